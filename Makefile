@@ -1,0 +1,46 @@
+# make study NAME=stopband   run studies/stopband.yaml, results in outputs/stopband
+# make report NAME=stopband  draw the report of outputs/stopband again
+# make test                  install and run the tests
+# make check                 ruff, mypy --strict
+# make bench                 measure speed, JSON in outputs/bench
+PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
+  $$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
+VENV := .venv
+BIN := $(VENV)/bin
+NAME ?= stopband
+ARGS ?=
+
+.PHONY: study report test check bench clean
+.DELETE_ON_ERROR:
+
+study: $(VENV)/.ready
+	$(BIN)/sweep run studies/$(NAME).yaml $(ARGS)
+
+report: $(VENV)/.ready
+	$(BIN)/sweep report outputs/$(NAME)
+
+test: $(VENV)/.ready-dev
+	$(BIN)/python -m pytest $(ARGS)
+
+check: $(VENV)/.ready-dev
+	$(BIN)/ruff check sweep tests
+	$(BIN)/ruff format --check sweep tests
+	$(BIN)/mypy
+
+bench: $(VENV)/.ready-dev
+	$(BIN)/python tests/bench.py $(ARGS)
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+
+$(VENV)/bin/python:
+	@test -n "$(PYTHON)" || { echo "make: Python 3.11 or newer with venv was not found; set PYTHON=/path/to/python3" >&2; exit 2; }
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.ready: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	@touch $@
+
+$(VENV)/.ready-dev: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	@touch $@ $(VENV)/.ready

@@ -1,0 +1,86 @@
+"""The command line. Heavy imports wait until a command needs them."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .errors import SweepError
+
+if TYPE_CHECKING:
+    from .report import Output
+
+app = typer.Typer(
+    name="sweep",
+    help="Sweeps and design-space exploration for color filter arrays that must tell traffic light colors apart.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+)
+
+StudyPath = Annotated[Path, typer.Argument(help="The study file, YAML.", show_default=False)]
+DataFolder = Annotated[
+    Path | None, typer.Option("--data", help="Folder that the study's files are looked for in first.")
+]
+
+
+@app.command()
+def run(
+    study: StudyPath,
+    data: DataFolder = None,
+    output: Annotated[Path, typer.Option(help="Folder for the results of all studies.")] = Path("outputs"),
+    jobs: Annotated[int | None, typer.Option(min=1, help="Worker processes.", show_default="all cores")] = None,
+) -> None:
+    """Run a study: results, figures and report go to OUTPUT/<study>."""
+    from .progress import ProgressDisplay
+    from .runner import run_study
+    from .study import folder_name, load_study
+
+    loaded = load_study(study, data)
+    folder = output / folder_name(loaded.name)
+    with ProgressDisplay() as display:
+        run_study(loaded, folder, jobs or os.cpu_count() or 1, display.update, sys.argv)
+    _finish(folder)
+
+
+@app.command()
+def report(folder: Annotated[Path, typer.Argument(help="Output folder of a study.", show_default=False)]) -> None:
+    """Draw figures and report of a finished run again."""
+    _finish(folder)
+
+
+@app.command()
+def check(study: StudyPath, data: DataFolder = None) -> None:
+    """Check a study file and count its designs, without running it."""
+    from .study import load_study
+
+    loaded = load_study(study, data)
+    typer.echo(f"{study}: {loaded.n_designs:,} designs on {', '.join(loaded.mosaics)}; nothing wrong found.")
+    for warning in loaded.warnings:
+        typer.echo(f"Note: {warning}.")
+
+
+def _finish(folder: Path) -> None:
+    from .report import make_report, read_output, summary_lines
+
+    found: Output = read_output(folder)
+    make_report(found)
+    for line in summary_lines(found):
+        typer.echo(line)
+
+
+def main() -> None:
+    """Run the command; a fault of the input is one line each on stderr and exit code 2."""
+    try:
+        app(standalone_mode=True)
+    except SweepError as error:
+        for fault in error.faults:
+            typer.echo(f"sweep: {fault}", err=True)
+        sys.exit(error.exit_code)
+    except KeyboardInterrupt:
+        typer.echo("sweep: interrupted; finished chunks are kept, the same command continues", err=True)
+        sys.exit(130)

@@ -1,0 +1,154 @@
+"""Pure evaluation: a block of designs in a scene -> response, color separation distances, sensitivities."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import FloatArray, IndexArray
+from .datasets.lights import Lights
+from .metrics import cfa_sensitivity, channel_sensitivity, class_pairs, csd_name, separations
+from .mosaics import Mosaic
+from .scenes import Scenario, WhitePatchExposure
+from .sensor import Pixel, digital_numbers, electron_rate, irradiance_factor, unquantized
+from .spectra import WavelengthGrid
+
+
+def quantities(lights: Lights) -> tuple[str, ...]:
+    """Names of the columns that `evaluate` gives."""
+    distances = (csd_name(pair) for pair in class_pairs(lights.classes))
+    return (*distances, "sensitivity", "cfa_sensitivity", "exposure_s")
+
+
+@dataclass(frozen=True)
+class Setup:
+    """All that a block of designs shares.
+
+    `qe`: ndarray[n_channels, n_wavelengths] of the mosaic's channels, electrons per photon; the rows of `modified`
+    (channel indices, one per curve that a family makes) hold the base curve. `clear_qe`: the reference of the CFA's
+    sensitivity, ndarray[n_wavelengths].
+    """
+
+    grid: WavelengthGrid
+    mosaic: Mosaic
+    qe: FloatArray
+    modified: tuple[int, ...]
+    clear_qe: FloatArray
+    lights: Lights
+    pixel: Pixel
+    scenario: Scenario
+
+    @property
+    def base_qe(self) -> FloatArray:
+        """Curves that the modified channels replace, ndarray[n_modified, n_wavelengths]."""
+        return self.qe[list(self.modified)]
+
+    @property
+    def members(self) -> dict[str, IndexArray]:
+        """Signal type -> indices of its signals."""
+        return self.lights.members
+
+
+def all_channels(setup: Setup, curves: FloatArray) -> FloatArray:
+    """Put the modified channels among the fixed ones.
+
+    `curves`: ndarray[n_designs, n_modified, n_wavelengths]. Returns ndarray[n_designs, n_channels, n_wavelengths].
+    """
+    qe = np.repeat(setup.qe[None], len(curves), axis=0)
+    qe[:, list(setup.modified)] = curves
+    return qe
+
+
+def _patches(setup: Setup) -> tuple[FloatArray, FloatArray]:
+    """Photon irradiance of the signals, ndarray[n_signals, n_wavelengths], and of the white patch, ndarray[1, ...]."""
+    scenario, grid = setup.scenario, setup.grid
+    factor = irradiance_factor(scenario.optics)
+    signals = setup.lights.photons * (scenario.photon_radiance * factor)
+    ratio = setup.lights.photon_ratio
+    if isinstance(scenario.exposure, WhitePatchExposure) and scenario.exposure.photon_ratio is not None:
+        ratio = scenario.exposure.photon_ratio
+    white = np.full((1, grid.size), scenario.photon_radiance * factor / (ratio * grid.size * grid.step_nm))
+    return signals, white
+
+
+def electrons(setup: Setup, qe: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Electrons before the full well, ndarray[n_designs, n_signals, n_channels], and exposure, s, ndarray[n_designs].
+
+    `qe`: ndarray[n_designs, n_channels, n_wavelengths]. A white-patch exposure is set per design, so that its
+    brightest channel on the white patch reaches the level of full scale.
+    """
+    signals, white = _patches(setup)
+    rate = electron_rate(signals, qe, setup.grid.step_nm, setup.pixel)
+    exposure = setup.scenario.exposure
+    if isinstance(exposure, WhitePatchExposure):
+        brightest = electron_rate(white, qe, setup.grid.step_nm, setup.pixel).max(axis=(1, 2))
+        full_e = exposure.level * setup.pixel.full_scale_dn / setup.pixel.dn_per_e
+        exposure_s = np.divide(full_e, brightest, out=np.full(len(qe), np.inf), where=brightest > 0)
+    else:
+        exposure_s = np.full(len(qe), exposure.exposure_s)
+    return rate * exposure_s[:, None, None], exposure_s
+
+
+def smooth_response(setup: Setup, curves: FloatArray) -> FloatArray:
+    """Unquantized, unclipped response, DN: ndarray[n_designs, n_signals, n_channels]; `curves` as in `all_channels`."""
+    return unquantized(electrons(setup, all_channels(setup, curves))[0], setup.pixel)
+
+
+def response_gradient(setup: Setup, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
+    """Exact derivative of `smooth_response` at one design, with that of the exposure.
+
+    `curves`: ndarray[n_modified, n_wavelengths]; `curves_gradient`: ndarray[n_parameters, n_modified, n_wavelengths].
+    Returns DN per unit of parameter, ndarray[n_parameters, n_signals, n_channels].
+    """
+    signals, white = _patches(setup)
+    step_nm, pixel = setup.grid.step_nm, setup.pixel
+    qe = all_channels(setup, curves[None])[0]
+    slope = np.zeros((len(curves_gradient), *qe.shape))
+    slope[:, list(setup.modified)] = curves_gradient
+    raw, exposure_s = electrons(setup, qe[None])
+    by_parameter = electron_rate(signals, slope, step_nm, pixel) * exposure_s[0]
+    if isinstance(setup.scenario.exposure, WhitePatchExposure):
+        white_rate = electron_rate(white, qe, step_nm, pixel)[0]
+        top = int(np.argmax(white_rate))
+        relative = electron_rate(white, slope, step_nm, pixel)[:, 0, top] / white_rate[top]
+        by_parameter = by_parameter - relative[:, None, None] * raw
+    return np.asarray(by_parameter * pixel.dn_per_e, dtype=float)
+
+
+def sensitivities(setup: Setup, curves: FloatArray) -> dict[str, FloatArray]:
+    """Sensitivity of the modified channels and of the CFA, each ndarray[n_designs]; `curves` as in `all_channels`.
+
+    `sensitivity`: total QE of the modified channels over that of the curves they replace, NaN without any; of several
+    modified channels it is that of their sum. `cfa_sensitivity`: see `metrics.cfa_sensitivity`.
+    """
+    channel = np.full(len(curves), np.nan)
+    if setup.modified:
+        channel = channel_sensitivity(curves.sum(axis=1), setup.base_qe.sum(axis=0))
+    qe = all_channels(setup, curves)
+    return {
+        "sensitivity": channel,
+        "cfa_sensitivity": cfa_sensitivity(qe, setup.mosaic.counts, setup.clear_qe),
+    }
+
+
+def sensitivities_gradient(setup: Setup, curves_gradient: FloatArray) -> dict[str, FloatArray]:
+    """Exact derivatives of `sensitivities`, ndarray[n_parameters]; shapes as in `response_gradient`."""
+    total = curves_gradient.sum(axis=-1)
+    counts = setup.mosaic.counts
+    return {
+        "sensitivity": total.sum(axis=1) / setup.base_qe.sum(),
+        "cfa_sensitivity": total @ counts[list(setup.modified)] / (counts.sum() * setup.clear_qe.sum()),
+    }
+
+
+def evaluate(setup: Setup, curves: FloatArray) -> dict[str, FloatArray]:
+    """Evaluate a block of designs as the camera reads them out (clipped and quantized).
+
+    `curves` as in `all_channels`. Returns columns, each ndarray[n_designs]: `csd_<a>_<b>` (DN) of every pair of
+    signal types, `sensitivity`, `cfa_sensitivity` and `exposure_s`.
+    """
+    raw, exposure_s = electrons(setup, all_channels(setup, curves))
+    distances = separations(digital_numbers(raw, setup.pixel), setup.members)
+    columns = {csd_name(pair): values for pair, values in distances.items()}
+    return columns | sensitivities(setup, curves) | {"exposure_s": exposure_s}

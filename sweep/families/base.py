@@ -1,0 +1,40 @@
+"""What every family of filters offers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+from ..arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a family: its name with its unit, the range it is defined on, and a default if it has one."""
+
+    name: str
+    low: float
+    high: float
+    default: float | None = None
+
+
+class Family(Protocol):
+    """A filter as a function of its parameters, for blocks of designs.
+
+    n_modified is the number of channels that the family replaces.
+    """
+
+    kind: ClassVar[str]
+    parameters: ClassVar[tuple[Parameter, ...]]
+
+    def curves(self, x: FloatArray) -> FloatArray:
+        """QE of the modified channels: [n_designs, n_parameters] -> [n_designs, n_modified, n_wavelengths]."""
+
+    def gradient(self, x: FloatArray) -> FloatArray:
+        """Derivative of `curves` at one design: [n_parameters] -> [n_parameters, n_modified, n_wavelengths]."""
+
+    def violation(self, x: FloatArray) -> FloatArray:
+        """Conditions of a well-formed design, met where <= 0: [n_designs, n_parameters] to [n_designs, n]."""
+
+    def violation_gradient(self, x: FloatArray) -> FloatArray:
+        """Derivative of `violation` at one design: [n_parameters] to [n, n_parameters]."""

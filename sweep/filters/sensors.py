@@ -1,0 +1,88 @@
+"""A sensor's QE curves on the wavelength grid."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..errors import DataError, Fault, nearest
+from ..mosaics import Mosaic
+from ..spectra import WavelengthGrid
+from ..surrogate import surrogate_parameters
+from .ar0820 import ar0820
+
+
+@dataclass(frozen=True)
+class SensorCurves:
+    """QE by curve name, each ndarray[n_wavelengths], electrons per photon (or on one common relative scale).
+
+    `clear` names the reference of the CFA's sensitivity. `variants` maps a CFA's name to channels of it that use a
+    curve of another name.
+    """
+
+    name: str
+    qe: Mapping[str, FloatArray]
+    clear: str
+    source: str
+    surrogate: bool = False
+    variants: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+
+    def curve_name(self, cfa: str, channel: str) -> str:
+        """The curve that `channel` of `cfa` uses."""
+        return self.variants.get(cfa, {}).get(channel, channel)
+
+    def curve(self, name: str) -> FloatArray:
+        """A curve by its name, ndarray[n_wavelengths]; raises DataError with the nearest name when there is none."""
+        if name not in self.qe:
+            known = list(self.qe)
+            raise DataError(
+                Fault(
+                    "the sensor has no such curve",
+                    value=name,
+                    allowed=", ".join(known),
+                    nearest=nearest(name, known),
+                )
+            )
+        return self.qe[name]
+
+    def mosaic_qe(self, mosaic: Mosaic, replaced: Mapping[str, str] | None = None) -> FloatArray:
+        """Curves of the mosaic's channels, ndarray[n_channels, n_wavelengths].
+
+        `replaced` names the curve of channels that the sensor does not have itself (a modified channel and its base).
+        """
+        names = {**{c: self.curve_name(mosaic.name, c) for c in mosaic.channels}, **(replaced or {})}
+        return np.stack([self.curve(names[channel]) for channel in mosaic.channels])
+
+
+def make_sensor(name: str, qe: Mapping[str, FloatArray], source: str, clear: str | None = None) -> SensorCurves:
+    """A sensor from curves on the grid; `clear` defaults to the curve with the largest total.
+
+    Raises DataError when a QE is above 1 or 0 everywhere, or `clear` is not a curve.
+    """
+    faults = []
+    for curve, values in qe.items():
+        top = float(values.max())
+        if not top <= 1 + 1e-9:
+            hint = "looks like percent: set `scale: 0.01`" if top <= 100 else "set `scale`"
+            faults.append(Fault(f"QE above 1 ({hint})", source, None, curve, round(top, 6), "0 to 1"))
+        if not top > 0:
+            faults.append(Fault("QE is 0 on the whole grid", source, None, curve))
+    if faults:
+        raise DataError(faults)
+    chosen = clear or max(qe, key=lambda curve: float(qe[curve].sum()))
+    sensor = SensorCurves(name, dict(qe), chosen, source)
+    sensor.curve(chosen)
+    return sensor
+
+
+def _ar0820(grid: WavelengthGrid) -> SensorCurves:
+    curves = ar0820(grid, surrogate_parameters())
+    red = {"R": "Rx"}
+    return SensorCurves("ar0820", curves.values, "C", curves.source, True, {"RCCC": red, "RCCB": red})
+
+
+BUILT_IN_SENSORS = {"ar0820": _ar0820}
+"""Sensors that a study can name; each is a function of the wavelength grid (inside 400-700 nm)."""

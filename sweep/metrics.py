@@ -1,0 +1,68 @@
+"""Color separation distance and sensitivity."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from .arrays import FloatArray, IndexArray
+
+Pair = tuple[str, str]
+_BLOCK_PAIRS = 262_144
+"""Pair distances held at once per channel: 2 MiB, so that a block stays in cache."""
+
+
+def class_pairs(classes: Sequence[str]) -> tuple[Pair, ...]:
+    """All unordered pairs of signal types, in the order of `classes`."""
+    return tuple(combinations(classes, 2))
+
+
+def csd_name(pair: Pair) -> str:
+    """Column name of a pair's color separation distance, in DN."""
+    return f"csd_{pair[0]}_{pair[1]}"
+
+
+def separation(response: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
+    """Color separation distance of two signal types for a block of designs.
+
+    `response`: ndarray[n_designs, n_signals, n_channels], DN. `first`, `second`: signal indices of the two types.
+    Returns ndarray[n_designs], DN: the smallest L2 distance between a point of one and a point of the other (the
+    paper's CSD). Differences are taken before squares, so nearly coincident points at large offsets lose no digits.
+    """
+    n_designs, _, n_channels = response.shape
+    found = np.empty(n_designs)
+    step = max(1, _BLOCK_PAIRS // max(1, len(first) * len(second)))
+    for start in range(0, n_designs, step):
+        block = response[start : start + step]
+        squared = np.zeros((len(block), len(first), len(second)))
+        for channel in range(n_channels):
+            values = block[:, :, channel]
+            difference = values[:, first, None] - values[:, None, second]
+            squared += difference * difference
+        found[start : start + step] = np.sqrt(squared.min(axis=(1, 2)))
+    return found
+
+
+def separations(response: FloatArray, members: Mapping[str, IndexArray]) -> dict[Pair, FloatArray]:
+    """CSD of every pair of signal types; `members` maps a type to its signal indices. Shapes as in `separation`."""
+    return {(a, b): separation(response, members[a], members[b]) for a, b in class_pairs(list(members))}
+
+
+def channel_sensitivity(qe: FloatArray, reference_qe: FloatArray) -> FloatArray:
+    """Total QE over the grid divided by that of the reference: ndarray[..., n_wavelengths] -> ndarray[...].
+
+    The paper's sensitivity of a modified channel N, with the channel that it replaces (Y) as the reference.
+    """
+    return np.asarray(qe.sum(axis=-1) / reference_qe.sum(), dtype=float)
+
+
+def cfa_sensitivity(qe: FloatArray, counts: IndexArray, clear_qe: FloatArray) -> FloatArray:
+    """Total QE, averaged over the pixels of the tile, divided by that of the clear pixel.
+
+    `qe`: ndarray[..., n_channels, n_wavelengths]; `counts`: pixels per tile of each channel. 1 means a sensor without
+    color filters. Returns ndarray[...].
+    """
+    mean = (qe.sum(axis=-1) * counts).sum(axis=-1) / counts.sum()
+    return np.asarray(mean / clear_qe.sum(), dtype=float)

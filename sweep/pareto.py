@@ -1,0 +1,24 @@
+"""Non-dominated sets."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .arrays import BoolArray, FloatArray
+
+
+def non_dominated(values: FloatArray, eligible: BoolArray | None = None) -> BoolArray:
+    """Return which rows of ndarray[n, n_objectives], all maximized, no other eligible row dominates: bool ndarray[n].
+
+    Rows with a NaN and rows that are not `eligible` are never in the set and dominate nothing. Rows that are equal
+    in every objective are all kept.
+    """
+    import moocore  # noqa: PLC0415  (pulls in pandas: kept off the start-up path)
+
+    keep = np.isfinite(values).all(axis=1)
+    if eligible is not None:
+        keep &= eligible
+    front = np.zeros(len(values), dtype=bool)
+    if keep.any():
+        front[keep] = moocore.is_nondominated(values[keep], maximise=True, keep_weakly=True)
+    return front

@@ -1,0 +1,150 @@
+"""What the report says and shows, as plain values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from ..figures import CurvesFigure, ParetoFigure, Points
+from .outputs import Output
+
+QUANTITIES = ("sensitivity", "cfa_sensitivity")
+
+
+def readable(column: str) -> str:
+    """A column's name as people write it."""
+    if column.startswith("csd_"):
+        return column.removeprefix("csd_").replace("_", "/") + " CSD"
+    return {"sensitivity": "sensitivity", "cfa_sensitivity": "CFA sensitivity"}.get(column, column)
+
+
+def pareto_figure(output: Output, scenario: str, cfa: str | None) -> ParetoFigure:
+    """CSD against sensitivity in a scenario, for the designs of one CFA (None: named designs of any CFA)."""
+    table = output.table[(output.table["scenario"] == scenario) & (output.table["status"] == "ok")]
+    designs = table if cfa is None else table[table["cfa"] == cfa]
+    swept = designs[designs["kind"] == "sweep"]
+    named = designs[designs["kind"] == "design"]
+    found = designs[designs["kind"] == "search"]
+    references = table[table["kind"] == "reference"]
+    front = swept["pareto"] & swept["feasible"]
+    groups = {
+        "infeasible": _points(output, swept[~swept["feasible"]]),
+        "feasible": _points(output, swept[swept["feasible"] & ~front]),
+        "front": _points(output, swept[front]),
+        "named": _points(output, named, list(named["name"])),
+        "best": _points(output, found, [f"{v:.0f} DN" for v in found[output.objective]]),
+    }
+    bound = output.constraints.get("sensitivity")
+    limit = None if bound is None else bound.min
+    where = "" if cfa is None else f", {cfa}"
+    return ParetoFigure(
+        title=f"{output.study['study']}{where}: what separation costs in sensitivity",
+        x_label="sensitivity of the modified channel (1 = the channel it replaces)",
+        y_label=f"{readable(output.objective)} / DN",
+        groups=groups,
+        levels=dict(zip(references["cfa"], references[output.objective], strict=True)),
+        bound=limit,
+        bound_text="" if limit is None else f"sensitivity >= {limit:g}",
+    )
+
+
+def _points(output: Output, rows: pd.DataFrame, labels: Sequence[str] = ()) -> Points:
+    x = rows["sensitivity"].to_numpy(dtype=float)
+    return Points(x, rows[output.objective].to_numpy(dtype=float), tuple(map(str, labels)))
+
+
+def sensor_figure(output: Output) -> CurvesFigure:
+    """The sensor's QE curves."""
+    curves = _curves(output, "qe:")
+    return CurvesFigure(f"Quantum efficiency, {_origin(output, 'sensor')}", "QE", _wave(output), curves)
+
+
+def lights_figure(output: Output) -> CurvesFigure:
+    """The mean photon spectrum of each signal type."""
+    types: dict[str, list[str]] = {}
+    for column in output.curves.columns:
+        if column.startswith("light:"):
+            types.setdefault(column.split(":")[1], []).append(column)
+    means = {f"{t} ({len(c)})": output.curves[c].to_numpy().mean(axis=1) for t, c in types.items()}
+    title = f"Signals, mean of each type, {_origin(output, 'lights')}"
+    return CurvesFigure(title, "photons per nm, each signal 1 photon", _wave(output), means)
+
+
+def filters_figure(output: Output, cfa: str) -> CurvesFigure:
+    """Modified channels of the named designs and the best ones of a CFA, beside the curves that they start from."""
+    rows = drawn(output)
+    rows = rows[rows["cfa"] == cfa]
+    ends = {e for m in modifications(output) if m["cfa"] == cfa for e in (m["base"], m["to"]) if isinstance(e, str)}
+    curves = {name: values for name, values in _curves(output, "qe:").items() if name in ends}
+    for row in rows.to_dict("records"):
+        curves[label(row)] = output.curves[f"design:{row['design_id']}:0"].to_numpy()
+    return CurvesFigure(f"{cfa}: modified channel", "QE", _wave(output), curves, tuple(ends))
+
+
+def modifications(output: Output) -> list[dict[str, object]]:
+    """The study's named designs and sweeps."""
+    return [*output.study.get("designs", {}).values(), *output.study.get("sweeps", {}).values()]
+
+
+def drawn(output: Output) -> pd.DataFrame:
+    """Rows whose filter's curve was kept: named designs, the search's answer, the best of each sweep."""
+    ids = [int(c.split(":")[1]) for c in output.curves.columns if c.startswith("design:")]
+    return output.table[output.table["design_id"].isin(ids)]
+
+
+def label(row: dict[object, object]) -> str:
+    """A design's name, or its number."""
+    return str(row["name"]) if isinstance(row["name"], str) else f"design {row['design_id']}"
+
+
+def comparison_table(output: Output) -> pd.DataFrame:
+    """Plain CFAs, named designs and the search's answer with all CSDs and sensitivities."""
+    rows = output.kind("reference", "design", "search")
+    return _shown(rows, ["name", "scenario", *output.distances, *QUANTITIES, "feasible"])
+
+
+def best_table(output: Output, most: int = 12) -> pd.DataFrame:
+    """The best feasible designs with their parameters."""
+    ranked = output.best.head(most)
+    columns = ["design_id", "kind", "cfa", "scenario", *output.parameters, *output.distances, *QUANTITIES, "pareto"]
+    return _shown(ranked, columns)
+
+
+def geometry_table(output: Output) -> pd.DataFrame:
+    """Object resolution of each distance scenario (the paper's Table 1)."""
+    rows = [
+        {
+            "scenario": name,
+            "distance_m": g.distance_m,
+            "fov_deg": g.fov_deg,
+            "object_resolution_px": round(g.object_resolution_px, 1),
+        }
+        for name, g in output.geometry.items()
+    ]
+    return pd.DataFrame(rows)
+
+
+def _shown(rows: pd.DataFrame, columns: list[str]) -> pd.DataFrame:
+    shown = rows[columns].copy()
+    for column in columns:
+        if column.startswith("csd_"):
+            shown[column] = shown[column].round(1)
+        elif shown[column].dtype == np.float64:
+            shown[column] = shown[column].round(4)
+    several = rows["scenario"].nunique() > 1
+    return shown if several else shown.drop(columns="scenario")
+
+
+def _curves(output: Output, prefix: str) -> dict[str, np.ndarray]:
+    return {c.removeprefix(prefix): output.curves[c].to_numpy() for c in output.curves.columns if c.startswith(prefix)}
+
+
+def _wave(output: Output) -> np.ndarray:
+    return output.curves["wavelength_nm"].to_numpy()
+
+
+def _origin(output: Output, what: str) -> str:
+    origin = output.provenance[what]
+    return f"{origin['name']}{' (surrogate: modeled, not measured)' if origin['surrogate'] else ''}"

@@ -1,0 +1,86 @@
+"""A finished output folder, read back."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from ..constraints import Bound
+from ..errors import Fault, OutputError
+from ..scenes import Geometry
+from ..store import CURVES, PROVENANCE, RESOLVED, RESULTS, read_table
+
+
+@dataclass(frozen=True)
+class Output:
+    """What a run left in its folder."""
+
+    folder: Path
+    study: Mapping[str, Any]
+    provenance: Mapping[str, Any]
+    table: pd.DataFrame
+    curves: pd.DataFrame
+
+    @property
+    def objective(self) -> str:
+        """Column of the CSD that the study maximizes."""
+        return str(self.study["objective"])
+
+    @property
+    def distances(self) -> list[str]:
+        """Columns of all CSDs."""
+        return [name for name in self.table.columns if name.startswith("csd_")]
+
+    @property
+    def parameters(self) -> list[str]:
+        """Columns of the families' parameters."""
+        columns = list(self.table.columns)
+        return columns[columns.index("scenario") + 1 : columns.index(self.distances[0])]
+
+    @property
+    def constraints(self) -> dict[str, Bound]:
+        """The study's constraints."""
+        return {name: Bound(**bound) for name, bound in self.study.get("constraints", {}).items()}
+
+    @property
+    def geometry(self) -> dict[str, Geometry]:
+        """The study's distance scenarios."""
+        return {name: Geometry(**entry) for name, entry in self.study.get("geometry", {}).items()}
+
+    @cached_property
+    def best(self) -> pd.DataFrame:
+        """Feasible swept and searched designs, best first."""
+        candidates = self.table[self.table["feasible"] & self.table["kind"].isin(["sweep", "search"])]
+        return candidates.sort_values([self.objective, "sensitivity", "design_id"], ascending=[False, False, True])
+
+    def kind(self, *kinds: str) -> pd.DataFrame:
+        """Rows of some kinds."""
+        return self.table[self.table["kind"].isin(kinds)]
+
+
+def read_output(folder: Path) -> Output:
+    """Read a finished run; raises OutputError when a file is missing or damaged."""
+    if not (folder / RESULTS).is_file():
+        raise OutputError(Fault("no finished run here", str(folder), allowed=f"a folder with {RESULTS}"))
+    study = _mapping(folder / RESOLVED, lambda text: YAML(typ="safe").load(text))
+    provenance = _mapping(folder / PROVENANCE, json.loads)
+    table = read_table(folder / RESULTS).to_pandas()
+    return Output(folder, study, provenance, table, read_table(folder / CURVES).to_pandas())
+
+
+def _mapping(path: Path, parse: Any) -> dict[str, Any]:
+    try:
+        found = parse(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, YAMLError) as error:
+        raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
+    if not isinstance(found, dict):
+        raise OutputError(Fault("not a mapping", str(path)))
+    return found

@@ -1,0 +1,69 @@
+"""A run in about ten lines for a person."""
+
+from __future__ import annotations
+
+from .content import geometry_table, readable
+from .outputs import Output
+
+
+def answer_sentences(output: Output) -> list[str]:
+    """The question's answer: the best feasible design beside the CFAs that a study compares with."""
+    name = readable(output.objective)
+    limits = " and ".join(f"{readable(q)} {bound}" for q, bound in output.constraints.items())
+    under = f" with {limits}" if limits else ""
+    beside = ", ".join(
+        f"{row['name']} {row[output.objective]:.0f} DN" for row in output.kind("reference").to_dict("records")
+    )
+    if not len(output.kind("sweep", "search")):
+        return [f"{name} of the named CFAs: {beside}."]
+    if output.best.empty:
+        return [f"No design is feasible{under}.", f"Plain CFAs: {beside}."]
+    best = output.best.iloc[0]
+    return [
+        f"The best {name}{under} is {best[output.objective]:.1f} DN (sensitivity {best['sensitivity']:.4f}, "
+        f"{best['cfa']}, found by the {best['kind']}).",
+        f"Plain CFAs: {beside}.",
+    ]
+
+
+def summary_lines(output: Output) -> list[str]:
+    """What a run found and where its files are."""
+    lines = answer_sentences(output)
+    if not output.best.empty:
+        best = output.best.iloc[0]
+        found = ", ".join(f"{name} {best[name]:.2f}" for name in output.parameters if best[name] == best[name])
+        lines.append(f"Parameters: {found}.")
+    named = output.kind("design")
+    if len(named):
+        each = ", ".join(
+            f"{row['name']} {row[output.objective]:.0f} DN at {row['sensitivity']:.3f}"
+            for row in named.to_dict("records")
+        )
+        lines.append(f"Named designs: {each}.")
+    for row in geometry_table(output).to_dict("records"):
+        lines.append(
+            f"{row['scenario']}: {row['distance_m']:g} m, {row['fov_deg']:g} deg: "
+            f"{row['object_resolution_px']:g} px across the light."
+        )
+    lines.append(_counts(output))
+    search = output.provenance.get("search")
+    if search:
+        best_csd = search["best_smooth_csd_dn"]
+        found = "no feasible design" if best_csd is None else f"{best_csd:.2f} DN before quantization"
+        lines.append(
+            f"Search: {search['algorithm']}, {search['starts']} starts, {search['evaluations']} evaluations: {found}."
+        )
+    lines += [f"Note: {warning}." for warning in output.provenance["warnings"]]
+    if output.provenance["sensor"]["surrogate"] or output.provenance["lights"]["surrogate"]:
+        lines.append("Note: built-in curves are surrogates, modeled from stated parameters, not measured.")
+    lines.append(f"Took {output.provenance['duration_s']:.1f} s with {output.provenance['workers']} workers.")
+    lines.append(f"Files: {output.folder}/: results.parquet, report.html, pareto.png, provenance.json.")
+    return lines
+
+
+def _counts(output: Output) -> str:
+    table = output.table
+    failed = int((table["status"] != "ok").sum())
+    feasible, front = int(table["feasible"].sum()), int(table["pareto"].sum())
+    text = f"{len(table):,} designs, {feasible:,} feasible, {front:,} on the Pareto front"
+    return f"{text}, {failed:,} failed." if failed else f"{text}."

@@ -1,0 +1,233 @@
+"""Constrained search for the best design; the only file that knows nlopt.
+
+Maximize the smallest distance of a pair of signal types. The minimum over pairs is not smooth, so it is written in the
+epigraph form: maximize t subject to (distance of every pair)^2 >= t^2, with exact gradients. The search sees the smooth
+response (unquantized, unclipped); every evaluation is logged, and the answer is the best feasible one of the log.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import nlopt
+import numpy as np
+from scipy.stats import qmc
+
+from .arrays import FloatArray, IndexArray
+from .constraints import FEASIBLE, Bound
+from .evaluate import Setup, response_gradient, sensitivities, sensitivities_gradient, smooth_response
+from .families import Family
+from .metrics import Pair, separation
+
+ALGORITHMS = {"SLSQP": nlopt.LD_SLSQP, "MMA": nlopt.LD_MMA}
+"""Gradient algorithms of nlopt that take inequality constraints."""
+_ENDINGS = {
+    nlopt.SUCCESS: "success",
+    nlopt.FTOL_REACHED: "ftol_reached",
+    nlopt.XTOL_REACHED: "xtol_reached",
+    nlopt.MAXEVAL_REACHED: "maxeval_reached",
+}
+_BACK_OFF = 1e-8
+"""The search keeps this far (relative) inside each bound, so that rounding does not leave its answer outside."""
+_CONDITION_NM = 100.0
+"""Scale of the families' own conditions, so that they weigh like the others."""
+_X_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Maximize the CSD of `pair` over the box `low`..`high` (ndarray[n_parameters]) under `constraints`.
+
+    `constraints` maps `sensitivity` and `cfa_sensitivity` to a range and `csd_<a>_<b>` to a minimum; `pairs` names the
+    signal types of each constrained CSD.
+    """
+
+    setup: Setup
+    family: Family
+    low: FloatArray
+    high: FloatArray
+    pair: Pair
+    constraints: Mapping[str, Bound]
+    pairs: Mapping[str, Pair] = field(default_factory=dict)
+
+    @property
+    def free(self) -> IndexArray:
+        """Indices of the parameters that are not fixed."""
+        return np.flatnonzero(self.high > self.low)
+
+    def from_unit(self, u: FloatArray) -> FloatArray:
+        """Parameters from the free ones in units of the box: ndarray[..., n_free] -> ndarray[..., n_parameters]."""
+        x = np.broadcast_to(self.low, (*u.shape[:-1], self.low.size)).copy()
+        # Clipped: low + 1 * (high - low) may round to above high.
+        x[..., self.free] = np.clip(
+            x[..., self.free] + u * (self.high - self.low)[self.free],
+            self.low[self.free],
+            self.high[self.free],
+        )
+        return x
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """One logged evaluation: parameters, smooth CSD (DN), sensitivities, largest violation (0 is feasible)."""
+
+    x: FloatArray
+    csd: float
+    sensitivity: float
+    cfa_sensitivity: float
+    violation: float
+
+
+@dataclass
+class SearchRun:
+    """What one start brought: the log of all evaluations, and how nlopt ended."""
+
+    start: int
+    status: str = "not started"
+    log: list[Evaluation] = field(default_factory=list)
+
+
+def best_feasible(log: Sequence[Evaluation]) -> Evaluation | None:
+    """The feasible evaluation with the largest CSD, the earlier one on a tie; None when none is feasible."""
+    feasible = [e for e in log if e.violation <= FEASIBLE and np.isfinite(e.csd)]
+    return max(feasible, key=lambda e: e.csd, default=None)
+
+
+def starting_points(n_free: int, starts: int, seed: int) -> FloatArray:
+    """Scrambled Sobol points in the unit cube, ndarray[starts, n_free]; the same for the same seed."""
+    sobol = qmc.Sobol(d=max(1, n_free), scramble=True, rng=np.random.default_rng(seed))
+    return np.asarray(sobol.random_base2(int(np.ceil(np.log2(max(2, starts)))))[:starts, :n_free], dtype=float)
+
+
+@dataclass(frozen=True)
+class _Point:
+    """Everything that one simulation gives: distances and conditions (<= 0 is met) with their derivatives by u."""
+
+    evaluation: Evaluation
+    squared: FloatArray
+    squared_by_u: FloatArray
+    conditions: FloatArray
+    conditions_by_u: FloatArray
+
+
+class _Model:
+    """The smooth problem in units of the box; one simulation per point, shared by objective and constraints."""
+
+    def __init__(self, problem: Problem, run: SearchRun) -> None:
+        self._problem = problem
+        self._run = run
+        self._span = (problem.high - problem.low)[problem.free]
+        self._seen: dict[bytes, _Point] = {}
+
+    def at(self, u: FloatArray) -> _Point:
+        """The simulation at `u`, made and logged once."""
+        key = u.tobytes()
+        if key not in self._seen:
+            # Only the newest is asked for again: the constraints follow the objective at the same point.
+            self._seen = {key: self._simulate(u)}
+            self._run.log.append(self._seen[key].evaluation)
+        return self._seen[key]
+
+    def _simulate(self, u: FloatArray) -> _Point:
+        problem, free = self._problem, self._problem.free
+        x = problem.from_unit(u)
+        curves = problem.family.curves(x[None])
+        slopes = problem.family.gradient(x)[free] * self._span[:, None, None]
+        response = smooth_response(problem.setup, curves)
+        by_u = response_gradient(problem.setup, curves[0], slopes)
+        squared, squared_by_u = self._pair_distances(problem.pair, response[0], by_u)
+
+        amounts = {name: float(v[0]) for name, v in sensitivities(problem.setup, curves).items()}
+        amounts_by_u = sensitivities_gradient(problem.setup, slopes)
+        own = problem.family.violation(x[None])[0]
+        own_by_u = problem.family.violation_gradient(x)[:, free] * self._span
+        conditions, conditions_by_u = [own / _CONDITION_NM], [own_by_u / _CONDITION_NM]
+        worst = float(max(own.max(initial=0.0), 0.0))
+        for name, bound in problem.constraints.items():
+            scale = bound.scale
+            if name in problem.pairs:
+                value = np.array([float(separation(response, *self._sides(problem.pairs[name]))[0])])
+                d2, d2_by_u = self._pair_distances(problem.pairs[name], response[0], by_u)
+                level = (bound.min or 0.0) * (1 + _BACK_OFF)
+                conditions.append((level**2 - d2) / scale**2)
+                conditions_by_u.append(-d2_by_u / scale**2)
+            else:
+                value = np.array([amounts[name]])
+                for end, sign in ((bound.min, -1.0), (bound.max, 1.0)):
+                    if end is not None:
+                        conditions.append(sign * (value - end) / scale + _BACK_OFF)
+                        conditions_by_u.append(sign * amounts_by_u[name][None] / scale)
+            worst = max(worst, float(bound.violation(value)[0]))
+        csd = float(separation(response, *self._sides(problem.pair))[0])
+        evaluation = Evaluation(x, csd, amounts["sensitivity"], amounts["cfa_sensitivity"], worst)
+        return _Point(evaluation, squared, squared_by_u, np.concatenate(conditions), np.concatenate(conditions_by_u))
+
+    def _sides(self, pair: Pair) -> tuple[IndexArray, IndexArray]:
+        members = self._problem.setup.members
+        return members[pair[0]], members[pair[1]]
+
+    def _pair_distances(self, pair: Pair, response: FloatArray, by_u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Squared distances of all pairs, ndarray[n_pairs], and their derivatives, ndarray[n_pairs, n_free]."""
+        first, second = self._sides(pair)
+        apart = (response[first, None] - response[None, second]).reshape(-1, response.shape[-1])
+        apart_by_u = (by_u[:, first, None] - by_u[:, None, second]).reshape(len(by_u), *apart.shape)
+        return (apart**2).sum(axis=1), 2 * (apart_by_u * apart).sum(axis=2).T
+
+
+def search_from(problem: Problem, start: int, u0: FloatArray, algorithm: str, max_evaluations: int) -> SearchRun:
+    """Search from one starting point with at most `max_evaluations` simulations.
+
+    `u0`: ndarray[n_free], in units of the box. The status is nlopt's word for how it ended; an early end is no
+    error, since the log keeps every evaluation.
+    """
+    run = SearchRun(start)
+    model = _Model(problem, run)
+    first = model.at(u0)
+    scale = max(first.evaluation.csd, 1.0)
+    n_rows = first.squared.size + first.conditions.size
+    opt = nlopt.opt(ALGORITHMS[algorithm], u0.size + 1)
+
+    def look(z: FloatArray) -> _Point:
+        # z is nlopt's own buffer: copied before it is kept.
+        u = np.clip(np.array(z[:-1], dtype=float), 0.0, 1.0)
+        if len(run.log) >= max_evaluations:
+            opt.force_stop()
+        return model.at(u)
+
+    def objective(z: FloatArray, gradient: FloatArray) -> float:
+        look(z)
+        if gradient.size:
+            gradient[:] = 0.0
+            gradient[-1] = 1.0
+        return float(z[-1])
+
+    def constraints(result: FloatArray, z: FloatArray, gradient: FloatArray) -> None:
+        point = look(z)
+        n_pairs = point.squared.size
+        result[:n_pairs] = z[-1] ** 2 - point.squared / scale**2
+        result[n_pairs:] = point.conditions
+        if gradient.size:
+            gradient[:n_pairs, :-1] = -point.squared_by_u / scale**2
+            gradient[:n_pairs, -1] = 2 * z[-1]
+            gradient[n_pairs:, :-1] = point.conditions_by_u
+            gradient[n_pairs:, -1] = 0.0
+
+    limit = 2 * problem.setup.pixel.full_scale_dn * np.sqrt(len(problem.setup.mosaic.channels)) / scale
+    opt.set_lower_bounds([0.0] * (u0.size + 1))
+    opt.set_upper_bounds([1.0] * u0.size + [max(limit, 1.0)])
+    opt.set_max_objective(objective)
+    opt.add_inequality_mconstraint(constraints, np.zeros(n_rows))
+    opt.set_maxeval(max_evaluations)
+    opt.set_xtol_rel(_X_TOLERANCE)
+    opt.set_xtol_abs(_X_TOLERANCE)
+    try:
+        opt.optimize([*u0, min(first.evaluation.csd / scale, 1.0)])
+        run.status = _ENDINGS.get(opt.last_optimize_result(), "unknown")
+    except nlopt.RoundoffLimited:
+        run.status = "roundoff_limited"
+    except nlopt.ForcedStop:
+        run.status = "maxeval_reached"
+    except RuntimeError as failure:
+        run.status = f"failed: {failure}"
+    return run

@@ -1,0 +1,79 @@
+"""Forward model of a uniform light: photon radiance -> irradiance -> electrons -> full well -> digital numbers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydantic import Field
+
+from .arrays import FloatArray
+from .schema import NonNegative, Positive, Section
+
+
+class Optics(Section):
+    """A diffraction-limited lens. `transmission` holds for all wavelengths."""
+
+    f_number: float = Field(default=4.0, gt=0)
+    transmission: float = Field(default=1.0, gt=0, le=1)
+
+
+class Pixel(Section):
+    """A pixel and its 12-bit readout.
+
+    Defaults: 2.1 um pitch (AR0820), a full well of 10,000 e that maps to full scale. `gain_dn_per_e` null means
+    full scale / full well. `offset_dn` is the pedestal.
+    """
+
+    pitch_um: Positive = 2.1
+    fill_factor: float = Field(default=1.0, gt=0, le=1)
+    well_e: Positive = 10_000.0
+    bits: int = Field(default=12, ge=1, le=24)
+    gain_dn_per_e: float | None = Field(default=None, gt=0)
+    offset_dn: NonNegative = 0.0
+
+    @property
+    def full_scale_dn(self) -> int:
+        """The largest digital number, 4095 for 12 bits."""
+        return int(2**self.bits - 1)
+
+    @property
+    def area_m2(self) -> float:
+        """Light-sensitive area."""
+        return (self.pitch_um * 1e-6) ** 2 * self.fill_factor
+
+    @property
+    def dn_per_e(self) -> float:
+        """System gain, DN per electron."""
+        return self.full_scale_dn / self.well_e if self.gain_dn_per_e is None else self.gain_dn_per_e
+
+
+def irradiance_factor(optics: Optics, magnification: float = 0.0, field_angle_rad: float = 0.0) -> float:
+    """Irradiance at the sensor over radiance of the scene, sr: pi T cos^4 / (1 + 4 N^2 (1 + |m|)^2).
+
+    A distant scene has magnification 0. The form is ISETCam's; it is the camera equation without the small-aperture
+    approximation.
+    """
+    cone = 1 + 4 * optics.f_number**2 * (1 + abs(magnification)) ** 2
+    return math.pi * optics.transmission * math.cos(field_angle_rad) ** 4 / cone
+
+
+def electron_rate(photon_irradiance: FloatArray, qe: FloatArray, step_nm: float, pixel: Pixel) -> FloatArray:
+    """Electrons per second of each light in each channel: A FF sum(E QE) dl.
+
+    `photon_irradiance`: ndarray[n_signals, n_wavelengths], photons/s/m^2/nm. `qe`: ndarray[..., n_channels,
+    n_wavelengths], electrons per photon. Returns ndarray[..., n_signals, n_channels].
+    """
+    rate = qe @ (photon_irradiance.T * (step_nm * pixel.area_m2))
+    return np.asarray(np.swapaxes(rate, -1, -2), dtype=float)
+
+
+def digital_numbers(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+    """Digital numbers as read out: full well, gain and pedestal, rounded half up, clipped to the ADC's range."""
+    held = np.minimum(electrons, pixel.well_e)
+    return np.clip(np.floor(unquantized(held, pixel) + 0.5), 0, pixel.full_scale_dn)
+
+
+def unquantized(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+    """The smooth response, DN: gain and pedestal without clipping or rounding."""
+    return electrons * pixel.dn_per_e + pixel.offset_dn

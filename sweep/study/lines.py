@@ -1,0 +1,196 @@
+"""YAML with line numbers, and pydantic's errors as one-line faults that name their line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from io import StringIO
+from pathlib import Path
+from types import UnionType
+from typing import Any, Union, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.constructor import DuplicateKeyError
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+from ..errors import Fault, StudyError, nearest
+
+Key = str | int
+
+
+class Document:
+    """A parsed YAML file that knows the line of each of its keys."""
+
+    def __init__(self, path: Path) -> None:
+        self.file = str(path)
+        try:
+            text = path.read_text(encoding="utf-8-sig")
+        except OSError as error:
+            raise StudyError(Fault(f"cannot be read: {error.strerror or error}", self.file)) from None
+        except UnicodeDecodeError as error:
+            raise StudyError(Fault(f"not UTF-8 text ({error.reason} at byte {error.start})", self.file)) from None
+        try:
+            self._root = YAML(typ="rt").load(StringIO(text))
+        except DuplicateKeyError as error:
+            line = None if error.problem_mark is None else error.problem_mark.line + 1
+            problem = str(error.problem or "a key occurs twice").splitlines()[0]
+            raise StudyError(Fault(problem, self.file, line)) from None
+        except MarkedYAMLError as error:
+            line = None if error.problem_mark is None else error.problem_mark.line + 1
+            raise StudyError(Fault(f"not valid YAML: {error.problem or error.context}", self.file, line)) from None
+        except YAMLError as error:
+            raise StudyError(Fault(f"not valid YAML: {error}", self.file)) from None
+        if not isinstance(self._root, CommentedMap):
+            raise StudyError(
+                Fault(
+                    "a study file is a mapping of keys",
+                    self.file,
+                    1,
+                    allowed="`study: name` and further keys",
+                )
+            )
+        self.data = _plain(self._root)
+
+    def line(self, path: Sequence[Key]) -> int:
+        """Line of the deepest key of `path` that the file has, from 1."""
+        node: Any = self._root
+        line = 1
+        for key in path:
+            if not _has(node, key):
+                break
+            if isinstance(node, CommentedMap) and key in node.lc.data:
+                line = node.lc.key(key)[0] + 1
+            elif isinstance(node, CommentedSeq):
+                line = node.lc.item(key)[0] + 1
+            node = _child(node, key)
+        return int(line)
+
+    def fault(
+        self,
+        path: Sequence[Key],
+        problem: str,
+        value: object = None,
+        allowed: str | None = None,
+        near: str | None = None,
+    ) -> Fault:
+        """A fault at `path` of this file."""
+        return Fault(problem, self.file, self.line(path), dotted(path), value, allowed, near)
+
+    def faults(self, error: ValidationError, model: type[BaseModel]) -> list[Fault]:
+        """Pydantic's errors as faults of this file."""
+        found: dict[tuple[object, ...], Fault] = {}
+        for item in error.errors():
+            path = self._known_path(item["loc"])
+            fault = self._fault(path, item, model)
+            found.setdefault((path, fault.problem), fault)
+        return list(found.values())
+
+    def _known_path(self, loc: Sequence[Key]) -> tuple[Key, ...]:
+        """`loc` without the tags that pydantic adds for unions, and with a missing last key kept."""
+        node: Any = self.data
+        path: list[Key] = []
+        for position, key in enumerate(loc):
+            if _has(node, key):
+                path.append(key)
+                node = _child(node, key)
+            elif isinstance(node, dict) and position == len(loc) - 1:
+                path.append(key)
+        return tuple(path)
+
+    def _fault(self, path: tuple[Key, ...], item: Any, model: type[BaseModel]) -> Fault:
+        kind, value = item["type"], item["input"]
+        if kind == "extra_forbidden":
+            known = field_names(model, path[:-1], self.data)
+            return self.fault(path, "unknown key", None, ", ".join(known), nearest(path[-1], known))
+        if kind == "missing":
+            return self.fault(path, "missing")
+        if kind == "value_error":
+            return self.fault(path, str(item["ctx"]["error"]))
+        if kind in ("union_tag_invalid", "union_tag_not_found"):
+            tag = str(item["ctx"]["discriminator"]).strip("'")
+            expected = item["ctx"].get("expected_tags", "")
+            got = value.get(tag) if isinstance(value, dict) else value
+            return self.fault((*path, tag), "unknown kind", got, expected)
+        shown = value if not isinstance(value, dict | list) else type(value).__name__
+        return self.fault(path, "not allowed", shown, _readable(item["msg"]))
+
+
+def field_names(model: type[BaseModel], path: Sequence[Key], data: Any) -> list[str]:
+    """Keys that the section at `path` of a model knows; the section is found by its declared types."""
+    annotation: Any = model
+    node = data
+    for key in path:
+        node = _child(node, key)
+        choices = [option for option in _options(annotation) if _accepts(option, key)]
+        annotation = _inner(choices[0], key) if choices else None
+    for option in _options(annotation):
+        if isinstance(option, type) and issubclass(option, BaseModel):
+            kinds = option.model_fields.get("kind")
+            if kinds is None or not isinstance(node, dict) or node.get("kind", kinds.default) == kinds.default:
+                return [name for name, info in option.model_fields.items() if info.exclude is not True]
+    return []
+
+
+def _has(node: Any, key: Key) -> bool:
+    return (isinstance(node, dict) and key in node) or (
+        isinstance(node, list) and isinstance(key, int) and key < len(node)
+    )
+
+
+def _child(node: Any, key: Key) -> Any:
+    return node[key] if _has(node, key) else None
+
+
+def _options(annotation: Any) -> list[Any]:
+    origin = get_origin(annotation)
+    if origin in (Union, UnionType):
+        return [inner for option in get_args(annotation) for inner in _options(option)]
+    return [] if annotation in (None, type(None)) else [annotation]
+
+
+def _accepts(annotation: Any, key: Key) -> bool:
+    if get_origin(annotation) is dict:
+        return True
+    if get_origin(annotation) is list:
+        return isinstance(key, int)
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel) and key in annotation.model_fields
+
+
+def _inner(annotation: Any, key: Key) -> Any:
+    if get_origin(annotation) is dict:
+        return _unannotated(get_args(annotation)[1])
+    if get_origin(annotation) is list:
+        return _unannotated(get_args(annotation)[0])
+    return annotation.model_fields[str(key)].annotation
+
+
+def _unannotated(annotation: Any) -> Any:
+    return get_args(annotation)[0] if hasattr(annotation, "__metadata__") else annotation
+
+
+def dotted(path: Sequence[Key]) -> str:
+    """A path as people write it: `sweeps.main.grid`, `sensor.files[0].file`."""
+    text = ""
+    for key in path:
+        text += f"[{key}]" if isinstance(key, int) else f".{key}" if text else str(key)
+    return text
+
+
+def _readable(message: str) -> str:
+    text = message.removeprefix("Input should be ").removeprefix("a valid ")
+    return text[:1].lower() + text[1:]
+
+
+def _plain(node: Any) -> Any:
+    """Round-trip nodes as plain Python values."""
+    if isinstance(node, dict):
+        return {str(key): _plain(value) for key, value in node.items()}
+    if isinstance(node, list):
+        return [_plain(value) for value in node]
+    if isinstance(node, bool) or node is None:
+        return node
+    for plain in (int, float, str):
+        if isinstance(node, plain):
+            return plain(node)
+    return node

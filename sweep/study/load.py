@@ -1,0 +1,36 @@
+"""Load a study file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from ..errors import StudyError
+from .lines import Document
+from .resolve import Study, resolve
+from .schema import StudySection
+
+_ALLOWED = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.")
+
+
+def load_study(path: Path, data: Path | None = None) -> Study:
+    """Read and check a study file.
+
+    Files that it names are looked for in `data`, when given, and then beside the study. Raises StudyError with one
+    fault per thing wrong: file:line, key, value, what is allowed, nearest name.
+    """
+    document = Document(path)
+    try:
+        section = StudySection.model_validate(document.data)
+    except ValidationError as error:
+        raise StudyError(document.faults(error, StudySection)) from None
+    if data is not None and not data.is_dir():
+        raise StudyError(f"--data {data}: no such folder")
+    return resolve(document, section, [*([data] if data is not None else []), path.parent])
+
+
+def folder_name(study_name: str) -> str:
+    """A folder name for a study's outputs: other characters than letters, digits, `-`, `_`, `.` become `_`."""
+    kept = "".join(c if c in _ALLOWED else "_" for c in study_name)
+    return kept if kept.strip(".") else "_"

@@ -1,0 +1,322 @@
+"""From the schema to frozen objects that a runner can work on; everything is checked here, before any work."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..constraints import Bound
+from ..datasets.lights import Lights
+from ..errors import StudyError, SweepError, nearest
+from ..evaluate import Setup
+from ..families import FAMILIES, Parameter
+from ..filters import SensorCurves
+from ..metrics import Pair, class_pairs, csd_name
+from ..mosaics import Mosaic
+from ..scenes import Geometry, Scenario
+from ..search import ALGORITHMS, Problem
+from ..sensor import Pixel
+from ..spaces import Filter, Kind, Space
+from ..spectra import WavelengthGrid
+from .lines import Document, Key
+from .schema import CfaSection, Modification, StudySection
+from .sources import Sources
+
+SENSITIVITIES = ("sensitivity", "cfa_sensitivity")
+MOST_DESIGNS = 10**9
+
+
+@dataclass(frozen=True)
+class Search:
+    """A search inside the box of a sweep."""
+
+    space: Space
+    scenario: str
+    algorithm: str
+    starts: int
+    max_evaluations: int
+
+
+@dataclass(frozen=True)
+class Study:
+    """A whole study, checked and ready to run."""
+
+    name: str
+    section: StudySection
+    grid: WavelengthGrid
+    sensor: SensorCurves
+    lights: Lights
+    pixel: Pixel
+    scenarios: Mapping[str, Scenario]
+    geometry: Mapping[str, Geometry]
+    mosaics: Mapping[str, Mosaic]
+    spaces: tuple[Space, ...]
+    objective: Pair
+    constraints: Mapping[str, Bound]
+    search: Search | None
+    digests: Mapping[str, str]
+    warnings: tuple[str, ...]
+
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        """Pairs of signal types, in order."""
+        return class_pairs(self.lights.classes)
+
+    @property
+    def objective_column(self) -> str:
+        """Column of the CSD that is maximized."""
+        return csd_name(self.objective)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Parameters of all families of the study, each once."""
+        return tuple(dict.fromkeys(name for space in self.spaces for name in space.parameters))
+
+    @property
+    def n_designs(self) -> int:
+        """Designs of all spaces, over all scenarios."""
+        return sum(space.size for space in self.spaces) * len(self.scenarios)
+
+    def setup(self, space: Space, scenario: str) -> Setup:
+        """What the designs of `space` share in a scenario."""
+        mosaic = self.mosaics[space.cfa]
+        replaced = dict(self.section.cfas[space.cfa].curves)
+        modified: tuple[int, ...] = ()
+        if space.filter is not None:
+            replaced |= dict.fromkeys(space.filter.channels, space.filter.base)
+            modified = tuple(mosaic.channels.index(channel) for channel in space.filter.channels)
+        return Setup(
+            grid=self.grid,
+            mosaic=mosaic,
+            qe=self.sensor.mosaic_qe(mosaic, replaced),
+            modified=modified,
+            clear_qe=self.sensor.curve(self.sensor.clear),
+            lights=self.lights,
+            pixel=self.pixel,
+            scenario=self.scenarios[scenario],
+        )
+
+    def problem(self, search: Search) -> Problem:
+        """The search as a mathematical problem."""
+        assert search.space.filter is not None
+        return Problem(
+            setup=self.setup(search.space, search.scenario),
+            family=search.space.filter.family,
+            low=np.array([min(axis) for axis in search.space.axes]),
+            high=np.array([max(axis) for axis in search.space.axes]),
+            pair=self.objective,
+            constraints=self.constraints,
+            pairs={csd_name(pair): pair for pair in self.pairs},
+        )
+
+
+class _Resolver:
+    """Turns a checked schema into a Study, collecting every fault that it finds."""
+
+    def __init__(self, document: Document, section: StudySection, folders: list[Path]) -> None:
+        self.document = document
+        self.section = section
+        self.sources = Sources(document, section.wavelengths, folders)
+        self.faults = self.sources.faults
+
+    def add(
+        self,
+        path: tuple[Key, ...],
+        problem: str,
+        value: object = None,
+        allowed: str | None = None,
+        near: str | None = None,
+    ) -> None:
+        self.faults.append(self.document.fault(path, problem, value, allowed, near))
+
+    def unknown(self, path: tuple[Key, ...], what: str, value: str, known: list[str]) -> None:
+        self.add(path, f"unknown {what}", value, ", ".join(known), nearest(value, known))
+
+    def resolve(self) -> Study:
+        section = self.section
+        sensor = self.sources.sensor(section.sensor)
+        lights = self.sources.lights(section.lights)
+        mosaics = {name: mosaic for name, cfa in section.cfas.items() if (mosaic := self.mosaic(name, cfa)) is not None}
+        if sensor is None or lights is None:
+            raise StudyError(self.faults)
+        spaces = self.spaces(sensor, mosaics)
+        objective = self.objective(lights)
+        self.check_constraints(lights)
+        search = self.search(spaces)
+        if self.faults or objective is None:
+            raise StudyError(self.faults)
+        study = Study(
+            name=section.study,
+            section=section,
+            grid=section.wavelengths,
+            sensor=sensor,
+            lights=lights,
+            pixel=section.pixel,
+            scenarios=section.scenarios,
+            geometry=section.geometry,
+            mosaics=mosaics,
+            spaces=tuple(spaces),
+            objective=objective,
+            constraints=section.constraints,
+            search=search,
+            digests=dict(self.sources.digests),
+            warnings=tuple(self.sources.warnings),
+        )
+        if study.n_designs > MOST_DESIGNS:
+            self.add(("sweeps",), "too many designs", f"{study.n_designs:,}", f"at most {MOST_DESIGNS:,}")
+            raise StudyError(self.faults)
+        return study
+
+    def mosaic(self, name: str, cfa: CfaSection) -> Mosaic | None:
+        try:
+            return Mosaic.from_name(name) if cfa.tile is None else Mosaic.from_rows(name, cfa.tile)
+        except SweepError as error:
+            for fault in error.faults:
+                self.add(("cfas", name), fault.problem, fault.value, fault.allowed)
+            return None
+
+    def spaces(self, sensor: SensorCurves, mosaics: Mapping[str, Mosaic]) -> list[Space]:
+        """Plain CFAs (those whose every channel has a curve), then named designs, then sweeps."""
+        section = self.section
+        changed = {(m.cfa, m.channel) for m in (*section.designs.values(), *section.sweeps.values())}
+        spaces = []
+        for name, mosaic in mosaics.items():
+            missing = False
+            for channel in mosaic.channels:
+                curve = section.cfas[name].curves.get(channel, sensor.curve_name(name, channel))
+                if curve not in sensor.qe:
+                    missing = True
+                    if (name, channel) not in changed:
+                        self.unknown(("cfas", name), f"channel {channel!r}: curve", curve, list(sensor.qe))
+            for channel in section.cfas[name].curves:
+                if channel not in mosaic.channels:
+                    self.unknown(("cfas", name, "curves", channel), "channel", channel, list(mosaic.channels))
+            if not missing:
+                spaces.append(Space("reference", name, name))
+        for name, design in section.designs.items():
+            axes: dict[str, tuple[float, ...]] = {key: (value,) for key, value in design.at.items()}
+            spaces += self.filtered(
+                "design", name, design, axes, ("designs", name, "at"), sensor=sensor, mosaics=mosaics
+            )
+        for name, sweep in section.sweeps.items():
+            axes = {key: axis.points() for key, axis in sweep.grid.items()}
+            spaces += self.filtered(
+                "sweep", name, sweep, axes, ("sweeps", name, "grid"), sensor=sensor, mosaics=mosaics
+            )
+        return spaces
+
+    def filtered(
+        self,
+        kind: Kind,
+        name: str,
+        entry: Modification,
+        axes: Mapping[str, tuple[float, ...]],
+        axes_path: tuple[Key, ...],
+        *,
+        sensor: SensorCurves,
+        mosaics: Mapping[str, Mosaic],
+    ) -> list[Space]:
+        before = len(self.faults)
+        path = axes_path[:-1]
+        curves = list(sensor.qe)
+        mosaic = mosaics.get(entry.cfa)
+        if entry.cfa not in self.section.cfas:
+            self.unknown((*path, "cfa"), "CFA", entry.cfa, list(self.section.cfas))
+        elif mosaic is not None and entry.channel not in mosaic.channels:
+            self.unknown((*path, "channel"), f"channel of {entry.cfa}", entry.channel, list(mosaic.channels))
+        if entry.base not in curves:
+            self.unknown((*path, "base"), "curve", entry.base, curves)
+        if isinstance(entry.to, str) and entry.to not in curves:
+            self.unknown((*path, "to"), "curve", entry.to, curves)
+        if entry.family not in FAMILIES:
+            self.unknown((*path, "family"), "family", entry.family, list(FAMILIES))
+            return []
+        kind_of = FAMILIES[entry.family]
+        ordered = self.axes(axes, axes_path, kind_of.parameters)
+        if len(self.faults) > before:
+            return []
+        base = sensor.curve(entry.base)
+        target = sensor.curve(entry.to) if isinstance(entry.to, str) else base * entry.to
+        family = kind_of(self.section.wavelengths.nodes_nm, base, target)
+        made = Filter(family, (entry.channel,), entry.base, str(entry.to))
+        return [Space(kind, name, entry.cfa, made, tuple(ordered))]
+
+    def axes(
+        self, axes: Mapping[str, tuple[float, ...]], path: tuple[Key, ...], parameters: tuple[Parameter, ...]
+    ) -> list[tuple[float, ...]]:
+        known = [parameter.name for parameter in parameters]
+        for name in axes:
+            if name not in known:
+                self.unknown((*path, name), "parameter", name, known)
+        ordered = []
+        for parameter in parameters:
+            values = axes.get(parameter.name, () if parameter.default is None else (parameter.default,))
+            if not values:
+                self.add((*path, parameter.name), "missing")
+            for value in (min(values), max(values)) if values else ():
+                if not parameter.low <= value <= parameter.high:
+                    allowed = f"{parameter.low:g} to {parameter.high:g}"
+                    self.add((*path, parameter.name), "out of range", value, allowed)
+                    break
+            ordered.append(values)
+        return ordered
+
+    def objective(self, lights: Lights) -> Pair | None:
+        known = {csd_name(pair): pair for pair in class_pairs(lights.classes)}
+        if self.section.objective not in known:
+            self.unknown(("objective",), "objective", self.section.objective, list(known))
+        return known.get(self.section.objective)
+
+    def check_constraints(self, lights: Lights) -> None:
+        distances = [csd_name(pair) for pair in class_pairs(lights.classes)]
+        for name, bound in self.section.constraints.items():
+            if name not in (*distances, *SENSITIVITIES):
+                self.unknown(("constraints", name), "quantity", name, [*SENSITIVITIES, *distances])
+            elif name in distances and bound.max is not None:
+                self.add(("constraints", name, "max"), "a CSD has no upper limit", bound.max, "`min`")
+
+    def search(self, spaces: list[Space]) -> Search | None:
+        section = self.section.search
+        if section is None:
+            return None
+        sweeps = {space.name: space for space in spaces if space.kind == "sweep"}
+        names = list(self.section.sweeps)
+        scenarios = list(self.section.scenarios)
+        chosen = section.sweep or (names[0] if len(names) == 1 else None)
+        if chosen is None:
+            self.add(
+                ("search", "sweep"),
+                "missing: the search needs the box of one sweep",
+                None,
+                ", ".join(names) or "a sweep",
+            )
+        elif chosen not in names:
+            self.unknown(("search", "sweep"), "sweep", chosen, names)
+        elif chosen in sweeps and all(min(axis) == max(axis) for axis in sweeps[chosen].axes):
+            self.add(
+                ("search", "sweep"),
+                "every parameter of the sweep is fixed",
+                chosen,
+                "one free parameter or more",
+            )
+        if section.scenario is not None and section.scenario not in scenarios:
+            self.unknown(("search", "scenario"), "scenario", section.scenario, scenarios)
+        if section.algorithm not in ALGORITHMS:
+            self.unknown(
+                ("search", "algorithm"),
+                "algorithm (it must take inequalities and gradients)",
+                section.algorithm,
+                list(ALGORITHMS),
+            )
+        if chosen not in sweeps or section.algorithm not in ALGORITHMS:
+            return None
+        scenario = section.scenario or scenarios[0]
+        return Search(sweeps[chosen], scenario, section.algorithm, section.starts, section.max_evaluations)
+
+
+def resolve(document: Document, section: StudySection, folders: list[Path]) -> Study:
+    """Make the study; `folders` are searched in order for its files. Raises StudyError with every fault found."""
+    return _Resolver(document, section, folders).resolve()

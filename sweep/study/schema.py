@@ -1,0 +1,173 @@
+"""The study file's schema. Sections that a lower layer owns (pixel, scenario, ...) are declared there."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from ..constraints import Bound
+from ..scenes import Geometry, Scenario
+from ..schema import Positive, Section
+from ..sensor import Pixel
+from ..spectra import Outside, Resampling, WavelengthGrid
+
+Name = Annotated[str, Field(min_length=1, max_length=100)]
+
+
+class CurveFile(Section):
+    """QE curves from one file: `columns` maps the sensor's curve names to the file's column names."""
+
+    file: Name
+    columns: Annotated[dict[Name, Name], Field(min_length=1)]
+    scale: Positive = 1.0
+    resampling: Resampling = "linear"
+    outside: Outside = "refuse"
+
+
+class SensorSection(Section):
+    """A built-in sensor by its name, or curves from files."""
+
+    builtin: str | None = None
+    name: Name | None = None
+    files: list[CurveFile] = []
+    clear: Name | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> SensorSection:
+        if (self.builtin is None) == (not self.files):
+            raise ValueError("a sensor is either the name of a built-in one or a mapping with `files`")
+        return self
+
+
+class LightFile(Section):
+    """Lights from one file: `signals` maps a signal type to the file's columns."""
+
+    file: Name
+    quantity: Annotated[str, Field(pattern="^(energy|photons)$")]
+    signals: Annotated[dict[Name, Annotated[list[Name], Field(min_length=1)]], Field(min_length=1)]
+    resampling: Resampling = "linear"
+    outside: Outside = "refuse"
+
+
+class LightsSection(Section):
+    """A built-in data set by its name, or lights from files."""
+
+    builtin: str | None = None
+    name: Name | None = None
+    files: list[LightFile] = []
+    photon_ratio: float | None = Field(default=None, gt=0)
+
+    @model_validator(mode="after")
+    def _one_source(self) -> LightsSection:
+        if (self.builtin is None) == (not self.files):
+            raise ValueError("lights are either the name of a built-in data set or a mapping with `files`")
+        return self
+
+
+class CfaSection(Section):
+    """A tile, row by row. `curves` maps channels to curves of the sensor that have another name."""
+
+    tile: list[list[Name]] | None = None
+    curves: dict[Name, Name] = {}
+
+
+class Modification(Section):
+    """A family of filters put into `channel` of a CFA: it starts from curve `base` and goes `to` a curve or a floor.
+
+    A number for `to` is a floor: that fraction of the base curve.
+    """
+
+    cfa: Name
+    family: Name = "stopband"
+    channel: Name
+    base: Name
+    to: Name | Annotated[float, Field(ge=0, le=1)]
+
+
+class DesignSection(Modification):
+    """One filter by its parameters."""
+
+    at: dict[Name, float]
+
+
+class Axis(Section):
+    """Values of one parameter: a list, or `count` equidistant ones from `min` to `max`."""
+
+    values: list[float] | None = Field(default=None, min_length=1)
+    min: float | None = None
+    max: float | None = None
+    count: int | None = Field(default=None, ge=1, le=1_000_000)
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Axis:
+        spanned = (self.min, self.max, self.count)
+        if (self.values is None) == (None in spanned) or (self.values is not None and spanned != (None, None, None)):
+            raise ValueError("an axis is a number, a list of numbers, or `min`, `max` and `count`")
+        if self.min is not None and self.max is not None and not self.min <= self.max:
+            raise ValueError(f"min {self.min:g} must not be above max {self.max:g}")
+        if self.count == 1 and self.min != self.max:
+            raise ValueError("count 1 needs min = max")
+        return self
+
+    def points(self) -> tuple[float, ...]:
+        """The values, in order."""
+        if self.values is not None:
+            return tuple(self.values)
+        assert self.min is not None
+        assert self.max is not None
+        assert self.count is not None
+        step = (self.max - self.min) / max(1, self.count - 1)
+        return tuple(self.max if i == self.count - 1 else self.min + i * step for i in range(self.count))
+
+
+def _axis(value: Any) -> Any:
+    if isinstance(value, list):
+        return {"values": value}
+    return {"values": [value]} if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
+class SweepSection(Modification):
+    """A full-factorial grid over the family's parameters."""
+
+    grid: dict[Name, Annotated[Axis, BeforeValidator(_axis)]]
+
+
+class SearchSection(Section):
+    """A search inside the box of a sweep's grid (from the smallest to the largest value of each axis)."""
+
+    sweep: Name | None = None
+    scenario: Name | None = None
+    algorithm: Name = "SLSQP"
+    starts: int = Field(default=16, ge=1, le=10_000)
+    max_evaluations: int = Field(default=2000, ge=10, le=10_000_000)
+
+
+def _builtin(value: Any) -> Any:
+    return {"builtin": value} if isinstance(value, str) else value
+
+
+def _cfas(value: Any) -> Any:
+    if isinstance(value, list):
+        return {name: {} for name in value}
+    return {name: {} if tile is None else tile for name, tile in value.items()} if isinstance(value, dict) else value
+
+
+class StudySection(Section):
+    """A whole study file."""
+
+    study: Annotated[str, Field(min_length=1, max_length=100)]
+    question: str = ""
+    seed: int = Field(default=1, ge=0, lt=2**32)
+    wavelengths: WavelengthGrid = WavelengthGrid()
+    sensor: Annotated[SensorSection, BeforeValidator(_builtin)]
+    pixel: Pixel = Pixel()
+    lights: Annotated[LightsSection, BeforeValidator(_builtin)]
+    scenarios: Annotated[dict[Name, Scenario], Field(min_length=1)] = {"chart": Scenario()}
+    geometry: dict[Name, Geometry] = {}
+    cfas: Annotated[dict[Name, CfaSection], BeforeValidator(_cfas), Field(min_length=1)]
+    designs: dict[Name, DesignSection] = {}
+    sweeps: dict[Name, SweepSection] = {}
+    objective: Name = "csd_yellow_red"
+    constraints: dict[Name, Bound] = {}
+    search: SearchSection | None = None

@@ -1,0 +1,173 @@
+"""Curves that a study names: built in, or from files beside the study or in a data folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeVar
+
+from ..arrays import FloatArray
+from ..curve_files import digest, read_curves
+from ..datasets import BUILT_IN_LIGHTS
+from ..datasets.lights import Lights, make_lights
+from ..errors import DataError, Fault, nearest
+from ..filters import BUILT_IN_SENSORS, SensorCurves, make_sensor
+from ..spectra import Curves, WavelengthGrid, photons_from_energy, resample
+from ..surrogate import BUILT_IN_RANGE_NM
+from .lines import Document, Key
+from .schema import CurveFile, LightFile, LightsSection, SensorSection
+
+_Made = TypeVar("_Made", SensorCurves, Lights)
+_CUT_OFF = 0.01
+"""Share of a light's photons outside the grid from which on the user is told."""
+
+
+@dataclass
+class Sources:
+    """Reads the files of one study, each once; collects faults, warnings and digests."""
+
+    document: Document
+    grid: WavelengthGrid
+    folders: Sequence[Path]
+    faults: list[Fault] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    digests: dict[str, str] = field(default_factory=dict)
+    _read: dict[str, Curves | None] = field(default_factory=dict)
+
+    def sensor(self, section: SensorSection) -> SensorCurves | None:
+        """The study's sensor, or None after adding faults."""
+        if section.builtin is not None:
+            return self._built_in("sensor", section.builtin, BUILT_IN_SENSORS)
+        before = len(self.faults)
+        qe: dict[str, FloatArray] = {}
+        for index, entry in enumerate(section.files):
+            path: tuple[Key, ...] = ("sensor", "files", index)
+            curves = self._curves(path, entry)
+            for name, column in entry.columns.items():
+                if name in qe:
+                    self._add((*path, "columns", name), "the curve is defined twice", name)
+                values = self._column((*path, "columns", name), curves, column, entry)
+                if values is not None:
+                    qe[name] = values * entry.scale
+        if len(self.faults) > before:
+            return None
+        name = section.name or "sensor"
+        try:
+            return make_sensor(name, qe, ", ".join(entry.file for entry in section.files), section.clear)
+        except DataError as error:
+            for fault in error.faults:
+                path = ("sensor", "clear") if fault.key is None else self._qe_path(section, fault.key)
+                self.faults.append(self.document.fault(path, fault.problem, fault.value, fault.allowed, fault.nearest))
+            return None
+
+    def _qe_path(self, section: SensorSection, curve: str) -> tuple[Key, ...]:
+        index = next(i for i, entry in enumerate(section.files) if curve in entry.columns)
+        return ("sensor", "files", index, "columns", curve)
+
+    def lights(self, section: LightsSection) -> Lights | None:
+        """The study's lights, or None after adding faults."""
+        if section.builtin is not None:
+            return self._built_in("lights", section.builtin, BUILT_IN_LIGHTS)
+        before = len(self.faults)
+        by_type: dict[str, list[tuple[str, str, FloatArray]]] = {}
+        for index, entry in enumerate(section.files):
+            path = ("lights", "files", index)
+            curves = self._curves(path, entry)
+            for signal_type, columns in entry.signals.items():
+                for position, column in enumerate(columns):
+                    place = (*path, "signals", signal_type, position)
+                    photons = self._photons(place, curves, column, entry)
+                    if photons is not None:
+                        label = f"{Path(entry.file).stem}:{column}"
+                        by_type.setdefault(signal_type, []).append((label, signal_type, photons))
+        if len(self.faults) > before:
+            return None
+        if len(by_type) < 2:
+            self._add(("lights", "files"), "only one signal type", list(by_type), "two or more, to tell them apart")
+            return None
+        signals = [signal for group in by_type.values() for signal in group]
+        source = ", ".join(entry.file for entry in section.files)
+        return make_lights(self.grid, section.name or "lights", signals, source, photon_ratio=section.photon_ratio)
+
+    def _built_in(self, key: str, name: str, known: Mapping[str, Callable[[WavelengthGrid], _Made]]) -> _Made | None:
+        if name not in known:
+            self._add(
+                (key,),
+                f"unknown built-in {key}",
+                name,
+                f"{', '.join(known)}, or a mapping with `files`",
+                nearest(name, known),
+            )
+            return None
+        if not (self.grid.start_nm >= BUILT_IN_RANGE_NM[0] and self.grid.stop_nm <= BUILT_IN_RANGE_NM[1]):
+            asked = f"{self.grid.start_nm:g} to {self.grid.stop_nm:g} nm"
+            self._add(("wavelengths",), f"the built-in {key} ends before the grid", asked, "400 to 700 nm")
+            return None
+        return known[name](self.grid)
+
+    def _photons(
+        self, path: tuple[Key, ...], curves: Curves | None, column: str, entry: LightFile
+    ) -> FloatArray | None:
+        """A light's photon spectrum on the grid; says so when photons are cut off."""
+        values = self._column(path, curves, column, entry)
+        if values is None or curves is None:
+            return None
+        wave, raw = curves.wavelength_nm, curves.values[column]
+        if entry.quantity == "energy":
+            raw = photons_from_energy(wave, raw)
+            values = resample(wave, raw, self.grid, entry.resampling, entry.outside)
+        if not values.any():
+            self._add(path, "the light has no photons on the wavelength grid", column)
+            return None
+        total = float(((raw[1:] + raw[:-1]) / 2 * (wave[1:] - wave[:-1])).sum())
+        lost = 1 - float(self.grid.integrate(values)) / total
+        if lost > _CUT_OFF:
+            self.warnings.append(
+                f"{entry.file}: {column}: {lost:.1%} of its photons lie outside the wavelength grid and are cut off"
+            )
+        return values
+
+    def _column(
+        self, path: tuple[Key, ...], curves: Curves | None, column: str, entry: CurveFile | LightFile
+    ) -> FloatArray | None:
+        if curves is None:
+            return None
+        if column not in curves.values:
+            known = list(curves.values)
+            self._add(path, f"{entry.file} has no such column", column, ", ".join(known), nearest(column, known))
+            return None
+        try:
+            return curves.on(self.grid, column, entry.resampling, entry.outside)
+        except DataError as error:
+            for fault in error.faults:
+                self._add(path, f"{entry.file}, column {column}: {fault.problem}", fault.value, fault.allowed)
+            return None
+
+    def _curves(self, path: tuple[Key, ...], entry: CurveFile | LightFile) -> Curves | None:
+        if entry.file in self._read:
+            return self._read[entry.file]
+        self._read[entry.file] = None
+        found = next((folder / entry.file for folder in self.folders if (folder / entry.file).is_file()), None)
+        if found is None:
+            searched = ", ".join(str(folder) for folder in self.folders)
+            beside = [item.name for folder in self.folders if folder.is_dir() for item in folder.iterdir()]
+            near = nearest(entry.file, beside)
+            self._add((*path, "file"), "no such file", entry.file, f"a path relative to {searched}", near)
+            return None
+        try:
+            self._read[entry.file] = read_curves(found)
+            self.digests[entry.file] = digest(found)
+        except DataError as error:
+            self.faults.extend(error.faults)
+        return self._read[entry.file]
+
+    def _add(
+        self,
+        path: tuple[Key, ...],
+        problem: str,
+        value: object = None,
+        allowed: str | None = None,
+        near: str | None = None,
+    ) -> None:
+        self.faults.append(self.document.fault(path, problem, value, allowed, near))

@@ -1,0 +1,198 @@
+"""Mosaics, metrics, sensor, geometry, edges, families: small models against closed forms and brute force."""
+
+from __future__ import annotations
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.distance import cdist
+
+from sweep.edges import SPAN_PER_WIDTH, edge, edge_gradient
+from sweep.errors import SweepError
+from sweep.families import Stopband
+from sweep.metrics import cfa_sensitivity, channel_sensitivity, separation
+from sweep.mosaics import Mosaic
+from sweep.pareto import non_dominated
+from sweep.scenes import Geometry
+from sweep.sensor import Optics, Pixel, digital_numbers, electron_rate, irradiance_factor
+
+
+@pytest.mark.parametrize(
+    ("name", "channels", "counts"),
+    [
+        ("RGGB", "R G B", [1, 2, 1]),
+        ("RCCC", "R C", [1, 3]),
+        ("RCCB", "R C B", [1, 2, 1]),
+        ("RYYCy", "R Y Cy", [1, 2, 1]),
+        ("RYNCy", "R Y N Cy", [1, 1, 1, 1]),
+    ],
+)
+def test_channels_count_once(name: str, channels: str, counts: list[int]) -> None:
+    mosaic = Mosaic.from_name(name)
+    assert mosaic.channels == tuple(channels.split())
+    assert list(mosaic.counts) == counts
+
+
+def test_any_tile() -> None:
+    rows = [["R", "G", "R"], ["G", "B", "W"]]
+    mosaic = Mosaic.from_rows("mine", rows)
+    assert [[mosaic.channels[i] for i in row] for row in mosaic.indices] == rows
+    for bad in ("RGB", "rggb", "RGGBB", "R-GB", ""):
+        with pytest.raises(SweepError, match="2x2"):
+            Mosaic.from_name(bad)
+    for ragged in ([], [[]], [["R"], ["G", "B"]]):
+        with pytest.raises(SweepError, match="equal length"):
+            Mosaic.from_rows("ragged", ragged)
+
+
+@settings(max_examples=40)
+@given(st.integers(1, 30), st.integers(1, 30), st.integers(1, 5), st.integers(1, 40), st.integers(0, 2**32 - 1))
+def test_separation_is_the_nearest_pair(n_a: int, n_b: int, channels: int, designs: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    response = rng.uniform(0, 4095, (designs, n_a + n_b, channels))
+    order = rng.permutation(n_a + n_b)
+    first, second = order[:n_a], order[n_a:]
+    found = separation(response, first, second)
+    brute = [cdist(r[first], r[second]).min() for r in response]
+    np.testing.assert_allclose(found, brute, rtol=1e-12)
+
+
+def test_separation_of_near_points_at_a_large_offset() -> None:
+    # 1e8 + 2^-20 is exact in float64, so the distance is exactly 2^-20 sqrt(2).
+    near = np.array([[[1e8, 1e8], [1e8 + 2.0**-20, 1e8 - 2.0**-20]]])
+    found = separation(near, np.array([0]), np.array([1]))[0]
+    assert found == pytest.approx(2.0**-20 * math.sqrt(2), rel=1e-15)
+
+
+def test_sensitivities() -> None:
+    base = np.array([0.2, 0.4, 0.4])
+    assert channel_sensitivity(np.array([[0.2, 0.3, 0.4]]), base)[0] == pytest.approx(0.9, rel=1e-15)
+    qe = np.array([[0.1, 0.1], [0.5, 0.3]])
+    # one pixel of the first, three of the second: (0.2 + 3 * 0.8) / 4 = 0.65 over 1.3
+    assert cfa_sensitivity(qe, np.array([1, 3]), np.array([0.6, 0.7])) == pytest.approx(0.5, rel=1e-15)
+
+
+def test_non_dominated_keeps_ties_and_skips_nan() -> None:
+    values = np.array([[1, 2], [2, 1], [1, 1], [2, 1], [np.nan, 9], [9, 9]], dtype=float)
+    eligible = np.array([True] * 5 + [False])
+    assert list(non_dominated(values, eligible)) == [True, True, False, True, False, False]
+    assert not non_dominated(np.empty((0, 2))).any()
+    assert not non_dominated(np.full((3, 2), np.nan)).any()
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 2**32 - 1), st.integers(1, 60))
+def test_non_dominated_is_the_definition(seed: int, n: int) -> None:
+    values = np.random.default_rng(seed).integers(0, 8, (n, 2)).astype(float)
+    brute = [not any((o >= v).all() and (o > v).any() for o in values) for v in values]
+    assert list(non_dominated(values)) == brute
+
+
+def test_irradiance_is_the_camera_equation() -> None:
+    assert irradiance_factor(Optics(f_number=4)) == pytest.approx(math.pi / 65, rel=1e-15)
+    assert irradiance_factor(Optics(f_number=4), magnification=-1) == pytest.approx(math.pi / 257, rel=1e-15)
+    off_axis = irradiance_factor(Optics(f_number=2, transmission=0.5), field_angle_rad=math.radians(60))
+    assert off_axis == pytest.approx(0.5 * math.pi / 17 / 16, rel=1e-12)
+
+
+def test_electrons_of_a_flat_light() -> None:
+    pixel = Pixel(pitch_um=2.0, fill_factor=0.5)
+    light, qe = np.full((1, 301), 1e15), np.full((2, 301), 0.25)
+    # 1e15 photons/s/m^2/nm x 301 nm x 0.25 x 2e-12 m^2
+    np.testing.assert_allclose(electron_rate(light, qe, 1.0, pixel), 1e15 * 301 * 0.25 * 2e-12, rtol=1e-13)
+
+
+def test_digital_numbers_clip_the_well_before_the_adc() -> None:
+    pixel = Pixel(well_e=1000.0, gain_dn_per_e=2.0, offset_dn=100.0)
+    electrons = np.array([0, 0.24, 0.25, 1.0, 999.0, 5000.0, np.inf])
+    np.testing.assert_array_equal(digital_numbers(electrons, pixel), [100, 100, 101, 102, 2098, 2100, 2100])
+    full = Pixel()
+    np.testing.assert_array_equal(digital_numbers(np.array([0.0, 1e4, 1e9]), full), [0, 4095, 4095])
+    loud = Pixel(gain_dn_per_e=1.0)
+    np.testing.assert_array_equal(digital_numbers(np.array([4095.4, 4096.0]), loud), [4095, 4095])
+
+
+@pytest.mark.parametrize(("distance_m", "fov_deg", "printed"), [(20, 120, "18"), (100, 60, "7.3"), (250, 30, "5.9")])
+def test_object_resolution_of_the_papers_table_1(distance_m: float, fov_deg: float, printed: str) -> None:
+    found = Geometry(distance_m=distance_m, fov_deg=fov_deg).object_resolution_px
+    assert f"{found:.2g}" == printed
+
+
+def exact_edge(wavelength: mpmath.mpf, center: mpmath.mpf, width: mpmath.mpf) -> mpmath.mpf:
+    """The quintic of minimal degree with two zero derivatives at both ends, as the integral of its slope."""
+    tenth = mpmath.findroot(lambda t: 30 * mpmath.quad(lambda s: s**2 * (1 - s) ** 2, [0, t]) - mpmath.mpf("0.1"), 0.25)
+    t = (wavelength - center) / (width / (1 - 2 * tenth)) + mpmath.mpf("0.5")
+    t = min(max(t, mpmath.mpf(0)), mpmath.mpf(1))
+    return 30 * mpmath.quad(lambda s: s**2 * (1 - s) ** 2, [0, t])
+
+
+def test_edge_and_its_gradient_in_50_digits() -> None:
+    with mpmath.workdps(50):
+        for wave, center, width in ((600, 601, 10), (595, 601, 10), (606.5, 601, 10), (640, 601, 30), (560, 601, 30)):
+            at = [mpmath.mpf(v) for v in (wave, center, width)]
+            found = edge(np.array([float(wave)]), np.array(float(center)), np.array(float(width)))[0]
+            assert found == pytest.approx(float(exact_edge(*at)), rel=1e-13, abs=1e-15)
+            by_center, by_width = edge_gradient(np.array([float(wave)]), np.array(float(center)), np.array(float(width)))
+            exact_c = mpmath.diff(lambda c, at=at: exact_edge(at[0], c, at[2]), at[1], h=mpmath.mpf(10) ** -20)
+            exact_w = mpmath.diff(lambda w, at=at: exact_edge(at[0], at[1], w), at[2], h=mpmath.mpf(10) ** -20)
+            assert by_center[0] == pytest.approx(float(exact_c), rel=1e-11, abs=1e-14)
+            assert by_width[0] == pytest.approx(float(exact_w), rel=1e-11, abs=1e-14)
+
+
+def test_edge_spans_10_to_90_percent_within_its_width() -> None:
+    center, width = np.array(600.0), np.array(20.0)
+    np.testing.assert_allclose(edge(np.array([590.0, 600.0, 610.0]), center, width), [0.1, 0.5, 0.9], rtol=1e-12)
+    outside = np.array([600 - 10 * SPAN_PER_WIDTH, 600 + 10 * SPAN_PER_WIDTH])
+    assert list(edge(outside, center, width)) == [0, 1]
+
+
+@pytest.mark.parametrize("width", [0.0, 5e-324, 1e-300])
+def test_edge_without_width_is_a_brick_wall(width: float) -> None:
+    found = edge(np.array([599.0, 600.0, 601.0]), np.array(600.0), np.array(width))
+    assert list(found) == [0, 0.5, 1]
+    assert all(np.isfinite(g).all() for g in edge_gradient(np.array([599.0, 600.0]), np.array(600.0), np.array(width)))
+
+
+WAVE = np.arange(400.0, 701.0)
+BASE = 0.3 + 0.5 / (1 + np.exp(-(WAVE - 500) / 20))
+TARGET = 0.2 + 0.1 * np.sin(WAVE / 40)
+
+
+@settings(max_examples=200)
+@given(st.floats(500, 650), st.floats(0, 60), st.floats(550, 720), st.floats(0, 60), st.floats(0, 1))
+def test_a_well_formed_stopband_stays_between_its_curves(
+    left: float, left_width: float, right: float, right_width: float, depth: float
+) -> None:
+    family = Stopband(WAVE, BASE, TARGET)
+    x = np.array([[left, left_width, right, right_width, depth]])
+    if (family.violation(x) <= 0).all():
+        curve = family.curves(x)[0, 0]
+        assert (curve >= np.minimum(BASE, TARGET) - 1e-15).all()
+        assert (curve <= np.maximum(BASE, TARGET) + 1e-15).all()
+
+
+def test_crossed_edges_are_a_violation() -> None:
+    family = Stopband(WAVE, BASE, TARGET)
+    good, crossed, wide = [600, 10, 640, 10, 1], [640, 10, 600, 10, 1], [600, 200, 610, 10, 1]
+    assert list((family.violation(np.array([good, crossed, wide], dtype=float)) <= 0).all(axis=1)) == [True, False, False]
+
+
+def test_stopband_gradients_agree_with_differences() -> None:
+    # The quintic's third derivative bounds the central difference's error: h^2 / 6 * 60 / span^3 << 1e-8 here.
+    family = Stopband(WAVE, BASE, TARGET)
+    x = np.array([601.3, 17.0, 652.7, 23.0, 0.8])
+    step = 1e-4
+    for index, exact in enumerate(family.gradient(x)[:, 0]):
+        shift = np.zeros(5)
+        shift[index] = step
+        numeric = (family.curves((x + shift)[None]) - family.curves((x - shift)[None]))[0, 0] / (2 * step)
+        np.testing.assert_allclose(exact, numeric, atol=2e-8)
+    for row, exact_row in zip(range(2), family.violation_gradient(x), strict=True):
+        numeric = [
+            (family.violation((x + d)[None]) - family.violation((x - d)[None]))[0, row] / 2 for d in np.eye(5)
+        ]
+        np.testing.assert_allclose(exact_row, numeric, atol=1e-12)
