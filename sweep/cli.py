@@ -81,6 +81,3 @@ def main() -> None:
         for fault in error.faults:
             typer.echo(f"sweep: {fault}", err=True)
         sys.exit(error.exit_code)
-    except KeyboardInterrupt:
-        typer.echo("sweep: interrupted; finished chunks are kept, the same command continues", err=True)
-        sys.exit(130)

@@ -65,6 +65,12 @@ class OutputError(SweepError):
     """An output folder that cannot be written, read or is in use."""
 
 
+class InterruptedRunError(SweepError):
+    """A run that a signal stopped."""
+
+    exit_code = 130
+
+
 def _short(value: object, limit: int = 60) -> str:
     text = repr(value)
     return text if len(text) <= limit else text[: limit - 3] + "..."

@@ -136,7 +136,9 @@ def test_edge_and_its_gradient_in_50_digits() -> None:
             at = [mpmath.mpf(v) for v in (wave, center, width)]
             found = edge(np.array([float(wave)]), np.array(float(center)), np.array(float(width)))[0]
             assert found == pytest.approx(float(exact_edge(*at)), rel=1e-13, abs=1e-15)
-            by_center, by_width = edge_gradient(np.array([float(wave)]), np.array(float(center)), np.array(float(width)))
+            by_center, by_width = edge_gradient(
+                np.array([float(wave)]), np.array(float(center)), np.array(float(width))
+            )
             exact_c = mpmath.diff(lambda c, at=at: exact_edge(at[0], c, at[2]), at[1], h=mpmath.mpf(10) ** -20)
             exact_w = mpmath.diff(lambda w, at=at: exact_edge(at[0], at[1], w), at[2], h=mpmath.mpf(10) ** -20)
             assert by_center[0] == pytest.approx(float(exact_c), rel=1e-11, abs=1e-14)
@@ -178,7 +180,11 @@ def test_a_well_formed_stopband_stays_between_its_curves(
 def test_crossed_edges_are_a_violation() -> None:
     family = Stopband(WAVE, BASE, TARGET)
     good, crossed, wide = [600, 10, 640, 10, 1], [640, 10, 600, 10, 1], [600, 200, 610, 10, 1]
-    assert list((family.violation(np.array([good, crossed, wide], dtype=float)) <= 0).all(axis=1)) == [True, False, False]
+    assert list((family.violation(np.array([good, crossed, wide], dtype=float)) <= 0).all(axis=1)) == [
+        True,
+        False,
+        False,
+    ]
 
 
 def test_stopband_gradients_agree_with_differences() -> None:
@@ -192,7 +198,5 @@ def test_stopband_gradients_agree_with_differences() -> None:
         numeric = (family.curves((x + shift)[None]) - family.curves((x - shift)[None]))[0, 0] / (2 * step)
         np.testing.assert_allclose(exact, numeric, atol=2e-8)
     for row, exact_row in zip(range(2), family.violation_gradient(x), strict=True):
-        numeric = [
-            (family.violation((x + d)[None]) - family.violation((x - d)[None]))[0, row] / 2 for d in np.eye(5)
-        ]
+        numeric = [(family.violation((x + d)[None]) - family.violation((x - d)[None]))[0, row] / 2 for d in np.eye(5)]
         np.testing.assert_allclose(exact_row, numeric, atol=1e-12)

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import signal
+import itertools
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 import joblib
 import numpy as np
 import pyarrow as pa
 
+from ..errors import InterruptedRunError
 from ..evaluate import quantities
 from ..search import Evaluation, SearchRun, best_feasible, search_from, starting_points
 from ..spaces import Space
@@ -35,6 +34,7 @@ from ..store import (
 from ..study import Search, Study
 from .jobs import Job, Rules, jobs_of, mark_front, run_job
 from .provenance import fingerprint, provenance, resolved_yaml
+from .stopping import Stop, leave_signals_to_the_parent, stop_on_signals
 
 Progress = Callable[[str, int, int], None]
 """Called with the phase's name, how much is done, and the total."""
@@ -62,12 +62,12 @@ def run_study(study: Study, output: Path, n_jobs: int, progress: Progress, comma
     started = time.monotonic()
     schema = result_schema(study.parameters, quantities(study.lights))
     rules = Rules(schema, study.constraints, (study.objective_column, "sensitivity"))
-    with locked(output), _sigterm_as_interrupt():
+    with locked(output), stop_on_signals() as stop:
         shards = Shards(output)
-        table = _sweep(study, rules, shards, n_jobs, progress)
+        table = _sweep(study, rules, shards, n_jobs, progress, stop)
         facts: dict[str, Any] = {"designs": table.num_rows, "warnings": list(study.warnings)}
         if study.search is not None:
-            answer = _search(study, study.search, n_jobs, progress)
+            answer = _search(study, study.search, n_jobs, progress, stop)
             table = pa.concat_tables([table, *_answer_row(study, answer, rules, table.num_rows)])
             facts["search"] = _search_facts(study, answer)
             write_table(_search_log(answer), output / SEARCH_LOG)
@@ -82,7 +82,7 @@ def run_study(study: Study, output: Path, n_jobs: int, progress: Progress, comma
         shards.remove()
 
 
-def _sweep(study: Study, rules: Rules, shards: Shards, n_jobs: int, progress: Progress) -> pa.Table:
+def _sweep(study: Study, rules: Rules, shards: Shards, n_jobs: int, progress: Progress, stop: Stop) -> pa.Table:
     key = fingerprint(study)
     jobs = list(jobs_of(study))
     setups = {
@@ -96,7 +96,7 @@ def _sweep(study: Study, rules: Rules, shards: Shards, n_jobs: int, progress: Pr
         joblib.delayed(run_job)(job, setups[job.space.kind, job.space.name, job.scenario], rules)
         for job in (jobs[i] for i in todo)
     )
-    for index, table in zip(todo, _parallel(n_jobs, tasks), strict=True):
+    for index, table in zip(todo, _parallel(n_jobs, tasks, stop), strict=False):
         shards.save(index, key, table)
         tables[index] = table
         done += table.num_rows
@@ -104,23 +104,30 @@ def _sweep(study: Study, rules: Rules, shards: Shards, n_jobs: int, progress: Pr
     return pa.concat_tables([tables[i] for i in range(len(jobs))])
 
 
-def _search(study: Study, search: Search, n_jobs: int, progress: Progress) -> SearchAnswer:
+def _search(study: Study, search: Search, n_jobs: int, progress: Progress, stop: Stop) -> SearchAnswer:
     """Search from Sobol points over the cores; the evaluations are shared evenly among the starts."""
     problem = study.problem(search)
     starts = starting_points(problem.free.size, search.starts, study.section.seed)
     each = max(1, search.max_evaluations // search.starts)
     tasks = (joblib.delayed(search_from)(problem, i, u, search.algorithm, each) for i, u in enumerate(starts))
     runs: list[SearchRun] = []
-    for run in _parallel(n_jobs, tasks):
+    for run in _parallel(n_jobs, tasks, stop):
         runs.append(run)
         progress("search starts", len(runs), search.starts)
     return SearchAnswer(search, tuple(runs), best_feasible([e for run in runs for e in run.log]))
 
 
-def _parallel(n_jobs: int, tasks: Iterator[Any]) -> Iterator[Any]:
-    """Results in the order of the tasks; the workers' own libraries use one thread each."""
-    with joblib.parallel_config("loky", inner_max_num_threads=1):
-        yield from joblib.Parallel(n_jobs=n_jobs, return_as="generator", pre_dispatch="3*n_jobs")(tasks)
+def _parallel(n_jobs: int, tasks: Iterable[Any], stop: Stop) -> Iterator[Any]:
+    """Results in the order of the tasks; the workers' own libraries use one thread each.
+
+    Raises InterruptedRunError after a stop was asked for and everything under way has been handed out.
+    """
+    wanted = itertools.takewhile(lambda _: not stop.requested, tasks)
+    settings = {"inner_max_num_threads": 1, "initializer": leave_signals_to_the_parent}
+    with joblib.parallel_config("loky", **settings):
+        yield from joblib.Parallel(n_jobs=n_jobs, return_as="generator", pre_dispatch="3*n_jobs")(wanted)
+    if stop.requested:
+        raise InterruptedRunError("interrupted; finished chunks are kept, the same command continues")
 
 
 def _answer_row(study: Study, answer: SearchAnswer, rules: Rules, first_id: int) -> list[pa.Table]:
@@ -201,17 +208,3 @@ def _drawn(study: Study, table: pa.Table) -> list[dict[str, Any]]:
     best = swept.sort_values([study.objective_column, "sensitivity"], ascending=False).groupby("cfa", observed=True)
     rows: list[dict[str, Any]] = [*named.to_dict("records"), *best.head(BEST_PER_CFA).to_dict("records")]
     return rows
-
-
-@contextmanager
-def _sigterm_as_interrupt() -> Iterator[None]:
-    """Let SIGTERM end a run as Ctrl-C does: workers are stopped, finished shards stay."""
-
-    def interrupt(_number: int, _frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)

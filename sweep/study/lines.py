@@ -79,12 +79,16 @@ class Document:
 
     def faults(self, error: ValidationError, model: type[BaseModel]) -> list[Fault]:
         """Pydantic's errors as faults of this file."""
-        found: dict[tuple[object, ...], Fault] = {}
+        found: dict[tuple[tuple[Key, ...], str], Fault] = {}
+        meant = set()
         for item in error.errors():
             path = self._known_path(item["loc"])
             fault = self._fault(path, item, model)
             found.setdefault((path, fault.problem), fault)
-        return list(found.values())
+            if item["type"] == "extra_forbidden":
+                meant.add((*path[:-1], fault.nearest))
+        # A misspelled key is one fault, not a second one because the right key is missing.
+        return [fault for (path, problem), fault in found.items() if not (problem == "missing" and path in meant)]
 
     def _known_path(self, loc: Sequence[Key]) -> tuple[Key, ...]:
         """`loc` without the tags that pydantic adds for unions, and with a missing last key kept."""
@@ -178,8 +182,7 @@ def dotted(path: Sequence[Key]) -> str:
 
 
 def _readable(message: str) -> str:
-    text = message.removeprefix("Input should be ").removeprefix("a valid ")
-    return text[:1].lower() + text[1:]
+    return message.removeprefix("Input should be ").removeprefix("a valid ")
 
 
 def _plain(node: Any) -> Any:

@@ -190,7 +190,7 @@ class _Resolver:
                 if curve not in sensor.qe:
                     missing = True
                     if (name, channel) not in changed:
-                        self.unknown(("cfas", name), f"channel {channel!r}: curve", curve, list(sensor.qe))
+                        self.unknown(("cfas", name), f"curve of channel {channel!r}", curve, list(sensor.qe))
             for channel in section.cfas[name].curves:
                 if channel not in mosaic.channels:
                     self.unknown(("cfas", name, "curves", channel), "channel", channel, list(mosaic.channels))
@@ -248,13 +248,14 @@ class _Resolver:
         self, axes: Mapping[str, tuple[float, ...]], path: tuple[Key, ...], parameters: tuple[Parameter, ...]
     ) -> list[tuple[float, ...]]:
         known = [parameter.name for parameter in parameters]
-        for name in axes:
-            if name not in known:
-                self.unknown((*path, name), "parameter", name, known)
+        misspelled = [name for name in axes if name not in known]
+        for name in misspelled:
+            self.unknown((*path, name), "parameter", name, known)
+        meant = {nearest(name, known) for name in misspelled}
         ordered = []
         for parameter in parameters:
             values = axes.get(parameter.name, () if parameter.default is None else (parameter.default,))
-            if not values:
+            if not values and parameter.name not in meant:
                 self.add((*path, parameter.name), "missing")
             for value in (min(values), max(values)) if values else ():
                 if not parameter.low <= value <= parameter.high:

@@ -13,7 +13,7 @@ from ..datasets import BUILT_IN_LIGHTS
 from ..datasets.lights import Lights, make_lights
 from ..errors import DataError, Fault, nearest
 from ..filters import BUILT_IN_SENSORS, SensorCurves, make_sensor
-from ..spectra import Curves, WavelengthGrid, photons_from_energy, resample
+from ..spectra import Curves, WavelengthGrid, photons_from_energy
 from ..surrogate import BUILT_IN_RANGE_NM
 from .lines import Document, Key
 from .schema import CurveFile, LightFile, LightsSection, SensorSection
@@ -100,9 +100,14 @@ class Sources:
                 nearest(name, known),
             )
             return None
-        if not (self.grid.start_nm >= BUILT_IN_RANGE_NM[0] and self.grid.stop_nm <= BUILT_IN_RANGE_NM[1]):
+        low, high = BUILT_IN_RANGE_NM
+        if not low <= self.grid.start_nm < self.grid.stop_nm <= high:
             asked = f"{self.grid.start_nm:g} to {self.grid.stop_nm:g} nm"
-            self._add(("wavelengths",), f"the built-in {key} ends before the grid", asked, "400 to 700 nm")
+            fault = self.document.fault(
+                ("wavelengths",), "the built-in curves end before the grid", asked, f"{low:g} to {high:g} nm"
+            )
+            if fault not in self.faults:
+                self.faults.append(fault)
             return None
         return known[name](self.grid)
 
@@ -116,7 +121,7 @@ class Sources:
         wave, raw = curves.wavelength_nm, curves.values[column]
         if entry.quantity == "energy":
             raw = photons_from_energy(wave, raw)
-            values = resample(wave, raw, self.grid, entry.resampling, entry.outside)
+            values = photons_from_energy(self.grid.nodes_nm, values)
         if not values.any():
             self._add(path, "the light has no photons on the wavelength grid", column)
             return None

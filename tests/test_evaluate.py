@@ -1,0 +1,117 @@
+"""The paper's exposure and the columns of an evaluation, against the formula written out by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sweep.datasets import BUILT_IN_LIGHTS
+from sweep.evaluate import Setup, evaluate, response_gradient, sensitivities, sensitivities_gradient, smooth_response
+from sweep.families import Stopband
+from sweep.filters import BUILT_IN_SENSORS
+from sweep.mosaics import Mosaic
+from sweep.scenes import FixedExposure, Scenario, WhitePatchExposure
+from sweep.sensor import Optics, Pixel
+from sweep.spectra import WavelengthGrid
+
+GRID = WavelengthGrid()
+SENSOR = BUILT_IN_SENSORS["ar0820"](GRID)
+LIGHTS = BUILT_IN_LIGHTS["tl16"](GRID)
+FAMILY = Stopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"])
+X = np.array([[606.6, 36.5, 645.8, 6.8, 1.0], [600.0, 20.0, 660.0, 30.0, 0.7]])
+
+
+def setup(name: str = "RYNCy", scenario: Scenario | None = None, base: str = "Y") -> Setup:
+    mosaic = Mosaic.from_name(name)
+    replaced = {"N": base} if "N" in mosaic.channels else None
+    modified = (mosaic.channels.index("N"),) if replaced else ()
+    qe = SENSOR.mosaic_qe(mosaic, replaced)
+    return Setup(GRID, mosaic, qe, modified, SENSOR.qe["C"], LIGHTS, Pixel(), scenario or Scenario())
+
+
+def by_hand(qe: dict[str, np.ndarray], level: float, ratio: float) -> np.ndarray:
+    """design.md's DN_c(signal) = level 4095 K sum(S q_c) / max_c' sum(W q_c'), S and W of equal photons."""
+    white = {c: q.mean() for c, q in qe.items()}
+    top = max(white.values())
+    rows = [[level * 4095 * ratio * (s * q).sum() / top for q in qe.values()] for s in LIGHTS.photons]
+    return np.array(rows)
+
+
+@pytest.mark.parametrize(("level", "ratio"), [(0.95, None), (0.5, 0.08)])
+def test_response_is_the_papers_exposure(level: float, ratio: float | None) -> None:
+    exposure = WhitePatchExposure(level=level, photon_ratio=ratio)
+    found = smooth_response(setup(scenario=Scenario(exposure=exposure)), FAMILY.curves(X))
+    for design, curve in zip(found, FAMILY.curves(X)[:, 0], strict=True):
+        qe = {"R": SENSOR.qe["R"], "Y": SENSOR.qe["Y"], "N": curve, "Cy": SENSOR.qe["Cy"]}
+        np.testing.assert_allclose(design, by_hand(qe, level, ratio or LIGHTS.photon_ratio), rtol=1e-12)
+
+
+def test_response_does_not_depend_on_well_pitch_or_optics() -> None:
+    usual = evaluate(setup(), FAMILY.curves(X))
+    scenario = Scenario(photon_radiance=1e15, optics=Optics(f_number=1.6, transmission=0.7))
+    other = replace(setup(scenario=scenario), pixel=Pixel(pitch_um=3.0, well_e=50_000.0))
+    found = evaluate(other, FAMILY.curves(X))
+    for name, values in usual.items():
+        if name != "exposure_s":
+            np.testing.assert_allclose(found[name], values, rtol=1e-12)
+
+
+def test_fixed_exposure_counts_photons() -> None:
+    scenario = Scenario(photon_radiance=1e18, exposure=FixedExposure(exposure_s=0.004))
+    pixel = Pixel(pitch_um=2.0)
+    found = smooth_response(replace(setup("RGGB", scenario), pixel=pixel), np.empty((1, 0, 301)))
+    mean_qe = (LIGHTS.photons * SENSOR.qe["G"]).sum(axis=1)
+    n_e = 1e18 * np.pi / 65 * mean_qe * 4e-12 * 0.004
+    np.testing.assert_allclose(found[0, :, 1], n_e * 4095 / 10_000, rtol=1e-12)
+
+
+def test_csd_is_of_the_quantized_readout() -> None:
+    curves = FAMILY.curves(X)
+    found = evaluate(setup(), curves)
+    points = np.floor(smooth_response(setup(), curves) + 0.5)
+    for design in range(2):
+        yellow, red = (points[design, LIGHTS.members[c]] for c in ("yellow", "red"))
+        brute = min(np.linalg.norm(y - r) for y in yellow for r in red)
+        assert found["csd_yellow_red"][design] == pytest.approx(brute, rel=1e-14)
+    assert [n for n in found if n.startswith("csd_")] == [
+        "csd_green_yellow",
+        "csd_green_orange",
+        "csd_green_red",
+        "csd_yellow_orange",
+        "csd_yellow_red",
+        "csd_orange_red",
+    ]
+
+
+def test_sensitivities_of_a_design() -> None:
+    found = evaluate(setup(), FAMILY.curves(X))
+    n = FAMILY.curves(X)[:, 0].sum(axis=1)
+    np.testing.assert_allclose(found["sensitivity"], n / SENSOR.qe["Y"].sum(), rtol=1e-14)
+    total = sum(SENSOR.qe[c].sum() for c in ("R", "Y", "Cy")) + n
+    np.testing.assert_allclose(found["cfa_sensitivity"], total / 4 / SENSOR.qe["C"].sum(), rtol=1e-13)
+    plain = evaluate(setup("RGGB"), np.empty((1, 0, 301)))
+    assert np.isnan(plain["sensitivity"][0])
+    rggb = (SENSOR.qe["R"] + 2 * SENSOR.qe["G"] + SENSOR.qe["B"]).sum() / 4 / SENSOR.qe["C"].sum()
+    assert plain["cfa_sensitivity"][0] == pytest.approx(rggb, rel=1e-13)
+
+
+@pytest.mark.parametrize("kind", ["white_patch", "white_patch_set_by_n", "fixed"])
+def test_gradients_agree_with_central_differences(kind: str) -> None:
+    scenario = Scenario(exposure=FixedExposure(exposure_s=0.005)) if kind == "fixed" else Scenario()
+    made, family = setup(scenario=scenario), FAMILY
+    if kind == "white_patch_set_by_n":  # N over the clear pixel is the brightest channel, so it sets the exposure
+        made = setup(base="C")
+        family = Stopband(GRID.nodes_nm, SENSOR.qe["C"], SENSOR.qe["G"])
+    x, step = X[1], 1e-4
+    exact = response_gradient(made, family.curves(x[None])[0], family.gradient(x))
+    amounts = sensitivities_gradient(made, family.gradient(x))
+    for index in range(5):
+        shift = np.eye(5)[index] * step
+        ends = family.curves(np.stack([x + shift, x - shift]))
+        response = smooth_response(made, ends)
+        np.testing.assert_allclose(exact[index], (response[0] - response[1]) / (2 * step), atol=2e-5)
+        values = sensitivities(made, ends)
+        for name, gradient in amounts.items():
+            assert gradient[index] == pytest.approx((values[name][0] - values[name][1]) / (2 * step), abs=1e-8)

@@ -1,0 +1,91 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sweep.constraints import FEASIBLE
+from sweep.evaluate import sensitivities, smooth_response
+from sweep.metrics import separation
+from sweep.search import ALGORITHMS, Evaluation, best_feasible, search_from, starting_points
+from sweep.study import Study, load_study
+
+from .conftest import STUDIES
+
+
+@pytest.fixture(scope="module")
+def study() -> Study:
+    return load_study(STUDIES / "stopband.yaml")
+
+
+@pytest.mark.parametrize("algorithm", list(ALGORITHMS))
+def test_search_beats_a_fine_grid_of_its_box(study: Study, algorithm: str) -> None:
+    assert study.search is not None
+    problem = study.problem(study.search)
+    rng = np.random.default_rng(7)
+    x = problem.from_unit(rng.uniform(size=(20_000, problem.free.size)))
+    curves = problem.family.curves(x)
+    ok = (sensitivities(problem.setup, curves)["sensitivity"] >= 0.90) & (problem.family.violation(x) <= 0).all(axis=1)
+    members = problem.setup.members
+    csd = separation(smooth_response(problem.setup, curves[ok]), members["yellow"], members["red"])
+    log = []
+    for start, u in enumerate(starting_points(problem.free.size, 4, 1)):
+        log += search_from(problem, start, u, algorithm, 125).log
+    best = best_feasible(log)
+    assert best is not None
+    assert best.csd >= csd.max()
+
+
+def test_answer_is_feasible_when_checked_again(study: Study) -> None:
+    assert study.search is not None
+    problem = study.problem(study.search)
+    run = search_from(problem, 0, starting_points(problem.free.size, 1, 1)[0], "SLSQP", 125)
+    best = best_feasible(run.log)
+    assert best is not None
+    curve = problem.family.curves(best.x[None])[0, 0]
+    assert curve.sum() / study.sensor.qe["Y"].sum() >= 0.90 * (1 - FEASIBLE)
+    assert ((best.x >= problem.low) & (best.x <= problem.high)).all()
+    assert (problem.family.violation(best.x[None]) <= FEASIBLE).all()
+
+
+def test_budget_counts_simulations(study: Study) -> None:
+    assert study.search is not None
+    problem = study.problem(study.search)
+    for budget in (1, 2, 7):
+        run = search_from(problem, 0, np.full(problem.free.size, 0.3), "MMA", budget)
+        assert len(run.log) <= budget + 1
+        assert run.status == "maxeval_reached"
+
+
+def test_same_seed_same_log(study: Study) -> None:
+    assert study.search is not None
+    problem = study.problem(study.search)
+    u = starting_points(problem.free.size, 3, 5)
+    np.testing.assert_array_equal(u, starting_points(problem.free.size, 3, 5))
+    assert not np.array_equal(u, starting_points(problem.free.size, 3, 6))
+    logs = [[e.csd for e in search_from(problem, 0, u[2], "SLSQP", 60).log] for _ in range(2)]
+    assert logs[0] == logs[1]
+
+
+def test_best_of_a_log() -> None:
+    def made(csd: float, violation: float) -> Evaluation:
+        return Evaluation(np.zeros(1), csd, 1.0, 1.0, violation)
+
+    log = [made(1, 0), made(9, 1e-6), made(5, 1e-10), made(np.nan, 0), made(5, 0)]
+    assert best_feasible(log) is log[2]
+    assert best_feasible(log[1:2]) is None
+
+
+def test_constraint_on_another_pair_is_met(tmp_path: Path) -> None:
+    text = (STUDIES / "stopband.yaml").read_text().replace("{min: 0.90}", "{min: 0.85}\n  csd_orange_red: {min: 100}")
+    (tmp_path / "s.yaml").write_text(text)
+    study = load_study(tmp_path / "s.yaml")
+    assert study.search is not None
+    problem = study.problem(study.search)
+    log = [e for i, u in enumerate(starting_points(4, 4, 1)) for e in search_from(problem, i, u, "SLSQP", 125).log]
+    best = best_feasible(log)
+    assert best is not None
+    members = problem.setup.members
+    response = smooth_response(problem.setup, problem.family.curves(best.x[None]))
+    assert separation(response, members["orange"], members["red"])[0] >= 100 * (1 - FEASIBLE)
