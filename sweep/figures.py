@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .arrays import FloatArray
 
 if TYPE_CHECKING:
@@ -33,7 +35,7 @@ CURVE_COLORS = {
 }
 _CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 _LABEL_BOX = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0}
-_DRAWN_POINTS = 20_000
+_DRAWN_POINTS = 10_000
 
 
 @dataclass(frozen=True)
@@ -70,11 +72,12 @@ class CurvesFigure:
 
 
 def thin(points: Points, most: int = _DRAWN_POINTS) -> Points:
-    """Every k-th point so that at most `most` are left; labeled points are all kept."""
+    """At most `most` of the points, spread evenly and not in step with a grid; labeled points are all kept."""
     if points.labels or points.x.size <= most:
         return points
-    step = -(-points.x.size // most)
-    return Points(points.x[::step], points.y[::step])
+    golden = (np.arange(most) * ((5**0.5 - 1) / 2)) % 1
+    kept = np.unique((golden * points.x.size).astype(np.intp))
+    return Points(points.x[kept], points.y[kept])
 
 
 def draw_pareto(figure: ParetoFigure) -> Figure:
