@@ -16,10 +16,6 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-# One thread for the libraries in this process, as in a worker.
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[variable] = "1"
-
 import numpy as np
 from scipy.spatial.distance import cdist
 
@@ -71,7 +67,9 @@ def main() -> None:
     script_rate = SCRIPT_DESIGNS / median_s(script)
     block_rate = len(points) / median_s(block)
     one, two = whole(1), whole(2)
-    start_up = median_s(lambda: subprocess.run([sys.executable, "-m", "sweep", "--help"], capture_output=True, check=True))
+    start_up = median_s(
+        lambda: subprocess.run([sys.executable, "-m", "sweep", "--help"], capture_output=True, check=True)
+    )
     found = {
         "script_designs_per_s": script_rate,
         "block_designs_per_s": block_rate,
