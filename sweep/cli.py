@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .errors import SweepError
+from .errors import StudyError, SweepError
 
 if TYPE_CHECKING:
     from .report import Output
@@ -62,6 +62,35 @@ def check(study: StudyPath, data: DataFolder = None) -> None:
     typer.echo(f"{study}: {loaded.n_designs:,} designs on {', '.join(loaded.mosaics)}; nothing wrong found.")
     for warning in loaded.warnings:
         typer.echo(f"Note: {warning}.")
+
+
+@app.command()
+def calibrate(
+    study: StudyPath,
+    output: Annotated[Path, typer.Option(help="Folder for the result.")] = Path("outputs/calibration"),
+    seed: Annotated[int, typer.Option(min=0)] = 1,
+    starts: Annotated[int, typer.Option(min=1, help="Starting points of each fit.")] = 4,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Worker processes.", show_default="all cores")] = None,
+) -> None:
+    """Fit the built-in surrogate curves to the figures that STUDY publishes."""
+    from .calibration import calibrate as fit
+    from .calibration.output import lines, parameter_file, record
+    from .progress import ProgressDisplay
+    from .store import write_json, write_text
+    from .study import load_study
+
+    loaded = load_study(study)
+    geometry = set(loaded.geometry)
+    printed = {r: dict(v) for rows in loaded.section.published.values() for r, v in rows.items() if r not in geometry}
+    if not printed:
+        raise StudyError(f"{study}: the study has no `published` figures to fit to")
+    with ProgressDisplay() as display:
+        found = fit(printed, seed, starts, jobs or os.cpu_count() or 1, display.update)
+    write_text(parameter_file(found), output / "surrogate.yaml")
+    write_json(record(found), output / "calibration.json")
+    for line in lines(found):
+        typer.echo(line)
+    typer.echo(f"Files: {output}/: surrogate.yaml (ships as sweep/data/surrogate.yaml), calibration.json.")
 
 
 def _finish(folder: Path) -> None:

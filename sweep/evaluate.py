@@ -142,13 +142,22 @@ def sensitivities_gradient(setup: Setup, curves_gradient: FloatArray) -> dict[st
     }
 
 
+def readout(setup: Setup, curves: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Digital numbers as read out, ndarray[n_designs, n_signals, n_channels], and exposure, s, ndarray[n_designs].
+
+    `curves` as in `all_channels`.
+    """
+    raw, exposure_s = electrons(setup, all_channels(setup, curves))
+    return digital_numbers(raw, setup.pixel), exposure_s
+
+
 def evaluate(setup: Setup, curves: FloatArray) -> dict[str, FloatArray]:
     """Evaluate a block of designs as the camera reads them out (clipped and quantized).
 
     `curves` as in `all_channels`. Returns columns, each ndarray[n_designs]: `csd_<a>_<b>` (DN) of every pair of
     signal types, `sensitivity`, `cfa_sensitivity` and `exposure_s`.
     """
-    raw, exposure_s = electrons(setup, all_channels(setup, curves))
-    distances = separations(digital_numbers(raw, setup.pixel), setup.members)
+    response, exposure_s = readout(setup, curves)
+    distances = separations(response, setup.members)
     columns = {csd_name(pair): values for pair, values in distances.items()}
     return columns | sensitivities(setup, curves) | {"exposure_s": exposure_s}

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import io
+import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from .arrays import FloatArray
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.patches import Rectangle
 
 COLORS = {
     "infeasible": "#b8b8b8",
@@ -33,6 +35,7 @@ CURVE_COLORS = {
     "Cy": "#17a2a2",
     "C": "#555555",
 }
+TYPE_COLORS = {"green": "#009e73", "yellow": "#c9a800", "orange": "#e66100", "red": "#b2182b"}
 _CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 _LABEL_BOX = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0}
 _DRAWN_POINTS = 10_000
@@ -62,13 +65,35 @@ class ParetoFigure:
 
 @dataclass(frozen=True)
 class CurvesFigure:
-    """Curves over wavelength; `curves` maps a name to ndarray[n_wavelengths], `dashed` names those drawn dashed."""
+    """Curves over wavelength: name -> ndarray[n_wavelengths], or ndarray[n, n_wavelengths] for a bundle of one name.
+
+    `dashed` names those drawn dashed; `colors` overrides the usual colors.
+    """
 
     title: str
     y_label: str
     wavelength_nm: FloatArray
     curves: Mapping[str, FloatArray]
     dashed: Sequence[str] = ()
+    colors: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """Signals of one design in the plane of two channels: signal type -> x and y, DN, each ndarray[n]."""
+
+    title: str
+    x_label: str
+    y_label: str
+    types: Mapping[str, tuple[FloatArray, FloatArray]]
+
+
+@dataclass(frozen=True)
+class ChartFigure:
+    """The color checker chart: signal type -> sRGB colors of its patches, ndarray[n, 3]."""
+
+    title: str
+    patches: Mapping[str, FloatArray]
 
 
 def thin(points: Points, most: int = _DRAWN_POINTS) -> Points:
@@ -146,9 +171,12 @@ def draw_curves(figure: CurvesFigure) -> Figure:
     canvas, axes = _canvas(8.0, 4.0)
     spare = iter(_CYCLE * (1 + len(figure.curves) // len(_CYCLE)))
     for name, values in figure.curves.items():
-        color = CURVE_COLORS.get(name) or next(spare)
+        color = figure.colors.get(name) or CURVE_COLORS.get(name) or next(spare)
         style = "--" if name in figure.dashed else "-"
-        axes.plot(figure.wavelength_nm, values, style, color=color, label=name, linewidth=1.6)
+        lines = values.reshape(-1, figure.wavelength_nm.size)
+        width = 1.6 if len(lines) == 1 else 0.7
+        labels = [name] + [None] * (len(lines) - 1)
+        axes.plot(figure.wavelength_nm, lines.T, style, color=color, linewidth=width, label=labels)
     axes.set_xlabel("wavelength / nm")
     axes.set_ylabel(figure.y_label)
     axes.set_ylim(bottom=0)
@@ -158,18 +186,72 @@ def draw_curves(figure: CurvesFigure) -> Figure:
     return canvas
 
 
+def draw_clouds(rows: Sequence[Sequence[Cloud]], title: str, top_dn: float) -> Figure:
+    """A row of panels per design, all with the same axes up to `top_dn`, so that distances compare by eye."""
+    most = max(len(row) for row in rows)
+    figure = _figure(3.1 * most + 1.0, 2.9 * len(rows) + 0.6)
+    panels = figure.subplots(len(rows), most, squeeze=False)
+    for line, row in zip(panels, rows, strict=True):
+        for axes in line[len(row) :]:
+            axes.set_axis_off()
+        for axes, cloud in zip(line, row, strict=False):
+            _decorate(axes)
+            for (name, (x, y)), marker in zip(cloud.types.items(), itertools.cycle("osD^vP")):
+                axes.scatter(x, y, s=13, marker=marker, color=TYPE_COLORS.get(name), label=name, linewidths=0)
+            axes.set(xlim=(0, top_dn), ylim=(0, top_dn), aspect="equal", xlabel=cloud.x_label, ylabel=cloud.y_label)
+            axes.set_title(cloud.title, fontsize=9)
+    panels[0][0].legend(fontsize=7, frameon=False)
+    figure.suptitle(title)
+    return figure
+
+
+def draw_chart(chart: ChartFigure) -> Figure:
+    """Draw the patches, a row per signal type, and the gray reference steps."""
+    figure = _figure(8.0, 0.55 * (len(chart.patches) + 1) + 0.8)
+    axes = figure.add_subplot()
+    steps = np.linspace(1.0, 0.1, 6)
+    rows = [*chart.patches.items(), ("gray reference", np.repeat(steps[:, None], 3, axis=1))]
+    for height, (_, colors) in enumerate(rows):
+        for place, color in enumerate(colors):
+            axes.add_patch(_rectangle(place, -height, color))
+    axes.set_xlim(-0.1, max(len(colors) for _, colors in rows))
+    axes.set_ylim(-len(rows) + 0.9, 1.0)
+    axes.set_yticks([0.45 - height for height in range(len(rows))], [name for name, _ in rows])
+    axes.set_xticks([])
+    axes.set_aspect("equal")
+    for side in axes.spines.values():
+        side.set_visible(False)
+    axes.set_title(chart.title)
+    return figure
+
+
+def _rectangle(x: float, y: float, color: FloatArray) -> Rectangle:
+    from matplotlib.patches import Rectangle  # noqa: PLC0415  (slow to import)
+
+    return Rectangle((x, y), 0.9, 0.9, facecolor=tuple(color))
+
+
 def _canvas(width_in: float, height_in: float) -> tuple[Figure, Axes]:
+    figure = _figure(width_in, height_in)
+    axes = figure.add_subplot()
+    _decorate(axes)
+    return figure, axes
+
+
+def _figure(width_in: float, height_in: float) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415  (slow to import)
     from matplotlib.figure import Figure  # noqa: PLC0415
 
     figure = Figure(figsize=(width_in, height_in), layout="constrained")
     FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
+    return figure
+
+
+def _decorate(axes: Axes) -> None:
     axes.grid(visible=True, color="#e4e4e4", linewidth=0.6)
     axes.set_axisbelow(True)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
-    return figure, axes
 
 
 def rendered(figure: Figure, kind: str) -> bytes:

@@ -55,4 +55,4 @@ class ProgressDisplay:
             self._last_line = now
             rate = (done - self._first) / max(now - self._started, 1e-9)
             eta = f"{(total - done) / rate:.0f} s left" if rate > 0 else "unknown time left"
-            print(f"{phase}: {done:,} of {total:,}, {rate:,.0f}/s, {eta}", file=sys.stderr, flush=True)
+            print(f"{phase}: {done:,} of {total:,}, {rate:,.3g}/s, {eta}", file=sys.stderr, flush=True)

@@ -10,6 +10,9 @@ from pydantic import Field
 from .schema import Positive, Section
 from .sensor import Optics
 
+OBJECT_RESOLUTION = "object_resolution_px"
+"""Name of the quantity that a geometry gives."""
+
 
 class WhitePatchExposure(Section):
     """The paper's exposure: the brightest channel on the white patch reaches `level` of full scale, per CFA.

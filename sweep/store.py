@@ -19,6 +19,7 @@ SCHEMA_VERSION = "1"
 RESULTS = "results.parquet"
 SEARCH_LOG = "search.parquet"
 CURVES = "curves.parquet"
+POINTS = "points.parquet"
 PROVENANCE = "provenance.json"
 RESOLVED = "study.resolved.yaml"
 _SHARDS = "shards"
@@ -70,10 +71,15 @@ def write_table(table: pa.Table, path: Path) -> None:
         pq.write_table(table, hidden, row_group_size=131_072)
 
 
+def write_bytes(content: bytes, path: Path) -> None:
+    """Write one file atomically; errors as for `atomic`."""
+    with atomic(path) as hidden:
+        hidden.write_bytes(content)
+
+
 def write_text(text: str, path: Path) -> None:
     """Write one UTF-8 text file atomically; errors as for `atomic`."""
-    with atomic(path) as hidden:
-        hidden.write_text(text, encoding="utf-8")
+    write_bytes(text.encode("utf-8"), path)
 
 
 def write_json(data: Mapping[str, Any], path: Path) -> None:

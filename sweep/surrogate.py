@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from importlib.resources import files
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 from ruamel.yaml import YAML
@@ -13,6 +13,7 @@ from .schema import Fraction, NonNegative, Positive, Section
 
 BUILT_IN_RANGE_NM = (400.0, 700.0)
 """Wavelengths that the surrogate curves are stated for; an IR cut filter closes the rest."""
+LEAK_NODES_NM = (400.0, 600.0, 700.0)
 
 
 class ClearPixel(Section):
@@ -20,6 +21,13 @@ class ClearPixel(Section):
 
     wavelength_nm: list[Positive]
     qe: list[Fraction]
+
+
+class IrCut(Section):
+    """The infrared cut filter before all pixels: a falling logistic edge; `width_nm` is its 10-90 % width."""
+
+    center_nm: Positive
+    width_nm: Positive
 
 
 class FilterEdge(Section):
@@ -31,10 +39,13 @@ class FilterEdge(Section):
 
 
 class FilterParameters(Section):
-    """A color filter's transmission: `leak` where it is closed, `peak` where all edges are open."""
+    """A color filter's transmission: `peak` where all edges are open, `leak` where it is closed.
+
+    `leak` holds the values at LEAK_NODES_NM: dyes close best somewhere and open again toward the ends.
+    """
 
     peak: Fraction
-    leak: Fraction
+    leak: Annotated[list[Fraction], Field(min_length=3, max_length=3)]
     edges: list[FilterEdge]
 
 
@@ -47,18 +58,35 @@ class LedParameters(Section):
     red_nm: Positive
 
 
-class SurrogateParameters(Section):
-    """The whole file `data/surrogate.yaml`."""
+class StopbandParameters(Section):
+    """A stopband filter of the paper, as `families.Stopband` takes it."""
 
-    provenance: str
+    left_nm: Positive
+    left_width_nm: Positive
+    right_nm: Positive
+    right_width_nm: Positive
+
+
+class SurrogateParameters(Section):
+    """The whole file: `data/surrogate.yaml` as shipped, `data/prior.yaml` as the calibration's start."""
+
+    provenance: dict[str, str | int | float]
     photon_ratio: Positive
     clear_pixel: ClearPixel
+    ir_cut: IrCut
     filters: dict[str, FilterParameters]
     lights: dict[str, dict[str, LedParameters]]
+    stopbands: dict[str, StopbandParameters]
 
 
 @cache
-def surrogate_parameters() -> SurrogateParameters:
-    """Read the file that ships with the package."""
-    text = files(__package__).joinpath("data/surrogate.yaml").read_text(encoding="utf-8")
-    return SurrogateParameters.model_validate(YAML(typ="safe").load(text))
+def surrogate_parameters(name: str = "surrogate") -> SurrogateParameters:
+    """Read a parameter file that ships with the package."""
+    return SurrogateParameters.model_validate(parameter_tree(name))
+
+
+def parameter_tree(name: str) -> dict[str, Any]:
+    """The file as plain mappings and lists."""
+    text = files(__package__).joinpath(f"data/{name}.yaml").read_text(encoding="utf-8")
+    tree: dict[str, Any] = YAML(typ="safe").load(text)
+    return tree

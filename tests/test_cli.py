@@ -35,6 +35,8 @@ def test_stopband_makes_its_files(stopband: tuple[Path, list[str]]) -> None:
         "results.parquet",
         "search.parquet",
         "curves.parquet",
+        "points.parquet",
+        "figures",
         "study.resolved.yaml",
         "provenance.json",
         "pareto.png",

@@ -100,7 +100,7 @@ def test_the_measured_study_loads() -> None:
             "search:\n",
             "serach:\n",
             "tiny.yaml:20: serach: unknown key; allowed: study, question, seed, wavelengths, sensor, pixel, lights, "
-            "scenarios, geometry, cfas, designs, sweeps, objective, constraints, search; did you mean 'search'?",
+            "scenarios, geometry, cfas, designs, sweeps, objective, constraints, search, published; did you mean 'search'?",
         ),
         (
             "min: 590, max: 610",

@@ -1,5 +1,5 @@
 """Quantum efficiency curves of sensors."""
 
-from .sensors import BUILT_IN_SENSORS, SensorCurves, make_sensor
+from .sensors import BUILT_IN_SENSORS, SensorCurves, ar0820_sensor, make_sensor
 
-__all__ = ["BUILT_IN_SENSORS", "SensorCurves", "make_sensor"]
+__all__ = ["BUILT_IN_SENSORS", "SensorCurves", "ar0820_sensor", "make_sensor"]

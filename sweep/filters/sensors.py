@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,7 +11,7 @@ from ..arrays import FloatArray
 from ..errors import DataError, Fault, nearest
 from ..mosaics import Mosaic
 from ..spectra import WavelengthGrid
-from ..surrogate import surrogate_parameters
+from ..surrogate import SurrogateParameters, surrogate_parameters
 from .ar0820 import ar0820
 
 
@@ -78,11 +78,14 @@ def make_sensor(name: str, qe: Mapping[str, FloatArray], source: str, clear: str
     return sensor
 
 
-def _ar0820(grid: WavelengthGrid) -> SensorCurves:
-    curves = ar0820(grid, surrogate_parameters())
+def ar0820_sensor(grid: WavelengthGrid, parameters: SurrogateParameters) -> SensorCurves:
+    """The surrogate sensor from its parameters; RCCC and RCCB have a red of their own."""
+    curves = ar0820(grid, parameters)
     red = {"R": "Rx"}
     return SensorCurves("ar0820", curves.values, "C", curves.source, True, {"RCCC": red, "RCCB": red})
 
 
-BUILT_IN_SENSORS = {"ar0820": _ar0820}
+BUILT_IN_SENSORS: dict[str, Callable[[WavelengthGrid], SensorCurves]] = {
+    "ar0820": lambda grid: ar0820_sensor(grid, surrogate_parameters())
+}
 """Sensors that a study can name; each is a function of the wavelength grid (inside 400-700 nm)."""

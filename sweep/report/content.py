@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from ..figures import CurvesFigure, ParetoFigure, Points
+from ..chromaticity import display_colors
+from ..figures import TYPE_COLORS, ChartFigure, Cloud, CurvesFigure, ParetoFigure, Points
+from ..spectra import WavelengthGrid
 from .outputs import Output
 
 QUANTITIES = ("sensitivity", "cfa_sensitivity")
@@ -62,14 +64,47 @@ def sensor_figure(output: Output) -> CurvesFigure:
 
 
 def lights_figure(output: Output) -> CurvesFigure:
-    """The mean photon spectrum of each signal type."""
+    """The photon spectra of all signals."""
+    bundles = {f"{kind} ({len(photons)})": photons for kind, photons in _lights(output).items()}
+    colors = {name: TYPE_COLORS[kind] for kind in TYPE_COLORS for name in bundles if name.startswith(f"{kind} (")}
+    title = f"Signals, {_origin(output, 'lights')}"
+    return CurvesFigure(title, "photons per nm, each signal 1 photon", _wave(output), bundles, colors=colors)
+
+
+def chart_figure(output: Output) -> ChartFigure:
+    """The color checker chart that the signals make."""
+    grid = WavelengthGrid(**output.study["wavelengths"])
+    patches = {kind: display_colors(grid, photons) for kind, photons in _lights(output).items()}
+    return ChartFigure("Color checker chart: a patch per signal, as near as sRGB comes", patches)
+
+
+def _lights(output: Output) -> dict[str, np.ndarray]:
+    """Signal type -> photon spectra, ndarray[n_signals, n_wavelengths]."""
     types: dict[str, list[str]] = {}
     for column in output.curves.columns:
         if column.startswith("light:"):
             types.setdefault(column.split(":")[1], []).append(column)
-    means = {f"{t} ({len(c)})": output.curves[c].to_numpy().mean(axis=1) for t, c in types.items()}
-    title = f"Signals, mean of each type, {_origin(output, 'lights')}"
-    return CurvesFigure(title, "photons per nm, each signal 1 photon", _wave(output), means)
+    return {kind: output.curves[columns].to_numpy().T for kind, columns in types.items()}
+
+
+def clouds(output: Output, *kinds: str) -> list[list[Cloud]]:
+    """Point clouds of the designs of some kinds: a row per design, the first channel against each other one."""
+    rows = output.kind(*kinds)
+    rows = rows[rows["scenario"] == next(iter(output.study["scenarios"]))]
+    found = []
+    for row in rows.to_dict("records"):
+        points = output.points[output.points["design_id"] == row["design_id"]]
+        first, *others = dict.fromkeys(points["channel"])
+        found.append([_cloud(points, f"{label(row)}: {first}, {other}", first, other) for other in others])
+    return found
+
+
+def _cloud(points: pd.DataFrame, title: str, first: str, other: str) -> Cloud:
+    types = {}
+    for kind, signals in points.groupby("signal_type", sort=False):
+        by_channel = {name: values["dn"].to_numpy() for name, values in signals.groupby("channel")}
+        types[str(kind)] = (by_channel[first], by_channel[other])
+    return Cloud(title, f"{first} / DN", f"{other} / DN", types)
 
 
 def filters_figure(output: Output, cfa: str) -> CurvesFigure:

@@ -16,7 +16,7 @@ from ruamel.yaml.error import YAMLError
 from ..constraints import Bound
 from ..errors import Fault, OutputError
 from ..scenes import Geometry
-from ..store import CURVES, PROVENANCE, RESOLVED, RESULTS, read_table
+from ..store import CURVES, POINTS, PROVENANCE, RESOLVED, RESULTS, read_table
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,7 @@ class Output:
     provenance: Mapping[str, Any]
     table: pd.DataFrame
     curves: pd.DataFrame
+    points: pd.DataFrame
 
     @property
     def objective(self) -> str:
@@ -73,7 +74,14 @@ def read_output(folder: Path) -> Output:
     study = _mapping(folder / RESOLVED, lambda text: YAML(typ="safe").load(text))
     provenance = _mapping(folder / PROVENANCE, json.loads)
     table = read_table(folder / RESULTS).to_pandas()
-    return Output(folder, study, provenance, table, read_table(folder / CURVES).to_pandas())
+    return Output(
+        folder,
+        study,
+        provenance,
+        table,
+        read_table(folder / CURVES).to_pandas(),
+        read_table(folder / POINTS).to_pandas(),
+    )
 
 
 def _mapping(path: Path, parse: Any) -> dict[str, Any]:

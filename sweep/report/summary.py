@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from .comparison import comparison_lines, comparison_with_published
 from .content import geometry_table, readable
 from .outputs import Output
 
@@ -45,6 +46,7 @@ def summary_lines(output: Output) -> list[str]:
             f"{row['scenario']}: {row['distance_m']:g} m, {row['fov_deg']:g} deg: "
             f"{row['object_resolution_px']:g} px across the light."
         )
+    lines += comparison_lines(comparison_with_published(output))
     lines.append(_counts(output))
     search = output.provenance.get("search")
     if search:

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import joblib
-import numpy as np
 import pyarrow as pa
 
 from ..errors import InterruptedRunError
@@ -19,6 +18,7 @@ from ..search import Evaluation, SearchRun, best_feasible, search_from, starting
 from ..spaces import Space
 from ..store import (
     CURVES,
+    POINTS,
     PROVENANCE,
     RESOLVED,
     RESULTS,
@@ -32,16 +32,13 @@ from ..store import (
     write_text,
 )
 from ..study import Search, Study
+from .drawn import curves_table, points_table
 from .jobs import Job, Rules, jobs_of, mark_front, run_job
 from .provenance import fingerprint, provenance, resolved_yaml
 from .stopping import Stop, leave_signals_to_the_parent, stop_on_signals
 
 Progress = Callable[[str, int, int], None]
 """Called with the phase's name, how much is done, and the total."""
-
-
-BEST_PER_CFA = 5
-"""Best feasible designs of each CFA's sweeps that the report lists and draws."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +53,9 @@ class SearchAnswer:
 def run_study(study: Study, output: Path, n_jobs: int, progress: Progress, command: Sequence[str] = ()) -> None:
     """Run a study into `output`; finished chunks of an earlier, interrupted run of the same study are kept.
 
-    Writes `results.parquet`, `search.parquet` (when the study searches), `curves.parquet`, `study.resolved.yaml` and
-    `provenance.json`, each atomically. Raises OutputError when the folder is in use or cannot be written.
+    Writes `results.parquet`, `search.parquet` (when the study searches), `curves.parquet`, `points.parquet`,
+    `study.resolved.yaml` and `provenance.json`, each atomically. Raises OutputError when the folder is in use or cannot
+    be written.
     """
     started = time.monotonic()
     schema = result_schema(study.parameters, quantities(study.lights))
@@ -75,7 +73,8 @@ def run_study(study: Study, output: Path, n_jobs: int, progress: Progress, comma
             (output / SEARCH_LOG).unlink(missing_ok=True)
         table = mark_front(table, rules)
         write_table(table, output / RESULTS)
-        write_table(_curves(study, table), output / CURVES)
+        write_table(curves_table(study, table), output / CURVES)
+        write_table(points_table(study, table), output / POINTS)
         write_text(resolved_yaml(study), output / RESOLVED)
         origin = provenance(study, n_jobs, command, time.monotonic() - started)
         write_json(origin | facts, output / PROVENANCE)
@@ -174,37 +173,3 @@ def _search_log(answer: SearchAnswer) -> pa.Table:
         for index, e in enumerate(run.log)
     ]
     return pa.Table.from_pylist(rows, schema=search_schema(names))
-
-
-def _curves(study: Study, table: pa.Table) -> pa.Table:
-    """Curves that a report draws: the sensor's, the lights', and the modified channel of named and best designs."""
-    columns: dict[str, Any] = {"wavelength_nm": study.grid.nodes_nm}
-    columns |= {f"qe:{name}": values for name, values in study.sensor.qe.items()}
-    lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
-    columns |= {f"light:{kind}:{name}": values for kind, name, values in lights}
-    spaces = {(space.kind, space.name): space for space in study.spaces}
-    for row in _drawn(study, table):
-        space = spaces.get((row["kind"], row["name"])) or _sweep_of(study, row)
-        point = np.array([[row[name] for name in space.parameters]], dtype=float)
-        for index, curve in enumerate(space.curves(point, study.grid.size)[0]):
-            columns[f"design:{row['design_id']}:{index}"] = curve
-    return pa.table(columns)
-
-
-def _sweep_of(study: Study, row: dict[str, Any]) -> Space:
-    """The sweep that a row of a sweep or a search belongs to; ids run through the spaces of each scenario."""
-    if row["kind"] == "search":
-        assert study.search is not None
-        return study.search.space
-    job = next(job for job in jobs_of(study) if job.first_id <= row["design_id"] < job.first_id + job.stop - job.start)
-    return job.space
-
-
-def _drawn(study: Study, table: pa.Table) -> list[dict[str, Any]]:
-    """Rows whose filter is drawn: named designs, the search's answer, the best feasible designs of each sweep."""
-    frame = table.to_pandas()
-    named = frame[frame["kind"].isin(["design", "search"])]
-    swept = frame[(frame["kind"] == "sweep") & frame["feasible"]]
-    best = swept.sort_values([study.objective_column, "sensitivity"], ascending=False).groupby("cfa", observed=True)
-    rows: list[dict[str, Any]] = [*named.to_dict("records"), *best.head(BEST_PER_CFA).to_dict("records")]
-    return rows

@@ -12,17 +12,18 @@ from ..constraints import Bound
 from ..datasets.lights import Lights
 from ..errors import StudyError, SweepError, nearest
 from ..evaluate import Setup
-from ..families import FAMILIES, Parameter
+from ..families import FAMILIES, Parameter, Stopband
 from ..filters import SensorCurves
 from ..metrics import Pair, class_pairs, csd_name
 from ..mosaics import Mosaic
-from ..scenes import Geometry, Scenario
+from ..scenes import OBJECT_RESOLUTION, Geometry, Scenario
 from ..search import ALGORITHMS, Problem
 from ..sensor import Pixel
 from ..spaces import Filter, Kind, Space
 from ..spectra import WavelengthGrid
+from ..surrogate import surrogate_parameters
 from .lines import Document, Key
-from .schema import CfaSection, Modification, StudySection
+from .schema import CfaSection, DesignSection, Modification, StudySection
 from .sources import Sources
 
 SENSITIVITIES = ("sensitivity", "cfa_sensitivity")
@@ -145,6 +146,7 @@ class _Resolver:
         spaces = self.spaces(sensor, mosaics)
         objective = self.objective(lights)
         self.check_constraints(lights)
+        self.check_published(lights, mosaics)
         search = self.search(spaces)
         if self.faults or objective is None:
             raise StudyError(self.faults)
@@ -197,7 +199,7 @@ class _Resolver:
             if not missing:
                 spaces.append(Space("reference", name, name))
         for name, design in section.designs.items():
-            axes: dict[str, tuple[float, ...]] = {key: (value,) for key, value in design.at.items()}
+            axes: dict[str, tuple[float, ...]] = {key: (value,) for key, value in self.built_in(name, design).items()}
             spaces += self.filtered(
                 "design", name, design, axes, ("designs", name, "at"), sensor=sensor, mosaics=mosaics
             )
@@ -207,6 +209,30 @@ class _Resolver:
                 "sweep", name, sweep, axes, ("sweeps", name, "grid"), sensor=sensor, mosaics=mosaics
             )
         return spaces
+
+    def built_in(self, name: str, design: DesignSection) -> Mapping[str, float]:
+        """A design's parameters, looked up when it names a built-in filter."""
+        if not isinstance(design.at, str):
+            return design.at
+        known = surrogate_parameters().stopbands
+        if design.at not in known:
+            self.unknown(("designs", name, "at"), "built-in filter", design.at, list(known))
+            return {parameter.name: parameter.low for parameter in Stopband.parameters}
+        return known[design.at].model_dump()
+
+    def check_published(self, lights: Lights, mosaics: Mapping[str, Mosaic]) -> None:
+        section = self.section
+        columns = [*SENSITIVITIES, *(csd_name(pair) for pair in class_pairs(lights.classes))]
+        for table, rows in section.published.items():
+            for row, values in rows.items():
+                path = ("published", table, row)
+                known = [*mosaics, *section.designs, *section.geometry]
+                if row not in known:
+                    self.unknown(path, "CFA, design or geometry", row, known)
+                for quantity in values:
+                    names = [OBJECT_RESOLUTION] if row in section.geometry else columns
+                    if row in known and quantity not in names:
+                        self.unknown((*path, quantity), "quantity", quantity, names)
 
     def filtered(
         self,

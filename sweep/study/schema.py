@@ -86,9 +86,9 @@ class Modification(Section):
 
 
 class DesignSection(Modification):
-    """One filter by its parameters."""
+    """One filter by its parameters, or by the name of a built-in one."""
 
-    at: dict[Name, float]
+    at: dict[Name, float] | Name
 
 
 class Axis(Section):
@@ -171,3 +171,5 @@ class StudySection(Section):
     objective: Name = "csd_yellow_red"
     constraints: dict[Name, Bound] = {}
     search: SearchSection | None = None
+    published: dict[Name, dict[Name, dict[Name, float]]] = {}
+    """Printed figures to compare with: table -> CFA, design or geometry -> quantity -> value."""

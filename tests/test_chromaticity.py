@@ -1,0 +1,61 @@
+"""Chromaticity against colour-science's own integration, and the color regions of signals."""
+
+from __future__ import annotations
+
+import colour
+import numpy as np
+import pytest
+
+from sweep.chromaticity import REGIONS, chromaticity, display_colors
+from sweep.datasets import BUILT_IN_LIGHTS
+from sweep.datasets.led import led_photons
+from sweep.spectra import WavelengthGrid
+
+GRID = WavelengthGrid()
+LIGHTS = BUILT_IN_LIGHTS["tl16"](GRID)
+
+
+def by_colour_science(photons: np.ndarray) -> np.ndarray:
+    wave = np.arange(360.0, 781.0)
+    energy = np.pad(photons / GRID.nodes_nm, (40, 80))
+    xyz = colour.sd_to_XYZ(colour.SpectralDistribution(energy, wave), method="Integration")
+    return np.asarray(colour.XYZ_to_xy(xyz))
+
+
+@pytest.mark.parametrize("peak_nm", [505, 592, 607, 635])
+def test_chromaticity_agrees_with_colour_science(peak_nm: float) -> None:
+    photons = led_photons(GRID.nodes_nm, peak_nm, 8.0, 7.0)
+    np.testing.assert_allclose(chromaticity(GRID, photons[None])[0], by_colour_science(photons), atol=1e-6)
+
+
+def test_every_signal_lies_inside_its_color_region() -> None:
+    for kind, index in LIGHTS.members.items():
+        for row in index:
+            xy = by_colour_science(LIGHTS.photons[row])
+            assert REGIONS[kind].violation(xy[None])[0] <= 0, (LIGHTS.names[row], xy)
+
+
+@pytest.mark.parametrize(
+    ("kind", "inside", "outside"),
+    [
+        ("red", (0.700, 0.295), (0.700, 0.285)),
+        ("red", (0.690, 0.305), (0.670, 0.330)),
+        ("red", (0.690, 0.300), (0.660, 0.300)),
+        ("yellow", (0.580, 0.415), (0.600, 0.385)),
+        ("yellow", (0.580, 0.415), (0.540, 0.455)),
+        ("green", (0.080, 0.550), (0.080, 0.390)),
+        ("green", (0.080, 0.550), (0.350, 0.500)),
+        ("green", (0.080, 0.550), (0.150, 0.650)),
+    ],
+)
+def test_regions_are_en_12368(kind: str, inside: tuple[float, float], outside: tuple[float, float]) -> None:
+    found = REGIONS[kind].violation(np.array([inside, outside]))
+    assert found[0] < 0 < found[1]
+
+
+def test_display_colors_have_the_hue_of_the_signal() -> None:
+    colors = {kind: display_colors(GRID, LIGHTS.photons[index[:1]])[0] for kind, index in LIGHTS.members.items()}
+    assert colors["green"].argmax() == 1
+    assert colors["red"].argmax() == 0
+    assert colors["red"][1] < colors["orange"][1] < colors["yellow"][1]
+    assert all((c >= 0).all() and c.max() == pytest.approx(1) for c in colors.values())
