@@ -65,6 +65,12 @@ class OutputError(SweepError):
     """An output folder that cannot be written, read or is in use."""
 
 
+class InfeasibleError(SweepError):
+    """A study that no design meets."""
+
+    exit_code = 3
+
+
 class InterruptedRunError(SweepError):
     """A run that a signal stopped."""
 

@@ -14,11 +14,14 @@ from .scenes import Scenario, WhitePatchExposure
 from .sensor import Pixel, digital_numbers, electron_rate, irradiance_factor, unquantized
 from .spectra import WavelengthGrid
 
+DESIGNED = ("sensitivity", "cfa_sensitivity", "slope_per_nm", "min_transmission")
+"""Quantities of a design that do not depend on the lights."""
+
 
 def quantities(lights: Lights) -> tuple[str, ...]:
     """Names of the columns that `evaluate` gives."""
     distances = (csd_name(pair) for pair in class_pairs(lights.classes))
-    return (*distances, "sensitivity", "cfa_sensitivity", "exposure_s")
+    return (*distances, *DESIGNED, "exposure_s")
 
 
 @dataclass(frozen=True)
@@ -116,24 +119,28 @@ def response_gradient(setup: Setup, curves: FloatArray, curves_gradient: FloatAr
     return np.asarray(by_parameter * pixel.dn_per_e, dtype=float)
 
 
-def sensitivities(setup: Setup, curves: FloatArray) -> dict[str, FloatArray]:
-    """Sensitivity of the modified channels and of the CFA, each ndarray[n_designs]; `curves` as in `all_channels`.
+def designed_quantities(setup: Setup, curves: FloatArray) -> dict[str, FloatArray]:
+    """What a design gives without any light, each ndarray[n_designs]; `curves` as in `all_channels`.
 
-    `sensitivity`: total QE of the modified channels over that of the curves they replace, NaN without any; of several
-    modified channels it is that of their sum. `cfa_sensitivity`: see `metrics.cfa_sensitivity`.
+    `sensitivity`: total QE of the modified channels over that of the curves they replace; of several modified channels
+    it is that of their sum. `cfa_sensitivity`: see `metrics.cfa_sensitivity`. `slope_per_nm`: the steepest slope of a
+    modified channel's QE. `min_transmission`: the smallest ratio of a modified channel to the curve it replaces.
+    Without a modified channel all but `cfa_sensitivity` are NaN.
     """
-    channel = np.full(len(curves), np.nan)
-    if setup.modified:
-        channel = channel_sensitivity(curves.sum(axis=1), setup.base_qe.sum(axis=0))
+    none = np.full(len(curves), np.nan)
     qe = all_channels(setup, curves)
-    return {
-        "sensitivity": channel,
-        "cfa_sensitivity": cfa_sensitivity(qe, setup.mosaic.counts, setup.clear_qe),
-    }
+    found = dict.fromkeys(DESIGNED, none)
+    found["cfa_sensitivity"] = cfa_sensitivity(qe, setup.mosaic.counts, setup.clear_qe)
+    if setup.modified:
+        found["sensitivity"] = channel_sensitivity(curves.sum(axis=1), setup.base_qe.sum(axis=0))
+        found["slope_per_nm"] = np.abs(np.diff(curves, axis=-1)).max(axis=(1, 2)) / setup.grid.step_nm
+        ratio = np.divide(curves, setup.base_qe, out=np.ones_like(curves), where=setup.base_qe > 0)
+        found["min_transmission"] = ratio.min(axis=(1, 2))
+    return found
 
 
 def sensitivities_gradient(setup: Setup, curves_gradient: FloatArray) -> dict[str, FloatArray]:
-    """Exact derivatives of `sensitivities`, ndarray[n_parameters]; shapes as in `response_gradient`."""
+    """Exact derivatives of `sensitivity` and `cfa_sensitivity`, ndarray[n_parameters]; see `response_gradient`."""
     total = curves_gradient.sum(axis=-1)
     counts = setup.mosaic.counts
     return {
@@ -155,9 +162,9 @@ def evaluate(setup: Setup, curves: FloatArray) -> dict[str, FloatArray]:
     """Evaluate a block of designs as the camera reads them out (clipped and quantized).
 
     `curves` as in `all_channels`. Returns columns, each ndarray[n_designs]: `csd_<a>_<b>` (DN) of every pair of
-    signal types, `sensitivity`, `cfa_sensitivity` and `exposure_s`.
+    signal types, those of `designed_quantities` and `exposure_s`.
     """
     response, exposure_s = readout(setup, curves)
     distances = separations(response, setup.members)
     columns = {csd_name(pair): values for pair, values in distances.items()}
-    return columns | sensitivities(setup, curves) | {"exposure_s": exposure_s}
+    return columns | designed_quantities(setup, curves) | {"exposure_s": exposure_s}

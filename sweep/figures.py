@@ -35,6 +35,7 @@ CURVE_COLORS = {
     "Cy": "#17a2a2",
     "C": "#555555",
 }
+LINE_COLORS = {"front of the search": "#d55e00", "limit of any filter": "#009e73"}
 TYPE_COLORS = {"green": "#009e73", "yellow": "#c9a800", "orange": "#e66100", "red": "#b2182b"}
 _CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 _LABEL_BOX = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0}
@@ -52,12 +53,13 @@ class Points:
 
 @dataclass(frozen=True)
 class ParetoFigure:
-    """CSD against sensitivity. `levels` are CFAs without a modified channel: name -> CSD."""
+    """CSD against sensitivity. `levels` are CFAs without a modified channel: name -> CSD. `lines` are trade-offs."""
 
     title: str
     x_label: str
     y_label: str
     groups: Mapping[str, Points]
+    lines: Mapping[str, Points]
     levels: Mapping[str, float]
     bound: float | None
     bound_text: str = ""
@@ -128,6 +130,8 @@ def draw_pareto(figure: ParetoFigure) -> Figure:
             )
             for x, y, label in zip(points.x, points.y, points.labels, strict=False):
                 axes.annotate(label, (x, y), textcoords="offset points", xytext=(7, 5), fontsize=9, zorder=7)
+    for (name, points), style in zip(figure.lines.items(), itertools.cycle(("-", "--"))):
+        axes.plot(points.x, points.y, style, color=LINE_COLORS.get(name, "black"), label=name, linewidth=1.5, zorder=4)
     low, high = axes.get_xlim()
     heights = sorted(figure.levels.items(), key=lambda item: item[1])
     for _, level in heights:

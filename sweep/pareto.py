@@ -7,6 +7,14 @@ import numpy as np
 from .arrays import BoolArray, FloatArray
 
 
+def hypervolume(values: FloatArray, reference: FloatArray) -> float:
+    """Volume that rows of ndarray[n, n_objectives], all maximized, dominate above `reference`."""
+    import moocore  # noqa: PLC0415  (pulls in pandas: kept off the start-up path)
+
+    inside = np.isfinite(values).all(axis=1) & (values > reference).all(axis=1)
+    return float(moocore.hypervolume(values[inside], ref=reference, maximise=True)) if inside.any() else 0.0
+
+
 def non_dominated(values: FloatArray, eligible: BoolArray | None = None) -> BoolArray:
     """Return which rows of ndarray[n, n_objectives], all maximized, no other eligible row dominates: bool ndarray[n].
 

@@ -7,8 +7,9 @@ response (unquantized, unclipped); every evaluation is logged, and the answer is
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import nlopt
 import numpy as np
@@ -16,7 +17,7 @@ from scipy.stats import qmc
 
 from .arrays import FloatArray, IndexArray
 from .constraints import FEASIBLE, Bound
-from .evaluate import Setup, response_gradient, sensitivities, sensitivities_gradient, smooth_response
+from .evaluate import Setup, designed_quantities, response_gradient, sensitivities_gradient, smooth_response
 from .families import Family
 from .metrics import Pair, separation
 
@@ -39,8 +40,8 @@ _X_TOLERANCE = 1e-9
 class Problem:
     """Maximize the CSD of `pair` over the box `low`..`high` (ndarray[n_parameters]) under `constraints`.
 
-    `constraints` maps `sensitivity` and `cfa_sensitivity` to a range and `csd_<a>_<b>` to a minimum; `pairs` names the
-    signal types of each constrained CSD.
+    `constraints` maps `sensitivity` and `cfa_sensitivity` to a range, `csd_<a>_<b>` and `min_transmission` to a minimum
+    and `slope_per_nm` to a maximum; `pairs` names the signal types of each constrained CSD.
     """
 
     setup: Setup
@@ -66,6 +67,11 @@ class Problem:
             self.high[self.free],
         )
         return x
+
+    def to_unit(self, x: FloatArray) -> FloatArray:
+        """The free parameters in units of the box, clipped to it: [..., n_parameters] -> [..., n_free]."""
+        low, span = self.low[self.free], (self.high - self.low)[self.free]
+        return np.asarray(np.clip((x[..., self.free] - low) / span, 0.0, 1.0), dtype=float)
 
 
 @dataclass(frozen=True)
@@ -94,10 +100,15 @@ def best_feasible(log: Sequence[Evaluation]) -> Evaluation | None:
     return max(feasible, key=lambda e: e.csd, default=None)
 
 
-def starting_points(n_free: int, starts: int, seed: int) -> FloatArray:
-    """Scrambled Sobol points in the unit cube, ndarray[starts, n_free]; the same for the same seed."""
-    sobol = qmc.Sobol(d=max(1, n_free), scramble=True, rng=np.random.default_rng(seed))
-    return np.asarray(sobol.random_base2(int(np.ceil(np.log2(max(2, starts)))))[:starts, :n_free], dtype=float)
+def starting_points(problem: Problem, starts: int, seed: int) -> FloatArray:
+    """Starting points from a scrambled Sobol set in units of the box, ndarray[starts, n_free]; one seed, one set."""
+    free = problem.free
+    dimensions = problem.family.start_dimensions or max(1, free.size)
+    sobol = qmc.Sobol(d=dimensions, scramble=True, rng=np.random.default_rng(seed))
+    points = np.asarray(sobol.random_base2(int(np.ceil(np.log2(max(2, starts)))))[:starts], dtype=float)
+    if problem.family.start_dimensions is None:
+        return points[:, : free.size]
+    return problem.to_unit(problem.family.start(points))
 
 
 @dataclass(frozen=True)
@@ -109,6 +120,25 @@ class _Point:
     squared_by_u: FloatArray
     conditions: FloatArray
     conditions_by_u: FloatArray
+    amounts: Mapping[str, float]
+    amounts_by_u: Mapping[str, FloatArray]
+
+
+def _finite(point: _Point) -> _Point:
+    """The point as it is, or with zeros for what is not a number: a NaN would end the search; it is never feasible."""
+    arrays = (point.squared, point.squared_by_u, point.conditions, point.conditions_by_u)
+    if all(np.isfinite(values).all() for values in arrays) and np.isfinite(point.evaluation.csd):
+        return point
+    squared, squared_by_u, conditions, conditions_by_u = (np.nan_to_num(v, posinf=0, neginf=0) for v in arrays)
+    flagged = replace(point.evaluation, violation=np.inf)
+    return replace(
+        point,
+        evaluation=flagged,
+        squared=squared,
+        squared_by_u=squared_by_u,
+        conditions=conditions,
+        conditions_by_u=conditions_by_u,
+    )
 
 
 class _Model:
@@ -125,7 +155,8 @@ class _Model:
         key = u.tobytes()
         if key not in self._seen:
             # Only the newest is asked for again: the constraints follow the objective at the same point.
-            self._seen = {key: self._simulate(u)}
+            with np.errstate(invalid="ignore", over="ignore"):  # a filter without light has no exposure
+                self._seen = {key: _finite(self._simulate(u))}
             self._run.log.append(self._seen[key].evaluation)
         return self._seen[key]
 
@@ -138,7 +169,7 @@ class _Model:
         by_u = response_gradient(problem.setup, curves[0], slopes)
         squared, squared_by_u = self._pair_distances(problem.pair, response[0], by_u)
 
-        amounts = {name: float(v[0]) for name, v in sensitivities(problem.setup, curves).items()}
+        amounts = {name: float(v[0]) for name, v in designed_quantities(problem.setup, curves).items()}
         amounts_by_u = sensitivities_gradient(problem.setup, slopes)
         own = problem.family.violation(x[None])[0]
         own_by_u = problem.family.violation_gradient(x)[:, free] * self._span
@@ -152,6 +183,11 @@ class _Model:
                 level = (bound.min or 0.0) * (1 + _BACK_OFF)
                 conditions.append((level**2 - d2) / scale**2)
                 conditions_by_u.append(-d2_by_u / scale**2)
+            elif name in ("slope_per_nm", "min_transmission"):
+                value = np.array([amounts[name]])
+                rows, rows_by_u = self._along_the_curve(name, bound, curves[0], slopes)
+                conditions.append(rows)
+                conditions_by_u.append(rows_by_u)
             else:
                 value = np.array([amounts[name]])
                 for end, sign in ((bound.min, -1.0), (bound.max, 1.0)):
@@ -161,7 +197,35 @@ class _Model:
             worst = max(worst, float(bound.violation(value)[0]))
         csd = float(separation(response, *self._sides(problem.pair))[0])
         evaluation = Evaluation(x, csd, amounts["sensitivity"], amounts["cfa_sensitivity"], worst)
-        return _Point(evaluation, squared, squared_by_u, np.concatenate(conditions), np.concatenate(conditions_by_u))
+        return _Point(
+            evaluation,
+            squared,
+            squared_by_u,
+            np.concatenate(conditions),
+            np.concatenate(conditions_by_u),
+            amounts,
+            amounts_by_u,
+        )
+
+    def _along_the_curve(
+        self, name: str, bound: Bound, curves: FloatArray, slopes: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Conditions on every wavelength: ndarray[n] and their derivatives, ndarray[n, n_free].
+
+        `curves`: ndarray[n_modified, n_wavelengths]; `slopes`: their derivatives by u, ndarray[n_free, ...].
+        """
+        if name == "slope_per_nm":
+            limit = (bound.max or 0.0) * (1 - _BACK_OFF)
+            step = self._problem.setup.grid.step_nm
+            steep = np.diff(curves, axis=-1).ravel() / step
+            by_u = np.diff(slopes, axis=-1).reshape(len(slopes), -1).T / step
+            return (
+                np.concatenate([steep - limit, -steep - limit]) / bound.scale,
+                np.vstack([by_u, -by_u]) / bound.scale,
+            )
+        base = self._problem.setup.base_qe
+        floor = (bound.min or 0.0) * (1 + _BACK_OFF)
+        return ((floor * base - curves).ravel() / bound.scale, -slopes.reshape(len(slopes), -1).T / bound.scale)
 
     def _sides(self, pair: Pair) -> tuple[IndexArray, IndexArray]:
         members = self._problem.setup.members
@@ -228,6 +292,58 @@ def search_from(problem: Problem, start: int, u0: FloatArray, algorithm: str, ma
         run.status = "roundoff_limited"
     except nlopt.ForcedStop:
         run.status = "maxeval_reached"
-    except RuntimeError as failure:
-        run.status = f"failed: {failure}"
+    except (RuntimeError, nlopt.runtime_error):  # its own class; what it carries cannot leave this process
+        run.status = "failed"
     return run
+
+
+def best_reachable(problem: Problem, quantity: str, starts: FloatArray, max_evaluations: int) -> float:
+    """The extreme that `quantity` reaches in the box when no other constraint counts: its largest value if the study
+    asks for a minimum, else its smallest. `starts`: ndarray[n, n_free].
+    """
+    bound = problem.constraints[quantity]
+    sign = 1.0 if bound.min is not None else -1.0
+    if quantity in problem.pairs:
+        alone = replace(problem, pair=problem.pairs[quantity], constraints={})
+        log = [e for i, u in enumerate(starts) for e in search_from(alone, i, u, "SLSQP", max_evaluations).log]
+        best = best_feasible(log)
+        return -np.inf if best is None else best.csd
+    alone = replace(problem, constraints={})
+    found = []
+    for index, u0 in enumerate(starts):
+        model = _Model(alone, SearchRun(index))
+        if quantity in model.at(u0).amounts_by_u:
+            found += _climb(model, quantity, sign, u0, max_evaluations)
+        else:
+            found.append(model.at(u0).amounts[quantity])
+    return sign * max(sign * value for value in found)
+
+
+def _climb(model: _Model, quantity: str, sign: float, u0: FloatArray, max_evaluations: int) -> list[float]:
+    """Values of a sensitivity at well-formed designs on the way to its extreme."""
+    seen: list[float] = []
+
+    def objective(u: FloatArray, gradient: FloatArray) -> float:
+        point = model.at(np.array(u, dtype=float))
+        if (point.conditions <= FEASIBLE).all():
+            seen.append(point.amounts[quantity])
+        if gradient.size:
+            gradient[:] = sign * point.amounts_by_u[quantity]
+        return sign * point.amounts[quantity]
+
+    def conditions(result: FloatArray, u: FloatArray, gradient: FloatArray) -> None:
+        point = model.at(np.array(u, dtype=float))
+        result[:] = point.conditions
+        if gradient.size:
+            gradient[:] = point.conditions_by_u
+
+    opt = nlopt.opt(nlopt.LD_SLSQP, u0.size)
+    opt.set_lower_bounds([0.0] * u0.size)
+    opt.set_upper_bounds([1.0] * u0.size)
+    opt.set_max_objective(objective)
+    opt.add_inequality_mconstraint(conditions, np.zeros(model.at(u0).conditions.size))
+    opt.set_maxeval(max_evaluations)
+    opt.set_xtol_rel(_X_TOLERANCE)
+    with contextlib.suppress(nlopt.RoundoffLimited, nlopt.runtime_error, RuntimeError):
+        opt.optimize(u0)
+    return seen

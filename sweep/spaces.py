@@ -37,11 +37,12 @@ class Space:
     cfa: str
     filter: Filter | None = None
     axes: tuple[tuple[float, ...], ...] = ()
+    gridded: bool = True
 
     @property
     def size(self) -> int:
-        """Number of designs."""
-        return math.prod(len(axis) for axis in self.axes)
+        """Number of designs; 0 for a box that is searched but not swept."""
+        return math.prod(len(axis) for axis in self.axes) if self.gridded else 0
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -50,9 +51,12 @@ class Space:
 
     def points(self, start: int, stop: int) -> FloatArray:
         """Parameters of designs start..stop-1: ndarray[stop - start, n_parameters]."""
-        index = np.unravel_index(np.arange(start, stop), tuple(len(axis) for axis in self.axes)) if self.axes else ()
-        columns = [np.asarray(axis, dtype=float)[i] for axis, i in zip(self.axes, index, strict=True)]
-        return np.stack(columns, axis=1) if columns else np.empty((stop - start, 0))
+        rest = np.arange(start, stop)
+        columns = []
+        for axis in reversed(self.axes):  # mixed radix: NumPy's own unravel_index stops at 64 axes
+            rest, digit = np.divmod(rest, len(axis))
+            columns.append(np.asarray(axis, dtype=float)[digit])
+        return np.stack(columns[::-1], axis=1) if columns else np.empty((stop - start, 0))
 
     def curves(self, points: FloatArray, n_wavelengths: int) -> FloatArray:
         """QE of the modified channels: ndarray[n_designs, n_modified, n_wavelengths]; none for a plain CFA."""

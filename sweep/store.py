@@ -18,6 +18,7 @@ from .errors import Fault, OutputError
 SCHEMA_VERSION = "1"
 RESULTS = "results.parquet"
 SEARCH_LOG = "search.parquet"
+FRONT = "front.parquet"
 CURVES = "curves.parquet"
 POINTS = "points.parquet"
 PROVENANCE = "provenance.json"
@@ -30,7 +31,7 @@ def result_schema(parameters: Sequence[str], quantities: Sequence[str]) -> pa.Sc
     text, number = pa.dictionary(pa.int32(), pa.string()), pa.float64()
     fields = [pa.field("design_id", pa.int64(), nullable=False)]
     fields += [pa.field(name, text) for name in ("kind", "name", "cfa", "family", "scenario")]
-    fields += [pa.field(name, number) for name in (*parameters, *quantities, "violation")]
+    fields += [pa.field(name, number) for name in (*parameters, *quantities, "violation", "limit_dn", "gap")]
     fields += [pa.field("feasible", pa.bool_()), pa.field("pareto", pa.bool_()), pa.field("status", text)]
     return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION})
 
@@ -43,6 +44,14 @@ def search_schema(parameters: Sequence[str]) -> pa.Schema:
         pa.field(name, number) for name in (*parameters, "csd_dn", "sensitivity", "cfa_sensitivity", "violation")
     ]
     return pa.schema([*fields, pa.field("status", text)], metadata={"cfa_sweep_schema": SCHEMA_VERSION})
+
+
+def front_schema(parameters: Sequence[str]) -> pa.Schema:
+    """Columns of the trade-off that the search traces: one row per level of sensitivity."""
+    number = pa.float64()
+    names = ("sensitivity_min", "csd_dn", "sensitivity", "limit_dn", "gap", *parameters)
+    fields = [pa.field(name, number) for name in names] + [pa.field("evaluations", pa.int64())]
+    return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION})
 
 
 @contextmanager

@@ -37,6 +37,7 @@ def test_stopband_makes_its_files(stopband: tuple[Path, list[str]]) -> None:
         "curves.parquet",
         "points.parquet",
         "figures",
+        "front.parquet",
         "study.resolved.yaml",
         "provenance.json",
         "pareto.png",
@@ -110,6 +111,17 @@ def test_hostile_names_come_out_as_text(tmp_path: Path) -> None:
     page = (folder / "report.html").read_text()
     assert "<script" not in page
     assert "&lt;script&gt;alert(1)&lt;/script&gt;" in page
+
+
+def test_an_infeasible_study_names_the_constraint_and_writes_nothing(tmp_path: Path) -> None:
+    text = study_file(tmp_path).read_text().replace("{min: 0.9}", "{min: 1.01}")
+    (tmp_path / "infeasible.yaml").write_text(text)
+    done = sweep("run", str(tmp_path / "infeasible.yaml"), "--output", str(tmp_path / "out"), "--jobs", "1")
+    assert done.returncode == 3
+    assert "no feasible design was found" in done.stderr
+    assert "constraints.sensitivity: out of reach: sensitivity >= 1.01; the best reachable value is 1" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "out").exists()
 
 
 @needs_measured

@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from sweep.datasets import BUILT_IN_LIGHTS
-from sweep.evaluate import Setup, evaluate, response_gradient, sensitivities, sensitivities_gradient, smooth_response
+from sweep.evaluate import (
+    Setup,
+    designed_quantities,
+    evaluate,
+    response_gradient,
+    sensitivities_gradient,
+    smooth_response,
+)
 from sweep.families import Stopband
 from sweep.filters import BUILT_IN_SENSORS
 from sweep.mosaics import Mosaic
@@ -112,6 +119,6 @@ def test_gradients_agree_with_central_differences(kind: str) -> None:
         ends = family.curves(np.stack([x + shift, x - shift]))
         response = smooth_response(made, ends)
         np.testing.assert_allclose(exact[index], (response[0] - response[1]) / (2 * step), atol=2e-5)
-        values = sensitivities(made, ends)
+        values = designed_quantities(made, ends)
         for name, gradient in amounts.items():
             assert gradient[index] == pytest.approx((values[name][0] - values[name][1]) / (2 * step), abs=1e-8)

@@ -18,6 +18,7 @@ LEVELS = [
     {"datasets", "filters", "scenes", "families"},
     {"spaces", "evaluate"},
     {"store", "search", "figures"},
+    {"limit"},
     {"study"},
     {"runner"},
     {"report", "calibration"},

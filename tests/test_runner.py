@@ -85,7 +85,7 @@ def test_rows_stand_in_order_with_their_columns(study: Study, output: Path) -> N
         *("design_id", "kind", "name", "cfa", "family", "scenario"),
         *("left_nm", "left_width_nm", "right_nm", "right_width_nm", "depth"),
         *quantities(study.lights),
-        *("violation", "feasible", "pareto", "status"),
+        *("violation", "limit_dn", "gap", "feasible", "pareto", "status"),
     ]
     assert set(frame["status"]) == {"ok"}
     assert list(frame["kind"][:4]) == ["reference", "reference", "design", "sweep"]
@@ -153,7 +153,7 @@ def test_finished_chunks_are_not_computed_again(study: Study, output: Path, tmp_
     kept -= 1
     assert not (tmp_path / "results.parquet").exists()
     seen = ran(study, tmp_path, 1)
-    assert seen[0] == ("designs", kept, study.n_designs)
+    assert next(call for call in seen if call[0] == "designs") == ("designs", kept, study.n_designs)
     assert pq.read_table(tmp_path / "results.parquet").equals(pq.read_table(output / "results.parquet"))
 
 
@@ -220,7 +220,7 @@ def test_a_killed_run_is_continued(tmp_path: Path, number: signal.Signals) -> No
     assert not (output / "tiny" / "results.parquet").exists()
     study = load_study(study_file(tmp_path, 401))
     seen = ran(study, output / "tiny", 2)
-    assert seen[0][1] > 0
+    assert next(call for call in seen if call[0] == "designs")[1] > 0
     ran(study, tmp_path / "whole", 2)
     tables = [pq.read_table(folder / "results.parquet") for folder in (output / "tiny", tmp_path / "whole")]
     assert tables[0].equals(tables[1])

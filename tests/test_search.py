@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sweep.constraints import FEASIBLE
-from sweep.evaluate import sensitivities, smooth_response
+from sweep.evaluate import designed_quantities, smooth_response
 from sweep.metrics import separation
 from sweep.search import ALGORITHMS, Evaluation, best_feasible, search_from, starting_points
 from sweep.study import Study, load_study
@@ -26,11 +26,13 @@ def test_search_beats_a_fine_grid_of_its_box(study: Study, algorithm: str) -> No
     rng = np.random.default_rng(7)
     x = problem.from_unit(rng.uniform(size=(20_000, problem.free.size)))
     curves = problem.family.curves(x)
-    ok = (sensitivities(problem.setup, curves)["sensitivity"] >= 0.90) & (problem.family.violation(x) <= 0).all(axis=1)
+    ok = (designed_quantities(problem.setup, curves)["sensitivity"] >= 0.90) & (problem.family.violation(x) <= 0).all(
+        axis=1
+    )
     members = problem.setup.members
     csd = separation(smooth_response(problem.setup, curves[ok]), members["yellow"], members["red"])
     log = []
-    for start, u in enumerate(starting_points(problem.free.size, 4, 1)):
+    for start, u in enumerate(starting_points(problem, 4, 1)):
         log += search_from(problem, start, u, algorithm, 125).log
     best = best_feasible(log)
     assert best is not None
@@ -40,7 +42,7 @@ def test_search_beats_a_fine_grid_of_its_box(study: Study, algorithm: str) -> No
 def test_answer_is_feasible_when_checked_again(study: Study) -> None:
     assert study.search is not None
     problem = study.problem(study.search)
-    run = search_from(problem, 0, starting_points(problem.free.size, 1, 1)[0], "SLSQP", 125)
+    run = search_from(problem, 0, starting_points(problem, 1, 1)[0], "SLSQP", 125)
     best = best_feasible(run.log)
     assert best is not None
     curve = problem.family.curves(best.x[None])[0, 0]
@@ -61,9 +63,9 @@ def test_budget_counts_simulations(study: Study) -> None:
 def test_same_seed_same_log(study: Study) -> None:
     assert study.search is not None
     problem = study.problem(study.search)
-    u = starting_points(problem.free.size, 3, 5)
-    np.testing.assert_array_equal(u, starting_points(problem.free.size, 3, 5))
-    assert not np.array_equal(u, starting_points(problem.free.size, 3, 6))
+    u = starting_points(problem, 3, 5)
+    np.testing.assert_array_equal(u, starting_points(problem, 3, 5))
+    assert not np.array_equal(u, starting_points(problem, 3, 6))
     logs = [[e.csd for e in search_from(problem, 0, u[2], "SLSQP", 60).log] for _ in range(2)]
     assert logs[0] == logs[1]
 
@@ -83,7 +85,9 @@ def test_constraint_on_another_pair_is_met(tmp_path: Path) -> None:
     study = load_study(tmp_path / "s.yaml")
     assert study.search is not None
     problem = study.problem(study.search)
-    log = [e for i, u in enumerate(starting_points(4, 4, 1)) for e in search_from(problem, i, u, "SLSQP", 125).log]
+    log = [
+        e for i, u in enumerate(starting_points(problem, 4, 1)) for e in search_from(problem, i, u, "SLSQP", 125).log
+    ]
     best = best_feasible(log)
     assert best is not None
     members = problem.setup.members

@@ -33,7 +33,7 @@ sweeps:
 constraints:
   sensitivity: {min: 0.9}
 search:
-  sweep: edges
+  space: edges
 """
 SENSOR_FILE = "sensor:\n  files:\n    - {file: qe.csv, columns: {R: R, C: C}}\n"
 LIGHT_FILE = "lights:\n  files:\n    - {file: led.csv, quantity: energy, signals: {red: [r], green: [g]}}\n"
@@ -70,7 +70,7 @@ def test_a_study_is_resolved(tmp_path: Path) -> None:
     assert study.objective == ("yellow", "red")
 
 
-@pytest.mark.parametrize("name", ["paper", "stopband"])
+@pytest.mark.parametrize("name", ["paper", "stopband", "freeform", "dual", "rccb", "producible"])
 def test_shipped_studies_load(name: str) -> None:
     study = load_study(STUDIES / f"{name}.yaml")
     assert study.name == name
@@ -100,7 +100,7 @@ def test_the_measured_study_loads() -> None:
             "search:\n",
             "serach:\n",
             "tiny.yaml:20: serach: unknown key; allowed: study, question, seed, wavelengths, sensor, pixel, lights, "
-            "scenarios, geometry, cfas, designs, sweeps, objective, constraints, search, published; did you mean 'search'?",
+            "scenarios, geometry, cfas, designs, sweeps, boxes, objective, constraints, search, published; did you mean 'search'?",
         ),
         (
             "min: 590, max: 610",
@@ -155,17 +155,17 @@ def test_the_measured_study_loads() -> None:
             "sensitivity: {min: 0.9}",
             "sensitivty: {min: 0.9}",
             "tiny.yaml:19: constraints.sensitivty: unknown quantity (got 'sensitivty'); allowed: sensitivity, "
-            "cfa_sensitivity, csd_green_yellow, csd_green_orange, csd_green_red, csd_yellow_orange, csd_yellow_red, "
+            "cfa_sensitivity, slope_per_nm, min_transmission, csd_green_yellow, csd_green_orange, csd_green_red, csd_yellow_orange, csd_yellow_red, "
             "csd_orange_red; did you mean 'sensitivity'?",
         ),
         (
-            "  sweep: edges\n",
-            "  sweep: edges\n  algorithm: COBYLLA\n",
+            "  space: edges\n",
+            "  space: edges\n  algorithm: COBYLLA\n",
             "tiny.yaml:22: search.algorithm: unknown algorithm",
         ),
         (
-            "  sweep: edges\n",
-            "  sweep: edges\n  starts: 0\n",
+            "  space: edges\n",
+            "  space: edges\n  starts: 0\n",
             "tiny.yaml:22: search.starts: not allowed (got 0); allowed:",
         ),
         ("study: tiny\n", "", "tiny.yaml:1: study: missing"),
@@ -222,7 +222,7 @@ def test_a_fault_is_one_line(tmp_path: Path, old: str, new: str, expected: str) 
 
 def test_every_fault_is_named_at_once(tmp_path: Path) -> None:
     text = (
-        BASE.replace("base: Y\n", "base: Q\n").replace("sensitivity:", "sens:").replace("sweep: edges", "sweep: edge")
+        BASE.replace("base: Y\n", "base: Q\n").replace("sensitivity:", "sens:").replace("space: edges", "space: edge")
     )
     assert [line.split(":")[1] for line in faults(tmp_path, text)] == ["11", "19", "21"]
 

@@ -10,7 +10,7 @@ from ..arrays import FloatArray
 from ..chromaticity import REGIONS, chromaticity
 from ..datasets.lights import Lights
 from ..datasets.tl16 import tl16
-from ..evaluate import Setup, sensitivities, smooth_response
+from ..evaluate import Setup, designed_quantities, smooth_response
 from ..families import Stopband
 from ..filters import SensorCurves, ar0820_sensor
 from ..metrics import csd_name, separations
@@ -56,7 +56,7 @@ def _filtered(rows: Sequence[str], parameters: SurrogateParameters, sensor: Sens
     x = np.array([[*stopband_values(parameters.stopbands[row]), 1.0] for row in rows])
     curves = Stopband(GRID.nodes_nm, sensor.qe["Y"], sensor.qe["G"]).curves(x)
     distances = separations(smooth_response(setup, curves), lights.members)
-    sensitivity = sensitivities(setup, curves)["sensitivity"]
+    sensitivity = designed_quantities(setup, curves)["sensitivity"]
     return {
         row: {csd_name(pair): float(v[i]) for pair, v in distances.items()} | {"sensitivity": float(sensitivity[i])}
         for i, row in enumerate(rows)

@@ -1,9 +1,9 @@
 """Families of filters: parameters in, QE curves of the modified channels out."""
 
 from .base import Family, Parameter
+from .build import CHANNELS, FamilyOptions, build_family
+from .dual import Dual
+from .free_form import FreeForm
 from .stopband import Stopband
 
-FAMILIES: dict[str, type[Stopband]] = {Stopband.kind: Stopband}
-"""Every family that a study can name."""
-
-__all__ = ["FAMILIES", "Family", "Parameter", "Stopband"]
+__all__ = ["CHANNELS", "Dual", "Family", "FamilyOptions", "FreeForm", "Parameter", "Stopband", "build_family"]

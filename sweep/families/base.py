@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import Protocol
 
 from ..arrays import FloatArray
 
@@ -21,17 +22,28 @@ class Parameter:
 class Family(Protocol):
     """A filter as a function of its parameters, for blocks of designs.
 
-    n_modified is the number of channels that the family replaces.
+    `kind` names the family, `n_modified` is the number of channels that it replaces.
     """
 
-    kind: ClassVar[str]
-    parameters: ClassVar[tuple[Parameter, ...]]
+    kind: str
+    n_modified: int
+
+    @property
+    def start_dimensions(self) -> int | None:
+        """Dimensions of the unit cube that `start` takes; None where any point of the box is a good start."""
+
+    @property
+    def parameters(self) -> Sequence[Parameter]:
+        """The parameters, in the order of the columns of `x`."""
 
     def curves(self, x: FloatArray) -> FloatArray:
         """QE of the modified channels: [n_designs, n_parameters] -> [n_designs, n_modified, n_wavelengths]."""
 
     def gradient(self, x: FloatArray) -> FloatArray:
         """Derivative of `curves` at one design: [n_parameters] -> [n_parameters, n_modified, n_wavelengths]."""
+
+    def start(self, points: FloatArray) -> FloatArray:
+        """Well-formed designs to start a search from: [n, start_dimensions] in 0..1 -> [n, n_parameters]."""
 
     def violation(self, x: FloatArray) -> FloatArray:
         """Conditions of a well-formed design, met where <= 0: [n_designs, n_parameters] to [n_designs, n]."""

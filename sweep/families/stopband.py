@@ -1,8 +1,6 @@
-"""One stopband: the channel leaves its base curve for a target curve and comes back."""
+"""Stopbands: a channel leaves its base curve for a target curve and comes back, once or several times."""
 
 from __future__ import annotations
-
-from typing import ClassVar
 
 import numpy as np
 
@@ -11,58 +9,121 @@ from ..edges import SPAN_PER_WIDTH, edge, edge_gradient
 from .base import Parameter
 
 _HALF = SPAN_PER_WIDTH / 2
+_PER_BAND = 5
+LEFT, LEFT_WIDTH, RIGHT, RIGHT_WIDTH, DEPTH = range(_PER_BAND)
+
+
+def band_parameters(number: int | None = None) -> tuple[Parameter, ...]:
+    """Edges and depth of one band; `number` goes into the names when there are several."""
+    n = "" if number is None else str(number)
+    return (
+        Parameter(f"left{n}_nm", 200, 2000),
+        Parameter(f"left{n}_width_nm", 0, 500),
+        Parameter(f"right{n}_nm", 200, 2000),
+        Parameter(f"right{n}_width_nm", 0, 500),
+        Parameter(f"depth{n}", 0, 1, default=1.0),
+    )
+
+
+class Bands:
+    """The sum of k bands, each e(l; left) - e(l; right) times its depth, and the conditions that keep it in 0..1."""
+
+    def __init__(self, wavelength_nm: FloatArray, count: int) -> None:
+        self._wave = wavelength_nm
+        self._count = count
+        self.parameters = (
+            band_parameters() if count == 1 else tuple(p for b in range(count) for p in band_parameters(b + 1))
+        )
+        self._conditions = self._condition_matrix()
+
+    def shape(self, x: FloatArray) -> FloatArray:
+        """Sum of the bands: ndarray[n_designs, 5 k] -> ndarray[n_designs, n_wavelengths]."""
+        return np.asarray(sum(self._depth(x, band) * self._open(x, band) for band in range(self._count)), dtype=float)
+
+    def gradient(self, x: FloatArray) -> FloatArray:
+        """Derivative of `shape` at one design: ndarray[5 k] -> ndarray[5 k, n_wavelengths]."""
+        rows = []
+        for band in range(self._count):
+            left, left_width, right, right_width, depth = x[band * _PER_BAND : (band + 1) * _PER_BAND]
+            rows += [depth * d for d in edge_gradient(self._wave, left, left_width)]
+            rows += [-depth * d for d in edge_gradient(self._wave, right, right_width)]
+            rows.append(self._open(x[None], band)[0])
+        return np.stack(rows)
+
+    def violation(self, x: FloatArray) -> FloatArray:
+        """Edges out of order, nm, ndarray[n_designs, 3 k - 1].
+
+        Start and end of a left edge must not lie behind those of its right edge, and a band must end before the next
+        begins.
+        """
+        return np.asarray(x @ self._conditions.T, dtype=float)
+
+    def violation_gradient(self, x: FloatArray) -> FloatArray:
+        """Constant, ndarray[3 k - 1, 5 k]."""
+        assert x.shape == (self._count * _PER_BAND,)
+        return self._conditions
+
+    def _open(self, x: FloatArray, band: int) -> FloatArray:
+        left, left_width, right, right_width = (x[:, band * _PER_BAND + i, None] for i in range(4))
+        return edge(self._wave, left, left_width) - edge(self._wave, right, right_width)
+
+    def _depth(self, x: FloatArray, band: int) -> FloatArray:
+        return x[:, band * _PER_BAND + DEPTH, None]
+
+    def _condition_matrix(self) -> FloatArray:
+        rows = []
+        for band in range(self._count):
+            at = band * _PER_BAND
+            for sign in (-_HALF, _HALF):
+                row = np.zeros(self._count * _PER_BAND)
+                row[at + LEFT], row[at + LEFT_WIDTH], row[at + RIGHT], row[at + RIGHT_WIDTH] = 1, sign, -1, -sign
+                rows.append(row)
+            if band + 1 < self._count:
+                row = np.zeros(self._count * _PER_BAND)
+                row[at + RIGHT], row[at + RIGHT_WIDTH] = 1, _HALF
+                row[at + _PER_BAND + LEFT], row[at + _PER_BAND + LEFT_WIDTH] = -1, _HALF
+                rows.append(row)
+        return np.stack(rows)
 
 
 class Stopband:
-    """N = base + depth (target - base) (e(l; left) - e(l; right)), the paper's N_x with base Y and target G.
+    """N = base + sum over bands of depth (target - base) (e(l; left) - e(l; right)).
 
-    `base`, `target`: QE, ndarray[n_wavelengths]. With the edges in order, the band lies between 0 and 1, so N lies
-    between its base and its target at every wavelength, and is exactly the base outside the band.
+    One band is the paper's N_x with base Y and target G. `base`, `target`: QE, ndarray[n_wavelengths]. With the edges
+    in order, the bands lie between 0 and 1 and do not overlap, so N lies between its base and its target at every
+    wavelength, and is exactly the base outside the bands.
     """
 
-    kind: ClassVar[str] = "stopband"
-    parameters: ClassVar[tuple[Parameter, ...]] = (
-        Parameter("left_nm", 200, 2000),
-        Parameter("left_width_nm", 0, 500),
-        Parameter("right_nm", 200, 2000),
-        Parameter("right_width_nm", 0, 500),
-        Parameter("depth", 0, 1, default=1.0),
-    )
+    n_modified = 1
+    start_dimensions: int | None = None
 
-    def __init__(self, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray) -> None:
-        self._wave = wavelength_nm
+    def __init__(self, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray, bands: int = 1) -> None:
+        self.kind = "stopband" if bands == 1 else "multi_stopband"
+        self._bands = Bands(wavelength_nm, bands)
         self._base = base
         self._change = target - base
 
-    def band(self, x: FloatArray) -> FloatArray:
-        """The band without its depth: ndarray[n_designs, n_parameters] -> ndarray[n_designs, n_wavelengths]."""
-        left, left_width, right, right_width, _ = (x[:, i, None] for i in range(5))
-        return edge(self._wave, left, left_width) - edge(self._wave, right, right_width)
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Edges, widths and depth of each band."""
+        return self._bands.parameters
 
     def curves(self, x: FloatArray) -> FloatArray:
         """QE of the modified channel, ndarray[n_designs, 1, n_wavelengths]; see `Family.curves`."""
-        return (self._base + x[:, 4, None] * self._change * self.band(x))[:, None, :]
+        return (self._base + self._change * self._bands.shape(x))[:, None, :]
 
     def gradient(self, x: FloatArray) -> FloatArray:
-        """Derivative by each parameter, ndarray[5, 1, n_wavelengths]; see `Family.gradient`."""
-        left, left_width, right, right_width, depth = x
-        by_left = edge_gradient(self._wave, left, left_width)
-        by_right = edge_gradient(self._wave, right, right_width)
-        scaled = depth * self._change
-        rows = [
-            *(scaled * d for d in by_left),
-            *(-scaled * d for d in by_right),
-            self._change * self.band(x[None])[0],
-        ]
-        return np.stack(rows)[:, None, :]
+        """Derivative by each parameter, ndarray[n_parameters, 1, n_wavelengths]; see `Family.gradient`."""
+        return (self._change * self._bands.gradient(x))[:, None, :]
+
+    def start(self, points: FloatArray) -> FloatArray:
+        """Not needed: a search starts anywhere in its box."""
+        return points
 
     def violation(self, x: FloatArray) -> FloatArray:
-        """Start and end of the left edge must not lie behind those of the right edge: nm, ndarray[n_designs, 2]."""
-        left, left_width, right, right_width = (x[:, i] for i in range(4))
-        apart, half = left - right, _HALF * (left_width - right_width)
-        return np.stack([apart - half, apart + half], axis=1)
+        """Edges out of order, nm; see `Bands.violation`."""
+        return self._bands.violation(x)
 
     def violation_gradient(self, x: FloatArray) -> FloatArray:
-        """Constant, ndarray[2, 5]."""
-        assert x.shape == (5,)
-        return np.array([[1, -_HALF, -1, _HALF, 0], [1, _HALF, -1, -_HALF, 0]], dtype=float)
+        """See `Bands.violation_gradient`."""
+        return self._bands.violation_gradient(x)

@@ -46,10 +46,25 @@ def pareto_figure(output: Output, scenario: str, cfa: str | None) -> ParetoFigur
         x_label="sensitivity of the modified channel (1 = the channel it replaces)",
         y_label=f"{readable(output.objective)} / DN",
         groups=groups,
+        lines=_trade_offs(output, scenario, cfa),
         levels=dict(zip(references["cfa"], references[output.objective], strict=True)),
         bound=limit,
         bound_text="" if limit is None else f"sensitivity >= {limit:g}",
     )
+
+
+def _trade_offs(output: Output, scenario: str, cfa: str | None) -> dict[str, Points]:
+    """What the search traced, and the limit, where the search is of this CFA and scenario."""
+    if output.front is None or cfa not in set(output.kind("search")["cfa"]):
+        return {}
+    if output.provenance["search"]["scenario"] != scenario:
+        return {}
+    traced = output.front.dropna(subset=["csd_dn"])
+    bounded = output.front.dropna(subset=["limit_dn"])
+    lines = {"front of the search": Points(traced["sensitivity"].to_numpy(), traced["csd_dn"].to_numpy())}
+    if len(bounded):
+        lines["limit of any filter"] = Points(bounded["sensitivity_min"].to_numpy(), bounded["limit_dn"].to_numpy())
+    return lines
 
 
 def _points(output: Output, rows: pd.DataFrame, labels: Sequence[str] = ()) -> Points:
@@ -111,16 +126,22 @@ def filters_figure(output: Output, cfa: str) -> CurvesFigure:
     """Modified channels of the named designs and the best ones of a CFA, beside the curves that they start from."""
     rows = drawn(output)
     rows = rows[rows["cfa"] == cfa]
-    ends = {e for m in modifications(output) if m["cfa"] == cfa for e in (m["base"], m["to"]) if isinstance(e, str)}
+    entries = [entry for entry in modifications(output) if entry["cfa"] == cfa]
+    ends = {end for entry in entries for end in (entry["base"], entry.get("to")) if isinstance(end, str)}
     curves = {name: values for name, values in _curves(output, "qe:").items() if name in ends}
     for row in rows.to_dict("records"):
-        curves[label(row)] = output.curves[f"design:{row['design_id']}:0"].to_numpy()
+        made = [c for c in output.curves.columns if c.startswith(f"design:{row['design_id']}:")]
+        for number, column in enumerate(made):
+            name = label(row) if len(made) == 1 else f"{label(row)}, {'ab'[number]}"
+            curves[name] = output.curves[column].to_numpy()
+    if f"limit:{cfa}" in output.curves.columns:
+        curves["limit of any filter"] = output.curves[f"limit:{cfa}"].to_numpy()
     return CurvesFigure(f"{cfa}: modified channel", "QE", _wave(output), curves, tuple(ends))
 
 
 def modifications(output: Output) -> list[dict[str, object]]:
     """The study's named designs and sweeps."""
-    return [*output.study.get("designs", {}).values(), *output.study.get("sweeps", {}).values()]
+    return [entry for key in ("designs", "sweeps", "boxes") for entry in output.study.get(key, {}).values()]
 
 
 def drawn(output: Output) -> pd.DataFrame:

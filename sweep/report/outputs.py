@@ -16,7 +16,7 @@ from ruamel.yaml.error import YAMLError
 from ..constraints import Bound
 from ..errors import Fault, OutputError
 from ..scenes import Geometry
-from ..store import CURVES, POINTS, PROVENANCE, RESOLVED, RESULTS, read_table
+from ..store import CURVES, FRONT, POINTS, PROVENANCE, RESOLVED, RESULTS, read_table
 
 
 @dataclass(frozen=True)
@@ -29,6 +29,7 @@ class Output:
     table: pd.DataFrame
     curves: pd.DataFrame
     points: pd.DataFrame
+    front: pd.DataFrame | None
 
     @property
     def objective(self) -> str:
@@ -73,15 +74,9 @@ def read_output(folder: Path) -> Output:
         raise OutputError(Fault("no finished run here", str(folder), allowed=f"a folder with {RESULTS}"))
     study = _mapping(folder / RESOLVED, lambda text: YAML(typ="safe").load(text))
     provenance = _mapping(folder / PROVENANCE, json.loads)
-    table = read_table(folder / RESULTS).to_pandas()
-    return Output(
-        folder,
-        study,
-        provenance,
-        table,
-        read_table(folder / CURVES).to_pandas(),
-        read_table(folder / POINTS).to_pandas(),
-    )
+    table, curves, points = (read_table(folder / name).to_pandas() for name in (RESULTS, CURVES, POINTS))
+    front = read_table(folder / FRONT).to_pandas() if (folder / FRONT).is_file() else None
+    return Output(folder, study, provenance, table, curves, points, front)
 
 
 def _mapping(path: Path, parse: Any) -> dict[str, Any]:

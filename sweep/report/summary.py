@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from .comparison import comparison_lines, comparison_with_published
 from .content import geometry_table, readable
 from .outputs import Output
+
+_MOST_PARAMETERS = 10
 
 
 def answer_sentences(output: Output) -> list[str]:
@@ -32,8 +37,10 @@ def summary_lines(output: Output) -> list[str]:
     lines = answer_sentences(output)
     if not output.best.empty:
         best = output.best.iloc[0]
-        found = ", ".join(f"{name} {best[name]:.2f}" for name in output.parameters if best[name] == best[name])
-        lines.append(f"Parameters: {found}.")
+        own = [name for name in output.parameters if best[name] == best[name]]
+        found = ", ".join(f"{name} {best[name]:.2f}" for name in own[:_MOST_PARAMETERS])
+        more = f" and {len(own) - _MOST_PARAMETERS} more" if len(own) > _MOST_PARAMETERS else ""
+        lines.append(f"Parameters: {found}{more}.")
     named = output.kind("design")
     if len(named):
         each = ", ".join(
@@ -50,11 +57,15 @@ def summary_lines(output: Output) -> list[str]:
     lines.append(_counts(output))
     search = output.provenance.get("search")
     if search:
-        best_csd = search["best_smooth_csd_dn"]
-        found = "no feasible design" if best_csd is None else f"{best_csd:.2f} DN before quantization"
+        found = f"{search['best_smooth_csd_dn']:.2f} DN before quantization"
         lines.append(
             f"Search: {search['algorithm']}, {search['starts']} starts, {search['evaluations']} evaluations: {found}."
         )
+        lines.append(_limit_line(search))
+    areas = output.provenance.get("hypervolume")
+    if areas:
+        both = ", ".join(f"{name} {area:.3f}" for name, area in areas.items() if area > 0)
+        lines.append(f"Hypervolume (DN x sensitivity): {both}.")
     lines += [f"Note: {warning}." for warning in output.provenance["warnings"]]
     if output.provenance["sensor"]["surrogate"] or output.provenance["lights"]["surrogate"]:
         lines.append("Note: built-in curves are surrogates, modeled from stated parameters, not measured.")
@@ -69,3 +80,12 @@ def _counts(output: Output) -> str:
     feasible, front = int(table["feasible"].sum()), int(table["pareto"].sum())
     text = f"{len(table):,} designs, {feasible:,} feasible, {front:,} on the Pareto front"
     return f"{text}, {failed:,} failed." if failed else f"{text}."
+
+
+def _limit_line(search: Mapping[str, Any]) -> str:
+    if search["no_limit"] is not None:
+        return f"Limit: none computed ({search['no_limit']})."
+    return (
+        f"Limit of any filter under the same constraints: between {search['limit_attained_dn']:.3f} and "
+        f"{search['limit_proven_dn']:.3f} DN; the search's answer is {search['gap']:.1%} below."
+    )

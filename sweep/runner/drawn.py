@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow as pa
 
 from ..evaluate import readout
+from ..limit import Limit
 from ..spaces import Space
 from ..study import Study
 from .jobs import jobs_of
@@ -16,8 +17,8 @@ BEST_PER_CFA = 5
 """Best feasible designs of each CFA's sweeps that the report lists and draws."""
 
 
-def curves_table(study: Study, table: pa.Table) -> pa.Table:
-    """Columns `wavelength_nm`, `qe:<curve>`, `light:<type>:<name>`, `design:<design_id>:<k>` (drawn designs)."""
+def curves_table(study: Study, table: pa.Table, limit: Limit | None) -> pa.Table:
+    """Columns `wavelength_nm`, `qe:<curve>`, `light:<type>:<name>`, `design:<design_id>:<k>`, `limit:<cfa>`."""
     columns: dict[str, Any] = {"wavelength_nm": study.grid.nodes_nm}
     columns |= {f"qe:{name}": values for name, values in study.sensor.qe.items()}
     lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
@@ -25,6 +26,8 @@ def curves_table(study: Study, table: pa.Table) -> pa.Table:
     for row in drawn_rows(study, table):
         for index, curve in enumerate(_row_curves(study, row)[1][0]):
             columns[f"design:{row['design_id']}:{index}"] = curve
+    if limit is not None and limit.curve is not None and study.search is not None:
+        columns[f"limit:{study.search.space.cfa}"] = limit.curve
     return pa.table(columns)
 
 

@@ -77,8 +77,9 @@ def _quantities(space: Space, setup: Setup, points: FloatArray) -> tuple[dict[st
         status = ["ok"] * len(points)
     except Exception:  # whatever fails in one design must not take the others with it
         columns, status = _one_by_one(space, setup, points)
-    # A CFA without a modified channel has no sensitivity of its own; all else must be a number.
-    numbers = [values for name, values in columns.items() if name != "sensitivity" or setup.modified]
+    # A CFA without a modified channel has no sensitivity or slope of its own; all else must be a number.
+    own = () if setup.modified else ("sensitivity", "slope_per_nm", "min_transmission")
+    numbers = [values for name, values in columns.items() if name not in own]
     for index in np.flatnonzero(~np.isfinite(numbers).all(axis=0)):
         if status[index] == "ok":
             status[index] = "not finite"

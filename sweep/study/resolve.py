@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,8 +11,8 @@ import numpy as np
 from ..constraints import Bound
 from ..datasets.lights import Lights
 from ..errors import StudyError, SweepError, nearest
-from ..evaluate import Setup
-from ..families import FAMILIES, Parameter, Stopband
+from ..evaluate import DESIGNED, Setup
+from ..families import CHANNELS, Parameter, build_family
 from ..filters import SensorCurves
 from ..metrics import Pair, class_pairs, csd_name
 from ..mosaics import Mosaic
@@ -23,10 +23,9 @@ from ..spaces import Filter, Kind, Space
 from ..spectra import WavelengthGrid
 from ..surrogate import surrogate_parameters
 from .lines import Document, Key
-from .schema import CfaSection, DesignSection, Modification, StudySection
+from .schema import Axis, CfaSection, DesignSection, Modification, StudySection
 from .sources import Sources
 
-SENSITIVITIES = ("sensitivity", "cfa_sensitivity")
 MOST_DESIGNS = 10**9
 
 
@@ -39,6 +38,7 @@ class Search:
     algorithm: str
     starts: int
     max_evaluations: int
+    levels: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -106,8 +106,8 @@ class Study:
         return Problem(
             setup=self.setup(search.space, search.scenario),
             family=search.space.filter.family,
-            low=np.array([min(axis) for axis in search.space.axes]),
-            high=np.array([max(axis) for axis in search.space.axes]),
+            low=np.array([min(axis) for axis in search.space.axes], dtype=float),
+            high=np.array([max(axis) for axis in search.space.axes], dtype=float),
             pair=self.objective,
             constraints=self.constraints,
             pairs={csd_name(pair): pair for pair in self.pairs},
@@ -183,7 +183,8 @@ class _Resolver:
     def spaces(self, sensor: SensorCurves, mosaics: Mapping[str, Mosaic]) -> list[Space]:
         """Plain CFAs (those whose every channel has a curve), then named designs, then sweeps."""
         section = self.section
-        changed = {(m.cfa, m.channel) for m in (*section.designs.values(), *section.sweeps.values())}
+        entries = (*section.designs.values(), *section.sweeps.values(), *section.boxes.values())
+        changed = {(entry.cfa, channel) for entry in entries for channel in entry.channel}
         spaces = []
         for name, mosaic in mosaics.items():
             missing = False
@@ -208,6 +209,9 @@ class _Resolver:
             spaces += self.filtered(
                 "sweep", name, sweep, axes, ("sweeps", name, "grid"), sensor=sensor, mosaics=mosaics
             )
+        for name, box in section.boxes.items():
+            axes = {key: axis.points() for key, axis in box.box.items()}
+            spaces += self.filtered("search", name, box, axes, ("boxes", name, "box"), sensor=sensor, mosaics=mosaics)
         return spaces
 
     def built_in(self, name: str, design: DesignSection) -> Mapping[str, float]:
@@ -217,12 +221,12 @@ class _Resolver:
         known = surrogate_parameters().stopbands
         if design.at not in known:
             self.unknown(("designs", name, "at"), "built-in filter", design.at, list(known))
-            return {parameter.name: parameter.low for parameter in Stopband.parameters}
+            return {}
         return known[design.at].model_dump()
 
     def check_published(self, lights: Lights, mosaics: Mapping[str, Mosaic]) -> None:
         section = self.section
-        columns = [*SENSITIVITIES, *(csd_name(pair) for pair in class_pairs(lights.classes))]
+        columns = [*DESIGNED, *(csd_name(pair) for pair in class_pairs(lights.classes))]
         for table, rows in section.published.items():
             for row, values in rows.items():
                 path = ("published", table, row)
@@ -251,28 +255,43 @@ class _Resolver:
         mosaic = mosaics.get(entry.cfa)
         if entry.cfa not in self.section.cfas:
             self.unknown((*path, "cfa"), "CFA", entry.cfa, list(self.section.cfas))
-        elif mosaic is not None and entry.channel not in mosaic.channels:
-            self.unknown((*path, "channel"), f"channel of {entry.cfa}", entry.channel, list(mosaic.channels))
+        elif mosaic is not None:
+            for channel in entry.channel:
+                if channel not in mosaic.channels:
+                    self.unknown((*path, "channel"), f"channel of {entry.cfa}", channel, list(mosaic.channels))
         if entry.base not in curves:
             self.unknown((*path, "base"), "curve", entry.base, curves)
         if isinstance(entry.to, str) and entry.to not in curves:
             self.unknown((*path, "to"), "curve", entry.to, curves)
-        if entry.family not in FAMILIES:
-            self.unknown((*path, "family"), "family", entry.family, list(FAMILIES))
-            return []
-        kind_of = FAMILIES[entry.family]
-        ordered = self.axes(axes, axes_path, kind_of.parameters)
+        if entry.family not in CHANNELS:
+            self.unknown((*path, "family"), "family", entry.family, list(CHANNELS))
+        elif len(entry.channel) != CHANNELS[entry.family]:
+            self.add((*path, "channel"), f"{entry.family} replaces {CHANNELS[entry.family]} channels", entry.channel)
         if len(self.faults) > before:
             return []
         base = sensor.curve(entry.base)
-        target = sensor.curve(entry.to) if isinstance(entry.to, str) else base * entry.to
-        family = kind_of(self.section.wavelengths.nodes_nm, base, target)
-        made = Filter(family, (entry.channel,), entry.base, str(entry.to))
-        return [Space(kind, name, entry.cfa, made, tuple(ordered))]
+        target = sensor.curve(entry.to) if isinstance(entry.to, str) else None if entry.to is None else base * entry.to
+        try:
+            family = build_family(entry.family, self.section.wavelengths.nodes_nm, base, target, entry.options)
+        except SweepError as error:
+            for fault in error.faults:
+                self.add((*path, "family"), fault.problem, fault.value, fault.allowed)
+            return []
+        ordered = self.axes(axes, axes_path, family.parameters, open_ended=kind == "search")
+        if len(self.faults) > before:
+            return []
+        made = Filter(family, tuple(entry.channel), entry.base, "" if entry.to is None else str(entry.to))
+        return [Space(kind, name, entry.cfa, made, tuple(ordered), gridded=kind != "search")]
 
     def axes(
-        self, axes: Mapping[str, tuple[float, ...]], path: tuple[Key, ...], parameters: tuple[Parameter, ...]
+        self,
+        axes: Mapping[str, tuple[float, ...]],
+        path: tuple[Key, ...],
+        parameters: Sequence[Parameter],
+        *,
+        open_ended: bool,
     ) -> list[tuple[float, ...]]:
+        """The values of each parameter, in order; one not named has its default, or its range if `open_ended`."""
         known = [parameter.name for parameter in parameters]
         misspelled = [name for name in axes if name not in known]
         for name in misspelled:
@@ -280,7 +299,10 @@ class _Resolver:
         meant = {nearest(name, known) for name in misspelled}
         ordered = []
         for parameter in parameters:
-            values = axes.get(parameter.name, () if parameter.default is None else (parameter.default,))
+            usual: tuple[float, ...] = () if parameter.default is None else (parameter.default,)
+            if open_ended and not usual:
+                usual = (parameter.low, parameter.high)
+            values = axes.get(parameter.name, usual)
             if not values and parameter.name not in meant:
                 self.add((*path, parameter.name), "missing")
             for value in (min(values), max(values)) if values else ():
@@ -300,48 +322,45 @@ class _Resolver:
     def check_constraints(self, lights: Lights) -> None:
         distances = [csd_name(pair) for pair in class_pairs(lights.classes)]
         for name, bound in self.section.constraints.items():
-            if name not in (*distances, *SENSITIVITIES):
-                self.unknown(("constraints", name), "quantity", name, [*SENSITIVITIES, *distances])
-            elif name in distances and bound.max is not None:
-                self.add(("constraints", name, "max"), "a CSD has no upper limit", bound.max, "`min`")
+            if name not in (*distances, *DESIGNED):
+                self.unknown(("constraints", name), "quantity", name, [*DESIGNED, *distances])
+            elif name not in ("sensitivity", "cfa_sensitivity"):
+                wrong = "min" if name == "slope_per_nm" else "max"
+                if getattr(bound, wrong) is not None:
+                    right = "max" if wrong == "min" else "min"
+                    self.add(
+                        ("constraints", name, wrong), f"{name} has no `{wrong}`", getattr(bound, wrong), f"`{right}`"
+                    )
 
     def search(self, spaces: list[Space]) -> Search | None:
         section = self.section.search
         if section is None:
             return None
-        sweeps = {space.name: space for space in spaces if space.kind == "sweep"}
-        names = list(self.section.sweeps)
+        boxes = {space.name: space for space in spaces if space.kind in ("sweep", "search")}
+        names = [*self.section.sweeps, *self.section.boxes]
         scenarios = list(self.section.scenarios)
-        chosen = section.sweep or (names[0] if len(names) == 1 else None)
+        chosen = section.space or (names[0] if len(names) == 1 else None)
         if chosen is None:
             self.add(
-                ("search", "sweep"),
-                "missing: the search needs the box of one sweep",
-                None,
-                ", ".join(names) or "a sweep",
+                ("search", "space"), "missing: the search needs one sweep or box", None, ", ".join(names) or "a sweep"
             )
         elif chosen not in names:
-            self.unknown(("search", "sweep"), "sweep", chosen, names)
-        elif chosen in sweeps and all(min(axis) == max(axis) for axis in sweeps[chosen].axes):
-            self.add(
-                ("search", "sweep"),
-                "every parameter of the sweep is fixed",
-                chosen,
-                "one free parameter or more",
-            )
+            self.unknown(("search", "space"), "sweep or box", chosen, names)
+        elif chosen in boxes and all(min(axis) == max(axis) for axis in boxes[chosen].axes):
+            self.add(("search", "space"), "every parameter is fixed", chosen, "one free parameter or more")
         if section.scenario is not None and section.scenario not in scenarios:
             self.unknown(("search", "scenario"), "scenario", section.scenario, scenarios)
         if section.algorithm not in ALGORITHMS:
-            self.unknown(
-                ("search", "algorithm"),
-                "algorithm (it must take inequalities and gradients)",
-                section.algorithm,
-                list(ALGORITHMS),
-            )
-        if chosen not in sweeps or section.algorithm not in ALGORITHMS:
+            what = "algorithm (it must take inequalities and gradients)"
+            self.unknown(("search", "algorithm"), what, section.algorithm, list(ALGORITHMS))
+        if chosen not in boxes or section.algorithm not in ALGORITHMS:
             return None
+        levels: tuple[float, ...] = ()
+        if section.front is not None:
+            axis = Axis(min=section.front.min, max=section.front.max, count=section.front.count)
+            levels = axis.points()
         scenario = section.scenario or scenarios[0]
-        return Search(sweeps[chosen], scenario, section.algorithm, section.starts, section.max_evaluations)
+        return Search(boxes[chosen], scenario, section.algorithm, section.starts, section.max_evaluations, levels)
 
 
 def resolve(document: Document, section: StudySection, folders: list[Path]) -> Study:

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, model_validator
 
 from ..constraints import Bound
+from ..families import FamilyOptions
 from ..scenes import Geometry, Scenario
 from ..schema import Positive, Section
 from ..sensor import Pixel
@@ -72,17 +73,23 @@ class CfaSection(Section):
     curves: dict[Name, Name] = {}
 
 
+def _listed(value: Any) -> Any:
+    return [value] if isinstance(value, str) else value
+
+
 class Modification(Section):
     """A family of filters put into `channel` of a CFA: it starts from curve `base` and goes `to` a curve or a floor.
 
-    A number for `to` is a floor: that fraction of the base curve.
+    A number for `to` is a floor: that fraction of the base curve. `dual` replaces two channels (a list) and goes `to` a
+    ceiling; `free_form` has no `to`.
     """
 
     cfa: Name
     family: Name = "stopband"
-    channel: Name
+    channel: Annotated[list[Name], BeforeValidator(_listed), Field(min_length=1)]
     base: Name
-    to: Name | Annotated[float, Field(ge=0, le=1)]
+    to: Name | Annotated[float, Field(ge=0, le=1)] | None = None
+    options: FamilyOptions = FamilyOptions()
 
 
 class DesignSection(Modification):
@@ -121,6 +128,13 @@ class Axis(Section):
         return tuple(self.max if i == self.count - 1 else self.min + i * step for i in range(self.count))
 
 
+def _span(value: Any) -> Any:
+    """An axis of a box: `min` and `max` are enough."""
+    if isinstance(value, dict) and set(value) == {"min", "max"}:
+        return {**value, "count": 1 if value["min"] == value["max"] else 2}
+    return _axis(value)
+
+
 def _axis(value: Any) -> Any:
     if isinstance(value, list):
         return {"values": value}
@@ -133,10 +147,34 @@ class SweepSection(Modification):
     grid: dict[Name, Annotated[Axis, BeforeValidator(_axis)]]
 
 
-class SearchSection(Section):
-    """A search inside the box of a sweep's grid (from the smallest to the largest value of each axis)."""
+class BoxSection(Modification):
+    """A box that is searched but not swept; a parameter that is not named may take all its family's values."""
 
-    sweep: Name | None = None
+    box: dict[Name, Annotated[Axis, BeforeValidator(_span)]] = {}
+
+
+class Levels(Section):
+    """Equidistant levels of sensitivity."""
+
+    min: float = Field(gt=0, lt=2)
+    max: float = Field(gt=0, lt=2)
+    count: int = Field(ge=1, le=1000)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Levels:
+        if not self.min <= self.max:
+            raise ValueError(f"min {self.min:g} must not be above max {self.max:g}")
+        return self
+
+
+class SearchSection(Section):
+    """A search in a box, or in that of a sweep's grid (from the smallest to the largest value of each axis).
+
+    `front`: repeat the search over these levels of the least sensitivity.
+    """
+
+    space: Name | None = None
+    front: Levels | None = None
     scenario: Name | None = None
     algorithm: Name = "SLSQP"
     starts: int = Field(default=16, ge=1, le=10_000)
@@ -168,6 +206,7 @@ class StudySection(Section):
     cfas: Annotated[dict[Name, CfaSection], BeforeValidator(_cfas), Field(min_length=1)]
     designs: dict[Name, DesignSection] = {}
     sweeps: dict[Name, SweepSection] = {}
+    boxes: dict[Name, BoxSection] = {}
     objective: Name = "csd_yellow_red"
     constraints: dict[Name, Bound] = {}
     search: SearchSection | None = None

@@ -1,0 +1,193 @@
+"""The search of a study over the cores: its best design, its limit, and the trade-off that it traces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import joblib
+import numpy as np
+import pyarrow as pa
+
+from ..arrays import FloatArray
+from ..constraints import Bound
+from ..errors import Fault, InfeasibleError
+from ..limit import Limit, limit_of, why_not
+from ..search import (
+    Evaluation,
+    Problem,
+    SearchRun,
+    best_feasible,
+    best_reachable,
+    search_from,
+    starting_points,
+)
+from ..spaces import Space
+from ..store import front_schema, search_schema
+from ..study import Search, Study
+from .jobs import Job, Rules, run_job
+
+Parallel = Callable[[Iterable[Any]], Iterator[Any]]
+"""Results of delayed calls, in their order."""
+Progress = Callable[[str, int, int], None]
+_FRONT_STARTS = 4
+_FRONT_LIMIT_DN = 0.02
+_REACH_STARTS = 8
+
+
+@dataclass(frozen=True)
+class FrontPoint:
+    """The best design with at least `level` of sensitivity (None: none was found), and the limit there."""
+
+    level: float
+    best: Evaluation | None
+    evaluations: int
+    limit: Limit | None
+
+
+@dataclass(frozen=True)
+class SearchAnswer:
+    """All starts of a search, the best feasible evaluation among them, its limit and the front."""
+
+    search: Search
+    runs: tuple[SearchRun, ...]
+    best: Evaluation
+    limit: Limit | None
+    no_limit: str | None
+    front: tuple[FrontPoint, ...]
+
+    @property
+    def gap(self) -> float | None:
+        """How far the answer is below what is proven to be out of reach, relative."""
+        return None if self.limit is None else 1 - self.best.csd / self.limit.proven
+
+
+def run_search(study: Study, search: Search, parallel: Parallel, progress: Progress) -> SearchAnswer:
+    """Search from Sobol points; the evaluations are shared evenly among the starts.
+
+    Raises InfeasibleError, naming each constraint with the best value that is reachable, when no start found a feasible
+    design.
+    """
+    problem = study.problem(search)
+    starts = starting_points(problem, search.starts, study.section.seed)
+    each = max(1, search.max_evaluations // search.starts)
+    tasks = (joblib.delayed(search_from)(problem, i, u, search.algorithm, each) for i, u in enumerate(starts))
+    runs: list[SearchRun] = []
+    for run in parallel(tasks):
+        runs.append(run)
+        progress("search starts", len(runs), search.starts)
+    best = best_feasible([e for run in runs for e in run.log])
+    if best is None:
+        raise _infeasible(study, problem, starts[:_REACH_STARTS], each)
+    no_limit = why_not(problem)
+    limit = limit_of(problem) if no_limit is None else None
+    front = tuple(_front(problem, search, starts, each, parallel, progress)) if search.levels else ()
+    return SearchAnswer(search, tuple(runs), best, limit, no_limit, front)
+
+
+def _infeasible(study: Study, problem: Problem, starts: FloatArray, each: int) -> InfeasibleError:
+    faults = [Fault(f"{study.name}: no feasible design was found")]
+    for name, bound in problem.constraints.items():
+        value = best_reachable(problem, name, starts, each)
+        met = "reachable alone" if bound.violation(np.array([value]))[0] <= 0 else "out of reach"
+        faults.append(
+            Fault(f"{met}: {name} {bound}; the best reachable value is {value:.6g}", key=f"constraints.{name}")
+        )
+    return InfeasibleError(faults)
+
+
+def _front(
+    problem: Problem, search: Search, starts: FloatArray, each: int, parallel: Parallel, progress: Progress
+) -> Iterator[FrontPoint]:
+    """The same search at each level of sensitivity, started from the neighboring level's answer and a few points."""
+    at_level = [replace(problem, constraints=_with_sensitivity(problem, level)) for level in search.levels]
+    limits: list[Limit | None] = [None] * len(at_level)
+    if why_not(problem) is None:
+        limits = list(parallel(joblib.delayed(limit_of)(p, _FRONT_LIMIT_DN) for p in at_level))
+    warm: list[FloatArray] = []
+    for index, (level, leveled) in enumerate(zip(search.levels, at_level, strict=True)):
+        points = [*warm, *starts[:_FRONT_STARTS]]
+        tasks = (joblib.delayed(search_from)(leveled, i, u, search.algorithm, each) for i, u in enumerate(points))
+        log = [e for run in parallel(tasks) for e in run.log]
+        best = best_feasible(log)
+        warm = [] if best is None else [problem.to_unit(best.x)]
+        yield FrontPoint(level, best, len(log), limits[index])
+        progress("front levels", index + 1, len(at_level))
+
+
+def _with_sensitivity(problem: Problem, level: float) -> dict[str, Bound]:
+    given = problem.constraints.get("sensitivity")
+    top = None if given is None or given.max is None or given.max < level else given.max
+    return {**problem.constraints, "sensitivity": Bound(min=level, max=top)}
+
+
+def answer_row(study: Study, answer: SearchAnswer, rules: Rules, first_id: int) -> pa.Table:
+    """The search's answer as the camera reads it out, with its limit and gap."""
+    space = answer.search.space
+    axes = tuple((float(value),) for value in answer.best.x)
+    found = Space("search", f"best of {space.name}", space.cfa, space.filter, axes)
+    job = Job(found, answer.search.scenario, 0, 1, first_id)
+    row = run_job(job, study.setup(found, job.scenario), rules)
+    if answer.limit is not None:
+        for name, value in (("limit_dn", answer.limit.proven), ("gap", answer.gap)):
+            index = row.schema.get_field_index(name)
+            row = row.set_column(index, row.schema.field(name), pa.array([value], type=pa.float64()))
+    return row
+
+
+def search_facts(study: Study, answer: SearchAnswer) -> dict[str, Any]:
+    """The search in figures, for provenance and summary."""
+    return {
+        "algorithm": answer.search.algorithm,
+        "scenario": answer.search.scenario,
+        "space": answer.search.space.name,
+        "starts": len(answer.runs),
+        "evaluations": sum(len(run.log) for run in answer.runs),
+        "endings": [run.status for run in answer.runs],
+        "objective": study.objective_column,
+        "best_smooth_csd_dn": answer.best.csd,
+        "best_sensitivity": answer.best.sensitivity,
+        "limit_attained_dn": None if answer.limit is None else answer.limit.attained,
+        "limit_proven_dn": None if answer.limit is None else answer.limit.proven,
+        "gap": answer.gap,
+        "no_limit": answer.no_limit,
+        "front_evaluations": sum(point.evaluations for point in answer.front),
+    }
+
+
+def search_log(answer: SearchAnswer) -> pa.Table:
+    """Every evaluation of every start."""
+    names = answer.search.space.parameters
+    rows = [
+        {
+            "scenario": answer.search.scenario,
+            "start": run.start,
+            "evaluation": index,
+            **dict(zip(names, map(float, e.x), strict=True)),
+            "csd_dn": e.csd,
+            "sensitivity": e.sensitivity,
+            "cfa_sensitivity": e.cfa_sensitivity,
+            "violation": e.violation,
+            "status": run.status,
+        }
+        for run in answer.runs
+        for index, e in enumerate(run.log)
+    ]
+    return pa.Table.from_pylist(rows, schema=search_schema(names))
+
+
+def front_table(answer: SearchAnswer) -> pa.Table:
+    """A row per level of sensitivity; nulls where no design or no limit was found."""
+    names = answer.search.space.parameters
+    rows = []
+    for point in answer.front:
+        row: dict[str, Any] = {"sensitivity_min": point.level, "evaluations": point.evaluations}
+        if point.best is not None:
+            row |= {"csd_dn": point.best.csd, "sensitivity": point.best.sensitivity}
+            row |= dict(zip(names, map(float, point.best.x), strict=True))
+        if point.limit is not None and point.limit.curve is not None:
+            row["limit_dn"] = point.limit.proven
+            row["gap"] = None if point.best is None else 1 - point.best.csd / point.limit.proven
+        rows.append(row)
+    return pa.Table.from_pylist(rows, schema=front_schema(names))

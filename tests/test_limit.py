@@ -1,0 +1,144 @@
+"""The limit: a closed form for one pair, a certified bracket, and no filter of any family that beats it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sweep.constraints import FEASIBLE, Bound, total_violation
+from sweep.datasets.lights import Lights
+from sweep.errors import SweepError
+from sweep.evaluate import designed_quantities, smooth_response
+from sweep.families import FreeForm, Stopband
+from sweep.limit import limit_of, why_not
+from sweep.metrics import separation
+from sweep.pareto import hypervolume
+from sweep.search import Problem, best_feasible, search_from, starting_points
+from sweep.study import load_study
+
+from .conftest import STUDIES
+
+STUDY = load_study(STUDIES / "stopband.yaml")
+assert STUDY.search is not None
+PROBLEM = STUDY.problem(STUDY.search)
+LIMIT = limit_of(PROBLEM)
+
+
+def csd(problem: Problem, curves: np.ndarray) -> np.ndarray:
+    first, second = (problem.setup.members[name] for name in problem.pair)
+    return separation(smooth_response(problem.setup, curves), first, second)
+
+
+def feasible(problem: Problem, curves: np.ndarray) -> np.ndarray:
+    amounts = designed_quantities(problem.setup, curves)
+    return total_violation(amounts, problem.constraints, np.zeros(len(curves))) <= FEASIBLE
+
+
+def test_the_bracket_is_tight_and_attained_by_its_filter() -> None:
+    assert LIMIT.curve is not None
+    curve = LIMIT.curve
+    assert 0 <= LIMIT.proven - LIMIT.attained <= 2e-3
+    assert ((curve >= 0) & (curve <= PROBLEM.setup.base_qe[0])).all()
+    assert feasible(PROBLEM, curve[None, None])[0]
+    assert csd(PROBLEM, curve[None, None])[0] == pytest.approx(LIMIT.attained, rel=1e-12)
+
+
+def test_one_pair_of_signals_has_a_closed_form() -> None:
+    """Without a slope bound, light is given up where it helps most per photon: the fractional knapsack's greedy rule."""
+    lights = STUDY.lights
+    keep = [lights.members["yellow"][3], lights.members["red"][5]]
+    two = Lights("two", ("y", "r"), ("yellow", "red"), lights.photons[keep], lights.photon_ratio, "", True)
+    problem = replace(PROBLEM, setup=replace(PROBLEM.setup, lights=two), constraints={"sensitivity": Bound(min=0.93)})
+    found = limit_of(problem)
+    base = problem.setup.base_qe[0]
+    response = smooth_response(problem.setup, base[None, None])[0]
+    channel = problem.setup.modified[0]
+    gain = response[:, channel] / (two.photons @ base)
+    per_qe = gain[0] * two.photons[0] - gain[1] * two.photons[1]
+    budget = 0.07 * base.sum()
+    taken = np.zeros_like(base)
+    for index in np.argsort(per_qe):
+        if per_qe[index] >= 0 or budget <= 0:
+            break
+        taken[index] = min(base[index], budget)
+        budget -= taken[index]
+    fixed = np.delete(response, channel, axis=1)
+    exact = np.hypot(np.linalg.norm(fixed[0] - fixed[1]), per_qe @ (base - taken))
+    assert found.attained == pytest.approx(exact, abs=2e-3)
+    assert found.proven >= exact - 1e-6
+
+
+def random_filters(kind: str, count: int, rng: np.random.Generator) -> np.ndarray:
+    base, green = PROBLEM.setup.base_qe[0], STUDY.sensor.qe["G"]
+    wave = STUDY.grid.nodes_nm
+    if kind == "free_form":
+        family = FreeForm(wave, base, np.arange(540.0, 701.0, 4.0))
+        return family.curves(family.start(rng.uniform(size=(count, 3))))
+    bands = 1 if kind == "stopband" else 2
+    target = np.minimum(green, base) if kind == "stopband" else 0.05 * base
+    family = Stopband(wave, base, target, bands)
+    edges = np.sort(rng.uniform(500, 690, (count, 2 * bands)), axis=1)
+    x = np.empty((count, 5 * bands))
+    for band in range(bands):
+        x[:, 5 * band] = edges[:, 2 * band]
+        x[:, 5 * band + 2] = edges[:, 2 * band + 1]
+        x[:, [5 * band + 1, 5 * band + 3]] = rng.uniform(5, 30, (count, 2))
+        x[:, 5 * band + 4] = rng.uniform(0, 1, count)
+    formed = (family.violation(x) <= 0).all(axis=1)
+    return family.curves(x[formed])
+
+
+@pytest.mark.parametrize("kind", ["stopband", "multi_stopband", "free_form"])
+def test_no_random_feasible_filter_beats_the_limit(kind: str) -> None:
+    curves = random_filters(kind, 20_000, np.random.default_rng(11))
+    # Scaled toward the base until the sensitivity holds, so that every filter takes part.
+    base = PROBLEM.setup.base_qe
+    lost = 1 - designed_quantities(PROBLEM.setup, curves)["sensitivity"]
+    share = np.minimum(1.0, 0.1 / np.maximum(lost, 1e-12))[:, None, None]
+    curves = base + share * (curves - base)
+    ok = feasible(PROBLEM, curves)
+    assert ok.sum() > 3_334  # 10,000 over the three kinds
+    assert csd(PROBLEM, curves[ok]).max() <= LIMIT.proven
+
+
+def test_free_form_search_comes_within_one_percent() -> None:
+    study = load_study(STUDIES / "freeform.yaml")
+    assert study.search is not None
+    problem = study.problem(study.search)
+    assert problem.constraints == PROBLEM.constraints
+    log = [
+        e for i, u in enumerate(starting_points(problem, 4, 1)) for e in search_from(problem, i, u, "SLSQP", 300).log
+    ]
+    best = best_feasible(log)
+    assert best is not None
+    assert 0.99 * LIMIT.proven <= best.csd <= LIMIT.proven
+
+
+def test_a_tighter_study_has_a_lower_limit() -> None:
+    tight = replace(PROBLEM, constraints={**PROBLEM.constraints, "min_transmission": Bound(min=0.3)})
+    found = limit_of(tight)
+    assert found.curve is not None
+    assert found.proven < LIMIT.attained
+    assert (found.curve >= 0.3 * PROBLEM.setup.base_qe[0] * (1 - 1e-9)).all()
+    steep = replace(PROBLEM, constraints={**PROBLEM.constraints, "slope_per_nm": Bound(max=0.04)})
+    assert limit_of(steep).proven <= LIMIT.proven
+    nothing = replace(PROBLEM, constraints={"sensitivity": Bound(min=1.01)})
+    assert limit_of(nothing).curve is None
+
+
+def test_no_limit_is_claimed_where_the_program_is_not_linear() -> None:
+    other = replace(PROBLEM, constraints={"csd_green_red": Bound(min=500.0)}, pairs={"csd_green_red": ("green", "red")})
+    assert why_not(other) == "constraint on csd_green_red"
+    with pytest.raises(SweepError, match="no limit: constraint on csd_green_red"):
+        limit_of(other)
+    dual = load_study(STUDIES / "dual.yaml")
+    assert dual.search is not None
+    assert why_not(dual.problem(dual.search)) == "more than one modified channel"
+
+
+def test_hypervolume_of_two_steps() -> None:
+    values = np.array([[2.0, 1.0], [1.0, 2.0], [np.nan, 5.0], [-1.0, 9.0]])
+    assert hypervolume(values, np.array([0.0, 0.0])) == pytest.approx(3.0)
+    assert hypervolume(values[2:], np.array([0.0, 0.0])) == 0.0
