@@ -21,8 +21,17 @@ from .evaluate import Setup, designed_quantities, response_gradient, sensitiviti
 from .families import Family
 from .metrics import Pair, separation
 
-ALGORITHMS = {"SLSQP": nlopt.LD_SLSQP, "MMA": nlopt.LD_MMA}
-"""Gradient algorithms of nlopt that take inequality constraints."""
+GRADIENT = {"SLSQP": nlopt.LD_SLSQP, "MMA": nlopt.LD_MMA, "CCSAQ": nlopt.LD_CCSAQ}
+"""Gradient algorithms of nlopt that take inequality constraints, for the epigraph form."""
+DIRECT = {
+    "COBYLA": nlopt.LN_COBYLA,
+    "ORIG_DIRECT_L": nlopt.GN_ORIG_DIRECT_L,
+    "ISRES": nlopt.GN_ISRES,
+    "AGS": nlopt.GN_AGS,
+}
+"""Derivative-free algorithms that take inequality constraints, for the smallest distance itself."""
+ALGORITHMS = (*GRADIENT, *DIRECT)
+"""Every algorithm that a study can name."""
 _ENDINGS = {
     nlopt.SUCCESS: "success",
     nlopt.FTOL_REACHED: "ftol_reached",
@@ -144,18 +153,25 @@ def _finite(point: _Point) -> _Point:
 class _Model:
     """The smooth problem in units of the box; one simulation per point, shared by objective and constraints."""
 
-    def __init__(self, problem: Problem, run: SearchRun) -> None:
+    def __init__(self, problem: Problem, run: SearchRun, budget: int) -> None:
         self._problem = problem
         self._run = run
+        self._budget = budget
+        self.opt: nlopt.opt | None = None
         self._span = (problem.high - problem.low)[problem.free]
         self._seen: dict[bytes, _Point] = {}
 
     def at(self, u: FloatArray) -> _Point:
-        """The simulation at `u`, made and logged once."""
+        """The simulation at `u`, made and logged once; past the budget it stops the search that uses this model."""
+        # A copy, since `u` is nlopt's own buffer.
+        u = np.clip(np.array(u, dtype=float), 0.0, 1.0)
         key = u.tobytes()
+        if key not in self._seen and len(self._run.log) >= self._budget and self.opt is not None:
+            self.opt.force_stop()
+            return next(iter(self._seen.values()))
         if key not in self._seen:
             # Only the newest is asked for again: the constraints follow the objective at the same point.
-            with np.errstate(invalid="ignore", over="ignore"):  # a filter without light has no exposure
+            with np.errstate(invalid="ignore", over="ignore", divide="ignore"):  # a filter without light has no exposure
                 self._seen = {key: _finite(self._simulate(u))}
             self._run.log.append(self._seen[key].evaluation)
         return self._seen[key]
@@ -239,35 +255,55 @@ class _Model:
         return (apart**2).sum(axis=1), 2 * (apart_by_u * apart).sum(axis=2).T
 
 
-def search_from(problem: Problem, start: int, u0: FloatArray, algorithm: str, max_evaluations: int) -> SearchRun:
+def search_from(
+    problem: Problem, start: int, u0: FloatArray, algorithm: str, max_evaluations: int, seed: int = 1
+) -> SearchRun:
     """Search from one starting point with at most `max_evaluations` simulations.
 
     `u0`: ndarray[n_free], in units of the box. The status is nlopt's word for how it ended; an early end is no
-    error, since the log keeps every evaluation.
+    error, since the log keeps every evaluation. `seed` and `start` set the random numbers of the algorithms that use
+    them (ISRES).
     """
     run = SearchRun(start)
-    model = _Model(problem, run)
+    model = _Model(problem, run, max_evaluations)
     first = model.at(u0)
-    scale = max(first.evaluation.csd, 1.0)
-    n_rows = first.squared.size + first.conditions.size
-    opt = nlopt.opt(ALGORITHMS[algorithm], u0.size + 1)
+    nlopt.srand(seed * 100_003 + start)
+    if algorithm in GRADIENT:
+        opt, z0 = _epigraph(problem, model, first, u0, algorithm)
+    else:
+        opt, z0 = _direct(model, first, u0, algorithm)
+    model.opt = opt
+    opt.set_maxeval(10 * max_evaluations)  # simulations are counted by the model, which forces the stop
+    opt.set_xtol_rel(_X_TOLERANCE)
+    opt.set_xtol_abs(_X_TOLERANCE)
+    try:
+        opt.optimize(z0)
+        run.status = _ENDINGS.get(opt.last_optimize_result(), "unknown")
+    except nlopt.RoundoffLimited:
+        run.status = "roundoff_limited"
+    except nlopt.ForcedStop:
+        run.status = "maxeval_reached"
+    except (RuntimeError, nlopt.runtime_error):  # its own class; what it carries cannot leave this process
+        run.status = "failed"
+    return run
 
-    def look(z: FloatArray) -> _Point:
-        # z is nlopt's own buffer: copied before it is kept.
-        u = np.clip(np.array(z[:-1], dtype=float), 0.0, 1.0)
-        if len(run.log) >= max_evaluations:
-            opt.force_stop()
-        return model.at(u)
+
+def _epigraph(
+    problem: Problem, model: _Model, first: _Point, u0: FloatArray, algorithm: str
+) -> tuple[nlopt.opt, list[float]]:
+    """Maximize t subject to (distance of every pair)^2 >= t^2 and the conditions, with gradients; z = (u, t)."""
+    scale = max(first.evaluation.csd, 1.0)
+    opt = nlopt.opt(GRADIENT[algorithm], u0.size + 1)
 
     def objective(z: FloatArray, gradient: FloatArray) -> float:
-        look(z)
+        model.at(z[:-1])
         if gradient.size:
             gradient[:] = 0.0
             gradient[-1] = 1.0
         return float(z[-1])
 
     def constraints(result: FloatArray, z: FloatArray, gradient: FloatArray) -> None:
-        point = look(z)
+        point = model.at(z[:-1])
         n_pairs = point.squared.size
         result[:n_pairs] = z[-1] ** 2 - point.squared / scale**2
         result[n_pairs:] = point.conditions
@@ -281,20 +317,19 @@ def search_from(problem: Problem, start: int, u0: FloatArray, algorithm: str, ma
     opt.set_lower_bounds([0.0] * (u0.size + 1))
     opt.set_upper_bounds([1.0] * u0.size + [max(limit, 1.0)])
     opt.set_max_objective(objective)
-    opt.add_inequality_mconstraint(constraints, np.zeros(n_rows))
-    opt.set_maxeval(max_evaluations)
-    opt.set_xtol_rel(_X_TOLERANCE)
-    opt.set_xtol_abs(_X_TOLERANCE)
-    try:
-        opt.optimize([*u0, min(first.evaluation.csd / scale, 1.0)])
-        run.status = _ENDINGS.get(opt.last_optimize_result(), "unknown")
-    except nlopt.RoundoffLimited:
-        run.status = "roundoff_limited"
-    except nlopt.ForcedStop:
-        run.status = "maxeval_reached"
-    except (RuntimeError, nlopt.runtime_error):  # its own class; what it carries cannot leave this process
-        run.status = "failed"
-    return run
+    opt.add_inequality_mconstraint(constraints, np.zeros(first.squared.size + first.conditions.size))
+    return opt, [*u0, min(first.evaluation.csd / scale, 1.0)]
+
+
+def _direct(model: _Model, first: _Point, u0: FloatArray, algorithm: str) -> tuple[nlopt.opt, list[float]]:
+    """Maximize the smallest distance itself, subject to the worst of the conditions."""
+    scale = max(first.evaluation.csd, 1.0)
+    opt = nlopt.opt(DIRECT[algorithm], u0.size)
+    opt.set_lower_bounds([0.0] * u0.size)
+    opt.set_upper_bounds([1.0] * u0.size)
+    opt.set_max_objective(lambda u, _: float(np.sqrt(model.at(u).squared.min()) / scale))
+    opt.add_inequality_constraint(lambda u, _: float(model.at(u).conditions.max(initial=-1.0)), 0.0)
+    return opt, [*u0]
 
 
 def best_reachable(problem: Problem, quantity: str, starts: FloatArray, max_evaluations: int) -> float:
@@ -311,7 +346,7 @@ def best_reachable(problem: Problem, quantity: str, starts: FloatArray, max_eval
     alone = replace(problem, constraints={})
     found = []
     for index, u0 in enumerate(starts):
-        model = _Model(alone, SearchRun(index))
+        model = _Model(alone, SearchRun(index), max_evaluations)
         if quantity in model.at(u0).amounts_by_u:
             found += _climb(model, quantity, sign, u0, max_evaluations)
         else:
@@ -324,7 +359,7 @@ def _climb(model: _Model, quantity: str, sign: float, u0: FloatArray, max_evalua
     seen: list[float] = []
 
     def objective(u: FloatArray, gradient: FloatArray) -> float:
-        point = model.at(np.array(u, dtype=float))
+        point = model.at(u)
         if (point.conditions <= FEASIBLE).all():
             seen.append(point.amounts[quantity])
         if gradient.size:
@@ -332,7 +367,7 @@ def _climb(model: _Model, quantity: str, sign: float, u0: FloatArray, max_evalua
         return sign * point.amounts[quantity]
 
     def conditions(result: FloatArray, u: FloatArray, gradient: FloatArray) -> None:
-        point = model.at(np.array(u, dtype=float))
+        point = model.at(u)
         result[:] = point.conditions
         if gradient.size:
             gradient[:] = point.conditions_by_u

@@ -1,14 +1,15 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from sweep.constraints import FEASIBLE
+from sweep.constraints import FEASIBLE, Bound
 from sweep.evaluate import designed_quantities, smooth_response
 from sweep.metrics import separation
-from sweep.search import ALGORITHMS, Evaluation, best_feasible, search_from, starting_points
+from sweep.search import Evaluation, best_feasible, search_from, starting_points
 from sweep.study import Study, load_study
 
 from .conftest import STUDIES
@@ -19,8 +20,7 @@ def study() -> Study:
     return load_study(STUDIES / "stopband.yaml")
 
 
-@pytest.mark.parametrize("algorithm", list(ALGORITHMS))
-def test_search_beats_a_fine_grid_of_its_box(study: Study, algorithm: str) -> None:
+def test_search_beats_a_fine_grid_of_its_box(study: Study) -> None:
     assert study.search is not None
     problem = study.problem(study.search)
     rng = np.random.default_rng(7)
@@ -33,7 +33,7 @@ def test_search_beats_a_fine_grid_of_its_box(study: Study, algorithm: str) -> No
     csd = separation(smooth_response(problem.setup, curves[ok]), members["yellow"], members["red"])
     log = []
     for start, u in enumerate(starting_points(problem, 4, 1)):
-        log += search_from(problem, start, u, algorithm, 125).log
+        log += search_from(problem, start, u, "SLSQP", 125).log
     best = best_feasible(log)
     assert best is not None
     assert best.csd >= csd.max()
@@ -56,7 +56,7 @@ def test_budget_counts_simulations(study: Study) -> None:
     problem = study.problem(study.search)
     for budget in (1, 2, 7):
         run = search_from(problem, 0, np.full(problem.free.size, 0.3), "MMA", budget)
-        assert len(run.log) <= budget + 1
+        assert len(run.log) == budget
         assert run.status == "maxeval_reached"
 
 
@@ -93,3 +93,41 @@ def test_constraint_on_another_pair_is_met(tmp_path: Path) -> None:
     members = problem.setup.members
     response = smooth_response(problem.setup, problem.family.curves(best.x[None]))
     assert separation(response, members["orange"], members["red"])[0] >= 100 * (1 - FEASIBLE)
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "share"), [("MMA", 0.99), ("COBYLA", 0.95), ("ISRES", 0.5), ("ORIG_DIRECT_L", 0.6), ("AGS", 0.5)]
+)
+def test_every_algorithm_finds_feasible_designs_within_its_budget(study: Study, algorithm: str, share: float) -> None:
+    """The gradient algorithms find the optimum; the others come near it in 400 simulations, as their kind does."""
+    assert study.search is not None
+    problem = replace(study.problem(study.search), constraints={"sensitivity": Bound(min=0.90)})
+    best_known = best_feasible(
+        [e for i, u in enumerate(starting_points(problem, 8, 1)) for e in search_from(problem, i, u, "SLSQP", 125).log]
+    )
+    log = [
+        e for i, u in enumerate(starting_points(problem, 2, 3)) for e in search_from(problem, i, u, algorithm, 200).log
+    ]
+    best = best_feasible(log)
+    assert len(log) <= 400
+    assert best is not None
+    assert best_known is not None
+    assert share * best_known.csd <= best.csd <= best_known.csd * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("algorithm", ["ISRES", "COBYLA"])
+def test_direct_algorithms_repeat(study: Study, algorithm: str) -> None:
+    assert study.search is not None
+    problem = study.problem(study.search)
+    u = starting_points(problem, 1, 5)[0]
+    logs = [[e.csd for e in search_from(problem, 3, u, algorithm, 60, seed=9).log] for _ in range(2)]
+    assert logs[0] == logs[1]
+
+
+def test_a_filter_without_light_does_not_end_the_search(study: Study) -> None:
+    assert study.search is not None
+    problem = study.problem(study.search)
+    dark = replace(problem.setup, qe=problem.setup.qe * 0)
+    run = search_from(replace(problem, setup=dark), 0, np.full(problem.free.size, 0.5), "SLSQP", 20)
+    assert best_feasible(run.log) is None
+    assert run.log

@@ -12,6 +12,7 @@ from ..figures import TYPE_COLORS, ChartFigure, Cloud, CurvesFigure, ParetoFigur
 from ..spectra import WavelengthGrid
 from .outputs import Output
 
+LIMIT_NAME = "limit of any filter"
 QUANTITIES = ("sensitivity", "cfa_sensitivity")
 
 
@@ -63,7 +64,7 @@ def _trade_offs(output: Output, scenario: str, cfa: str | None) -> dict[str, Poi
     bounded = output.front.dropna(subset=["limit_dn"])
     lines = {"front of the search": Points(traced["sensitivity"].to_numpy(), traced["csd_dn"].to_numpy())}
     if len(bounded):
-        lines["limit of any filter"] = Points(bounded["sensitivity_min"].to_numpy(), bounded["limit_dn"].to_numpy())
+        lines[LIMIT_NAME] = Points(bounded["sensitivity_min"].to_numpy(), bounded["limit_dn"].to_numpy())
     return lines
 
 
@@ -135,8 +136,9 @@ def filters_figure(output: Output, cfa: str) -> CurvesFigure:
             name = label(row) if len(made) == 1 else f"{label(row)}, {'ab'[number]}"
             curves[name] = output.curves[column].to_numpy()
     if f"limit:{cfa}" in output.curves.columns:
-        curves["limit of any filter"] = output.curves[f"limit:{cfa}"].to_numpy()
-    return CurvesFigure(f"{cfa}: modified channel", "QE", _wave(output), curves, tuple(ends))
+        curves[LIMIT_NAME] = output.curves[f"limit:{cfa}"].to_numpy()
+    dashed = (*ends, LIMIT_NAME)
+    return CurvesFigure(f"{cfa}: modified channel", "QE", _wave(output), curves, dashed, {LIMIT_NAME: "#000000"})
 
 
 def modifications(output: Output) -> list[dict[str, object]]:

@@ -72,7 +72,10 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     problem = study.problem(search)
     starts = starting_points(problem, search.starts, study.section.seed)
     each = max(1, search.max_evaluations // search.starts)
-    tasks = (joblib.delayed(search_from)(problem, i, u, search.algorithm, each) for i, u in enumerate(starts))
+    tasks = (
+        joblib.delayed(search_from)(problem, i, u, search.algorithm, each, study.section.seed)
+        for i, u in enumerate(starts)
+    )
     runs: list[SearchRun] = []
     for run in parallel(tasks):
         runs.append(run)
@@ -82,7 +85,9 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
         raise _infeasible(study, problem, starts[:_REACH_STARTS], each)
     no_limit = why_not(problem)
     limit = limit_of(problem) if no_limit is None else None
-    front = tuple(_front(problem, search, starts, each, parallel, progress)) if search.levels else ()
+    front = (
+        tuple(_front(problem, search, starts, each, study.section.seed, parallel, progress)) if search.levels else ()
+    )
     return SearchAnswer(search, tuple(runs), best, limit, no_limit, front)
 
 
@@ -98,7 +103,7 @@ def _infeasible(study: Study, problem: Problem, starts: FloatArray, each: int) -
 
 
 def _front(
-    problem: Problem, search: Search, starts: FloatArray, each: int, parallel: Parallel, progress: Progress
+    problem: Problem, search: Search, starts: FloatArray, each: int, seed: int, parallel: Parallel, progress: Progress
 ) -> Iterator[FrontPoint]:
     """The same search at each level of sensitivity, started from the neighboring level's answer and a few points."""
     at_level = [replace(problem, constraints=_with_sensitivity(problem, level)) for level in search.levels]
@@ -108,7 +113,7 @@ def _front(
     warm: list[FloatArray] = []
     for index, (level, leveled) in enumerate(zip(search.levels, at_level, strict=True)):
         points = [*warm, *starts[:_FRONT_STARTS]]
-        tasks = (joblib.delayed(search_from)(leveled, i, u, search.algorithm, each) for i, u in enumerate(points))
+        tasks = (joblib.delayed(search_from)(leveled, i, u, search.algorithm, each, seed) for i, u in enumerate(points))
         log = [e for run in parallel(tasks) for e in run.log]
         best = best_feasible(log)
         warm = [] if best is None else [problem.to_unit(best.x)]

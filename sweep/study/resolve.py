@@ -351,7 +351,7 @@ class _Resolver:
         if section.scenario is not None and section.scenario not in scenarios:
             self.unknown(("search", "scenario"), "scenario", section.scenario, scenarios)
         if section.algorithm not in ALGORITHMS:
-            what = "algorithm (it must take inequalities and gradients)"
+            what = "algorithm (it must take inequality constraints)"
             self.unknown(("search", "algorithm"), what, section.algorithm, list(ALGORITHMS))
         if chosen not in boxes or section.algorithm not in ALGORITHMS:
             return None
