@@ -19,8 +19,8 @@ from .constraints import FEASIBLE
 from .errors import Fault, SweepError
 from .evaluate import designed_quantities, smooth_response
 from .metrics import separation
+from .problem import Problem
 from .scenes import WhitePatchExposure
-from .search import Problem
 from .sensor import electron_rate
 
 _MARGIN_DN = 1e-6

@@ -18,7 +18,8 @@ from sweep.constraints import FEASIBLE, total_violation
 from sweep.evaluate import designed_quantities, smooth_response
 from sweep.limit import limit_of
 from sweep.metrics import separation
-from sweep.search import search_from, starting_points
+from sweep.problem import starting_points
+from sweep.search import search_from
 from sweep.study import load_study
 
 ROOT = Path(__file__).parent.parent
@@ -81,40 +82,28 @@ def scipy_de(box: Counted, seed: int) -> list[float]:
     return box.log
 
 
-def optuna_tpe(box: Counted, seed: int) -> list[float]:
-    import optuna
+def optuna_with(sampler_name: str) -> Callable[[Counted, int], list[float]]:
+    """Optuna with one of its samplers."""
 
-    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    def search(box: Counted, seed: int) -> list[float]:
+        import optuna
 
-    def objective(trial: optuna.Trial) -> float:
-        u = np.array([trial.suggest_float(f"u{i}", 0, 1) for i in range(box.size)])
-        csd, violation = box.both(u)
-        trial.set_user_attr("violation", violation)
-        return csd
+        optuna.logging.set_verbosity(optuna.logging.ERROR)
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        sampler = optuna.samplers.TPESampler(seed=seed, constraints_func=lambda t: (t.user_attrs["violation"],))
-        optuna.create_study(direction="maximize", sampler=sampler).optimize(objective, n_trials=BUDGET)
-    return box.log
+        def objective(trial: optuna.Trial) -> float:
+            u = np.array([trial.suggest_float(f"u{i}", 0, 1) for i in range(box.size)])
+            csd, violation = box.both(u)
+            trial.set_user_attr("violation", violation)
+            return csd
 
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            kind = getattr(optuna.samplers, sampler_name)
+            sampler = kind(seed=seed, constraints_func=lambda t: (t.user_attrs["violation"],))
+            optuna.create_study(direction="maximize", sampler=sampler).optimize(objective, n_trials=BUDGET)
+        return box.log
 
-def optuna_nsga2(box: Counted, seed: int) -> list[float]:
-    import optuna
-
-    optuna.logging.set_verbosity(optuna.logging.ERROR)
-
-    def objective(trial: optuna.Trial) -> float:
-        u = np.array([trial.suggest_float(f"u{i}", 0, 1) for i in range(box.size)])
-        csd, violation = box.both(u)
-        trial.set_user_attr("violation", violation)
-        return csd
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        sampler = optuna.samplers.NSGAIISampler(seed=seed, constraints_func=lambda t: (t.user_attrs["violation"],))
-        optuna.create_study(direction="maximize", sampler=sampler).optimize(objective, n_trials=BUDGET)
-    return box.log
+    return search
 
 
 def pymoo_ga(box: Counted, seed: int) -> list[float]:
@@ -137,8 +126,8 @@ def pymoo_ga(box: Counted, seed: int) -> list[float]:
 TOOLS: dict[str, Callable[[Counted, int], list[float]]] = {
     "sweep (SLSQP, epigraph)": ours,
     "SciPy differential evolution": scipy_de,
-    "Optuna TPE": optuna_tpe,
-    "Optuna NSGA-II": optuna_nsga2,
+    "Optuna TPE": optuna_with("TPESampler"),
+    "Optuna NSGA-II": optuna_with("NSGAIISampler"),
     "pymoo GA": pymoo_ga,
 }
 

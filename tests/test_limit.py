@@ -15,7 +15,8 @@ from sweep.families import FreeForm, Stopband
 from sweep.limit import limit_of, why_not
 from sweep.metrics import separation
 from sweep.pareto import hypervolume
-from sweep.search import Problem, best_feasible, search_from, starting_points
+from sweep.problem import Problem, best_feasible, starting_points
+from sweep.search import search_from
 from sweep.study import load_study
 
 from .conftest import STUDIES

@@ -9,7 +9,8 @@ import pytest
 from sweep.constraints import FEASIBLE, Bound
 from sweep.evaluate import designed_quantities, smooth_response
 from sweep.metrics import separation
-from sweep.search import Evaluation, best_feasible, search_from, starting_points
+from sweep.problem import Evaluation, best_feasible, starting_points
+from sweep.search import search_from
 from sweep.study import Study, load_study
 
 from .conftest import STUDIES

@@ -86,35 +86,18 @@ class Bands:
         return np.stack(rows)
 
 
-class Stopband:
-    """N = base + sum over bands of depth (target - base) (e(l; left) - e(l; right)).
+class Banded:
+    """What families whose parameters are those of bands have in common."""
 
-    One band is the paper's N_x with base Y and target G. `base`, `target`: QE, ndarray[n_wavelengths]. With the edges
-    in order, the bands lie between 0 and 1 and do not overlap, so N lies between its base and its target at every
-    wavelength, and is exactly the base outside the bands.
-    """
-
-    n_modified = 1
     start_dimensions: int | None = None
 
-    def __init__(self, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray, bands: int = 1) -> None:
-        self.kind = "stopband" if bands == 1 else "multi_stopband"
+    def __init__(self, wavelength_nm: FloatArray, bands: int) -> None:
         self._bands = Bands(wavelength_nm, bands)
-        self._base = base
-        self._change = target - base
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Edges, widths and depth of each band."""
         return self._bands.parameters
-
-    def curves(self, x: FloatArray) -> FloatArray:
-        """QE of the modified channel, ndarray[n_designs, 1, n_wavelengths]; see `Family.curves`."""
-        return (self._base + self._change * self._bands.shape(x))[:, None, :]
-
-    def gradient(self, x: FloatArray) -> FloatArray:
-        """Derivative by each parameter, ndarray[n_parameters, 1, n_wavelengths]; see `Family.gradient`."""
-        return (self._change * self._bands.gradient(x))[:, None, :]
 
     def start(self, points: FloatArray) -> FloatArray:
         """Not needed: a search starts anywhere in its box."""
@@ -127,3 +110,28 @@ class Stopband:
     def violation_gradient(self, x: FloatArray) -> FloatArray:
         """See `Bands.violation_gradient`."""
         return self._bands.violation_gradient(x)
+
+
+class Stopband(Banded):
+    """N = base + sum over bands of depth (target - base) (e(l; left) - e(l; right)).
+
+    One band is the paper's N_x with base Y and target G. `base`, `target`: QE, ndarray[n_wavelengths]. With the edges
+    in order, the bands lie between 0 and 1 and do not overlap, so N lies between its base and its target at every
+    wavelength, and is exactly the base outside the bands.
+    """
+
+    n_modified = 1
+
+    def __init__(self, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray, bands: int = 1) -> None:
+        self.kind = "stopband" if bands == 1 else "multi_stopband"
+        super().__init__(wavelength_nm, bands)
+        self._base = base
+        self._change = target - base
+
+    def curves(self, x: FloatArray) -> FloatArray:
+        """QE of the modified channel, ndarray[n_designs, 1, n_wavelengths]; see `Family.curves`."""
+        return (self._base + self._change * self._bands.shape(x))[:, None, :]
+
+    def gradient(self, x: FloatArray) -> FloatArray:
+        """Derivative by each parameter, ndarray[n_parameters, 1, n_wavelengths]; see `Family.gradient`."""
+        return (self._change * self._bands.gradient(x))[:, None, :]

@@ -14,15 +14,8 @@ from ..arrays import FloatArray
 from ..constraints import Bound
 from ..errors import Fault, InfeasibleError
 from ..limit import Limit, limit_of, why_not
-from ..search import (
-    Evaluation,
-    Problem,
-    SearchRun,
-    best_feasible,
-    best_reachable,
-    search_from,
-    starting_points,
-)
+from ..problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
+from ..search import best_reachable, search_from
 from ..spaces import Space
 from ..store import front_schema, search_schema
 from ..study import Search, Study

@@ -8,7 +8,8 @@ from pydantic import ValidationError
 
 from ..errors import StudyError
 from .lines import Document
-from .resolve import Study, resolve
+from .model import Study
+from .resolve import resolve
 from .schema import StudySection
 
 _ALLOWED = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.")

@@ -3,115 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
-from ..constraints import Bound
 from ..datasets.lights import Lights
 from ..errors import StudyError, SweepError, nearest
-from ..evaluate import DESIGNED, Setup
+from ..evaluate import DESIGNED
 from ..families import CHANNELS, Parameter, build_family
 from ..filters import SensorCurves
 from ..metrics import Pair, class_pairs, csd_name
 from ..mosaics import Mosaic
-from ..scenes import OBJECT_RESOLUTION, Geometry, Scenario
-from ..search import ALGORITHMS, Problem
-from ..sensor import Pixel
+from ..scenes import OBJECT_RESOLUTION
+from ..search import ALGORITHMS
 from ..spaces import Filter, Kind, Space
-from ..spectra import WavelengthGrid
 from ..surrogate import surrogate_parameters
 from .lines import Document, Key
+from .model import Search, Study
 from .schema import Axis, CfaSection, DesignSection, Modification, StudySection
 from .sources import Sources
 
 MOST_DESIGNS = 10**9
-
-
-@dataclass(frozen=True)
-class Search:
-    """A search inside the box of a sweep."""
-
-    space: Space
-    scenario: str
-    algorithm: str
-    starts: int
-    max_evaluations: int
-    levels: tuple[float, ...] = ()
-
-
-@dataclass(frozen=True)
-class Study:
-    """A whole study, checked and ready to run."""
-
-    name: str
-    section: StudySection
-    grid: WavelengthGrid
-    sensor: SensorCurves
-    lights: Lights
-    pixel: Pixel
-    scenarios: Mapping[str, Scenario]
-    geometry: Mapping[str, Geometry]
-    mosaics: Mapping[str, Mosaic]
-    spaces: tuple[Space, ...]
-    objective: Pair
-    constraints: Mapping[str, Bound]
-    search: Search | None
-    digests: Mapping[str, str]
-    warnings: tuple[str, ...]
-
-    @property
-    def pairs(self) -> tuple[Pair, ...]:
-        """Pairs of signal types, in order."""
-        return class_pairs(self.lights.classes)
-
-    @property
-    def objective_column(self) -> str:
-        """Column of the CSD that is maximized."""
-        return csd_name(self.objective)
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """Parameters of all families of the study, each once."""
-        return tuple(dict.fromkeys(name for space in self.spaces for name in space.parameters))
-
-    @property
-    def n_designs(self) -> int:
-        """Designs of all spaces, over all scenarios."""
-        return sum(space.size for space in self.spaces) * len(self.scenarios)
-
-    def setup(self, space: Space, scenario: str) -> Setup:
-        """What the designs of `space` share in a scenario."""
-        mosaic = self.mosaics[space.cfa]
-        replaced = dict(self.section.cfas[space.cfa].curves)
-        modified: tuple[int, ...] = ()
-        if space.filter is not None:
-            replaced |= dict.fromkeys(space.filter.channels, space.filter.base)
-            modified = tuple(mosaic.channels.index(channel) for channel in space.filter.channels)
-        return Setup(
-            grid=self.grid,
-            mosaic=mosaic,
-            qe=self.sensor.mosaic_qe(mosaic, replaced),
-            modified=modified,
-            clear_qe=self.sensor.curve(self.sensor.clear),
-            lights=self.lights,
-            pixel=self.pixel,
-            scenario=self.scenarios[scenario],
-        )
-
-    def problem(self, search: Search) -> Problem:
-        """The search as a mathematical problem."""
-        assert search.space.filter is not None
-        return Problem(
-            setup=self.setup(search.space, search.scenario),
-            family=search.space.filter.family,
-            low=np.array([min(axis) for axis in search.space.axes], dtype=float),
-            high=np.array([max(axis) for axis in search.space.axes], dtype=float),
-            pair=self.objective,
-            constraints=self.constraints,
-            pairs={csd_name(pair): pair for pair in self.pairs},
-        )
 
 
 class _Resolver:
@@ -122,16 +32,7 @@ class _Resolver:
         self.section = section
         self.sources = Sources(document, section.wavelengths, folders)
         self.faults = self.sources.faults
-
-    def add(
-        self,
-        path: tuple[Key, ...],
-        problem: str,
-        value: object = None,
-        allowed: str | None = None,
-        near: str | None = None,
-    ) -> None:
-        self.faults.append(self.document.fault(path, problem, value, allowed, near))
+        self.add = self.sources.add
 
     def unknown(self, path: tuple[Key, ...], what: str, value: str, known: list[str]) -> None:
         self.add(path, f"unknown {what}", value, ", ".join(known), nearest(value, known))

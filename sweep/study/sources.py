@@ -46,7 +46,7 @@ class Sources:
             curves = self._curves(path, entry)
             for name, column in entry.columns.items():
                 if name in qe:
-                    self._add((*path, "columns", name), "the curve is defined twice", name)
+                    self.add((*path, "columns", name), "the curve is defined twice", name)
                 values = self._column((*path, "columns", name), curves, column, entry)
                 if values is not None:
                     qe[name] = values * entry.scale
@@ -84,7 +84,7 @@ class Sources:
         if len(self.faults) > before:
             return None
         if len(by_type) < 2:
-            self._add(("lights", "files"), "only one signal type", list(by_type), "two or more, to tell them apart")
+            self.add(("lights", "files"), "only one signal type", list(by_type), "two or more, to tell them apart")
             return None
         signals = [signal for group in by_type.values() for signal in group]
         source = ", ".join(entry.file for entry in section.files)
@@ -92,7 +92,7 @@ class Sources:
 
     def _built_in(self, key: str, name: str, known: Mapping[str, Callable[[WavelengthGrid], _Made]]) -> _Made | None:
         if name not in known:
-            self._add(
+            self.add(
                 (key,),
                 f"unknown built-in {key}",
                 name,
@@ -123,7 +123,7 @@ class Sources:
             raw = photons_from_energy(wave, raw)
             values = photons_from_energy(self.grid.nodes_nm, values)
         if not values.any():
-            self._add(path, "the light has no photons on the wavelength grid", column)
+            self.add(path, "the light has no photons on the wavelength grid", column)
             return None
         total = float(((raw[1:] + raw[:-1]) / 2 * (wave[1:] - wave[:-1])).sum())
         lost = 1 - float(self.grid.integrate(values)) / total
@@ -140,13 +140,13 @@ class Sources:
             return None
         if column not in curves.values:
             known = list(curves.values)
-            self._add(path, f"{entry.file} has no such column", column, ", ".join(known), nearest(column, known))
+            self.add(path, f"{entry.file} has no such column", column, ", ".join(known), nearest(column, known))
             return None
         try:
             return curves.on(self.grid, column, entry.resampling, entry.outside)
         except DataError as error:
             for fault in error.faults:
-                self._add(path, f"{entry.file}, column {column}: {fault.problem}", fault.value, fault.allowed)
+                self.add(path, f"{entry.file}, column {column}: {fault.problem}", fault.value, fault.allowed)
             return None
 
     def _curves(self, path: tuple[Key, ...], entry: CurveFile | LightFile) -> Curves | None:
@@ -158,7 +158,7 @@ class Sources:
             searched = ", ".join(str(folder) for folder in self.folders)
             beside = [item.name for folder in self.folders if folder.is_dir() for item in folder.iterdir()]
             near = nearest(entry.file, beside)
-            self._add((*path, "file"), "no such file", entry.file, f"a path relative to {searched}", near)
+            self.add((*path, "file"), "no such file", entry.file, f"a path relative to {searched}", near)
             return None
         try:
             self._read[entry.file] = read_curves(found)
@@ -167,7 +167,7 @@ class Sources:
             self.faults.extend(error.faults)
         return self._read[entry.file]
 
-    def _add(
+    def add(
         self,
         path: tuple[Key, ...],
         problem: str,
@@ -175,4 +175,5 @@ class Sources:
         allowed: str | None = None,
         near: str | None = None,
     ) -> None:
+        """Add a fault at `path` of the study file."""
         self.faults.append(self.document.fault(path, problem, value, allowed, near))
