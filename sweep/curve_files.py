@@ -47,10 +47,11 @@ def _read_csv(path: Path) -> Curves:
         text = _read_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise DataError(Fault(f"not UTF-8 text ({error.reason} at byte {error.start})", str(path))) from None
-    reader = csv.reader(io.StringIO(text))
-    rows = [
-        (reader.line_num, row) for row in reader if any(cell.strip() for cell in row) and not row[0].startswith("#")
-    ]
+    reader = csv.reader(io.StringIO(text, newline=None))
+    try:
+        rows = [(reader.line_num, row) for row in reader if any(c.strip() for c in row) and not row[0].startswith("#")]
+    except csv.Error as error:
+        raise DataError(Fault(f"not a readable CSV: {error}", str(path), reader.line_num)) from None
     if not rows:
         raise DataError(
             Fault("the file is empty", str(path), allowed=f"a header `{WAVELENGTH},...` and rows of numbers")
@@ -59,7 +60,7 @@ def _read_csv(path: Path) -> Curves:
     faults = _header_faults(str(path), header_line, header)
     if faults:
         raise DataError(faults)
-    values = np.empty((len(rows) - 1, len(header)))
+    values = np.full((len(rows) - 1, len(header)), np.nan)
     for index, (line, row) in enumerate(rows[1:]):
         if len(row) != len(header):
             faults.append(Fault("wrong number of columns", str(path), line, value=len(row), allowed=str(len(header))))
@@ -84,7 +85,7 @@ def _read_csv(path: Path) -> Curves:
 
 def _header_faults(file: str, line: int, header: list[str]) -> list[Fault]:
     if header[0] != WAVELENGTH:
-        unit = "wrong unit of " if header[0].startswith("wavelength_") else "no column "
+        unit = "wrong unit of " if header[0].startswith("wavelength_") and ";" not in header[0] else "no column "
         return [Fault(f"{unit}wavelength", file, line, header[0], header[0], f"`{WAVELENGTH}` as the first column")]
     faults = [
         Fault("column occurs twice", file, line, name) for index, name in enumerate(header) if name in header[:index]
@@ -132,7 +133,7 @@ def _read_mat(path: Path) -> Curves:
         raise DataError(Fault("`wavelength` and `data` must be numbers", str(path))) from None
     if data.shape[0] != wave.size and data.shape[1] == wave.size:
         data = data.T
-    if data.ndim != 2 or data.shape[0] != wave.size:
+    if data.ndim != 2 or data.shape[0] != wave.size or not data.size:
         raise DataError(
             Fault("`data` does not fit `wavelength`", str(path), value=data.shape, allowed=f"({wave.size}, n)")
         )
@@ -140,11 +141,8 @@ def _read_mat(path: Path) -> Curves:
 
 
 def _mat_names(raw: object, count: int) -> list[str]:
-    names = (
-        [str(np.asarray(item).ravel()[0]).strip() for item in np.asarray(raw, dtype=object).ravel()]
-        if raw is not None
-        else []
-    )
+    items = [] if raw is None else [np.asarray(item).ravel() for item in np.asarray(raw, dtype=object).ravel()]
+    names = [str(item[0]).strip() if item.size else "" for item in items]
     if len(names) == count and len(set(names)) == count and all(names):
         return names
     return [f"curve_{index + 1}" for index in range(count)]

@@ -21,11 +21,12 @@ from .evaluate import designed_quantities, smooth_response
 from .metrics import separation
 from .problem import Problem
 from .scenes import WhitePatchExposure
-from .sensor import electron_rate
+from .sensor import electron_rate, unquantized
 
 _MARGIN_DN = 1e-6
 """A linear program whose best margin is below minus this is infeasible beyond its solver's own tolerance."""
 _MOST_STEPS = 80
+_ROUNDING = 1e-9
 _ALLOWED = ("sensitivity", "slope_per_nm", "min_transmission")
 
 
@@ -64,11 +65,28 @@ def why_not(problem: Problem) -> str | None:
     others = [name for name in problem.constraints if name not in _ALLOWED]
     if problem.family.n_modified != 1:
         return "more than one modified channel"
+    if (_top(problem) > problem.setup.base_qe[0] * (1 + _ROUNDING)).any():
+        return "filters of the box may exceed the curve that they replace"
+    if _clips(problem):
+        return "signals exceed the full well or the range of the ADC"
     if others:
         return f"constraint on {others[0]}"
     if isinstance(problem.setup.scenario.exposure, WhitePatchExposure) and not _exposure_is_fixed(problem):
         return "the modified channel could set the exposure"
     return None
+
+
+def _top(problem: Problem) -> FloatArray:
+    """No filter of the box exceeds this curve, ndarray[n_wavelengths]."""
+    return np.asarray(problem.family.upper(problem.low, problem.high)[0], dtype=float)
+
+
+def _clips(problem: Problem) -> bool:
+    """Whether the base curve's response, the largest that any of the filters has, is cut off when it is read out."""
+    setup = problem.setup
+    smooth = smooth_response(setup, setup.base_qe[None])
+    well_dn = float(unquantized(np.array([setup.pixel.well_e]), setup.pixel)[0])
+    return bool((smooth > min(float(setup.pixel.full_scale_dn), well_dn)).any())
 
 
 def _exposure_is_fixed(problem: Problem) -> bool:
@@ -134,6 +152,8 @@ class _Program:
             bounds=[*zip(self.low, self.base, strict=True), (None, max(t, 1.0))],
             method="highs",
         )
+        if found.status not in (0, 2):  # 2: proven infeasible
+            raise SweepError(Fault(f"the limit's linear program ended without an answer: {found.message}"))
         return (float(found.x[-1]), found.x[:-1]) if found.status == 0 else (-np.inf, None)
 
     def attained(self, curve: FloatArray) -> float:

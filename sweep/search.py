@@ -133,7 +133,7 @@ def best_reachable(problem: Problem, quantity: str, starts: FloatArray, max_eval
             found += _climb(model, quantity, sign, u0, max_evaluations)
         else:
             found.append(model.at(u0).amounts[quantity])
-    return sign * max(sign * value for value in found)
+    return sign * max((sign * value for value in found), default=-np.inf)
 
 
 def _climb(model: Model, quantity: str, sign: float, u0: FloatArray, max_evaluations: int) -> list[float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from .arrays import FloatArray
 from .schema import NonNegative, Positive, Section
@@ -31,6 +31,12 @@ class Pixel(Section):
     bits: int = Field(default=12, ge=1, le=24)
     gain_dn_per_e: float | None = Field(default=None, gt=0)
     offset_dn: NonNegative = 0.0
+
+    @model_validator(mode="after")
+    def _pedestal_in_range(self) -> Pixel:
+        if not self.offset_dn < self.full_scale_dn:
+            raise ValueError(f"offset_dn {self.offset_dn:g} must be below full scale, {self.full_scale_dn}")
+        return self
 
     @property
     def full_scale_dn(self) -> int:

@@ -25,6 +25,7 @@ PLANCK_J_S = 6.62607015e-34
 LIGHT_M_S = 299792458.0
 """Speed of light in vacuum, exact in the SI."""
 _GRID_SLACK = 1e-9
+_MOST_STEPS = 20_000
 
 
 class WavelengthGrid(Section):
@@ -46,6 +47,8 @@ class WavelengthGrid(Section):
             raise ValueError(
                 f"step_nm {self.step_nm:g} must divide stop_nm - start_nm = {self.stop_nm - self.start_nm:g}"
             )
+        if steps > _MOST_STEPS:
+            raise ValueError(f"step_nm {self.step_nm:g} is too fine: at most {_MOST_STEPS} steps")
         if not 200 <= self.start_nm < self.stop_nm <= 2000:
             raise ValueError("wavelengths must be in nm, between 200 and 2000")
         return self

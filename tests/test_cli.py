@@ -119,7 +119,7 @@ def test_an_infeasible_study_names_the_constraint_and_writes_nothing(tmp_path: P
     done = sweep("run", str(tmp_path / "infeasible.yaml"), "--output", str(tmp_path / "out"), "--jobs", "1")
     assert done.returncode == 3
     assert "no feasible design was found" in done.stderr
-    assert "constraints.sensitivity: out of reach: sensitivity >= 1.01; the best reachable value is 1" in done.stderr
+    assert "constraints.sensitivity: out of reach: sensitivity >= 1.01; the best value found is 1" in done.stderr
     assert "Traceback" not in done.stderr
     assert not (tmp_path / "out").exists()
 

@@ -108,3 +108,16 @@ def test_damaged_files_are_faults(tmp_path: Path) -> None:
 def test_digest_is_sha256_of_the_bytes(tmp_path: Path) -> None:
     # FIPS 180-2's example of "abc"
     assert digest(written(tmp_path, "abc")).startswith("ba7816bf8f01cfea414140de5dae2223")
+
+
+def test_one_bad_cell_is_one_fault_and_old_line_ends_are_read(tmp_path: Path) -> None:
+    assert len(faults(written(tmp_path, "wavelength_nm,a\n400,1\nx,1\n700,2\n"))) == 1
+    path = tmp_path / "mac.csv"
+    path.write_bytes(b"wavelength_nm,a\r400,1\r700,2\r")
+    assert list(read_curves(path).values["a"]) == [1, 2]
+    assert "CSV" in faults(written(tmp_path, 'wavelength_nm,a\n400,"' + "1" * 200_000 + "\n"))[0]
+    savemat(
+        tmp_path / "names.mat",
+        {"wavelength": [400.0, 700.0], "data": np.ones((2, 2)), "filterNames": np.array(["", ""], dtype=object)},
+    )
+    assert list(read_curves(tmp_path / "names.mat").values) == ["curve_1", "curve_2"]

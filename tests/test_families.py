@@ -113,3 +113,15 @@ def test_a_family_refuses_what_does_not_fit() -> None:
     ):
         with pytest.raises(SweepError):
             build_family(name, WAVE, BASE, target, given_options)
+
+
+@pytest.mark.parametrize("name", list(FAMILIES))
+def test_no_filter_of_a_box_exceeds_its_upper_curve(name: str) -> None:
+    family, x = FAMILIES[name]
+    low, high = np.maximum(x - np.minimum(0.3 * x, 8), 0), np.minimum(x * 1.3, x + 8)
+    limits = np.array([p.high for p in family.parameters])
+    high = np.minimum(high, limits)
+    points = low + (high - low) * np.random.default_rng(2).uniform(size=(2000, x.size))
+    points = points[(family.violation(points) <= 0).all(axis=1)]
+    assert len(points) > 100
+    assert (family.curves(points) <= family.upper(low, high) + 1e-12).all()

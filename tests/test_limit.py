@@ -10,12 +10,13 @@ import pytest
 from sweep.constraints import FEASIBLE, Bound, total_violation
 from sweep.datasets.lights import Lights
 from sweep.errors import SweepError
-from sweep.evaluate import designed_quantities, smooth_response
+from sweep.evaluate import Setup, designed_quantities, smooth_response
 from sweep.families import FreeForm, Stopband
 from sweep.limit import limit_of, why_not
 from sweep.metrics import separation
 from sweep.pareto import hypervolume
 from sweep.problem import Problem, best_feasible, starting_points
+from sweep.scenes import FixedExposure, Scenario
 from sweep.search import search_from
 from sweep.study import load_study
 
@@ -143,3 +144,17 @@ def test_hypervolume_of_two_steps() -> None:
     values = np.array([[2.0, 1.0], [1.0, 2.0], [np.nan, 5.0], [-1.0, 9.0]])
     assert hypervolume(values, np.array([0.0, 0.0])) == pytest.approx(3.0)
     assert hypervolume(values[2:], np.array([0.0, 0.0])) == 0.0
+
+
+def test_no_limit_is_claimed_where_it_would_not_hold() -> None:
+    wave, cyan, green = STUDY.grid.nodes_nm, STUDY.sensor.qe["Cy"], STUDY.sensor.qe["G"]
+    above = replace(PROBLEM, family=Stopband(wave, cyan, green), setup=_with_base(cyan))
+    assert why_not(above) == "filters of the box may exceed the curve that they replace"
+    scenario = replace(PROBLEM.setup, scenario=Scenario(exposure=FixedExposure(exposure_s=1000.0)))
+    assert why_not(replace(PROBLEM, setup=scenario)) == "signals exceed the full well or the range of the ADC"
+
+
+def _with_base(curve: np.ndarray) -> Setup:
+    qe = PROBLEM.setup.qe.copy()
+    qe[PROBLEM.setup.modified[0]] = curve
+    return replace(PROBLEM.setup, qe=qe)

@@ -39,6 +39,9 @@ class Family(Protocol):
     def curves(self, x: FloatArray) -> FloatArray:
         """QE of the modified channels: [n_designs, n_parameters] -> [n_designs, n_modified, n_wavelengths]."""
 
+    def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """No filter of the box `low`..`high` ([n_parameters] each) exceeds this: [n_modified, n_wavelengths]."""
+
     def gradient(self, x: FloatArray) -> FloatArray:
         """Derivative of `curves` at one design: [n_parameters] -> [n_parameters, n_modified, n_wavelengths]."""
 

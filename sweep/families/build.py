@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from ..arrays import FloatArray
 from ..errors import Fault, SweepError
@@ -19,12 +19,24 @@ CHANNELS: Mapping[str, int] = {"stopband": 1, "multi_stopband": 1, "dual": 2, "f
 """Every family that a study can name, with the number of channels that it replaces."""
 
 
+_MOST_NODES = 500
+
+
 class Nodes(Section):
     """Equidistant nodes of a free-form filter."""
 
     start_nm: Positive
     stop_nm: Positive
     step_nm: Positive
+
+    @model_validator(mode="after")
+    def _whole_steps(self) -> Nodes:
+        steps = (self.stop_nm - self.start_nm) / self.step_nm
+        if not 1 <= steps < _MOST_NODES:
+            raise ValueError(f"nodes: {steps + 1:g} of them; allowed: 2 to {_MOST_NODES}")
+        if not abs(steps - round(steps)) < 1e-6:
+            raise ValueError(f"step_nm {self.step_nm:g} must divide {self.stop_nm - self.start_nm:g}")
+        return self
 
 
 class FamilyOptions(Section):
@@ -48,10 +60,16 @@ def build_family(
     if (options.nodes is None) == (name == "free_form"):
         raise SweepError(Fault("`nodes` goes with free_form, and free_form with `nodes`"))
     if name == "dual" and target is not None:
+        if not (target > base).any():
+            raise SweepError(Fault("dual needs a ceiling `to` above its base: there is no room to swing"))
         return Dual(wavelength_nm, base, target)
     if options.nodes is not None:
         nodes = options.nodes
+        if nodes.start_nm < wavelength_nm[0] or nodes.stop_nm > wavelength_nm[-1]:
+            place = f"{nodes.start_nm:g} to {nodes.stop_nm:g} nm"
+            allowed = f"{wavelength_nm[0]:g} to {wavelength_nm[-1]:g} nm"
+            raise SweepError(Fault("nodes outside the wavelength grid", value=place, allowed=allowed))
         count = round((nodes.stop_nm - nodes.start_nm) / nodes.step_nm) + 1
-        return FreeForm(wavelength_nm, base, nodes.start_nm + nodes.step_nm * np.arange(max(count, 0), dtype=float))
+        return FreeForm(wavelength_nm, base, nodes.start_nm + nodes.step_nm * np.arange(count, dtype=float))
     assert target is not None
     return Stopband(wavelength_nm, base, target, options.bands or 1)

@@ -29,6 +29,10 @@ class Dual(Banded):
         swing = self._room * self._bands.shape(x)
         return np.stack([self._base - swing, self._base + swing], axis=1)
 
+    def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """The base, and the base with the whole swing where the band can reach; see `Family.upper`."""
+        return np.stack([self._base, self._base + self._room * self._bands.reach(low, high)])
+
     def gradient(self, x: FloatArray) -> FloatArray:
         """Derivative by each parameter, ndarray[5, 2, n_wavelengths]; see `Family.gradient`."""
         slope = self._room * self._bands.gradient(x)

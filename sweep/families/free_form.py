@@ -37,6 +37,11 @@ class FreeForm:
         """QE of the modified channel, ndarray[n_designs, 1, n_wavelengths]; see `Family.curves`."""
         return np.asarray((self._fixed + x @ self._hats)[:, None, :], dtype=float)
 
+    def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """Every transmission at its largest; see `Family.upper`."""
+        assert low.shape == high.shape
+        return np.asarray(self.curves(high[None])[0], dtype=float)
+
     def gradient(self, x: FloatArray) -> FloatArray:
         """Constant, ndarray[n_nodes, 1, n_wavelengths]; see `Family.gradient`."""
         assert x.shape == self.nodes_nm.shape

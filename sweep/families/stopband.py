@@ -50,6 +50,15 @@ class Bands:
             rows.append(self._open(x[None], band)[0])
         return np.stack(rows)
 
+    def reach(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """1 where a band of the box `low`..`high` can be open, else 0: ndarray[n_wavelengths]."""
+        open_at = np.zeros(self._wave.size)
+        for at in range(0, self._count * _PER_BAND, _PER_BAND):
+            start = low[at + LEFT] - _HALF * high[at + LEFT_WIDTH]
+            end = high[at + RIGHT] + _HALF * high[at + RIGHT_WIDTH]
+            open_at[(self._wave >= start) & (self._wave <= end)] = 1.0
+        return open_at
+
     def violation(self, x: FloatArray) -> FloatArray:
         """Edges out of order, nm, ndarray[n_designs, 3 k - 1].
 
@@ -131,6 +140,10 @@ class Stopband(Banded):
     def curves(self, x: FloatArray) -> FloatArray:
         """QE of the modified channel, ndarray[n_designs, 1, n_wavelengths]; see `Family.curves`."""
         return (self._base + self._change * self._bands.shape(x))[:, None, :]
+
+    def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """The base, or the target where it is higher and a band can reach; see `Family.upper`."""
+        return (self._base + np.maximum(self._change, 0.0) * self._bands.reach(low, high))[None, :]
 
     def gradient(self, x: FloatArray) -> FloatArray:
         """Derivative by each parameter, ndarray[n_parameters, 1, n_wavelengths]; see `Family.gradient`."""

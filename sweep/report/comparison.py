@@ -29,7 +29,7 @@ def comparison_with_published(output: Output) -> pd.DataFrame:
                     exact = float(named.loc[name, quantity])
                 ours = round(exact, _decimals(paper))
                 error = round(ours - paper, 12)
-                rows.append((table, name, quantity, paper, ours, error, error / paper, exact))
+                rows.append((table, name, quantity, paper, ours, error, error / paper if paper else None, exact))
     columns = ["table", "cfa", "quantity", "paper", "ours", "error", "relative_error", "ours_exact"]
     return pd.DataFrame(rows, columns=columns)
 

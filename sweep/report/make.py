@@ -75,7 +75,7 @@ def _drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
     ):
         rows = content.clouds(output, *kinds)
         if rows:
-            yield name, caption, draw_clouds(rows, caption, 1.05 * float(output.points["dn"].max()))
+            yield name, caption, draw_clouds(rows, caption, max(1.0, 1.05 * float(output.points["dn"].max())))
 
 
 def _rows(table: pd.DataFrame) -> list[list[str]]:

@@ -98,7 +98,8 @@ def _write(
 def _hypervolumes(study: Study, table: pa.Table, answer: SearchAnswer) -> dict[str, float]:
     """Area that the sweep's and the search's front dominate above no separation and the lowest level of sensitivity."""
     reference = np.array([0.0, answer.search.levels[0] - 1e-6])
-    frame = table.select([study.objective_column, "sensitivity", "pareto", "kind", "cfa"]).to_pandas()
+    frame = table.select([study.objective_column, "sensitivity", "pareto", "kind", "cfa", "scenario"]).to_pandas()
+    frame = frame[frame["scenario"] == answer.search.scenario]
     swept = frame[frame["pareto"] & (frame["kind"] == "sweep") & (frame["cfa"] == answer.search.space.cfa)]
     traced = np.array([[p.best.csd, p.best.sensitivity] for p in answer.front if p.best is not None]).reshape(-1, 2)
     return {

@@ -63,8 +63,9 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     design.
     """
     problem = study.problem(search)
-    starts = starting_points(problem, search.starts, study.section.seed)
-    each = max(1, search.max_evaluations // search.starts)
+    n_starts = min(search.starts, search.max_evaluations)
+    starts = starting_points(problem, n_starts, study.section.seed)
+    each = search.max_evaluations // n_starts
     tasks = (
         joblib.delayed(search_from)(problem, i, u, search.algorithm, each, study.section.seed)
         for i, u in enumerate(starts)
@@ -72,7 +73,7 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     runs: list[SearchRun] = []
     for run in parallel(tasks):
         runs.append(run)
-        progress("search starts", len(runs), search.starts)
+        progress("search starts", len(runs), n_starts)
     best = best_feasible([e for run in runs for e in run.log])
     if best is None:
         raise _infeasible(study, problem, starts[:_REACH_STARTS], each)
@@ -89,9 +90,8 @@ def _infeasible(study: Study, problem: Problem, starts: FloatArray, each: int) -
     for name, bound in problem.constraints.items():
         value = best_reachable(problem, name, starts, each)
         met = "reachable alone" if bound.violation(np.array([value]))[0] <= 0 else "out of reach"
-        faults.append(
-            Fault(f"{met}: {name} {bound}; the best reachable value is {value:.6g}", key=f"constraints.{name}")
-        )
+        best = f"the best value found is {value:.6g}" if np.isfinite(value) else "no well-formed filter was found"
+        faults.append(Fault(f"{met}: {name} {bound}; {best}", key=f"constraints.{name}"))
     return InfeasibleError(faults)
 
 

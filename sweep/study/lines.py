@@ -39,8 +39,8 @@ class Document:
         except MarkedYAMLError as error:
             line = None if error.problem_mark is None else error.problem_mark.line + 1
             raise StudyError(Fault(f"not valid YAML: {error.problem or error.context}", self.file, line)) from None
-        except YAMLError as error:
-            raise StudyError(Fault(f"not valid YAML: {error}", self.file)) from None
+        except (YAMLError, RecursionError, ValueError) as error:
+            raise StudyError(Fault(f"not valid YAML: {type(error).__name__} {error}", self.file)) from None
         if not isinstance(self._root, CommentedMap):
             raise StudyError(
                 Fault(

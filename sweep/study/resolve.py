@@ -139,6 +139,18 @@ class _Resolver:
                     if row in known and quantity not in names:
                         self.unknown((*path, quantity), "quantity", quantity, names)
 
+    def check_channels(self, path: tuple[Key, ...], entry: Modification, mosaic: Mosaic | None) -> None:
+        """The channels that a family replaces: of the CFA, as many as the family wants, each once."""
+        for channel in entry.channel:
+            if mosaic is not None and channel not in mosaic.channels:
+                self.unknown((*path, "channel"), f"channel of {entry.cfa}", channel, list(mosaic.channels))
+        if entry.family not in CHANNELS:
+            self.unknown((*path, "family"), "family", entry.family, list(CHANNELS))
+        elif len(entry.channel) != CHANNELS[entry.family]:
+            self.add((*path, "channel"), f"{entry.family} replaces {CHANNELS[entry.family]} channel(s)", entry.channel)
+        elif len(set(entry.channel)) < len(entry.channel):
+            self.add((*path, "channel"), "a channel is named twice", entry.channel)
+
     def filtered(
         self,
         kind: Kind,
@@ -156,18 +168,11 @@ class _Resolver:
         mosaic = mosaics.get(entry.cfa)
         if entry.cfa not in self.section.cfas:
             self.unknown((*path, "cfa"), "CFA", entry.cfa, list(self.section.cfas))
-        elif mosaic is not None:
-            for channel in entry.channel:
-                if channel not in mosaic.channels:
-                    self.unknown((*path, "channel"), f"channel of {entry.cfa}", channel, list(mosaic.channels))
         if entry.base not in curves:
             self.unknown((*path, "base"), "curve", entry.base, curves)
         if isinstance(entry.to, str) and entry.to not in curves:
             self.unknown((*path, "to"), "curve", entry.to, curves)
-        if entry.family not in CHANNELS:
-            self.unknown((*path, "family"), "family", entry.family, list(CHANNELS))
-        elif len(entry.channel) != CHANNELS[entry.family]:
-            self.add((*path, "channel"), f"{entry.family} replaces {CHANNELS[entry.family]} channels", entry.channel)
+        self.check_channels(path, entry, mosaic)
         if len(self.faults) > before:
             return []
         base = sensor.curve(entry.base)

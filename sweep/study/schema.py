@@ -164,6 +164,8 @@ class Levels(Section):
     def _ordered(self) -> Levels:
         if not self.min <= self.max:
             raise ValueError(f"min {self.min:g} must not be above max {self.max:g}")
+        if (self.count == 1) != (self.min == self.max):
+            raise ValueError("count 1 goes with min = max")
         return self
 
 
@@ -187,7 +189,12 @@ def _builtin(value: Any) -> Any:
 
 def _cfas(value: Any) -> Any:
     if isinstance(value, list):
-        return {name: {} for name in value}
+        names = [name for name in value if isinstance(name, str)]
+        if len(names) < len(value):
+            raise ValueError("a list of CFAs holds names; write others as `NAME: {tile: [[R, G], [G, B]]}`")
+        if len(set(names)) < len(names):
+            raise ValueError("a CFA is named twice")
+        return {name: {} for name in names}
     return {name: {} if tile is None else tile for name, tile in value.items()} if isinstance(value, dict) else value
 
 
