@@ -44,8 +44,7 @@ def run_study(study: Study, output: Path, n_jobs: int, progress: Progress, comma
 
     Writes `results.parquet`, `search.parquet` (when the study searches), `curves.parquet`, `points.parquet`,
     `study.resolved.yaml` and `provenance.json`, each atomically. Raises OutputError when the folder is in use or cannot
-    be written, and InfeasibleError, before
-    anything is written, when the study's search finds no feasible design.
+    be written, and InfeasibleError, before anything is written, when the study's search finds no feasible design.
     """
     started = time.monotonic()
     schema = result_schema(study.parameters, quantities(study.lights))
