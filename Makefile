@@ -1,6 +1,7 @@
 # make study NAME=stopband   run studies/stopband.yaml, results in outputs/stopband
 # make report NAME=stopband  draw the report of outputs/stopband again
 # make test                  install and run the tests
+# make slow                  run the tests that take minutes
 # make check                 ruff, mypy --strict
 # make bench                 measure speed, JSON in outputs/bench
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
@@ -10,7 +11,7 @@ BIN := $(VENV)/bin
 NAME ?= stopband
 ARGS ?=
 
-.PHONY: study report test check bench clean
+.PHONY: study report test slow check bench clean
 .DELETE_ON_ERROR:
 
 study: $(VENV)/.ready
@@ -21,6 +22,9 @@ report: $(VENV)/.ready
 
 test: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest $(ARGS)
+
+slow: $(VENV)/.ready-dev
+	$(BIN)/python -m pytest -m slow $(ARGS)
 
 check: $(VENV)/.ready-dev
 	$(BIN)/ruff check sweep tests

@@ -16,12 +16,20 @@ from .spectra import WavelengthGrid
 
 DESIGNED = ("sensitivity", "cfa_sensitivity", "slope_per_nm", "min_transmission")
 """Quantities of a design that do not depend on the lights."""
+WORST = "worst_"
+"""Prefix of a quantity that is the smallest over the shifts of the edges in production."""
 
 
 def quantities(lights: Lights) -> tuple[str, ...]:
     """Names of the columns that `evaluate` gives."""
     distances = (csd_name(pair) for pair in class_pairs(lights.classes))
     return (*distances, *DESIGNED, "exposure_s")
+
+
+def shiftable(lights: Lights) -> tuple[str, ...]:
+    """Quantities whose worst case over an edge shift is known: all CSDs and both sensitivities."""
+    distances = (csd_name(pair) for pair in class_pairs(lights.classes))
+    return (*distances, "sensitivity", "cfa_sensitivity")
 
 
 @dataclass(frozen=True)
@@ -46,6 +54,11 @@ class Setup:
     def base_qe(self) -> FloatArray:
         """Curves that the modified channels replace, ndarray[n_modified, n_wavelengths]."""
         return self.qe[list(self.modified)]
+
+    @property
+    def longest_distance_dn(self) -> float:
+        """No two points of the unclipped response that fit into the range are further apart; DN."""
+        return float(2 * self.pixel.full_scale_dn * np.sqrt(len(self.mosaic.channels)))
 
     @property
     def members(self) -> dict[str, IndexArray]:

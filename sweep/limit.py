@@ -3,77 +3,111 @@
 Over all N(l) with 0 <= N <= base, a least transmission, a slope bound and the study's sensitivity, the largest t such
 that every pair of a first and a second signal is at least t apart. For fixed t that is a linear program, so bisection
 on t finds the global optimum. The certificate is a bracket: a filter that attains the lower end, and a linear program
-that proves the upper end infeasible.
+that proves the upper end infeasible. What only some families have (edges and bands, and their shifts in production) is
+left out: that makes the set of filters larger, so the upper end stays true for them.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from scipy.optimize import linprog
 from scipy.sparse import csr_matrix, diags_array, vstack
 
 from .arrays import FloatArray
-from .constraints import FEASIBLE
+from .constraints import FEASIBLE, Bound
 from .errors import Fault, SweepError
-from .evaluate import designed_quantities, smooth_response
+from .evaluate import DESIGNED, WORST, designed_quantities, smooth_response
 from .metrics import separation
+from .objectives import Objective
 from .problem import Problem
 from .scenes import WhitePatchExposure
 from .sensor import electron_rate, unquantized
 
 _MARGIN_DN = 1e-6
 """A linear program whose best margin is below minus this is infeasible beyond its solver's own tolerance."""
+_INSIDE_DN = 2e-7
+"""Constrained distances are kept this far inside, beyond the solver's own tolerance of 1e-7."""
+_SENSITIVITY_TOLERANCE = 1e-6
 _MOST_STEPS = 80
 _ROUNDING = 1e-9
-_ALLOWED = ("sensitivity", "slope_per_nm", "min_transmission")
+_SENSITIVITIES = ("sensitivity", "cfa_sensitivity")
+Signs = Mapping[str, float]
+"""CSD -> which of its two signal types has the larger response in the modified channel, +1 the first, -1 the second."""
 
 
 @dataclass(frozen=True)
 class Limit:
-    """The bracket of the limit, DN, and the filter that attains its lower end, QE, ndarray[n_wavelengths].
+    """The bracket of the limit, in the objective's unit, and the filter that attains its lower end, QE.
 
-    `attained`: CSD of `curve`, evaluated like any design; no filter whose first signals all lie on one side of the
-    second ones reaches `proven` or more. `curve` is None when no filter meets the constraints.
+    `attained`: the objective for `curve` (ndarray[n_wavelengths]), evaluated like any design; no filter whose first
+    signals all lie on one side of the second ones reaches `proven` or more. `curve` is None when no filter meets the
+    constraints. `left_out`: what the study asks for beyond the limit's own constraints.
     """
 
     attained: float
     proven: float
     curve: FloatArray | None
+    left_out: tuple[str, ...] = ()
 
 
 def limit_of(problem: Problem, tolerance_dn: float = 1e-3) -> Limit:
-    """The limit of a problem whose constraints are on `sensitivity`, `slope_per_nm` and `min_transmission`.
+    """The limit of a problem with one modified channel, to `tolerance_dn` (1e-6 for an objective without a CSD).
 
     Filters are bounded by 0 (or the least transmission) and the base curve. Raises SweepError where the program would
-    not be linear: several modified channels, an exposure that the modified channel may set, or a constraint of another
-    kind.
+    not be linear; see `why_not`.
     """
     refused = why_not(problem)
     if refused is not None:
         raise SweepError(Fault(f"no limit: {refused}"))
-    program = _Program(problem)
-    above = _bisect(program, 1.0, -np.inf, tolerance_dn)
-    below = _bisect(program, -1.0, above.attained, tolerance_dn)
-    best = above if above.attained >= below.attained else below
-    return Limit(best.attained, max(above.proven, below.proven), best.curve)
+    nominal, left_out = _relaxed(problem)
+    program = _Program(nominal)
+    tolerance = tolerance_dn if program.distances & set(nominal.objective.weights) else _SENSITIVITY_TOLERANCE
+    sided = program.undecided
+    best, proven = Limit(-np.inf, -np.inf, None), -np.inf
+    for signs in product((1.0, -1.0), repeat=len(sided)):
+        found = _bisect(program, dict(zip(sided, signs, strict=True)), best.attained, tolerance)
+        proven = max(proven, found.proven)
+        best = found if found.attained > best.attained else best
+    return replace(best, proven=proven, left_out=left_out)
 
 
 def why_not(problem: Problem) -> str | None:
     """Why a problem has no linear limit; None when it has."""
-    others = [name for name in problem.constraints if name not in _ALLOWED]
     if problem.family.n_modified != 1:
         return "more than one modified channel"
+    if problem.objective.rule == "sum":
+        return "the objective is a sum"
     if (_top(problem) > problem.setup.base_qe[0] * (1 + _ROUNDING)).any():
         return "filters of the box may exceed the curve that they replace"
     if _clips(problem):
         return "signals exceed the full well or the range of the ADC"
-    if others:
-        return f"constraint on {others[0]}"
     if isinstance(problem.setup.scenario.exposure, WhitePatchExposure) and not _exposure_is_fixed(problem):
         return "the modified channel could set the exposure"
     return None
+
+
+def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
+    """The problem without what only families of edges have, worst cases as nominal ones; and what was left out."""
+    known = (*problem.pairs, *DESIGNED)
+    left_out = [name for name in problem.constraints if name.removeprefix(WORST) not in known]
+    kept: dict[str, Bound] = {}
+    for name, bound in problem.constraints.items():
+        plain = name.removeprefix(WORST)
+        if plain in known:
+            ends = [b for b in (bound, kept.get(plain)) if b is not None]
+            least, most = [b.min for b in ends if b.min is not None], [b.max for b in ends if b.max is not None]
+            kept[plain] = Bound.model_construct(min=max(least, default=None), max=min(most, default=None))
+    weights: dict[str, float] = {}
+    for name, weight in problem.objective.weights.items():
+        plain = name.removeprefix(WORST)
+        weights[plain] = min(weight, weights.get(plain, weight))
+    if any(name.startswith(WORST) for name in (*problem.constraints, *problem.objective.weights)):
+        left_out.append("edge shifts")
+    return replace(problem, objective=Objective(minimum=weights), constraints=kept), tuple(left_out)
 
 
 def _top(problem: Problem) -> FloatArray:
@@ -99,56 +133,97 @@ def _exposure_is_fixed(problem: Problem) -> bool:
 
 
 class _Program:
-    """The linear program: N between its bounds, slope, sensitivity; and what N gives for each signal."""
+    """The linear program: N between its bounds, slope, sensitivities; and what N gives for each pair of signals."""
 
     def __init__(self, problem: Problem) -> None:
         setup = problem.setup
         self.problem = problem
         self.base = setup.base_qe[0]
-        floor = problem.constraints.get("min_transmission")
-        self.low = self.base * (0.0 if floor is None else floor.min or 0.0)
-        size = setup.grid.size
+        self.low = self.base * self._least("min_transmission")
         response = smooth_response(setup, self.base[None, None])[0]
         channel = setup.modified[0]
         # Exposure does not depend on N, so the response to a filter is linear, plus the pedestal.
         rate = electron_rate(setup.lights.photons, self.base[None], setup.grid.step_nm, setup.pixel)[:, 0]
         scale = (response[:, channel] - setup.pixel.offset_dn) / rate
-        per_qe = setup.lights.photons * (setup.grid.step_nm * setup.pixel.area_m2)
-        self.gain = per_qe * scale[:, None]
-        first, second = (setup.members[name] for name in problem.pair)
+        gain = setup.lights.photons * (setup.grid.step_nm * setup.pixel.area_m2) * scale[:, None]
         fixed = np.delete(response, channel, axis=1)
-        apart = fixed[first, None] - fixed[None, second]
-        self.fixed_squared = (apart**2).sum(axis=2).ravel()
-        self.difference = (self.gain[first, None] - self.gain[None, second]).reshape(-1, size)
-        rows, limits = [], []
-        slope = problem.constraints.get("slope_per_nm")
+        self.distances = {n for n in (*problem.objective.weights, *problem.constraints) if n in problem.pairs}
+        self.fixed_squared: dict[str, FloatArray] = {}
+        self.difference: dict[str, FloatArray] = {}
+        for name in self.distances:
+            first, second = (setup.members[kind] for kind in problem.pairs[name])
+            self.fixed_squared[name] = ((fixed[first, None] - fixed[None, second]) ** 2).sum(axis=2).ravel()
+            self.difference[name] = (gain[first, None] - gain[None, second]).reshape(-1, self.base.size)
+        self._sums = self._sensitivity_rows()
+        self._rows, self._limits = self._fixed_rows()
+
+    @property
+    def undecided(self) -> list[str]:
+        """CSDs for which the modified channel matters, each with a side to choose."""
+        weights = self.problem.objective.weights
+        return [
+            name
+            for name in sorted(self.distances)
+            if name in weights or self._least(name) ** 2 > self.fixed_squared[name].min()
+        ]
+
+    def _least(self, name: str) -> float:
+        bound = self.problem.constraints.get(name)
+        return 0.0 if bound is None or bound.min is None else bound.min
+
+    def _needed(self, name: str, t: float) -> float:
+        """What a quantity must reach for an objective of t."""
+        weight = self.problem.objective.weights.get(name)
+        return max(self._least(name), 0.0 if weight is None else t / weight)
+
+    def _sensitivity_rows(self) -> dict[str, tuple[FloatArray, float]]:
+        """Each sensitivity as (row, constant): row @ N + constant."""
+        setup, size = self.problem.setup, self.base.size
+        counts, modified = setup.mosaic.counts, setup.modified[0]
+        whole = counts.sum() * setup.clear_qe.sum()
+        others = float(np.delete(setup.qe.sum(axis=1) * counts, modified).sum())
+        return {
+            "sensitivity": (np.full(size, 1 / self.base.sum()), 0.0),
+            "cfa_sensitivity": (np.full(size, counts[modified] / whole), others / whole),
+        }
+
+    def _fixed_rows(self) -> tuple[csr_matrix, FloatArray]:
+        """Rows and right-hand sides of what does not depend on t: slope, largest sensitivities."""
+        constraints, size = self.problem.constraints, self.base.size
+        rows, limits = [csr_matrix((0, size))], [np.empty(0)]
+        slope = constraints.get("slope_per_nm")
         if slope is not None and slope.max is not None:
             step = diags_array([-1.0, 1.0], offsets=[0, 1], shape=(size - 1, size))
             rows += [step, -step]
-            limits += [np.full(2 * (size - 1), slope.max * setup.grid.step_nm)]
-        sensitivity = problem.constraints.get("sensitivity")
-        total = csr_matrix(np.ones((1, size)) / self.base.sum())
-        if sensitivity is not None and sensitivity.min is not None:
-            rows.append(-total)
-            limits.append(np.array([-sensitivity.min]))
-        if sensitivity is not None and sensitivity.max is not None:
-            rows.append(total)
-            limits.append(np.array([sensitivity.max]))
-        self.rows = vstack(rows).tocsr() if rows else csr_matrix((0, size))
-        self.limits = np.concatenate(limits) if limits else np.empty(0)
+            limits.append(np.full(2 * (size - 1), slope.max * self.problem.setup.grid.step_nm))
+        for name, (row, constant) in self._sums.items():
+            bound = constraints.get(name)
+            if bound is not None and bound.max is not None:
+                rows.append(csr_matrix(row[None]))
+                limits.append(np.array([bound.max - constant]))
+        return vstack(rows).tocsr(), np.concatenate(limits)
 
-    def best_margin(self, t: float, sign: float) -> tuple[float, FloatArray | None]:
+    def best_margin(self, t: float, signs: Signs) -> tuple[float, FloatArray | None]:
         """The largest m with sign (n_i - n_j) >= needed(t) + m for all pairs, and its filter; -inf where none is."""
-        needed = np.sqrt(np.maximum(0.0, t**2 - self.fixed_squared))
-        bound = needed > 0
         size = self.base.size
         # Columns: N, then m. Margin rows: -sign (n_i - n_j) + m <= -needed.
-        pairs = np.hstack([-sign * self.difference[bound], np.ones((int(bound.sum()), 1))])
-        own = np.hstack([self.rows.toarray(), np.zeros((self.rows.shape[0], 1))])
+        rows = [np.hstack([self._rows.toarray(), np.zeros((self._rows.shape[0], 1))])]
+        limits = [self._limits]
+        for name in signs:
+            inside = _INSIDE_DN if self._least(name) else 0.0
+            needed = np.sqrt(np.maximum(0.0, self._needed(name, t) ** 2 - self.fixed_squared[name]))
+            bound = needed > 0
+            pairs = -signs[name] * self.difference[name][bound]
+            rows.append(np.hstack([pairs, np.ones((len(pairs), 1))]))
+            limits.append(-needed[bound] - inside)
+        for name, (row, constant) in self._sums.items():
+            if self._needed(name, t) > 0:
+                rows.append(-np.append(row, 0.0)[None])
+                limits.append(np.array([constant - self._needed(name, t)]))
         found = linprog(
             c=np.append(np.zeros(size), -1.0),
-            A_ub=np.vstack([pairs, own]),
-            b_ub=np.concatenate([-needed[bound], self.limits]),
+            A_ub=np.vstack(rows),
+            b_ub=np.concatenate(limits),
             bounds=[*zip(self.low, self.base, strict=True), (None, max(t, 1.0))],
             method="highs",
         )
@@ -156,16 +231,31 @@ class _Program:
             raise SweepError(Fault(f"the limit's linear program ended without an answer: {found.message}"))
         return (float(found.x[-1]), found.x[:-1]) if found.status == 0 else (-np.inf, None)
 
+    def reach(self, signs: Signs) -> float:
+        """No filter comes further: each distance with a filter that is open where it helps, else closed."""
+        ends = []
+        for name, weight in self.problem.objective.weights.items():
+            if name in signs:
+                helps = signs[name] * self.difference[name]
+                most = np.maximum(np.maximum(helps, 0) @ self.base + np.minimum(helps, 0) @ self.low, 0.0)
+                ends.append(weight * float(np.sqrt(self.fixed_squared[name] + most**2).min()))
+            else:
+                row, constant = self._sums[name]
+                ends.append(weight * float(row @ self.base + constant))
+        return min(ends)
+
     def attained(self, curve: FloatArray) -> float:
-        """CSD of a filter as the search evaluates it, DN; -inf when it does not meet the constraints."""
-        setup = self.problem.setup
+        """The objective for a filter as the search evaluates it; -inf when it does not meet the constraints."""
+        setup, problem = self.problem.setup, self.problem
         curves = curve[None, None]
-        amounts = designed_quantities(setup, curves)
-        for name, bound in self.problem.constraints.items():
-            if not bound.violation(amounts[name])[0] <= FEASIBLE:
+        found = designed_quantities(setup, curves)
+        response = smooth_response(setup, curves)
+        for name in self.distances:
+            found[name] = separation(response, *(setup.members[kind] for kind in problem.pairs[name]))
+        for name, bound in problem.constraints.items():
+            if not bound.violation(found[name])[0] <= FEASIBLE:
                 return -np.inf
-        first, second = (setup.members[name] for name in self.problem.pair)
-        return float(separation(smooth_response(setup, curves), first, second)[0])
+        return float(problem.objective.of(found)[0])
 
     def inside(self, curve: FloatArray) -> FloatArray:
         """The solver's filter moved by its tolerance (1e-7) into the bounds, toward the base curve."""
@@ -177,29 +267,24 @@ class _Program:
         return clipped
 
 
-def _bisect(program: _Program, sign: float, known: float, tolerance_dn: float) -> Limit:
-    """The bracket for one sign; `known` is a CSD that is attained elsewhere, below which nothing is looked for."""
-    # No pair can come further apart than the filter that is open where it helps and closed where it hurts.
-    helps = sign * program.difference
-    reach = np.maximum(helps, 0) @ program.base + np.minimum(helps, 0) @ program.low
-    reach = np.maximum(reach, 0.0)
-    low, high = max(known, 0.0), float(np.sqrt(program.fixed_squared + reach**2).min()) + tolerance_dn
+def _bisect(program: _Program, signs: Signs, known: float, tolerance: float) -> Limit:
+    """The bracket for one choice of sides; `known` is attained elsewhere, below which nothing is looked for."""
+    low, high = max(known, 0.0), program.reach(signs) + tolerance
     attained, curve = -np.inf, None
     at = low
     for _ in range(_MOST_STEPS):
-        margin, found = program.best_margin(at, sign)
+        margin, found = program.best_margin(at, signs)
         if found is None or margin < -_MARGIN_DN:
             high = min(high, at)
         else:
             low = max(low, at)
-        if found is None:
-            break
-        candidate = program.inside(found)
-        reached = program.attained(candidate)
-        if reached > attained:
-            attained, curve = reached, candidate
-        low = max(low, attained)
-        if high - low <= tolerance_dn:
+        if found is not None:
+            candidate = program.inside(found)
+            reached = program.attained(candidate)
+            if reached > attained:
+                attained, curve = reached, candidate
+            low = max(low, attained)
+        if high - low <= tolerance:
             break
         at = (low + high) / 2
     return Limit(attained, high, curve)

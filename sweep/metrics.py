@@ -10,6 +10,8 @@ import numpy as np
 from .arrays import FloatArray, IndexArray
 
 Pair = tuple[str, str]
+CSD = "csd_"
+"""How the name of a color separation distance begins."""
 _BLOCK_PAIRS = 262_144
 """Pair distances held at once per channel: 2 MiB, so that a block stays in cache."""
 
@@ -21,7 +23,7 @@ def class_pairs(classes: Sequence[str]) -> tuple[Pair, ...]:
 
 def csd_name(pair: Pair) -> str:
     """Column name of a pair's color separation distance, in DN."""
-    return f"csd_{pair[0]}_{pair[1]}"
+    return f"{CSD}{pair[0]}_{pair[1]}"
 
 
 def separation(response: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:

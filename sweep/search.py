@@ -1,8 +1,9 @@
 """Constrained search for the best design; the only file that knows nlopt.
 
-Maximize the smallest distance of a pair of signal types. The minimum over pairs is not smooth, so it is written in the
-epigraph form: maximize t subject to (distance of every pair)^2 >= t^2, with exact gradients. The search sees the smooth
-response (unquantized, unclipped); every evaluation is logged, and the answer is the best feasible one of the log.
+Maximize a study's objective, such as the smallest distance of a pair of signal types. The minimum over pairs is not
+smooth, so it is written in the epigraph form: maximize t subject to (distance of every pair)^2 >= t^2, with exact
+gradients. The search sees the smooth response (unquantized, unclipped); every evaluation is logged, and the answer is
+the best feasible one of the log.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ import numpy as np
 
 from .arrays import FloatArray
 from .constraints import FEASIBLE
-from .problem import Model, Point, Problem, SearchRun, best_feasible
+from .problem import Problem, SearchRun
+from .smooth import Model, Point, is_distance
 
 GRADIENT = {"SLSQP": nlopt.LD_SLSQP, "MMA": nlopt.LD_MMA, "CCSAQ": nlopt.LD_CCSAQ}
 """Gradient algorithms of nlopt that take inequality constraints, for the epigraph form."""
@@ -25,7 +27,7 @@ DIRECT = {
     "ISRES": nlopt.GN_ISRES,
     "AGS": nlopt.GN_AGS,
 }
-"""Derivative-free algorithms that take inequality constraints, for the smallest distance itself."""
+"""Derivative-free algorithms that take inequality constraints, for the objective itself."""
 ALGORITHMS = (*GRADIENT, *DIRECT)
 """Every algorithm that a study can name."""
 _ENDINGS = {
@@ -73,44 +75,58 @@ def search_from(
 def _epigraph(
     problem: Problem, model: Model, first: Point, u0: FloatArray, algorithm: str
 ) -> tuple[nlopt.opt, list[float]]:
-    """Maximize t subject to (distance of every pair)^2 >= t^2 and the conditions, with gradients; z = (u, t)."""
-    scale = max(first.evaluation.csd, 1.0)
-    opt = nlopt.opt(GRADIENT[algorithm], u0.size + 1)
+    """Maximize the sum of t_k (a minimum has one t) subject to rows of term k >= t_k^2 and the conditions; z = (u, t).
+
+    Each t_k is in units of its term's first value.
+    """
+    values = first.term_values
+    scale = np.maximum(values, 1.0)
+    n_free, n_rows = u0.size, first.terms.values.size
+    share = scale / scale.sum()
+    row_scale = scale[first.term] ** 2
+    opt = nlopt.opt(GRADIENT[algorithm], n_free + scale.size)
 
     def objective(z: FloatArray, gradient: FloatArray) -> float:
-        model.at(z[:-1])
+        model.at(z[:n_free])
         if gradient.size:
-            gradient[:] = 0.0
-            gradient[-1] = 1.0
-        return float(z[-1])
+            gradient[:n_free] = 0.0
+            gradient[n_free:] = share
+        return float(share @ z[n_free:])
 
     def constraints(result: FloatArray, z: FloatArray, gradient: FloatArray) -> None:
-        point = model.at(z[:-1])
-        n_pairs = point.squared.size
-        result[:n_pairs] = z[-1] ** 2 - point.squared / scale**2
-        result[n_pairs:] = point.conditions
+        point = model.at(z[:n_free])
+        t = z[n_free:][point.term]
+        result[:n_rows] = t**2 - point.terms.values / row_scale
+        result[n_rows:] = point.conditions.values
         if gradient.size:
-            gradient[:n_pairs, :-1] = -point.squared_by_u / scale**2
-            gradient[:n_pairs, -1] = 2 * z[-1]
-            gradient[n_pairs:, :-1] = point.conditions_by_u
-            gradient[n_pairs:, -1] = 0.0
+            gradient[:] = 0.0
+            gradient[:n_rows, :n_free] = -point.terms.by_u / row_scale[:, None]
+            gradient[np.arange(n_rows), n_free + point.term] = 2 * t
+            gradient[n_rows:, :n_free] = point.conditions.by_u
 
-    limit = 2 * problem.setup.pixel.full_scale_dn * np.sqrt(len(problem.setup.mosaic.channels)) / scale
-    opt.set_lower_bounds([0.0] * (u0.size + 1))
-    opt.set_upper_bounds([1.0] * u0.size + [max(limit, 1.0)])
+    # No term exceeds its largest weight times the longest distance between two digital numbers.
+    reach = max(problem.objective.weights.values()) * problem.setup.longest_distance_dn / scale
+    opt.set_lower_bounds([0.0] * (n_free + scale.size))
+    opt.set_upper_bounds([1.0] * n_free + [max(float(r), 1.0) for r in reach])
     opt.set_max_objective(objective)
-    opt.add_inequality_mconstraint(constraints, np.zeros(first.squared.size + first.conditions.size))
-    return opt, [*u0, min(first.evaluation.csd / scale, 1.0)]
+    opt.add_inequality_mconstraint(constraints, np.zeros(n_rows + first.conditions.values.size))
+    return opt, [*u0, *np.minimum(values / scale, 1.0)]
 
 
 def _direct(model: Model, first: Point, u0: FloatArray, algorithm: str) -> tuple[nlopt.opt, list[float]]:
-    """Maximize the smallest distance itself, subject to the worst of the conditions."""
-    scale = max(first.evaluation.csd, 1.0)
+    """Maximize the objective itself, subject to the worst of the conditions."""
+    scale = float(np.maximum(first.term_values, 1.0).sum())
+    minimum = first.term.max() == 0
+
+    def objective(u: FloatArray, _: FloatArray) -> float:
+        values = model.at(u).term_values
+        return float(values.min() if minimum else values.sum()) / scale
+
     opt = nlopt.opt(DIRECT[algorithm], u0.size)
     opt.set_lower_bounds([0.0] * u0.size)
     opt.set_upper_bounds([1.0] * u0.size)
-    opt.set_max_objective(lambda u, _: float(np.sqrt(model.at(u).squared.min()) / scale))
-    opt.add_inequality_constraint(lambda u, _: float(model.at(u).conditions.max(initial=-1.0)), 0.0)
+    opt.set_max_objective(objective)
+    opt.add_inequality_constraint(lambda u, _: float(model.at(u).conditions.values.max(initial=-1.0)), 0.0)
     return opt, [*u0]
 
 
@@ -118,49 +134,49 @@ def best_reachable(problem: Problem, quantity: str, starts: FloatArray, max_eval
     """The extreme that `quantity` reaches in the box when no other constraint counts: its largest value if the study
     asks for a minimum, else its smallest. `starts`: ndarray[n, n_free].
     """
-    bound = problem.constraints[quantity]
-    sign = 1.0 if bound.min is not None else -1.0
-    if quantity in problem.pairs:
-        alone = replace(problem, pair=problem.pairs[quantity], constraints={})
-        log = [e for i, u in enumerate(starts) for e in search_from(alone, i, u, "SLSQP", max_evaluations).log]
-        best = best_feasible(log)
-        return -np.inf if best is None else best.csd
-    alone = replace(problem, constraints={})
-    found = []
-    for index, u0 in enumerate(starts):
-        model = Model(alone, SearchRun(index), max_evaluations)
-        if quantity in model.at(u0).amounts_by_u:
-            found += _climb(model, quantity, sign, u0, max_evaluations)
-        else:
-            found.append(model.at(u0).amounts[quantity])
-    return sign * max((sign * value for value in found), default=-np.inf)
+    alone = replace(problem, constraints={quantity: problem.constraints[quantity]})
+    sign = 1.0 if problem.constraints[quantity].min is not None else -1.0
+    found = [v for u0 in starts for v in _extremes(alone, quantity, sign, u0, max_evaluations)]
+    best = sign * max((sign * value for value in found), default=-np.inf)
+    return float(np.sqrt(best)) if is_distance(quantity) and best > 0 else best
 
 
-def _climb(model: Model, quantity: str, sign: float, u0: FloatArray, max_evaluations: int) -> list[float]:
-    """Values of a sensitivity at well-formed designs on the way to its extreme."""
+def _extremes(problem: Problem, quantity: str, sign: float, u0: FloatArray, max_evaluations: int) -> list[float]:
+    """Worst rows of a quantity at well-formed designs on the way to their extreme: maximize t, sign x rows >= t."""
+    n_own = problem.family.violation(problem.low[None]).shape[1]
+    model = Model(problem, SearchRun(0), max_evaluations)
+    first = model.at(u0).quantities[quantity]
+    scale = max(float(np.abs(first.values).max()), 1e-6)
+    n_rows = first.values.size
     seen: list[float] = []
 
-    def objective(u: FloatArray, gradient: FloatArray) -> float:
-        point = model.at(u)
-        if (point.conditions <= FEASIBLE).all():
-            seen.append(point.amounts[quantity])
+    def objective(z: FloatArray, gradient: FloatArray) -> float:
+        point = model.at(z[:-1])
+        if point.evaluation.violation < np.inf and (point.conditions.values[:n_own] <= FEASIBLE).all():
+            seen.append(sign * float((sign * point.quantities[quantity].values).min()))
         if gradient.size:
-            gradient[:] = sign * point.amounts_by_u[quantity]
-        return sign * point.amounts[quantity]
+            gradient[:] = 0.0
+            gradient[-1] = 1.0
+        return float(z[-1])
 
-    def conditions(result: FloatArray, u: FloatArray, gradient: FloatArray) -> None:
-        point = model.at(u)
-        result[:] = point.conditions
+    def conditions(result: FloatArray, z: FloatArray, gradient: FloatArray) -> None:
+        point = model.at(z[:-1])
+        rows = point.quantities[quantity]
+        result[:n_rows] = z[-1] - sign * rows.values / scale
+        result[n_rows:] = point.conditions.values[:n_own]
         if gradient.size:
-            gradient[:] = point.conditions_by_u
+            gradient[:n_rows, :-1] = -sign * rows.by_u / scale
+            gradient[:n_rows, -1] = 1.0
+            gradient[n_rows:, :-1] = point.conditions.by_u[:n_own]
+            gradient[n_rows:, -1] = 0.0
 
-    opt = nlopt.opt(nlopt.LD_SLSQP, u0.size)
-    opt.set_lower_bounds([0.0] * u0.size)
-    opt.set_upper_bounds([1.0] * u0.size)
+    opt = nlopt.opt(nlopt.LD_SLSQP, u0.size + 1)
+    opt.set_lower_bounds([0.0] * u0.size + [-1e6])
+    opt.set_upper_bounds([1.0] * u0.size + [1e6])
     opt.set_max_objective(objective)
-    opt.add_inequality_mconstraint(conditions, np.zeros(model.at(u0).conditions.size))
+    opt.add_inequality_mconstraint(conditions, np.zeros(n_rows + n_own))
     opt.set_maxeval(max_evaluations)
     opt.set_xtol_rel(_X_TOLERANCE)
     with contextlib.suppress(nlopt.RoundoffLimited, nlopt.runtime_error, RuntimeError):
-        opt.optimize(u0)
+        opt.optimize([*u0, float((sign * first.values).min()) / scale])
     return seen

@@ -11,6 +11,8 @@ import numpy as np
 from .arrays import FloatArray
 from .families import Family
 
+DIMENSIONS = ("edge_width_nm", "band_width_nm")
+"""Lengths of a family's design that a producer asks for."""
 Kind = Literal["reference", "design", "sweep", "search"]
 
 
@@ -58,11 +60,21 @@ class Space:
             columns.append(np.asarray(axis, dtype=float)[digit])
         return np.stack(columns[::-1], axis=1) if columns else np.empty((stop - start, 0))
 
-    def curves(self, points: FloatArray, n_wavelengths: int) -> FloatArray:
-        """QE of the modified channels: ndarray[n_designs, n_modified, n_wavelengths]; none for a plain CFA."""
+    def curves(self, points: FloatArray, n_wavelengths: int, shift_nm: float = 0.0) -> FloatArray:
+        """QE of the modified channels: ndarray[n_designs, n_modified, n_wavelengths]; none for a plain CFA.
+
+        `shift_nm`: how far production moved every edge toward the red.
+        """
         if self.filter is None:
             return np.empty((len(points), 0, n_wavelengths))
-        return self.filter.family.curves(points)
+        family = self.filter.family
+        return (family.shifted(shift_nm) if shift_nm else family).curves(points)
+
+    def dimensions(self, points: FloatArray) -> dict[str, FloatArray]:
+        """The narrowest edge and band of each design, nm, ndarray[n_designs]; NaN for what the family does not have."""
+        rows = {} if self.filter is None else self.filter.family.dimensions
+        nothing = np.full(len(points), np.nan)
+        return {name: (points @ rows[name].T).min(axis=1) if name in rows else nothing for name in DIMENSIONS}
 
     def violation(self, points: FloatArray) -> FloatArray:
         """Largest violation of the family's own conditions, ndarray[n_designs]; 0 where a design is well formed."""

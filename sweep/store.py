@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 
 from .errors import Fault, OutputError
 
-SCHEMA_VERSION = "1"
+SCHEMA_VERSION = "2"
 RESULTS = "results.parquet"
 SEARCH_LOG = "search.parquet"
 FRONT = "front.parquet"
@@ -31,25 +31,28 @@ def result_schema(parameters: Sequence[str], quantities: Sequence[str]) -> pa.Sc
     text, number = pa.dictionary(pa.int32(), pa.string()), pa.float64()
     fields = [pa.field("design_id", pa.int64(), nullable=False)]
     fields += [pa.field(name, text) for name in ("kind", "name", "cfa", "family", "scenario")]
-    fields += [pa.field(name, number) for name in (*parameters, *quantities, "violation", "limit_dn", "gap")]
+    fields += [pa.field(name, number) for name in (*parameters, *quantities, "violation", "limit", "gap")]
     fields += [pa.field("feasible", pa.bool_()), pa.field("pareto", pa.bool_()), pa.field("status", text)]
     return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION})
 
 
 def search_schema(parameters: Sequence[str]) -> pa.Schema:
-    """Columns of the search's log: one row per evaluation of the smooth response."""
+    """Columns of the search's log: one row per evaluation of the smooth response.
+
+    `sensitivity_min` is the level of the front that the evaluation belongs to; null in the search itself.
+    """
     text, number = pa.dictionary(pa.int32(), pa.string()), pa.float64()
-    fields = [pa.field("scenario", text), pa.field("start", pa.int32()), pa.field("evaluation", pa.int32())]
-    fields += [
-        pa.field(name, number) for name in (*parameters, "csd_dn", "sensitivity", "cfa_sensitivity", "violation")
-    ]
+    fields = [pa.field("scenario", text), pa.field("sensitivity_min", number)]
+    fields += [pa.field("start", pa.int32()), pa.field("evaluation", pa.int32())]
+    names = (*parameters, "objective", "sensitivity", "cfa_sensitivity", "violation")
+    fields += [pa.field(name, number) for name in names]
     return pa.schema([*fields, pa.field("status", text)], metadata={"cfa_sweep_schema": SCHEMA_VERSION})
 
 
 def front_schema(parameters: Sequence[str]) -> pa.Schema:
     """Columns of the trade-off that the search traces: one row per level of sensitivity."""
     number = pa.float64()
-    names = ("sensitivity_min", "csd_dn", "sensitivity", "limit_dn", "gap", *parameters)
+    names = ("sensitivity_min", "objective", "sensitivity", "limit", "gap", *parameters)
     fields = [pa.field(name, number) for name in names] + [pa.field("evaluations", pa.int64())]
     return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION})
 

@@ -46,7 +46,7 @@ class Counted:
             problem = self.problem
             x = problem.from_unit(u)[None]
             curves = problem.family.curves(x)
-            first, second = (problem.setup.members[name] for name in problem.pair)
+            first, second = (problem.setup.members[name] for name in problem.pairs["csd_yellow_red"])
             csd = float(separation(smooth_response(problem.setup, curves), first, second)[0])
             own = np.maximum(problem.family.violation(x).max(axis=1), 0) / 100
             amounts = designed_quantities(problem.setup, curves)
@@ -149,7 +149,7 @@ def main() -> None:
     record = {
         "budget": BUDGET,
         "seeds": len(SEEDS),
-        "limit_dn": limit.proven,
+        "limit": limit.proven,
         "median_dn": {name: np.median(rows, axis=0).tolist() for name, rows in traces.items()},
         "worst_dn": {name: rows.min(axis=0).tolist() for name, rows in traces.items()},
     }
@@ -158,7 +158,7 @@ def main() -> None:
     print(f"Kept in {target.relative_to(ROOT)}/search.json and search.png.")
 
 
-def draw(traces: dict[str, np.ndarray], limit_dn: float, path: Path) -> None:
+def draw(traces: dict[str, np.ndarray], limit: float, path: Path) -> None:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8, 4.5), layout="constrained")
@@ -166,7 +166,7 @@ def draw(traces: dict[str, np.ndarray], limit_dn: float, path: Path) -> None:
     for name, rows in traces.items():
         (line,) = axes.plot(range(1, BUDGET + 1), np.median(rows, axis=0), label=name)
         axes.fill_between(range(1, BUDGET + 1), rows.min(axis=0), rows.max(axis=0), color=line.get_color(), alpha=0.12)
-    axes.axhline(limit_dn, color="black", linestyle="--", linewidth=1, label="limit of any filter")
+    axes.axhline(limit, color="black", linestyle="--", linewidth=1, label="limit of any filter")
     axes.set(xscale="log", xlabel="evaluations", ylabel="best feasible yellow/red CSD / DN")
     axes.set_title(f"Median and range over {len(SEEDS)} seeds")
     axes.legend(fontsize=8)

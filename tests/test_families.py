@@ -1,7 +1,10 @@
-"""Every family: its promises, and its exact gradients against mpmath or central differences of a polynomial."""
+"""Every family: its promises, and its exact gradients against its definition at fifty digits."""
 
 from __future__ import annotations
 
+from itertools import pairwise
+
+import mpmath as mp
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -46,18 +49,83 @@ def test_shapes_and_names(name: str) -> None:
     assert (conditions <= 0).all()
 
 
+def exact_edge(wavelength: mp.mpf, center: mp.mpf, width: mp.mpf) -> mp.mpf:
+    """The quintic smoothstep whose 10 to 90 % width is `width`, from its definition."""
+
+    def step(u: mp.mpf) -> mp.mpf:
+        return u**3 * (10 - 15 * u + 6 * u**2)
+
+    tenth = mp.findroot(lambda u: step(u) - mp.mpf(1) / 10, mp.mpf("0.25"))
+    u = mp.mpf(1) / 2 + (wavelength - center) / width * (1 - 2 * tenth)
+    return mp.mpf(0) if u <= 0 else mp.mpf(1) if u >= 1 else step(u)
+
+
+def exact_curves(name: str, x: list[mp.mpf], index: int) -> list[mp.mpf]:
+    """The modified channels at one wavelength, from the families' definitions."""
+    wavelength, base, target, ceiling = (mp.mpf(float(v[index])) for v in (WAVE, BASE, TARGET, CEILING))
+    if name == "free_form":
+        nodes = [mp.mpf(n) for n in (550, 600, 613.5, 690)]
+        for (a, ta), (b, tb) in pairwise(zip(nodes, x, strict=True)):
+            if a <= wavelength <= b:
+                return [base * (ta + (tb - ta) * (wavelength - a) / (b - a))]
+        return [base]
+    shape = mp.mpf(0)
+    for left, left_width, right, right_width, depth in zip(*(x[i::5] for i in range(5)), strict=True):
+        shape += depth * (exact_edge(wavelength, left, left_width) - exact_edge(wavelength, right, right_width))
+    if name == "dual":
+        swing = min(base, ceiling - base) * shape
+        return [base - swing, base + swing]
+    return [base + (target - base) * shape]
+
+
 @pytest.mark.parametrize("name", list(FAMILIES))
-def test_gradients_agree_with_differences(name: str) -> None:
-    # The edges are quintic in nm, so the central difference errs by h^2/6 times their third derivative: < 2e-8 here.
+def test_curves_and_gradients_agree_with_their_definitions_at_fifty_digits(name: str) -> None:
     family, x = FAMILIES[name]
-    step = 1e-4
-    for index, exact in enumerate(family.gradient(x)):
-        shift = np.eye(x.size)[index] * step
-        ends = family.curves(np.stack([x + shift, x - shift]))
-        np.testing.assert_allclose(exact, (ends[0] - ends[1]) / (2 * step), atol=2e-8)
-        conditions = family.violation(np.stack([x + shift, x - shift]))
-        numeric = (conditions[0] - conditions[1]) / (2 * step)
-        np.testing.assert_allclose(family.violation_gradient(x)[:, index], numeric, atol=1e-8)
+    at = [int(i) for i in np.random.default_rng(3).choice(np.arange(90, 295), 12, replace=False)]
+    curves, gradient = family.curves(x[None])[0], family.gradient(x)
+    with mp.workdps(50):
+        exact_x = [mp.mpf(float(v)) for v in x]
+        for index in at:
+            values = exact_curves(name, exact_x, index)
+            np.testing.assert_allclose(curves[:, index], [float(v) for v in values], rtol=1e-13)
+            for k in range(x.size):
+                derivative = [
+                    mp.diff(
+                        lambda p, k=k, c=c, i=index: exact_curves(name, [*exact_x[:k], p, *exact_x[k + 1 :]], i)[c],
+                        exact_x[k],
+                    )
+                    for c in range(family.n_modified)
+                ]
+                np.testing.assert_allclose(gradient[k, :, index], [float(d) for d in derivative], rtol=1e-9, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", list(FAMILIES))
+def test_conditions_and_dimensions_are_linear(name: str) -> None:
+    family, x = FAMILIES[name]
+    other = x * 1.01
+    slope = family.violation_gradient(x)
+    np.testing.assert_allclose(family.violation(other[None])[0], family.violation(x[None])[0] + slope @ (other - x))
+    if name == "multi_stopband":
+        assert (family.dimensions["edge_width_nm"] @ x).tolist() == [17.0, 9.0, 12.0, 23.0]
+        np.testing.assert_allclose(family.dimensions["band_width_nm"] @ x, [38.9, 51.4])
+    assert set(family.dimensions) == (set() if name == "free_form" else {"edge_width_nm", "band_width_nm"})
+
+
+@pytest.mark.parametrize("name", ["stopband", "multi_stopband", "dual"])
+def test_a_shifted_family_moves_every_edge(name: str) -> None:
+    family, x = FAMILIES[name]
+    moved = x.copy()
+    moved[0::5] += 3.0
+    moved[2::5] += 3.0
+    np.testing.assert_allclose(family.shifted(3.0).curves(x[None]), family.curves(moved[None]), rtol=1e-13)
+    np.testing.assert_allclose(family.shifted(3.0).gradient(x), family.gradient(moved), rtol=1e-10, atol=1e-15)
+
+
+def test_a_shifted_free_form_moves_its_transmission() -> None:
+    family, x = FAMILIES["free_form"]
+    ratio = family.shifted(5.0).curves(x[None])[0, 0] / BASE
+    np.testing.assert_allclose(ratio[155:296], np.interp(WAVE[155:296] - 5, [550, 600, 613.5, 690], x), rtol=1e-14)
+    assert (ratio[:155] == 1).all()
 
 
 @settings(max_examples=100)

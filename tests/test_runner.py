@@ -20,10 +20,11 @@ import pytest
 from sweep.errors import OutputError
 from sweep.evaluate import evaluate, quantities
 from sweep.families import Stopband
+from sweep.report import make_report, read_output
 from sweep.runner import run_study
-from sweep.runner.jobs import CHUNK, Job, Rules, jobs_of, run_job
+from sweep.runner.jobs import CHUNK, Job, jobs_of, rules_of, run_job
 from sweep.spaces import Filter, Space
-from sweep.store import locked, result_schema
+from sweep.store import locked
 from sweep.study import Study, load_study
 
 STUDY = """\
@@ -85,7 +86,8 @@ def test_rows_stand_in_order_with_their_columns(study: Study, output: Path) -> N
         *("design_id", "kind", "name", "cfa", "family", "scenario"),
         *("left_nm", "left_width_nm", "right_nm", "right_width_nm", "depth"),
         *quantities(study.lights),
-        *("violation", "limit_dn", "gap", "feasible", "pareto", "status"),
+        *("edge_width_nm", "band_width_nm"),
+        *("violation", "limit", "gap", "feasible", "pareto", "status"),
     ]
     assert set(frame["status"]) == {"ok"}
     assert list(frame["kind"][:4]) == ["reference", "reference", "design", "sweep"]
@@ -169,7 +171,7 @@ def test_a_failing_design_is_a_row(study: Study) -> None:
     family = Fragile(study.grid.nodes_nm, study.sensor.qe["Y"], study.sensor.qe["G"])
     axes = ((2.0, 3.0, 4.0, 5.0), (10.0,), (650.0,), (10.0,), (1.0,))
     space = Space("sweep", "fragile", "RYNCy", Filter(family, ("N",), "Y", "G"), axes)
-    rules = Rules(result_schema(space.parameters, quantities(study.lights)), {}, ("csd_yellow_red", "sensitivity"))
+    rules = replace(rules_of(study), constraints={})
     rows = run_job(Job(space, "chart", 0, 4, 0), study.setup(space, "chart"), rules).to_pandas()
     assert list(rows["status"]) == ["ok", "error: ValueError: no such filter", "ok", "not finite"]
     assert list(rows["feasible"]) == [True, False, True, False]
@@ -244,3 +246,31 @@ def test_a_full_disk_is_one_line_and_keeps_the_earlier_result(tmp_path: Path) ->
     assert "File too large" in said
     assert earlier.read_bytes() == b"earlier"
     assert not list(output.rglob(".tmp-*"))
+
+
+def test_worst_cases_and_combined_objectives_are_columns(tmp_path: Path) -> None:
+    text = STUDY.replace("COUNT", "3").replace(
+        "sweeps:",
+        "production: {edge_shift_nm: 3}\nobjective: {minimum: {worst_csd_yellow_red: 2, sensitivity: 300}}\nsweeps:",
+    )
+    path = tmp_path / "tiny.yaml"
+    path.write_text(text)
+    study = load_study(path)
+    run_study(study, tmp_path / "out", 1, lambda *_: None)
+    frame = pd.read_parquet(tmp_path / "out" / "results.parquet")
+    assert set(frame["status"]) == {"ok"}
+    row = frame[frame["kind"] == "sweep"].iloc[17]
+    sweep = study.spaces[-1]
+    x = np.repeat(row[list(sweep.parameters)].to_numpy(dtype=float)[None], 5, axis=0)
+    x[:, [0, 2]] += np.array([-3.0, -1.5, 0, 1.5, 3.0])[:, None]
+    found = evaluate(study.setup(sweep, row["scenario"]), sweep.curves(x, study.grid.size))
+    assert row["worst_csd_yellow_red"] == found["csd_yellow_red"].min()
+    assert row["worst_sensitivity"] == pytest.approx(found["sensitivity"].min(), rel=1e-12)
+    assert row["objective"] == min(2 * row["worst_csd_yellow_red"], 300 * row["sensitivity"])
+    plain = frame[frame["kind"] == "reference"]
+    assert (plain["worst_csd_yellow_red"] == plain["csd_yellow_red"]).all()
+    answer = frame.iloc[-1]
+    assert answer["kind"] == "search"
+    assert answer["objective"] >= frame[frame["feasible"] & (frame["kind"] == "sweep")]["objective"].max() - 4
+    make_report(read_output(tmp_path / "out"))
+    assert "smallest of 2 worst_csd_yellow_red, 300 sensitivity" in (tmp_path / "out" / "report.html").read_text()

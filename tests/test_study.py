@@ -67,7 +67,7 @@ def test_a_study_is_resolved(tmp_path: Path) -> None:
         [610, 10, 650, 25, 1],
     ]
     assert edges.points(5, 7).tolist() == edges.points(0, 12)[5:7].tolist()
-    assert study.objective == ("yellow", "red")
+    assert study.objective.column == "csd_yellow_red"
 
 
 @pytest.mark.parametrize("name", ["paper", "stopband", "freeform", "dual", "rccb", "producible"])
@@ -100,7 +100,7 @@ def test_the_measured_study_loads() -> None:
             "search:\n",
             "serach:\n",
             "tiny.yaml:20: serach: unknown key; allowed: study, question, seed, wavelengths, sensor, pixel, lights, "
-            "scenarios, geometry, cfas, designs, sweeps, boxes, objective, constraints, search, published; did you mean 'search'?",
+            "scenarios, geometry, cfas, designs, sweeps, boxes, production, objective, constraints, search, published; did you mean 'search'?",
         ),
         (
             "min: 590, max: 610",
@@ -155,7 +155,7 @@ def test_the_measured_study_loads() -> None:
             "sensitivity: {min: 0.9}",
             "sensitivty: {min: 0.9}",
             "tiny.yaml:19: constraints.sensitivty: unknown quantity (got 'sensitivty'); allowed: sensitivity, "
-            "cfa_sensitivity, slope_per_nm, min_transmission, csd_green_yellow, csd_green_orange, csd_green_red, csd_yellow_orange, csd_yellow_red, "
+            "cfa_sensitivity, slope_per_nm, min_transmission, edge_width_nm, band_width_nm, csd_green_yellow, csd_green_orange, csd_green_red, csd_yellow_orange, csd_yellow_red, "
             "csd_orange_red; did you mean 'sensitivity'?",
         ),
         (
@@ -177,6 +177,37 @@ def test_the_measured_study_loads() -> None:
         ),
         ("study: tiny\n", "study: tiny\nstudy: again\n", "tiny.yaml:2: found duplicate key"),
         ("[RGGB, RYNCy]", "[RGGB, RYNCy", "not valid YAML"),
+        (
+            "constraints:\n",
+            "objective: {minimum: {csd_yellow_red: 1, csd_yelow_red: 2}}\nconstraints:\n",
+            "tiny.yaml:18: objective.minimum.csd_yelow_red: unknown objective (got 'csd_yelow_red')",
+        ),
+        (
+            "constraints:\n",
+            "objective: {sum: {csd_yellow_red: -1}}\nconstraints:\n",
+            "tiny.yaml:18: objective.sum.csd_yellow_red: not allowed (got -1)",
+        ),
+        ("constraints:\n", "objective: {}\nconstraints:\n", "tiny.yaml:18: objective: an objective is a quantity"),
+        (
+            "constraints:\n",
+            "objective: worst_csd_yellow_red\nconstraints:\n",
+            "tiny.yaml:18: objective: worst_csd_yellow_red needs `production.edge_shift_nm`; allowed: a shift above 0",
+        ),
+        (
+            "constraints:\n",
+            "production: {edge_shift: 2}\nconstraints:\n",
+            "tiny.yaml:18: production.edge_shift: unknown key; allowed: edge_shift_nm; did you mean 'edge_shift_nm'?",
+        ),
+        (
+            "constraints:\n",
+            "constraints:\n  band_width_nm: {max: 30}\n",
+            "tiny.yaml:19: constraints.band_width_nm.max: band_width_nm has no `max` (got 30.0); allowed: `min`",
+        ),
+        (
+            "  space: edges\n",
+            "  front: {min: 0.9, max: 1.0, count: 3}\nobjective: sensitivity\n",
+            "search.front: the front is searched at levels of sensitivity, which is in the objective",
+        ),
         (
             "lights: tl16\n",
             "lights: tl16\nwavelengths: {stop_nm: 800}\n",

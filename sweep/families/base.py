@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, Self
 
 from ..arrays import FloatArray
 
@@ -44,6 +44,13 @@ class Family(Protocol):
 
     def gradient(self, x: FloatArray) -> FloatArray:
         """Derivative of `curves` at one design: [n_parameters] -> [n_parameters, n_modified, n_wavelengths]."""
+
+    @property
+    def dimensions(self) -> Mapping[str, FloatArray]:
+        """Lengths that a producer asks for, nm: name -> rows r, ndarray[n, n_parameters]; a length is min(r @ x)."""
+
+    def shifted(self, shift_nm: float) -> Self:
+        """The same family as produced with every edge `shift_nm` too far toward the red."""
 
     def start(self, points: FloatArray) -> FloatArray:
         """Well-formed designs to start a search from: [n, start_dimensions] in 0..1 -> [n, n_parameters]."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ..arrays import FloatArray
@@ -13,18 +15,23 @@ class FreeForm:
     """N = base x transmission, which is piecewise linear between nodes and 1 outside the first and the last node.
 
     Linear in its parameters, so it is the natural family to come near the limit. `nodes_nm`: ndarray[n_nodes].
+    `shift_nm` moves the transmission toward the red.
     """
 
     kind = "free_form"
     n_modified = 1
     start_dimensions: int | None = 3
 
-    def __init__(self, wavelength_nm: FloatArray, base: FloatArray, nodes_nm: FloatArray) -> None:
+    def __init__(
+        self, wavelength_nm: FloatArray, base: FloatArray, nodes_nm: FloatArray, shift_nm: float = 0.0
+    ) -> None:
         if nodes_nm.size < 2:
             raise SweepError(Fault("a free-form filter needs two nodes or more", value=nodes_nm.tolist()))
         self.nodes_nm = nodes_nm
-        inside = (wavelength_nm >= nodes_nm[0]) & (wavelength_nm <= nodes_nm[-1])
-        hats = [np.interp(wavelength_nm, nodes_nm, unit) for unit in np.eye(nodes_nm.size)]
+        self._made_of = wavelength_nm, base
+        nominal_nm = wavelength_nm - shift_nm
+        inside = (nominal_nm >= nodes_nm[0]) & (nominal_nm <= nodes_nm[-1])
+        hats = [np.interp(nominal_nm, nodes_nm, unit) for unit in np.eye(nodes_nm.size)]
         self._hats = np.stack(hats) * (base * inside)
         self._fixed = np.where(inside, 0.0, base)
 
@@ -46,6 +53,15 @@ class FreeForm:
         """Constant, ndarray[n_nodes, 1, n_wavelengths]; see `Family.gradient`."""
         assert x.shape == self.nodes_nm.shape
         return np.asarray(self._hats[:, None, :], dtype=float)
+
+    @property
+    def dimensions(self) -> Mapping[str, FloatArray]:
+        """None: it has no bands."""
+        return {}
+
+    def shifted(self, shift_nm: float) -> FreeForm:
+        """The whole transmission moved; see `Family.shifted`."""
+        return FreeForm(*self._made_of, self.nodes_nm, shift_nm)
 
     def start(self, points: FloatArray) -> FloatArray:
         """Smooth dips of different place, breadth and depth: random nodes would be a filter of spikes."""

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from copy import copy
+from typing import Self
+
 import numpy as np
 
 from ..arrays import FloatArray
@@ -59,6 +63,20 @@ class Bands:
             open_at[(self._wave >= start) & (self._wave <= end)] = 1.0
         return open_at
 
+    def shifted(self, shift_nm: float) -> Bands:
+        """The bands that come out with every edge `shift_nm` too far toward the red."""
+        return Bands(self._wave - shift_nm, self._count)
+
+    @property
+    def dimensions(self) -> dict[str, FloatArray]:
+        """Rows of the narrowest edge (10 to 90 %) and the narrowest band (between its 50 % points), nm."""
+        identity = np.eye(self._count * _PER_BAND)
+        first = np.arange(self._count) * _PER_BAND
+        return {
+            "edge_width_nm": identity[np.sort(np.concatenate([first + LEFT_WIDTH, first + RIGHT_WIDTH]))],
+            "band_width_nm": identity[first + RIGHT] - identity[first + LEFT],
+        }
+
     def violation(self, x: FloatArray) -> FloatArray:
         """Edges out of order, nm, ndarray[n_designs, 3 k - 1].
 
@@ -107,6 +125,17 @@ class Banded:
     def parameters(self) -> tuple[Parameter, ...]:
         """Edges, widths and depth of each band."""
         return self._bands.parameters
+
+    @property
+    def dimensions(self) -> Mapping[str, FloatArray]:
+        """See `Bands.dimensions`."""
+        return self._bands.dimensions
+
+    def shifted(self, shift_nm: float) -> Self:
+        """The same curves to go between, with the bands moved; see `Family.shifted`."""
+        made = copy(self)
+        made._bands = self._bands.shifted(shift_nm)
+        return made
 
     def start(self, points: FloatArray) -> FloatArray:
         """Not needed: a search starts anywhere in its box."""

@@ -8,19 +8,35 @@ import numpy as np
 import pandas as pd
 
 from ..chromaticity import display_colors
+from ..evaluate import WORST
 from ..figures import TYPE_COLORS, ChartFigure, Cloud, CurvesFigure, ParetoFigure, Points
+from ..metrics import CSD
+from ..objectives import COMBINED
 from ..spectra import WavelengthGrid
 from .outputs import Output
 
 LIMIT_NAME = "limit of any filter"
 QUANTITIES = ("sensitivity", "cfa_sensitivity")
+_SENSITIVITY_LABELS = {
+    "sensitivity": "sensitivity of the modified channel (1 = the channel it replaces)",
+    "cfa_sensitivity": "sensitivity of the CFA (1 = a sensor without color filters)",
+}
 
 
 def readable(column: str) -> str:
     """A column's name as people write it."""
-    if column.startswith("csd_"):
-        return column.removeprefix("csd_").replace("_", "/") + " CSD"
-    return {"sensitivity": "sensitivity", "cfa_sensitivity": "CFA sensitivity"}.get(column, column)
+    worst = "worst-case " if column.startswith(WORST) else ""
+    plain = column.removeprefix(WORST)
+    if plain.startswith(CSD):
+        return worst + plain.removeprefix(CSD).replace("_", "/") + " CSD"
+    return worst + {"cfa_sensitivity": "CFA sensitivity"}.get(plain, plain)
+
+
+def amount(column: str, value: float, digits: int = 0) -> str:
+    """A quantity's value with its unit; ratios with four digits."""
+    if "csd_" in column or column == COMBINED:
+        return f"{value:.{digits}f} DN"
+    return f"{value:.4f}"
 
 
 def pareto_figure(output: Output, scenario: str, cfa: str | None) -> ParetoFigure:
@@ -37,18 +53,18 @@ def pareto_figure(output: Output, scenario: str, cfa: str | None) -> ParetoFigur
         "feasible": _points(output, swept[swept["feasible"] & ~front]),
         "front": _points(output, swept[front]),
         "named": _points(output, named, list(named["name"])),
-        "best": _points(output, found, [f"{v:.0f} DN" for v in found[output.objective]]),
+        "best": _points(output, found, [amount(output.trade_off[0], v) for v in found[output.trade_off[0]]]),
     }
-    bound = output.constraints.get("sensitivity")
+    bound = output.constraints.get(output.trade_off[1])
     limit = None if bound is None else bound.min
     where = "" if cfa is None else f", {cfa}"
     return ParetoFigure(
         title=f"{output.study['study']}{where}: what separation costs in sensitivity",
-        x_label="sensitivity of the modified channel (1 = the channel it replaces)",
-        y_label=f"{readable(output.objective)} / DN",
+        x_label=_SENSITIVITY_LABELS[output.trade_off[1].removeprefix(WORST)],
+        y_label=f"{readable(output.trade_off[0])} / DN",
         groups=groups,
         lines=_trade_offs(output, scenario, cfa),
-        levels=dict(zip(references["cfa"], references[output.objective], strict=True)),
+        levels=dict(zip(references["cfa"], references[output.trade_off[0]], strict=True)),
         bound=limit,
         bound_text="" if limit is None else f"sensitivity >= {limit:g}",
     )
@@ -60,17 +76,18 @@ def _trade_offs(output: Output, scenario: str, cfa: str | None) -> dict[str, Poi
         return {}
     if output.provenance["search"]["scenario"] != scenario:
         return {}
-    traced = output.front.dropna(subset=["csd_dn"])
-    bounded = output.front.dropna(subset=["limit_dn"])
-    lines = {"front of the search": Points(traced["sensitivity"].to_numpy(), traced["csd_dn"].to_numpy())}
+    traced = output.front.dropna(subset=["objective"])
+    bounded = output.front.dropna(subset=["limit"])
+    lines = {"front of the search": Points(traced["sensitivity"].to_numpy(), traced["objective"].to_numpy())}
     if len(bounded):
-        lines[LIMIT_NAME] = Points(bounded["sensitivity_min"].to_numpy(), bounded["limit_dn"].to_numpy())
+        lines[LIMIT_NAME] = Points(bounded["sensitivity_min"].to_numpy(), bounded["limit"].to_numpy())
     return lines
 
 
 def _points(output: Output, rows: pd.DataFrame, labels: Sequence[str] = ()) -> Points:
-    x = rows["sensitivity"].to_numpy(dtype=float)
-    return Points(x, rows[output.objective].to_numpy(dtype=float), tuple(map(str, labels)))
+    separation, sensitivity = output.trade_off
+    x = rows[sensitivity].to_numpy(dtype=float)
+    return Points(x, rows[separation].to_numpy(dtype=float), tuple(map(str, labels)))
 
 
 def sensor_figure(output: Output) -> CurvesFigure:
@@ -124,11 +141,13 @@ def _cloud(points: pd.DataFrame, title: str, first: str, other: str) -> Cloud:
 
 
 def filters_figure(output: Output, cfa: str) -> CurvesFigure:
-    """Modified channels of the named designs and the best ones of a CFA, beside the curves that they start from."""
+    """Modified channels of the named designs and the best ones of a CFA, beside the green and yellow pixels' curves and
+    those that they go between.
+    """
     rows = drawn(output)
     rows = rows[rows["cfa"] == cfa]
     entries = [entry for entry in modifications(output) if entry["cfa"] == cfa]
-    ends = {end for entry in entries for end in (entry["base"], entry.get("to")) if isinstance(end, str)}
+    ends = {end for entry in entries for end in (entry["base"], entry.get("to")) if isinstance(end, str)} | {"G", "Y"}
     curves = {name: values for name, values in _curves(output, "qe:").items() if name in ends}
     for row in rows.to_dict("records"):
         made = [c for c in output.curves.columns if c.startswith(f"design:{row['design_id']}:")]
@@ -160,13 +179,23 @@ def label(row: dict[object, object]) -> str:
 def comparison_table(output: Output) -> pd.DataFrame:
     """Plain CFAs, named designs and the search's answer with all CSDs and sensitivities."""
     rows = output.kind("reference", "design", "search")
-    return _shown(rows, ["name", "scenario", *output.distances, *QUANTITIES, "feasible"])
+    return _shown(rows, ["name", "scenario", *output.distances, *QUANTITIES, *output.further, "feasible"])
 
 
 def best_table(output: Output, most: int = 12) -> pd.DataFrame:
     """The best feasible designs with their parameters."""
     ranked = output.best.head(most)
-    columns = ["design_id", "kind", "cfa", "scenario", *output.parameters, *output.distances, *QUANTITIES, "pareto"]
+    columns = [
+        "design_id",
+        "kind",
+        "cfa",
+        "scenario",
+        *output.parameters,
+        *output.distances,
+        *QUANTITIES,
+        *output.further,
+        "pareto",
+    ]
     return _shown(ranked, columns)
 
 
@@ -187,7 +216,7 @@ def geometry_table(output: Output) -> pd.DataFrame:
 def _shown(rows: pd.DataFrame, columns: list[str]) -> pd.DataFrame:
     shown = rows[columns].copy()
     for column in columns:
-        if column.startswith("csd_"):
+        if column.removeprefix(WORST).startswith(CSD) or column == COMBINED:
             shown[column] = shown[column].round(1)
         elif shown[column].dtype == np.float64:
             shown[column] = shown[column].round(4)

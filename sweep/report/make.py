@@ -12,6 +12,7 @@ import pyarrow as pa
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ..figures import draw_chart, draw_clouds, draw_curves, draw_pareto, rendered
+from ..objectives import Objective
 from ..store import write_bytes, write_table, write_text
 from . import content
 from .comparison import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
@@ -44,6 +45,7 @@ def make_report(output: Output) -> None:
     template = _environment().get_template("report.html.j2")
     page = template.render(
         study=output.study,
+        objective=str(Objective.model_validate(output.study["objective"])),
         answer=answer_sentences(output),
         images=images,
         comparison=_rows(content.comparison_table(output)),

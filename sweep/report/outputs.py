@@ -15,6 +15,8 @@ from ruamel.yaml.error import YAMLError
 
 from ..constraints import Bound
 from ..errors import Fault, OutputError
+from ..metrics import CSD
+from ..objectives import Objective
 from ..scenes import Geometry
 from ..store import CURVES, FRONT, POINTS, PROVENANCE, RESOLVED, RESULTS, read_table
 
@@ -33,13 +35,25 @@ class Output:
 
     @property
     def objective(self) -> str:
-        """Column of the CSD that the study maximizes."""
-        return str(self.study["objective"])
+        """Column of what the study maximizes."""
+        return Objective.model_validate(self.study["objective"]).column
+
+    @property
+    def trade_off(self) -> tuple[str, str]:
+        """Columns of the Pareto front: separation, sensitivity."""
+        separation, sensitivity = self.provenance["trade_off"]
+        return separation, sensitivity
 
     @property
     def distances(self) -> list[str]:
         """Columns of all CSDs."""
-        return [name for name in self.table.columns if name.startswith("csd_")]
+        return [name for name in self.table.columns if name.startswith(CSD)]
+
+    @property
+    def further(self) -> list[str]:
+        """Columns that the study's objective and constraints name beside the CSDs and the sensitivities."""
+        named = (*self.constraints, *Objective.model_validate(self.study["objective"]).weights, self.objective)
+        return [n for n in dict.fromkeys(named) if n not in self.distances and not n.startswith(("sens", "cfa_sens"))]
 
     @property
     def parameters(self) -> list[str]:
@@ -61,7 +75,7 @@ class Output:
     def best(self) -> pd.DataFrame:
         """Feasible swept and searched designs, best first."""
         candidates = self.table[self.table["feasible"] & self.table["kind"].isin(["sweep", "search"])]
-        return candidates.sort_values([self.objective, "sensitivity", "design_id"], ascending=[False, False, True])
+        return candidates.sort_values([self.objective, *self.trade_off, "design_id"], ascending=[False] * 3 + [True])
 
     def kind(self, *kinds: str) -> pd.DataFrame:
         """Rows of some kinds."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from .comparison import comparison_lines, comparison_with_published
-from .content import geometry_table, readable
+from .content import amount, geometry_table, readable
 from .outputs import Output
 
 _MOST_PARAMETERS = 10
@@ -15,10 +15,11 @@ _MOST_PARAMETERS = 10
 def answer_sentences(output: Output) -> list[str]:
     """The question's answer: the best feasible design beside the CFAs that a study compares with."""
     name = readable(output.objective)
+    shown = output.trade_off[0]
     limits = " and ".join(f"{readable(q)} {bound}" for q, bound in output.constraints.items())
     under = f" with {limits}" if limits else ""
     beside = ", ".join(
-        f"{row['name']} {row[output.objective]:.0f} DN" for row in output.kind("reference").to_dict("records")
+        f"{row['name']} {amount(shown, row[shown])}" for row in output.kind("reference").to_dict("records")
     )
     if not len(output.kind("sweep", "search")):
         return [f"{name} of the named CFAs: {beside}."]
@@ -26,7 +27,8 @@ def answer_sentences(output: Output) -> list[str]:
         return [f"No design is feasible{under}.", f"Plain CFAs: {beside}."]
     best = output.best.iloc[0]
     return [
-        f"The best {name}{under} is {best[output.objective]:.1f} DN (sensitivity {best['sensitivity']:.4f}, "
+        f"The best {name}{under} is {amount(output.objective, best[output.objective], 1)} "
+        f"(sensitivity {best['sensitivity']:.4f}, "
         f"{best['cfa']}, found by the {best['kind']}).",
         f"Plain CFAs: {beside}.",
     ]
@@ -44,7 +46,7 @@ def summary_lines(output: Output) -> list[str]:
     named = output.kind("design")
     if len(named):
         each = ", ".join(
-            f"{row['name']} {row[output.objective]:.0f} DN at {row['sensitivity']:.3f}"
+            f"{row['name']} {amount(output.trade_off[0], row[output.trade_off[0]])} at {row['sensitivity']:.3f}"
             for row in named.to_dict("records")
         )
         lines.append(f"Named designs: {each}.")
@@ -57,11 +59,11 @@ def summary_lines(output: Output) -> list[str]:
     lines.append(_counts(output))
     search = output.provenance.get("search")
     if search:
-        found = f"{search['best_smooth_csd_dn']:.2f} DN before quantization"
+        found = f"{amount(output.objective, search['best_smooth_objective'], 2)} before quantization"
         lines.append(
             f"Search: {search['algorithm']}, {search['starts']} starts, {search['evaluations']} evaluations: {found}."
         )
-        lines.append(_limit_line(search))
+        lines.append(_limit_line(output, search))
     areas = output.provenance.get("hypervolume")
     if areas:
         both = ", ".join(f"{name} {area:.3f}" for name, area in areas.items() if area > 0)
@@ -82,10 +84,12 @@ def _counts(output: Output) -> str:
     return f"{text}, {failed:,} failed." if failed else f"{text}."
 
 
-def _limit_line(search: Mapping[str, Any]) -> str:
+def _limit_line(output: Output, search: Mapping[str, Any]) -> str:
     if search["no_limit"] is not None:
         return f"Limit: none computed ({search['no_limit']})."
+    without = f" but {', '.join(search['limit_left_out'])}" if search["limit_left_out"] else ""
+    ends = [amount(output.objective, search[f"limit_{end}"], 3) for end in ("attained", "proven")]
     return (
-        f"Limit of any filter under the same constraints: between {search['limit_attained_dn']:.3f} and "
-        f"{search['limit_proven_dn']:.3f} DN; the search's answer is {search['gap']:.1%} below."
+        f"Limit of any filter under the same constraints{without}: between {ends[0]} and {ends[1]}; "
+        f"the search's answer is {search['gap']:.1%} below."
     )

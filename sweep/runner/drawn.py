@@ -57,7 +57,7 @@ def drawn_rows(study: Study, table: pa.Table) -> list[dict[str, Any]]:
     frame = table.to_pandas()
     named = frame[frame["kind"].isin(["reference", "design", "search"])]
     swept = frame[(frame["kind"] == "sweep") & frame["feasible"]]
-    best = swept.sort_values([study.objective_column, "sensitivity"], ascending=False).groupby("cfa", observed=True)
+    best = swept.sort_values([study.objective.column, *study.trade_off], ascending=False).groupby("cfa", observed=True)
     rows: list[dict[str, Any]] = [*named.to_dict("records"), *best.head(BEST_PER_CFA).to_dict("records")]
     return rows
 

@@ -11,9 +11,12 @@ import pyarrow as pa
 
 from ..arrays import BoolArray, FloatArray
 from ..constraints import FEASIBLE, Bound, total_violation
-from ..evaluate import Setup, evaluate, quantities
+from ..evaluate import WORST, Setup, evaluate, shiftable
+from ..objectives import COMBINED, Objective
 from ..pareto import non_dominated
-from ..spaces import Space
+from ..problem import SHIFTS
+from ..spaces import DIMENSIONS, Space
+from ..store import result_schema
 from ..study import Study
 
 CHUNK = 4096
@@ -33,11 +36,17 @@ class Job:
 
 @dataclass(frozen=True)
 class Rules:
-    """What turns quantities into verdicts: the table's schema, the constraints, the two quantities of the front."""
+    """What turns designs into rows: the table's schema, its quantities and the verdicts on them.
+
+    `front`: the two quantities of the Pareto front.
+    """
 
     schema: pa.Schema
+    columns: tuple[str, ...]
+    objective: Objective
     constraints: Mapping[str, Bound]
     front: tuple[str, str]
+    edge_shift_nm: float
 
 
 def jobs_of(study: Study) -> Iterator[Job]:
@@ -56,7 +65,7 @@ def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
     `pareto` marks the non-dominated designs of this chunk alone; `mark_front` finds those of the whole table.
     """
     points = job.space.points(job.start, job.stop)
-    columns, status = _quantities(job.space, setup, points)
+    columns, status = _quantities(job.space, setup, points, rules)
     ok = np.array([text == "ok" for text in status])
     own = job.space.violation(points)
     violation = total_violation(columns, rules.constraints, own)
@@ -71,34 +80,65 @@ def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
     return _table(values, len(points), rules.schema)
 
 
-def _quantities(space: Space, setup: Setup, points: FloatArray) -> tuple[dict[str, FloatArray], list[str]]:
+def rules_of(study: Study) -> Rules:
+    """The rules of a study."""
+    schema = result_schema(study.parameters, study.columns)
+    return Rules(schema, study.columns, study.objective, study.constraints, study.trade_off, study.edge_shift_nm)
+
+
+def _columns(space: Space, setup: Setup, points: FloatArray, rules: Rules) -> dict[str, FloatArray]:
+    """Every quantity of a block of designs, ndarray[n_designs] each."""
+    size = setup.grid.size
+    columns = evaluate(setup, space.curves(points, size)) | space.dimensions(points)
+    if rules.edge_shift_nm:
+        shifts = [rules.edge_shift_nm * s for s in SHIFTS if s] if space.filter is not None else []
+        cases = [columns, *(evaluate(setup, space.curves(points, size, shift)) for shift in shifts)]
+        columns |= {WORST + n: np.min([case[n] for case in cases], axis=0) for n in shiftable(setup.lights)}
+    if rules.objective.column == COMBINED:
+        columns[COMBINED] = rules.objective.of(columns)
+    return columns
+
+
+def _may_lack(setup: Setup, rules: Rules) -> set[str]:
+    """Quantities that a design may not have: dimensions; of a plain CFA, all that a modified channel has."""
+    lacking = {*DIMENSIONS}
+    if not setup.modified:
+        lacking |= {"sensitivity", "slope_per_nm", "min_transmission", WORST + "sensitivity"}
+        if lacking & set(rules.objective.weights):
+            lacking.add(COMBINED)
+    return lacking
+
+
+def _quantities(
+    space: Space, setup: Setup, points: FloatArray, rules: Rules
+) -> tuple[dict[str, FloatArray], list[str]]:
     try:
-        columns = evaluate(setup, space.curves(points, setup.grid.size))
+        columns = _columns(space, setup, points, rules)
         status = ["ok"] * len(points)
     except Exception:  # whatever fails in one design must not take the others with it
-        columns, status = _one_by_one(space, setup, points)
-    # A CFA without a modified channel has no sensitivity or slope of its own; all else must be a number.
-    own = () if setup.modified else ("sensitivity", "slope_per_nm", "min_transmission")
-    numbers = [values for name, values in columns.items() if name not in own]
+        columns, status = _one_by_one(space, setup, points, rules)
+    lacking = _may_lack(setup, rules)
+    numbers = [values for name, values in columns.items() if name not in lacking]
     for index in np.flatnonzero(~np.isfinite(numbers).all(axis=0)):
         if status[index] == "ok":
             status[index] = "not finite"
     return columns, status
 
 
-def _one_by_one(space: Space, setup: Setup, points: FloatArray) -> tuple[dict[str, FloatArray], list[str]]:
+def _one_by_one(
+    space: Space, setup: Setup, points: FloatArray, rules: Rules
+) -> tuple[dict[str, FloatArray], list[str]]:
     found: list[dict[str, FloatArray] | None] = []
     status = []
     for point in points:
         try:
-            found.append(evaluate(setup, space.curves(point[None], setup.grid.size)))
+            found.append(_columns(space, setup, point[None], rules))
             status.append("ok")
         except Exception as error:  # the row says what happened
             found.append(None)
             status.append(f"error: {type(error).__name__}: {error}"[:200])
     nothing = np.array([np.nan])
-    names = quantities(setup.lights)
-    return {n: np.concatenate([nothing if c is None else c[n] for c in found]) for n in names}, status
+    return {n: np.concatenate([nothing if c is None else c[n] for c in found]) for n in rules.columns}, status
 
 
 def _labels(job: Job) -> dict[str, Any]:

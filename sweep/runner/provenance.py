@@ -17,7 +17,7 @@ from ruamel.yaml import YAML
 from ..study import Study
 from .jobs import CHUNK
 
-MODEL_VERSION = "1"
+MODEL_VERSION = "2"
 """Raised whenever the same study would give other rows; part of every shard's key."""
 _PACKAGES = ("cfa-sweep", "numpy", "scipy", "pandas", "pyarrow", "joblib", "nlopt", "moocore")
 

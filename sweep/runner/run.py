@@ -14,7 +14,6 @@ import numpy as np
 import pyarrow as pa
 
 from ..errors import InterruptedRunError
-from ..evaluate import quantities
 from ..pareto import hypervolume
 from ..store import (
     CURVES,
@@ -26,14 +25,13 @@ from ..store import (
     SEARCH_LOG,
     Shards,
     locked,
-    result_schema,
     write_json,
     write_table,
     write_text,
 )
 from ..study import Study
 from .drawn import curves_table, points_table
-from .jobs import Rules, jobs_of, mark_front, run_job
+from .jobs import Rules, jobs_of, mark_front, rules_of, run_job
 from .provenance import fingerprint, provenance, resolved_yaml
 from .searching import Parallel, Progress, SearchAnswer, answer_row, front_table, run_search, search_facts, search_log
 from .stopping import Stop, leave_signals_to_the_parent, stop_on_signals
@@ -47,8 +45,7 @@ def run_study(study: Study, output: Path, n_jobs: int, progress: Progress, comma
     be written, and InfeasibleError, before anything is written, when the study's search finds no feasible design.
     """
     started = time.monotonic()
-    schema = result_schema(study.parameters, quantities(study.lights))
-    rules = Rules(schema, study.constraints, (study.objective_column, "sensitivity"))
+    rules = rules_of(study)
     with stop_on_signals() as stop:
         parallel = functools.partial(_parallel, n_jobs, stop)
         # Searched first: a study that no design meets ends here, before anything is written.
@@ -71,7 +68,7 @@ def _write(
     """Sweep, and write everything."""
     shards = Shards(output)
     table = _sweep(study, rules, shards, parallel, progress)
-    facts: dict[str, Any] = {"designs": table.num_rows, "warnings": list(study.warnings)}
+    facts: dict[str, Any] = {"designs": table.num_rows, "trade_off": study.trade_off, "warnings": list(study.warnings)}
     if answer is not None:
         table = pa.concat_tables([table, answer_row(study, answer, rules, table.num_rows)])
         facts["search"] = search_facts(study, answer)
@@ -97,12 +94,15 @@ def _write(
 def _hypervolumes(study: Study, table: pa.Table, answer: SearchAnswer) -> dict[str, float]:
     """Area that the sweep's and the search's front dominate above no separation and the lowest level of sensitivity."""
     reference = np.array([0.0, answer.search.levels[0] - 1e-6])
-    frame = table.select([study.objective_column, "sensitivity", "pareto", "kind", "cfa", "scenario"]).to_pandas()
+    axes = list(study.trade_off)
+    frame = table.select([*axes, "pareto", "kind", "cfa", "scenario"]).to_pandas()
     frame = frame[frame["scenario"] == answer.search.scenario]
     swept = frame[frame["pareto"] & (frame["kind"] == "sweep") & (frame["cfa"] == answer.search.space.cfa)]
-    traced = np.array([[p.best.csd, p.best.sensitivity] for p in answer.front if p.best is not None]).reshape(-1, 2)
+    traced = np.array([[p.best.objective, p.best.sensitivity] for p in answer.front if p.best is not None]).reshape(
+        -1, 2
+    )
     return {
-        "sweep": hypervolume(swept[[study.objective_column, "sensitivity"]].to_numpy(dtype=float), reference),
+        "sweep": hypervolume(swept[axes].to_numpy(dtype=float), reference),
         "search": hypervolume(traced, reference),
     }
 

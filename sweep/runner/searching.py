@@ -35,7 +35,7 @@ class FrontPoint:
 
     level: float
     best: Evaluation | None
-    evaluations: int
+    runs: tuple[SearchRun, ...]
     limit: Limit | None
 
 
@@ -53,7 +53,7 @@ class SearchAnswer:
     @property
     def gap(self) -> float | None:
         """How far the answer is below what is proven to be out of reach, relative."""
-        return None if self.limit is None else 1 - self.best.csd / self.limit.proven
+        return None if self.limit is None else 1 - self.best.objective / self.limit.proven
 
 
 def run_search(study: Study, search: Search, parallel: Parallel, progress: Progress) -> SearchAnswer:
@@ -107,10 +107,10 @@ def _front(
     for index, (level, leveled) in enumerate(zip(search.levels, at_level, strict=True)):
         points = [*warm, *starts[:_FRONT_STARTS]]
         tasks = (joblib.delayed(search_from)(leveled, i, u, search.algorithm, each, seed) for i, u in enumerate(points))
-        log = [e for run in parallel(tasks) for e in run.log]
-        best = best_feasible(log)
+        runs = tuple(parallel(tasks))
+        best = best_feasible([e for run in runs for e in run.log])
         warm = [] if best is None else [problem.to_unit(best.x)]
-        yield FrontPoint(level, best, len(log), limits[index])
+        yield FrontPoint(level, best, runs, limits[index])
         progress("front levels", index + 1, len(at_level))
 
 
@@ -128,7 +128,7 @@ def answer_row(study: Study, answer: SearchAnswer, rules: Rules, first_id: int) 
     job = Job(found, answer.search.scenario, 0, 1, first_id)
     row = run_job(job, study.setup(found, job.scenario), rules)
     if answer.limit is not None:
-        for name, value in (("limit_dn", answer.limit.proven), ("gap", answer.gap)):
+        for name, value in (("limit", answer.limit.proven), ("gap", answer.gap)):
             index = row.schema.get_field_index(name)
             row = row.set_column(index, row.schema.field(name), pa.array([value], type=pa.float64()))
     return row
@@ -143,33 +143,36 @@ def search_facts(study: Study, answer: SearchAnswer) -> dict[str, Any]:
         "starts": len(answer.runs),
         "evaluations": sum(len(run.log) for run in answer.runs),
         "endings": [run.status for run in answer.runs],
-        "objective": study.objective_column,
-        "best_smooth_csd_dn": answer.best.csd,
+        "objective": str(study.objective),
+        "best_smooth_objective": answer.best.objective,
         "best_sensitivity": answer.best.sensitivity,
-        "limit_attained_dn": None if answer.limit is None else answer.limit.attained,
-        "limit_proven_dn": None if answer.limit is None else answer.limit.proven,
+        "limit_attained": None if answer.limit is None else answer.limit.attained,
+        "limit_proven": None if answer.limit is None else answer.limit.proven,
+        "limit_left_out": [] if answer.limit is None else list(answer.limit.left_out),
         "gap": answer.gap,
         "no_limit": answer.no_limit,
-        "front_evaluations": sum(point.evaluations for point in answer.front),
+        "front_evaluations": sum(len(run.log) for point in answer.front for run in point.runs),
     }
 
 
 def search_log(answer: SearchAnswer) -> pa.Table:
-    """Every evaluation of every start."""
+    """Every evaluation of every start, of the search and then of each level of the front."""
     names = answer.search.space.parameters
     rows = [
         {
             "scenario": answer.search.scenario,
+            "sensitivity_min": level,
             "start": run.start,
             "evaluation": index,
             **dict(zip(names, map(float, e.x), strict=True)),
-            "csd_dn": e.csd,
+            "objective": e.objective,
             "sensitivity": e.sensitivity,
             "cfa_sensitivity": e.cfa_sensitivity,
             "violation": e.violation,
             "status": run.status,
         }
-        for run in answer.runs
+        for level, runs in ((None, answer.runs), *((point.level, point.runs) for point in answer.front))
+        for run in runs
         for index, e in enumerate(run.log)
     ]
     return pa.Table.from_pylist(rows, schema=search_schema(names))
@@ -180,12 +183,12 @@ def front_table(answer: SearchAnswer) -> pa.Table:
     names = answer.search.space.parameters
     rows = []
     for point in answer.front:
-        row: dict[str, Any] = {"sensitivity_min": point.level, "evaluations": point.evaluations}
+        row: dict[str, Any] = {"sensitivity_min": point.level, "evaluations": sum(len(run.log) for run in point.runs)}
         if point.best is not None:
-            row |= {"csd_dn": point.best.csd, "sensitivity": point.best.sensitivity}
+            row |= {"objective": point.best.objective, "sensitivity": point.best.sensitivity}
             row |= dict(zip(names, map(float, point.best.x), strict=True))
         if point.limit is not None and point.limit.curve is not None:
-            row["limit_dn"] = point.limit.proven
-            row["gap"] = None if point.best is None else 1 - point.best.csd / point.limit.proven
+            row["limit"] = point.limit.proven
+            row["gap"] = None if point.best is None else 1 - point.best.objective / point.limit.proven
         rows.append(row)
     return pa.Table.from_pylist(rows, schema=front_schema(names))

@@ -9,14 +9,15 @@ import numpy as np
 
 from ..constraints import Bound
 from ..datasets.lights import Lights
-from ..evaluate import Setup
+from ..evaluate import WORST, Setup, quantities, shiftable
 from ..filters import SensorCurves
-from ..metrics import Pair, class_pairs, csd_name
+from ..metrics import CSD, Pair, class_pairs, csd_name
 from ..mosaics import Mosaic
+from ..objectives import COMBINED, Objective
 from ..problem import Problem
 from ..scenes import Geometry, Scenario
 from ..sensor import Pixel
-from ..spaces import Space
+from ..spaces import DIMENSIONS, Space
 from ..spectra import WavelengthGrid
 from .schema import StudySection
 
@@ -47,7 +48,7 @@ class Study:
     geometry: Mapping[str, Geometry]
     mosaics: Mapping[str, Mosaic]
     spaces: tuple[Space, ...]
-    objective: Pair
+    objective: Objective
     constraints: Mapping[str, Bound]
     search: Search | None
     digests: Mapping[str, str]
@@ -59,9 +60,28 @@ class Study:
         return class_pairs(self.lights.classes)
 
     @property
-    def objective_column(self) -> str:
-        """Column of the CSD that is maximized."""
-        return csd_name(self.objective)
+    def edge_shift_nm(self) -> float:
+        """How far production may move the edges to either side."""
+        return self.section.production.edge_shift_nm
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Quantities of the result table: those of a design, worst cases over the edge shift, a combined objective."""
+        worst = [WORST + name for name in shiftable(self.lights)] if self.edge_shift_nm else []
+        combined = [COMBINED] if self.objective.column == COMBINED else []
+        return (*quantities(self.lights), *DIMENSIONS, *worst, *combined)
+
+    @property
+    def trade_off(self) -> tuple[str, str]:
+        """The two quantities of the Pareto front: separation and sensitivity.
+
+        The separation is the objective, or, where that is a sensitivity, the first CSD that is constrained.
+        """
+        column = self.objective.column
+        if not column.endswith("sensitivity"):
+            return column, "sensitivity"
+        constrained = [name for name in self.constraints if name.startswith((CSD, WORST + CSD))]
+        return (constrained or [csd_name(self.pairs[0])])[0], column
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -100,7 +120,7 @@ class Study:
             family=search.space.filter.family,
             low=np.array([min(axis) for axis in search.space.axes], dtype=float),
             high=np.array([max(axis) for axis in search.space.axes], dtype=float),
-            pair=self.objective,
+            objective=self.objective,
             constraints=self.constraints,
-            pairs={csd_name(pair): pair for pair in self.pairs},
+            edge_shift_nm=self.edge_shift_nm,
         )

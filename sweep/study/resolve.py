@@ -7,14 +7,14 @@ from pathlib import Path
 
 from ..datasets.lights import Lights
 from ..errors import StudyError, SweepError, nearest
-from ..evaluate import DESIGNED
+from ..evaluate import DESIGNED, WORST, shiftable
 from ..families import CHANNELS, Parameter, build_family
 from ..filters import SensorCurves
-from ..metrics import Pair, class_pairs, csd_name
+from ..metrics import class_pairs, csd_name
 from ..mosaics import Mosaic
 from ..scenes import OBJECT_RESOLUTION
 from ..search import ALGORITHMS
-from ..spaces import Filter, Kind, Space
+from ..spaces import DIMENSIONS, Filter, Kind, Space
 from ..surrogate import surrogate_parameters
 from .lines import Document, Key
 from .model import Search, Study
@@ -45,11 +45,11 @@ class _Resolver:
         if sensor is None or lights is None:
             raise StudyError(self.faults)
         spaces = self.spaces(sensor, mosaics)
-        objective = self.objective(lights)
+        self.check_objective(lights)
         self.check_constraints(lights)
         self.check_published(lights, mosaics)
         search = self.search(spaces)
-        if self.faults or objective is None:
+        if self.faults:
             raise StudyError(self.faults)
         study = Study(
             name=section.study,
@@ -62,7 +62,7 @@ class _Resolver:
             geometry=section.geometry,
             mosaics=mosaics,
             spaces=tuple(spaces),
-            objective=objective,
+            objective=section.objective,
             constraints=section.constraints,
             search=search,
             digests=dict(self.sources.digests),
@@ -219,24 +219,37 @@ class _Resolver:
             ordered.append(values)
         return ordered
 
-    def objective(self, lights: Lights) -> Pair | None:
-        known = {csd_name(pair): pair for pair in class_pairs(lights.classes)}
-        if self.section.objective not in known:
-            self.unknown(("objective",), "objective", self.section.objective, list(known))
-        return known.get(self.section.objective)
+    def named_quantities(self, lights: Lights) -> list[str]:
+        """Quantities that an objective or a constraint can name."""
+        worst = [WORST + name for name in shiftable(lights)] if self.section.production.edge_shift_nm else []
+        return [*DESIGNED, *DIMENSIONS, *(csd_name(pair) for pair in class_pairs(lights.classes)), *worst]
+
+    def check_quantity(self, path: tuple[Key, ...], what: str, name: str, known: list[str]) -> bool:
+        if name in known:
+            return True
+        if name.startswith(WORST) and not self.section.production.edge_shift_nm:
+            self.add(path, f"{name} needs `production.edge_shift_nm`", None, "a shift above 0")
+        else:
+            self.unknown(path, what, name, known)
+        return False
+
+    def check_objective(self, lights: Lights) -> None:
+        known = [name for name in self.named_quantities(lights) if name.removeprefix(WORST) in shiftable(lights)]
+        path: tuple[Key, ...] = ("objective",)
+        given = self.document.data.get("objective")
+        for name in self.section.objective.weights:
+            inner = (*path, self.section.objective.rule, name) if isinstance(given, dict) else path
+            self.check_quantity(inner, "objective", name, known)
 
     def check_constraints(self, lights: Lights) -> None:
-        distances = [csd_name(pair) for pair in class_pairs(lights.classes)]
         for name, bound in self.section.constraints.items():
-            if name not in (*distances, *DESIGNED):
-                self.unknown(("constraints", name), "quantity", name, [*DESIGNED, *distances])
-            elif name not in ("sensitivity", "cfa_sensitivity"):
+            path = ("constraints", name)
+            known = self.check_quantity(path, "quantity", name, self.named_quantities(lights))
+            if known and name not in ("sensitivity", "cfa_sensitivity"):
                 wrong = "min" if name == "slope_per_nm" else "max"
                 if getattr(bound, wrong) is not None:
                     right = "max" if wrong == "min" else "min"
-                    self.add(
-                        ("constraints", name, wrong), f"{name} has no `{wrong}`", getattr(bound, wrong), f"`{right}`"
-                    )
+                    self.add((*path, wrong), f"{name} has no `{wrong}`", getattr(bound, wrong), f"`{right}`")
 
     def search(self, spaces: list[Space]) -> Search | None:
         section = self.section.search
@@ -261,12 +274,27 @@ class _Resolver:
             self.unknown(("search", "algorithm"), what, section.algorithm, list(ALGORITHMS))
         if chosen not in boxes or section.algorithm not in ALGORITHMS:
             return None
+        self.check_searched(boxes[chosen])
         levels: tuple[float, ...] = ()
         if section.front is not None:
             axis = Axis(min=section.front.min, max=section.front.max, count=section.front.count)
             levels = axis.points()
         scenario = section.scenario or scenarios[0]
         return Search(boxes[chosen], scenario, section.algorithm, section.starts, section.max_evaluations, levels)
+
+    def check_searched(self, space: Space) -> None:
+        """What the searched family must have for the study's constraints, and the front for its objective."""
+        assert space.filter is not None
+        own = space.filter.family.dimensions
+        for name in self.section.constraints:
+            if name in DIMENSIONS and name not in own:
+                self.add(
+                    ("constraints", name), f"{space.filter.family.kind} has no {name}", None, ", ".join(own) or "none"
+                )
+        assert self.section.search is not None
+        if self.section.search.front is not None and any("sensitivity" in n for n in self.section.objective.weights):
+            problem = "the front is searched at levels of sensitivity, which is in the objective"
+            self.add(("search", "front"), problem, None, "an objective of CSDs")
 
 
 def resolve(document: Document, section: StudySection, folders: list[Path]) -> Study:

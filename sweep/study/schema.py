@@ -8,8 +8,9 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from ..constraints import Bound
 from ..families import FamilyOptions
+from ..objectives import Objective
 from ..scenes import Geometry, Scenario
-from ..schema import Positive, Section
+from ..schema import NonNegative, Positive, Section
 from ..sensor import Pixel
 from ..spectra import Outside, Resampling, WavelengthGrid
 
@@ -153,6 +154,12 @@ class BoxSection(Modification):
     box: dict[Name, Annotated[Axis, BeforeValidator(_span)]] = {}
 
 
+class Production(Section):
+    """What production does to a filter: every edge may come out up to `edge_shift_nm` too far to either side."""
+
+    edge_shift_nm: NonNegative = 0.0
+
+
 class Levels(Section):
     """Equidistant levels of sensitivity."""
 
@@ -214,7 +221,8 @@ class StudySection(Section):
     designs: dict[Name, DesignSection] = {}
     sweeps: dict[Name, SweepSection] = {}
     boxes: dict[Name, BoxSection] = {}
-    objective: Name = "csd_yellow_red"
+    production: Production = Production()
+    objective: Objective = Objective(minimum={"csd_yellow_red": 1.0})
     constraints: dict[Name, Bound] = {}
     search: SearchSection | None = None
     published: dict[Name, dict[Name, dict[Name, float]]] = {}
