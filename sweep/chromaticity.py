@@ -46,6 +46,28 @@ def color_matching(grid: WavelengthGrid) -> FloatArray:
     return np.stack([np.interp(grid.nodes_nm, functions.wavelengths, column) for column in functions.values.T])
 
 
+LUMINOUS_EFFICACY_LM_W = 683.002
+"""Of monochromatic light at 540 THz, which defines the candela."""
+
+
+@cache
+def _photopic(grid: WavelengthGrid) -> FloatArray:
+    """V(lambda), CIE 1924, on the grid, ndarray[n_wavelengths] (colour-science)."""
+    from colour import SDS_LEFS  # noqa: PLC0415  (more than a second to import)
+
+    efficiency = SDS_LEFS["CIE 1924 Photopic Standard Observer"]
+    return np.interp(grid.nodes_nm, efficiency.wavelengths, efficiency.values, left=0.0, right=0.0)
+
+
+def luminance_per_photon_radiance(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
+    """cd/m^2 for each photon/s/sr/m^2 of spectra that integrate to one photon: [n, n_wavelengths] -> [n].
+
+    L = 683 integral(V h c / lambda S) d lambda, S in photons per nm.
+    """
+    power = energy_from_photons(grid.nodes_nm, photons)
+    return np.asarray(LUMINOUS_EFFICACY_LM_W * grid.integrate(power * _photopic(grid)), dtype=float)
+
+
 def chromaticity(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
     """CIE 1931 x, y of photon spectra: ndarray[n, n_wavelengths] -> ndarray[n, 2]."""
     xyz = energy_from_photons(grid.nodes_nm, photons) @ color_matching(grid).T

@@ -65,6 +65,23 @@ def check(study: StudyPath, data: DataFolder = None) -> None:
 
 
 @app.command()
+def plan(
+    study: StudyPath,
+    data: DataFolder = None,
+    tolerance: Annotated[
+        float | None, typer.Option(min=0, help="Tolerance of a CSD, DN.", show_default="the study's")
+    ] = None,
+    explain: Annotated[bool, typer.Option("--explain", help="Show the alternatives that were rejected.")] = False,
+) -> None:
+    """Say which effects each scene calls for, and why, without running it."""
+    from .report.plans import plan_lines
+    from .study import load_study
+
+    for line in plan_lines(load_study(study, data).planned(tolerance), explain=explain):
+        typer.echo(line)
+
+
+@app.command()
 def calibrate(
     study: StudyPath,
     output: Annotated[Path, typer.Option(help="Folder for the result.")] = Path("outputs/calibration"),

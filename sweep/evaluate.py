@@ -1,27 +1,25 @@
-"""Pure evaluation: a block of designs in a scene -> response, color separation distances, sensitivities."""
+"""Pure evaluation: a block of designs in a scene -> color separation distances, sensitivities."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from .arrays import FloatArray, IndexArray
+from .arrays import FloatArray
 from .datasets.lights import Lights
-from .metrics import cfa_sensitivity, channel_sensitivity, class_pairs, csd_name, separations
-from .mosaics import Mosaic
-from .scenes import Scenario, WhitePatchExposure
-from .sensor import Pixel, digital_numbers, electron_rate, irradiance_factor, unquantized
-from .spectra import WavelengthGrid
+from .imaging import Imager, smooth_imager
+from .metrics import Pair, cfa_sensitivity, channel_sensitivity, class_pairs, csd_name, separation, separations
+from .setup import Setup
 
 DESIGNED = ("sensitivity", "cfa_sensitivity", "slope_per_nm", "min_transmission")
 """Quantities of a design that do not depend on the lights."""
 WORST = "worst_"
 """Prefix of a quantity that is the smallest over the shifts of the edges in production."""
+BEST_PLACE = "best_place_"
+"""Prefix of a CSD that is the largest over the places where the light may fall on the mosaic."""
 
 
 def quantities(lights: Lights) -> tuple[str, ...]:
-    """Names of the columns that `evaluate` gives."""
+    """Names of the columns that `evaluate` gives for a scene with one place of the light."""
     distances = (csd_name(pair) for pair in class_pairs(lights.classes))
     return (*distances, *DESIGNED, "exposure_s")
 
@@ -30,40 +28,6 @@ def shiftable(lights: Lights) -> tuple[str, ...]:
     """Quantities whose worst case over an edge shift is known: all CSDs and both sensitivities."""
     distances = (csd_name(pair) for pair in class_pairs(lights.classes))
     return (*distances, "sensitivity", "cfa_sensitivity")
-
-
-@dataclass(frozen=True)
-class Setup:
-    """All that a block of designs shares.
-
-    `qe`: ndarray[n_channels, n_wavelengths] of the mosaic's channels, electrons per photon; the rows of `modified`
-    (channel indices, one per curve that a family makes) hold the base curve. `clear_qe`: the reference of the CFA's
-    sensitivity, ndarray[n_wavelengths].
-    """
-
-    grid: WavelengthGrid
-    mosaic: Mosaic
-    qe: FloatArray
-    modified: tuple[int, ...]
-    clear_qe: FloatArray
-    lights: Lights
-    pixel: Pixel
-    scenario: Scenario
-
-    @property
-    def base_qe(self) -> FloatArray:
-        """Curves that the modified channels replace, ndarray[n_modified, n_wavelengths]."""
-        return self.qe[list(self.modified)]
-
-    @property
-    def longest_distance_dn(self) -> float:
-        """No two points of the unclipped response that fit into the range are further apart; DN."""
-        return float(2 * self.pixel.full_scale_dn * np.sqrt(len(self.mosaic.channels)))
-
-    @property
-    def members(self) -> dict[str, IndexArray]:
-        """Signal type -> indices of its signals."""
-        return self.lights.members
 
 
 def all_channels(setup: Setup, curves: FloatArray) -> FloatArray:
@@ -76,60 +40,17 @@ def all_channels(setup: Setup, curves: FloatArray) -> FloatArray:
     return qe
 
 
-def _patches(setup: Setup) -> tuple[FloatArray, FloatArray]:
-    """Photon irradiance of the signals, ndarray[n_signals, n_wavelengths], and of the white patch, ndarray[1, ...]."""
-    scenario, grid = setup.scenario, setup.grid
-    factor = irradiance_factor(scenario.optics)
-    signals = setup.lights.photons * (scenario.photon_radiance * factor)
-    ratio = setup.lights.photon_ratio
-    if isinstance(scenario.exposure, WhitePatchExposure) and scenario.exposure.photon_ratio is not None:
-        ratio = scenario.exposure.photon_ratio
-    white = np.full((1, grid.size), scenario.photon_radiance * factor / (ratio * grid.size * grid.step_nm))
-    return signals, white
-
-
-def electrons(setup: Setup, qe: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Electrons before the full well, ndarray[n_designs, n_signals, n_channels], and exposure, s, ndarray[n_designs].
-
-    `qe`: ndarray[n_designs, n_channels, n_wavelengths]. A white-patch exposure is set per design, so that its
-    brightest channel on the white patch reaches the level of full scale.
-    """
-    signals, white = _patches(setup)
-    rate = electron_rate(signals, qe, setup.grid.step_nm, setup.pixel)
-    exposure = setup.scenario.exposure
-    if isinstance(exposure, WhitePatchExposure):
-        brightest = electron_rate(white, qe, setup.grid.step_nm, setup.pixel).max(axis=(1, 2))
-        full_e = exposure.level * setup.pixel.full_scale_dn / setup.pixel.dn_per_e
-        exposure_s = np.divide(full_e, brightest, out=np.full(len(qe), np.inf), where=brightest > 0)
-    else:
-        exposure_s = np.full(len(qe), exposure.exposure_s)
-    return rate * exposure_s[:, None, None], exposure_s
-
-
 def smooth_response(setup: Setup, curves: FloatArray) -> FloatArray:
-    """Unquantized, unclipped response, DN: ndarray[n_designs, n_signals, n_channels]; `curves` as in `all_channels`."""
-    return unquantized(electrons(setup, all_channels(setup, curves))[0], setup.pixel)
+    """Unquantized, unclipped response, DN: ndarray[n_designs, n_cases, n_signals, n_channels]; `curves` as above."""
+    return smooth_imager(setup).smooth(curves)
 
 
-def response_gradient(setup: Setup, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
-    """Exact derivative of `smooth_response` at one design, with that of the exposure.
-
-    `curves`: ndarray[n_modified, n_wavelengths]; `curves_gradient`: ndarray[n_parameters, n_modified, n_wavelengths].
-    Returns DN per unit of parameter, ndarray[n_parameters, n_signals, n_channels].
-    """
-    signals, white = _patches(setup)
-    step_nm, pixel = setup.grid.step_nm, setup.pixel
-    qe = all_channels(setup, curves[None])[0]
-    slope = np.zeros((len(curves_gradient), *qe.shape))
-    slope[:, list(setup.modified)] = curves_gradient
-    raw, exposure_s = electrons(setup, qe[None])
-    by_parameter = electron_rate(signals, slope, step_nm, pixel) * exposure_s[0]
-    if isinstance(setup.scenario.exposure, WhitePatchExposure):
-        white_rate = electron_rate(white, qe, step_nm, pixel)[0]
-        top = int(np.argmax(white_rate))
-        relative = electron_rate(white, slope, step_nm, pixel)[:, 0, top] / white_rate[top]
-        by_parameter = by_parameter - relative[:, None, None] * raw
-    return np.asarray(by_parameter * pixel.dn_per_e, dtype=float)
+def smooth_csd(setup: Setup, curves: FloatArray, pair: Pair) -> FloatArray:
+    """CSD of the smooth response, the smallest over the cases, DN, ndarray[n_designs]."""
+    response = smooth_response(setup, curves)
+    first, second = (setup.members[name] for name in pair)
+    over = [separation(response[:, case], first, second) for case in range(response.shape[1])]
+    return np.asarray(np.min(over, axis=0), dtype=float)
 
 
 def designed_quantities(setup: Setup, curves: FloatArray) -> dict[str, FloatArray]:
@@ -153,7 +74,10 @@ def designed_quantities(setup: Setup, curves: FloatArray) -> dict[str, FloatArra
 
 
 def sensitivities_gradient(setup: Setup, curves_gradient: FloatArray) -> dict[str, FloatArray]:
-    """Exact derivatives of `sensitivity` and `cfa_sensitivity`, ndarray[n_parameters]; see `response_gradient`."""
+    """Exact derivatives of `sensitivity` and `cfa_sensitivity`, ndarray[n_parameters].
+
+    `curves_gradient`: ndarray[n_parameters, n_modified, n_wavelengths].
+    """
     total = curves_gradient.sum(axis=-1)
     counts = setup.mosaic.counts
     return {
@@ -162,22 +86,20 @@ def sensitivities_gradient(setup: Setup, curves_gradient: FloatArray) -> dict[st
     }
 
 
-def readout(setup: Setup, curves: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Digital numbers as read out, ndarray[n_designs, n_signals, n_channels], and exposure, s, ndarray[n_designs].
-
-    `curves` as in `all_channels`.
-    """
-    raw, exposure_s = electrons(setup, all_channels(setup, curves))
-    return digital_numbers(raw, setup.pixel), exposure_s
-
-
-def evaluate(setup: Setup, curves: FloatArray) -> dict[str, FloatArray]:
-    """Evaluate a block of designs as the camera reads them out (clipped and quantized).
+def evaluate(imager: Imager, curves: FloatArray) -> dict[str, FloatArray]:
+    """Evaluate a block of designs as the camera reads them out, as far as the scene's methods go.
 
     `curves` as in `all_channels`. Returns columns, each ndarray[n_designs]: `csd_<a>_<b>` (DN) of every pair of
-    signal types, those of `designed_quantities` and `exposure_s`.
+    signal types, the smallest over the places of the light; `best_place_csd_<a>_<b>`, the largest, where a scene has
+    several; those of `designed_quantities` and `exposure_s`.
     """
-    response, exposure_s = readout(setup, curves)
-    distances = separations(response, setup.members)
-    columns = {csd_name(pair): values for pair, values in distances.items()}
-    return columns | designed_quantities(setup, curves) | {"exposure_s": exposure_s}
+    response, exposure_s = imager.read(curves)
+    columns: dict[str, FloatArray] = {}
+    best: dict[str, FloatArray] = {}
+    members = imager.setup.members
+    cases = [separations(response[:, case], members) for case in range(response.shape[1])]
+    for pair in class_pairs(list(members)):
+        over = np.stack([case[pair] for case in cases])
+        columns[csd_name(pair)] = over.min(axis=0)
+        best[BEST_PLACE + csd_name(pair)] = over.max(axis=0)
+    return columns | best | designed_quantities(imager.setup, curves) | {"exposure_s": exposure_s}

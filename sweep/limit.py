@@ -20,12 +20,11 @@ from scipy.sparse import csr_matrix, diags_array, vstack
 from .arrays import FloatArray
 from .constraints import FEASIBLE, Bound
 from .errors import Fault, SweepError
-from .evaluate import DESIGNED, WORST, designed_quantities, smooth_response
-from .metrics import separation
+from .evaluate import DESIGNED, WORST, designed_quantities, smooth_csd, smooth_response
+from .imaging import smooth_imager, straight_dn
 from .objectives import Objective
 from .problem import Problem
 from .scenes import WhitePatchExposure
-from .sensor import electron_rate, unquantized
 
 _MARGIN_DN = 1e-6
 """A linear program whose best margin is below minus this is infeasible beyond its solver's own tolerance."""
@@ -81,6 +80,8 @@ def why_not(problem: Problem) -> str | None:
         return "more than one modified channel"
     if problem.objective.rule == "sum":
         return "the objective is a sum"
+    if problem.setup.pixel.crosstalk > 0:
+        return "crosstalk mixes the modified channel into others"
     if (_top(problem) > problem.setup.base_qe[0] * (1 + _ROUNDING)).any():
         return "filters of the box may exceed the curve that they replace"
     if _clips(problem):
@@ -119,15 +120,14 @@ def _clips(problem: Problem) -> bool:
     """Whether the base curve's response, the largest that any of the filters has, is cut off when it is read out."""
     setup = problem.setup
     smooth = smooth_response(setup, setup.base_qe[None])
-    well_dn = float(unquantized(np.array([setup.pixel.well_e]), setup.pixel)[0])
+    well_dn = float(straight_dn(np.array([setup.pixel.well_e]), setup.pixel)[0])
     return bool((smooth > min(float(setup.pixel.full_scale_dn), well_dn)).any())
 
 
 def _exposure_is_fixed(problem: Problem) -> bool:
     """Whether a channel that is not modified is at least as bright on white as the base curve."""
     setup = problem.setup
-    white = np.ones((1, setup.grid.size))
-    rates = electron_rate(white, setup.qe, setup.grid.step_nm, setup.pixel)[0]
+    rates = setup.qe.sum(axis=1)  # the white patch is flat in photons
     kept = np.delete(rates, setup.modified)
     return bool(kept.size and kept.max() >= rates[list(setup.modified)].max())
 
@@ -140,20 +140,18 @@ class _Program:
         self.problem = problem
         self.base = setup.base_qe[0]
         self.low = self.base * self._least("min_transmission")
-        response = smooth_response(setup, self.base[None, None])[0]
-        channel = setup.modified[0]
-        # Exposure does not depend on N, so the response to a filter is linear, plus the pedestal.
-        rate = electron_rate(setup.lights.photons, self.base[None], setup.grid.step_nm, setup.pixel)[:, 0]
-        scale = (response[:, channel] - setup.pixel.offset_dn) / rate
-        gain = setup.lights.photons * (setup.grid.step_nm * setup.pixel.area_m2) * scale[:, None]
-        fixed = np.delete(response, channel, axis=1)
+        imager, channel = smooth_imager(setup), setup.modified[0]
+        response = imager.smooth(self.base[None, None])[0]
+        # Exposure does not depend on N, so the response to a filter is linear, plus what does not depend on it.
+        gain = imager.per_qe(0, self.base[None])[:, :, channel]
+        fixed = np.delete(response, channel, axis=2)
         self.distances = {n for n in (*problem.objective.weights, *problem.constraints) if n in problem.pairs}
         self.fixed_squared: dict[str, FloatArray] = {}
         self.difference: dict[str, FloatArray] = {}
         for name in self.distances:
             first, second = (setup.members[kind] for kind in problem.pairs[name])
-            self.fixed_squared[name] = ((fixed[first, None] - fixed[None, second]) ** 2).sum(axis=2).ravel()
-            self.difference[name] = (gain[first, None] - gain[None, second]).reshape(-1, self.base.size)
+            self.fixed_squared[name] = ((fixed[:, first, None] - fixed[:, None, second]) ** 2).sum(axis=3).ravel()
+            self.difference[name] = (gain[:, first, None] - gain[:, None, second]).reshape(-1, self.base.size)
         self._sums = self._sensitivity_rows()
         self._rows, self._limits = self._fixed_rows()
 
@@ -249,9 +247,8 @@ class _Program:
         setup, problem = self.problem.setup, self.problem
         curves = curve[None, None]
         found = designed_quantities(setup, curves)
-        response = smooth_response(setup, curves)
         for name in self.distances:
-            found[name] = separation(response, *(setup.members[kind] for kind in problem.pairs[name]))
+            found[name] = smooth_csd(setup, curves, problem.pairs[name])
         for name, bound in problem.constraints.items():
             if not bound.violation(found[name])[0] <= FEASIBLE:
                 return -np.inf

@@ -10,10 +10,11 @@ from scipy.stats import qmc
 
 from .arrays import FloatArray, IndexArray
 from .constraints import FEASIBLE, Bound
-from .evaluate import WORST, Setup
+from .evaluate import WORST
 from .families import Family
 from .metrics import Pair, class_pairs, csd_name
 from .objectives import Objective
+from .setup import Setup
 
 SHIFTS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Where in the range of an edge shift the worst case is looked for, in units of its half width."""

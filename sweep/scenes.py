@@ -1,15 +1,17 @@
-"""What is looked at: the chart's patches under an exposure, and the geometry of a traffic light at a distance."""
+"""What is looked at: the chart's patches or a traffic light at a distance, under an exposure, in a weather."""
 
 from __future__ import annotations
 
 import math
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from .schema import Positive, Section
+from .schema import NonNegative, Positive, Section
 from .sensor import Optics
 
+DIAMETER_M = 0.2
+"""Diameter of a usual traffic light, EN 12368."""
 OBJECT_RESOLUTION = "object_resolution_px"
 """Name of the quantity that a geometry gives."""
 
@@ -33,27 +35,75 @@ class FixedExposure(Section):
     exposure_s: Positive
 
 
-class Scenario(Section):
-    """Every signal as a self-emissive patch that fills the field, all with the same photon count.
-
-    `photon_radiance`: photons/s/sr/m^2 of each signal, summed over the wavelength grid.
-    """
-
-    photon_radiance: Positive = 2e18
-    exposure: Annotated[WhitePatchExposure | FixedExposure, Field(discriminator="kind")] = WhitePatchExposure()
-    optics: Optics = Optics()
-
-
 class Geometry(Section):
     """A traffic light of `diameter_m` at `distance_m`, seen by a sensor of `width_px` columns over `fov_deg`."""
 
     distance_m: Positive
     fov_deg: float = Field(gt=0, le=360)
     width_px: int = Field(default=3840, ge=1)
-    diameter_m: Positive = 0.2
+    diameter_m: Positive = DIAMETER_M
 
     @property
     def object_resolution_px(self) -> float:
         """Pixels across the light, r_o = (width / FOV) 2 atan(d / 2D), uniform pixel density (the paper's Table 1)."""
         angle_deg = math.degrees(2 * math.atan(self.diameter_m / (2 * self.distance_m)))
         return self.width_px / self.fov_deg * angle_deg
+
+    def focal_length_um(self, pitch_um: float) -> float:
+        """Focal length that gives the pixels per radian, micrometers."""
+        return pitch_um * self.width_px / math.radians(self.fov_deg)
+
+
+class Target(Geometry):
+    """A traffic light as a disc on the sensor.
+
+    `phase_px`: where its center falls, in pixels from the center of the tile's first pixel (column, row); `any` asks for
+    the worst of all places. `readout`: `mean` of each channel's pixels over the disc, weighted by how much of each the
+    disc covers (over at least the radius in which every channel has a pixel), or the demosaicked pixel at the `center`.
+    """
+
+    phase_px: Literal["any"] | Annotated[list[float], Field(min_length=2, max_length=2)] = [0.0, 0.0]
+    readout: Literal["mean", "center"] = "mean"
+
+
+class Drive(Section):
+    """A pulsed LED: on for `duty` of each period; its mean intensity is the rated one."""
+
+    duty: float = Field(gt=0, le=1)
+    frequency_hz: Positive
+
+
+class Scenario(Section):
+    """What the camera sees, and how it is exposed.
+
+    Without a `target` every signal is a self-emissive patch that fills the field. Signals have the same photon count,
+    `photon_radiance` (photons/s/sr/m^2, summed over the wavelength grid), or, with `intensity_cd`, the luminance of a
+    light of that luminous intensity and the target's diameter (0.2 m without a target). `visibility_m`: meteorological
+    optical range, which dims a target by its distance. `background_cd_m2`: uniform light over the whole field, flat in
+    photons. `off_axis_deg`: field angle. `noise`: photon, read and dark noise and PRNU act before the mean is taken.
+    """
+
+    photon_radiance: Positive = 2e18
+    intensity_cd: Positive | None = None
+    exposure: Annotated[WhitePatchExposure | FixedExposure, Field(discriminator="kind")] = WhitePatchExposure()
+    optics: Optics = Optics()
+    target: Target | None = None
+    off_axis_deg: float = Field(default=0.0, ge=0, lt=90)
+    visibility_m: Positive | None = None
+    background_cd_m2: NonNegative = 0.0
+    drive: Drive | None = None
+    noise: bool = False
+
+    @model_validator(mode="after")
+    def _weather_needs_a_distance(self) -> Scenario:
+        if self.visibility_m is not None and self.target is None:
+            raise ValueError("visibility_m needs a target with a distance")
+        return self
+
+    @property
+    def luminance_cd_m2(self) -> float | None:
+        """Luminance of a signal, L = I / (pi d^2 / 4) (EN 12368's round signal); None for equal photons."""
+        if self.intensity_cd is None:
+            return None
+        diameter = DIAMETER_M if self.target is None else self.target.diameter_m
+        return self.intensity_cd / (math.pi * diameter**2 / 4)

@@ -12,9 +12,13 @@ from .schema import NonNegative, Positive, Section
 
 
 class Optics(Section):
-    """A diffraction-limited lens. `transmission` holds for all wavelengths."""
+    """A lens without aberrations. `transmission` holds for all wavelengths.
+
+    `focus_m`: distance that is in focus; null focuses on the target.
+    """
 
     f_number: float = Field(default=4.0, gt=0)
+    focus_m: Positive | None = None
     transmission: float = Field(default=1.0, gt=0, le=1)
 
 
@@ -22,7 +26,8 @@ class Pixel(Section):
     """A pixel and its 12-bit readout.
 
     Defaults: 2.1 um pitch (AR0820), a full well of 10,000 e that maps to full scale. `gain_dn_per_e` null means
-    full scale / full well. `offset_dn` is the pedestal.
+    full scale / full well. `offset_dn` is the pedestal. `crosstalk`: share of a pixel's light that comes through the
+    filters of its four neighbors. `prnu`: relative standard deviation of the pixels' gains.
     """
 
     pitch_um: Positive = 2.1
@@ -31,6 +36,10 @@ class Pixel(Section):
     bits: int = Field(default=12, ge=1, le=24)
     gain_dn_per_e: float | None = Field(default=None, gt=0)
     offset_dn: NonNegative = 0.0
+    crosstalk: float = Field(default=0.0, ge=0, lt=1)
+    read_noise_e: NonNegative = 0.0
+    dark_e_per_s: NonNegative = 0.0
+    prnu: float = Field(default=0.0, ge=0, lt=1)
 
     @model_validator(mode="after")
     def _pedestal_in_range(self) -> Pixel:

@@ -14,7 +14,8 @@ import numpy as np
 
 from .arrays import FloatArray, IndexArray
 from .constraints import Bound
-from .evaluate import WORST, Setup, designed_quantities, response_gradient, sensitivities_gradient, smooth_response
+from .evaluate import WORST, designed_quantities, sensitivities_gradient
+from .imaging import Imager, smooth_imager
 from .metrics import Pair
 from .problem import Evaluation, Problem, SearchRun
 
@@ -91,23 +92,24 @@ def is_distance(quantity: str) -> bool:
 class _Simulation:
     """One design, as it comes out with its edges shifted, with derivatives by the free parameters."""
 
-    def __init__(self, setup: Setup, curves: FloatArray, by_u: FloatArray) -> None:
-        self._setup = setup
+    def __init__(self, imager: Imager, curves: FloatArray, by_u: FloatArray) -> None:
+        self._imager = imager
+        self._setup = setup = imager.setup
         self._curves = curves
         self._by_u = by_u
         self.amounts = {name: float(v[0]) for name, v in designed_quantities(setup, curves[None]).items()}
 
     @cached_property
     def _response(self) -> tuple[FloatArray, FloatArray]:
-        setup, curves = self._setup, self._curves
-        return smooth_response(setup, curves[None])[0], response_gradient(setup, curves, self._by_u)
+        curves = self._curves
+        return self._imager.smooth(curves[None])[0], self._imager.smooth_gradient(curves, self._by_u)
 
     def squared(self, pair: Pair) -> Rows:
-        """Squared distances of all pairs of signals of two types."""
+        """Squared distances of all pairs of signals of two types, in every case."""
         response, by_u = self._response
         first, second = (self._setup.members[name] for name in pair)
-        apart = (response[first, None] - response[None, second]).reshape(-1, response.shape[-1])
-        apart_by_u = (by_u[:, first, None] - by_u[:, None, second]).reshape(len(by_u), *apart.shape)
+        apart = (response[:, first, None] - response[:, None, second]).reshape(-1, response.shape[-1])
+        apart_by_u = (by_u[:, :, first, None] - by_u[:, :, None, second]).reshape(len(by_u), *apart.shape)
         return Rows((apart**2).sum(axis=1), 2 * (apart_by_u * apart).sum(axis=2).T)
 
     def sensitivity(self, name: str) -> Rows:
@@ -135,6 +137,7 @@ class Model:
 
     def __init__(self, problem: Problem, run: SearchRun, budget: int) -> None:
         self._problem = problem
+        self._imager = smooth_imager(problem.setup)
         self._run = run
         self._budget = budget
         self.stop: Callable[[], object] | None = None
@@ -165,7 +168,7 @@ class Model:
         x = problem.from_unit(u)
         made = {
             shift: _Simulation(
-                problem.setup, family.curves(x[None])[0], family.gradient(x)[free] * self._span[:, None, None]
+                self._imager, family.curves(x[None])[0], family.gradient(x)[free] * self._span[:, None, None]
             )
             for shift, family in self._families.items()
         }

@@ -32,7 +32,8 @@ def result_schema(parameters: Sequence[str], quantities: Sequence[str]) -> pa.Sc
     fields = [pa.field("design_id", pa.int64(), nullable=False)]
     fields += [pa.field(name, text) for name in ("kind", "name", "cfa", "family", "scenario")]
     fields += [pa.field(name, number) for name in (*parameters, *quantities, "violation", "limit", "gap")]
-    fields += [pa.field("feasible", pa.bool_()), pa.field("pareto", pa.bool_()), pa.field("status", text)]
+    fields += [pa.field("feasible", pa.bool_()), pa.field("pareto", pa.bool_())]
+    fields += [pa.field("plan", text), pa.field("promised_dn", number), pa.field("status", text)]
     return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION})
 
 

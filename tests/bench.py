@@ -20,6 +20,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from sweep.evaluate import evaluate
+from sweep.imaging import imager_of
 from sweep.runner import run_study
 from sweep.study import load_study
 
@@ -58,7 +59,7 @@ def main() -> None:
                     cdist(response[first], response[second]).min()
 
     def block() -> None:
-        evaluate(setup, space.curves(points, setup.grid.size))
+        evaluate(imager_of(setup), space.curves(points, setup.grid.size))
 
     def whole(jobs: int) -> float:
         with tempfile.TemporaryDirectory() as folder:

@@ -47,7 +47,7 @@ class Counted:
             x = problem.from_unit(u)[None]
             curves = problem.family.curves(x)
             first, second = (problem.setup.members[name] for name in problem.pairs["csd_yellow_red"])
-            csd = float(separation(smooth_response(problem.setup, curves), first, second)[0])
+            csd = float(separation(smooth_response(problem.setup, curves)[:, 0], first, second)[0])
             own = np.maximum(problem.family.violation(x).max(axis=1), 0) / 100
             amounts = designed_quantities(problem.setup, curves)
             violation = float(total_violation(amounts, problem.constraints, own)[0])

@@ -8,19 +8,14 @@ import numpy as np
 import pytest
 
 from sweep.datasets import BUILT_IN_LIGHTS
-from sweep.evaluate import (
-    Setup,
-    designed_quantities,
-    evaluate,
-    response_gradient,
-    sensitivities_gradient,
-    smooth_response,
-)
+from sweep.evaluate import designed_quantities, evaluate, sensitivities_gradient, smooth_response
 from sweep.families import Stopband
 from sweep.filters import BUILT_IN_SENSORS
+from sweep.imaging import imager_of, smooth_imager
 from sweep.mosaics import Mosaic
 from sweep.scenes import FixedExposure, Scenario, WhitePatchExposure
 from sweep.sensor import Optics, Pixel
+from sweep.setup import Setup
 from sweep.spectra import WavelengthGrid
 
 GRID = WavelengthGrid()
@@ -49,17 +44,17 @@ def by_hand(qe: dict[str, np.ndarray], level: float, ratio: float) -> np.ndarray
 @pytest.mark.parametrize(("level", "ratio"), [(0.95, None), (0.5, 0.08)])
 def test_response_is_the_papers_exposure(level: float, ratio: float | None) -> None:
     exposure = WhitePatchExposure(level=level, photon_ratio=ratio)
-    found = smooth_response(setup(scenario=Scenario(exposure=exposure)), FAMILY.curves(X))
+    found = smooth_response(setup(scenario=Scenario(exposure=exposure)), FAMILY.curves(X))[:, 0]
     for design, curve in zip(found, FAMILY.curves(X)[:, 0], strict=True):
         qe = {"R": SENSOR.qe["R"], "Y": SENSOR.qe["Y"], "N": curve, "Cy": SENSOR.qe["Cy"]}
         np.testing.assert_allclose(design, by_hand(qe, level, ratio or LIGHTS.photon_ratio), rtol=1e-12)
 
 
 def test_response_does_not_depend_on_well_pitch_or_optics() -> None:
-    usual = evaluate(setup(), FAMILY.curves(X))
+    usual = evaluate(imager_of(setup()), FAMILY.curves(X))
     scenario = Scenario(photon_radiance=1e15, optics=Optics(f_number=1.6, transmission=0.7))
     other = replace(setup(scenario=scenario), pixel=Pixel(pitch_um=3.0, well_e=50_000.0))
-    found = evaluate(other, FAMILY.curves(X))
+    found = evaluate(imager_of(other), FAMILY.curves(X))
     for name, values in usual.items():
         if name != "exposure_s":
             np.testing.assert_allclose(found[name], values, rtol=1e-12)
@@ -68,7 +63,7 @@ def test_response_does_not_depend_on_well_pitch_or_optics() -> None:
 def test_fixed_exposure_counts_photons() -> None:
     scenario = Scenario(photon_radiance=1e18, exposure=FixedExposure(exposure_s=0.004))
     pixel = Pixel(pitch_um=2.0)
-    found = smooth_response(replace(setup("RGGB", scenario), pixel=pixel), np.empty((1, 0, 301)))
+    found = smooth_response(replace(setup("RGGB", scenario), pixel=pixel), np.empty((1, 0, 301)))[:, 0]
     mean_qe = (LIGHTS.photons * SENSOR.qe["G"]).sum(axis=1)
     n_e = 1e18 * np.pi / 65 * mean_qe * 4e-12 * 0.004
     np.testing.assert_allclose(found[0, :, 1], n_e * 4095 / 10_000, rtol=1e-12)
@@ -76,8 +71,8 @@ def test_fixed_exposure_counts_photons() -> None:
 
 def test_csd_is_of_the_quantized_readout() -> None:
     curves = FAMILY.curves(X)
-    found = evaluate(setup(), curves)
-    points = np.floor(smooth_response(setup(), curves) + 0.5)
+    found = evaluate(imager_of(setup()), curves)
+    points = np.floor(smooth_response(setup(), curves)[:, 0] + 0.5)
     for design in range(2):
         yellow, red = (points[design, LIGHTS.members[c]] for c in ("yellow", "red"))
         brute = min(np.linalg.norm(y - r) for y in yellow for r in red)
@@ -93,12 +88,12 @@ def test_csd_is_of_the_quantized_readout() -> None:
 
 
 def test_sensitivities_of_a_design() -> None:
-    found = evaluate(setup(), FAMILY.curves(X))
+    found = evaluate(imager_of(setup()), FAMILY.curves(X))
     n = FAMILY.curves(X)[:, 0].sum(axis=1)
     np.testing.assert_allclose(found["sensitivity"], n / SENSOR.qe["Y"].sum(), rtol=1e-14)
     total = sum(SENSOR.qe[c].sum() for c in ("R", "Y", "Cy")) + n
     np.testing.assert_allclose(found["cfa_sensitivity"], total / 4 / SENSOR.qe["C"].sum(), rtol=1e-13)
-    plain = evaluate(setup("RGGB"), np.empty((1, 0, 301)))
+    plain = evaluate(imager_of(setup("RGGB")), np.empty((1, 0, 301)))
     assert np.isnan(plain["sensitivity"][0])
     rggb = (SENSOR.qe["R"] + 2 * SENSOR.qe["G"] + SENSOR.qe["B"]).sum() / 4 / SENSOR.qe["C"].sum()
     assert plain["cfa_sensitivity"][0] == pytest.approx(rggb, rel=1e-13)
@@ -112,7 +107,7 @@ def test_gradients_agree_with_central_differences(kind: str) -> None:
         made = setup(base="C")
         family = Stopband(GRID.nodes_nm, SENSOR.qe["C"], SENSOR.qe["G"])
     x, step = X[1], 1e-4
-    exact = response_gradient(made, family.curves(x[None])[0], family.gradient(x))
+    exact = smooth_imager(made).smooth_gradient(family.curves(x[None])[0], family.gradient(x))
     amounts = sensitivities_gradient(made, family.gradient(x))
     for index in range(5):
         shift = np.eye(5)[index] * step

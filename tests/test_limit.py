@@ -10,7 +10,7 @@ import pytest
 from sweep.constraints import FEASIBLE, Bound, total_violation
 from sweep.datasets.lights import Lights
 from sweep.errors import SweepError
-from sweep.evaluate import Setup, designed_quantities, smooth_response
+from sweep.evaluate import designed_quantities, smooth_response
 from sweep.families import FreeForm, Stopband
 from sweep.limit import limit_of, why_not
 from sweep.metrics import separation
@@ -19,6 +19,7 @@ from sweep.pareto import hypervolume
 from sweep.problem import Problem, best_feasible, starting_points
 from sweep.scenes import FixedExposure, Scenario
 from sweep.search import search_from
+from sweep.setup import Setup
 from sweep.study import load_study
 
 from .conftest import STUDIES
@@ -31,7 +32,7 @@ LIMIT = limit_of(PROBLEM)
 
 def csd(problem: Problem, curves: np.ndarray) -> np.ndarray:
     first, second = (problem.setup.members[name] for name in problem.pairs["csd_yellow_red"])
-    return separation(smooth_response(problem.setup, curves), first, second)
+    return separation(smooth_response(problem.setup, curves)[:, 0], first, second)
 
 
 def feasible(problem: Problem, curves: np.ndarray) -> np.ndarray:
@@ -56,7 +57,7 @@ def test_one_pair_of_signals_has_a_closed_form() -> None:
     problem = replace(PROBLEM, setup=replace(PROBLEM.setup, lights=two), constraints={"sensitivity": Bound(min=0.93)})
     found = limit_of(problem)
     base = problem.setup.base_qe[0]
-    response = smooth_response(problem.setup, base[None, None])[0]
+    response = smooth_response(problem.setup, base[None, None])[0, 0]
     channel = problem.setup.modified[0]
     gain = response[:, channel] / (two.photons @ base)
     per_qe = gain[0] * two.photons[0] - gain[1] * two.photons[1]
@@ -166,7 +167,7 @@ def test_the_limit_of_the_smallest_of_several_distances() -> None:
     found = limit_of(two)
     assert found.curve is not None
     members = PROBLEM.setup.members
-    response = smooth_response(PROBLEM.setup, found.curve[None, None])
+    response = smooth_response(PROBLEM.setup, found.curve[None, None])[:, 0]
     yr, orange = (separation(response, members[kind], members["red"])[0] for kind in ("yellow", "orange"))
     assert min(yr, 2 * orange) == pytest.approx(found.attained, rel=1e-12)
     assert found.proven <= LIMIT.proven + 1e-3

@@ -20,6 +20,7 @@ import pytest
 from sweep.errors import OutputError
 from sweep.evaluate import evaluate, quantities
 from sweep.families import Stopband
+from sweep.imaging import imager_of
 from sweep.report import make_report, read_output
 from sweep.runner import run_study
 from sweep.runner.jobs import CHUNK, Job, jobs_of, rules_of, run_job
@@ -102,7 +103,7 @@ def test_a_row_is_what_its_parameters_say(study: Study, output: Path) -> None:
         rows = frame[(frame["kind"] == "sweep") & (frame["scenario"] == scenario)].sample(5, random_state=3)
         for _, row in rows.iterrows():
             x = row[list(sweep.parameters)].to_numpy(dtype=float)[None]
-            found = evaluate(study.setup(sweep, scenario), sweep.curves(x, study.grid.size))
+            found = evaluate(imager_of(study.setup(sweep, scenario)), sweep.curves(x, study.grid.size))
             for name in quantities(study.lights):
                 assert row[name] == pytest.approx(found[name][0], rel=1e-12)
             ordered = row["left_nm"] <= row["right_nm"] and (sweep.violation(x) == 0).all()
@@ -263,7 +264,7 @@ def test_worst_cases_and_combined_objectives_are_columns(tmp_path: Path) -> None
     sweep = study.spaces[-1]
     x = np.repeat(row[list(sweep.parameters)].to_numpy(dtype=float)[None], 5, axis=0)
     x[:, [0, 2]] += np.array([-3.0, -1.5, 0, 1.5, 3.0])[:, None]
-    found = evaluate(study.setup(sweep, row["scenario"]), sweep.curves(x, study.grid.size))
+    found = evaluate(imager_of(study.setup(sweep, row["scenario"])), sweep.curves(x, study.grid.size))
     assert row["worst_csd_yellow_red"] == found["csd_yellow_red"].min()
     assert row["worst_sensitivity"] == pytest.approx(found["sensitivity"].min(), rel=1e-12)
     assert row["objective"] == min(2 * row["worst_csd_yellow_red"], 300 * row["sensitivity"])

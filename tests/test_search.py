@@ -31,7 +31,7 @@ def test_search_beats_a_fine_grid_of_its_box(study: Study) -> None:
         axis=1
     )
     members = problem.setup.members
-    csd = separation(smooth_response(problem.setup, curves[ok]), members["yellow"], members["red"])
+    csd = separation(smooth_response(problem.setup, curves[ok])[:, 0], members["yellow"], members["red"])
     log = []
     for start, u in enumerate(starting_points(problem, 4, 1)):
         log += search_from(problem, start, u, "SLSQP", 125).log
@@ -65,7 +65,7 @@ def test_search_beats_a_million_designs_of_its_box(tmp_path: Path) -> None:
         amounts = designed_quantities(problem.setup, curves)
         ok = total_violation(amounts, problem.constraints, space.violation(x)) <= FEASIBLE
         if ok.any():
-            response = smooth_response(problem.setup, curves[ok])
+            response = smooth_response(problem.setup, curves[ok])[:, 0]
             best_swept = max(best_swept, separation(response, members["yellow"], members["red"]).max())
     runs = [search_from(problem, i, u, "SLSQP", 125) for i, u in enumerate(starting_points(problem, 16, 1))]
     best = best_feasible([e for run in runs for e in run.log])
@@ -126,7 +126,7 @@ def test_constraint_on_another_pair_is_met(tmp_path: Path) -> None:
     best = best_feasible(log)
     assert best is not None
     members = problem.setup.members
-    response = smooth_response(problem.setup, problem.family.curves(best.x[None]))
+    response = smooth_response(problem.setup, problem.family.curves(best.x[None]))[:, 0]
     assert separation(response, members["orange"], members["red"])[0] >= 100 * (1 - FEASIBLE)
 
 

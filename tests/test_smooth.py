@@ -80,7 +80,7 @@ def test_worst_case_is_the_smallest_over_the_shifts() -> None:
     moved[:, [0, 2]] += np.linspace(-4, 4, 401)[:, None]
     curves = problem.family.curves(moved)
     members = problem.setup.members
-    csd = separation(smooth_response(problem.setup, curves), members["yellow"], members["red"])
+    csd = separation(smooth_response(problem.setup, curves)[:, 0], members["yellow"], members["red"])
     sensitivity = designed_quantities(problem.setup, curves)["sensitivity"]
     assert best.objective == pytest.approx(csd[::100].min(), rel=1e-12)
     # Between the five places that are looked at, nothing is much worse.
@@ -144,5 +144,5 @@ def test_best_reachable_is_the_extreme_of_a_quantity_alone() -> None:
     assert found["slope_per_nm"] < 0.06
     assert found["band_width_nm"] == pytest.approx(problem.high[2] - problem.low[0], rel=1e-6)
     members = problem.setup.members
-    response = smooth_response(problem.setup, problem.family.curves(x))
+    response = smooth_response(problem.setup, problem.family.curves(x))[:, 0]
     assert separation(response, members["yellow"], members["red"]).max() <= found["csd_yellow_red"] < 4000

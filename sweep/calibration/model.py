@@ -10,13 +10,14 @@ from ..arrays import FloatArray
 from ..chromaticity import REGIONS, chromaticity
 from ..datasets.lights import Lights
 from ..datasets.tl16 import tl16
-from ..evaluate import Setup, designed_quantities, smooth_response
+from ..evaluate import designed_quantities, smooth_response
 from ..families import Stopband
 from ..filters import SensorCurves, ar0820_sensor
 from ..metrics import csd_name, separations
 from ..mosaics import Mosaic
 from ..scenes import Scenario
 from ..sensor import Pixel
+from ..setup import Setup
 from ..spectra import WavelengthGrid
 from ..surrogate import StopbandParameters, SurrogateParameters
 
@@ -45,7 +46,7 @@ def _setup(mosaic: Mosaic, sensor: SensorCurves, lights: Lights, base: Mapping[s
 
 def _plain(cfa: str, sensor: SensorCurves, lights: Lights) -> dict[str, float]:
     setup = _setup(Mosaic.from_name(cfa), sensor, lights, {})
-    response = smooth_response(setup, np.empty((1, 0, GRID.size)))
+    response = smooth_response(setup, np.empty((1, 0, GRID.size)))[:, 0]
     return {csd_name(pair): float(v[0]) for pair, v in separations(response, lights.members).items()}
 
 
@@ -55,7 +56,7 @@ def _filtered(rows: Sequence[str], parameters: SurrogateParameters, sensor: Sens
     setup = _setup(Mosaic.from_name(MODIFIED_CFA), sensor, lights, {"N": "Y"})
     x = np.array([[*stopband_values(parameters.stopbands[row]), 1.0] for row in rows])
     curves = Stopband(GRID.nodes_nm, sensor.qe["Y"], sensor.qe["G"]).curves(x)
-    distances = separations(smooth_response(setup, curves), lights.members)
+    distances = separations(smooth_response(setup, curves)[:, 0], lights.members)
     sensitivity = designed_quantities(setup, curves)["sensitivity"]
     return {
         row: {csd_name(pair): float(v[i]) for pair, v in distances.items()} | {"sensitivity": float(sensitivity[i])}

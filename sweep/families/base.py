@@ -42,6 +42,9 @@ class Family(Protocol):
     def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
         """No filter of the box `low`..`high` ([n_parameters] each) exceeds this: [n_modified, n_wavelengths]."""
 
+    def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """No filter of the box is below this: [n_modified, n_wavelengths]; see `upper`."""
+
     def gradient(self, x: FloatArray) -> FloatArray:
         """Derivative of `curves` at one design: [n_parameters] -> [n_parameters, n_modified, n_wavelengths]."""
 

@@ -49,6 +49,11 @@ class FreeForm:
         assert low.shape == high.shape
         return np.asarray(self.curves(high[None])[0], dtype=float)
 
+    def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """Every transmission at its smallest; see `Family.lower`."""
+        assert low.shape == high.shape
+        return np.asarray(self.curves(low[None])[0], dtype=float)
+
     def gradient(self, x: FloatArray) -> FloatArray:
         """Constant, ndarray[n_nodes, 1, n_wavelengths]; see `Family.gradient`."""
         assert x.shape == self.nodes_nm.shape

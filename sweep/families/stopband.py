@@ -174,6 +174,10 @@ class Stopband(Banded):
         """The base, or the target where it is higher and a band can reach; see `Family.upper`."""
         return (self._base + np.maximum(self._change, 0.0) * self._bands.reach(low, high))[None, :]
 
+    def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """The base, or the target where it is lower and a band can reach; see `Family.lower`."""
+        return (self._base + np.minimum(self._change, 0.0) * self._bands.reach(low, high))[None, :]
+
     def gradient(self, x: FloatArray) -> FloatArray:
         """Derivative by each parameter, ndarray[n_parameters, 1, n_wavelengths]; see `Family.gradient`."""
         return (self._change * self._bands.gradient(x))[:, None, :]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from ..evaluate import readout
+from ..imaging import imager_of
 from ..limit import Limit
 from ..spaces import Space
 from ..study import Study
@@ -37,7 +37,7 @@ def points_table(study: Study, table: pa.Table) -> pa.Table:
     for row in drawn_rows(study, table):
         space, curves = _row_curves(study, row)
         setup = study.setup(space, row["scenario"])
-        response = readout(setup, curves)[0][0]
+        response = imager_of(setup).read(curves)[0][0, 0]
         for signal, (kind, name) in enumerate(zip(study.lights.types, study.lights.names, strict=True)):
             for channel, values in zip(setup.mosaic.channels, response.T, strict=True):
                 found.append(

@@ -11,10 +11,13 @@ import pyarrow as pa
 
 from ..arrays import BoolArray, FloatArray
 from ..constraints import FEASIBLE, Bound, total_violation
-from ..evaluate import WORST, Setup, evaluate, shiftable
+from ..evaluate import WORST, evaluate, shiftable
+from ..imaging import imager_of
 from ..objectives import COMBINED, Objective
 from ..pareto import non_dominated
+from ..plan import Plan
 from ..problem import SHIFTS
+from ..setup import Setup
 from ..spaces import DIMENSIONS, Space
 from ..store import result_schema
 from ..study import Study
@@ -47,6 +50,7 @@ class Rules:
     constraints: Mapping[str, Bound]
     front: tuple[str, str]
     edge_shift_nm: float
+    plans: Mapping[str, Plan]
 
 
 def jobs_of(study: Study) -> Iterator[Job]:
@@ -70,7 +74,12 @@ def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
     own = job.space.violation(points)
     violation = total_violation(columns, rules.constraints, own)
     eligible = ok & (total_violation(columns, rules.constraints, own, leave_out=rules.front) <= FEASIBLE)
-    values = _labels(job) | {name: points[:, i] for i, name in enumerate(job.space.parameters)} | columns
+    values = (
+        _labels(job)
+        | _how(rules.plans.get(job.scenario), len(points))
+        | {name: points[:, i] for i, name in enumerate(job.space.parameters)}
+        | columns
+    )
     values |= {
         "violation": np.where(ok, violation, np.nan),
         "feasible": ok & (violation <= FEASIBLE),
@@ -83,16 +92,19 @@ def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
 def rules_of(study: Study) -> Rules:
     """The rules of a study."""
     schema = result_schema(study.parameters, study.columns)
-    return Rules(schema, study.columns, study.objective, study.constraints, study.trade_off, study.edge_shift_nm)
+    return Rules(
+        schema, study.columns, study.objective, study.constraints, study.trade_off, study.edge_shift_nm, study.plans
+    )
 
 
 def _columns(space: Space, setup: Setup, points: FloatArray, rules: Rules) -> dict[str, FloatArray]:
     """Every quantity of a block of designs, ndarray[n_designs] each."""
     size = setup.grid.size
-    columns = evaluate(setup, space.curves(points, size)) | space.dimensions(points)
+    imager = imager_of(setup)
+    columns = evaluate(imager, space.curves(points, size)) | space.dimensions(points)
     if rules.edge_shift_nm:
         shifts = [rules.edge_shift_nm * s for s in SHIFTS if s] if space.filter is not None else []
-        cases = [columns, *(evaluate(setup, space.curves(points, size, shift)) for shift in shifts)]
+        cases = [columns, *(evaluate(imager, space.curves(points, size, shift)) for shift in shifts)]
         columns |= {WORST + n: np.min([case[n] for case in cases], axis=0) for n in shiftable(setup.lights)}
     if rules.objective.column == COMBINED:
         columns[COMBINED] = rules.objective.of(columns)
@@ -151,6 +163,11 @@ def _labels(job: Job) -> dict[str, Any]:
         "family": ["none" if space.filter is None else space.filter.family.kind] * n,
         "scenario": [job.scenario] * n,
     }
+
+
+def _how(plan: Plan | None, n: int) -> dict[str, Any]:
+    """How the scene was simulated: the plan's key and its promise."""
+    return {} if plan is None else {"plan": [plan.key] * n, "promised_dn": np.full(n, plan.promised_dn)}
 
 
 def _table(values: Mapping[str, Sequence[Any] | FloatArray | BoolArray], n: int, schema: pa.Schema) -> pa.Table:

@@ -8,6 +8,7 @@ import os
 import platform
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from importlib.metadata import version
 from io import StringIO
 from typing import Any
@@ -17,7 +18,7 @@ from ruamel.yaml import YAML
 from ..study import Study
 from .jobs import CHUNK
 
-MODEL_VERSION = "2"
+MODEL_VERSION = "3"
 """Raised whenever the same study would give other rows; part of every shard's key."""
 _PACKAGES = ("cfa-sweep", "numpy", "scipy", "pandas", "pyarrow", "joblib", "nlopt", "moocore")
 
@@ -26,7 +27,8 @@ def fingerprint(study: Study) -> str:
     """SHA-256 of everything that the sweep's rows depend on: the checked study, its curves, the model's version."""
     digest = hashlib.sha256()
     section = study.section.model_dump(mode="json", by_alias=True, exclude={"question", "search"})
-    digest.update(json.dumps([MODEL_VERSION, CHUNK, section, dict(study.digests)], sort_keys=True).encode())
+    keys = {name: plan.key for name, plan in study.plans.items()}
+    digest.update(json.dumps([MODEL_VERSION, CHUNK, section, dict(study.digests), keys], sort_keys=True).encode())
     for name, curve in sorted(study.sensor.qe.items()):
         digest.update(name.encode() + curve.tobytes())
     digest.update(study.lights.photons.tobytes() + repr((study.lights.types, study.lights.photon_ratio)).encode())
@@ -44,6 +46,21 @@ def resolved_yaml(study: Study) -> str:
     yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
     yaml.dump(section, text)
     return text.getvalue()
+
+
+def plan_facts(study: Study) -> dict[str, Any]:
+    """How each scene was simulated."""
+    return {
+        name: {
+            "key": plan.key,
+            "tolerance_dn": plan.tolerance_dn,
+            "promised_dn": plan.promised_dn,
+            "work": plan.work,
+            "reference_work": plan.reference_work,
+            "effects": [asdict(choice) for choice in plan.choices],
+        }
+        for name, plan in study.plans.items()
+    }
 
 
 def provenance(study: Study, workers: int, command: Sequence[str], duration_s: float) -> dict[str, Any]:

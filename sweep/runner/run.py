@@ -32,7 +32,7 @@ from ..store import (
 from ..study import Study
 from .drawn import curves_table, points_table
 from .jobs import Rules, jobs_of, mark_front, rules_of, run_job
-from .provenance import fingerprint, provenance, resolved_yaml
+from .provenance import fingerprint, plan_facts, provenance, resolved_yaml
 from .searching import Parallel, Progress, SearchAnswer, answer_row, front_table, run_search, search_facts, search_log
 from .stopping import Stop, leave_signals_to_the_parent, stop_on_signals
 
@@ -45,6 +45,7 @@ def run_study(study: Study, output: Path, n_jobs: int, progress: Progress, comma
     be written, and InfeasibleError, before anything is written, when the study's search finds no feasible design.
     """
     started = time.monotonic()
+    study = study.planned()
     rules = rules_of(study)
     with stop_on_signals() as stop:
         parallel = functools.partial(_parallel, n_jobs, stop)
@@ -68,7 +69,12 @@ def _write(
     """Sweep, and write everything."""
     shards = Shards(output)
     table = _sweep(study, rules, shards, parallel, progress)
-    facts: dict[str, Any] = {"designs": table.num_rows, "trade_off": study.trade_off, "warnings": list(study.warnings)}
+    facts: dict[str, Any] = {
+        "designs": table.num_rows,
+        "plans": plan_facts(study),
+        "trade_off": study.trade_off,
+        "warnings": list(study.warnings),
+    }
     if answer is not None:
         table = pa.concat_tables([table, answer_row(study, answer, rules, table.num_rows)])
         facts["search"] = search_facts(study, answer)

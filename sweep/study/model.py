@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..constraints import Bound
 from ..datasets.lights import Lights
-from ..evaluate import WORST, Setup, quantities, shiftable
+from ..effects.bounds import Box
+from ..evaluate import BEST_PLACE, WORST, quantities, shiftable
 from ..filters import SensorCurves
 from ..metrics import CSD, Pair, class_pairs, csd_name
 from ..mosaics import Mosaic
 from ..objectives import COMBINED, Objective
-from ..problem import Problem
+from ..plan import Plan, Planner
+from ..problem import SHIFTS, Problem
 from ..scenes import Geometry, Scenario
 from ..sensor import Pixel
+from ..setup import REFERENCE, Setup
 from ..spaces import DIMENSIONS, Space
 from ..spectra import WavelengthGrid
 from .schema import StudySection
@@ -53,6 +56,7 @@ class Study:
     search: Search | None
     digests: Mapping[str, str]
     warnings: tuple[str, ...]
+    plans: Mapping[str, Plan] = field(default_factory=dict)
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
@@ -69,7 +73,14 @@ class Study:
         """Quantities of the result table: those of a design, worst cases over the edge shift, a combined objective."""
         worst = [WORST + name for name in shiftable(self.lights)] if self.edge_shift_nm else []
         combined = [COMBINED] if self.objective.column == COMBINED else []
-        return (*quantities(self.lights), *DIMENSIONS, *worst, *combined)
+        places = [BEST_PLACE + csd_name(pair) for pair in self.pairs] if self.any_place else []
+        return (*quantities(self.lights), *DIMENSIONS, *places, *worst, *combined)
+
+    @property
+    def any_place(self) -> bool:
+        """Whether a scenario asks for the worst of all places of the light on the mosaic."""
+        targets = [scenario.target for scenario in self.scenarios.values()]
+        return any(target is not None and target.phase_px == "any" for target in targets)
 
     @property
     def trade_off(self) -> tuple[str, str]:
@@ -110,7 +121,37 @@ class Study:
             lights=self.lights,
             pixel=self.pixel,
             scenario=self.scenarios[scenario],
+            methods=self.plans[scenario].methods if scenario in self.plans else REFERENCE,
         )
+
+    def box(self, space: Space, scenario: str) -> Box:
+        """What the designs of `space` can be, for a plan of the scenario."""
+        setup = replace(self.setup(space, scenario), methods=REFERENCE)
+        low, high = setup.qe.copy(), setup.qe.copy()
+        if space.filter is not None:
+            ends = [np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max)]
+            shifts = [self.edge_shift_nm * s for s in SHIFTS] if self.edge_shift_nm else [0.0]
+            families = [space.filter.family.shifted(shift) for shift in shifts]
+            if space.size == 1:
+                curves = [family.curves(ends[0][None])[0] for family in families]
+                lows = highs = curves
+            else:
+                lows, highs = [f.lower(*ends) for f in families], [f.upper(*ends) for f in families]
+            low[list(setup.modified)] = np.min(lows, axis=0)
+            high[list(setup.modified)] = np.max(highs, axis=0)
+        searched = self.search is not None and self.search.space is space and self.search.scenario == scenario
+        evaluations = self.search.max_evaluations if searched and self.search is not None else 0
+        return Box(setup, low, high, space.size + evaluations)
+
+    def plan(self, scenario: str, tolerance_dn: float | None = None) -> Plan:
+        """The cheapest plan of a scenario that holds for all designs of the study."""
+        boxes = [self.box(space, scenario) for space in self.spaces]
+        boxes = [box for box in boxes if box.n_designs]
+        return Planner(boxes).plan(scenario, tolerance_dn or self.section.tolerance_dn)
+
+    def planned(self, tolerance_dn: float | None = None) -> Study:
+        """The study with a plan for each of its scenarios."""
+        return replace(self, plans={name: self.plan(name, tolerance_dn) for name in self.scenarios})
 
     def problem(self, search: Search) -> Problem:
         """The search as a mathematical problem."""

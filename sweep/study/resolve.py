@@ -12,7 +12,7 @@ from ..families import CHANNELS, Parameter, build_family
 from ..filters import SensorCurves
 from ..metrics import class_pairs, csd_name
 from ..mosaics import Mosaic
-from ..scenes import OBJECT_RESOLUTION
+from ..scenes import OBJECT_RESOLUTION, WhitePatchExposure
 from ..search import ALGORITHMS
 from ..spaces import DIMENSIONS, Filter, Kind, Space
 from ..surrogate import surrogate_parameters
@@ -272,7 +272,7 @@ class _Resolver:
         if section.algorithm not in ALGORITHMS:
             what = "algorithm (it must take inequality constraints)"
             self.unknown(("search", "algorithm"), what, section.algorithm, list(ALGORITHMS))
-        if chosen not in boxes or section.algorithm not in ALGORITHMS:
+        if chosen not in boxes or section.algorithm not in ALGORITHMS or self.faults:
             return None
         self.check_searched(boxes[chosen])
         levels: tuple[float, ...] = ()
@@ -280,6 +280,9 @@ class _Resolver:
             axis = Axis(min=section.front.min, max=section.front.max, count=section.front.count)
             levels = axis.points()
         scenario = section.scenario or scenarios[0]
+        seen = self.section.scenarios[scenario]
+        if seen.drive is not None and isinstance(seen.exposure, WhitePatchExposure):
+            self.add(("search", "scenario"), "a search under a pulsed light needs a fixed exposure", scenario)
         return Search(boxes[chosen], scenario, section.algorithm, section.starts, section.max_evaluations, levels)
 
     def check_searched(self, space: Space) -> None:

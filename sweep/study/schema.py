@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from copy import deepcopy
+from itertools import product
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -205,6 +208,42 @@ def _cfas(value: Any) -> Any:
     return {name: {} if tile is None else tile for name, tile in value.items()} if isinstance(value, dict) else value
 
 
+_MOST_SCENARIOS = 2000
+
+
+def _expanded(value: Any) -> Any:
+    """Scenarios with `each: {key: values}` become one per combination, named after their values."""
+    if not isinstance(value, dict):
+        return value
+    found: dict[str, Any] = {}
+    for name, entry in value.items():
+        if not isinstance(entry, dict) or "each" not in entry:
+            found[name] = entry
+            continue
+        each = entry["each"]
+        if not isinstance(each, dict) or not each:
+            raise ValueError(f"{name}: `each` maps keys such as target.distance_m to values")
+        axes = [Axis.model_validate(_axis(axis)).points() for axis in each.values()]
+        if math.prod(map(len, axes)) + len(found) > _MOST_SCENARIOS:
+            raise ValueError(f"{name}: more than {_MOST_SCENARIOS} scenarios")
+        for point in product(*axes):
+            made = deepcopy({key: inner for key, inner in entry.items() if key != "each"})
+            for key, number in zip(each, point, strict=True):
+                _set(made, str(key).split("."), number)
+            labels = [f"{str(key).rsplit('.', 1)[-1]}={number:g}" for key, number in zip(each, point, strict=True)]
+            found[" ".join([str(name), *labels])] = made
+    return found
+
+
+def _set(mapping: dict[str, Any], path: list[str], number: float) -> None:
+    """Put a number at a dotted path."""
+    for key in path[:-1]:
+        mapping = mapping.setdefault(key, {})
+        if not isinstance(mapping, dict):
+            raise ValueError(f"each: {key} is no mapping")
+    mapping[path[-1]] = number
+
+
 class StudySection(Section):
     """A whole study file."""
 
@@ -215,7 +254,8 @@ class StudySection(Section):
     sensor: Annotated[SensorSection, BeforeValidator(_builtin)]
     pixel: Pixel = Pixel()
     lights: Annotated[LightsSection, BeforeValidator(_builtin)]
-    scenarios: Annotated[dict[Name, Scenario], Field(min_length=1)] = {"chart": Scenario()}
+    scenarios: Annotated[dict[Name, Scenario], BeforeValidator(_expanded), Field(min_length=1)] = {"chart": Scenario()}
+    tolerance_dn: Positive = 0.1
     geometry: dict[Name, Geometry] = {}
     cfas: Annotated[dict[Name, CfaSection], BeforeValidator(_cfas), Field(min_length=1)]
     designs: dict[Name, DesignSection] = {}

@@ -1,0 +1,162 @@
+"""How much a change of a linear effect can change a CSD, for every design of a box: a proven upper bound.
+
+A CSD is the smallest of the distances of all pairs, so it changes by no more than the distance of a pair that can be the
+smallest, before or after; and a distance changes by no more than the norm of the change of its difference vector. That is
+linear in QE and kernel, and both are known up to an interval.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import FloatArray, IndexArray
+from ..setup import (
+    Setup,
+    background_irradiance,
+    exposure_times,
+    per_photon,
+    signal_irradiance,
+    white_irradiance,
+)
+from . import blur, flicker
+
+
+@dataclass(frozen=True)
+class Box:
+    """Designs of a scene: every channel's QE lies between `low` and `high`, ndarray[n_channels, n_wavelengths]."""
+
+    setup: Setup
+    low: FloatArray
+    high: FloatArray
+    n_designs: int
+
+
+@dataclass(frozen=True)
+class Amounts:
+    """Sums of signals times QE on hats between the knots, DN: middle value, half width, and the largest possible.
+
+    `middle`: ndarray[n_signals, n_channels, n_knots], `half`: ndarray[n_pairs, n_channels, n_knots] (of a pair's
+    difference), `half_each`: the same of each signal, `most`, `most_each`: ndarray[n_pairs or n_signals, n_channels].
+    """
+
+    middle: FloatArray
+    half: FloatArray
+    half_each: FloatArray
+    most: FloatArray
+    most_each: FloatArray
+
+
+class Reach:
+    """The responses that the designs of a box can have, on the knots at which kernels are compared."""
+
+    def __init__(self, box: Box) -> None:
+        setup = box.setup
+        self.box = box
+        wave = setup.grid.nodes_nm
+        self.knots_nm = blur.knots(wave)
+        self._hats = np.stack([np.interp(wave, self.knots_nm, unit) for unit in np.eye(self.knots_nm.size)])
+        self.shortest_s, self.longest_s = self._exposures()
+        drive = setup.scenario.drive
+        self.least_light = 1.0 if drive is None else flicker.smallest(drive, self.shortest_s, self.longest_s)
+        self.most_light = 1.0 if drive is None else flicker.largest(drive, self.shortest_s, self.longest_s)
+        dn = per_photon(setup) * self.longest_s * self.most_light * setup.pixel.dn_per_e
+        self._signals = signal_irradiance(setup) * dn
+        self.first, self.second, self.group = _pairs(setup.members)
+
+    def _exposures(self) -> tuple[float, float]:
+        setup = self.box.setup
+        modified = list(setup.modified)
+        white = white_irradiance(setup) * per_photon(setup)
+        ends = [exposure_times(setup, (qe[modified] @ white)[None])[0] for qe in (self.box.high, self.box.low)]
+        return float(ends[0]), float(ends[1])
+
+    @property
+    def brightest_dn(self) -> FloatArray:
+        """Largest response of each channel to any signal whose image is whole, DN, ndarray[n_channels]."""
+        return np.asarray((self._signals @ self.box.high.T).max(axis=0), dtype=float)
+
+    @property
+    def background_dn(self) -> FloatArray:
+        """Largest response of each channel to the background, DN, ndarray[n_channels]."""
+        setup = self.box.setup
+        dn = per_photon(setup) * self.longest_s * setup.pixel.dn_per_e
+        return np.asarray(self.box.high @ background_irradiance(setup) * dn, dtype=float)
+
+    def amounts(self, factor: FloatArray, low: FloatArray, high: FloatArray) -> Amounts:
+        """Sums for QE between `low` and `high` (ndarray[n_channels, n_wavelengths]) and a factor per wavelength."""
+        middle, half = (low + high) / 2, (high - low) / 2
+        most = np.maximum(np.abs(low), np.abs(high))
+        light = self._signals * factor
+        apart = np.abs(light[self.first] - light[self.second])
+        return Amounts(
+            middle=np.einsum("sl,cl,kl->sck", light, middle, self._hats, optimize=True),
+            half=np.einsum("pl,cl,kl->pck", apart, half, self._hats, optimize=True),
+            half_each=np.einsum("sl,cl,kl->sck", np.abs(light), half, self._hats, optimize=True),
+            most=apart @ most.T,
+            most_each=np.abs(light) @ most.T,
+        )
+
+    def largest_change(
+        self,
+        changed: Amounts,
+        change: FloatArray,
+        remainder: float,
+        base: Amounts,
+        after: FloatArray,
+        *,
+        straight: bool,
+    ) -> float:
+        """Bound on the change of any CSD, DN.
+
+        `change`: ndarray[n_cases, n_values, n_channels, n_knots], of the kernel that multiplies `changed`, exact up to
+        `remainder` between the knots. `base`, `after`: the responses and the kernel after the change, which say which
+        pairs can be the smallest. `straight`: the readout is linear; if not, a distance may change by what each of its
+        two points moves.
+        """
+        n_cases, n_values = change.shape[:2]
+        shape = (-1, n_cases, n_values)
+        pairs = _flat(base.middle)[self.first] - _flat(base.middle)[self.second]
+        by, size = _flat(change, 2).T, np.abs(_flat(change, 2)).T
+        if straight:
+            apart = _flat(changed.middle)[self.first] - _flat(changed.middle)[self.second]
+            moved = np.abs(apart @ by) + _flat(changed.half) @ size
+            moved += remainder * changed.most.sum(axis=1, keepdims=True)
+        else:
+            each = np.abs(_flat(changed.middle) @ by) + _flat(changed.half_each) @ size
+            each += remainder * changed.most_each.sum(axis=1, keepdims=True)
+            moved = each[self.first] + each[self.second]
+        far = np.linalg.norm(moved.reshape(shape), axis=2)
+        middle = np.abs(pairs @ _flat(after, 2).T).reshape(shape)
+        width = (_flat(base.half) @ np.abs(_flat(after, 2)).T).reshape(shape)
+        width += (remainder * base.most.sum(axis=1))[:, None, None]
+        shortened = self.shortest_s / self.longest_s * self.least_light / self.most_light if straight else 0.0
+        least = np.linalg.norm(np.maximum(middle - width, 0.0), axis=2) * shortened
+        most = np.linalg.norm(middle + width, axis=2)
+        worst = 0.0
+        for group in range(int(self.group.max(initial=-1)) + 1):
+            own = self.group == group
+            can_be = least[own] - far[own] <= (most[own] + far[own]).min(axis=0)
+            worst = max(worst, float(far[own][can_be].max(initial=0.0)))
+        return worst
+
+
+def _flat(values: FloatArray, kept: int = 1) -> FloatArray:
+    """The last two axes as one; the first `kept` axes as one."""
+    return values.reshape(int(np.prod(values.shape[:kept])), -1)
+
+
+def _pairs(members: dict[str, IndexArray]) -> tuple[IndexArray, IndexArray, IndexArray]:
+    """Signals of all pairs of two types: first, second, number of the pair of types."""
+    names = list(members)
+    first, second, group = [], [], []
+    number = 0
+    for i, one in enumerate(names):
+        for other in names[i + 1 :]:
+            a, b = np.meshgrid(members[one], members[other], indexing="ij")
+            first.append(a.ravel())
+            second.append(b.ravel())
+            group.append(np.full(a.size, number))
+            number += 1
+    return tuple(np.concatenate(part) if part else np.empty(0, dtype=np.intp) for part in (first, second, group))  # type: ignore[return-value]

@@ -1,0 +1,138 @@
+"""What a readout sees of each channel's quantum efficiency: the linear effects, put together in their physical order.
+
+Optics do not depend on the filter. So everything between the scene and the pixels' electrons is a weight per wavelength
+for each unit of the readout (a channel's mean, or a single pixel) and each channel whose filter it looks through.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..setup import Methods, Setup
+from . import blur, crosstalk, demosaic, extinction, illumination, phase, sampling
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """Weights of a scene.
+
+    `light`: ndarray[n_cases, n_units, n_channels, n_wavelengths], what a unit gets of a signal's light through each
+    channel's filter, relative to a uniform field on axis in clear air. `uniform`: ndarray[n_cases, n_units, n_channels],
+    the same of a uniform background. `readout`: ndarray[n_cases, n_units, n_channels], weight of each unit in the value
+    of each channel. A case is a place of the light on the mosaic.
+    """
+
+    light: FloatArray
+    uniform: FloatArray
+    readout: FloatArray
+
+
+def make_kernel(
+    setup: Setup, methods: Methods, wavelength_nm: FloatArray, *, by_pixel: bool, work: Counter[str]
+) -> Kernel:
+    """The kernel at some wavelengths; `by_pixel` keeps the pixels apart, for a readout that is not straight."""
+    if setup.scenario.target is None:
+        made = _uniform(setup, methods, by_pixel=by_pixel)
+        light = made.light
+    elif methods.sampling == "skip":
+        made = _ideal(setup, methods, wavelength_nm)
+        light = made.light
+    else:
+        knots = blur.knots(wavelength_nm) if methods.blur == "every 10 nm" else wavelength_nm
+        made = _pixels(setup, methods, knots, by_pixel=by_pixel, work=work)
+        light = made.light if knots is wavelength_nm else _interpolated(made.light, knots, wavelength_nm)
+    falls = illumination.factor(setup, methods.illumination)
+    dimmed = falls * extinction.transmittance(setup, methods.extinction, wavelength_nm)
+    return Kernel(light * dimmed, made.uniform * falls, made.readout)
+
+
+def _interpolated(light: FloatArray, knots: FloatArray, wavelength_nm: FloatArray) -> FloatArray:
+    """Linear between the knots along the last axis."""
+    if light.shape[-1] == 1:
+        return light
+    hats = np.stack([np.interp(wavelength_nm, knots, unit) for unit in np.eye(knots.size)])
+    return np.asarray(light @ hats, dtype=float)
+
+
+def _share(setup: Setup, methods: Methods) -> float:
+    return 0.0 if methods.crosstalk == "skip" else setup.pixel.crosstalk
+
+
+def _uniform(setup: Setup, methods: Methods, *, by_pixel: bool) -> Kernel:
+    """A field without structure: one tile stands for all."""
+    tile, n = setup.mosaic.indices, len(setup.mosaic.channels)
+    own = (tile[..., None] == np.arange(n)).astype(float)
+    share = _share(setup, methods)
+    split = crosstalk.mixed(own[None], share, periodic=True).reshape(1, tile.size, n, 1)
+    weights = own.reshape(-1, n) / setup.mosaic.counts
+    if by_pixel and share:
+        return Kernel(split, split[..., 0], weights[None])
+    folded = np.einsum("uc,xukl->xckl", weights, split)
+    return Kernel(folded, folded[..., 0], np.eye(n)[None])
+
+
+def _ideal(setup: Setup, methods: Methods, wavelength_nm: FloatArray) -> Kernel:
+    """No pixels: every channel sees the mean over the readout, or the image's very center."""
+    target = setup.scenario.target
+    assert target is not None
+    uniform = _uniform(setup, methods, by_pixel=False).uniform
+    radius, readout = (r * setup.pixel.pitch_um for r in sampling.radii_px(setup, target))
+    if target.readout == "center":
+        readout = 1e-3 * setup.pixel.pitch_um
+    lost = np.full(wavelength_nm.size, min(1.0, radius / readout) ** 2)
+    if methods.blur != "skip":
+        w20_um = blur.defocus_um(setup.scenario, setup.pixel.pitch_um)
+        knots = blur.knots(wavelength_nm) if methods.blur == "every 10 nm" else wavelength_nm
+        kept = blur.mean_over_disc(radius, readout, knots * 1e-3, setup.scenario.optics.f_number, w20_um)
+        lost = np.interp(wavelength_nm, knots, kept)
+    return Kernel(uniform[..., None] * lost, uniform, np.eye(uniform.shape[-1])[None])
+
+
+def _pixels(setup: Setup, methods: Methods, wavelength_nm: FloatArray, *, by_pixel: bool, work: Counter[str]) -> Kernel:
+    """Every pixel of the readout, for every place of the light."""
+    target, mosaic, pixel = setup.scenario.target, setup.mosaic, setup.pixel
+    assert target is not None
+    n = len(mosaic.channels)
+    radius, readout = sampling.radii_px(setup, target)
+    half = pixel.fill_factor**0.5 / 2
+    reach = readout + 0.5 if target.readout == "mean" else float(max(mosaic.indices.shape))
+    seen = sampling.window(mosaic, phase.places_px(setup, methods.phase), reach)
+    if target.readout == "mean":
+        weights = sampling.mean_weights(seen, half, readout, n)
+    else:
+        weights = demosaic.center_weights(seen, methods.demosaic, mosaic.indices.shape, n)
+    share = _share(setup, methods)
+    own = (seen.channel[..., None] == np.arange(n)).astype(float)
+    apart = weights[..., None] * own  # [cases, rows, columns, channels]
+    spread = crosstalk.mixed(apart, share) if share else apart
+    wanted = (spread > 0).any(axis=3)
+    profile = None
+    if methods.blur != "skip":
+        furthest = float(np.hypot(seen.dx, seen.dy)[wanted].max()) + 2**0.5 * half
+        w20_um = blur.defocus_um(setup.scenario, pixel.pitch_um)
+        sizes = (radius * pixel.pitch_um, furthest * pixel.pitch_um)
+        profile = blur.profile(*sizes, tuple(wavelength_nm * 1e-3), setup.scenario.optics.f_number, w20_um)
+        work["blur"] += profile.work
+    light = sampling.light_on_pixels(seen, wanted, half, radius, profile, pixel.pitch_um)
+    work["sampling"] += light.values.size
+    if by_pixel:
+        return _apart(light, own, apart, share)
+    # What each channel's readout takes of the pixels of each channel: [cases, rows, columns, channels x channels].
+    taken = spread[..., :, None] * own[..., None, :]
+    shape = (len(weights), n, n)
+    folded = light.folded(taken.reshape(*taken.shape[:3], n * n)).reshape(*shape, light.values.shape[1])
+    return Kernel(folded, taken.sum(axis=(1, 2)), np.repeat(np.eye(n)[None], len(weights), axis=0))
+
+
+def _apart(light: sampling.PixelLight, own: FloatArray, apart: FloatArray, share: float) -> Kernel:
+    """The pixels one by one: those with a weight in any readout."""
+    used = (apart > 0).any(axis=(0, 3))
+    split = light.by_pixel()[..., None, :] * own[None, ..., None]
+    uniform = own[None]
+    if share:
+        split, uniform = crosstalk.mixed(split, share), crosstalk.mixed(uniform, share)
+    return Kernel(split[:, used], np.repeat(uniform[:, used], len(apart), axis=0), apart[:, used])

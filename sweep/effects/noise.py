@@ -1,0 +1,122 @@
+"""Photon, read and dark noise and PRNU: the mean readout in closed form, the variance, and Monte Carlo draws.
+
+The CSD is the distance of mean values. Noise moves a mean only where the readout is not straight: at the full well, at the
+ends of the ADC and at the steps of its quantization. Variance (EMVA 1288): gain^2 (read^2 + n) + PRNU^2 + 1/12.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from scipy.special import ndtr
+
+from ..arrays import FloatArray
+from ..sensor import Pixel
+from ..setup import Setup
+
+METHODS = ("skip", "expected")
+_NODES = 48
+_TAILS = 9.0
+
+
+def skip_is_exact(setup: Setup) -> str | None:
+    """Why leaving it out changes nothing; None when it may."""
+    return None if setup.scenario.noise else "no noise asked for"
+
+
+def variance_e(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+    """Variance of the collected electrons: photon noise and PRNU."""
+    return np.asarray(electrons + (pixel.prnu * electrons) ** 2, dtype=float)
+
+
+def least_sigma_dn(pixel: Pixel) -> float:
+    """The noise that even a dark pixel has, DN."""
+    return pixel.dn_per_e * pixel.read_noise_e
+
+
+def variance_dn(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+    """Variance of a pixel's digital number below saturation, with the 1/12 of its quantization."""
+    return np.asarray(pixel.dn_per_e**2 * (pixel.read_noise_e**2 + variance_e(electrons, pixel)) + 1 / 12, dtype=float)
+
+
+def _density(z: FloatArray) -> FloatArray:
+    return np.asarray(np.exp(-0.5 * z**2) / math.sqrt(2 * math.pi), dtype=float)
+
+
+def _ramp(z: FloatArray) -> FloatArray:
+    """Mean of max(0, z + Z)."""
+    return np.asarray(z * ndtr(z) + _density(z), dtype=float)
+
+
+def _soft(mean: FloatArray, sigma: float, low: float, high: float) -> FloatArray:
+    """Mean of a Gaussian clipped to low..high."""
+    if sigma == 0:
+        return np.clip(mean, low, high)
+    return np.asarray(low + sigma * (_ramp((mean - low) / sigma) - _ramp((mean - high) / sigma)), dtype=float)
+
+
+def expected_dn(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+    """Mean digital number before rounding: Gaussian electrons, full well, read noise, pedestal, ADC range."""
+    gain, offset, top = pixel.dn_per_e, pixel.offset_dn, float(pixel.full_scale_dn)
+    read = gain * pixel.read_noise_e
+
+    def bent(held: FloatArray) -> FloatArray:
+        """What the ADC's ends and the read noise change in the mean of a given number of electrons."""
+        dn = gain * held + offset
+        return _soft(dn, read, 0.0, top) - dn
+
+    sigma = np.sqrt(variance_e(electrons, pixel))
+    some = sigma > 0
+    full = np.divide(pixel.well_e - electrons, sigma, out=np.full_like(sigma, _TAILS), where=some)
+    end = np.clip(full, -_TAILS, _TAILS)
+    # Where the read noise is small, the ADC's ends are corners: integrate between them.
+    corners = [np.full_like(end, -_TAILS)]
+    for at_dn in (0.0, top):
+        at = np.divide((at_dn - offset) / gain - electrons, sigma, out=np.full_like(sigma, -_TAILS), where=some)
+        corners.append(np.clip(at, -_TAILS, end))
+    corners.append(end)
+    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    found = gain * electrons + offset
+    for left, right in pairwise(corners):
+        for node, weight in zip((nodes + 1) / 2, weights / 2, strict=True):
+            z = left + node * (right - left)
+            found += weight * (right - left) * _density(z) * bent(electrons + z * sigma)
+    beyond = np.maximum(_density(full) - full * ndtr(-full), 0.0) * sigma
+    found += bent(np.full_like(electrons, pixel.well_e)) * ndtr(-full) - gain * beyond
+    held = np.minimum(electrons, pixel.well_e)
+    return np.where(some, found, gain * held + offset + bent(held))
+
+
+def draws_dn(electrons: float, pixel: Pixel, rng: np.random.Generator, count: int) -> FloatArray:
+    """Monte Carlo: `count` readouts of pixels that expect `electrons`, each with its own gain error; rounded."""
+    gains = 1 + pixel.prnu * rng.standard_normal(count)
+    held = np.minimum(rng.poisson(np.maximum(electrons * gains, 0.0)), pixel.well_e)
+    dn = (held + pixel.read_noise_e * rng.standard_normal(count)) * pixel.dn_per_e + pixel.offset_dn
+    return np.clip(np.floor(dn + 0.5), 0, pixel.full_scale_dn)
+
+
+def promise(setup: Setup, brightest_e: float) -> float:
+    """Range of what leaving noise out changes in one coordinate's mean, DN.
+
+    A clip at distance z sigma takes sigma (density(z) - z tail(z)) from the mean. At the top that grows with the signal,
+    so the brightest one counts (at its clip, if it is beyond). At the bottom it is bounded on intervals of the
+    signal, by the least distance and the largest sigma in each.
+    """
+    pixel = setup.pixel
+    gain, offset_e = pixel.dn_per_e, pixel.offset_dn / pixel.dn_per_e
+
+    def taken(distance: FloatArray, sigma: FloatArray) -> FloatArray:
+        z = np.maximum(distance, 0.0) / np.maximum(sigma, 1e-300)
+        return np.asarray(np.where(sigma > 0, sigma * np.maximum(_density(z) - z * ndtr(-z), 0.0), 0.0))
+
+    bright = np.array([brightest_e])
+    photon = np.sqrt(variance_e(bright, pixel))
+    whole = np.sqrt(variance_e(bright, pixel) + pixel.read_noise_e**2)
+    adc_e = (pixel.full_scale_dn - pixel.offset_dn) / gain
+    top = taken(pixel.well_e - bright, photon)[0] + taken(adc_e - bright, whole)[0]
+    edges = np.concatenate([[0.0], np.geomspace(1e-3, max(brightest_e, 2e-3), 400)])
+    sigma = np.sqrt(variance_e(edges[1:], pixel) + pixel.read_noise_e**2)
+    bottom = taken(offset_e + edges[:-1], sigma).max()
+    return float(gain * (top + bottom))

@@ -1,0 +1,244 @@
+"""The image chain of a scene: light on the pixels, electrons, full well, readout, for a block of designs.
+
+In the physical order: optics blur, pixel aperture and mosaic sampling with crosstalk, photon noise, full well, read noise,
+pedestal, ADC, readout (mean over the disc, or demosaicked center). Only what `Setup.methods` names is computed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from collections import Counter, OrderedDict
+from dataclasses import asdict, replace
+from functools import lru_cache
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from .arrays import FloatArray
+from .effects import flicker, noise, quadrature, quantization, saturation
+from .effects.kernel import make_kernel
+from .scenes import WhitePatchExposure
+from .sensor import Pixel
+from .setup import (
+    Methods,
+    Setup,
+    background_irradiance,
+    exposure_times,
+    per_photon,
+    signal_irradiance,
+    white_irradiance,
+)
+
+_BLOCK = 2_000_000
+"""Values of a block of pixels that are held at once."""
+_KEPT = 15_000_000
+"""Largest table of signals times kernel that is kept."""
+_TABLE_NODES = 16_384
+
+
+class Imager:
+    """A scene with its kernel made, ready for designs. `work` counts what is computed, by effect."""
+
+    def __init__(self, setup: Setup, work: Counter[str] | None = None) -> None:
+        self.setup = setup
+        self.work: Counter[str] = Counter() if work is None else work
+        methods, grid = setup.methods, setup.grid
+        self.straight = methods.saturation == "skip" and methods.quantization == "skip"
+        kernel = make_kernel(setup, methods, grid.nodes_nm, by_pixel=not self.straight, work=self.work)
+        self.n_cases, self.n_units = kernel.light.shape[:2]
+        self._readout, self._light, self._uniform = kernel.readout, kernel.light, kernel.uniform
+        self._nodes = quadrature.nodes(grid.size, methods.quadrature)
+        self._hats = None if self._nodes.size == grid.size else quadrature.hats(grid.size, self._nodes)
+        self.signals = signal_irradiance(setup) * per_photon(setup)
+        self._background = background_irradiance(setup) * per_photon(setup)
+        self._white = white_irradiance(setup) * per_photon(setup)
+        fixed, modified = list(setup.fixed), list(setup.modified)
+        # Electrons/s of what no design changes, [n_cases, n_signals, n_units] and [n_cases, n_units].
+        self._fixed = self._products(kernel.light[:, :, fixed], setup.qe[None, fixed])[0]
+        self._fixed_uniform = kernel.uniform[:, :, fixed] @ (setup.qe[fixed] @ self._background)
+        self._modified_uniform = kernel.uniform[:, :, modified]
+        # Units that look through a filter that changes; electrons/s per QE of it, kept where the table is small.
+        self._touched = np.flatnonzero((kernel.light[:, :, modified] != 0).any(axis=(0, 2, 3)))
+        self._modified = kernel.light[:, self._touched][:, :, modified]
+        size = self._modified[..., 0].size * len(self.signals) * self._nodes.size
+        self._kept = self._table() if 0 < size <= _KEPT else None
+
+    def _looked_at(self, qe: FloatArray) -> FloatArray:
+        """QE as the quadrature sees it: itself, or linear between its nodes."""
+        return qe if self._hats is None else qe[..., self._nodes] @ self._hats
+
+    def _products(self, light: FloatArray, qe: FloatArray) -> FloatArray:
+        """Sum over channels and wavelengths of kernel, QE and signals, [n_designs, n_cases, n_signals, n_units]."""
+        cases, units, channels, _ = light.shape
+        size, n, n_signals = self.setup.grid.size, len(qe), len(self.signals)
+        weights = np.broadcast_to(light, (cases, units, channels, size)).reshape(cases * units, channels * size)
+        seen = self._looked_at(qe)[:, :, None] * self.signals  # [n_designs, channels, n_signals, n_wavelengths]
+        moved = np.moveaxis(seen, 2, 1).reshape(n * n_signals, channels * size)
+        self.work["response"] += weights.shape[0] * moved.size
+        found = (moved @ weights.T).reshape(n, n_signals, cases, units)
+        return np.asarray(np.moveaxis(found, 1, 2), dtype=float)
+
+    def _table(self) -> FloatArray:
+        """Signals times kernel on the quadrature's nodes, [channels x nodes, n_cases x n_signals x n_units]."""
+        product = self._modified[:, None] * self.signals[:, None, None, :]
+        on_nodes = product if self._hats is None else product @ self._hats.T
+        channels, nodes = on_nodes.shape[-2:]
+        return np.ascontiguousarray(on_nodes.reshape(-1, channels * nodes).T)
+
+    def rates(self, curves: FloatArray) -> FloatArray:
+        """Electrons/s of each signal, ndarray[n_designs, n_cases, n_signals, n_units].
+
+        `curves`: QE of the modified channels, ndarray[n_designs, n_modified, n_wavelengths].
+        """
+        found = np.repeat(self._fixed[None], len(curves), axis=0)
+        if not self._touched.size:
+            return found
+        if self._kept is None:
+            part = self._products(self._modified, curves)
+        else:
+            qe = curves[:, :, self._nodes].reshape(len(curves), -1)
+            self.work["response"] += len(curves) * self._kept.size
+            part = (qe @ self._kept).reshape(len(curves), *self._fixed.shape[:2], self._touched.size)
+        found[..., self._touched] += part
+        return found
+
+    def exposure_s(self, curves: FloatArray) -> FloatArray:
+        """Exposure of each design, s, ndarray[n_designs]."""
+        return exposure_times(self.setup, curves @ self._white)
+
+    def scales(self, exposure_s: FloatArray) -> FloatArray:
+        """Light relative to its mean in the cases of a pulsed light, ndarray[n_designs, n_scales]."""
+        found = flicker.scales(self.setup, self.setup.methods.flicker, exposure_s)
+        self.work["flicker"] += found.size if found.shape[1] > 1 else 0
+        return found
+
+    def electrons(self, curves: FloatArray, scales: FloatArray, exposure_s: FloatArray) -> FloatArray:
+        """Expected electrons before the full well, ndarray[n_designs, n_cases x n_scales, n_signals, n_units]."""
+        uniform = self._fixed_uniform + np.einsum("cuk,dk->dcu", self._modified_uniform, curves @ self._background)
+        uniform = uniform + self.setup.pixel.dark_e_per_s
+        both = self.rates(curves)[:, :, None] * scales[:, None, :, None, None] + uniform[:, :, None, None, :]
+        flat = both.reshape(len(curves), -1, *both.shape[3:])
+        return np.asarray(flat * exposure_s[:, None, None, None], dtype=float)
+
+    def _folded(self, dn: FloatArray) -> FloatArray:
+        """Value of each channel from those of the units: the last axis n_units -> n_channels."""
+        if self.straight or (self.setup.scenario.target is None and self.n_units == self._readout.shape[2]):
+            return dn
+        repeats = dn.shape[1] // self.n_cases
+        self.work["readout"] += dn.size
+        return np.asarray(np.einsum("dcsu,cuk->dcsk", dn, np.repeat(self._readout, repeats, axis=0), optimize=True))
+
+    def smooth(self, curves: FloatArray) -> FloatArray:
+        """Unquantized, unclipped response, DN, ndarray[n_designs, n_cases, n_signals, n_channels]."""
+        exposure_s = self.exposure_s(curves)
+        return self._folded(straight_dn(self.electrons(curves, self.scales(exposure_s), exposure_s), self._pixel))
+
+    def smooth_gradient(self, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
+        """Exact derivative of `smooth` at one design, with that of its exposure; a pulse's share of it is held.
+
+        `curves`: ndarray[n_modified, n_wavelengths]; `curves_gradient`: ndarray[n_parameters, n_modified,
+        n_wavelengths]. Returns DN per unit of parameter, ndarray[n_parameters, n_cases, n_signals, n_channels].
+        """
+        one = curves[None]
+        exposure_s = self.exposure_s(one)
+        scales = self.scales(exposure_s)
+        whole = self.electrons(one, scales, exposure_s)[0]
+        light = (self.rates(curves_gradient) - self._fixed)[:, :, None] * scales[0][None, None, :, None, None]
+        uniform = np.einsum("cuk,dk->dcu", self._modified_uniform, curves_gradient @ self._background)
+        slope = (light + uniform[:, :, None, None, :]).reshape(len(curves_gradient), *whole.shape) * exposure_s
+        if isinstance(self.setup.scenario.exposure, WhitePatchExposure):
+            rates = one[0] @ self._white
+            fixed = self.setup.qe[list(self.setup.fixed)] @ self._white
+            if rates.size and rates.max() > fixed.max(initial=0.0):
+                top = int(np.argmax(rates))
+                relative = (curves_gradient[:, top] @ self._white) / rates[top]
+                slope = slope - relative[:, None, None, None] * whole
+        return self._folded(slope * self._pixel.dn_per_e)
+
+    def per_qe(self, modified: int, curves: FloatArray) -> FloatArray:
+        """DN per QE of one modified channel at every wavelength, with the exposure of the design `curves`.
+
+        ndarray[n_cases, n_signals, n_units, n_wavelengths]; the smooth response is linear in it where N does not set
+        the exposure.
+        """
+        exposure_s = self.exposure_s(curves[None])
+        scales = self.scales(exposure_s)[0]
+        light = self._light[:, None, None, :, self.setup.modified[modified]] * self.signals[:, None, :]
+        uniform = self._uniform[:, None, None, :, self.setup.modified[modified], None] * self._background
+        both = light * scales[None, :, None, None, None] + uniform
+        return np.asarray(both.reshape(-1, *both.shape[2:]) * (exposure_s[0] * self._pixel.dn_per_e), dtype=float)
+
+    @property
+    def _pixel(self) -> Pixel:
+        """The pixel, without a pedestal where that is skipped."""
+        pixel = self.setup.pixel
+        return pixel.model_copy(update={"offset_dn": 0.0}) if self.setup.methods.pedestal == "skip" else pixel
+
+    def read(self, curves: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The readout, DN, ndarray[n_designs, n_cases, n_signals, n_channels], and exposure, s, ndarray[n_designs]."""
+        exposure_s = self.exposure_s(curves)
+        scales = self.scales(exposure_s)
+        step = max(1, _BLOCK // (self.n_cases * scales.shape[1] * len(self.signals) * self.n_units))
+        blocks = [slice(start, start + step) for start in range(0, len(curves), step)]
+        parts = [
+            self._folded(self.transfer(self.electrons(curves[block], scales[block], exposure_s[block])))
+            for block in blocks
+        ]
+        return np.concatenate(parts), exposure_s
+
+    def transfer(self, electrons: FloatArray) -> FloatArray:
+        """Digital numbers of the units from their expected electrons, as far as the methods go."""
+        methods, noisy, pixel = self.setup.methods, self.setup.scenario.noise, self._pixel
+        if methods.saturation == "skip":
+            dn = straight_dn(electrons, pixel)
+        elif noisy and methods.noise == "expected":
+            self.work["noise"] += electrons.size
+            dn = _expected(electrons, pixel)
+        else:
+            self.work["saturation"] += electrons.size
+            dn = straight_dn(saturation.clipped(electrons, pixel), pixel)
+        if methods.quantization == "skip":
+            return dn
+        self.work["quantization"] += electrons.size
+        return quantization.dithered(dn, electrons, pixel) if noisy else quantization.rounded(dn, pixel)
+
+
+_KEPT_IMAGERS = 16
+_imagers: OrderedDict[bytes, Imager] = OrderedDict()
+
+
+def imager_of(setup: Setup) -> Imager:
+    """The imager of a setup; the latest ones are kept, so that a kernel is made once in a process."""
+    key = hashlib.sha256(pickle.dumps(setup)).digest()
+    if key not in _imagers:
+        _imagers[key] = Imager(setup)
+        if len(_imagers) > _KEPT_IMAGERS:
+            _imagers.popitem(last=False)
+    _imagers.move_to_end(key)
+    return _imagers[key]
+
+
+def smooth_imager(setup: Setup) -> Imager:
+    """The imager of a setup without clipping and rounding, on every wavelength: what a search sees."""
+    straight = {"saturation": "skip", "quantization": "skip", "noise": "skip", "quadrature": "grid"}
+    return imager_of(replace(setup, methods=Methods(**{**asdict(setup.methods), **straight})))
+
+
+def straight_dn(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+    """Gain and pedestal without clipping or rounding, DN."""
+    return electrons * pixel.dn_per_e + pixel.offset_dn
+
+
+def _expected(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+    """`noise.expected_dn` from a table over the square root of the signal, in which it is smooth."""
+    finite = electrons[np.isfinite(electrons)]
+    brightest = float(2 ** np.ceil(np.log2(max(1.0, finite.max(initial=1.0)))))
+    return np.asarray(_expected_table(pixel, brightest)(np.sqrt(electrons + pixel.read_noise_e**2)), dtype=float)
+
+
+@lru_cache(maxsize=8)
+def _expected_table(pixel: Pixel, brightest_e: float) -> CubicSpline:
+    read = pixel.read_noise_e
+    roots = np.linspace(read, np.sqrt(brightest_e + read**2), _TABLE_NODES)
+    return CubicSpline(roots, noise.expected_dn(np.maximum(roots**2 - read**2, 0.0), pixel))

@@ -1,0 +1,341 @@
+"""Which effects a scene calls for: the cheapest methods whose proven errors sum to at most the study's tolerance.
+
+Effects are switched from the reference to their method one after the other; each promise bounds what that step changes in
+any CSD, for every design of the scene. So the sum bounds the whole. The readout's effects come first: once it is straight,
+what the optics change passes through it unchanged.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from types import ModuleType
+
+import numpy as np
+
+from .arrays import FloatArray
+from .effects import (
+    blur,
+    crosstalk,
+    demosaic,
+    extinction,
+    flicker,
+    illumination,
+    noise,
+    pedestal,
+    phase,
+    quadrature,
+    quantization,
+    sampling,
+    saturation,
+)
+from .effects.bounds import Amounts, Box, Reach
+from .effects.kernel import make_kernel
+from .setup import REFERENCE, Methods
+
+EFFECTS: Mapping[str, ModuleType] = {
+    "noise": noise,
+    "quantization": quantization,
+    "saturation": saturation,
+    "pedestal": pedestal,
+    "quadrature": quadrature,
+    "sampling": sampling,
+    "phase": phase,
+    "demosaic": demosaic,
+    "blur": blur,
+    "crosstalk": crosstalk,
+    "illumination": illumination,
+    "extinction": extinction,
+    "flicker": flicker,
+}
+"""Every effect in the order in which it is switched to its method; methods go from the cheapest to the reference."""
+_READOUT = ("noise", "quantization", "saturation", "pedestal")
+_NOISE_COST = 8
+"""A pixel through the table of the mean readout costs about as much as this many multiplications."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One effect of a plan: its method, what that changes in any CSD at most (DN), and why."""
+
+    effect: str
+    method: str
+    promised_dn: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How one scene is simulated; `work` estimates the operations for all its designs, `reference_work` everything on."""
+
+    scenario: str
+    tolerance_dn: float
+    choices: tuple[Choice, ...]
+    work: float
+    reference_work: float
+    rejected: tuple[tuple[str, str, float], ...] = ()
+
+    @property
+    def methods(self) -> Methods:
+        """The methods, as a setup takes them."""
+        return Methods(**{choice.effect: choice.method for choice in self.choices})
+
+    @property
+    def promised_dn(self) -> float:
+        """No CSD differs by more from the reference."""
+        return sum(choice.promised_dn for choice in self.choices)
+
+    @property
+    def key(self) -> str:
+        """Hash of the methods: part of every cache key, and in every row."""
+        return hashlib.sha256(json.dumps(asdict(self.methods), sort_keys=True).encode()).hexdigest()[:12]
+
+    @property
+    def computed(self) -> tuple[str, ...]:
+        """Effects that are not skipped."""
+        return tuple(c.effect for c in self.choices if c.method not in ("skip", "one"))
+
+
+class _Scene:
+    """One box of designs: what each step changes in it, remembered."""
+
+    def __init__(self, box: Box) -> None:
+        self.box = box
+        self.setup = box.setup
+        self.reach = Reach(box)
+        self.spectrum = extinction.transmittance(self.setup, "spectral", self.setup.grid.nodes_nm)
+        self._kernels: dict[Methods, FloatArray] = {}
+        self._amounts: dict[bytes, Amounts] = {}
+        self._gaps: dict[float, float] = {}
+        self._promises: dict[tuple[str, Methods, Methods], float] = {}
+        self.work: Counter[str] = Counter()
+
+    def promise(self, effect: str, before: Methods, after: Methods) -> float:
+        """What switching `effect` from its reference changes in any CSD, DN."""
+        if getattr(before, effect) == getattr(after, effect):
+            return 0.0
+        if effect in _READOUT:
+            return self._readout_promise(effect, after)
+        # What optics change does not depend on these.
+        others = {e: getattr(REFERENCE, e) for e in ("noise", "pedestal", "quadrature") if e != effect}
+        key = (effect, replace(before, **others), replace(after, **others))
+        if key not in self._promises:
+            self._promises[key] = self._linear_promise(*key)
+        return self._promises[key]
+
+    def _readout_promise(self, effect: str, after: Methods) -> float:
+        """Ranges of the change in each channel, put together over the channels."""
+        pixel = self.setup.pixel
+        others = self.setup.pixel.dark_e_per_s * self.reach.longest_s * pixel.dn_per_e + self.reach.background_dn
+        tops = self.reach.brightest_dn + others
+        if pixel.crosstalk:
+            tops = np.full(tops.size, tops.max())
+        if effect == "noise":
+            each = [noise.promise(self.setup, top / pixel.dn_per_e) for top in tops]
+        elif effect == "quantization":
+            each = [quantization.promise(self.setup)] * tops.size
+        elif effect == "saturation":
+            each = [saturation.promise(self.setup, top / pixel.dn_per_e) for top in tops]
+        else:
+            soft = self.setup.scenario.noise and after.noise == "expected"
+            clipped = after.saturation == "clip"
+            each = [
+                pixel.offset_dn if soft and clipped else pedestal.promise(self.setup, top, clipped=clipped)
+                for top in tops
+            ]
+        return float(np.linalg.norm(each))
+
+    def _kernel(self, methods: Methods) -> FloatArray:
+        """The kernel at the knots for the reference's places, without extinction, [cases, channels, channels, knots]."""
+        on = "skip" if methods.blur == "skip" else REFERENCE.blur
+        wanted = replace(methods, extinction="skip", illumination="skip", blur=on)
+        wanted = replace(wanted, **{e: getattr(REFERENCE, e) for e in (*_READOUT, "quadrature", "flicker")})
+        if wanted not in self._kernels:
+            light = make_kernel(self.setup, wanted, self.reach.knots_nm, by_pixel=False, work=self.work).light
+            places = phase.places_px(self.setup, REFERENCE.phase)
+            at = np.zeros(len(places), dtype=np.intp)
+            if len(light) > 1:
+                at = phase.nearest(self.setup, places, phase.places_px(self.setup, wanted.phase))
+            full = np.broadcast_to(light, (*light.shape[:3], self.reach.knots_nm.size))
+            self._kernels[wanted] = np.ascontiguousarray(full[at])
+        return self._kernels[wanted]
+
+    def _between_knots(self, methods: Methods) -> float:
+        """How far a kernel may be from its interpolation between the knots."""
+        setup, target = self.setup, self.setup.scenario.target
+        if target is None or methods.blur == "skip" or self.reach.knots_nm.size == setup.grid.size:
+            return 0.0
+        aperture = 0.0 if methods.sampling == "skip" else setup.pixel.fill_factor**0.5 * setup.pixel.pitch_um
+        radius = sampling.radii_px(setup, target)[0] * setup.pixel.pitch_um
+        w20_um = blur.defocus_um(setup.scenario, setup.pixel.pitch_um)
+        f_number = setup.scenario.optics.f_number
+        if aperture not in self._gaps:
+            knots_um = self.reach.knots_nm * 1e-3
+            self._gaps[aperture] = blur.interpolation_bound(radius, aperture, knots_um, f_number, w20_um)
+        return self._gaps[aperture]
+
+    def amounts(self, factor: FloatArray, low: FloatArray, high: FloatArray) -> Amounts:
+        """`Reach.amounts`, remembered."""
+        key = factor.tobytes() + low.tobytes() + high.tobytes()
+        digest = hashlib.sha256(key).digest()
+        if digest not in self._amounts:
+            self._amounts[digest] = self.reach.amounts(factor, low, high)
+        return self._amounts[digest]
+
+    def _linear_promise(self, effect: str, before: Methods, after: Methods) -> float:
+        box, setup, reach = self.box, self.setup, self.reach
+        straight = after.saturation == "skip" and after.quantization == "skip"
+        falls = illumination.factor(setup, after.illumination if effect != "illumination" else before.illumination)
+        base = changed = self.amounts(self.spectrum * falls, box.low, box.high)
+        now, then = self._kernel(before), self._kernel(after)
+        left, remainder = then, self._between_knots(before)
+        if effect == "quadrature":
+            kept = quadrature.nodes(setup.grid.size, after.quadrature)
+            middle, half = quadrature.deviation(box.low, box.high, kept)
+            changed, change = self.amounts(self.spectrum * falls, middle - half, middle + half), now
+        elif effect == "illumination":
+            lost = 1 - illumination.factor(setup, after.illumination) / falls
+            change, remainder = now * lost, remainder * abs(lost)
+        elif effect == "extinction":
+            other = extinction.transmittance(setup, after.extinction, setup.grid.nodes_nm)
+            changed = self.amounts((self.spectrum - other) * falls, box.low, box.high)
+            base, change = self.amounts(other * falls, box.low, box.high), now
+        elif effect == "flicker":
+            share = self._flicker_share(after.flicker, straight=straight)
+            change, remainder = now * share, remainder * share
+        else:
+            change = now - then
+            if effect != "blur":  # what is interpolated in both kernels; nothing where they are the same
+                remainder = (remainder + self._between_knots(after)) * bool(change.any())
+        if remainder == 0 and not change.any():
+            return 0.0
+        found = reach.largest_change(changed, change, remainder, base, left, straight=straight)
+        steep = quantization.steepness(setup) if after.quantization == "round" and setup.scenario.noise else 1.0
+        return found * steep
+
+    def _flicker_share(self, method: str, *, straight: bool) -> float:
+        """What a method misses of the light, relative to the most light of a pulsed exposure."""
+        reach = self.reach
+        below, above = 1 - reach.least_light, reach.most_light - 1
+        if method == "ends":
+            return 0.0 if straight else (below + above) / 2 / reach.most_light
+        return (below if straight else max(below, above)) / reach.most_light
+
+    def work_of(self, methods: Methods) -> float:
+        """Estimated operations of a run of all designs."""
+        setup, target = self.setup, self.setup.scenario.target
+        grid, signals = setup.grid.size, len(setup.lights.photons)
+        channels = len(setup.mosaic.channels)
+        straight = methods.saturation == "skip" and methods.quantization == "skip"
+        cases, pixels, kernel = 1.0, float(channels), 0.0
+        if target is not None and methods.sampling != "skip":
+            cases = float(len(phase.places_px(setup, methods.phase)))
+            across = 2 * sampling.radii_px(setup, target)[1] + 1
+            places = max(across, 2.0 * max(setup.mosaic.indices.shape)) ** 2
+            pixels = channels if straight else places
+            waves = {"skip": 1, "every 10 nm": self.reach.knots_nm.size}.get(methods.blur, grid)
+            kernel = cases * places * channels * waves + (200 * places * waves if methods.blur != "skip" else 0)
+        elif target is not None and methods.blur != "skip":
+            kernel = 500.0 * (self.reach.knots_nm.size if methods.blur == "every 10 nm" else grid)
+        nodes = quadrature.nodes(grid, methods.quadrature).size
+        touched = pixels * max(len(setup.modified), 1) / channels
+        scales = len(flicker.scales(setup, methods.flicker, np.ones(1))[0])
+        values = cases * scales * signals
+        each = values / scales * touched * nodes + values * channels * signals / 2
+        if methods.saturation != "skip":
+            each += values * pixels * (_NOISE_COST if setup.scenario.noise and methods.noise != "skip" else 1)
+        each += values * pixels if methods.quantization != "skip" else 0.0
+        return kernel + self.box.n_designs * each
+
+
+class Planner:
+    """Finds the plan of a scene for all its boxes of designs."""
+
+    def __init__(self, boxes: Sequence[Box]) -> None:
+        self._scenes = [_Scene(box) for box in boxes]
+        self._exact = {effect: self._why_exact(effect) for effect in EFFECTS}
+
+    def _why_exact(self, effect: str) -> str | None:
+        """The reason when skipping an effect changes nothing in any box."""
+        if effect == "saturation":
+            if any(scene.promise(effect, REFERENCE, replace(REFERENCE, saturation="skip")) for scene in self._scenes):
+                return None
+            if any(scene.setup.scenario.noise for scene in self._scenes):
+                return None
+            top = max(float(scene.reach.brightest_dn.max()) for scene in self._scenes)
+            return f"the brightest signal has at most {top:.0f} DN"
+        reasons = [EFFECTS[effect].skip_is_exact(scene.setup) for scene in self._scenes]
+        return None if None in reasons else str(reasons[0])
+
+    def promise(self, effect: str, before: Methods, after: Methods) -> float:
+        """What switching an effect changes in any CSD of any box, DN."""
+        return max((scene.promise(effect, before, after) for scene in self._scenes), default=0.0)
+
+    def plan(self, scenario: str, tolerance_dn: float) -> Plan:
+        """The cheapest plan whose promises sum to at most `tolerance_dn`."""
+        best: tuple[float, float, Methods, dict[str, float]] | None = None
+        rejected: dict[tuple[str, str], float] = {}
+        for methods, promises in self._candidates(tolerance_dn, rejected):
+            work = sum(scene.work_of(methods) for scene in self._scenes)
+            total = sum(promises.values())
+            if best is None or (work, total) < best[:2]:
+                best = (work, total, methods, promises)
+        assert best is not None  # the reference promises 0
+        work, _, methods, promises = best
+        choices = tuple(
+            Choice(
+                e, getattr(methods, e), promises.get(e, 0.0), self._reason(e, getattr(methods, e), promises.get(e, 0.0))
+            )
+            for e in EFFECTS
+        )
+        shown = tuple((e, m, dn) for (e, m), dn in rejected.items() if getattr(methods, e) != m)
+        whole = sum(scene.work_of(REFERENCE) for scene in self._scenes)
+        return Plan(scenario, tolerance_dn, choices, work, whole, shown)
+
+    def _candidates(
+        self, tolerance_dn: float, rejected: dict[tuple[str, str], float]
+    ) -> Iterator[tuple[Methods, dict[str, float]]]:
+        """Every combination within the tolerance, with the promise of each of its effects."""
+        start = replace(REFERENCE, **{e: EFFECTS[e].METHODS[0] for e in EFFECTS if self._exact[e] is not None})
+        active = [e for e in EFFECTS if self._exact[e] is None]
+
+        def deeper(at: int, methods: Methods, promises: dict[str, float]) -> Iterator[tuple[Methods, dict[str, float]]]:
+            if at == len(active):
+                yield methods, promises
+                return
+            effect = active[at]
+            for method in EFFECTS[effect].METHODS:
+                after = replace(methods, **{effect: method})
+                if not self._allowed(effect, after):
+                    continue
+                promised = self.promise(effect, methods, after)
+                if (effect, method) not in rejected or promised < rejected[effect, method]:
+                    rejected[effect, method] = promised
+                # Behind a rounded readout, an error however small may move a value by a whole step.
+                rounded = after.quantization == "round" and not self._noisy
+                if sum(promises.values()) + promised <= (0.0 if rounded and effect not in _READOUT else tolerance_dn):
+                    yield from deeper(at + 1, after, promises | {effect: promised})
+
+        yield from deeper(0, start, {})
+
+    @property
+    def _noisy(self) -> bool:
+        return any(scene.setup.scenario.noise for scene in self._scenes)
+
+    def _allowed(self, effect: str, methods: Methods) -> bool:
+        """Without pixels nothing can saturate or be rounded one by one; noise is in the mean only where something clips."""
+        if effect == "saturation" and methods.saturation == "skip":
+            return self._exact["noise"] is not None or methods.noise == "skip"
+        straight = methods.saturation == "skip" and methods.quantization == "skip"
+        return effect != "sampling" or methods.sampling != "skip" or straight
+
+    def _reason(self, effect: str, method: str, promised: float) -> str:
+        exact = self._exact[effect]
+        if exact is not None:
+            return exact
+        if method == EFFECTS[effect].METHODS[-1]:
+            return "needed" if promised == 0 else "the reference"
+        return f"changes a CSD by at most {promised:.2g} DN"

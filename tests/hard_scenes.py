@@ -1,0 +1,235 @@
+"""Scenes in which single effects are strong, weak or at an edge case, and a random generator of scenes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from sweep.datasets import BUILT_IN_LIGHTS
+from sweep.datasets.lights import Lights
+from sweep.effects.bounds import Box
+from sweep.families import Stopband
+from sweep.filters import BUILT_IN_SENSORS
+from sweep.mosaics import Mosaic
+from sweep.scenes import Scenario
+from sweep.sensor import Pixel
+from sweep.setup import Setup
+from sweep.spectra import WavelengthGrid
+
+GRID = WavelengthGrid(step_nm=5)
+SENSOR = BUILT_IN_SENSORS["ar0820"](GRID)
+FAMILY = Stopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"])
+LOW = np.array([595.0, 20.0, 640.0, 6.0, 0.9])
+HIGH = np.array([605.0, 30.0, 650.0, 20.0, 1.0])
+TILES = {
+    "RGGB": Mosaic.from_name("RGGB"),
+    "RCCC": Mosaic.from_name("RCCC"),
+    "RYNCy": Mosaic.from_name("RYNCy"),
+    "3x3": Mosaic.from_rows("3x3", [["R", "C", "C"], ["C", "N", "C"], ["C", "C", "Cy"]]),
+    "1x3": Mosaic.from_rows("1x3", [["R", "N", "B"]]),
+    "quad": Mosaic.from_rows(
+        "quad", [["R", "R", "G", "G"], ["R", "R", "G", "G"], ["G", "G", "B", "B"], ["G", "G", "B", "B"]]
+    ),
+}
+
+
+@cache
+def lights() -> Lights:
+    """Three signals of each type: enough for pairs of every kind, few enough for thousands of scenes."""
+    whole = BUILT_IN_LIGHTS["tl16"](GRID)
+    kept = [int(i) for members in whole.members.values() for i in members[:: max(1, len(members) // 3)][:3]]
+    names, types = tuple(whole.names[i] for i in kept), tuple(whole.types[i] for i in kept)
+    return Lights("few", names, types, whole.photons[kept], whole.photon_ratio, "", True)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A scene with one design, and the box of designs that the plan is for."""
+
+    name: str
+    setup: Setup
+    curves: np.ndarray
+    box: Box
+
+
+def scene(
+    name: str,
+    cfa: str,
+    scenario: dict[str, Any],
+    pixel: dict[str, Any] | None = None,
+    wide: bool = False,
+    seed: int = 1,
+) -> Scene:
+    """`wide`: plan for a box of filters; else for the one design."""
+    mosaic = TILES[cfa]
+    modified = (mosaic.channels.index("N"),) if "N" in mosaic.channels else ()
+    setup = Setup(
+        GRID,
+        mosaic,
+        SENSOR.mosaic_qe(mosaic, {"N": "Y"} if modified else None),
+        modified,
+        SENSOR.qe["C"],
+        lights(),
+        Pixel(**(pixel or {})),
+        Scenario.model_validate(scenario),
+    )
+    x = LOW + (HIGH - LOW) * np.random.default_rng(seed).uniform(size=5)
+    curves = FAMILY.curves(x[None]) if modified else np.empty((1, 0, GRID.size))
+    low, high = setup.qe.copy(), setup.qe.copy()
+    if modified:
+        low[list(modified)] = FAMILY.lower(LOW, HIGH) if wide else curves[0]
+        high[list(modified)] = FAMILY.upper(LOW, HIGH) if wide else curves[0]
+    return Scene(name, setup, curves, Box(setup, low, high, 1000))
+
+
+def target(distance_m: float, fov_deg: float, **more: Any) -> dict[str, Any]:
+    return {"distance_m": distance_m, "fov_deg": fov_deg, **more}
+
+
+NEAR, MIDDLE, FAR = target(20, 120), target(100, 60), target(250, 30)
+F2, F4 = {"f_number": 2.0}, {"f_number": 4.0}
+FIXED = {"kind": "fixed", "exposure_s": 2e-3}
+DARK = {"read_noise_e": 2.0, "offset_dn": 64.0}
+
+HARD: tuple[Scene, ...] = (
+    scene("paper", "RYNCy", {}),
+    scene("paper, box", "RYNCy", {}, wide=True),
+    scene("near", "RYNCy", {"target": NEAR, "optics": F4}),
+    scene("middle", "RYNCy", {"target": MIDDLE, "optics": F4}),
+    scene("far", "RYNCy", {"target": FAR, "optics": F4}),
+    scene("far, box", "RYNCy", {"target": FAR, "optics": F2}, wide=True),
+    scene("far, RGGB", "RGGB", {"target": FAR, "optics": F2}),
+    scene("far, RCCC", "RCCC", {"target": FAR, "optics": F2}),
+    scene("far, any place", "RYNCy", {"target": FAR | {"phase_px": "any"}, "optics": F2}),
+    scene("near, any place", "RGGB", {"target": NEAR | {"phase_px": "any"}, "optics": F2}),
+    scene("far, half a pixel off", "RYNCy", {"target": FAR | {"phase_px": [0.5, 0.5]}, "optics": F2}),
+    scene("far, on a corner", "RGGB", {"target": FAR | {"phase_px": [1.5, 0.5]}, "optics": F2}),
+    scene("one pixel", "RYNCy", {"target": target(1000, 20, phase_px="any"), "optics": F2}),
+    scene("a quarter of a pixel", "RYNCy", {"target": target(2000, 60), "optics": F2}),
+    scene("3x3 tile", "3x3", {"target": FAR, "optics": F2}),
+    scene("3x3 tile, center", "3x3", {"target": FAR | {"readout": "center"}, "optics": F2}),
+    scene("1x3 tile", "1x3", {"target": FAR | {"phase_px": "any"}, "optics": F2}),
+    scene("quad Bayer, center", "quad", {"target": FAR | {"readout": "center", "phase_px": [1.3, 0.2]}, "optics": F2}),
+    scene("center, near", "RYNCy", {"target": NEAR | {"readout": "center"}, "optics": F4}),
+    scene("center, far", "RYNCy", {"target": FAR | {"readout": "center", "phase_px": "any"}, "optics": F4}),
+    scene("f/1", "RYNCy", {"target": FAR, "optics": {"f_number": 1.0}}),
+    scene("f/16", "RYNCy", {"target": FAR, "optics": {"f_number": 16.0}}),
+    scene("f/64", "RGGB", {"target": FAR, "optics": {"f_number": 64.0}}),
+    scene("focus at 1 m", "RYNCy", {"target": FAR, "optics": {"f_number": 2.0, "focus_m": 1.0}}),
+    scene("focus at 10 m", "RYNCy", {"target": NEAR, "optics": {"f_number": 2.0, "focus_m": 10.0}}),
+    scene("small aperture", "RYNCy", {"target": FAR, "optics": F2}, {"fill_factor": 0.3}),
+    scene("crosstalk", "RYNCy", {}, {"crosstalk": 0.1}),
+    scene("crosstalk, far", "RYNCy", {"target": FAR, "optics": F2}, {"crosstalk": 0.03}),
+    scene("crosstalk, quad", "quad", {}, {"crosstalk": 0.2}),
+    scene("off axis", "RYNCy", {"off_axis_deg": 40}),
+    scene("off axis, a little", "RYNCy", {"off_axis_deg": 1, "target": FAR}),
+    scene("fog", "RYNCy", {"target": MIDDLE, "visibility_m": 100}),
+    scene("haze", "RYNCy", {"target": FAR, "visibility_m": 4000}),
+    scene("clear day", "RYNCy", {"target": FAR, "visibility_m": 50_000}),
+    scene("background", "RYNCy", {"target": MIDDLE, "background_cd_m2": 3000, "exposure": FIXED, "intensity_cd": 200}),
+    scene(
+        "flicker",
+        "RYNCy",
+        {"drive": {"duty": 0.3, "frequency_hz": 90}, "exposure": {"kind": "fixed", "exposure_s": 0.03}},
+    ),
+    scene("flicker, short", "RYNCy", {"drive": {"duty": 0.7, "frequency_hz": 100}, "exposure": FIXED}),
+    scene("flicker, box", "RYNCy", {"drive": {"duty": 0.5, "frequency_hz": 2000}}, wide=True),
+    scene("luminous", "RYNCy", {"intensity_cd": 200, "exposure": {"kind": "fixed", "exposure_s": 1e-3}}),
+    scene(
+        "red saturates", "RYNCy", {"intensity_cd": 200, "exposure": {"kind": "fixed", "exposure_s": 4e-2}, "optics": F2}
+    ),
+    scene("everything saturates", "RGGB", {"intensity_cd": 800, "exposure": {"kind": "fixed", "exposure_s": 1.0}}),
+    scene(
+        "saturated disc",
+        "RGGB",
+        {"intensity_cd": 200, "target": FAR, "exposure": {"kind": "fixed", "exposure_s": 2e-2}, "optics": F2},
+    ),
+    scene("nearly saturated", "RYNCy", {"exposure": {"kind": "white_patch", "level": 1.0, "photon_ratio": 1.0}}),
+    scene(
+        "saturated, pedestal",
+        "RYNCy",
+        {"intensity_cd": 200, "exposure": {"kind": "fixed", "exposure_s": 2e-2}},
+        {"offset_dn": 200},
+    ),
+    scene(
+        "well below the ADC",
+        "RYNCy",
+        {"intensity_cd": 200, "exposure": {"kind": "fixed", "exposure_s": 2e-2}},
+        {"well_e": 8000, "gain_dn_per_e": 0.3},
+    ),
+    scene("pedestal", "RYNCy", {}, {"offset_dn": 168}),
+    scene("noise", "RYNCy", {"noise": True}, DARK),
+    scene("noise, far", "RYNCy", {"noise": True, "target": FAR, "optics": F2}, DARK | {"prnu": 0.01}),
+    scene("noise, no pedestal", "RYNCy", {"noise": True}, {"read_noise_e": 3.0}),
+    scene("noise, little", "RGGB", {"noise": True}, {"read_noise_e": 0.3, "offset_dn": 64.0}),
+    scene(
+        "noise, saturated",
+        "RYNCy",
+        {"noise": True, "intensity_cd": 200, "exposure": {"kind": "fixed", "exposure_s": 2e-2}},
+        DARK,
+    ),
+    scene("dark", "RYNCy", {"photon_radiance": 1e10, "exposure": FIXED}),
+    scene("8 bits", "RYNCy", {"target": MIDDLE}, {"bits": 8}),
+    scene(
+        "everything",
+        "RYNCy",
+        {
+            "noise": True,
+            "target": FAR | {"phase_px": "any"},
+            "visibility_m": 2000,
+            "off_axis_deg": 10,
+            "background_cd_m2": 50,
+            "intensity_cd": 200,
+            "exposure": {"kind": "fixed", "exposure_s": 5e-3},
+            "drive": {"duty": 0.5, "frequency_hz": 1000},
+            "optics": F2,
+        },
+        DARK | {"crosstalk": 0.02},
+    ),
+)
+
+
+def random_scene(seed: int) -> Scene:
+    """Any mixture of effects, in moderate strength."""
+    rng = np.random.default_rng([seed, 17])
+
+    def now(probability: float) -> bool:
+        return bool(rng.uniform() < probability)
+
+    given: dict[str, Any] = {"optics": {"f_number": float(2 ** rng.uniform(0.3, 4))}}
+    if now(0.7):
+        given["target"] = target(
+            float(10 ** rng.uniform(1.5, 2.7)),
+            float(rng.uniform(20, 120)),
+            readout="center" if now(0.3) else "mean",
+            phase_px="any" if now(0.15) else [float(v) for v in rng.uniform(0, 2, 2)],
+        )
+        if now(0.3):
+            given["visibility_m"] = float(10 ** rng.uniform(2, 4.5))
+        if now(0.15):
+            given["optics"]["focus_m"] = float(10 ** rng.uniform(0.5, 2))
+    if now(0.3):
+        given["off_axis_deg"] = float(rng.uniform(0, 50))
+    if now(0.5):
+        given["exposure"] = {"kind": "fixed", "exposure_s": float(10 ** rng.uniform(-3.5, -1.5))}
+    if now(0.3):
+        given["intensity_cd"] = 200.0
+    if now(0.2):
+        given["background_cd_m2"] = float(10 ** rng.uniform(0, 3.5))
+    if now(0.2):
+        given["drive"] = {"duty": float(rng.uniform(0.1, 1)), "frequency_hz": float(10 ** rng.uniform(1.7, 3.5))}
+    given["noise"] = now(0.4)
+    pixel: dict[str, Any] = {"fill_factor": float(rng.uniform(0.3, 1)), "offset_dn": 64.0 if now(0.5) else 0.0}
+    if now(0.3):
+        pixel["crosstalk"] = float(rng.uniform(0, 0.15))
+    if given["noise"]:
+        pixel |= {"read_noise_e": float(rng.uniform(0.2, 5)), "prnu": 0.01 if now(0.5) else 0.0}
+    cfa = str(rng.choice(list(TILES)))
+    return scene(f"random {seed}", cfa, given, pixel, wide=now(0.3), seed=seed)
+
+
+def with_methods(made: Scene, **methods: str) -> Setup:
+    return replace(made.setup, methods=replace(made.setup.methods, **methods))
