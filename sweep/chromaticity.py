@@ -56,7 +56,9 @@ def _photopic(grid: WavelengthGrid) -> FloatArray:
     from colour import SDS_LEFS  # noqa: PLC0415  (more than a second to import)
 
     efficiency = SDS_LEFS["CIE 1924 Photopic Standard Observer"]
-    return np.interp(grid.nodes_nm, efficiency.wavelengths, efficiency.values, left=0.0, right=0.0)
+    return np.asarray(
+        np.interp(grid.nodes_nm, efficiency.wavelengths, efficiency.values, left=0.0, right=0.0), dtype=float
+    )
 
 
 def luminance_per_photon_radiance(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:

@@ -37,7 +37,7 @@ CURVE_COLORS = {
 }
 LINE_COLORS = {"front of the search": "#d55e00", "limit of any filter": "#009e73"}
 TYPE_COLORS = {"green": "#009e73", "yellow": "#c9a800", "orange": "#e66100", "red": "#b2182b"}
-_CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
+CURVE_CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 _LABEL_BOX = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0}
 _DRAWN_POINTS = 10_000
 
@@ -109,7 +109,7 @@ def thin(points: Points, most: int = _DRAWN_POINTS) -> Points:
 
 def draw_pareto(figure: ParetoFigure) -> Figure:
     """Draw the trade-off; infeasible and feasible designs, front, optimum and named designs each have their marker."""
-    canvas, axes = _canvas(8.0, 5.0)
+    figure_, axes = canvas(8.0, 5.0)
     styles: dict[str, dict[str, Any]] = {
         "infeasible": {"marker": "x", "s": 9, "alpha": 0.45, "linewidths": 0.6, "zorder": 1},
         "feasible": {"marker": "o", "s": 6, "alpha": 0.5, "linewidths": 0, "zorder": 2},
@@ -145,7 +145,7 @@ def draw_pareto(figure: ParetoFigure) -> Figure:
     axes.set_ylabel(figure.y_label)
     axes.set_title(figure.title)
     axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0, frameon=False)
-    return canvas
+    return figure_
 
 
 def _group_label(group: str, points: Points) -> str:
@@ -172,8 +172,8 @@ def _level_labels(heights: Sequence[tuple[str, float]], limits: tuple[float, flo
 
 def draw_curves(figure: CurvesFigure) -> Figure:
     """Draw curves over wavelength."""
-    canvas, axes = _canvas(8.0, 4.0)
-    spare = iter(_CYCLE * (1 + len(figure.curves) // len(_CYCLE)))
+    figure_, axes = canvas(8.0, 4.0)
+    spare = iter(CURVE_CYCLE * (1 + len(figure.curves) // len(CURVE_CYCLE)))
     for name, values in figure.curves.items():
         color = figure.colors.get(name) or CURVE_COLORS.get(name) or next(spare)
         style = "--" if name in figure.dashed else "-"
@@ -187,7 +187,7 @@ def draw_curves(figure: CurvesFigure) -> Figure:
     axes.margins(x=0)
     axes.set_title(figure.title)
     axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0, frameon=False)
-    return canvas
+    return figure_
 
 
 def draw_clouds(rows: Sequence[Sequence[Cloud]], title: str, top_dn: float) -> Figure:
@@ -235,7 +235,8 @@ def _rectangle(x: float, y: float, color: FloatArray) -> Rectangle:
     return Rectangle((x, y), 0.9, 0.9, facecolor=tuple(color))
 
 
-def _canvas(width_in: float, height_in: float) -> tuple[Figure, Axes]:
+def canvas(width_in: float, height_in: float) -> tuple[Figure, Axes]:
+    """An empty figure with one pair of axes, sizes in inches."""
     figure = _figure(width_in, height_in)
     axes = figure.add_subplot()
     _decorate(axes)

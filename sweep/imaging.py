@@ -1,7 +1,7 @@
 """The image chain of a scene: light on the pixels, electrons, full well, readout, for a block of designs.
 
-In the physical order: optics blur, pixel aperture and mosaic sampling with crosstalk, photon noise, full well, read noise,
-pedestal, ADC, readout (mean over the disc, or demosaicked center). Only what `Setup.methods` names is computed.
+In the physical order: optics blur, pixel aperture and mosaic sampling with crosstalk, photon noise, full well, read
+noise, pedestal, ADC, readout (mean over the disc, or demosaicked center). Only what `Setup.methods` names is computed.
 """
 
 from __future__ import annotations

@@ -76,12 +76,13 @@ def limit_of(problem: Problem, tolerance_dn: float = 1e-3) -> Limit:
 
 def why_not(problem: Problem) -> str | None:
     """Why a problem has no linear limit; None when it has."""
-    if problem.family.n_modified != 1:
-        return "more than one modified channel"
-    if problem.objective.rule == "sum":
-        return "the objective is a sum"
-    if problem.setup.pixel.crosstalk > 0:
-        return "crosstalk mixes the modified channel into others"
+    for refused, reason in (
+        (problem.family.n_modified != 1, "more than one modified channel"),
+        (problem.objective.rule == "sum", "the objective is a sum"),
+        (problem.setup.pixel.crosstalk > 0, "crosstalk mixes the modified channel into others"),
+    ):
+        if refused:
+            return reason
     if (_top(problem) > problem.setup.base_qe[0] * (1 + _ROUNDING)).any():
         return "filters of the box may exceed the curve that they replace"
     if _clips(problem):

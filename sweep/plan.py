@@ -1,8 +1,8 @@
 """Which effects a scene calls for: the cheapest methods whose proven errors sum to at most the study's tolerance.
 
-Effects are switched from the reference to their method one after the other; each promise bounds what that step changes in
-any CSD, for every design of the scene. So the sum bounds the whole. The readout's effects come first: once it is straight,
-what the optics change passes through it unchanged.
+Effects are switched from the reference to their method one after the other; each promise bounds what that step changes
+in any CSD, for every design of the scene. So the sum bounds the whole. The readout's effects come first: once it is
+straight, what the optics change passes through it unchanged.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class Choice:
 
 @dataclass(frozen=True)
 class Plan:
-    """How one scene is simulated; `work` estimates the operations for all its designs, `reference_work` everything on."""
+    """How one scene is simulated; `work` estimates the operations for all designs, `reference_work` everything on."""
 
     scenario: str
     tolerance_dn: float
@@ -149,7 +149,7 @@ class _Scene:
         return float(np.linalg.norm(each))
 
     def _kernel(self, methods: Methods) -> FloatArray:
-        """The kernel at the knots for the reference's places, without extinction, [cases, channels, channels, knots]."""
+        """The kernel at the knots at the reference's places, without extinction: [cases, channels, channels, knots]."""
         on = "skip" if methods.blur == "skip" else REFERENCE.blur
         wanted = replace(methods, extinction="skip", illumination="skip", blur=on)
         wanted = replace(wanted, **{e: getattr(REFERENCE, e) for e in (*_READOUT, "quadrature", "flicker")})
@@ -326,7 +326,7 @@ class Planner:
         return any(scene.setup.scenario.noise for scene in self._scenes)
 
     def _allowed(self, effect: str, methods: Methods) -> bool:
-        """Without pixels nothing can saturate or be rounded one by one; noise is in the mean only where something clips."""
+        """Without pixels nothing saturates or is rounded one by one; noise moves a mean only where something clips."""
         if effect == "saturation" and methods.saturation == "skip":
             return self._exact["noise"] is not None or methods.noise == "skip"
         straight = methods.saturation == "skip" and methods.quantization == "skip"

@@ -57,9 +57,10 @@ class Geometry(Section):
 class Target(Geometry):
     """A traffic light as a disc on the sensor.
 
-    `phase_px`: where its center falls, in pixels from the center of the tile's first pixel (column, row); `any` asks for
-    the worst of all places. `readout`: `mean` of each channel's pixels over the disc, weighted by how much of each the
-    disc covers (over at least the radius in which every channel has a pixel), or the demosaicked pixel at the `center`.
+    `phase_px`: where its center falls, in pixels from the center of the tile's first pixel (column, row); `any` asks
+    for the worst of all places. `readout`: `mean` of each channel's pixels over the disc, weighted by how much of each
+    the disc covers (over at least the radius in which every channel has a pixel), or the demosaicked pixel at the
+    `center`.
     """
 
     phase_px: Literal["any"] | Annotated[list[float], Field(min_length=2, max_length=2)] = [0.0, 0.0]

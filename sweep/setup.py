@@ -127,4 +127,5 @@ def exposure_times(setup: Setup, modified_white: FloatArray) -> FloatArray:
     fixed = setup.qe[list(setup.fixed)] @ white_irradiance(setup) * per_photon(setup)
     brightest = np.maximum(modified_white.max(axis=1, initial=0.0), fixed.max(initial=0.0))
     full_e = exposure.level * setup.pixel.full_scale_dn / setup.pixel.dn_per_e
-    return np.divide(full_e, brightest, out=np.full(len(brightest), np.inf), where=brightest > 0)
+    found = np.full(len(brightest), np.inf)
+    return np.asarray(np.divide(full_e, brightest, out=found, where=brightest > 0), dtype=float)

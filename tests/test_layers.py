@@ -21,11 +21,13 @@ LEVELS = [
     {"plan", "imaging"},
     {"evaluate"},
     {"store", "problem", "figures"},
+    {"series"},
     {"smooth", "limit"},
     {"search"},
     {"study"},
     {"runner"},
     {"report", "calibration"},
+    {"audit"},
     {"cli"},
     {"__main__"},
 ]

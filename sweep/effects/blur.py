@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -112,7 +113,7 @@ def mean_over_disc(
     nu, weight = _frequencies(radius_um + readout_um, wavelength_um, f_number)
     inner = j1(2 * math.pi * radius_um * nu) * weight
     inner *= (2 * radius_um / readout_um) * j1(2 * math.pi * readout_um * nu) / nu
-    return inner @ transfer(nu, wavelength_um, f_number, w20_um)
+    return np.asarray(inner @ transfer(nu, wavelength_um, f_number, w20_um), dtype=float)
 
 
 def _envelope(x: FloatArray) -> FloatArray:
@@ -126,8 +127,9 @@ def interpolation_bound(
     """No kernel of this disc differs by more than this from its linear interpolation between the knots.
 
     In focus |d2h/dlambda2| step^2 / 8, else |dh/dlambda| step / 2 (a derivative of the OTF by lambda at given nu is
-    never larger with defocus than without). Both derivatives are bounded by the integral of the absolute integrand, with
-    an envelope of |J1|; for s = lambda N nu fixed that falls with lambda, so each interval's shorter end counts, but
+    never larger with defocus than without). Both derivatives are bounded by the integral of the absolute integrand,
+    with an envelope of |J1|; for s = lambda N nu fixed that falls with lambda, so each interval's shorter end counts,
+    but
     for the pixel aperture, whose transfer falls with nu, where the longer end does.
     """
     u, weight = np.polynomial.legendre.leggauss(200)
@@ -135,7 +137,7 @@ def interpolation_bound(
     s = np.sin(u)
     theta = (np.arange(64) + 0.5) / 64 * (math.pi / 2)
     worst = 0.0
-    for short, long in zip(knots_um[:-1], knots_um[1:], strict=True):
+    for short, long in pairwise(knots_um):
         nu = s / (short * f_number)
         aperture = 1.0
         if aperture_um > 0:

@@ -1,8 +1,8 @@
 """How much a change of a linear effect can change a CSD, for every design of a box: a proven upper bound.
 
-A CSD is the smallest of the distances of all pairs, so it changes by no more than the distance of a pair that can be the
-smallest, before or after; and a distance changes by no more than the norm of the change of its difference vector. That is
-linear in QE and kernel, and both are known up to an interval.
+A CSD is the smallest of the distances of all pairs, so it changes by no more than the distance of a pair that can be
+the smallest, before or after; and a distance changes by no more than the norm of the change of its difference vector.
+That is linear in QE and kernel, and both are known up to an interval.
 """
 
 from __future__ import annotations
@@ -127,19 +127,23 @@ class Reach:
             each = np.abs(_flat(changed.middle) @ by) + _flat(changed.half_each) @ size
             each += remainder * changed.most_each.sum(axis=1, keepdims=True)
             moved = each[self.first] + each[self.second]
-        far = np.linalg.norm(moved.reshape(shape), axis=2)
+        far = _norms(moved.reshape(shape))
         middle = np.abs(pairs @ _flat(after, 2).T).reshape(shape)
         width = (_flat(base.half) @ np.abs(_flat(after, 2)).T).reshape(shape)
         width += (remainder * base.most.sum(axis=1))[:, None, None]
         shortened = self.shortest_s / self.longest_s * self.least_light / self.most_light if straight else 0.0
-        least = np.linalg.norm(np.maximum(middle - width, 0.0), axis=2) * shortened
-        most = np.linalg.norm(middle + width, axis=2)
+        least = _norms(np.maximum(middle - width, 0.0)) * shortened
+        most = _norms(middle + width)
         worst = 0.0
         for group in range(int(self.group.max(initial=-1)) + 1):
             own = self.group == group
             can_be = least[own] - far[own] <= (most[own] + far[own]).min(axis=0)
             worst = max(worst, float(far[own][can_be].max(initial=0.0)))
         return worst
+
+
+def _norms(vectors: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt(np.einsum("pcv,pcv->pc", vectors, vectors)), dtype=float)
 
 
 def _flat(values: FloatArray, kept: int = 1) -> FloatArray:

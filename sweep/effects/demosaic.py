@@ -44,4 +44,4 @@ def _nearest_offset(offsets: FloatArray) -> FloatArray:
     """Offset of the nearest pixel along one axis, ndarray[n_cases, 1, 1]."""
     flat = offsets.reshape(len(offsets), -1)
     nearest = np.abs(flat).argmin(axis=1)
-    return flat[np.arange(len(flat)), nearest][:, None, None]
+    return np.asarray(flat[np.arange(len(flat)), nearest][:, None, None], dtype=float)

@@ -44,7 +44,7 @@ def smallest(drive: Drive, shortest_s: float, longest_s: float) -> float:
 
 
 def largest(drive: Drive, shortest_s: float, longest_s: float) -> float:
-    """The most light for any exposure from `shortest_s` to `longest_s`: at the ends or where a pulse just fits, r = duty."""
+    """The most light for any exposure in a range: at its ends or where one more pulse just fits, r = duty."""
     first = np.floor(shortest_s * drive.frequency_hz)
     candidates = (first + np.arange(3) + drive.duty) / drive.frequency_hz
     inside = candidates[(candidates >= shortest_s) & (candidates <= longest_s)]

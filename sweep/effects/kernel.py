@@ -21,9 +21,9 @@ class Kernel:
     """Weights of a scene.
 
     `light`: ndarray[n_cases, n_units, n_channels, n_wavelengths], what a unit gets of a signal's light through each
-    channel's filter, relative to a uniform field on axis in clear air. `uniform`: ndarray[n_cases, n_units, n_channels],
-    the same of a uniform background. `readout`: ndarray[n_cases, n_units, n_channels], weight of each unit in the value
-    of each channel. A case is a place of the light on the mosaic.
+    channel's filter, relative to a uniform field on axis in clear air. `uniform`: ndarray[n_cases, n_units,
+    n_channels], the same of a uniform background. `readout`: ndarray[n_cases, n_units, n_channels], weight of each
+    unit in the value of each channel. A case is a place of the light on the mosaic.
     """
 
     light: FloatArray
@@ -109,7 +109,7 @@ def _pixels(setup: Setup, methods: Methods, wavelength_nm: FloatArray, *, by_pix
     own = (seen.channel[..., None] == np.arange(n)).astype(float)
     apart = weights[..., None] * own  # [cases, rows, columns, channels]
     spread = crosstalk.mixed(apart, share) if share else apart
-    wanted = (spread > 0).any(axis=3)
+    wanted = np.asarray((spread > 0).any(axis=3))
     profile = None
     if methods.blur != "skip":
         furthest = float(np.hypot(seen.dx, seen.dy)[wanted].max()) + 2**0.5 * half

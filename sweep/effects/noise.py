@@ -1,7 +1,7 @@
 """Photon, read and dark noise and PRNU: the mean readout in closed form, the variance, and Monte Carlo draws.
 
-The CSD is the distance of mean values. Noise moves a mean only where the readout is not straight: at the full well, at the
-ends of the ADC and at the steps of its quantization. Variance (EMVA 1288): gain^2 (read^2 + n) + PRNU^2 + 1/12.
+The CSD is the distance of mean values. Noise moves a mean only where the readout is not straight: at the full well, at
+the ends of the ADC and at the steps of its quantization. Variance (EMVA 1288): gain^2 (read^2 + n) + PRNU^2 + 1/12.
 """
 
 from __future__ import annotations
@@ -100,8 +100,8 @@ def draws_dn(electrons: float, pixel: Pixel, rng: np.random.Generator, count: in
 def promise(setup: Setup, brightest_e: float) -> float:
     """Range of what leaving noise out changes in one coordinate's mean, DN.
 
-    A clip at distance z sigma takes sigma (density(z) - z tail(z)) from the mean. At the top that grows with the signal,
-    so the brightest one counts (at its clip, if it is beyond). At the bottom it is bounded on intervals of the
+    A clip at distance z sigma takes sigma (density(z) - z tail(z)) from the mean. At the top that grows with the
+    signal, so the brightest one counts (at its clip, if it is beyond). At the bottom it is bounded on intervals of the
     signal, by the least distance and the largest sigma in each.
     """
     pixel = setup.pixel

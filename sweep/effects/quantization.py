@@ -32,8 +32,8 @@ def rounded(dn: FloatArray, pixel: Pixel) -> FloatArray:
 def mean_step(dn: FloatArray, sigma_dn: FloatArray) -> FloatArray:
     """Mean of round(x + noise) - x for Gaussian noise.
 
-    sum over k of (-1)^k sin(2 pi k x) exp(-2 (pi k sigma)^2) / (pi k); where little noise lets that converge slowly, the
-    sum over the steps of the probability to pass each.
+    sum over k of (-1)^k sin(2 pi k x) exp(-2 (pi k sigma)^2) / (pi k); where little noise lets that converge slowly,
+    the sum over the steps of the probability to pass each.
     """
     found = np.zeros_like(dn)
     for k in range(1, _TERMS + 1):

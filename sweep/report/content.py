@@ -8,10 +8,11 @@ import numpy as np
 import pandas as pd
 
 from ..chromaticity import display_colors
-from ..evaluate import WORST
+from ..evaluate import BEST_PLACE, WORST
 from ..figures import TYPE_COLORS, ChartFigure, Cloud, CurvesFigure, ParetoFigure, Points
 from ..metrics import CSD
 from ..objectives import COMBINED
+from ..series import Line, SeriesFigure
 from ..spectra import WavelengthGrid
 from .outputs import Output
 
@@ -88,6 +89,60 @@ def _points(output: Output, rows: pd.DataFrame, labels: Sequence[str] = ()) -> P
     separation, sensitivity = output.trade_off
     x = rows[sensitivity].to_numpy(dtype=float)
     return Points(x, rows[separation].to_numpy(dtype=float), tuple(map(str, labels)))
+
+
+def series_figures(output: Output) -> list[SeriesFigure]:
+    """A figure for each set of scenarios that differ in one number: the objective of every named design over it."""
+    groups: dict[tuple[str, str], dict[str, float]] = {}
+    for name in output.study["scenarios"]:
+        base, _, last = str(name).rpartition(" ")
+        key, equals, number = last.partition("=")
+        if base and equals and " " not in base:
+            groups.setdefault((base, key), {})[name] = float(number)
+    rows = output.kind("reference", "design", "search")
+    separation = output.trade_off[0]
+    figures = []
+    for (base, key), scenarios in groups.items():
+        lines = {}
+        for name, own in rows[rows["scenario"].isin(scenarios)].groupby("name", observed=True, sort=False):
+            at = own.assign(x=own["scenario"].map(scenarios).astype(float)).sort_values("x")
+            upper = at[BEST_PLACE + separation].to_numpy() if BEST_PLACE + separation in at else None
+            if len(at) == len(scenarios):
+                lines[str(name)] = Line(at[separation].to_numpy(), upper)
+        x = np.array(sorted(scenarios.values()))
+        if len(x) > 1 and lines:
+            band = "over the places on the mosaic" if BEST_PLACE + separation in rows else ""
+            title = f"{output.study['study']}: {base}"
+            figures.append(SeriesFigure(title, key, f"{readable(separation)} / DN", x, lines, band))
+    return figures
+
+
+def plan_table(output: Output) -> pd.DataFrame:
+    """What was computed in each scenario, and what the rest changes at most; scenarios of one plan share a row."""
+    groups: dict[tuple[str, str], list[str]] = {}
+    for name, plan in output.provenance["plans"].items():
+        computed = [f"{e['effect']}: {e['method']}" for e in plan["effects"] if e["method"] not in ("skip", "one")]
+        skipped = [
+            f"{e['effect']}: {e['promised_dn']:.2g} DN ({e['reason']})"
+            if e["promised_dn"]
+            else f"{e['effect']}: {e['reason']}"
+            for e in plan["effects"]
+            if e["method"] in ("skip", "one")
+        ]
+        groups.setdefault(("; ".join(computed), "; ".join(skipped)), []).append(name)
+    plans = output.provenance["plans"]
+    return pd.DataFrame(
+        [
+            {
+                "scenarios": ", ".join(names),
+                "computed": computed,
+                "left out": skipped,
+                "promised / DN": f"{max(plans[name]['promised_dn'] for name in names):.2g}",
+                "tolerance / DN": f"{plans[names[0]]['tolerance_dn']:g}",
+            }
+            for (computed, skipped), names in groups.items()
+        ]
+    )
 
 
 def sensor_figure(output: Output) -> CurvesFigure:

@@ -13,6 +13,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ..figures import draw_chart, draw_clouds, draw_curves, draw_pareto, rendered
 from ..objectives import Objective
+from ..series import draw_series
 from ..store import write_bytes, write_table, write_text
 from . import content
 from .comparison import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
@@ -52,6 +53,7 @@ def make_report(output: Output) -> None:
         best=_rows(content.best_table(output)),
         geometry=_rows(content.geometry_table(output)),
         published=_rows(published),
+        plans=_rows(content.plan_table(output)),
         constraints={name: str(bound) for name, bound in output.constraints.items()},
         summary=summary_lines(output),
         provenance=output.provenance,
@@ -68,6 +70,8 @@ def _drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
         yield ("pareto" if number == 0 else f"pareto-{number + 1}"), f"Trade-off{f' of {cfa}' if cfa else ''}", figure
     for number, cfa in enumerate(cfas):
         yield f"filters-{number + 1}", f"Filters of {cfa}", draw_curves(content.filters_figure(output, cfa))
+    for number, series in enumerate(content.series_figures(output)):
+        yield f"series-{number + 1}", series.title, draw_series(series)
     yield "sensor", "Quantum efficiency of the sensor", draw_curves(content.sensor_figure(output))
     yield "signals", "Spectra of the signals", draw_curves(content.lights_figure(output))
     yield "chart", "The color checker chart", draw_chart(content.chart_figure(output))

@@ -9,7 +9,7 @@ from ..study import Study
 
 
 def plan_lines(study: Study, *, explain: bool) -> Iterator[str]:
-    """Every scene's effects with method, promised error, reason and work; scenes with the same plan are told at once."""
+    """Every scene's effects with method, promised error, reason and work; scenes of one plan are told at once."""
     groups: dict[tuple[object, ...], list[Plan]] = {}
     for plan in study.plans.values():
         groups.setdefault((plan.key, *(f"{c.promised_dn:.2g}{c.reason}" for c in plan.choices)), []).append(plan)

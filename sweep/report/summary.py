@@ -10,28 +10,45 @@ from .content import amount, geometry_table, readable
 from .outputs import Output
 
 _MOST_PARAMETERS = 10
+_MOST_SCENARIOS = 8
 
 
 def answer_sentences(output: Output) -> list[str]:
     """The question's answer: the best feasible design beside the CFAs that a study compares with."""
-    name = readable(output.objective)
-    shown = output.trade_off[0]
     limits = " and ".join(f"{readable(q)} {bound}" for q, bound in output.constraints.items())
     under = f" with {limits}" if limits else ""
-    beside = ", ".join(
-        f"{row['name']} {amount(shown, row[shown])}" for row in output.kind("reference").to_dict("records")
-    )
-    if not len(output.kind("sweep", "search")):
-        return [f"{name} of the named CFAs: {beside}."]
-    if output.best.empty:
-        return [f"No design is feasible{under}.", f"Plain CFAs: {beside}."]
-    best = output.best.iloc[0]
-    return [
-        f"The best {name}{under} is {amount(output.objective, best[output.objective], 1)} "
-        f"(sensitivity {best['sensitivity']:.4f}, "
-        f"{best['cfa']}, found by the {best['kind']}).",
-        f"Plain CFAs: {beside}.",
-    ]
+    found = []
+    if len(output.kind("sweep", "search")) and output.best.empty:
+        found.append(f"No design is feasible{under}.")
+    elif not output.best.empty:
+        best = output.best.iloc[0]
+        where = f", in {best['scenario']}" if len(output.study["scenarios"]) > 1 else ""
+        found.append(
+            f"The best {readable(output.objective)}{under} is {amount(output.objective, best[output.objective], 1)} "
+            f"(sensitivity {best['sensitivity']:.4f}, {best['cfa']}, found by the {best['kind']}{where})."
+        )
+    return found + _scene_lines(output)
+
+
+def _scene_lines(output: Output) -> list[str]:
+    """CFAs and named designs in each scenario; of many scenarios the first and the last ones."""
+    shown = output.trade_off[0]
+    title = f"{readable(shown)} of the named CFAs and designs:"
+    rows = output.kind("reference", "design")
+    scenarios = list(output.study["scenarios"])
+    lines = []
+    for name in scenarios if len(scenarios) <= _MOST_SCENARIOS else [*scenarios[:4], "", *scenarios[-2:]]:
+        if not name:
+            lines.append(f"({len(scenarios) - 6} more scenarios in the report.)")
+            continue
+        each = ", ".join(
+            f"{row['name']} {amount(shown, row[shown])}"
+            + (f" at {row['sensitivity']:.3f}" if row["kind"] == "design" and len(scenarios) == 1 else "")
+            for row in rows[rows["scenario"] == name].to_dict("records")
+        )
+        if each:
+            lines.append(f"{title} {each}." if len(scenarios) == 1 else f"{name}: {each}.")
+    return lines if len(scenarios) == 1 else [title, *lines]
 
 
 def summary_lines(output: Output) -> list[str]:
@@ -43,13 +60,6 @@ def summary_lines(output: Output) -> list[str]:
         found = ", ".join(f"{name} {best[name]:.2f}" for name in own[:_MOST_PARAMETERS])
         more = f" and {len(own) - _MOST_PARAMETERS} more" if len(own) > _MOST_PARAMETERS else ""
         lines.append(f"Parameters: {found}{more}.")
-    named = output.kind("design")
-    if len(named):
-        each = ", ".join(
-            f"{row['name']} {amount(output.trade_off[0], row[output.trade_off[0]])} at {row['sensitivity']:.3f}"
-            for row in named.to_dict("records")
-        )
-        lines.append(f"Named designs: {each}.")
     for row in geometry_table(output).to_dict("records"):
         lines.append(
             f"{row['scenario']}: {row['distance_m']:g} m, {row['fov_deg']:g} deg: "
@@ -57,6 +67,7 @@ def summary_lines(output: Output) -> list[str]:
         )
     lines += comparison_lines(comparison_with_published(output))
     lines.append(_counts(output))
+    lines.append(_plan_line(output))
     search = output.provenance.get("search")
     if search:
         found = f"{amount(output.objective, search['best_smooth_objective'], 2)} before quantization"
@@ -74,6 +85,15 @@ def summary_lines(output: Output) -> list[str]:
     lines.append(f"Took {output.provenance['duration_s']:.1f} s with {output.provenance['workers']} workers.")
     lines.append(f"Files: {output.folder}/: results.parquet, report.html, pareto.png, provenance.json.")
     return lines
+
+
+def _plan_line(output: Output) -> str:
+    """What was simulated, over all scenarios."""
+    plans = output.provenance["plans"].values()
+    computed = dict.fromkeys(e["effect"] for p in plans for e in p["effects"] if e["method"] not in ("skip", "one"))
+    promised = max(plan["promised_dn"] for plan in plans)
+    tolerance = max(plan["tolerance_dn"] for plan in plans)
+    return f"Simulated: {', '.join(computed)}; all else changes a CSD by at most {promised:.2g} of {tolerance:g} DN."
 
 
 def _counts(output: Output) -> str:

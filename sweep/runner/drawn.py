@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,6 @@ from ..imaging import imager_of
 from ..limit import Limit
 from ..spaces import Space
 from ..study import Study
-from .jobs import jobs_of
 
 BEST_PER_CFA = 5
 """Best feasible designs of each CFA's sweeps that the report lists and draws."""
@@ -53,8 +53,9 @@ def points_table(study: Study, table: pa.Table) -> pa.Table:
 
 
 def drawn_rows(study: Study, table: pa.Table) -> list[dict[str, Any]]:
-    """Plain CFAs, named designs, the search's answer and the best feasible designs of each CFA's sweeps."""
+    """The search's answer, and in the first scenario plain CFAs, named designs and the best of each CFA's sweeps."""
     frame = table.to_pandas()
+    frame = frame[(frame["scenario"] == next(iter(study.scenarios))) | (frame["kind"] == "search")]
     named = frame[frame["kind"].isin(["reference", "design", "search"])]
     swept = frame[(frame["kind"] == "sweep") & frame["feasible"]]
     best = swept.sort_values([study.objective.column, *study.trade_off], ascending=False).groupby("cfa", observed=True)
@@ -62,13 +63,18 @@ def drawn_rows(study: Study, table: pa.Table) -> list[dict[str, Any]]:
     return rows
 
 
-def _row_curves(study: Study, row: dict[str, Any]) -> tuple[Space, Any]:
-    """The space that a row belongs to and its filters' curves, ndarray[1, n_modified, n_wavelengths]."""
+def row_space(study: Study, row: Mapping[Any, Any]) -> Space:
+    """The space that a row belongs to."""
     if row["kind"] == "search":
         assert study.search is not None
-        space = study.search.space
-    else:  # ids run through the spaces of each scenario
-        at = row["design_id"]
-        space = next(j.space for j in jobs_of(study) if j.first_id <= at < j.first_id + j.stop - j.start)
+        return study.search.space
+    within = row["design_id"] % sum(space.size for space in study.spaces)  # ids run through the spaces of each scenario
+    ends = np.cumsum([space.size for space in study.spaces])
+    return study.spaces[int(np.searchsorted(ends, within, side="right"))]
+
+
+def _row_curves(study: Study, row: dict[str, Any]) -> tuple[Space, Any]:
+    """The space that a row belongs to and its filters' curves, ndarray[1, n_modified, n_wavelengths]."""
+    space = row_space(study, row)
     point = np.array([[row[name] for name in space.parameters]], dtype=float)
     return space, space.curves(point, study.grid.size)

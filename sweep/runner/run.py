@@ -32,6 +32,7 @@ from ..store import (
 from ..study import Study
 from .drawn import curves_table, points_table
 from .jobs import Rules, jobs_of, mark_front, rules_of, run_job
+from .planning import with_plans
 from .provenance import fingerprint, plan_facts, provenance, resolved_yaml
 from .searching import Parallel, Progress, SearchAnswer, answer_row, front_table, run_search, search_facts, search_log
 from .stopping import Stop, leave_signals_to_the_parent, stop_on_signals
@@ -45,7 +46,7 @@ def run_study(study: Study, output: Path, n_jobs: int, progress: Progress, comma
     be written, and InfeasibleError, before anything is written, when the study's search finds no feasible design.
     """
     started = time.monotonic()
-    study = study.planned()
+    study = with_plans(study, n_jobs, progress)
     rules = rules_of(study)
     with stop_on_signals() as stop:
         parallel = functools.partial(_parallel, n_jobs, stop)

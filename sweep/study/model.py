@@ -149,10 +149,6 @@ class Study:
         boxes = [box for box in boxes if box.n_designs]
         return Planner(boxes).plan(scenario, tolerance_dn or self.section.tolerance_dn)
 
-    def planned(self, tolerance_dn: float | None = None) -> Study:
-        """The study with a plan for each of its scenarios."""
-        return replace(self, plans={name: self.plan(name, tolerance_dn) for name in self.scenarios})
-
     def problem(self, search: Search) -> Problem:
         """The search as a mathematical problem."""
         assert search.space.filter is not None

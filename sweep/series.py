@@ -1,0 +1,59 @@
+"""A quantity over the scenarios that differ in one number: against distance, exposure or visibility."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from .arrays import FloatArray
+from .figures import CURVE_CYCLE, canvas
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_WIDE = 15.0
+_LABELS = {
+    "distance_m": "distance / m",
+    "exposure_s": "exposure / s",
+    "visibility_m": "visibility / m",
+    "intensity_cd": "luminous intensity / cd",
+}
+
+
+@dataclass(frozen=True)
+class Line:
+    """A design: values over the numbers, ndarray[n], and, where it has one, the upper end of its band."""
+
+    y: FloatArray
+    upper: FloatArray | None
+
+
+@dataclass(frozen=True)
+class SeriesFigure:
+    """A line per design over `x` (ndarray[n]), the number `key` of the scenarios."""
+
+    title: str
+    key: str
+    y_label: str
+    x: FloatArray
+    lines: Mapping[str, Line]
+    band: str
+
+
+def draw_series(series: SeriesFigure) -> Figure:
+    """Draw a line with its band per design; numbers over more than a decade are drawn on a logarithmic axis."""
+    figure, axes = canvas(8.0, 4.8)
+    for (name, line), color in zip(series.lines.items(), CURVE_CYCLE * 4, strict=False):
+        axes.plot(series.x, line.y, "o-", color=color, label=name, linewidth=1.5, markersize=3.5)
+        if line.upper is not None:
+            axes.fill_between(series.x, line.y, line.upper, color=color, alpha=0.2, linewidth=0)
+    if series.x.min() > 0 and series.x.max() / series.x.min() > _WIDE:
+        axes.set_xscale("log")
+    axes.set_xlabel(_LABELS.get(series.key, series.key))
+    axes.set_ylabel(series.y_label)
+    axes.set_ylim(bottom=0)
+    axes.set_title(series.title)
+    legend = f"band: {series.band}" if series.band else None
+    axes.legend(title=legend, fontsize=8, title_fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False)
+    return figure
