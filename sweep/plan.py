@@ -109,7 +109,7 @@ class _Scene:
         self.spectrum = extinction.transmittance(self.setup, "spectral", self.setup.grid.nodes_nm)
         self._kernels: dict[Methods, FloatArray] = {}
         self._amounts: dict[bytes, Amounts] = {}
-        self._gaps: dict[float, float] = {}
+        self._gaps: dict[tuple[str, float], float] = {}
         self._promises: dict[tuple[str, Methods, Methods], float] = {}
         self.work: Counter[str] = Counter()
 
@@ -163,19 +163,26 @@ class _Scene:
             self._kernels[wanted] = np.ascontiguousarray(full[at])
         return self._kernels[wanted]
 
-    def _between_knots(self, methods: Methods) -> float:
-        """How far a kernel may be from its interpolation between the knots."""
+    def _gap(self, methods: Methods, method: str) -> float:
+        """How far a kernel may be from its interpolation between the wavelengths of a method of blur."""
         setup, target = self.setup, self.setup.scenario.target
-        if target is None or methods.blur == "skip" or self.reach.knots_nm.size == setup.grid.size:
+        knots_nm = blur.knots(setup.grid.nodes_nm, method)
+        if target is None or knots_nm.size == setup.grid.size:
             return 0.0
         aperture = 0.0 if methods.sampling == "skip" else setup.pixel.fill_factor**0.5 * setup.pixel.pitch_um
-        radius = sampling.radii_px(setup, target)[0] * setup.pixel.pitch_um
-        w20_um = blur.defocus_um(setup.scenario, setup.pixel.pitch_um)
-        f_number = setup.scenario.optics.f_number
-        if aperture not in self._gaps:
-            knots_um = self.reach.knots_nm * 1e-3
-            self._gaps[aperture] = blur.interpolation_bound(radius, aperture, knots_um, f_number, w20_um)
-        return self._gaps[aperture]
+        if (method, aperture) not in self._gaps:
+            radius = sampling.radii_px(setup, target)[0] * setup.pixel.pitch_um
+            w20_um = blur.defocus_um(setup.scenario, setup.pixel.pitch_um)
+            f_number = setup.scenario.optics.f_number
+            bound = blur.interpolation_bound(radius, aperture, knots_nm * 1e-3, f_number, w20_um)
+            self._gaps[method, aperture] = bound
+        return self._gaps[method, aperture]
+
+    def _between_knots(self, methods: Methods) -> float:
+        """How far the kernel of some methods may be from its interpolation between the knots of the comparison."""
+        if methods.blur in ("skip", blur.COARSE):
+            return 0.0
+        return self._gap(methods, blur.COARSE) + self._gap(methods, methods.blur)
 
     def amounts(self, factor: FloatArray, low: FloatArray, high: FloatArray) -> Amounts:
         """`Reach.amounts`, remembered."""
@@ -210,6 +217,8 @@ class _Scene:
             change = now - then
             if effect != "blur":  # what is interpolated in both kernels; nothing where they are the same
                 remainder = (remainder + self._between_knots(after)) * bool(change.any())
+            elif after.blur != "skip":
+                remainder = self._gap(after, after.blur)
         if remainder == 0 and not change.any():
             return 0.0
         found = reach.largest_change(changed, change, remainder, base, left, straight=straight)
@@ -236,10 +245,10 @@ class _Scene:
             across = 2 * sampling.radii_px(setup, target)[1] + 1
             places = max(across, 2.0 * max(setup.mosaic.indices.shape)) ** 2
             pixels = channels if straight else places
-            waves = {"skip": 1, "every 10 nm": self.reach.knots_nm.size}.get(methods.blur, grid)
+            waves = 1 if methods.blur == "skip" else blur.knots(setup.grid.nodes_nm, methods.blur).size
             kernel = cases * places * channels * waves + (200 * places * waves if methods.blur != "skip" else 0)
         elif target is not None and methods.blur != "skip":
-            kernel = 500.0 * (self.reach.knots_nm.size if methods.blur == "every 10 nm" else grid)
+            kernel = 500.0 * blur.knots(setup.grid.nodes_nm, methods.blur).size
         nodes = quadrature.nodes(grid, methods.quadrature).size
         touched = pixels * max(len(setup.modified), 1) / channels
         scales = len(flicker.scales(setup, methods.flicker, np.ones(1))[0])

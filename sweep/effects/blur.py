@@ -20,9 +20,10 @@ from ..arrays import FloatArray
 from ..scenes import Scenario
 from ..setup import Setup
 
-METHODS = ("skip", "every 10 nm", "every wavelength")
-KNOT_NM = 10.0
-"""Spacing of the wavelengths between which a kernel is interpolated."""
+METHODS = ("skip", "every 10 nm", "every 5 nm", "every 2 nm", "every wavelength")
+COARSE = "every 10 nm"
+"""The interpolated method on whose wavelengths kernels are compared when a plan is made."""
+_SPACING_NM = {"every 10 nm": 10.0, "every 5 nm": 5.0, "every 2 nm": 2.0}
 _PANEL_NODES = 32
 _CYCLES_PER_PANEL = 4.0
 _SPLINE_PER_CYCLE = 24
@@ -155,9 +156,10 @@ def interpolation_bound(
     return worst
 
 
-def knots(wavelength_nm: FloatArray) -> FloatArray:
-    """Wavelengths between which kernels are interpolated: every 10 nm and the end; all, where the grid is coarser."""
-    if wavelength_nm.size < 3 or wavelength_nm[1] - wavelength_nm[0] >= KNOT_NM:
+def knots(wavelength_nm: FloatArray, method: str) -> FloatArray:
+    """Wavelengths at which a method makes its kernels: equidistant ones and the end; all, where the grid is coarser."""
+    spacing = _SPACING_NM.get(method, 0.0)
+    if wavelength_nm.size < 3 or wavelength_nm[1] - wavelength_nm[0] >= spacing:
         return wavelength_nm
-    inner = np.arange(wavelength_nm[0], wavelength_nm[-1], KNOT_NM)
+    inner = np.arange(wavelength_nm[0], wavelength_nm[-1], spacing)
     return np.append(inner, wavelength_nm[-1])

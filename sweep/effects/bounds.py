@@ -55,7 +55,7 @@ class Reach:
         setup = box.setup
         self.box = box
         wave = setup.grid.nodes_nm
-        self.knots_nm = blur.knots(wave)
+        self.knots_nm = blur.knots(wave, blur.COARSE)
         self._hats = np.stack([np.interp(wave, self.knots_nm, unit) for unit in np.eye(self.knots_nm.size)])
         self.shortest_s, self.longest_s = self._exposures()
         drive = setup.scenario.drive

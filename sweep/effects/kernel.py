@@ -42,7 +42,7 @@ def make_kernel(
         made = _ideal(setup, methods, wavelength_nm)
         light = made.light
     else:
-        knots = blur.knots(wavelength_nm) if methods.blur == "every 10 nm" else wavelength_nm
+        knots = blur.knots(wavelength_nm, methods.blur)
         made = _pixels(setup, methods, knots, by_pixel=by_pixel, work=work)
         light = made.light if knots is wavelength_nm else _interpolated(made.light, knots, wavelength_nm)
     falls = illumination.factor(setup, methods.illumination)
@@ -86,7 +86,7 @@ def _ideal(setup: Setup, methods: Methods, wavelength_nm: FloatArray) -> Kernel:
     lost = np.full(wavelength_nm.size, min(1.0, radius / readout) ** 2)
     if methods.blur != "skip":
         w20_um = blur.defocus_um(setup.scenario, setup.pixel.pitch_um)
-        knots = blur.knots(wavelength_nm) if methods.blur == "every 10 nm" else wavelength_nm
+        knots = blur.knots(wavelength_nm, methods.blur)
         kept = blur.mean_over_disc(radius, readout, knots * 1e-3, setup.scenario.optics.f_number, w20_um)
         lost = np.interp(wavelength_nm, knots, kept)
     return Kernel(uniform[..., None] * lost, uniform, np.eye(uniform.shape[-1])[None])
