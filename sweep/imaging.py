@@ -110,7 +110,8 @@ class Imager:
     def scales(self, exposure_s: FloatArray) -> FloatArray:
         """Light relative to its mean in the cases of a pulsed light, ndarray[n_designs, n_scales]."""
         found = flicker.scales(self.setup, self.setup.methods.flicker, exposure_s)
-        self.work["flicker"] += found.size if found.shape[1] > 1 else 0
+        if found.shape[1] > 1:
+            self.work["flicker"] += found.size
         return found
 
     def electrons(self, curves: FloatArray, scales: FloatArray, exposure_s: FloatArray) -> FloatArray:
