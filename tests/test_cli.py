@@ -11,7 +11,7 @@ import pytest
 from sweep.curve_files import read_curves
 
 from .conftest import SHARED, STUDIES, needs_measured
-from .test_runner import study_file
+from .test_runner import SCENES, study_file
 
 
 @pytest.fixture(scope="module")
@@ -99,6 +99,27 @@ def test_check_counts_designs() -> None:
     done = sweep("check", str(STUDIES / "stopband.yaml"))
     assert done.returncode == 0
     assert "116,286 designs" in done.stdout
+
+
+def test_plan_says_what_a_scene_calls_for(tmp_path: Path) -> None:
+    path = tmp_path / "scenes.yaml"
+    path.write_text(SCENES)
+    done = sweep("plan", str(path), "--explain", "--tolerance", "50")
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[0].startswith("road distance_m=50: promised ")
+    assert " of 50 DN" in lines[0]
+    for effect in ("noise", "blur", "sampling", "phase", "extinction"):
+        assert sum(line.strip().startswith(f"{effect} ") for line in lines) == 2
+    assert any(line.strip() == "extinction    skip                     0 DN  clear air" for line in lines)
+    assert any(line.strip().startswith("rejected: ") for line in lines)
+    assert "2 scenes" in lines[-1]
+
+
+def test_audit_without_a_run_is_one_line(tmp_path: Path) -> None:
+    done = sweep("audit", str(tmp_path))
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
 
 
 def test_hostile_names_come_out_as_text(tmp_path: Path) -> None:

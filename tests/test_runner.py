@@ -17,6 +17,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
+from sweep.audit import audit, audit_output, sampled
 from sweep.errors import OutputError
 from sweep.evaluate import evaluate, quantities
 from sweep.families import Stopband
@@ -88,7 +89,7 @@ def test_rows_stand_in_order_with_their_columns(study: Study, output: Path) -> N
         *("left_nm", "left_width_nm", "right_nm", "right_width_nm", "depth"),
         *quantities(study.lights),
         *("edge_width_nm", "band_width_nm"),
-        *("violation", "limit", "gap", "feasible", "pareto", "status"),
+        *("violation", "limit", "gap", "feasible", "pareto", "plan", "promised_dn", "status"),
     ]
     assert set(frame["status"]) == {"ok"}
     assert list(frame["kind"][:4]) == ["reference", "reference", "design", "sweep"]
@@ -275,3 +276,70 @@ def test_worst_cases_and_combined_objectives_are_columns(tmp_path: Path) -> None
     assert answer["objective"] >= frame[frame["feasible"] & (frame["kind"] == "sweep")]["objective"].max() - 4
     make_report(read_output(tmp_path / "out"))
     assert "smallest of 2 worst_csd_yellow_red, 300 sensitivity" in (tmp_path / "out" / "report.html").read_text()
+
+
+SCENES = """\
+study: scenes
+sensor: ar0820
+lights: tl16
+wavelengths: {step_nm: 5}
+pixel: {read_noise_e: 2, offset_dn: 168}
+scenarios:
+  road:
+    target: {fov_deg: 60, phase_px: any}
+    optics: {f_number: 2}
+    noise: true
+    each: {target.distance_m: [50, 250]}
+tolerance_dn: 5
+cfas: [RGGB, RYNCy]
+sweeps:
+  edges:
+    cfa: RYNCy
+    channel: N
+    base: Y
+    to: G
+    grid: {left_nm: [600, 610], left_width_nm: 20, right_nm: [640, 650], right_width_nm: 10}
+"""
+
+
+def test_scenes_are_planned_drawn_and_audited(tmp_path: Path) -> None:
+    path, folder = tmp_path / "scenes.yaml", tmp_path / "out"
+    path.write_text(SCENES)
+    study = load_study(path)
+    assert list(study.scenarios) == ["road distance_m=50", "road distance_m=250"]
+    run_study(study, folder, 1, lambda *_: None)
+    frame = pd.read_parquet(folder / "results.parquet")
+    assert set(frame["status"]) == {"ok"}
+    assert (frame["csd_yellow_red"] < frame["best_place_csd_yellow_red"]).all()
+    assert (frame["promised_dn"] <= 5).all()
+    assert (frame["promised_dn"] > 0).all()
+    output = read_output(folder)
+    make_report(output)
+    assert (folder / "figures" / "series-1.svg").is_file()
+    plans = output.provenance["plans"]
+    assert frame["plan"].iloc[0] == plans["road distance_m=50"]["key"]
+    assert "quarter pixel" in (folder / "report.html").read_text()
+    lines = audit_output(folder, None)
+    audited = pd.read_parquet(folder / "audit.parquet")
+    assert lines[0].startswith(f"{len(audited)} of {len(frame)} designs recomputed with every effect on: no error")
+    assert (audited["realized_dn"] <= audited["promised_dn"]).all()
+    assert audited["realized_dn"].max() > 1e-9
+    # The audit notices a row that is wrong by more than was promised.
+    wrong = frame.assign(csd_yellow_red=frame["csd_yellow_red"] + 6)
+    assert len(audit(study, wrong).broken) == len(audited)
+
+
+def test_sampled_rows_are_the_front_and_a_hundredth() -> None:
+    n = 50_000
+    frame = pd.DataFrame(
+        {
+            "design_id": range(n),
+            "kind": ["sweep"] * n,
+            "pareto": [i % 5000 == 7 for i in range(n)],
+            "status": ["ok"] * n,
+        }
+    )
+    chosen = sampled(frame)
+    assert chosen["pareto"].sum() == 10
+    assert 400 < len(chosen) < 600
+    assert list(sampled(frame)["design_id"]) == list(chosen["design_id"])

@@ -8,11 +8,15 @@ import numpy as np
 import pytest
 
 from sweep.constraints import Bound
-from sweep.evaluate import designed_quantities, smooth_response
+from sweep.evaluate import designed_quantities, smooth_csd, smooth_response
+from sweep.limit import limit_of, why_not
 from sweep.metrics import separation
 from sweep.objectives import Objective
 from sweep.problem import Problem, SearchRun, best_feasible, starting_points
+from sweep.scenes import Scenario
 from sweep.search import best_reachable, search_from
+from sweep.sensor import Pixel
+from sweep.setup import REFERENCE
 from sweep.smooth import Model
 from sweep.study import load_study
 
@@ -68,6 +72,50 @@ def test_derivatives_agree_with_differences(name: str, objective: Objective) -> 
         ends = [at(problem, u + sign * step * np.eye(u.size)[k])[0] for sign in (1, -1)]
         numeric = (ends[0] - ends[1]) / (2 * step)
         np.testing.assert_allclose(by_u[:, k] / scale, numeric / scale, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "scenario",
+    [
+        {"target": {"distance_m": 250, "fov_deg": 30, "phase_px": "any"}, "optics": {"f_number": 2.0}},
+        {"target": {"distance_m": 250, "fov_deg": 30, "readout": "center"}, "optics": {"f_number": 2.0}},
+        {"background_cd_m2": 100, "exposure": {"kind": "fixed", "exposure_s": 0.003}, "off_axis_deg": 20},
+        {"drive": {"duty": 0.4, "frequency_hz": 90}, "exposure": {"kind": "fixed", "exposure_s": 0.003}},
+    ],
+)
+@pytest.mark.parametrize("crosstalk", [0.0, 0.05])
+def test_derivatives_hold_in_scenes(scenario: dict[str, object], crosstalk: float) -> None:
+    setup = replace(
+        STOPBAND.setup,
+        scenario=Scenario.model_validate(scenario),
+        pixel=Pixel(crosstalk=crosstalk),
+        methods=replace(REFERENCE, phase="pixel", blur="every 10 nm"),
+    )
+    problem = replace(STOPBAND, setup=setup)
+    u, step = np.full(problem.free.size, 0.4), 1e-5
+    _, by_u = at(problem, u)
+    scale = np.abs(by_u).max(axis=1) + 1e-9
+    for k in range(u.size):
+        ends = [at(problem, u + sign * step * np.eye(u.size)[k])[0] for sign in (1, -1)]
+        np.testing.assert_allclose(by_u[:, k] / scale, (ends[0] - ends[1]) / (2 * step) / scale, atol=1e-5)
+
+
+def test_a_search_in_a_far_scene_stays_below_its_limit() -> None:
+    far = {"target": {"distance_m": 250, "fov_deg": 30}, "optics": {"f_number": 2.0}}
+    setup = replace(STOPBAND.setup, scenario=Scenario.model_validate(far))
+    problem = replace(STOPBAND, setup=setup)
+    limit = limit_of(problem)
+    assert limit.curve is not None
+    assert smooth_csd(setup, limit.curve[None, None], ("yellow", "red"))[0] == pytest.approx(limit.attained, rel=1e-12)
+    log = [
+        e for i, u in enumerate(starting_points(problem, 4, 1)) for e in search_from(problem, i, u, "SLSQP", 125).log
+    ]
+    best = best_feasible(log)
+    assert best is not None
+    assert 0.7 * limit.proven < best.objective <= limit.proven
+    assert limit.proven < limit_of(STOPBAND).proven  # blur takes separation away from every filter
+    mixed = replace(problem, setup=replace(setup, pixel=Pixel(crosstalk=0.01)))
+    assert why_not(mixed) == "crosstalk mixes the modified channel into others"
 
 
 def test_worst_case_is_the_smallest_over_the_shifts() -> None:

@@ -70,7 +70,9 @@ def test_a_study_is_resolved(tmp_path: Path) -> None:
     assert study.objective.column == "csd_yellow_red"
 
 
-@pytest.mark.parametrize("name", ["paper", "stopband", "freeform", "dual", "rccb", "producible"])
+@pytest.mark.parametrize(
+    "name", ["paper", "stopband", "freeform", "dual", "rccb", "producible", "distance", "exposure", "night", "fog"]
+)
 def test_shipped_studies_load(name: str) -> None:
     study = load_study(STUDIES / f"{name}.yaml")
     assert study.name == name
@@ -100,7 +102,7 @@ def test_the_measured_study_loads() -> None:
             "search:\n",
             "serach:\n",
             "tiny.yaml:20: serach: unknown key; allowed: study, question, seed, wavelengths, sensor, pixel, lights, "
-            "scenarios, geometry, cfas, designs, sweeps, boxes, production, objective, constraints, search, published; did you mean 'search'?",
+            "scenarios, tolerance_dn, geometry, cfas, designs, sweeps, boxes, production, objective, constraints, search, published; did you mean 'search'?",
         ),
         (
             "min: 590, max: 610",
@@ -178,6 +180,37 @@ def test_the_measured_study_loads() -> None:
         ("study: tiny\n", "study: tiny\nstudy: again\n", "tiny.yaml:2: found duplicate key"),
         ("[RGGB, RYNCy]", "[RGGB, RYNCy", "not valid YAML"),
         (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  far: {visibility_m: 100}\n",
+            "tiny.yaml:5: scenarios.far: visibility_m needs a target with a distance",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  far: {target: {distance_m: 100, fov_deg: 60, phase_px: all}}\n",
+            "tiny.yaml:5: scenarios.far.target.phase_px",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  far: {target: {distance_m: 100, fov_deg: 60, phase_px: [1]}}\n",
+            "tiny.yaml:5: scenarios.far.target.phase_px",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  far: {target: {fov_deg: 60}, each: {target.distance_km: [1], target.distance_m: [9]}}\n",
+            "tiny.yaml:5: scenarios.far.target.distance_km: unknown key; allowed: distance_m",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  far: {each: [1]}\n",
+            "tiny.yaml:4: scenarios: far: `each` maps keys such as target.distance_m to values",
+        ),
+        ("lights: tl16\n", "lights: tl16\ntolerance_dn: 0\n", "tiny.yaml:4: tolerance_dn: not allowed (got 0)"),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  far: {drive: {duty: 0.5, frequency_hz: 90}}\n",
+            "search.scenario: a search under a pulsed light needs a fixed exposure (got 'far')",
+        ),
+        (
             "constraints:\n",
             "objective: {minimum: {csd_yellow_red: 1, csd_yelow_red: 2}}\nconstraints:\n",
             "tiny.yaml:18: objective.minimum.csd_yelow_red: unknown objective (got 'csd_yelow_red')",
@@ -235,7 +268,7 @@ def test_the_measured_study_loads() -> None:
             "sensor: ar0820\n",
             "sensor: ar0820\npixel: {well_ke: 10}\n",
             "tiny.yaml:3: pixel.well_ke: unknown key; allowed: pitch_um, fill_factor, well_e, bits, gain_dn_per_e, "
-            "offset_dn; did you mean 'well_e'?",
+            "offset_dn, crosstalk, read_noise_e, dark_e_per_s, prnu; did you mean 'well_e'?",
         ),
         (
             "lights: tl16\n",

@@ -94,7 +94,8 @@ class Document:
         """`loc` without the tags that pydantic adds for unions, and with a missing last key kept."""
         node: Any = self.data
         path: list[Key] = []
-        for position, key in enumerate(loc):
+        for position, made in enumerate(loc):
+            key = _written(node, made)
             if _has(node, key):
                 path.append(key)
                 node = _child(node, key)
@@ -140,6 +141,15 @@ def _has(node: Any, key: Key) -> bool:
     return (isinstance(node, dict) and key in node) or (
         isinstance(node, list) and isinstance(key, int) and key < len(node)
     )
+
+
+def _written(node: Any, key: Key) -> Key:
+    """The key as the file has it: a scenario made by `each` is named after the one that it was made from."""
+    if isinstance(node, dict) and isinstance(key, str) and key not in node:
+        for name, entry in node.items():
+            if isinstance(entry, dict) and "each" in entry and key.startswith(f"{name} "):
+                return str(name)
+    return key
 
 
 def _child(node: Any, key: Key) -> Any:
