@@ -18,6 +18,7 @@ LEVELS = [
     {"datasets", "filters", "scenes", "families"},
     {"spaces", "setup"},
     {"effects"},
+    {"promises"},
     {"plan", "imaging"},
     {"evaluate"},
     {"store", "problem", "figures"},

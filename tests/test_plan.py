@@ -14,14 +14,14 @@ from sweep.effects import blur
 from sweep.evaluate import evaluate
 from sweep.imaging import Imager
 from sweep.metrics import CSD
-from sweep.plan import EFFECTS, Plan, Planner
+from sweep.plan import Plan, Planner
+from sweep.promises import EFFECTS, READOUT
 from sweep.setup import REFERENCE, Methods
 from sweep.study import load_study
 
 from .conftest import STUDIES
 from .hard_scenes import F2, FAR, HARD, Scene, random_scene, scene
 
-_READOUT = ("noise", "quantization", "saturation", "pedestal")
 _ARITHMETIC_DN = 1e-9
 """Rounding of double precision itself."""
 _RANDOM = 1000
@@ -46,7 +46,7 @@ def contract(made: Scene) -> list[tuple[str, str, float, float]]:
         for effect, module in EFFECTS.items():
             for method in module.METHODS[:-1]:
                 after = replace(before, **{effect: method})
-                if after == before or (before == straight and effect in _READOUT):
+                if after == before or (before == straight and effect in READOUT):
                     continue
                 if effect == "saturation" and made.setup.scenario.noise:  # goes with noise, which is switched first
                     continue

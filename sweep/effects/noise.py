@@ -100,9 +100,9 @@ def draws_dn(electrons: float, pixel: Pixel, rng: np.random.Generator, count: in
 def promise(setup: Setup, brightest_e: float) -> float:
     """Range of what leaving noise out changes in one coordinate's mean, DN.
 
-    A clip at distance z sigma takes sigma (density(z) - z tail(z)) from the mean. At the top that grows with the
-    signal, so the brightest one counts (at its clip, if it is beyond). At the bottom it is bounded on intervals of the
-    signal, by the least distance and the largest sigma in each.
+    A clip at distance z sigma, to either side, takes sigma (density(z) - z tail(z)) from the mean. Up to the clip that
+    grows with the signal. Beyond it, and at the bottom, it is bounded on intervals of the signal, by the least distance
+    and the largest sigma in each.
     """
     pixel = setup.pixel
     gain, offset_e = pixel.dn_per_e, pixel.offset_dn / pixel.dn_per_e
@@ -111,11 +111,20 @@ def promise(setup: Setup, brightest_e: float) -> float:
         z = np.maximum(distance, 0.0) / np.maximum(sigma, 1e-300)
         return np.asarray(np.where(sigma > 0, sigma * np.maximum(_density(z) - z * ndtr(-z), 0.0), 0.0))
 
-    bright = np.array([brightest_e])
-    photon = np.sqrt(variance_e(bright, pixel))
-    whole = np.sqrt(variance_e(bright, pixel) + pixel.read_noise_e**2)
-    adc_e = (pixel.full_scale_dn - pixel.offset_dn) / gain
-    top = taken(pixel.well_e - bright, photon)[0] + taken(adc_e - bright, whole)[0]
+    def at_the_top(clip_e: float, read_e: float) -> float:
+        def spread(electrons: FloatArray) -> FloatArray:
+            return np.asarray(np.sqrt(variance_e(electrons, pixel) + read_e**2), dtype=float)
+
+        below = np.array([min(brightest_e, clip_e)])
+        found = taken(clip_e - below, spread(below))[0]
+        if brightest_e > clip_e:
+            unit = spread(np.array([clip_e]))[0] or 1.0
+            beyond = clip_e + unit * np.expm1(np.linspace(0, math.log1p((brightest_e - clip_e) / unit), 400))
+            found = max(found, taken(beyond[:-1] - clip_e, spread(beyond[1:])).max())
+        return float(found)
+
+    top = at_the_top(pixel.well_e, 0.0)
+    top += at_the_top((pixel.full_scale_dn - pixel.offset_dn) / gain, pixel.read_noise_e)
     edges = np.concatenate([[0.0], np.geomspace(1e-3, max(brightest_e, 2e-3), 400)])
     sigma = np.sqrt(variance_e(edges[1:], pixel) + pixel.read_noise_e**2)
     bottom = taken(offset_e + edges[:-1], sigma).max()

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..plan import EFFECTS, Plan
+from ..plan import Plan
+from ..promises import EFFECTS
 from ..study import Study
 
 
 def plan_lines(study: Study, *, explain: bool) -> Iterator[str]:
     """Every scene's effects with method, promised error, reason and work; scenes of one plan are told at once."""
-    groups: dict[tuple[object, ...], list[Plan]] = {}
+    groups: dict[str, list[Plan]] = {}
     for plan in study.plans.values():
-        groups.setdefault((plan.key, *(f"{c.promised_dn:.2g}{c.reason}" for c in plan.choices)), []).append(plan)
+        groups.setdefault(plan.key, []).append(plan)
     for plans in groups.values():
         yield from _lines(plans, explain=explain)
     computed = sum(plan.work for plan in study.plans.values())
@@ -24,18 +25,19 @@ def plan_lines(study: Study, *, explain: bool) -> Iterator[str]:
 
 
 def _lines(plans: list[Plan], *, explain: bool) -> Iterator[str]:
-    plan = plans[0]
-    names = (
-        plans[0].scenario if len(plans) == 1 else f"{plans[0].scenario} ... {plans[-1].scenario} ({len(plans)} scenes)"
-    )
+    """Scenes that are computed alike, with the largest promise of each effect among them."""
+    first, last = plans[0].scenario, plans[-1].scenario
+    names = first if len(plans) == 1 else f"{first} ... {last} ({len(plans)} scenes)"
+    work, whole = (sum(w) for w in zip(*((p.work, p.reference_work) for p in plans), strict=True))
     yield (
-        f"{names}: promised {plan.promised_dn:.2g} of {plan.tolerance_dn:g} DN, about {plan.work:.2g} operations "
-        f"(everything on: {plan.reference_work:.2g})"
+        f"{names}: promised {max(p.promised_dn for p in plans):.2g} of {plans[0].tolerance_dn:g} DN, "
+        f"about {work:.2g} operations (everything on: {whole:.2g})"
     )
     width = max(map(len, EFFECTS))
-    for choice in plan.choices:
+    for choices in zip(*(plan.choices for plan in plans), strict=True):
+        choice = max(choices, key=lambda c: c.promised_dn)
         yield f"  {choice.effect:<{width}}  {choice.method:<16}  {choice.promised_dn:>8.2g} DN  {choice.reason}"
     if explain:
-        for effect, method, promised in plan.rejected:
+        for effect, method, promised in plans[0].rejected:
             yield f"  rejected: {effect} = {method}, which changes a CSD by up to {promised:.3g} DN"
     yield ""

@@ -1,0 +1,217 @@
+"""What every method of every effect changes in a CSD, at most, and what it costs, for the designs of a scene.
+
+Effects are switched from the reference to their method one after the other; each promise bounds what that step changes
+in any CSD, for every design of the scene. So the sum bounds the whole. The readout's effects come first: once it is
+straight, what the optics change passes through it unchanged.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import replace
+from types import ModuleType
+
+import numpy as np
+
+from .arrays import FloatArray
+from .effects import (
+    blur,
+    crosstalk,
+    demosaic,
+    extinction,
+    flicker,
+    illumination,
+    noise,
+    pedestal,
+    phase,
+    quadrature,
+    quantization,
+    sampling,
+    saturation,
+)
+from .effects.bounds import Amounts, Box, Reach
+from .effects.kernel import make_kernel
+from .setup import REFERENCE, Methods
+
+EFFECTS: Mapping[str, ModuleType] = {
+    "noise": noise,
+    "quantization": quantization,
+    "saturation": saturation,
+    "pedestal": pedestal,
+    "quadrature": quadrature,
+    "sampling": sampling,
+    "phase": phase,
+    "demosaic": demosaic,
+    "blur": blur,
+    "crosstalk": crosstalk,
+    "illumination": illumination,
+    "extinction": extinction,
+    "flicker": flicker,
+}
+"""Every effect in the order in which it is switched to its method; methods go from the cheapest to the reference."""
+READOUT = ("noise", "quantization", "saturation", "pedestal")
+_NOISE_COST = 8
+"""A pixel through the table of the mean readout costs about as much as this many multiplications."""
+
+
+class Promises:
+    """One box of designs: what each step changes in it, remembered."""
+
+    def __init__(self, box: Box) -> None:
+        self.box = box
+        self.setup = box.setup
+        self.reach = Reach(box)
+        self.spectrum = extinction.transmittance(self.setup, "spectral", self.setup.grid.nodes_nm)
+        self._kernels: dict[Methods, FloatArray] = {}
+        self._amounts: dict[bytes, Amounts] = {}
+        self._gaps: dict[tuple[str, float], float] = {}
+        self._promises: dict[tuple[str, Methods, Methods], float] = {}
+        self.work: Counter[str] = Counter()
+
+    def promise(self, effect: str, before: Methods, after: Methods) -> float:
+        """What switching `effect` from its reference changes in any CSD, DN."""
+        if getattr(before, effect) == getattr(after, effect):
+            return 0.0
+        if effect in READOUT:
+            return self._readout_promise(effect, after)
+        # What optics change does not depend on these.
+        others = {e: getattr(REFERENCE, e) for e in ("noise", "pedestal", "quadrature") if e != effect}
+        key = (effect, replace(before, **others), replace(after, **others))
+        if key not in self._promises:
+            self._promises[key] = self._linear_promise(*key)
+        return self._promises[key]
+
+    def _readout_promise(self, effect: str, after: Methods) -> float:
+        """Ranges of the change in each channel, put together over the channels."""
+        pixel = self.setup.pixel
+        others = self.setup.pixel.dark_e_per_s * self.reach.longest_s * pixel.dn_per_e + self.reach.background_dn
+        tops = self.reach.brightest_dn + others
+        if pixel.crosstalk:
+            tops = np.full(tops.size, tops.max())
+        if effect == "noise":
+            each = [noise.promise(self.setup, top / pixel.dn_per_e) for top in tops]
+        elif effect == "quantization":
+            each = [quantization.promise(self.setup)] * tops.size
+        elif effect == "saturation":
+            each = [saturation.promise(self.setup, top / pixel.dn_per_e) for top in tops]
+        else:
+            soft = self.setup.scenario.noise and after.noise == "expected"
+            clipped = after.saturation == "clip"
+            each = [
+                pixel.offset_dn if soft and clipped else pedestal.promise(self.setup, top, clipped=clipped)
+                for top in tops
+            ]
+        return float(np.linalg.norm(each))
+
+    def _kernel(self, methods: Methods) -> FloatArray:
+        """The kernel at the knots at the reference's places, without extinction: [cases, channels, channels, knots]."""
+        on = "skip" if methods.blur == "skip" else REFERENCE.blur
+        wanted = replace(methods, extinction="skip", illumination="skip", blur=on)
+        wanted = replace(wanted, **{e: getattr(REFERENCE, e) for e in (*READOUT, "quadrature", "flicker")})
+        if wanted not in self._kernels:
+            light = make_kernel(self.setup, wanted, self.reach.knots_nm, by_pixel=False, work=self.work).light
+            places = phase.places_px(self.setup, REFERENCE.phase)
+            at = np.zeros(len(places), dtype=np.intp)
+            if len(light) > 1:
+                at = phase.nearest(self.setup, places, phase.places_px(self.setup, wanted.phase))
+            full = np.broadcast_to(light, (*light.shape[:3], self.reach.knots_nm.size))
+            self._kernels[wanted] = np.ascontiguousarray(full[at])
+        return self._kernels[wanted]
+
+    def _gap(self, methods: Methods, method: str) -> float:
+        """How far a kernel may be from its interpolation between the wavelengths of a method of blur."""
+        setup, target = self.setup, self.setup.scenario.target
+        knots_nm = blur.knots(setup.grid.nodes_nm, method)
+        if target is None or knots_nm.size == setup.grid.size:
+            return 0.0
+        aperture = 0.0 if methods.sampling == "skip" else setup.pixel.fill_factor**0.5 * setup.pixel.pitch_um
+        if (method, aperture) not in self._gaps:
+            radius = sampling.radii_px(setup, target)[0] * setup.pixel.pitch_um
+            w20_um = blur.defocus_um(setup.scenario, setup.pixel.pitch_um)
+            f_number = setup.scenario.optics.f_number
+            bound = blur.interpolation_bound(radius, aperture, knots_nm * 1e-3, f_number, w20_um)
+            self._gaps[method, aperture] = bound
+        return self._gaps[method, aperture]
+
+    def _between_knots(self, methods: Methods) -> float:
+        """How far the kernel of some methods may be from its interpolation between the knots of the comparison."""
+        if methods.blur in ("skip", blur.COARSE):
+            return 0.0
+        return self._gap(methods, blur.COARSE) + self._gap(methods, methods.blur)
+
+    def amounts(self, factor: FloatArray, low: FloatArray, high: FloatArray) -> Amounts:
+        """`Reach.amounts`, remembered."""
+        key = factor.tobytes() + low.tobytes() + high.tobytes()
+        digest = hashlib.sha256(key).digest()
+        if digest not in self._amounts:
+            self._amounts[digest] = self.reach.amounts(factor, low, high)
+        return self._amounts[digest]
+
+    def _linear_promise(self, effect: str, before: Methods, after: Methods) -> float:
+        box, setup, reach = self.box, self.setup, self.reach
+        straight = after.saturation == "skip" and after.quantization == "skip"
+        falls = illumination.factor(setup, after.illumination if effect != "illumination" else before.illumination)
+        base = changed = self.amounts(self.spectrum * falls, box.low, box.high)
+        now, then = self._kernel(before), self._kernel(after)
+        left, remainder = then, self._between_knots(before)
+        if effect == "quadrature":
+            kept = quadrature.nodes(setup.grid.size, after.quadrature)
+            middle, half = quadrature.deviation(box.low, box.high, kept)
+            changed, change = self.amounts(self.spectrum * falls, middle - half, middle + half), now
+        elif effect == "illumination":
+            lost = 1 - illumination.factor(setup, after.illumination) / falls
+            change, remainder = now * lost, remainder * abs(lost)
+        elif effect == "extinction":
+            other = extinction.transmittance(setup, after.extinction, setup.grid.nodes_nm)
+            changed = self.amounts((self.spectrum - other) * falls, box.low, box.high)
+            base, change = self.amounts(other * falls, box.low, box.high), now
+        elif effect == "flicker":
+            share = self._flicker_share(after.flicker, straight=straight)
+            change, remainder = now * share, remainder * share
+        else:
+            change = now - then
+            if effect != "blur":  # what is interpolated in both kernels; nothing where they are the same
+                remainder = (remainder + self._between_knots(after)) * bool(change.any())
+            elif after.blur != "skip":
+                remainder = self._gap(after, after.blur)
+        if remainder == 0 and not change.any():
+            return 0.0
+        found = reach.largest_change(changed, change, remainder, base, left, straight=straight)
+        steep = quantization.steepness(setup) if after.quantization == "round" and setup.scenario.noise else 1.0
+        return found * steep
+
+    def _flicker_share(self, method: str, *, straight: bool) -> float:
+        """What a method misses of the light, relative to the most light of a pulsed exposure."""
+        reach = self.reach
+        below, above = 1 - reach.least_light, reach.most_light - 1
+        if method == "ends":
+            return 0.0 if straight else (below + above) / 2 / reach.most_light
+        return (below if straight else max(below, above)) / reach.most_light
+
+    def work_of(self, methods: Methods) -> float:
+        """Estimated operations of a run of all designs."""
+        setup, target = self.setup, self.setup.scenario.target
+        grid, signals = setup.grid.size, len(setup.lights.photons)
+        channels = len(setup.mosaic.channels)
+        straight = methods.saturation == "skip" and methods.quantization == "skip"
+        cases, pixels, kernel = 1.0, float(channels), 0.0
+        if target is not None and methods.sampling != "skip":
+            cases = float(len(phase.places_px(setup, methods.phase)))
+            across = 2 * sampling.radii_px(setup, target)[1] + 1
+            places = max(across, 2.0 * max(setup.mosaic.indices.shape)) ** 2
+            pixels = channels if straight else places
+            waves = 1 if methods.blur == "skip" else blur.knots(setup.grid.nodes_nm, methods.blur).size
+            kernel = cases * places * channels * waves + (200 * places * waves if methods.blur != "skip" else 0)
+        elif target is not None and methods.blur != "skip":
+            kernel = 500.0 * blur.knots(setup.grid.nodes_nm, methods.blur).size
+        nodes = quadrature.nodes(grid, methods.quadrature).size
+        touched = pixels * max(len(setup.modified), 1) / channels
+        scales = len(flicker.scales(setup, methods.flicker, np.ones(1))[0])
+        values = cases * scales * signals
+        each = values / scales * touched * nodes + values * channels * signals / 2
+        if methods.saturation != "skip":
+            each += values * pixels * (_NOISE_COST if setup.scenario.noise and methods.noise != "skip" else 1)
+        each += values * pixels if methods.quantization != "skip" else 0.0
+        return kernel + self.box.n_designs * each
