@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from .errors import Fault, OutputError
 from .evaluate import evaluate
 from .imaging import imager_of
 from .metrics import CSD
@@ -22,6 +23,7 @@ from .study import Study, load_study
 
 SHARE = 0.01
 AUDIT = "audit.parquet"
+_COLUMNS = ("design_id", "scenario", "plan", "promised_dn", "realized_dn")
 
 
 @dataclass(frozen=True)
@@ -46,12 +48,14 @@ def sampled(table: pd.DataFrame, share: float = SHARE) -> pd.DataFrame:
 
 def audit(study: Study, table: pd.DataFrame) -> Audit:
     """Recompute the sample with the reference; `study` is the one that made `table`."""
-    return Audit(pd.DataFrame(_rows(study, sampled(table))), len(table))
+    return Audit(pd.DataFrame(_rows(study, sampled(table)), columns=list(_COLUMNS)), len(table))
 
 
 def audit_output(folder: Path, data: Path | None) -> list[str]:
     """Audit a finished run, write its rows beside it, and say what was found."""
     output = read_output(folder)
+    if output.provenance["data_sha256"] and data is None:
+        raise OutputError(Fault("the run read curve files", str(folder), allowed="--data FOLDER with these files"))
     study = load_study(folder / RESOLVED, data)
     found = audit(study, output.table)
     write_table(pa.Table.from_pandas(found.rows, preserve_index=False), folder / AUDIT)

@@ -68,9 +68,7 @@ def check(study: StudyPath, data: DataFolder = None) -> None:
 def plan(
     study: StudyPath,
     data: DataFolder = None,
-    tolerance: Annotated[
-        float | None, typer.Option(min=0, help="Tolerance of a CSD, DN.", show_default="the study's")
-    ] = None,
+    tolerance: Annotated[float | None, typer.Option(help="Tolerance of a CSD, DN.", show_default="the study's")] = None,
     explain: Annotated[bool, typer.Option("--explain", help="Show the alternatives that were rejected.")] = False,
 ) -> None:
     """Say which effects each scene calls for, and why, without running it."""
@@ -79,6 +77,8 @@ def plan(
     from .runner import with_plans
     from .study import load_study
 
+    if tolerance is not None and not tolerance > 0:
+        raise StudyError(f"--tolerance {tolerance:g}: must be above 0 DN")
     with ProgressDisplay() as display:
         planned = with_plans(load_study(study, data), os.cpu_count() or 1, display.update, tolerance)
     for line in plan_lines(planned, explain=explain):

@@ -223,6 +223,8 @@ def imager_of(setup: Setup) -> Imager:
 def smooth_imager(setup: Setup) -> Imager:
     """The imager of a setup without clipping and rounding, on every wavelength: what a search sees."""
     straight = {"saturation": "skip", "quantization": "skip", "noise": "skip", "quadrature": "grid"}
+    if setup.methods.flicker == "fine":  # of a straight response the ends are the extremes
+        straight["flicker"] = "ends"
     return imager_of(replace(setup, methods=Methods(**{**asdict(setup.methods), **straight})))
 
 

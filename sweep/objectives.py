@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from .arrays import FloatArray
-from .schema import Positive, Section
+from .schema import Section
+
+Weight = Annotated[float, Field(ge=1e-6, le=1e6)]
 
 COMBINED = "objective"
 """Column of an objective that is not simply one of the quantities."""
@@ -21,8 +23,8 @@ class Objective(Section):
     A name alone is that quantity; a list is the smallest of its members.
     """
 
-    minimum: dict[str, Positive] = {}
-    sum: dict[str, Positive] = {}
+    minimum: dict[str, Weight] = {}
+    sum: dict[str, Weight] = {}
 
     @model_validator(mode="before")
     @classmethod

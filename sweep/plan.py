@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
 from .effects.bounds import Box
@@ -86,34 +86,32 @@ class Planner:
         return max((scene.promise(effect, before, after) for scene in self._scenes), default=0.0)
 
     def plan(self, scenario: str, tolerance_dn: float) -> Plan:
-        """The cheapest plan whose promises sum to at most `tolerance_dn`."""
-        best: tuple[float, float, Methods, dict[str, float]] | None = None
-        rejected: dict[tuple[str, str], float] = {}
-        for methods, promises in self._candidates(tolerance_dn, rejected):
-            work = sum(scene.work_of(methods) for scene in self._scenes)
-            total = sum(promises.values())
-            if best is None or (work, total) < best[:2]:
-                best = (work, total, methods, promises)
-        assert best is not None  # the reference promises 0
-        work, _, methods, promises = best
+        """The cheapest plan whose promises sum to at most `tolerance_dn`; of equally cheap ones, what skips more."""
+        tried: dict[tuple[str, str], float] = {}
+        methods, promises = self._cheapest(tolerance_dn, tried)
         choices = tuple(
-            Choice(e, method, promises.get(e, 0.0), self._reason(e, method, promises.get(e, 0.0), rejected))
+            Choice(e, method, promises.get(e, 0.0), self._reason(e, method, promises.get(e, 0.0), tried))
             for e, method in asdict(methods).items()
         )
-        shown = tuple((e, m, dn) for (e, m), dn in rejected.items() if getattr(methods, e) != m)
-        whole = sum(scene.work_of(REFERENCE) for scene in self._scenes)
-        return Plan(scenario, tolerance_dn, choices, work, whole, shown)
+        rejected = tuple((e, m, dn) for (e, m), dn in tried.items() if getattr(methods, e) != m)
+        return Plan(scenario, tolerance_dn, choices, self._work(methods), self._work(REFERENCE), rejected)
 
-    def _candidates(
-        self, tolerance_dn: float, rejected: dict[tuple[str, str], float]
-    ) -> Iterator[tuple[Methods, dict[str, float]]]:
-        """Every combination within the tolerance, with the promise of each of its effects."""
+    def _work(self, methods: Methods) -> float:
+        return sum(scene.work_of(methods) for scene in self._scenes)
+
+    def _cheapest(self, tolerance_dn: float, tried: dict[tuple[str, str], float]) -> tuple[Methods, dict[str, float]]:
+        """Branch and bound over the effects, cheapest methods first; `tried` takes each method's smallest promise."""
         start = replace(REFERENCE, **{e: EFFECTS[e].METHODS[0] for e in EFFECTS if self._exact[e] is not None})
         active = [e for e in EFFECTS if self._exact[e] is None]
+        best: list[tuple[float, Methods, dict[str, float]]] = []
 
-        def deeper(at: int, methods: Methods, promises: dict[str, float]) -> Iterator[tuple[Methods, dict[str, float]]]:
+        def deeper(at: int, methods: Methods, promises: dict[str, float]) -> None:
+            # Every further effect at its cheapest: no completion of these methods costs less.
+            least = self._work(replace(methods, **{e: EFFECTS[e].METHODS[0] for e in active[at:]}))
+            if best and least >= best[0][0]:
+                return
             if at == len(active):
-                yield methods, promises
+                best[:] = [(least, methods, promises)]
                 return
             effect = active[at]
             for method in EFFECTS[effect].METHODS:
@@ -121,14 +119,15 @@ class Planner:
                 if not self._allowed(effect, after):
                     continue
                 promised = self.promise(effect, methods, after)
-                if (effect, method) not in rejected or promised < rejected[effect, method]:
-                    rejected[effect, method] = promised
+                tried[effect, method] = min(promised, tried.get((effect, method), promised))
                 # Behind a rounded readout, an error however small may move a value by a whole step.
                 rounded = after.quantization == "round" and not self._noisy
                 if sum(promises.values()) + promised <= (0.0 if rounded and effect not in READOUT else tolerance_dn):
-                    yield from deeper(at + 1, after, promises | {effect: promised})
+                    deeper(at + 1, after, promises | {effect: promised})
 
-        yield from deeper(0, start, {})
+        deeper(0, start, {})
+        _, methods, promises = best[0]  # there is one: the reference promises 0
+        return methods, promises
 
     @property
     def _noisy(self) -> bool:
@@ -141,7 +140,7 @@ class Planner:
         straight = methods.saturation == "skip" and methods.quantization == "skip"
         return effect != "sampling" or methods.sampling != "skip" or straight
 
-    def _reason(self, effect: str, method: str, promised: float, rejected: Mapping[tuple[str, str], float]) -> str:
+    def _reason(self, effect: str, method: str, promised: float, tried: Mapping[tuple[str, str], float]) -> str:
         exact = self._exact[effect]
         if exact is not None:
             return exact
@@ -150,7 +149,7 @@ class Planner:
             return _NOTHING.get(effect, "changes nothing here")
         if promised > 0:
             return f"changes a CSD by at most {promised:.2g} DN"
-        cheaper = {m: rejected[effect, m] for m in methods[: methods.index(method)] if (effect, m) in rejected}
+        cheaper = {m: tried[effect, m] for m in methods[: methods.index(method)] if (effect, m) in tried}
         if not cheaper:
             return "what else is chosen needs it"
         nearest = min(cheaper, key=lambda m: cheaper[m])

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, PlainValidator, model_validator
 
 from .schema import NonNegative, Positive, Section
 from .sensor import Optics
@@ -19,7 +19,8 @@ OBJECT_RESOLUTION = "object_resolution_px"
 class WhitePatchExposure(Section):
     """The paper's exposure: the brightest channel on the white patch reaches `level` of full scale, per CFA.
 
-    The white patch is flat in photons. `photon_ratio` (K) is the photons of a signal patch over those of the white
+    The white patch is flat in photons and fills the field, on axis in clear air; the level counts neither pedestal nor
+    crosstalk, background or dark current. `photon_ratio` (K) is the photons of a signal patch over those of the white
     patch; null takes the data set's own, which for peak-normalized spectra is equivalent bandwidth / grid span.
     """
 
@@ -54,6 +55,16 @@ class Geometry(Section):
         return pitch_um * self.width_px / math.radians(self.fov_deg)
 
 
+def _place(value: Any) -> Any:
+    """`any`, or two finite numbers."""
+    if value == "any":
+        return value
+    numbers = list(value) if isinstance(value, list | tuple) else []
+    if len(numbers) != 2 or not all(isinstance(v, int | float) and math.isfinite(v) for v in numbers):
+        raise ValueError("a place is `any`, or [column, row] in pixels")
+    return (float(numbers[0]), float(numbers[1]))
+
+
 class Target(Geometry):
     """A traffic light as a disc on the sensor.
 
@@ -63,7 +74,7 @@ class Target(Geometry):
     `center`.
     """
 
-    phase_px: Literal["any"] | Annotated[list[float], Field(min_length=2, max_length=2)] = [0.0, 0.0]
+    phase_px: Annotated[Literal["any"] | tuple[float, float], PlainValidator(_place)] = (0.0, 0.0)
     readout: Literal["mean", "center"] = "mean"
 
 
@@ -79,9 +90,10 @@ class Scenario(Section):
 
     Without a `target` every signal is a self-emissive patch that fills the field. Signals have the same photon count,
     `photon_radiance` (photons/s/sr/m^2, summed over the wavelength grid), or, with `intensity_cd`, the luminance of a
-    light of that luminous intensity and the target's diameter (0.2 m without a target). `visibility_m`: meteorological
-    optical range, which dims a target by its distance. `background_cd_m2`: uniform light over the whole field, flat in
-    photons. `off_axis_deg`: field angle. `noise`: photon, read and dark noise and PRNU act before the mean is taken.
+    light of that luminous intensity and the target's diameter (0.2 m without a target). `visibility_m`: the distance at
+    which the air leaves 2 % (Koschmieder's meteorological range); it dims a target. `background_cd_m2`: light that is
+    added over the whole field, also in front of the target, flat in photons and not dimmed. `off_axis_deg`: field
+    angle. `noise`: photon, read and dark noise and PRNU act before the mean is taken.
     """
 
     photon_radiance: Positive = 2e18
@@ -96,9 +108,11 @@ class Scenario(Section):
     noise: bool = False
 
     @model_validator(mode="after")
-    def _weather_needs_a_distance(self) -> Scenario:
+    def _goes_together(self) -> Scenario:
         if self.visibility_m is not None and self.target is None:
             raise ValueError("visibility_m needs a target with a distance")
+        if self.intensity_cd is not None and isinstance(self.exposure, WhitePatchExposure):
+            raise ValueError("intensity_cd needs a fixed exposure: the white patch is given in photons")
         return self
 
     @property

@@ -215,8 +215,8 @@ def random_scene(seed: int) -> Scene:
         given["off_axis_deg"] = float(rng.uniform(0, 50))
     if now(0.5):
         given["exposure"] = {"kind": "fixed", "exposure_s": float(10 ** rng.uniform(-3.5, -1.5))}
-    if now(0.3):
-        given["intensity_cd"] = 200.0
+        if now(0.6):
+            given["intensity_cd"] = 200.0
     if now(0.2):
         given["background_cd_m2"] = float(10 ** rng.uniform(0, 3.5))
     if now(0.2):

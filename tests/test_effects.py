@@ -27,7 +27,7 @@ from sweep.effects import (
     sampling,
     saturation,
 )
-from sweep.scenes import Drive, Scenario, Target
+from sweep.scenes import Drive, FixedExposure, Scenario, Target
 from sweep.sensor import Pixel
 from sweep.spectra import LIGHT_M_S, PLANCK_J_S, WavelengthGrid
 
@@ -224,7 +224,9 @@ def test_flicker_by_sliding_an_exposure_over_the_pulses(duty: float, periods: fl
 
 
 def test_luminance_of_a_traffic_light() -> None:
-    assert Scenario(intensity_cd=200.0).luminance_cd_m2 == pytest.approx(6366, abs=0.5)
+    assert Scenario(intensity_cd=200.0, exposure=FixedExposure(exposure_s=0.01)).luminance_cd_m2 == pytest.approx(
+        6366, abs=0.5
+    )
     grid = WavelengthGrid()
     line = (grid.nodes_nm == 555).astype(float)
     per_photon = luminance_per_photon_radiance(grid, line[None])[0]
@@ -308,6 +310,13 @@ def test_places_are_nested_and_nearest_is_on_the_torus() -> None:
     assert {tuple(p) for p in coarse} <= {tuple(p) for p in fine}
     near = phase.nearest(made, np.array([[1.9, 0.1]]), coarse)
     assert tuple(coarse[near[0]]) == (0.0, 0.0)
+
+
+def test_a_place_counts_within_the_tile() -> None:
+    one, other = (
+        scene("a", "RGGB", {"target": FAR | {"phase_px": p}}).setup for p in ([0.25, 1.5], [1e6 + 0.25, -0.5])
+    )
+    np.testing.assert_allclose(phase.places_px(one, "one"), phase.places_px(other, "one"), atol=1e-9)
 
 
 def test_focal_length_gives_the_pixels_per_radian() -> None:

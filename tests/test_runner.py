@@ -343,3 +343,23 @@ def test_sampled_rows_are_the_front_and_a_hundredth() -> None:
     assert chosen["pareto"].sum() == 10
     assert 400 < len(chosen) < 600
     assert list(sampled(frame)["design_id"]) == list(chosen["design_id"])
+
+
+def test_a_study_of_a_searched_box_alone(tmp_path: Path) -> None:
+    text = (
+        "study: box\nsensor: ar0820\nlights: tl16\nwavelengths: {step_nm: 5}\ncfas: [RYNCy]\n"
+        "boxes: {x: {cfa: RYNCy, channel: N, base: Y, to: G, box: {left_nm: {min: 570, max: 630}, right_nm: {min: 640, max: 700}}}}\n"
+        "scenarios: {a: {}, b: {off_axis_deg: 20}}\nsearch: {starts: 2, max_evaluations: 20, scenario: b}\n"
+    )
+    path = tmp_path / "box.yaml"
+    path.write_text(text)
+    run_study(load_study(path), tmp_path / "out", 1, lambda *_: None)
+    frame = pd.read_parquet(tmp_path / "out" / "results.parquet")
+    assert list(frame["kind"]) == ["search"]
+    assert list(frame["scenario"]) == ["b"]
+    make_report(read_output(tmp_path / "out"))
+
+
+def test_an_audit_of_nothing_finds_nothing_broken(study: Study) -> None:
+    frame = pd.DataFrame({"design_id": [0], "kind": ["reference"], "pareto": [False], "status": ["not finite"]})
+    assert audit(study, frame).broken.empty

@@ -204,6 +204,41 @@ def test_the_measured_study_loads() -> None:
             "lights: tl16\nscenarios:\n  far: {each: [1]}\n",
             "tiny.yaml:4: scenarios: far: `each` maps keys such as target.distance_m to values",
         ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  a: {target: {distance_m: 1, fov_deg: 60}}\n",
+            "tiny.yaml:5: scenarios.a.target: the light is too large (got '730.956 px'); allowed: at most 128 px",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  a: {target: {distance_m: 90, fov_deg: 60}, optics: {focus_m: 0.005}}\n",
+            "tiny.yaml:5: scenarios.a.optics.focus_m: too near for this lens (got '0.005 m'); allowed: more than 0.0154 m",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  a: {target: {distance_m: 90, fov_deg: 60}, optics: {f_number: 0.01}}\n",
+            "tiny.yaml:5: scenarios.a.optics.f_number: the image is too fine",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  a: {each: {off_axis_deg: [1, 2, 1]}}\n",
+            "tiny.yaml:4: scenarios: a: two scenarios are named 'a off_axis_deg=1'",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  a: {each: {off_axis_deg: [mean]}}\n",
+            "tiny.yaml:4: scenarios: a: each.off_axis_deg: a number, a list of numbers, or `min`, `max` and `count`",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  a: {intensity_cd: 200}\n",
+            "tiny.yaml:5: scenarios.a: intensity_cd needs a fixed exposure: the white patch is given in photons",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  a: {exposure: {exposure_s: 1}}\n",
+            "tiny.yaml:5: scenarios.a.exposure.kind: missing",
+        ),
         ("lights: tl16\n", "lights: tl16\ntolerance_dn: 0\n", "tiny.yaml:4: tolerance_dn: not allowed (got 0)"),
         (
             "lights: tl16\n",
@@ -353,3 +388,29 @@ def test_folder_names_stay_inside_the_output() -> None:
     assert folder_name("../../etc") == ".._.._etc"
     assert folder_name("..") == "_"
     assert folder_name("<script>") == "_script_"
+
+
+def test_columns_of_signal_types_must_differ(tmp_path: Path) -> None:
+    (tmp_path / "led.csv").write_text("wavelength_nm,x\n400,1\n700,1\n")
+    types = "{a: [x], a_b: [x], b: [x], b_b: [x], a_b_b: [x]}"
+    text = BASE.replace(
+        "lights: tl16\n", f"lights:\n  files:\n    - {{file: led.csv, quantity: energy, signals: {types}}}\n"
+    )
+    found = faults(tmp_path, text.replace("constraints:\n", "objective: csd_a_b\nconstraints:\n"))
+    assert "the pairs a/b_b and a_b/b share the column csd_a_b_b" in found[0]
+
+
+def test_a_study_needs_designs(tmp_path: Path) -> None:
+    text = "study: tiny\nsensor: ar0820\nlights: tl16\ncfas: [RYNCy]\nboxes: {x: {cfa: RYNCy, channel: N, base: Y, to: G}}\n"
+    assert "cfas: no designs" in faults(tmp_path, text)[0]
+    assert load(tmp_path, text + "search: {starts: 2, max_evaluations: 10}\n").n_designs == 0
+
+
+def test_each_makes_scenarios(tmp_path: Path) -> None:
+    scenes = "scenarios:\n  a:\n    target: {distance_m: 100, fov_deg: 60}\n    each: {target.width_px: [1920, 3840], off_axis_deg: {min: 0, max: 20, count: 3}}\n"
+    study = load(tmp_path, BASE.replace("lights: tl16\n", "lights: tl16\n" + scenes))
+    assert len(study.scenarios) == 6
+    assert study.scenarios["a width_px=1920 off_axis_deg=10"].off_axis_deg == 10
+    target = study.scenarios["a width_px=3840 off_axis_deg=0"].target
+    assert target is not None
+    assert target.width_px == 3840

@@ -2,7 +2,8 @@
 
 The image of a disc of radius R is a function of the distance r from its center,
   h(r) = 2 pi R integral_0^(1 / lambda N) J1(2 pi R nu) J0(2 pi r nu) OTF(nu) dnu,
-since the transfer function ends at nu = 1 / (lambda N). OTF with defocus W20 (Hopkins), s = lambda N nu:
+since the transfer function ends at nu = 1 / (lambda N), the cutoff of a cone with sin = 1 / 2N (the irradiance, as
+ISETCam's, is that of tan = 1 / 2N; they differ by 0.8 % at f/4). OTF with defocus W20 (Hopkins), s = lambda N nu:
   OTF = (4 / pi) integral_0^acos(s) sin^2 p cos(8 pi W20 N nu (cos p - s)) dp.
 """
 
@@ -18,12 +19,14 @@ from scipy.special import j0, j1
 
 from ..arrays import FloatArray
 from ..scenes import Scenario
+from ..sensor import Pixel
 from ..setup import Setup
 
 METHODS = ("skip", "every 10 nm", "every 5 nm", "every 2 nm", "every wavelength")
 COARSE = "every 10 nm"
 """The interpolated method on whose wavelengths kernels are compared when a plan is made."""
 _SPACING_NM = {"every 10 nm": 10.0, "every 5 nm": 5.0, "every 2 nm": 2.0}
+_SHORTEST_UM = 0.4
 _PANEL_NODES = 32
 _CYCLES_PER_PANEL = 4.0
 _SPLINE_PER_CYCLE = 24
@@ -45,6 +48,39 @@ def defocus_um(scenario: Scenario, pitch_um: float) -> float:
     return abs(image[0] - image[1]) / (8 * scenario.optics.f_number**2)
 
 
+_MOST_PX = 128.0
+_MOST_PERIODS = 400.0
+
+
+def too_much(scenario: Scenario, pixel: Pixel) -> tuple[tuple[str, ...], str, str, str] | None:
+    """Why a target's image is not computed: where it is set, problem, value, what is allowed; None when it is."""
+    target, optics = scenario.target, scenario.optics
+    if target is None:
+        return None
+    across = target.object_resolution_px
+    if across > _MOST_PX:
+        uniform = f"at most {_MOST_PX:g} px (a larger light fills the field: leave out `target`)"
+        return ("target",), "the light is too large", f"{across:.6g} px", uniform
+    f_m = target.focal_length_um(pixel.pitch_um) * 1e-6
+    for key, distance_m in ((("target", "distance_m"), target.distance_m), (("optics", "focus_m"), optics.focus_m)):
+        if distance_m is not None and distance_m <= 2 * f_m:
+            return (
+                key,
+                "too near for this lens",
+                f"{distance_m:g} m",
+                f"more than {2 * f_m:.4g} m, twice its focal length",
+            )
+    # The image shift over the f-number is the diameter of the blur circle.
+    circle_px = defocus_um(scenario, pixel.pitch_um) * 8 * optics.f_number / pixel.pitch_um
+    if circle_px > _MOST_PX:
+        return ("optics", "focus_m"), "too far out of focus", f"{circle_px:.4g} px of blur", f"at most {_MOST_PX:g} px"
+    periods = (across + 4) * pixel.pitch_um / (_SHORTEST_UM * optics.f_number)
+    if periods > _MOST_PERIODS:
+        allowed = f"at most {_MOST_PERIODS:g} periods of the finest detail across the light"
+        return ("optics", "f_number"), "the image is too fine", f"{periods:.4g} periods", allowed
+    return None
+
+
 def transfer(nu_per_um: FloatArray, wavelength_um: FloatArray, f_number: float, w20_um: float) -> FloatArray:
     """OTF, ndarray[n_nu, n_wavelengths]."""
     s = np.minimum(nu_per_um[:, None] * wavelength_um * f_number, 1.0)
@@ -52,10 +88,11 @@ def transfer(nu_per_um: FloatArray, wavelength_um: FloatArray, f_number: float, 
     if w20_um == 0:
         return np.asarray((2 / math.pi) * (angle - s * np.sqrt(1 - s**2)), dtype=float)
     phase = 8 * math.pi * w20_um * f_number * nu_per_um
-    count = 24 + int(phase.max(initial=0.0) / 2)
-    nodes, weights = np.polynomial.legendre.leggauss(count)
+    panels = 1 + int(phase.max(initial=0.0) / _PANEL_NODES)
+    nodes, weights = np.polynomial.legendre.leggauss(_PANEL_NODES)
+    shares = ((np.arange(panels)[:, None] + (nodes + 1) / 2) / panels).ravel()
     found = np.zeros_like(s)
-    for node, weight in zip((nodes + 1) / 2, weights / 2, strict=True):
+    for node, weight in zip(shares, np.tile(weights / 2 / panels, panels), strict=True):
         p = node * angle
         found += weight * np.sin(p) ** 2 * np.cos(phase[:, None] * (np.cos(p) - s))
     return np.asarray((4 / math.pi) * angle * found, dtype=float)

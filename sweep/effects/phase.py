@@ -22,12 +22,14 @@ def skip_is_exact(setup: Setup) -> str | None:
 def places_px(setup: Setup, method: str) -> FloatArray:
     """Centers of the light, ndarray[n_cases, 2] as (column, row): all of a grid over the tile, or the scene's one."""
     target = setup.scenario.target
-    if target is None or target.phase_px != "any":
-        return np.array([(0.0, 0.0) if target is None else target.phase_px], dtype=float)
+    rows, columns = setup.mosaic.indices.shape
+    if target is None:
+        return np.zeros((1, 2))
+    if target.phase_px != "any":
+        return np.asarray(np.mod([target.phase_px], (columns, rows)), dtype=float)
     per_pixel = _PER_PIXEL[method]
     if not per_pixel:
         return np.zeros((1, 2))
-    rows, columns = setup.mosaic.indices.shape
     x, y = np.meshgrid(np.arange(columns * per_pixel) / per_pixel, np.arange(rows * per_pixel) / per_pixel)
     return np.stack([x.ravel(), y.ravel()], axis=1)
 

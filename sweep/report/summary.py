@@ -70,7 +70,7 @@ def summary_lines(output: Output) -> list[str]:
     lines.append(_plan_line(output))
     search = output.provenance.get("search")
     if search:
-        found = f"{amount(output.objective, search['best_smooth_objective'], 2)} before quantization"
+        found = f"{amount(output.objective, search['best_smooth_objective'], 2)} before clipping and quantization"
         lines.append(
             f"Search: {search['algorithm']}, {search['starts']} starts, {search['evaluations']} evaluations: {found}."
         )
@@ -109,7 +109,6 @@ def _limit_line(output: Output, search: Mapping[str, Any]) -> str:
         return f"Limit: none computed ({search['no_limit']})."
     without = f" but {', '.join(search['limit_left_out'])}" if search["limit_left_out"] else ""
     ends = [amount(output.objective, search[f"limit_{end}"], 3) for end in ("attained", "proven")]
-    return (
-        f"Limit of any filter under the same constraints{without}: between {ends[0]} and {ends[1]}; "
-        f"the search's answer is {search['gap']:.1%} below."
+    return f"Limit of any filter under the same constraints{without}: between {ends[0]} and {ends[1]}; " + (
+        "nothing is left to gain." if search["gap"] is None else f"the search's answer is {search['gap']:.1%} below."
     )

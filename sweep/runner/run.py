@@ -79,6 +79,8 @@ def _write(
     if answer is not None:
         table = pa.concat_tables([table, answer_row(study, answer, rules, table.num_rows)])
         facts["search"] = search_facts(study, answer)
+        if study.plans[answer.search.scenario].methods.saturation == "clip":
+            facts["warnings"].append("signals can saturate; the search sees the response before that, its row after")
     table = mark_front(table, rules)
     for name, made in (
         (RESULTS, table),
@@ -133,7 +135,7 @@ def _sweep(study: Study, rules: Rules, shards: Shards, parallel: Parallel, progr
         tables[index] = table
         done += table.num_rows
         progress("designs", done, study.n_designs)
-    return pa.concat_tables([tables[i] for i in range(len(jobs))])
+    return pa.concat_tables([rules.schema.empty_table(), *(tables[i] for i in range(len(jobs)))])
 
 
 def _parallel(n_jobs: int, stop: Stop, tasks: Iterable[Any]) -> Iterator[Any]:

@@ -26,6 +26,7 @@ Parallel = Callable[[Iterable[Any]], Iterator[Any]]
 Progress = Callable[[str, int, int], None]
 _FRONT_STARTS = 4
 _FRONT_LIMIT_DN = 0.02
+_NO_LIMIT = 0.05
 _REACH_STARTS = 8
 
 
@@ -53,7 +54,12 @@ class SearchAnswer:
     @property
     def gap(self) -> float | None:
         """How far the answer is below what is proven to be out of reach, relative."""
-        return None if self.limit is None else 1 - self.best.objective / self.limit.proven
+        return None if self.limit is None else _gap(self.best, self.limit)
+
+
+def _gap(best: Evaluation, limit: Limit) -> float | None:
+    """Relative distance of an answer from the limit; none where the limit itself is no more than its own accuracy."""
+    return None if limit.proven <= _NO_LIMIT else 1 - best.objective / limit.proven
 
 
 def run_search(study: Study, search: Search, parallel: Parallel, progress: Progress) -> SearchAnswer:
@@ -189,6 +195,6 @@ def front_table(answer: SearchAnswer) -> pa.Table:
             row |= dict(zip(names, map(float, point.best.x), strict=True))
         if point.limit is not None and point.limit.curve is not None:
             row["limit"] = point.limit.proven
-            row["gap"] = None if point.best is None else 1 - point.best.objective / point.limit.proven
+            row["gap"] = None if point.best is None else _gap(point.best, point.limit)
         rows.append(row)
     return pa.Table.from_pylist(rows, schema=front_schema(names))

@@ -94,12 +94,15 @@ class Document:
         """`loc` without the tags that pydantic adds for unions, and with a missing last key kept."""
         node: Any = self.data
         path: list[Key] = []
+        varied: set[Key] = set()
         for position, made in enumerate(loc):
             key = _written(node, made)
+            if key != made:
+                varied = {part for name in node[key]["each"] for part in str(name).split(".")}
             if _has(node, key):
                 path.append(key)
                 node = _child(node, key)
-            elif isinstance(node, dict) and position == len(loc) - 1:
+            elif key in varied or (isinstance(node, dict) and position == len(loc) - 1):
                 path.append(key)
         return tuple(path)
 
@@ -112,7 +115,9 @@ class Document:
             return self.fault(path, "missing")
         if kind == "value_error":
             return self.fault(path, str(item["ctx"]["error"]))
-        if kind in ("union_tag_invalid", "union_tag_not_found"):
+        if kind == "union_tag_not_found":
+            return self.fault((*path, str(item["ctx"]["discriminator"]).strip("'")), "missing")
+        if kind == "union_tag_invalid":
             tag = str(item["ctx"]["discriminator"]).strip("'")
             expected = item["ctx"].get("expected_tags", "")
             got = value.get(tag) if isinstance(value, dict) else value
@@ -147,7 +152,7 @@ def _written(node: Any, key: Key) -> Key:
     """The key as the file has it: a scenario made by `each` is named after the one that it was made from."""
     if isinstance(node, dict) and isinstance(key, str) and key not in node:
         for name, entry in node.items():
-            if isinstance(entry, dict) and "each" in entry and key.startswith(f"{name} "):
+            if isinstance(entry, dict) and isinstance(entry.get("each"), dict) and key.startswith(f"{name} "):
                 return str(name)
     return key
 
@@ -192,7 +197,8 @@ def dotted(path: Sequence[Key]) -> str:
 
 
 def _readable(message: str) -> str:
-    return message.removeprefix("Input should be ").removeprefix("a valid ")
+    plain = message.removeprefix("Input should be ").removeprefix("a valid ")
+    return "mapping" if plain.startswith("dictionary") else plain
 
 
 def _plain(node: Any) -> Any:

@@ -146,8 +146,9 @@ class Study:
     def plan(self, scenario: str, tolerance_dn: float | None = None) -> Plan:
         """The cheapest plan of a scenario that holds for all designs of the study."""
         boxes = [self.box(space, scenario) for space in self.spaces]
-        boxes = [box for box in boxes if box.n_designs]
-        return Planner(boxes).plan(scenario, tolerance_dn or self.section.tolerance_dn)
+        used = [box for box in boxes if box.n_designs]
+        tolerance = self.section.tolerance_dn if tolerance_dn is None else tolerance_dn
+        return Planner(used or boxes).plan(scenario, tolerance)
 
     def problem(self, search: Search) -> Problem:
         """The search as a mathematical problem."""

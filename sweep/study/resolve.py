@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ..datasets.lights import Lights
+from ..effects import blur
 from ..errors import StudyError, SweepError, nearest
 from ..evaluate import DESIGNED, WORST, shiftable
 from ..families import CHANNELS, Parameter, build_family
@@ -45,6 +46,8 @@ class _Resolver:
         if sensor is None or lights is None:
             raise StudyError(self.faults)
         spaces = self.spaces(sensor, mosaics)
+        self.check_columns(lights)
+        self.check_images()
         self.check_objective(lights)
         self.check_constraints(lights)
         self.check_published(lights, mosaics)
@@ -68,10 +71,33 @@ class _Resolver:
             digests=dict(self.sources.digests),
             warnings=tuple(self.sources.warnings),
         )
+        if not study.n_designs and search is None:
+            self.add(
+                ("cfas",), "no designs", None, "a CFA with a curve for each channel, a design, a sweep or a search"
+            )
+            raise StudyError(self.faults)
         if study.n_designs > MOST_DESIGNS:
             self.add(("sweeps",), "too many designs", f"{study.n_designs:,}", f"at most {MOST_DESIGNS:,}")
             raise StudyError(self.faults)
         return study
+
+    def check_columns(self, lights: Lights) -> None:
+        """Every pair of signal types has a column of its own."""
+        seen: dict[str, tuple[str, str]] = {}
+        for pair in class_pairs(lights.classes):
+            name = csd_name(pair)
+            if name in seen:
+                problem = f"the pairs {'/'.join(seen[name])} and {'/'.join(pair)} share the column {name}"
+                self.add(("lights",), problem, None, "other names of signal types")
+            seen[name] = pair
+
+    def check_images(self) -> None:
+        """Every target makes an image that can be computed."""
+        for name, scenario in self.section.scenarios.items():
+            refused = blur.too_much(scenario, self.section.pixel)
+            if refused is not None:
+                key, problem, value, allowed = refused
+                self.add(("scenarios", name, *key), problem, value, allowed)
 
     def mosaic(self, name: str, cfa: CfaSection) -> Mosaic | None:
         try:

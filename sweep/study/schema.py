@@ -7,7 +7,7 @@ from copy import deepcopy
 from itertools import product
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from ..constraints import Bound
 from ..families import FamilyOptions
@@ -223,16 +223,28 @@ def _expanded(value: Any) -> Any:
         each = entry["each"]
         if not isinstance(each, dict) or not each:
             raise ValueError(f"{name}: `each` maps keys such as target.distance_m to values")
-        axes = [Axis.model_validate(_axis(axis)).points() for axis in each.values()]
+        axes = [_numbers(f"{name}: each.{key}", axis) for key, axis in each.items()]
         if math.prod(map(len, axes)) + len(found) > _MOST_SCENARIOS:
             raise ValueError(f"{name}: more than {_MOST_SCENARIOS} scenarios")
         for point in product(*axes):
             made = deepcopy({key: inner for key, inner in entry.items() if key != "each"})
             for key, number in zip(each, point, strict=True):
                 _set(made, str(key).split("."), number)
-            labels = [f"{str(key).rsplit('.', 1)[-1]}={number:g}" for key, number in zip(each, point, strict=True)]
-            found[" ".join([str(name), *labels])] = made
+            labels = [f"{str(key).rsplit('.', 1)[-1]}={number:.12g}" for key, number in zip(each, point, strict=True)]
+            full = " ".join([str(name), *labels])
+            if full in found:
+                raise ValueError(f"{name}: two scenarios are named {full!r}")
+            found[full] = made
     return found
+
+
+def _numbers(where: str, axis: Any) -> tuple[float, ...]:
+    """Values of one key of `each`; whole numbers of a list stay whole."""
+    try:
+        points = Axis.model_validate(_axis(axis)).points()
+    except ValidationError:
+        raise ValueError(f"{where}: a number, a list of numbers, or `min`, `max` and `count`") from None
+    return tuple(axis) if isinstance(axis, list) else points
 
 
 def _set(mapping: dict[str, Any], path: list[str], number: float) -> None:
