@@ -3,6 +3,7 @@
 # make test                  install and run the tests
 # make slow                  run the tests that take minutes
 # make check                 ruff, mypy --strict
+# make accuracy              measure what accuracy costs in time, results in outputs/accuracy
 # make bench                 measure speed, JSON in outputs/bench
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
   $$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
@@ -11,7 +12,7 @@ BIN := $(VENV)/bin
 NAME ?= stopband
 ARGS ?=
 
-.PHONY: study report test slow check bench clean
+.PHONY: study report test slow accuracy check bench clean
 .DELETE_ON_ERROR:
 
 study: $(VENV)/.ready
@@ -25,6 +26,9 @@ test: $(VENV)/.ready-dev
 
 slow: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest -m slow $(ARGS)
+
+accuracy: $(VENV)/.ready
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/sweep accuracy studies/accuracy.yaml $(ARGS)
 
 check: $(VENV)/.ready-dev
 	$(BIN)/ruff check sweep tests

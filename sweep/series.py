@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import pandas as pd
+
 from .arrays import FloatArray
 from .figures import CURVE_CYCLE, canvas
 
@@ -13,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WIDE = 15.0
+_LEAST_DN = 1e-6
 _LABELS = {
     "distance_m": "distance / m",
     "exposure_s": "exposure / s",
@@ -56,4 +59,27 @@ def draw_series(series: SeriesFigure) -> Figure:
     axes.set_title(series.title)
     legend = f"band: {series.band}" if series.band else None
     axes.legend(title=legend, fontsize=8, title_fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False)
+    return figure
+
+
+def draw_work_precision(table: pd.DataFrame, name: str) -> Figure:
+    """Error against time for each scenario's ladder of tolerances: realized (full line) and promised (dashed).
+
+    `table`: columns scenario, tolerance_dn, seconds, reference_s, promised_dn, realized_dn. Errors below 1e-6 DN are
+    drawn there.
+    """
+    figure, axes = canvas(8.5, 5.0)
+    for (scenario, rows), color in zip(table.groupby("scenario", sort=False), CURVE_CYCLE * 4, strict=False):
+        ladder = rows.sort_values("tolerance_dn")
+        for column, style in (("realized_dn", "o-"), ("promised_dn", "x--")):
+            label = str(scenario) if column == "realized_dn" else None
+            errors = ladder[column].clip(lower=_LEAST_DN)
+            axes.plot(ladder["seconds"], errors, style, color=color, label=label, linewidth=1.3, markersize=4)
+        axes.axvline(float(rows["reference_s"].iloc[0]), color=color, linestyle=":", linewidth=1.0)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlabel("time / s (dotted: everything on)")
+    axes.set_ylabel("error of a CSD / DN (full: realized, dashed: promised)")
+    axes.set_title(f"{name}: what accuracy costs")
+    axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0, frameon=False)
     return figure

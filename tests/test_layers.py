@@ -28,7 +28,7 @@ LEVELS = [
     {"study"},
     {"runner"},
     {"report", "calibration"},
-    {"audit"},
+    {"audit", "accuracy"},
     {"cli"},
     {"__main__"},
 ]

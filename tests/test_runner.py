@@ -17,6 +17,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
+from sweep.accuracy import TOLERANCES_DN, accuracy
 from sweep.audit import audit, audit_output, sampled
 from sweep.errors import OutputError
 from sweep.evaluate import evaluate, quantities
@@ -363,3 +364,19 @@ def test_a_study_of_a_searched_box_alone(tmp_path: Path) -> None:
 def test_an_audit_of_nothing_finds_nothing_broken(study: Study) -> None:
     frame = pd.DataFrame({"design_id": [0], "kind": ["reference"], "pareto": [False], "status": ["not finite"]})
     assert audit(study, frame).broken.empty
+
+
+def test_accuracy_measures_a_ladder_of_tolerances(tmp_path: Path) -> None:
+    path = tmp_path / "scenes.yaml"
+    path.write_text(SCENES)
+    lines = accuracy(load_study(path), tmp_path / "out", lambda *_: None, most_designs=4)
+    table = pd.read_parquet(tmp_path / "out" / "accuracy.parquet")
+    assert len(table) == 2 * len(TOLERANCES_DN)
+    assert (table["promised_dn"] <= table["tolerance_dn"]).all()
+    assert (table["realized_dn"] <= table["promised_dn"] * (1 + 1e-9) + 1e-9).all()
+    for _, rows in table.groupby("scenario"):
+        assert list(rows["work"]) == sorted(rows["work"])  # from the coarsest tolerance to the finest
+        assert (rows["work"] < rows["reference_work"]).all()
+        assert rows["plan"].nunique() >= 2
+    assert f"{len(table)} of {len(table)} realized errors are within their promise." in lines
+    assert (tmp_path / "out" / "accuracy.svg").is_file()

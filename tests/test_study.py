@@ -71,7 +71,8 @@ def test_a_study_is_resolved(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["paper", "stopband", "freeform", "dual", "rccb", "producible", "distance", "exposure", "night", "fog"]
+    "name",
+    ["paper", "stopband", "freeform", "dual", "rccb", "producible", "distance", "exposure", "night", "fog", "accuracy"],
 )
 def test_shipped_studies_load(name: str) -> None:
     study = load_study(STUDIES / f"{name}.yaml")
