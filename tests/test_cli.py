@@ -11,7 +11,8 @@ import pytest
 from sweep.curve_files import read_curves
 
 from .conftest import SHARED, STUDIES, needs_measured
-from .test_runner import SCENES, study_file
+from .test_runner import study_file
+from .test_scenes import SCENES
 
 
 @pytest.fixture(scope="module")

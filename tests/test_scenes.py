@@ -1,0 +1,117 @@
+"""Runs of studies with scenes: planned, drawn, audited, measured."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+
+from sweep.accuracy import TOLERANCES_DN, accuracy
+from sweep.audit import audit, audit_output, sampled
+from sweep.report import make_report, read_output
+from sweep.runner import run_study
+from sweep.study import load_study
+
+from .conftest import STUDIES
+
+SCENES = """\
+study: scenes
+sensor: ar0820
+lights: tl16
+wavelengths: {step_nm: 5}
+pixel: {read_noise_e: 2, offset_dn: 168}
+scenarios:
+  road:
+    target: {fov_deg: 60, phase_px: any}
+    optics: {f_number: 2}
+    noise: true
+    each: {target.distance_m: [50, 250]}
+tolerance_dn: 5
+cfas: [RGGB, RYNCy]
+sweeps:
+  edges:
+    cfa: RYNCy
+    channel: N
+    base: Y
+    to: G
+    grid: {left_nm: [600, 610], left_width_nm: 20, right_nm: [640, 650], right_width_nm: 10}
+"""
+
+
+def test_scenes_are_planned_drawn_and_audited(tmp_path: Path) -> None:
+    path, folder = tmp_path / "scenes.yaml", tmp_path / "out"
+    path.write_text(SCENES)
+    study = load_study(path)
+    assert list(study.scenarios) == ["road distance_m=50", "road distance_m=250"]
+    run_study(study, folder, 1, lambda *_: None)
+    frame = pd.read_parquet(folder / "results.parquet")
+    assert set(frame["status"]) == {"ok"}
+    assert (frame["csd_yellow_red"] < frame["best_place_csd_yellow_red"]).all()
+    assert (frame["promised_dn"] <= 5).all()
+    assert (frame["promised_dn"] > 0).all()
+    output = read_output(folder)
+    make_report(output)
+    assert (folder / "figures" / "series-1.svg").is_file()
+    plans = output.provenance["plans"]
+    assert frame["plan"].iloc[0] == plans["road distance_m=50"]["key"]
+    assert "quarter pixel" in (folder / "report.html").read_text()
+    lines = audit_output(folder, None)
+    audited = pd.read_parquet(folder / "audit.parquet")
+    assert lines[0].startswith(f"{len(audited)} of {len(frame)} designs recomputed with every effect on: no error")
+    assert (audited["realized_dn"] <= audited["promised_dn"]).all()
+    assert audited["realized_dn"].max() > 1e-9
+    # The audit notices a row that is wrong by more than was promised.
+    wrong = frame.assign(csd_yellow_red=frame["csd_yellow_red"] + 6)
+    assert len(audit(study, wrong).broken) == len(audited)
+
+
+def test_sampled_rows_are_the_front_and_a_hundredth() -> None:
+    n = 50_000
+    frame = pd.DataFrame(
+        {
+            "design_id": range(n),
+            "kind": ["sweep"] * n,
+            "pareto": [i % 5000 == 7 for i in range(n)],
+            "status": ["ok"] * n,
+        }
+    )
+    chosen = sampled(frame)
+    assert chosen["pareto"].sum() == 10
+    assert 400 < len(chosen) < 600
+    assert list(sampled(frame)["design_id"]) == list(chosen["design_id"])
+
+
+def test_a_study_of_a_searched_box_alone(tmp_path: Path) -> None:
+    text = (
+        "study: box\nsensor: ar0820\nlights: tl16\nwavelengths: {step_nm: 5}\ncfas: [RYNCy]\n"
+        "boxes: {x: {cfa: RYNCy, channel: N, base: Y, to: G, box: {left_nm: {min: 570, max: 630}, right_nm: {min: 640, max: 700}}}}\n"
+        "scenarios: {a: {}, b: {off_axis_deg: 20}}\nsearch: {starts: 2, max_evaluations: 20, scenario: b}\n"
+    )
+    path = tmp_path / "box.yaml"
+    path.write_text(text)
+    run_study(load_study(path), tmp_path / "out", 1, lambda *_: None)
+    frame = pd.read_parquet(tmp_path / "out" / "results.parquet")
+    assert list(frame["kind"]) == ["search"]
+    assert list(frame["scenario"]) == ["b"]
+    make_report(read_output(tmp_path / "out"))
+
+
+def test_an_audit_of_nothing_finds_nothing_broken() -> None:
+    frame = pd.DataFrame({"design_id": [0], "kind": ["reference"], "pareto": [False], "status": ["not finite"]})
+    assert audit(load_study(STUDIES / "stopband.yaml"), frame).broken.empty
+
+
+def test_accuracy_measures_a_ladder_of_tolerances(tmp_path: Path) -> None:
+    path = tmp_path / "scenes.yaml"
+    path.write_text(SCENES)
+    lines = accuracy(load_study(path), tmp_path / "out", lambda *_: None, most_designs=4)
+    table = pd.read_parquet(tmp_path / "out" / "accuracy.parquet")
+    assert len(table) == 2 * len(TOLERANCES_DN)
+    assert (table["promised_dn"] <= table["tolerance_dn"]).all()
+    assert (table["realized_dn"] <= table["promised_dn"] * (1 + 1e-9) + 1e-9).all()
+    for _, rows in table.groupby("scenario"):
+        assert list(rows["work"]) == sorted(rows["work"])  # from the coarsest tolerance to the finest
+        assert (rows["work"] < rows["reference_work"]).all()
+        assert rows["plan"].nunique() >= 2
+    assert f"{len(table)} of {len(table)} realized errors are within their promise." in lines
+    assert (tmp_path / "out" / "accuracy.svg").is_file()
