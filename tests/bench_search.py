@@ -60,7 +60,7 @@ def ours(box: Counted, seed: int) -> list[float]:
     found: list[float] = []
     for start, u in enumerate(starting_points(box.problem, 16, seed)):
         run = search_from(box.problem, start, u, "SLSQP", min(125, BUDGET - len(found)), seed)
-        found += [e.csd if e.violation <= FEASIBLE else 0.0 for e in run.log]
+        found += [e.objective if e.violation <= FEASIBLE else 0.0 for e in run.log]
         if len(found) >= BUDGET:
             break
     return found
