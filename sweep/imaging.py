@@ -19,7 +19,7 @@ from .arrays import FloatArray
 from .effects import flicker, noise, quadrature, quantization, saturation
 from .effects.kernel import make_kernel
 from .scenes import WhitePatchExposure
-from .sensor import Pixel
+from .sensor import Pixel, unquantized
 from .setup import (
     Methods,
     Setup,
@@ -133,7 +133,7 @@ class Imager:
     def smooth(self, curves: FloatArray) -> FloatArray:
         """Unquantized, unclipped response, DN, ndarray[n_designs, n_cases, n_signals, n_channels]."""
         exposure_s = self.exposure_s(curves)
-        return self._folded(straight_dn(self.electrons(curves, self.scales(exposure_s), exposure_s), self._pixel))
+        return self._folded(unquantized(self.electrons(curves, self.scales(exposure_s), exposure_s), self._pixel))
 
     def smooth_gradient(self, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
         """Exact derivative of `smooth` at one design, with that of its exposure; a pulse's share of it is held.
@@ -192,13 +192,13 @@ class Imager:
         """Digital numbers of the units from their expected electrons, as far as the methods go."""
         methods, noisy, pixel = self.setup.methods, self.setup.scenario.noise, self._pixel
         if methods.saturation == "skip":
-            dn = straight_dn(electrons, pixel)
+            dn = unquantized(electrons, pixel)
         elif noisy and methods.noise == "expected":
             self.work["noise"] += electrons.size
             dn = _expected(electrons, pixel)
         else:
             self.work["saturation"] += electrons.size
-            dn = straight_dn(saturation.clipped(electrons, pixel), pixel)
+            dn = unquantized(saturation.clipped(electrons, pixel), pixel)
         if methods.quantization == "skip":
             return dn
         self.work["quantization"] += electrons.size
@@ -226,11 +226,6 @@ def smooth_imager(setup: Setup) -> Imager:
     if setup.methods.flicker == "fine":  # of a straight response the ends are the extremes
         straight["flicker"] = "ends"
     return imager_of(replace(setup, methods=Methods(**{**asdict(setup.methods), **straight})))
-
-
-def straight_dn(electrons: FloatArray, pixel: Pixel) -> FloatArray:
-    """Gain and pedestal without clipping or rounding, DN."""
-    return electrons * pixel.dn_per_e + pixel.offset_dn
 
 
 def _expected(electrons: FloatArray, pixel: Pixel) -> FloatArray:

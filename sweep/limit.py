@@ -19,12 +19,14 @@ from scipy.sparse import csr_matrix, diags_array, vstack
 
 from .arrays import FloatArray
 from .constraints import FEASIBLE, Bound
+from .effects.saturation import top_e
 from .errors import Fault, SweepError
 from .evaluate import DESIGNED, WORST, designed_quantities, smooth_csd, smooth_response
-from .imaging import smooth_imager, straight_dn
+from .imaging import smooth_imager
 from .objectives import Objective
 from .problem import Problem
 from .scenes import WhitePatchExposure
+from .sensor import unquantized
 
 _MARGIN_DN = 1e-6
 """A linear program whose best margin is below minus this is infeasible beyond its solver's own tolerance."""
@@ -121,8 +123,8 @@ def _clips(problem: Problem) -> bool:
     """Whether the base curve's response, the largest that any of the filters has, is cut off when it is read out."""
     setup = problem.setup
     smooth = smooth_response(setup, setup.base_qe[None])
-    well_dn = float(straight_dn(np.array([setup.pixel.well_e]), setup.pixel)[0])
-    return bool((smooth > min(float(setup.pixel.full_scale_dn), well_dn)).any())
+    top_dn = unquantized(np.array(top_e(setup.pixel)), setup.pixel)
+    return bool((smooth > top_dn).any())
 
 
 def _exposure_is_fixed(problem: Problem) -> bool:

@@ -68,7 +68,6 @@ class Promises:
         self._amounts: dict[bytes, Amounts] = {}
         self._gaps: dict[tuple[str, float], float] = {}
         self._promises: dict[tuple[str, Methods, Methods], float] = {}
-        self.work: Counter[str] = Counter()
 
     def promise(self, effect: str, before: Methods, after: Methods) -> float:
         """What switching `effect` from its reference changes in any CSD, DN."""
@@ -111,7 +110,7 @@ class Promises:
         wanted = replace(methods, extinction="skip", illumination="skip", blur=on)
         wanted = replace(wanted, **{e: getattr(REFERENCE, e) for e in (*READOUT, "quadrature", "flicker")})
         if wanted not in self._kernels:
-            light = make_kernel(self.setup, wanted, self.reach.knots_nm, by_pixel=False, work=self.work).light
+            light = make_kernel(self.setup, wanted, self.reach.knots_nm, by_pixel=False, work=Counter()).light
             places = phase.places_px(self.setup, REFERENCE.phase)
             at = np.zeros(len(places), dtype=np.intp)
             if len(light) > 1:
@@ -141,7 +140,7 @@ class Promises:
             return 0.0
         return self._gap(methods, blur.COARSE) + self._gap(methods, methods.blur)
 
-    def amounts(self, factor: FloatArray, low: FloatArray, high: FloatArray) -> Amounts:
+    def _sums(self, factor: FloatArray, low: FloatArray, high: FloatArray) -> Amounts:
         """`Reach.amounts`, remembered."""
         key = factor.tobytes() + low.tobytes() + high.tobytes()
         digest = hashlib.sha256(key).digest()
@@ -153,20 +152,20 @@ class Promises:
         box, setup, reach = self.box, self.setup, self.reach
         straight = after.saturation == "skip" and after.quantization == "skip"
         falls = illumination.factor(setup, after.illumination if effect != "illumination" else before.illumination)
-        base = changed = self.amounts(self.spectrum * falls, box.low, box.high)
+        base = changed = self._sums(self.spectrum * falls, box.low, box.high)
         now, then = self._kernel(before), self._kernel(after)
         left, remainder = then, self._between_knots(before)
         if effect == "quadrature":
             kept = quadrature.nodes(setup.grid.size, after.quadrature)
             middle, half = quadrature.deviation(box.low, box.high, kept)
-            changed, change = self.amounts(self.spectrum * falls, middle - half, middle + half), now
+            changed, change = self._sums(self.spectrum * falls, middle - half, middle + half), now
         elif effect == "illumination":
             lost = 1 - illumination.factor(setup, after.illumination) / falls
             change, remainder = now * lost, remainder * abs(lost)
         elif effect == "extinction":
             other = extinction.transmittance(setup, after.extinction, setup.grid.nodes_nm)
-            changed = self.amounts((self.spectrum - other) * falls, box.low, box.high)
-            base, change = self.amounts(other * falls, box.low, box.high), now
+            changed = self._sums((self.spectrum - other) * falls, box.low, box.high)
+            base, change = self._sums(other * falls, box.low, box.high), now
         elif effect == "flicker":
             share = self._flicker_share(after.flicker, straight=straight)
             change, remainder = now * share, remainder * share

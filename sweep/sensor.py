@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from pydantic import Field, model_validator
 
 from .arrays import FloatArray
@@ -71,22 +70,6 @@ def irradiance_factor(optics: Optics, magnification: float = 0.0, field_angle_ra
     """
     cone = 1 + 4 * optics.f_number**2 * (1 + abs(magnification)) ** 2
     return math.pi * optics.transmission * math.cos(field_angle_rad) ** 4 / cone
-
-
-def electron_rate(photon_irradiance: FloatArray, qe: FloatArray, step_nm: float, pixel: Pixel) -> FloatArray:
-    """Electrons per second of each light in each channel: A FF sum(E QE) dl.
-
-    `photon_irradiance`: ndarray[n_signals, n_wavelengths], photons/s/m^2/nm. `qe`: ndarray[..., n_channels,
-    n_wavelengths], electrons per photon. Returns ndarray[..., n_signals, n_channels].
-    """
-    rate = qe @ (photon_irradiance.T * (step_nm * pixel.area_m2))
-    return np.asarray(np.swapaxes(rate, -1, -2), dtype=float)
-
-
-def digital_numbers(electrons: FloatArray, pixel: Pixel) -> FloatArray:
-    """Digital numbers as read out: full well, gain and pedestal, rounded half up, clipped to the ADC's range."""
-    held = np.minimum(electrons, pixel.well_e)
-    return np.clip(np.floor(unquantized(held, pixel) + 0.5), 0, pixel.full_scale_dn)
 
 
 def unquantized(electrons: FloatArray, pixel: Pixel) -> FloatArray:

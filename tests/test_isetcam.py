@@ -21,7 +21,7 @@ from sweep.imaging import Imager, smooth_imager
 from sweep.mosaics import Mosaic
 from sweep.plan import Planner
 from sweep.scenes import FixedExposure, Scenario
-from sweep.sensor import Optics, Pixel, digital_numbers, electron_rate, irradiance_factor
+from sweep.sensor import Optics, Pixel, irradiance_factor
 from sweep.setup import Setup
 from sweep.spectra import WavelengthGrid
 
@@ -47,15 +47,49 @@ def pixel() -> Pixel:
     )
 
 
+def isetcam_setup(mosaic: Mosaic, magnification: float, exposure_s: float, kept: np.ndarray | float = 1.0) -> Setup:
+    """The reference's patches and sensor; a lens at a finite distance has a magnification, which dims its image.
+
+    `kept`: share of the light that the blur leaves, per wavelength.
+    """
+    ref = reference()
+    optics, names = Optics(f_number=float(ref["constants"]["f_number"])), tuple(ref["patch_names"])
+    dimmed = irradiance_factor(optics, magnification) / irradiance_factor(optics)
+    total = float(ref["total_photon_radiance"])
+    photons = np.array(ref["photon_radiance"]) / total
+    np.testing.assert_allclose(photons.sum(axis=1) * ref["bin_nm"], 1.0, rtol=1e-12)
+    lights = Lights("isetcam", names, names, photons * kept, 1.0, "", False)
+    qe = np.array(ref["qe"])[columns_of(mosaic)]
+    scenario = Scenario(
+        photon_radiance=total,
+        optics=Optics(f_number=optics.f_number, transmission=dimmed),
+        exposure=FixedExposure(exposure_s=exposure_s),
+    )
+    return Setup(WavelengthGrid(step_nm=5), mosaic, qe, (), qe[0], lights, pixel(), scenario)
+
+
+def columns_of(mosaic: Mosaic) -> list[int]:
+    """The reference's number of each channel; its clear pixel is W."""
+    names: list[str] = reference()["qe_names"]
+    return [names.index({"C": "W"}.get(channel, channel)) for channel in mosaic.channels]
+
+
+def every_channel() -> Setup:
+    """All channels of the reference side by side, read out with everything on."""
+    return isetcam_setup(Mosaic.from_rows("all", [reference()["qe_names"]]), 0.0, 1.0)
+
+
+NOTHING = np.empty((1, 0, 61))
+"""Curves of a CFA without a modified channel."""
+
+
 def electrons(cfa: str, mode: str) -> tuple[np.ndarray, dict[str, Any]]:
     """Ours, ndarray[n_patches, n_channels] in the reference's channel order, and the reference's run."""
     ref = reference()
     run = next(r for r in ref["runs"] if r["cfa"] == cfa and r["mode"] == mode)
-    optics = Optics(f_number=float(ref["constants"]["f_number"]))
-    factor = irradiance_factor(optics, magnification=ref["skip_magnification"])
-    light = np.array(ref["photon_radiance"]) * factor
-    rate = electron_rate(light, np.array(ref["qe"]), float(ref["bin_nm"]), pixel())
-    return rate * run["skip_exposure_s"], run
+    every = Mosaic.from_rows("all", [ref["qe_names"]])
+    setup = isetcam_setup(every, ref["skip_magnification"], run["skip_exposure_s"])
+    return smooth_imager(setup).rates(NOTHING)[0, 0] * run["skip_exposure_s"], run
 
 
 @pytest.mark.parametrize("mode", ["fixed", "auto"])
@@ -76,7 +110,7 @@ def test_digital_numbers_are_the_same(cfa: str, channels: list[int], mode: str) 
     if mode == "fixed":
         assert expected.max() < 4095
     # The only difference that is allowed: where ISETCam's ADC saturates at 4096, ours does at 4095.
-    np.testing.assert_array_equal(digital_numbers(found, pixel())[:, channels], np.minimum(expected, 4095))
+    np.testing.assert_array_equal(Imager(every_channel()).transfer(found)[:, channels], np.minimum(expected, 4095))
 
 
 def test_irradiance_agrees_to_single_precision() -> None:
@@ -122,28 +156,16 @@ def test_blur_of_a_uniform_field_agrees_with_isetcam() -> None:
 def test_a_uniform_field_agrees_through_the_whole_image_chain(cfa: str) -> None:
     ref = reference()
     run = next(r for r in ref["runs"] if r["cfa"] == cfa and r["mode"] == "fixed")
-    grid, names = WavelengthGrid(step_nm=5), tuple(ref["patch_names"])
-    # A lens at a finite distance: its magnification lowers the irradiance.
-    f_number, m = float(ref["constants"]["f_number"]), ref["constants"]["magnification"]
-    nearer = irradiance_factor(Optics(f_number=f_number), m) / irradiance_factor(Optics(f_number=f_number))
-    total = float(ref["total_photon_radiance"])
-    photons = np.array(ref["photon_radiance"]) / total
-    np.testing.assert_allclose(grid.integrate(photons), 1.0, rtol=1e-12)
-    lights = Lights("isetcam", names, names, photons * kept_at_the_center(f_number), 1.0, "", False)
     mosaic = Mosaic.from_name(cfa)
-    columns = [ref["qe_names"].index({"C": "W"}.get(channel, channel)) for channel in mosaic.channels]
-    qe = np.array(ref["qe"])[columns]
-    optics = Optics(f_number=f_number, transmission=nearer)
-    exposure = FixedExposure(exposure_s=run["exposure_s"])
-    scenario = Scenario(photon_radiance=total, optics=optics, exposure=exposure)
-    setup = Setup(grid, mosaic, qe, (), qe[0], lights, pixel(), scenario)
-    plan = Planner([Box(setup, qe, qe, 1)]).plan("uniform", 0.1)
+    columns, constants = columns_of(mosaic), ref["constants"]
+    kept = kept_at_the_center(float(constants["f_number"]))
+    setup = isetcam_setup(mosaic, constants["magnification"], run["exposure_s"], kept)
+    plan = Planner([Box(setup, setup.qe, setup.qe, 1)]).plan("uniform", 0.1)
     assert "quantization" in plan.computed
-    nothing = np.empty((1, 0, grid.size))
-    smooth = smooth_imager(setup).smooth(nothing)[0, 0]
+    smooth = smooth_imager(setup).smooth(NOTHING)[0, 0]
     volts = np.array(run["uniform_volts_unclipped"], dtype=float)[:, columns]
     np.testing.assert_allclose(smooth, 4096 * volts, atol=0.1, rtol=0)
-    dn = Imager(replace(setup, methods=plan.methods)).read(nothing)[0][0, 0]
+    dn = Imager(replace(setup, methods=plan.methods)).read(NOTHING)[0][0, 0]
     expected = np.minimum(np.array(run["uniform_dn"], dtype=float)[:, columns], 4095)
     near_a_step = np.abs(4096 * volts - np.floor(4096 * volts) - 0.5) < 0.1
     assert ((dn == expected) | near_a_step).all()

@@ -11,14 +11,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
+from sweep.datasets.lights import Lights
 from sweep.edges import SPAN_PER_WIDTH, edge, edge_gradient
+from sweep.effects import quantization, saturation
 from sweep.errors import SweepError
 from sweep.families import Stopband
+from sweep.imaging import Imager
 from sweep.metrics import cfa_sensitivity, channel_sensitivity, separation
 from sweep.mosaics import Mosaic
 from sweep.pareto import non_dominated
-from sweep.scenes import Geometry
-from sweep.sensor import Optics, Pixel, digital_numbers, electron_rate, irradiance_factor
+from sweep.scenes import FixedExposure, Geometry, Scenario
+from sweep.sensor import Optics, Pixel, irradiance_factor, unquantized
+from sweep.setup import Setup
+from sweep.spectra import WavelengthGrid
 
 
 @pytest.mark.parametrize(
@@ -101,19 +106,28 @@ def test_irradiance_is_the_camera_equation() -> None:
 
 def test_electrons_of_a_flat_light() -> None:
     pixel = Pixel(pitch_um=2.0, fill_factor=0.5)
-    light, qe = np.full((1, 301), 1e15), np.full((2, 301), 0.25)
+    qe = np.full((2, 301), 0.25)
+    grid, factor = WavelengthGrid(), irradiance_factor(Optics())
+    light = Lights("flat", ("flat",), ("flat",), np.full((1, 301), 1 / 301), 1.0, "", True)
+    scenario = Scenario(photon_radiance=1e15 * 301 / factor, exposure=FixedExposure(exposure_s=1.0))
+    setup = Setup(grid, Mosaic.from_rows("RB", [["R", "B"]]), qe, (), qe[0], light, pixel, scenario)
+    rate = Imager(setup).rates(np.empty((1, 0, 301)))
     # 1e15 photons/s/m^2/nm x 301 nm x 0.25 x 2e-12 m^2
-    np.testing.assert_allclose(electron_rate(light, qe, 1.0, pixel), 1e15 * 301 * 0.25 * 2e-12, rtol=1e-13)
+    np.testing.assert_allclose(rate, 1e15 * 301 * 0.25 * 2e-12, rtol=1e-13)
+
+
+def read_out(electrons: np.ndarray, pixel: Pixel) -> np.ndarray:
+    return quantization.rounded(unquantized(saturation.clipped(electrons, pixel), pixel), pixel)
 
 
 def test_digital_numbers_clip_the_well_before_the_adc() -> None:
     pixel = Pixel(well_e=1000.0, gain_dn_per_e=2.0, offset_dn=100.0)
     electrons = np.array([0, 0.24, 0.25, 1.0, 999.0, 5000.0, np.inf])
-    np.testing.assert_array_equal(digital_numbers(electrons, pixel), [100, 100, 101, 102, 2098, 2100, 2100])
+    np.testing.assert_array_equal(read_out(electrons, pixel), [100, 100, 101, 102, 2098, 2100, 2100])
     full = Pixel()
-    np.testing.assert_array_equal(digital_numbers(np.array([0.0, 1e4, 1e9]), full), [0, 4095, 4095])
+    np.testing.assert_array_equal(read_out(np.array([0.0, 1e4, 1e9]), full), [0, 4095, 4095])
     loud = Pixel(gain_dn_per_e=1.0)
-    np.testing.assert_array_equal(digital_numbers(np.array([4095.4, 4096.0]), loud), [4095, 4095])
+    np.testing.assert_array_equal(read_out(np.array([4095.4, 4096.0]), loud), [4095, 4095])
 
 
 @pytest.mark.parametrize(("distance_m", "fov_deg", "printed"), [(20, 120, "18"), (100, 60, "7.3"), (250, 30, "5.9")])
