@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -14,6 +14,8 @@ CSD = "csd_"
 """How the name of a color separation distance begins."""
 _BLOCK_PAIRS = 262_144
 """Pair distances held at once per channel: 2 MiB, so that a block stays in cache."""
+_SMALLEST = 1e-140
+"""Distances below this, and above its inverse, are computed without squares."""
 
 
 def class_pairs(classes: Sequence[str]) -> tuple[Pair, ...]:
@@ -38,13 +40,38 @@ def separation(response: FloatArray, first: IndexArray, second: IndexArray) -> F
     step = max(1, _BLOCK_PAIRS // max(1, len(first) * len(second)))
     for start in range(0, n_designs, step):
         block = response[start : start + step]
-        squared = np.zeros((len(block), len(first), len(second)))
-        for channel in range(n_channels):
-            values = block[:, :, channel]
-            difference = values[:, first, None] - values[:, None, second]
-            squared += difference * difference
+        squared = np.zeros((len(block), len(first), len(second)), dtype=response.dtype)
+        with np.errstate(over="ignore"):
+            for channel in range(n_channels):
+                values = block[:, :, channel]
+                difference = values[:, first, None] - values[:, None, second]
+                squared += difference * difference
         found[start : start + step] = np.sqrt(squared.min(axis=(1, 2)))
+    doubtful = np.flatnonzero((found < _SMALLEST) | (found > 1 / _SMALLEST))
+    found[doubtful] = _unscaled_separation(response[doubtful], first, second)
     return found
+
+
+def _unscaled_separation(response: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
+    """`separation` where squares would be too small or too large for a float."""
+    found = np.empty(len(response))
+    for block, one, other in pair_blocks(response.shape, first, second):
+        apart = np.hypot.reduce(response[block][:, one] - response[block][:, other], axis=-1)
+        found[block] = apart.min(axis=1)
+    return found
+
+
+def pair_blocks(
+    shape: tuple[int, ...], first: IndexArray, second: IndexArray
+) -> Iterator[tuple[slice, IndexArray, IndexArray]]:
+    """Blocks of designs small enough for all pairs at once: their slice, and both signal indices of every pair.
+
+    `shape`: (n_designs, n_signals, n_channels).
+    """
+    one, other = np.repeat(first, len(second)), np.tile(second, len(first))
+    step = max(1, _BLOCK_PAIRS // max(1, one.size * shape[2]))
+    for start in range(0, shape[0], step):
+        yield slice(start, min(start + step, shape[0])), one, other
 
 
 def separations(response: FloatArray, members: Mapping[str, IndexArray]) -> dict[Pair, FloatArray]:

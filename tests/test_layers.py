@@ -15,7 +15,7 @@ LEVELS = [
     {"schema"},
     {"spectra", "mosaics", "pareto", "constraints", "objectives", "edges", "progress"},
     {"metrics", "curve_files", "surrogate", "sensor", "chromaticity"},
-    {"datasets", "filters", "scenes", "families"},
+    {"datasets", "filters", "scenes", "families", "discrimination"},
     {"spaces", "setup"},
     {"effects"},
     {"promises"},

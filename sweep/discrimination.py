@@ -1,0 +1,134 @@
+"""How often noise confuses two signal types: from mean and variance of what the readout gives for each signal.
+
+The channels of a mosaic are read from different pixels, so their noise is independent and a covariance is diagonal.
+All functions take `mean` and `variance`, ndarray[n_designs, n_signals, n_channels] (DN, DN^2), and the signal indices
+`first`, `second` of the two types; they return ndarray[n_designs]. A channel without variance tells two signals
+apart for certain, unless their means there are the same; then it tells nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from scipy.special import ndtr
+
+from .arrays import FloatArray, IndexArray
+from .metrics import Pair, pair_blocks
+
+CNR, D_PRIME, ERROR, ERROR_BOUND = "cnr_", "dprime_", "error_", "error_bound_"
+"""How the names of a pair's noise metrics begin."""
+STATE_ERROR_BOUND = "state_error_bound"
+"""Name of `state_error_bound`."""
+
+
+def noise_names(pair: Pair) -> tuple[str, ...]:
+    """Names of a pair's four metrics: contrast to noise, d', error, bound of the error."""
+    one, other = pair
+    prefixes = (CNR, D_PRIME, ERROR, ERROR_BOUND)
+    return tuple(f"{prefix}{one}_{other}" for prefix in prefixes)
+
+
+def contrast_to_noise(mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
+    """CSD over the noise floor: the standard deviation, along the line of the nearest pair, of its two points.
+
+    The floor is sqrt(u' (Sa + Sb) / 2 u) for the unit vector u from one point to the other; of several pairs at
+    exactly the same distance, the one with the most noise counts. 0 for coincident points.
+    """
+    found = np.empty(len(mean))
+    for block, difference, ours, theirs in _pairs(mean, variance, first, second):
+        distance = np.hypot.reduce(difference, axis=-1)
+        nearest = distance == distance.min(axis=1, keepdims=True)
+        along = np.divide(difference, distance[..., None], out=np.zeros_like(difference), where=distance[..., None] > 0)
+        floor = np.hypot.reduce(along * np.sqrt((ours + theirs) / 2), axis=-1)
+        floor = np.where(nearest, floor, -1.0).max(axis=1)
+        contrast = distance.min(axis=1)
+        found[block] = _ratio(contrast, floor)
+    return found
+
+
+def detectability(mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
+    """d', the smallest over the pairs of the two types: sqrt(D' S^-1 D), S the mean covariance of the two points.
+
+    This is d_a of signal detection theory for unequal variances (Simpson and Fitter, 1973), in several channels.
+    """
+    found = np.empty(len(mean))
+    for block, difference, ours, theirs in _pairs(mean, variance, first, second):
+        z = _ratio(difference, np.sqrt((ours + theirs) / 2))
+        found[block] = np.hypot.reduce(z, axis=-1).min(axis=1)
+    return found
+
+
+def pairwise_error(mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
+    """Probability that Gaussian noise moves one point over to the other, the largest over the pairs of the two types.
+
+    The pair is divided by a plane with normal S^-1 D, S the mean covariance, placed so that both points err equally
+    often: Q(D' S^-1 D / (s_a + s_b)), with the standard deviation s of each along the normal (Fukunaga,
+    "Introduction to Statistical Pattern Recognition", linear classifiers). 0.5 for coincident points.
+    """
+    found = np.empty(len(mean))
+    for block, difference, ours, theirs in _pairs(mean, variance, first, second):
+        total = ours + theirs
+        z = _ratio(difference, np.sqrt(total))
+        share = np.divide(ours, total, out=np.full_like(total, 0.5), where=total > 0)
+        whole = np.hypot.reduce(z, axis=-1)
+        some = np.isfinite(whole)
+        z = np.where(some[..., None], z, 0.0)
+        spread = np.hypot.reduce(z * np.sqrt(share), axis=-1) + np.hypot.reduce(z * np.sqrt(1 - share), axis=-1)
+        apart = np.where(some, whole * _ratio(whole, spread), np.inf)
+        found[block] = ndtr(-apart.min(axis=1))
+    return found
+
+
+def error_bound(mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
+    """Bound on how often the most likely signal of two types is of the wrong one, for the signal that errs most often.
+
+    The sum over the signals of the other type of each pair's Bhattacharyya coefficient (Kailath, 1967), at most 1.
+    """
+    return state_error_bound(mean, variance, {"first": first, "second": second})
+
+
+def state_error_bound(mean: FloatArray, variance: FloatArray, members: Mapping[str, IndexArray]) -> FloatArray:
+    """`error_bound` over all types of `members` (type -> signal indices): how often the state is told wrong at most."""
+    sums = np.zeros(mean.shape[:2])
+    types = list(members.values())
+    for at, first in enumerate(types):
+        for second in types[at + 1 :]:
+            for block, difference, ours, theirs in _pairs(mean, variance, first, second):
+                shape = (len(difference), len(first), len(second))
+                overlap = np.exp(-_distance(difference, ours, theirs)).reshape(shape)
+                sums[block, first] += overlap.sum(axis=2)
+                sums[block, second] += overlap.sum(axis=1)
+    used = np.concatenate(types)
+    return np.asarray(np.minimum(sums[:, used].max(axis=1), 1.0), dtype=float)
+
+
+def _distance(difference: FloatArray, ours: FloatArray, theirs: FloatArray) -> FloatArray:
+    """Bhattacharyya distance of Gaussians: D'S^-1 D / 8 + ln(S / sqrt(Sa Sb)) / 2, ndarray[n_designs, n_pairs].
+
+    Where one of the two variances is 0 the logarithm is left out: digital numbers are steps, so that a point and a
+    Gaussian around it are not told apart for certain. Without it the coefficient is larger, so that it still bounds.
+    """
+    z = _ratio(difference, np.sqrt(ours + theirs))
+    both = (ours > 0) & (theirs > 0)
+    small, large = np.minimum(ours, theirs), np.maximum(ours, theirs)
+    ratio = np.sqrt(np.divide(small, large, out=np.ones_like(small), where=both))
+    # (Sa + Sb) / (2 sqrt(Sa Sb)) - 1 = (1 - r)^2 / (2 r) for r = sqrt(small / large): no digits are lost near 1.
+    with np.errstate(over="ignore"):
+        return np.asarray((z**2 / 4 + np.log1p((1 - ratio) ** 2 / (2 * ratio)) / 2).sum(axis=-1), dtype=float)
+
+
+def _ratio(over: FloatArray, under: FloatArray) -> FloatArray:
+    """Ratio of non-negative numbers; 0 / 0 is 0, and anything else over 0 is infinite."""
+    with np.errstate(over="ignore"):
+        infinite = np.where(over > 0, np.inf, 0.0)
+        return np.divide(over, under, out=infinite, where=under > 0)
+
+
+def _pairs(
+    mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray
+) -> Iterator[tuple[slice, FloatArray, FloatArray, FloatArray]]:
+    """Blocks of designs: their slice, absolute differences and both variances, ndarray[n, n_pairs, n_channels] each."""
+    for block, one, other in pair_blocks(mean.shape, first, second):
+        ours, theirs = variance[block][:, one], variance[block][:, other]
+        yield block, np.abs(mean[block][:, one] - mean[block][:, other]), ours, theirs
