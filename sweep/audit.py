@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,10 +14,10 @@ from .errors import Fault, OutputError
 from .evaluate import evaluate
 from .imaging import imager_of
 from .metrics import CSD
-from .report import read_output
+from .report import batches, hashed, read_output
 from .runner.drawn import row_space
 from .setup import REFERENCE
-from .store import RESOLVED, write_table
+from .store import RESOLVED, RESULTS, write_table
 from .study import Study, load_study
 
 SHARE = 0.01
@@ -41,14 +40,18 @@ class Audit:
 
 def sampled(table: pd.DataFrame, share: float = SHARE) -> pd.DataFrame:
     """The Pareto front, everything that is no sweep, and a share of the rest, chosen by the hash of the row's id."""
-    hashed = [int.from_bytes(hashlib.sha256(str(i).encode()).digest()[:4], "big") / 2**32 for i in table["design_id"]]
-    wanted = table["pareto"] | (table["kind"] != "sweep") | (np.array(hashed) < share)
+    wanted = table["pareto"] | (table["kind"] != "sweep") | (hashed(table["design_id"].to_numpy()) < share)
     return table[wanted & (table["status"] == "ok")]
 
 
-def audit(study: Study, table: pd.DataFrame) -> Audit:
-    """Recompute the sample with the reference; `study` is the one that made `table`."""
-    return Audit(pd.DataFrame(_rows(study, sampled(table)), columns=list(_COLUMNS)), len(table))
+def audit(study: Study, tables: Iterable[pd.DataFrame]) -> Audit:
+    """Recompute the sample with the reference; `study` is the one that made the tables."""
+    rows: list[dict[str, object]] = []
+    n_designs = 0
+    for table in tables:
+        rows += _rows(study, sampled(table))
+        n_designs += len(table)
+    return Audit(pd.DataFrame(rows, columns=list(_COLUMNS)), n_designs)
 
 
 def audit_output(folder: Path, data: Path | None) -> list[str]:
@@ -57,7 +60,7 @@ def audit_output(folder: Path, data: Path | None) -> list[str]:
     if output.provenance["data_sha256"] and data is None:
         raise OutputError(Fault("the run read curve files", str(folder), allowed="--data FOLDER with these files"))
     study = load_study(folder / RESOLVED, data)
-    found = audit(study, output.table)
+    found = audit(study, (table.to_pandas() for table in batches(folder / RESULTS)))
     write_table(pa.Table.from_pandas(found.rows, preserve_index=False), folder / AUDIT)
     broken = len(found.broken)
     lines = [

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .errors import StudyError, SweepError
+from .errors import Fault, StudyError, SweepError
 
 if TYPE_CHECKING:
     from .report import Output
@@ -33,18 +33,49 @@ def run(
     study: StudyPath,
     data: DataFolder = None,
     output: Annotated[Path, typer.Option(help="Folder for the results of all studies.")] = Path("outputs"),
-    jobs: Annotated[int | None, typer.Option(min=1, help="Worker processes.", show_default="all cores")] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, help="Workers.", show_default="all cores")] = None,
+    backend: Annotated[str, typer.Option(help="loky (processes), threading, or dask (a cluster).")] = "loky",
+    scheduler: Annotated[str | None, typer.Option(help="Of Dask: tcp://HOST:PORT.", show_default=False)] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what is to do and what it takes.")] = False,
+    fail_fast: Annotated[bool, typer.Option("--fail-fast", help="Stop at the first design that fails.")] = False,
+    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Compute failed designs again.")] = False,
 ) -> None:
-    """Run a study: results, figures and report go to OUTPUT/<study>."""
+    """Run a study: results, figures and report go to OUTPUT/<study>. The same command continues an interrupted run."""
     from .progress import ProgressDisplay
-    from .runner import run_study
+    from .runner import BACKENDS, Wishes, estimate, estimate_lines, output_folder, run_study
     from .study import folder_name, load_study
 
-    loaded = load_study(study, data)
-    folder = output / folder_name(loaded.name)
+    if backend not in BACKENDS:
+        allowed = ", ".join(BACKENDS)
+        raise SweepError(Fault("unknown backend", key="--backend", value=backend, allowed=allowed))
+    loaded, workers = load_study(study, data), jobs or os.cpu_count() or 1
+    folder, note = output_folder(output / folder_name(loaded.name), loaded)
+    if note is not None:
+        typer.echo(f"Note: {note}.", err=True)
     with ProgressDisplay() as display:
-        run_study(loaded, folder, jobs or os.cpu_count() or 1, display.update, sys.argv)
+        if dry_run:
+            found = estimate(loaded, folder, workers, display.update)
+        else:
+            wishes = Wishes(fail_fast, retry_failed)
+            computed = run_study(
+                loaded, folder, workers, display.update, sys.argv, backend=backend, scheduler=scheduler, wishes=wishes
+            )
+    if dry_run:
+        for line in estimate_lines(found, folder):
+            typer.echo(line)
+        return
+    if not computed:
+        typer.echo(f"Note: {folder} holds this very study, finished; nothing was computed.", err=True)
     _finish(folder)
+
+
+@app.command()
+def status(folder: Annotated[Path, typer.Argument(help="Output folder of a study.", show_default=False)]) -> None:
+    """Say how far a run is, from another terminal."""
+    from .runner import status_lines
+
+    for line in status_lines(folder):
+        typer.echo(line)
 
 
 @app.command()

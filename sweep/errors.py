@@ -71,6 +71,12 @@ class InfeasibleError(SweepError):
     exit_code = 3
 
 
+class FailedDesignError(SweepError):
+    """A design that could not be computed, in a run that is to stop at the first one."""
+
+    exit_code = 4
+
+
 class InterruptedRunError(SweepError):
     """A run that a signal stopped."""
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import pickle
+import threading
 from collections import Counter, OrderedDict
 from collections.abc import Iterator
 from dataclasses import asdict, replace
@@ -256,17 +257,19 @@ class Imager:
 
 _KEPT_IMAGERS = 16
 _imagers: OrderedDict[bytes, Imager] = OrderedDict()
+_one_at_a_time = threading.Lock()
 
 
 def imager_of(setup: Setup) -> Imager:
     """The imager of a setup; the latest ones are kept, so that a kernel is made once in a process."""
     key = hashlib.sha256(pickle.dumps(setup)).digest()
-    if key not in _imagers:
-        _imagers[key] = Imager(setup)
-        if len(_imagers) > _KEPT_IMAGERS:
-            _imagers.popitem(last=False)
-    _imagers.move_to_end(key)
-    return _imagers[key]
+    with _one_at_a_time:
+        if key not in _imagers:
+            _imagers[key] = Imager(setup)
+            if len(_imagers) > _KEPT_IMAGERS:
+                _imagers.popitem(last=False)
+        _imagers.move_to_end(key)
+        return _imagers[key]
 
 
 def smooth_imager(setup: Setup) -> Imager:

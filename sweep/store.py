@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -24,7 +23,8 @@ POINTS = "points.parquet"
 RECOGNITION = "recognition.parquet"
 PROVENANCE = "provenance.json"
 RESOLVED = "study.resolved.yaml"
-_SHARDS = "shards"
+ROW_GROUP = 131_072
+"""Rows that are read and written at once."""
 
 
 def result_schema(parameters: Sequence[str], quantities: Sequence[str]) -> pa.Schema:
@@ -82,7 +82,7 @@ def atomic(path: Path) -> Iterator[Path]:
 def write_table(table: pa.Table, path: Path) -> None:
     """Write one Parquet file atomically; errors as for `atomic`."""
     with atomic(path) as hidden:
-        pq.write_table(table, hidden, row_group_size=131_072)
+        pq.write_table(table, hidden, row_group_size=ROW_GROUP)
 
 
 def write_bytes(content: bytes, path: Path) -> None:
@@ -101,72 +101,26 @@ def write_json(data: Mapping[str, Any], path: Path) -> None:
     write_text(json.dumps(data, indent=2, sort_keys=True, allow_nan=False) + "\n", path)
 
 
+def sliced(path: Path, sizes: Iterable[int]) -> Iterator[pa.Table]:
+    """The rows of a Parquet file in tables of these sizes, a row group in memory; raises OutputError when damaged."""
+    try:
+        batches = (pa.Table.from_batches([batch]) for batch in pq.ParquetFile(path).iter_batches(ROW_GROUP))
+        rest = None
+        for size in sizes:
+            while rest is None or rest.num_rows < size:
+                more = next(batches, None)
+                if more is None:
+                    raise OutputError(Fault("has too few rows", str(path)))
+                rest = more if rest is None else pa.concat_tables([rest, more])
+            yield rest.slice(0, size)
+            rest = rest.slice(size)
+    except (OSError, pa.ArrowException) as error:
+        raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
+
+
 def read_table(path: Path) -> pa.Table:
     """Read a Parquet file; raises OutputError when it is missing or damaged."""
     try:
         return pq.read_table(path)
     except (OSError, pa.ArrowException) as error:
         raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
-
-
-class Shards:
-    """Finished chunks of a run, one Parquet file each, named by index and key; kept until the run is whole."""
-
-    def __init__(self, output: Path) -> None:
-        self._folder = output / _SHARDS
-
-    def path(self, index: int, key: str) -> Path:
-        """Where the shard of a chunk stands; `key` is a hash of everything that its rows depend on."""
-        return self._folder / f"{index:08d}-{key[:32]}.parquet"
-
-    def load(self, index: int, key: str, schema: pa.Schema) -> pa.Table | None:
-        """A finished shard, or None when it is missing or damaged (then it is computed again)."""
-        path = self.path(index, key)
-        if not path.exists():
-            return None
-        try:
-            table = pq.read_table(path)
-        except (OSError, pa.ArrowException):
-            return None
-        return table if table.schema.equals(schema) else None
-
-    def save(self, index: int, key: str, table: pa.Table) -> None:
-        """Keep a finished chunk; errors as for `atomic`."""
-        write_table(table, self.path(index, key))
-
-    def remove(self) -> None:
-        """Drop all shards, after their rows stand in the result table."""
-        if self._folder.is_dir():
-            for path in self._folder.iterdir():
-                path.unlink()
-            self._folder.rmdir()
-
-
-@contextmanager
-def locked(output: Path) -> Iterator[None]:
-    """Hold the output folder for one run; raises OutputError, naming the other run, when it is in use.
-
-    The kernel drops the lock with its process, so a lock cannot go stale. Hidden files that a killed run left behind
-    are removed.
-    """
-    lock = output / ".lock"
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-        handle: IO[str] = lock.open("a+", encoding="utf-8")
-    except OSError as error:
-        raise OutputError(Fault(f"cannot be written: {error.strerror or error}", str(output))) from None
-    with handle:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            handle.seek(0)
-            raise OutputError(
-                Fault(f"in use by another run (process {handle.read().strip() or '?'})", str(output))
-            ) from None
-        handle.seek(0)
-        handle.truncate()
-        handle.write(str(os.getpid()))
-        handle.flush()
-        for left_over in output.rglob(".tmp-*"):
-            left_over.unlink(missing_ok=True)
-        yield

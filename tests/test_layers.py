@@ -22,7 +22,7 @@ LEVELS = [
     {"plan", "imaging"},
     {"evaluate", "recognition"},
     {"store", "problem", "figures"},
-    {"series"},
+    {"series", "journal"},
     {"smooth", "limit"},
     {"search"},
     {"study"},

@@ -21,11 +21,11 @@ from sweep.errors import OutputError
 from sweep.evaluate import evaluate, quantities
 from sweep.families import Stopband
 from sweep.imaging import imager_of
+from sweep.journal import Journal, locked
 from sweep.report import make_report, read_output
 from sweep.runner import run_study
 from sweep.runner.jobs import CHUNK, Job, jobs_of, rules_of, run_job
 from sweep.spaces import Filter, Space
-from sweep.store import locked
 from sweep.study import Study, load_study
 
 STUDY = """\
@@ -194,8 +194,8 @@ def test_two_runs_at_once_are_refused(study: Study, tmp_path: Path) -> None:
     ran(study, tmp_path, 1)
 
 
-def started(folder: Path, output: Path, *extra: str, **options: object) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "sweep", "run", str(study_file(folder, 401)), "--output", str(output), *extra]
+def started(folder: Path, output: Path, *extra: str, count: int = 401, **options: object) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "sweep", "run", str(study_file(folder, count)), "--output", str(output), *extra]
     with (folder / "said").open("w") as said:
         return subprocess.Popen(command, stderr=said, start_new_session=True, **options)  # type: ignore[call-overload, no-any-return]
 
@@ -229,24 +229,24 @@ def test_a_killed_run_is_continued(tmp_path: Path, number: signal.Signals) -> No
     assert tables[0].equals(tables[1])
 
 
-def test_a_full_disk_is_one_line_and_keeps_the_earlier_result(tmp_path: Path) -> None:
-    output = tmp_path / "out"
-    earlier = output / "tiny" / "results.parquet"
-    earlier.parent.mkdir(parents=True)
-    earlier.write_bytes(b"earlier")
-
+def test_a_full_disk_is_one_line_and_loses_nothing(study: Study, output: Path, tmp_path: Path) -> None:
     def small_files_only() -> None:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (150_000, 150_000))
 
-    run = started(tmp_path, output, "--jobs", "1", preexec_fn=small_files_only)
+    folder = tmp_path / "out" / "tiny"
+    run = started(tmp_path, tmp_path / "out", "--jobs", "1", count=26, preexec_fn=small_files_only)
     assert run.wait(timeout=120) == 2
     said = (tmp_path / "said").read_text()
     assert said.count("\n") == 1, said
     assert "cannot be written" in said
     assert "File too large" in said
-    assert earlier.read_bytes() == b"earlier"
-    assert not list(output.rglob(".tmp-*"))
+    assert not list(folder.rglob(".tmp-*"))
+    kept = Journal(folder).entries
+    assert kept
+    seen = ran(study, folder, 1)  # the disk has room again
+    assert next(call for call in seen if call[0] == "designs")[1] == sum(entry.rows for entry in kept.values())
+    assert pq.read_table(folder / "results.parquet").equals(pq.read_table(output / "results.parquet"))
 
 
 def test_worst_cases_and_combined_objectives_are_columns(tmp_path: Path) -> None:

@@ -62,7 +62,7 @@ def test_scenes_are_planned_drawn_and_audited(tmp_path: Path) -> None:
     assert audited["realized_dn"].max() > 1e-9
     # The audit notices a row that is wrong by more than was promised.
     wrong = frame.assign(csd_yellow_red=frame["csd_yellow_red"] + 6)
-    assert len(audit(study, wrong).broken) == len(audited)
+    assert len(audit(study, [wrong]).broken) == len(audited)
 
 
 def test_sampled_rows_are_the_front_and_a_hundredth() -> None:
@@ -98,7 +98,7 @@ def test_a_study_of_a_searched_box_alone(tmp_path: Path) -> None:
 
 def test_an_audit_of_nothing_finds_nothing_broken() -> None:
     frame = pd.DataFrame({"design_id": [0], "kind": ["reference"], "pareto": [False], "status": ["not finite"]})
-    assert audit(load_study(STUDIES / "stopband.yaml"), frame).broken.empty
+    assert audit(load_study(STUDIES / "stopband.yaml"), [frame]).broken.empty
 
 
 def test_accuracy_measures_a_ladder_of_tolerances(tmp_path: Path) -> None:

@@ -19,16 +19,18 @@ from ..metrics import CSD
 from ..objectives import Objective
 from ..scenes import Geometry
 from ..store import CURVES, FRONT, POINTS, PROVENANCE, RECOGNITION, RESOLVED, RESULTS, read_table
+from .thinning import Counts, thinned
 
 
 @dataclass(frozen=True)
 class Output:
-    """What a run left in its folder."""
+    """What a run left in its folder; of a long result table, `table` holds what a report shows."""
 
     folder: Path
     study: Mapping[str, Any]
     provenance: Mapping[str, Any]
     table: pd.DataFrame
+    counts: Counts
     curves: pd.DataFrame
     points: pd.DataFrame
     front: pd.DataFrame | None
@@ -89,11 +91,13 @@ def read_output(folder: Path) -> Output:
         raise OutputError(Fault("no finished run here", str(folder), allowed=f"a folder with {RESULTS}"))
     study = _mapping(folder / RESOLVED, lambda text: YAML(typ="safe").load(text))
     provenance = _mapping(folder / PROVENANCE, json.loads)
-    table, curves, points = (read_table(folder / name).to_pandas() for name in (RESULTS, CURVES, POINTS))
+    objective = Objective.model_validate(study["objective"]).column
+    table, counts = thinned(folder / RESULTS, [objective, *provenance["trade_off"]])
+    curves, points = (read_table(folder / name).to_pandas() for name in (CURVES, POINTS))
     front, recognition = (
         read_table(folder / name).to_pandas() if (folder / name).is_file() else None for name in (FRONT, RECOGNITION)
     )
-    return Output(folder, study, provenance, table, curves, points, front, recognition)
+    return Output(folder, study, provenance, table, counts, curves, points, front, recognition)
 
 
 def _mapping(path: Path, parse: Any) -> dict[str, Any]:

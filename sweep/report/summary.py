@@ -99,11 +99,13 @@ def _plan_line(output: Output) -> str:
 
 
 def _counts(output: Output) -> str:
-    table = output.table
-    failed = int((table["status"] != "ok").sum())
-    feasible, front = int(table["feasible"].sum()), int(table["pareto"].sum())
-    text = f"{len(table):,} designs, {feasible:,} feasible, {front:,} on the Pareto front"
-    return f"{text}, {failed:,} failed." if failed else f"{text}."
+    counts = output.counts
+    text = f"{counts.rows:,} designs, {counts.feasible:,} feasible, {counts.front:,} on the Pareto front"
+    if counts.failed:
+        text += f", {counts.failed:,} failed"
+    if counts.left_out:
+        text += f"; the report draws the front, the best and a sample, and leaves out {counts.left_out:,}"
+    return f"{text}."
 
 
 def _limit_line(output: Output, search: Mapping[str, Any]) -> str:

@@ -1,7 +1,21 @@
-"""Run a study over the cores and keep what it found."""
+"""Run a study over the cores or a cluster and keep what it found."""
 
+from .estimate import estimate, estimate_lines
+from .folders import output_folder
 from .planning import with_plans
-from .run import run_study
+from .run import Wishes, run_study
 from .searching import Progress
+from .status import status_lines
+from .workers import BACKENDS
 
-__all__ = ["Progress", "run_study", "with_plans"]
+__all__ = [
+    "BACKENDS",
+    "Progress",
+    "Wishes",
+    "estimate",
+    "estimate_lines",
+    "output_folder",
+    "run_study",
+    "status_lines",
+    "with_plans",
+]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 
 from ..imaging import imager_of
@@ -13,17 +14,14 @@ from ..limit import Limit
 from ..spaces import Space
 from ..study import Study
 
-BEST_PER_CFA = 5
-"""Best feasible designs of each CFA's sweeps that the report lists and draws."""
 
-
-def curves_table(study: Study, table: pa.Table, limit: Limit | None) -> pa.Table:
+def curves_table(study: Study, rows: pd.DataFrame, limit: Limit | None) -> pa.Table:
     """Columns `wavelength_nm`, `qe:<curve>`, `light:<type>:<name>`, `design:<design_id>:<k>`, `limit:<cfa>`."""
     columns: dict[str, Any] = {"wavelength_nm": study.grid.nodes_nm}
     columns |= {f"qe:{name}": values for name, values in study.sensor.qe.items()}
     lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
     columns |= {f"light:{kind}:{name}": values for kind, name, values in lights}
-    for row in drawn_rows(study, table):
+    for row in _drawn(study, rows):
         for index, curve in enumerate(row_curves(study, row)[1][0]):
             columns[f"design:{row['design_id']}:{index}"] = curve
     if limit is not None and limit.curve is not None and study.search is not None:
@@ -31,10 +29,10 @@ def curves_table(study: Study, table: pa.Table, limit: Limit | None) -> pa.Table
     return pa.table(columns)
 
 
-def points_table(study: Study, table: pa.Table) -> pa.Table:
+def points_table(study: Study, rows: pd.DataFrame) -> pa.Table:
     """Digital numbers of every signal in every channel of the drawn designs, a row each."""
     found: list[dict[str, Any]] = []
-    for row in drawn_rows(study, table):
+    for row in _drawn(study, rows):
         space, curves = row_curves(study, row)
         setup = study.setup(space, row["scenario"])
         response = imager_of(setup).read(curves)[0][0, 0]
@@ -52,15 +50,10 @@ def points_table(study: Study, table: pa.Table) -> pa.Table:
     return pa.Table.from_pylist(found)
 
 
-def drawn_rows(study: Study, table: pa.Table) -> list[dict[str, Any]]:
-    """The search's answer, and in the first scenario plain CFAs, named designs and the best of each CFA's sweeps."""
-    frame = table.to_pandas()
-    frame = frame[(frame["scenario"] == next(iter(study.scenarios))) | (frame["kind"] == "search")]
-    named = frame[frame["kind"].isin(["reference", "design", "search"])]
-    swept = frame[(frame["kind"] == "sweep") & frame["feasible"]]
-    best = swept.sort_values([study.objective.column, *study.trade_off], ascending=False).groupby("cfa", observed=True)
-    rows: list[dict[str, Any]] = [*named.to_dict("records"), *best.head(BEST_PER_CFA).to_dict("records")]
-    return rows
+def _drawn(study: Study, rows: pd.DataFrame) -> list[dict[Hashable, Any]]:
+    """Of the highlights those in the first scenario, and the search's answer."""
+    shown = rows[(rows["scenario"] == next(iter(study.scenarios))) | (rows["kind"] == "search")]
+    return shown.to_dict("records")
 
 
 def row_space(study: Study, row: Mapping[Any, Any]) -> Space:
@@ -73,7 +66,7 @@ def row_space(study: Study, row: Mapping[Any, Any]) -> Space:
     return study.spaces[int(np.searchsorted(ends, within, side="right"))]
 
 
-def row_curves(study: Study, row: dict[str, Any]) -> tuple[Space, Any]:
+def row_curves(study: Study, row: Mapping[Any, Any]) -> tuple[Space, Any]:
     """The space that a row belongs to and its filters' curves, ndarray[1, n_modified, n_wavelengths]."""
     space = row_space(study, row)
     point = np.array([[row[name] for name in space.parameters]], dtype=float)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -67,7 +69,7 @@ def jobs_of(study: Study) -> Iterator[Job]:
 def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
     """Evaluate a job; a design that fails is a row with its status, and the others of its chunk are kept.
 
-    `pareto` marks the non-dominated designs of this chunk alone; `mark_front` finds those of the whole table.
+    `pareto` marks the non-dominated designs of this chunk alone; `compaction.Front` finds those of the whole table.
     """
     points = job.space.points(job.start, job.stop)
     columns, status = _quantities(job.space, setup, points, rules)
@@ -88,6 +90,24 @@ def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
         "status": status,
     }
     return _table(values, len(points), rules.schema)
+
+
+def job_key(job: Job, fingerprint: str, plan: Plan | None) -> str:
+    """SHA-256 of everything that a job's rows depend on; `fingerprint`: of the study, its data and the model."""
+    parts = [fingerprint, "" if plan is None else plan.key, job.scenario, job.space.kind, job.space.name]
+    return hashlib.sha256(json.dumps([*parts, job.start, job.stop]).encode()).hexdigest()
+
+
+def failed_rows(job: Job, rules: Rules, status: str) -> pa.Table:
+    """Rows of a job that could not be computed."""
+    points = job.space.points(job.start, job.stop)
+    values = (
+        _labels(job)
+        | _how(rules.plans.get(job.scenario), len(points))
+        | {name: points[:, i] for i, name in enumerate(job.space.parameters)}
+        | dict.fromkeys(("feasible", "pareto"), np.zeros(len(points), dtype=bool))
+    )
+    return _table(values | {"status": [status] * len(points)}, len(points), rules.schema)
 
 
 def rules_of(study: Study) -> Rules:
@@ -192,22 +212,3 @@ def _table(values: Mapping[str, Sequence[Any] | FloatArray | BoolArray], n: int,
         for field in schema
     ]
     return pa.Table.from_arrays(arrays, schema=schema)
-
-
-def mark_front(table: pa.Table, rules: Rules) -> pa.Table:
-    """Keep `pareto` only for the non-dominated designs of each CFA and scenario, given those of each chunk.
-
-    Both quantities are maximized. A design takes part when it meets every constraint but those on these two, so that
-    the front shows the whole trade-off.
-    """
-    local = np.flatnonzero(table["pareto"].to_numpy())
-    few = table.take(pa.array(local))
-    values = np.stack([few[name].to_numpy() for name in rules.front], axis=1)
-    cfa, scenario = few["cfa"].to_pylist(), few["scenario"].to_pylist()
-    groups = list(zip(cfa, scenario, strict=True))
-    kept = np.zeros(len(local), dtype=bool)
-    for group in dict.fromkeys(groups):
-        kept |= non_dominated(values, np.array([g == group for g in groups], dtype=bool))
-    front = np.zeros(table.num_rows, dtype=bool)
-    front[local] = kept
-    return table.set_column(table.schema.get_field_index("pareto"), table.schema.field("pareto"), pa.array(front))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import joblib
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 
 from ..arrays import FloatArray
@@ -19,7 +20,9 @@ from .searching import Parallel, Progress
 _KINDS = ("reference", "design", "search")
 
 
-def recognition_table(study: Study, table: pa.Table, parallel: Parallel, progress: Progress) -> pa.Table | None:
+def recognition_table(
+    study: Study, highlights: pd.DataFrame, parallel: Parallel, progress: Progress
+) -> pa.Table | None:
     """Columns `design_id`, those of a design's name, `patches` and `recognition.columns`; None where none are drawn.
 
     The random numbers of a row follow from the study's seed and its id.
@@ -28,8 +31,7 @@ def recognition_table(study: Study, table: pa.Table, parallel: Parallel, progres
     if asked is None or not asked.patches:
         return None
     keys = ["design_id", "kind", "name", "cfa", "scenario"]
-    frame = table.to_pandas()
-    rows = frame[frame["kind"].isin(_KINDS) & (frame["status"] == "ok")].to_dict("records")
+    rows = highlights[highlights["kind"].isin(_KINDS) & (highlights["status"] == "ok")].to_dict("records")
     tasks = []
     for row in rows:
         space, curves = row_curves(study, row)

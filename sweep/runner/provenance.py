@@ -17,22 +17,32 @@ from ruamel.yaml import YAML
 
 from ..study import Study
 from .jobs import CHUNK
+from .workers import Workers
 
 MODEL_VERSION = "4"
 """Raised whenever the same study would give other rows; part of every shard's key."""
 _PACKAGES = ("cfa-sweep", "numpy", "scipy", "scikit-learn", "pandas", "pyarrow", "joblib", "nlopt", "moocore")
 
 
-def fingerprint(study: Study) -> str:
-    """SHA-256 of everything that the sweep's rows depend on: the checked study, its curves, the model's version."""
-    digest = hashlib.sha256()
-    section = study.section.model_dump(mode="json", by_alias=True, exclude={"question", "search"})
-    keys = {name: plan.key for name, plan in study.plans.items()}
-    digest.update(json.dumps([MODEL_VERSION, CHUNK, section, dict(study.digests), keys], sort_keys=True).encode())
+def identity(study: Study) -> dict[str, Any]:
+    """Everything that a run's results depend on: the checked study, digests of its curves, the model's version."""
+    curves, lights = hashlib.sha256(), hashlib.sha256()
     for name, curve in sorted(study.sensor.qe.items()):
-        digest.update(name.encode() + curve.tobytes())
-    digest.update(study.lights.photons.tobytes() + repr((study.lights.types, study.lights.photon_ratio)).encode())
-    return digest.hexdigest()
+        curves.update(name.encode() + curve.tobytes())
+    lights.update(study.lights.photons.tobytes() + repr((study.lights.types, study.lights.photon_ratio)).encode())
+    return {
+        "study": study.section.model_dump(mode="json", by_alias=True, exclude={"question"}),
+        "files": dict(study.digests),
+        "curves": curves.hexdigest(),
+        "lights": lights.hexdigest(),
+        "model_version": MODEL_VERSION,
+        "chunk": CHUNK,
+    }
+
+
+def fingerprint(study: Study) -> str:
+    """SHA-256 of the canonical JSON of `identity`."""
+    return hashlib.sha256(json.dumps(identity(study), sort_keys=True).encode()).hexdigest()
 
 
 def resolved_yaml(study: Study) -> str:
@@ -63,7 +73,7 @@ def plan_facts(study: Study) -> dict[str, Any]:
     }
 
 
-def provenance(study: Study, workers: int, command: Sequence[str], duration_s: float) -> dict[str, Any]:
+def provenance(study: Study, workers: Workers, command: Sequence[str], duration_s: float) -> dict[str, Any]:
     """Everything needed to run the study again, and what the machine was."""
     return {
         "command": list(command),
@@ -78,6 +88,8 @@ def provenance(study: Study, workers: int, command: Sequence[str], duration_s: f
         "platform": platform.platform(),
         "byte_order": sys.byteorder,
         "cores": os.cpu_count(),
-        "workers": workers,
+        "backend": workers.backend,
+        "scheduler": workers.scheduler,
+        "workers": workers.count,
         "threads_per_worker": 1,
     }

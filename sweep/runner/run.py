@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import functools
-import itertools
+import hashlib
+import json
 import time
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import joblib
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 
-from ..errors import InterruptedRunError
+from ..errors import InfeasibleError
+from ..journal import Journal, locked
 from ..pareto import hypervolume
 from ..store import (
     CURVES,
@@ -24,131 +26,191 @@ from ..store import (
     RESOLVED,
     RESULTS,
     SEARCH_LOG,
-    Shards,
-    locked,
     write_json,
     write_table,
     write_text,
 )
 from ..study import Study
+from .compaction import Front, Highlights, compact
 from .drawn import curves_table, points_table
-from .jobs import Rules, jobs_of, mark_front, rules_of, run_job
+from .folders import begin, discard, held_by
+from .jobs import Rules, rules_of
 from .patches import recognition_table
 from .planning import with_plans
 from .provenance import fingerprint, plan_facts, provenance, resolved_yaml
-from .searching import Parallel, Progress, SearchAnswer, answer_row, front_table, run_search, search_facts, search_log
-from .stopping import Stop, leave_signals_to_the_parent, stop_on_signals
+from .searching import Progress, SearchAnswer, answer_row, front_table, run_search, search_facts, search_log
+from .stopping import stop_on_signals
+from .sweeping import Sweep
+from .workers import Call, Workers, workers
 
 
-def run_study(study: Study, output: Path, n_jobs: int, progress: Progress, command: Sequence[str] = ()) -> None:
-    """Run a study into `output`; finished chunks of an earlier, interrupted run of the same study are kept.
+@dataclass(frozen=True)
+class Wishes:
+    """How a run goes about failing designs.
+
+    `fail_fast`: stop at the first one; `retry_failed`: compute the chunks again in which an earlier run had some.
+    """
+
+    fail_fast: bool = False
+    retry_failed: bool = False
+
+
+def run_study(
+    study: Study,
+    output: Path,
+    n_jobs: int,
+    progress: Progress,
+    command: Sequence[str] = (),
+    *,
+    backend: str = "loky",
+    scheduler: str | None = None,
+    wishes: Wishes = Wishes(),
+) -> bool:
+    """Run a study into `output`; what an earlier, interrupted run of the same study finished is kept.
 
     Writes `results.parquet`, `search.parquet` (when the study searches), `curves.parquet`, `points.parquet`,
-    `study.resolved.yaml` and `provenance.json`, each atomically. Raises OutputError when the folder is in use or cannot
-    be written, and InfeasibleError, before anything is written, when the study's search finds no feasible design.
+    `recognition.parquet` (when the study asks for it), `study.resolved.yaml` and `provenance.json`, each atomically.
+    Returns False when there was nothing left to do. Raises OutputError when the folder is in use, holds another study
+    or cannot be written; InfeasibleError, before anything is left behind, when the search finds no feasible design;
+    FailedDesignError for the first failing design, if it is wished.
     """
     started = time.monotonic()
-    study = with_plans(study, n_jobs, progress)
-    rules = rules_of(study)
-    with stop_on_signals() as stop:
-        parallel = functools.partial(_parallel, n_jobs, stop)
-        # Searched first: a study that no design meets ends here, before anything is written.
-        answer = None if study.search is None else run_search(study, study.search, parallel, progress)
-        with locked(output):
-            _write(study, answer, output, rules, parallel, progress, started, n_jobs, command)
+    with stop_on_signals() as stop, workers(Workers(n_jobs, stop, backend, scheduler)) as crew, locked(output):
+        held = held_by(output)
+        done = held is not None and held.finished and held.fingerprint == fingerprint(study)
+        if done and not (wishes.retry_failed and _failed(output)):
+            return False
+        facts = {"command": list(command), "designs": study.n_designs, "workers": crew.count, "backend": crew.backend}
+        begin(output, study, facts)
+        study = with_plans(study, crew.count, progress)
+        run = _Run(study, output, rules_of(study), crew, progress, wishes)
+        run.whole(started, command, again=done)
+    return True
 
 
-def _write(
-    study: Study,
-    answer: SearchAnswer | None,
-    output: Path,
-    rules: Rules,
-    parallel: Parallel,
-    progress: Progress,
-    started: float,
-    n_jobs: int,
-    command: Sequence[str],
-) -> None:
-    """Sweep, and write everything."""
-    shards = Shards(output)
-    table = _sweep(study, rules, shards, parallel, progress)
-    facts: dict[str, Any] = {
-        "designs": table.num_rows,
-        "plans": plan_facts(study),
-        "trade_off": study.trade_off,
-        "warnings": list(study.warnings),
-    }
-    if answer is not None:
-        table = pa.concat_tables([table, answer_row(study, answer, rules, table.num_rows)])
-        facts["search"] = search_facts(study, answer)
-        if study.plans[answer.search.scenario].methods.saturation == "clip":
-            facts["warnings"].append("signals can saturate; the search sees the response before that, its row after")
-    table = mark_front(table, rules)
-    for name, made in (
-        (RESULTS, table),
-        (SEARCH_LOG, None if answer is None else search_log(answer)),
-        (FRONT, None if answer is None or not answer.front else front_table(answer)),
-        (CURVES, curves_table(study, table, None if answer is None else answer.limit)),
-        (POINTS, points_table(study, table)),
-        (RECOGNITION, recognition_table(study, table, parallel, progress)),
-    ):
-        if made is None:
-            (output / name).unlink(missing_ok=True)  # of an earlier run of another study
+def _failed(output: Path) -> int:
+    """Failed designs of a finished run."""
+    return int(json.loads((output / PROVENANCE).read_text(encoding="utf-8")).get("failed", 0))
+
+
+@dataclass
+class _Kept:
+    """Runs calls as the crew does, and keeps each answer: what a killed search has finished is not searched again."""
+
+    crew: Workers
+    journal: Journal
+    fingerprint: str
+    _round: int = 0
+
+    def __call__(self, calls: Iterable[Call]) -> Iterator[Any]:
+        self._round += 1
+        waiting = list(calls)
+        keys = [
+            hashlib.sha256(f"{self.fingerprint} answer {self._round} {at}".encode()).hexdigest()
+            for at in range(len(waiting))
+        ]
+        known = {at: answer for at, key in enumerate(keys) if (answer := self.journal.answer(key)) is not None}
+        fresh = self.crew(call for at, call in enumerate(waiting) if at not in known)
+        for at, key in enumerate(keys):
+            if at in known:
+                yield known[at]
+                continue
+            started = time.monotonic()
+            answer = next(fresh)
+            self.journal.keep(key, answer, time.monotonic() - started)
+            yield answer
+
+
+@dataclass
+class _Run:
+    """One run of a study whose scenes are planned, in a folder that it holds."""
+
+    study: Study
+    output: Path
+    rules: Rules
+    crew: Workers
+    progress: Progress
+    wishes: Wishes
+    facts: dict[str, Any] = field(default_factory=dict)
+
+    def whole(self, started: float, command: Sequence[str], *, again: bool) -> None:
+        """Search, sweep, and write everything; `again`: of a finished run, the chunks with failed designs."""
+        study, output = self.study, self.output
+        journal = Journal(output)
+        journal.check()
+        sweep = Sweep(study, self.rules, journal, self.crew)
+        if again:
+            sweep.refill(output / RESULTS)
+        answer = self._searched(journal, sweep.fingerprint)
+        sweep.run(self.progress, fail_fast=self.wishes.fail_fast, retry_failed=self.wishes.retry_failed)
+        answered = [] if answer is None else [answer_row(study, answer, self.rules, study.n_designs)]
+        order = [study.objective.column, *study.trade_off]
+        highlights = Highlights(self.rules.schema, order, next(iter(study.scenarios)))
+
+        def tables() -> Iterator[pa.Table]:
+            yield from sweep.tables()
+            yield from answered
+
+        front, swept = compact(tables, output / RESULTS, self.rules, highlights)
+        rows = highlights.frame(front)
+        self.facts |= {
+            "designs": study.n_designs + len(answered),
+            "failed": sweep.failed,
+            "plans": plan_facts(study),
+            "trade_off": study.trade_off,
+            "warnings": [*study.warnings, *sweep.warnings],
+        }
+        self._write_search(answer, swept)
+        self._write_drawn(rows, answer)
+        write_text(resolved_yaml(study), output / RESOLVED)
+        duration = time.monotonic() - started
+        write_json(provenance(study, self.crew, command, duration) | self.facts, output / PROVENANCE)
+        journal.remove()
+
+    def _searched(self, journal: Journal, mine: str) -> SearchAnswer | None:
+        """The search comes first: a study that no design meets ends here, and leaves nothing."""
+        if self.study.search is None:
+            return None
+        try:
+            return run_search(self.study, self.study.search, _Kept(self.crew, journal, mine), self.progress)
+        except InfeasibleError:
+            journal.remove()
+            discard(self.output)
+            raise
+
+    def _write_search(self, answer: SearchAnswer | None, swept: Front) -> None:
+        log, trade_off = None, None
+        if answer is not None:
+            log = search_log(answer)
+            self.facts["search"] = search_facts(self.study, answer)
+            if self.study.plans[answer.search.scenario].methods.saturation == "clip":
+                self.facts["warnings"].append(
+                    "signals can saturate; the search sees the response before that, its row after"
+                )
+            if answer.front:
+                trade_off = front_table(answer)
+                self.facts["hypervolume"] = _hypervolumes(answer, swept)
+        self._write(SEARCH_LOG, log)
+        self._write(FRONT, trade_off)
+
+    def _write_drawn(self, rows: pd.DataFrame, answer: SearchAnswer | None) -> None:
+        self._write(CURVES, curves_table(self.study, rows, None if answer is None else answer.limit))
+        self._write(POINTS, points_table(self.study, rows))
+        self._write(RECOGNITION, recognition_table(self.study, rows, self.crew, self.progress))
+
+    def _write(self, name: str, table: pa.Table | None) -> None:
+        """A table, or its absence."""
+        if table is None:
+            (self.output / name).unlink(missing_ok=True)
         else:
-            write_table(made, output / name)
-    if answer is not None and answer.front:
-        facts["hypervolume"] = _hypervolumes(study, table, answer)
-    write_text(resolved_yaml(study), output / RESOLVED)
-    write_json(provenance(study, n_jobs, command, time.monotonic() - started) | facts, output / PROVENANCE)
-    shards.remove()
+            write_table(table, self.output / name)
 
 
-def _hypervolumes(study: Study, table: pa.Table, answer: SearchAnswer) -> dict[str, float]:
+def _hypervolumes(answer: SearchAnswer, swept: Front) -> dict[str, float]:
     """Area that the sweep's and the search's front dominate above no separation and the lowest level of sensitivity."""
     reference = np.array([0.0, answer.search.levels[0] - 1e-6])
-    axes = list(study.trade_off)
-    frame = table.select([*axes, "pareto", "kind", "cfa", "scenario"]).to_pandas()
-    frame = frame[frame["scenario"] == answer.search.scenario]
-    swept = frame[frame["pareto"] & (frame["kind"] == "sweep") & (frame["cfa"] == answer.search.space.cfa)]
-    traced = np.array([[p.best.objective, p.best.sensitivity] for p in answer.front if p.best is not None]).reshape(
-        -1, 2
-    )
+    found = [[p.best.objective, p.best.sensitivity] for p in answer.front if p.best is not None]
     return {
-        "sweep": hypervolume(swept[axes].to_numpy(dtype=float), reference),
-        "search": hypervolume(traced, reference),
+        "sweep": hypervolume(swept.points(answer.search.space.cfa, answer.search.scenario), reference),
+        "search": hypervolume(np.array(found).reshape(-1, 2), reference),
     }
-
-
-def _sweep(study: Study, rules: Rules, shards: Shards, parallel: Parallel, progress: Progress) -> pa.Table:
-    key = fingerprint(study)
-    jobs = list(jobs_of(study))
-    setups = {
-        (s.kind, s.name, scenario): study.setup(s, scenario) for scenario in study.scenarios for s in study.spaces
-    }
-    tables = {i: kept for i in range(len(jobs)) if (kept := shards.load(i, key, rules.schema)) is not None}
-    todo = [i for i in range(len(jobs)) if i not in tables]
-    done = sum(table.num_rows for table in tables.values())
-    progress("designs", done, study.n_designs)
-    tasks = (
-        joblib.delayed(run_job)(job, setups[job.space.kind, job.space.name, job.scenario], rules)
-        for job in (jobs[i] for i in todo)
-    )
-    for index, table in zip(todo, parallel(tasks), strict=False):
-        shards.save(index, key, table)
-        tables[index] = table
-        done += table.num_rows
-        progress("designs", done, study.n_designs)
-    return pa.concat_tables([rules.schema.empty_table(), *(tables[i] for i in range(len(jobs)))])
-
-
-def _parallel(n_jobs: int, stop: Stop, tasks: Iterable[Any]) -> Iterator[Any]:
-    """Results in the order of the tasks; the workers' own libraries use one thread each.
-
-    Raises InterruptedRunError after a stop was asked for and everything under way has been handed out.
-    """
-    wanted = itertools.takewhile(lambda _: not stop.requested, tasks)
-    settings = {"inner_max_num_threads": 1, "initializer": leave_signals_to_the_parent}
-    with joblib.parallel_config("loky", **settings):
-        yield from joblib.Parallel(n_jobs=n_jobs, return_as="generator", pre_dispatch="3*n_jobs")(wanted)
-    if stop.requested:
-        raise InterruptedRunError("interrupted; finished chunks are kept, the same command continues")

@@ -1,0 +1,102 @@
+"""Which folder a run works in: its own, beside that of another study of the same name."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from ..errors import Fault, OutputError
+from ..journal import LOCK
+from ..store import PROVENANCE, RESULTS, write_json
+from ..study import Study
+from .provenance import fingerprint, identity
+
+RUN = "run.json"
+_MOST_SHOWN = 3
+
+
+@dataclass(frozen=True)
+class Held:
+    """The run that a folder holds: its fingerprint, its identity, whether it is finished."""
+
+    fingerprint: str
+    identity: Mapping[str, Any]
+    finished: bool
+
+
+def held_by(folder: Path) -> Held | None:
+    """The run in a folder, or None; a folder with results of unknown origin has an empty fingerprint."""
+    run = _read(folder / RUN)
+    finished = _read(folder / PROVENANCE)
+    if not run and not finished and not (folder / RESULTS).exists():
+        return None
+    mine = str(run.get("fingerprint", finished.get("fingerprint", "")))
+    whole = (folder / RESULTS).is_file() and finished.get("fingerprint") == mine
+    return Held(mine, run.get("identity", {}), whole)
+
+
+def output_folder(base: Path, study: Study) -> tuple[Path, str | None]:
+    """`base`, or, where that holds another study, `base-2` and so on; and in that case what is different, in words."""
+    mine, note = fingerprint(study), None
+    for number in count(1):
+        folder = base if number == 1 else base.with_name(f"{base.name}-{number}")
+        held = held_by(folder)
+        if held is None or held.fingerprint == mine:
+            return folder, None if note is None else f"{note}; this one is in {folder}"
+        note = f"{folder} holds another study of this name ({_changed(held.identity, identity(study))})"
+    raise AssertionError
+
+
+def discard(folder: Path) -> None:
+    """Leave nothing of a run that has no result, unless the folder holds other files."""
+    for name in (RUN, LOCK):
+        (folder / name).unlink(missing_ok=True)
+    with contextlib.suppress(OSError):
+        folder.rmdir()
+
+
+def begin(folder: Path, study: Study, facts: Mapping[str, Any]) -> None:
+    """Say in the folder which run it holds; raises OutputError when it holds another one."""
+    held, mine = held_by(folder), fingerprint(study)
+    if held is not None and held.fingerprint != mine:
+        problem = f"holds another study ({_changed(held.identity, identity(study))})"
+        raise OutputError(Fault(problem, str(folder), allowed="another folder"))
+    write_json({"fingerprint": mine, "identity": identity(study)} | dict(facts), folder / RUN)
+
+
+def _changed(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
+    """The keys that differ with their values, the first few."""
+    if not old:
+        return "of an earlier version"
+    before, after = (dict(_flat(value)) for value in (json.loads(json.dumps(old)), json.loads(json.dumps(new))))
+    keys = [key for key in {**before, **after} if before.get(key) != after.get(key)]
+    shown = [f"{_short(key)}: {_short(before.get(key))} -> {_short(after.get(key))}" for key in keys[:_MOST_SHOWN]]
+    more = f", {len(keys) - _MOST_SHOWN} more" if len(keys) > _MOST_SHOWN else ""
+    return "changed " + ", ".join(shown) + more
+
+
+def _flat(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from _flat(inner, f"{path}.{key}" if path else str(key))
+    else:
+        yield path, value
+
+
+def _short(value: object) -> str:
+    text = str(value).removeprefix("study.")
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """A JSON mapping; an empty one where there is none that can be read."""
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}

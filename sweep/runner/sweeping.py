@@ -1,0 +1,139 @@
+"""The sweep of a study: chunks over the workers, each kept as soon as it is finished."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+
+import joblib
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from ..errors import FailedDesignError, Fault
+from ..journal import Journal
+from ..setup import Setup
+from ..store import sliced
+from ..study import Study
+from .jobs import Job, Rules, failed_rows, job_key, jobs_of, run_job
+from .provenance import fingerprint
+from .searching import Progress
+from .workers import Call, WorkerKilledError, Workers, alone
+
+KILLED = "error: its worker died twice"
+
+
+def failures(table: pa.Table) -> int:
+    """Rows of a table whose design failed."""
+    fine: int = pc.sum(pc.equal(pc.cast(table["status"], pa.string()), "ok")).as_py() or 0
+    return int(table.num_rows) - fine
+
+
+@dataclass
+class Sweep:
+    """All chunks of a study, those that the journal holds and those that are still to compute."""
+
+    study: Study
+    rules: Rules
+    journal: Journal
+    crew: Workers
+    warnings: list[str] = field(default_factory=list)
+    failed: int = 0
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """What all keys depend on."""
+        return fingerprint(self.study)
+
+    @cached_property
+    def jobs(self) -> list[Job]:
+        """All jobs, in the order of their rows."""
+        return list(jobs_of(self.study))
+
+    @cached_property
+    def keys(self) -> list[str]:
+        """The key of each job."""
+        return [job_key(job, self.fingerprint, self.study.plans.get(job.scenario)) for job in self.jobs]
+
+    @cached_property
+    def _setups(self) -> dict[tuple[str, str, str], Setup]:
+        return {
+            (space.kind, space.name, scenario): self.study.setup(space, scenario)
+            for scenario in self.study.scenarios
+            for space in self.study.spaces
+        }
+
+    def _setup(self, job: Job) -> Setup:
+        return self._setups[job.space.kind, job.space.name, job.scenario]
+
+    def compute(self, job: Job) -> pa.Table:
+        """Rows of a job, in this process."""
+        return run_job(job, self._setup(job), self.rules)
+
+    def refill(self, results: Path) -> None:
+        """Take the chunks of a finished run into the journal, but for those with failed designs."""
+        sizes = [job.stop - job.start for job in self.jobs]
+        for index, table in enumerate(sliced(results, sizes)):
+            if not failures(table):
+                self.journal.save(self.keys[index], index, table.cast(self.rules.schema), 0, 0.0)
+
+    def run(self, progress: Progress, *, fail_fast: bool, retry_failed: bool) -> None:
+        """Compute what is not kept yet. Raises FailedDesignError, after its chunk is kept, if it is to `fail_fast`."""
+        entries = self.journal.entries
+        if retry_failed:
+            for key in self.keys:
+                if key in entries and entries[key].failed:
+                    self.journal.forget(key)
+        todo = [index for index, key in enumerate(self.keys) if key not in entries]
+        done = sum(entries[key].rows for key in self.keys if key in entries)
+        progress("designs", done, self.study.n_designs)
+        calls = (joblib.delayed(_timed)(self.jobs[i], self._setup(self.jobs[i]), self.rules) for i in todo)
+        for index, (table, seconds) in zip(todo, self.crew(calls, _quarantined), strict=False):
+            failed = failures(table)
+            self.journal.save(self.keys[index], index, table, failed, seconds)
+            done += table.num_rows
+            progress("designs", done, self.study.n_designs)
+            if failed and fail_fast:
+                raise _first_failure(table)
+
+    def tables(self) -> Iterator[pa.Table]:
+        """All finished chunks in order; one whose file is damaged is computed again."""
+        self.failed = 0
+        for index, (job, key) in enumerate(zip(self.jobs, self.keys, strict=True)):
+            table = self.journal.table(key, self.rules.schema)
+            if table is None:
+                self.warnings.append(f"chunk {index} was damaged on the disk and is computed again")
+                table, seconds = _timed(job, self._setup(job), self.rules)
+                self.journal.save(key, index, table, failures(table), seconds)
+            self.failed += self.journal.entries[key].failed
+            yield table
+
+
+def _timed(job: Job, setup: Setup, rules: Rules) -> tuple[pa.Table, float]:
+    started = time.monotonic()
+    return run_job(job, setup, rules), time.monotonic() - started
+
+
+def _quarantined(call: Call) -> tuple[pa.Table, float]:
+    """A job whose worker died twice: by halves, down to the design that kills, which becomes a row with its status."""
+    started = time.monotonic()
+    job, setup, rules = call[1]
+    if job.stop - job.start == 1:
+        return failed_rows(job, rules, KILLED), time.monotonic() - started
+    middle = (job.start + job.stop) // 2
+    tables = []
+    for half in (replace(job, stop=middle), replace(job, start=middle, first_id=job.first_id + middle - job.start)):
+        part: Call = (call[0], (half, setup, rules), {})
+        try:
+            tables.append(alone(part)[0])
+        except WorkerKilledError:
+            tables.append(_quarantined(part)[0])
+    return pa.concat_tables(tables).unify_dictionaries(), time.monotonic() - started
+
+
+def _first_failure(table: pa.Table) -> FailedDesignError:
+    status, ids = table["status"].to_pylist(), table["design_id"].to_pylist()
+    first = next(at for at, text in enumerate(status) if text != "ok")
+    return FailedDesignError(Fault(f"design {ids[first]} failed ({status[first]}); finished chunks are kept"))

@@ -1,0 +1,142 @@
+"""Calls over worker processes, threads or a cluster: results in order, whatever becomes of the workers."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import joblib
+from joblib.externals.loky import ProcessPoolExecutor
+from threadpoolctl import threadpool_limits
+
+from ..errors import InterruptedRunError, SweepError
+from .stopping import Stop, leave_signals_to_the_parent
+
+BACKENDS = ("loky", "threading", "dask")
+Call = tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
+"""A call that `joblib.delayed` has put off."""
+
+
+class WorkerKilledError(SweepError):
+    """A call whose worker died twice."""
+
+
+@dataclass(frozen=True)
+class Workers:
+    """How many workers of which kind; never more than the cores, each with one thread for its libraries.
+
+    `scheduler`: address of a Dask scheduler, whose workers are used as they are.
+    """
+
+    n_jobs: int
+    stop: Stop
+    backend: str = "loky"
+    scheduler: str | None = None
+
+    @property
+    def count(self) -> int:
+        """Workers on this machine."""
+        return max(1, min(self.n_jobs, os.cpu_count() or 1))
+
+    def __call__(self, calls: Iterable[Call], killed: Callable[[Call], Any] | None = None) -> Iterator[Any]:
+        """Results of delayed calls in their order.
+
+        When a worker dies, the calls under way run again, each in a process of its own. One that dies again goes to
+        `killed`, whose answer counts as its result; without it, WorkerKilledError is raised. Raises
+        InterruptedRunError after a stop was asked for and everything under way has been handed out.
+        """
+        rest = iter(calls)
+        flying: deque[Call] = deque()
+
+        def taken() -> Iterator[Call]:
+            while not self.stop.requested:
+                call = next(rest, None)
+                if call is None:
+                    return
+                flying.append(call)
+                yield (_one_threaded, call, {})
+
+        while True:
+            try:
+                parallel = joblib.Parallel(n_jobs=self._n_jobs, return_as="generator", pre_dispatch="3*n_jobs")
+                for result in parallel(taken()):
+                    flying.popleft()
+                    yield result
+                break
+            except Exception as error:
+                if not _is_death(error):
+                    raise
+            suspects = list(flying)
+            flying.clear()
+            for call in suspects:
+                yield self._again(call, killed)
+        if self.stop.requested:
+            raise InterruptedRunError("interrupted; finished chunks are kept, the same command continues")
+
+    @property
+    def _n_jobs(self) -> int:
+        return -1 if self.backend == "dask" else self.count
+
+    @staticmethod
+    def _again(call: Call, killed: Callable[[Call], Any] | None) -> Any:
+        try:
+            return alone(call)
+        except WorkerKilledError:
+            if killed is None:
+                raise
+            return killed(call)
+
+
+@contextmanager
+def workers(how: Workers) -> Iterator[Workers]:
+    """Start the backend and give the workers for as long as the block stands.
+
+    Raises SweepError when Dask is not installed or its scheduler does not answer.
+    """
+    settings: dict[str, Any] = {}
+    with ExitStack() as stack:
+        if how.backend == "dask":
+            stack.enter_context(_dask_client(how.scheduler))
+        elif how.backend == "loky":
+            settings = {"inner_max_num_threads": 1, "initializer": leave_signals_to_the_parent}
+        stack.enter_context(joblib.parallel_config(how.backend, **settings))
+        yield how
+
+
+def alone(call: Call) -> Any:
+    """Result of a call in a process of its own; raises WorkerKilledError when that dies."""
+    with ProcessPoolExecutor(max_workers=1, initializer=leave_signals_to_the_parent) as process:
+        try:
+            return process.submit(_one_threaded, *call).result()
+        except BrokenProcessPool:
+            raise WorkerKilledError("a worker died twice at the same work: out of memory, or killed") from None
+
+
+def _one_threaded(function: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
+    """A call whose libraries use one thread: the same sums in the same order with any number of workers."""
+    with threadpool_limits(1):
+        return function(*arguments, **named)
+
+
+def _is_death(error: Exception) -> bool:
+    """Whether a worker died, as the backends say it: loky's broken pool, or Dask's KilledWorker."""
+    return isinstance(error, BrokenProcessPool) or type(error).__name__ == "KilledWorker"
+
+
+def _dask_client(scheduler: str | None) -> Any:
+    """A client of the scheduler; raises SweepError when Dask is not installed or the scheduler does not answer."""
+    if scheduler is None:
+        raise SweepError("--backend dask needs --scheduler tcp://HOST:PORT")
+    try:
+        from distributed import Client  # noqa: PLC0415  (an extra)
+    except ImportError:
+        raise SweepError("--backend dask needs Dask: pip install 'cfa-sweep[dask]'") from None
+    try:
+        return Client(scheduler, timeout="10s", set_as_default=True)  # type: ignore[no-untyped-call]
+    except (OSError, ValueError) as error:
+        raise SweepError(f"--scheduler {scheduler}: {str(error).splitlines()[0]}") from None
