@@ -26,7 +26,8 @@ from .errors import Fault, OutputError
 from .store import write_bytes
 
 SHARDS = "shards"
-_JOURNAL = "journal.jsonl"
+_JOURNAL = "_journal.jsonl"
+"""Readers of Parquet folders skip names that begin so."""
 LOCK = ".lock"
 _ATTEMPTS, _PAUSE_S = 5, 0.02
 
@@ -89,7 +90,7 @@ class Journal:
 
     def keep(self, key: str, answer: object, seconds: float) -> None:
         """Keep any finished answer under `key`; errors as for `save`."""
-        self._keep(key, f"answer-{key[:16]}.pickle", pickle.dumps(answer), 0, 0, seconds)
+        self._keep(key, f"_answer-{key[:16]}.pickle", pickle.dumps(answer), 0, 0, seconds)
 
     def table(self, key: str, schema: pa.Schema) -> pa.Table | None:
         """The table kept under `key`; None, and forgotten, when it is missing, damaged or has another schema."""

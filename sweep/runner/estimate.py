@@ -86,10 +86,15 @@ def _sampled(sweep: Sweep, todo: list[Job]) -> tuple[float, float]:
             total += per_row * rows[kind]
             measured += rows[kind]
             tables.append(table)
-    sink = pa.BufferOutputStream()
     sample = pa.concat_tables(tables).unify_dictionaries()
-    pq.write_table(sample, sink)
-    return total * sum(rows.values()) / measured, sink.getvalue().size / sample.num_rows
+    bytes_per_row = (_file_size(sample) - _file_size(sample.slice(0, 1))) / max(1, sample.num_rows - 1)
+    return total * sum(rows.values()) / measured, bytes_per_row
+
+
+def _file_size(table: pa.Table) -> int:
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink)
+    return int(sink.getvalue().size)
 
 
 def _measured(sweep: Sweep, kinds: list[tuple[_Kind, Job]]) -> Iterator[tuple[float, pa.Table, _Kind]]:

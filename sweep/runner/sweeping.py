@@ -77,7 +77,7 @@ class Sweep:
         sizes = [job.stop - job.start for job in self.jobs]
         for index, table in enumerate(sliced(results, sizes)):
             if not failures(table):
-                self.journal.save(self.keys[index], index, table.cast(self.rules.schema), 0, 0.0)
+                self.journal.save(self.keys[index], index, _encoded(table, self.rules.schema), 0, 0.0)
 
     def run(self, progress: Progress, *, fail_fast: bool, retry_failed: bool) -> None:
         """Compute what is not kept yet. Raises FailedDesignError, after its chunk is kept, if it is to `fail_fast`."""
@@ -109,6 +109,13 @@ class Sweep:
                 self.journal.save(key, index, table, failures(table), seconds)
             self.failed += self.journal.entries[key].failed
             yield table
+
+
+def _encoded(table: pa.Table, schema: pa.Schema) -> pa.Table:
+    """The table with the words alone that its own rows use."""
+    words = {field.name: field.type.value_type for field in schema if pa.types.is_dictionary(field.type)}
+    columns = [table[name].cast(words[name]) if name in words else table[name] for name in schema.names]
+    return pa.table(columns, names=schema.names).cast(schema)
 
 
 def _timed(job: Job, setup: Setup, rules: Rules) -> tuple[pa.Table, float]:

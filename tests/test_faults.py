@@ -1,0 +1,341 @@
+"""What can go wrong in a run: killed workers, damaged files, failing designs, other studies, clusters."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import psutil
+import pyarrow.parquet as pq
+import pytest
+
+from sweep.errors import FailedDesignError, OutputError, SweepError
+from sweep.families import Stopband
+from sweep.journal import SHARDS, Journal, locked
+from sweep.runner import Wishes, estimate, estimate_lines, output_folder, run_study, status_lines
+from sweep.runner.jobs import CHUNK
+from sweep.runner.stopping import Stop
+from sweep.runner.sweeping import KILLED
+from sweep.runner.workers import Workers, workers
+from sweep.spaces import Filter
+from sweep.study import Study, load_study
+
+from .test_runner import ran, started, study_file
+
+
+class Mischief(Stopband):
+    """A stopband that does as its file says where its left edge is at 590 nm: `kill N` (N times), or `fail`."""
+
+    file: Path
+
+    def curves(self, x: np.ndarray) -> np.ndarray:
+        if (x[:, 0] == 590).any() and self.file.exists():
+            wish = self.file.read_text().split()
+            with self.file.open("a") as handle:
+                handle.write("done\n")
+            if wish[0] == "kill" and len(wish) <= int(wish[1]) + 1:
+                os.kill(os.getpid(), signal.SIGKILL)
+            if wish[0] == "fail":
+                raise ValueError("no such filter")
+        return super().curves(x)
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    """A sweep alone, of two kinds of chunks."""
+    folder = tmp_path_factory.mktemp("study")
+    path = study_file(folder)
+    path.write_text(path.read_text().split("constraints:")[0])
+    return load_study(path)
+
+
+@pytest.fixture(scope="module")
+def whole(plain: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
+    folder = tmp_path_factory.mktemp("whole")
+    ran(plain, folder, 1)
+    return pd.read_parquet(folder / "results.parquet")
+
+
+def mischievous(study: Study, file: Path) -> Study:
+    """The study with a sweep whose first left edge does what `file` says."""
+    sweep = study.spaces[-1]
+    assert sweep.filter is not None
+    family = Mischief(study.grid.nodes_nm, study.sensor.qe["Y"], study.sensor.qe["G"])
+    family.file = file
+    made = replace(sweep, filter=Filter(family, sweep.filter.channels, sweep.filter.base, sweep.filter.target))
+    return replace(study, spaces=(*study.spaces[:-1], made))
+
+
+def rows(folder: Path) -> pd.DataFrame:
+    return pd.read_parquet(folder / "results.parquet")
+
+
+def test_a_worker_that_is_killed_once_costs_nothing(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
+    wish = tmp_path / "wish"
+    wish.write_text("kill 1 ")
+    ran(mischievous(plain, wish), tmp_path / "out", 2)
+    assert wish.read_text().split()[2] == "done"
+    pd.testing.assert_frame_equal(rows(tmp_path / "out"), whole)
+
+
+def test_a_design_that_kills_its_worker_is_a_row(plain: Study, tmp_path: Path) -> None:
+    wish = tmp_path / "wish"
+    wish.write_text("kill 1000000 ")
+    few = replace(plain, scenarios={"chart": plain.scenarios["chart"]})
+    sweep = few.spaces[-1]
+    few = replace(few, spaces=(replace(sweep, axes=((590.0, 600.0, 610.0), (5.0,), (660.0, 670.0), (5.0,), (1.0,))),))
+    ran(few, tmp_path / "fine", 1)
+    ran(mischievous(few, wish), tmp_path / "out", 2)
+    found, fine = rows(tmp_path / "out"), rows(tmp_path / "fine")
+    killed = found["left_nm"] == 590
+    assert list(found.loc[killed, "status"]) == [KILLED] * 2
+    assert found.loc[killed, "csd_yellow_red"].isna().all()
+    assert not found.loc[killed, ["feasible", "pareto"]].any(axis=None)
+    same = [name for name in found.columns if name != "pareto"]
+    words = {"status": str}  # the word of the killed rows is no category of the others
+    pd.testing.assert_frame_equal(found.loc[~killed, same].astype(words), fine.loc[~killed, same].astype(words))
+
+
+def test_failing_designs_stop_a_run_or_are_tried_again(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
+    wish = tmp_path / "wish"
+    wish.write_text("fail ")
+    study, folder = mischievous(plain, wish), tmp_path / "out"
+    with pytest.raises(FailedDesignError, match="no such filter"):
+        run_study(study, folder, 1, lambda *_: None, wishes=Wishes(fail_fast=True))
+    assert run_study(study, folder, 1, lambda *_: None)
+    failed = (rows(folder)["status"] != "ok").sum()
+    assert failed == 2 * 2 * 51 * 2  # in both scenes, every design of this edge
+    assert not run_study(study, folder, 1, lambda *_: None)
+    wish.unlink()
+    assert run_study(study, folder, 1, lambda *_: None, wishes=Wishes(retry_failed=True))
+    pd.testing.assert_frame_equal(rows(folder), whole)
+    assert not run_study(study, folder, 1, lambda *_: None, wishes=Wishes(retry_failed=True))
+
+
+class StoppedError(Exception):
+    pass
+
+
+def half_done(study: Study, folder: Path) -> Journal:
+    """A run that was broken off after two whole chunks."""
+
+    def stop(phase: str, done: int, _total: int) -> None:
+        if phase == "designs" and done > 2 * CHUNK:
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        run_study(study, folder, 1, stop)
+    return Journal(folder)
+
+
+def test_damaged_shards_are_computed_again_and_named(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
+    journal = half_done(plain, tmp_path)
+    large = [tmp_path / SHARDS / entry.file for entry in journal.entries.values() if entry.rows > 1000]
+    content = bytearray(large[0].read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    large[0].write_bytes(content)
+    large[1].write_bytes(large[1].read_bytes()[:-7])
+    (tmp_path / SHARDS / ".tmp-1-left-over").write_bytes(b"x")
+    ran(plain, tmp_path, 1)
+    pd.testing.assert_frame_equal(rows(tmp_path), whole)
+    said = (tmp_path / "provenance.json").read_text()
+    assert said.count("was damaged on the disk and is computed again") == 1  # the torn one was missed from the start
+    assert not (tmp_path / SHARDS).exists()
+
+
+@pytest.mark.parametrize("cut", [1, 20, 200])
+def test_a_torn_journal_costs_its_last_line_alone(plain: Study, whole: pd.DataFrame, tmp_path: Path, cut: int) -> None:
+    known = len(half_done(plain, tmp_path).entries)
+    path = tmp_path / SHARDS / "_journal.jsonl"
+    path.write_bytes(path.read_bytes()[:-cut])
+    left = len(Journal(tmp_path).entries)
+    assert left == (known if cut == 1 else known - 1)
+    ran(plain, tmp_path, 1)
+    pd.testing.assert_frame_equal(rows(tmp_path), whole)
+
+
+def test_a_clock_that_goes_back_changes_nothing(
+    plain: Study, whole: pd.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = iter(range(10**9, 0, -3600))
+    monkeypatch.setattr(time, "time", lambda: float(next(now)))
+    half_done(plain, tmp_path)
+    with locked(tmp_path):
+        assert len(status_lines(tmp_path)) >= 2
+    ran(plain, tmp_path, 1)
+    pd.testing.assert_frame_equal(rows(tmp_path), whole)
+
+
+def test_status_of_a_run(plain: Study, tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="no run here"):
+        status_lines(tmp_path)
+    journal = half_done(plain, tmp_path)
+    done = sum(entry.rows for entry in journal.entries.values())
+    lines = status_lines(tmp_path)
+    assert lines[0].startswith(f"interrupted; the same command continues: {done:,} of {plain.n_designs:,} designs")
+    assert len(pd.read_parquet(tmp_path / SHARDS)) == done  # readable while it runs
+    with locked(tmp_path):
+        lines = status_lines(tmp_path)
+        assert lines[0].startswith(f"running (process {os.getpid()} on ")
+        assert "designs/s, about " in lines[1]
+    ran(plain, tmp_path, 1)
+    assert status_lines(tmp_path)[0].startswith(f"finished: {plain.n_designs:,} designs in ")
+
+
+def test_dry_run_counts_what_is_finished(plain: Study, tmp_path: Path) -> None:
+    found = estimate(plain, tmp_path / "out", 2, lambda *_: None)
+    assert (found.designs, found.kept) == (plain.n_designs, 0)
+    assert not (tmp_path / "out").exists()
+    half_done(plain, tmp_path / "out")
+    kept = sum(entry.rows for entry in Journal(tmp_path / "out").entries.values())
+    found = estimate(plain, tmp_path / "out", 2, lambda *_: None)
+    assert found.kept == kept
+    assert found.seconds > 0
+    assert found.memory_bytes > 50e6
+    # What the sample says of the disk is what the rest takes.
+    ran(plain, tmp_path / "out", 1)
+    bytes_per_row = (tmp_path / "out" / "results.parquet").stat().st_size / plain.n_designs
+    assert found.disk_bytes / 2 / (plain.n_designs - kept) == pytest.approx(bytes_per_row, rel=1.0)
+    found = estimate(plain, tmp_path / "out", 2, lambda *_: None)
+    assert (
+        estimate_lines(found, tmp_path)[0]
+        == f"{found.designs:,} designs: {found.designs:,} finished, 0 in 0 chunks to compute."
+    )
+
+
+def test_a_changed_study_goes_beside_the_old_one(plain: Study, tmp_path: Path) -> None:
+    base = tmp_path / "tiny"
+    assert output_folder(base, plain) == (base, None)
+    ran(plain, base, 1)
+    assert output_folder(base, plain) == (base, None)
+    path = study_file(tmp_path)
+    path.write_text(path.read_text().split("constraints:")[0].replace("exposure_s: 0.002", "exposure_s: 0.003"))
+    changed = load_study(path)
+    folder, note = output_folder(base, changed)
+    assert folder == tmp_path / "tiny-2"
+    assert note is not None
+    assert "changed scenarios.dim.exposure.exposure_s: 0.002 -> 0.003" in note
+    with pytest.raises(OutputError, match="holds another study"):
+        ran(changed, base, 1)
+    ran(changed, folder, 1)
+    assert output_folder(base, changed)[0] == folder
+    path.write_text(path.read_text().replace("0.003", "0.004"))
+    assert output_folder(base, load_study(path))[0] == tmp_path / "tiny-3"
+
+
+def test_an_output_that_cannot_be_written_is_one_line(plain: Study, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    for folder in (tmp_path / "file" / "out", Path("/proc/nothing")):
+        with pytest.raises(OutputError, match="cannot be written"):
+            ran(plain, folder, 1)
+
+
+def test_threads_give_the_same_rows(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
+    run_study(plain, tmp_path, 2, lambda *_: None, backend="threading")
+    pd.testing.assert_frame_equal(rows(tmp_path), whole)
+
+
+def test_workers_never_outnumber_the_cores(plain: Study, tmp_path: Path) -> None:
+    assert Workers(1000, Stop()).count == os.cpu_count()
+    run_study(plain, tmp_path, 1000, lambda *_: None, backend="threading")
+    facts = pd.read_json(tmp_path / "provenance.json", typ="series")
+    assert facts["workers"] * facts["threads_per_worker"] <= facts["cores"]
+
+
+def test_dask_needs_a_scheduler_that_answers() -> None:
+    for scheduler, said in ((None, "needs --scheduler"), ("tcp://127.0.0.1:9", "--scheduler tcp://127.0.0.1:9: ")):
+        with pytest.raises(SweepError, match=said), workers(Workers(2, Stop(), "dask", scheduler)):
+            pass
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_cluster_gives_the_same_rows_with_a_worker_killed(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    path = study_file(tmp_path, 201)
+    path.write_text(path.read_text().replace("starts: 4", "starts: 2"))
+    study = load_study(path)
+    ran(study, tmp_path / "one", 1)
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+    ) as cluster:
+        killed: list[int] = []
+
+        def kill_one(phase: str, done: int, _total: int) -> None:
+            if phase == "designs" and done > CHUNK and not killed:
+                worker = next(iter(cluster.workers.values()))
+                killed.append(worker.process.pid)
+                psutil.Process(worker.process.pid).kill()
+
+        run_study(study, tmp_path / "many", 2, kill_one, backend="dask", scheduler=cluster.scheduler_address)
+    assert killed
+    for name in ("results", "search"):
+        tables = [pq.read_table(tmp_path / folder / f"{name}.parquet") for folder in ("one", "many")]
+        assert tables[0].equals(tables[1])
+
+
+def test_a_search_that_was_killed_is_not_repeated(tmp_path: Path) -> None:
+    study = load_study(study_file(tmp_path))
+
+    def stop(phase: str, done: int, _total: int) -> None:
+        if phase == "search starts" and done == 2:
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        run_study(study, tmp_path / "out", 1, stop)
+    kept = {
+        entry.file: (tmp_path / "out" / SHARDS / entry.file).stat().st_mtime_ns
+        for entry in Journal(tmp_path / "out").entries.values()
+    }
+    assert len(kept) == 2
+    seen: list[dict[str, int]] = []
+
+    def look(phase: str, _done: int, _total: int) -> None:
+        if phase == "designs" and not seen:
+            seen.append({f: (tmp_path / "out" / SHARDS / f).stat().st_mtime_ns for f in kept})
+
+    run_study(study, tmp_path / "out", 1, look)
+    assert seen == [kept]
+    ran(study, tmp_path / "whole", 2)
+    for name in ("results", "search"):
+        tables = [pq.read_table(tmp_path / folder / f"{name}.parquet") for folder in ("out", "whole")]
+        assert tables[0].equals(tables[1])
+
+
+def children(pid: int) -> list[psutil.Process]:
+    """Worker processes of a run; not the tracker of its semaphores."""
+    found = psutil.Process(pid).children(recursive=True)
+    return [process for process in found if "resource_tracker" not in " ".join(process.cmdline())]
+
+
+@pytest.mark.slow
+def test_thirty_kills_of_a_run_and_ten_of_its_workers(tmp_path: Path) -> None:
+    study, rng = load_study(study_file(tmp_path, 401)), np.random.default_rng(11)
+    folder = tmp_path / "out" / "tiny"
+    kills = {"run": 0, "worker": 0}
+    while kills["run"] < 30:
+        run = started(tmp_path, tmp_path / "out", "--jobs", "2")
+        if kills["worker"] < 10:
+            time.sleep(float(rng.uniform(4, 7)))
+            for process in children(run.pid)[:1] if run.poll() is None else []:
+                process.kill()
+                kills["worker"] += 1
+        time.sleep(float(rng.uniform(0, 8)))
+        if run.poll() is None:
+            os.kill(run.pid, signal.SIGKILL)
+            kills["run"] += 1
+        run.wait()
+        if (folder / "provenance.json").exists():  # finished between two kills: once more from the start
+            ran(study, tmp_path / "again", 2)
+            assert pq.read_table(folder / "results.parquet").equals(
+                pq.read_table(tmp_path / "again" / "results.parquet")
+            )
+            for made in sorted(folder.rglob("*"), reverse=True):
+                made.rmdir() if made.is_dir() else made.unlink()
+    ran(study, folder, 2)
+    ran(study, tmp_path / "whole", 2)
+    assert pq.read_table(folder / "results.parquet").equals(pq.read_table(tmp_path / "whole" / "results.parquet"))
