@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
 import numpy as np
 
-from .arrays import FloatArray
+from .arrays import FloatArray, IndexArray
 from .datasets.lights import Lights
+from .discrimination import (
+    STATE_ERROR_BOUND,
+    contrast_to_noise,
+    detectability,
+    error_bound,
+    noise_names,
+    pairwise_error,
+    state_error_bound,
+)
 from .imaging import Imager, smooth_imager
 from .metrics import Pair, cfa_sensitivity, channel_sensitivity, class_pairs, csd_name, separation, separations
 from .setup import Setup
@@ -14,6 +26,8 @@ DESIGNED = ("sensitivity", "cfa_sensitivity", "slope_per_nm", "min_transmission"
 """Quantities of a design that do not depend on the lights."""
 WORST = "worst_"
 """Prefix of a quantity that is the smallest over the shifts of the edges in production."""
+STATE_ERROR = "state_error"
+"""Name of the largest pairwise error over all pairs of states."""
 BEST_PLACE = "best_place_"
 """Prefix of a CSD that is the largest over the places where the light may fall on the mosaic."""
 
@@ -22,6 +36,12 @@ def quantities(lights: Lights) -> tuple[str, ...]:
     """Names of the columns that `evaluate` gives for a scene with one place of the light."""
     distances = (csd_name(pair) for pair in class_pairs(lights.classes))
     return (*distances, *DESIGNED, "exposure_s")
+
+
+def noise_quantities(states: Sequence[str]) -> tuple[str, ...]:
+    """Names of the columns that `evaluate` adds for `states`, the signal types that noise may confuse."""
+    each = (name for pair in class_pairs(states) for name in noise_names(pair))
+    return (*each, STATE_ERROR, STATE_ERROR_BOUND) if states else ()
 
 
 def shiftable(lights: Lights) -> tuple[str, ...]:
@@ -86,14 +106,44 @@ def sensitivities_gradient(setup: Setup, curves_gradient: FloatArray) -> dict[st
     }
 
 
-def evaluate(imager: Imager, curves: FloatArray) -> dict[str, FloatArray]:
+def _told_apart(mean: FloatArray, variance: FloatArray, members: Mapping[str, IndexArray]) -> dict[str, FloatArray]:
+    """The columns of `noise_quantities`, the worst over the cases; `mean`, `variance` as of `read_with_noise`."""
+    cases = [(mean[:, case], variance[:, case]) for case in range(mean.shape[1])]
+
+    def over(quantity: Callable[..., FloatArray], worst: Callable[..., FloatArray], *of: Any) -> FloatArray:
+        return worst([quantity(*case, *of) for case in cases], axis=0)
+
+    found: dict[str, FloatArray] = {}
+    errors = []
+    for pair in class_pairs(list(members)):
+        both = members[pair[0]], members[pair[1]]
+        errors.append(over(pairwise_error, np.max, *both))
+        values = (
+            over(contrast_to_noise, np.min, *both),
+            over(detectability, np.min, *both),
+            errors[-1],
+            over(error_bound, np.max, *both),
+        )
+        found |= dict(zip(noise_names(pair), values, strict=True))
+    found[STATE_ERROR] = np.max(errors, axis=0)
+    found[STATE_ERROR_BOUND] = over(state_error_bound, np.max, members)
+    return found
+
+
+def evaluate(imager: Imager, curves: FloatArray, states: Sequence[str] = ()) -> dict[str, FloatArray]:
     """Evaluate a block of designs as the camera reads them out, as far as the scene's methods go.
 
     `curves` as in `all_channels`. Returns columns, each ndarray[n_designs]: `csd_<a>_<b>` (DN) of every pair of
     signal types, the smallest over the places of the light; `best_place_csd_<a>_<b>`, the largest, where a scene has
-    several; those of `designed_quantities` and `exposure_s`.
+    several; those of `designed_quantities` and `exposure_s`; with `states`, those of `noise_quantities`, the worst over
+    the places.
     """
-    response, exposure_s = imager.read(curves)
+    apart: dict[str, FloatArray] = {}
+    if states:
+        response, variance, exposure_s = imager.read_with_noise(curves)
+        apart = _told_apart(response, variance, {name: imager.setup.members[name] for name in states})
+    else:
+        response, exposure_s = imager.read(curves)
     columns: dict[str, FloatArray] = {}
     best: dict[str, FloatArray] = {}
     members = imager.setup.members
@@ -102,4 +152,4 @@ def evaluate(imager: Imager, curves: FloatArray) -> dict[str, FloatArray]:
         over = np.stack([case[pair] for case in cases])
         columns[csd_name(pair)] = over.min(axis=0)
         best[BEST_PLACE + csd_name(pair)] = over.max(axis=0)
-    return columns | best | designed_quantities(imager.setup, curves) | {"exposure_s": exposure_s}
+    return columns | best | apart | designed_quantities(imager.setup, curves) | {"exposure_s": exposure_s}

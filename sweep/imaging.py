@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import pickle
 from collections import Counter, OrderedDict
+from collections.abc import Iterator
 from dataclasses import asdict, replace
 from functools import lru_cache
 
@@ -48,6 +49,7 @@ class Imager:
         kernel = make_kernel(setup, methods, grid.nodes_nm, by_pixel=not self.straight, work=self.work)
         self.n_cases, self.n_units = kernel.light.shape[:2]
         self._readout, self._light, self._uniform = kernel.readout, kernel.light, kernel.uniform
+        self._spread = kernel.spread
         self._nodes = quadrature.nodes(grid.size, methods.quadrature)
         self._hats = None if self._nodes.size == grid.size else quadrature.hats(grid.size, self._nodes)
         self.signals = signal_irradiance(setup) * per_photon(setup)
@@ -126,14 +128,18 @@ class Imager:
         """Value of each channel from those of the units: the last axis n_units -> n_channels."""
         if self.straight or (self.setup.scenario.target is None and self.n_units == self._readout.shape[2]):
             return dn
-        repeats = dn.shape[1] // self.n_cases
-        self.work["readout"] += dn.size
-        return np.asarray(np.einsum("dcsu,cuk->dcsk", dn, np.repeat(self._readout, repeats, axis=0), optimize=True))
+        return self._weighed(dn, self._readout)
+
+    def _weighed(self, values: FloatArray, weights: FloatArray) -> FloatArray:
+        """Sums over the units by their `weights`, ndarray[n_cases, n_units, n_channels]."""
+        self.work["readout"] += values.size
+        repeats = values.shape[1] // self.n_cases
+        return np.asarray(np.einsum("dcsu,cuk->dcsk", values, np.repeat(weights, repeats, axis=0), optimize=True))
 
     def smooth(self, curves: FloatArray) -> FloatArray:
         """Unquantized, unclipped response, DN, ndarray[n_designs, n_cases, n_signals, n_channels]."""
         exposure_s = self.exposure_s(curves)
-        return self._folded(unquantized(self.electrons(curves, self.scales(exposure_s), exposure_s), self._pixel))
+        return self._folded(unquantized(self.electrons(curves, self.scales(exposure_s), exposure_s), self.pixel))
 
     def smooth_gradient(self, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
         """Exact derivative of `smooth` at one design, with that of its exposure; a pulse's share of it is held.
@@ -155,7 +161,7 @@ class Imager:
                 top = int(np.argmax(rates))
                 relative = (curves_gradient[:, top] @ self._white) / rates[top]
                 slope = slope - relative[:, None, None, None] * whole
-        return self._folded(slope * self._pixel.dn_per_e)
+        return self._folded(slope * self.pixel.dn_per_e)
 
     def per_qe(self, modified: int, curves: FloatArray) -> FloatArray:
         """DN per QE of one modified channel at every wavelength, with the exposure of the design `curves`.
@@ -168,10 +174,21 @@ class Imager:
         light = self._light[:, None, None, :, self.setup.modified[modified]] * self.signals[:, None, :]
         uniform = self._uniform[:, None, None, :, self.setup.modified[modified], None] * self._background
         both = light * scales[None, :, None, None, None] + uniform
-        return np.asarray(both.reshape(-1, *both.shape[2:]) * (exposure_s[0] * self._pixel.dn_per_e), dtype=float)
+        return np.asarray(both.reshape(-1, *both.shape[2:]) * (exposure_s[0] * self.pixel.dn_per_e), dtype=float)
+
+    def channels_of(self, pixels: FloatArray, place: int) -> FloatArray:
+        """Readout of each channel from its pixels (those of `pixel_electrons`) at a place of the light.
+
+        ndarray[n, n_pixels] -> ndarray[n, n_channels].
+        """
+        setup = self.setup
+        if setup.scenario.target is None:
+            own = setup.mosaic.indices.ravel()[:, None] == np.arange(len(setup.mosaic.channels))
+            return np.asarray(pixels @ (own / setup.mosaic.counts), dtype=float)
+        return np.asarray(pixels @ self._readout[place], dtype=float)
 
     @property
-    def _pixel(self) -> Pixel:
+    def pixel(self) -> Pixel:
         """The pixel, without a pedestal where that is skipped."""
         pixel = self.setup.pixel
         return pixel.model_copy(update={"offset_dn": 0.0}) if self.setup.methods.pedestal == "skip" else pixel
@@ -179,23 +196,48 @@ class Imager:
     def read(self, curves: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The readout, DN, ndarray[n_designs, n_cases, n_signals, n_channels], and exposure, s, ndarray[n_designs]."""
         exposure_s = self.exposure_s(curves)
+        return np.concatenate([self._folded(self.transfer(e)) for e in self._blocks(curves, exposure_s)]), exposure_s
+
+    def read_with_noise(self, curves: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The readout as from `read`, its variance (DN^2, same shape), and the exposure.
+
+        Pixels are read one by one, so saturation and quantization must be among the setup's methods.
+        """
+        exposure_s = self.exposure_s(curves)
+        parts = [
+            (self._folded(self.transfer(e)), self._weighed(self.variance_dn(e), self._spread))
+            for e in self._blocks(curves, exposure_s)
+        ]
+        mean, variance = (np.concatenate(values) for values in zip(*parts, strict=True))
+        return mean, variance, exposure_s
+
+    def _blocks(self, curves: FloatArray, exposure_s: FloatArray) -> Iterator[FloatArray]:
+        """`electrons` of blocks of designs."""
         scales = self.scales(exposure_s)
         step = max(1, _BLOCK // (self.n_cases * scales.shape[1] * len(self.signals) * self.n_units))
-        blocks = [slice(start, start + step) for start in range(0, len(curves), step)]
-        parts = [
-            self._folded(self.transfer(self.electrons(curves[block], scales[block], exposure_s[block])))
-            for block in blocks
-        ]
-        return np.concatenate(parts), exposure_s
+        for start in range(0, len(curves), step):
+            block = slice(start, start + step)
+            yield self.electrons(curves[block], scales[block], exposure_s[block])
+
+    def pixel_electrons(self, curves: FloatArray) -> FloatArray:
+        """Expected electrons of the pixels that are read, ndarray[n_designs, n_cases, n_signals, n_pixels].
+
+        Of a light that fills the field, the pixels of one tile, row by row.
+        """
+        exposure_s = self.exposure_s(curves)
+        found = self.electrons(curves, self.scales(exposure_s), exposure_s)
+        if self.setup.scenario.target is None and self.n_units == len(self.setup.mosaic.channels):
+            return found[..., self.setup.mosaic.indices.ravel()]
+        return found
 
     def transfer(self, electrons: FloatArray) -> FloatArray:
         """Digital numbers of the units from their expected electrons, as far as the methods go."""
-        methods, noisy, pixel = self.setup.methods, self.setup.scenario.noise, self._pixel
+        methods, noisy, pixel = self.setup.methods, self.setup.scenario.noise is not None, self.pixel
         if methods.saturation == "skip":
             dn = unquantized(electrons, pixel)
         elif noisy and methods.noise == "expected":
             self.work["noise"] += electrons.size
-            dn = _expected(electrons, pixel)
+            dn = _moments(electrons, pixel)[0]
         else:
             self.work["saturation"] += electrons.size
             dn = unquantized(saturation.clipped(electrons, pixel), pixel)
@@ -203,6 +245,11 @@ class Imager:
             return dn
         self.work["quantization"] += electrons.size
         return quantization.dithered(dn, electrons, pixel) if noisy else quantization.rounded(dn, pixel)
+
+    def variance_dn(self, electrons: FloatArray) -> FloatArray:
+        """Variance of the units' digital numbers, DN^2, with their rounding."""
+        self.work["variance"] += electrons.size
+        return quantization.variance_of_rounded(*_moments(electrons, self.pixel))
 
 
 _KEPT_IMAGERS = 16
@@ -228,15 +275,16 @@ def smooth_imager(setup: Setup) -> Imager:
     return imager_of(replace(setup, methods=Methods(**{**asdict(setup.methods), **straight})))
 
 
-def _expected(electrons: FloatArray, pixel: Pixel) -> FloatArray:
-    """`noise.expected_dn` from a table over the square root of the signal, in which it is smooth."""
+def _moments(electrons: FloatArray, pixel: Pixel) -> tuple[FloatArray, FloatArray]:
+    """`noise.moments_dn` from a table over the square root of the signal, in which both are smooth."""
     finite = electrons[np.isfinite(electrons)]
     brightest = float(2 ** np.ceil(np.log2(max(1.0, finite.max(initial=1.0)))))
-    return np.asarray(_expected_table(pixel, brightest)(np.sqrt(electrons + pixel.read_noise_e**2)), dtype=float)
+    mean, variance = np.moveaxis(_moments_table(pixel, brightest)(np.sqrt(electrons + pixel.read_noise_e**2)), -1, 0)
+    return mean, np.maximum(variance, 0.0)
 
 
 @lru_cache(maxsize=8)
-def _expected_table(pixel: Pixel, brightest_e: float) -> CubicSpline:
+def _moments_table(pixel: Pixel, brightest_e: float) -> CubicSpline:
     read = pixel.read_noise_e
     roots = np.linspace(read, np.sqrt(brightest_e + read**2), _TABLE_NODES)
-    return CubicSpline(roots, noise.expected_dn(np.maximum(roots**2 - read**2, 0.0), pixel))
+    return CubicSpline(roots, np.stack(noise.moments_dn(np.maximum(roots**2 - read**2, 0.0), pixel), axis=1))

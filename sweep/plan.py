@@ -18,6 +18,8 @@ _NOTHING = {
     "pedestal": "cancels in every difference",
 }
 """Why an effect that could matter in other scenes changes less than this here."""
+_OF_NOISE = (*READOUT, "sampling")
+"""What metrics of noise ask for."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,9 @@ class Plan:
 class Planner:
     """Finds the plan of a scene for all its boxes of designs."""
 
-    def __init__(self, boxes: Sequence[Box]) -> None:
+    def __init__(self, boxes: Sequence[Box], *, for_noise: bool = False) -> None:
+        """`for_noise`: metrics of noise are asked for, which need every pixel and what the readout does to it."""
+        self._for_noise = for_noise
         self._scenes = [Promises(box) for box in boxes]
         self._exact = {effect: self._why_exact(effect) for effect in EFFECTS}
 
@@ -74,7 +78,7 @@ class Planner:
         if effect == "saturation":
             if any(scene.promise(effect, REFERENCE, replace(REFERENCE, saturation="skip")) for scene in self._scenes):
                 return None
-            if any(scene.setup.scenario.noise for scene in self._scenes):
+            if self._noisy:
                 return None
             top = max(float(scene.reach.brightest_dn.max()) for scene in self._scenes)
             return f"the brightest signal has at most {top:.0f} DN"
@@ -131,10 +135,12 @@ class Planner:
 
     @property
     def _noisy(self) -> bool:
-        return any(scene.setup.scenario.noise for scene in self._scenes)
+        return any(scene.setup.scenario.noise is not None for scene in self._scenes)
 
     def _allowed(self, effect: str, methods: Methods) -> bool:
         """Without pixels nothing saturates or is rounded one by one; noise moves a mean only where something clips."""
+        if self._for_noise and effect in _OF_NOISE:
+            return bool(getattr(methods, effect) == getattr(REFERENCE, effect))
         if effect == "saturation" and methods.saturation == "skip":
             return self._exact["noise"] is not None or methods.noise == "skip"
         straight = methods.saturation == "skip" and methods.quantization == "skip"
@@ -144,6 +150,8 @@ class Planner:
         exact = self._exact[effect]
         if exact is not None:
             return exact
+        if self._for_noise and effect in _OF_NOISE:
+            return "the noise metrics ask for it"
         methods = EFFECTS[effect].METHODS
         if method == methods[0] and promised < _NOTHING_DN:
             return _NOTHING.get(effect, "changes nothing here")

@@ -96,7 +96,7 @@ class Promises:
         elif effect == "saturation":
             each = [saturation.promise(self.setup, top / pixel.dn_per_e) for top in tops]
         else:
-            soft = self.setup.scenario.noise and after.noise == "expected"
+            soft = self.setup.scenario.noise is not None and after.noise == "expected"
             clipped = after.saturation == "clip"
             each = [
                 pixel.offset_dn if soft and clipped else pedestal.promise(self.setup, top, clipped=clipped)
@@ -178,7 +178,9 @@ class Promises:
         if remainder == 0 and not change.any():
             return 0.0
         found = reach.largest_change(changed, change, remainder, base, left, straight=straight)
-        steep = quantization.steepness(setup) if after.quantization == "round" and setup.scenario.noise else 1.0
+        steep = (
+            quantization.steepness(setup) if after.quantization == "round" and setup.scenario.noise is not None else 1.0
+        )
         return found * steep
 
     def _flicker_share(self, method: str, *, straight: bool) -> float:
@@ -211,6 +213,8 @@ class Promises:
         values = cases * scales * signals
         each = values / scales * touched * nodes + values * channels * signals / 2
         if methods.saturation != "skip":
-            each += values * pixels * (_NOISE_COST if setup.scenario.noise and methods.noise != "skip" else 1)
+            each += (
+                values * pixels * (_NOISE_COST if setup.scenario.noise is not None and methods.noise != "skip" else 1)
+            )
         each += values * pixels if methods.quantization != "skip" else 0.0
         return kernel + self.box.n_designs * each

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, PlainValidator, model_validator
+from pydantic import BeforeValidator, Field, PlainValidator, model_validator
 
 from .schema import NonNegative, Positive, Section
-from .sensor import Optics
+from .sensor import Optics, Pixel
 
 DIAMETER_M = 0.2
 """Diameter of a usual traffic light, EN 12368."""
@@ -85,6 +85,25 @@ class Drive(Section):
     frequency_hz: Positive
 
 
+class Noise(Section):
+    """Photon, read and dark noise and PRNU of the study's pixel; what is given here replaces the pixel's figure."""
+
+    read_noise_e: NonNegative | None = None
+    dark_e_per_s: NonNegative | None = None
+    prnu: float | None = Field(default=None, ge=0, lt=1)
+
+    def of(self, pixel: Pixel) -> Pixel:
+        """The pixel with this noise."""
+        return pixel.model_copy(update=self.model_dump(exclude_none=True))
+
+
+def _noise(value: Any) -> Any:
+    """`true` is the pixel's own noise, `false` none."""
+    if isinstance(value, bool):
+        return {} if value else None
+    return value
+
+
 class Scenario(Section):
     """What the camera sees, and how it is exposed.
 
@@ -93,7 +112,7 @@ class Scenario(Section):
     light of that luminous intensity and the target's diameter (0.2 m without a target). `visibility_m`: the distance at
     which the air leaves 2 % (Koschmieder's meteorological range); it dims a target. `background_cd_m2`: light that is
     added over the whole field, also in front of the target, flat in photons and not dimmed. `off_axis_deg`: field
-    angle. `noise`: photon, read and dark noise and PRNU act before the mean is taken.
+    angle. `noise`: photon, read and dark noise and PRNU act before the mean is taken; true, or figures of its own.
     """
 
     photon_radiance: Positive = 2e18
@@ -105,7 +124,7 @@ class Scenario(Section):
     visibility_m: Positive | None = None
     background_cd_m2: NonNegative = 0.0
     drive: Drive | None = None
-    noise: bool = False
+    noise: Annotated[Noise | None, BeforeValidator(_noise)] = None
 
     @model_validator(mode="after")
     def _goes_together(self) -> Scenario:

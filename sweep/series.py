@@ -21,6 +21,9 @@ _LABELS = {
     "exposure_s": "exposure / s",
     "visibility_m": "visibility / m",
     "intensity_cd": "luminous intensity / cd",
+    "read_noise_e": "read noise / e",
+    "dark_e_per_s": "dark current / (e/s)",
+    "level": "exposure: brightest channel on white / full scale",
 }
 
 
@@ -34,7 +37,7 @@ class Line:
 
 @dataclass(frozen=True)
 class SeriesFigure:
-    """A line per design over `x` (ndarray[n]), the number `key` of the scenarios."""
+    """A line per design over `x` (ndarray[n]), the number `key` of the scenarios; `level` is marked."""
 
     title: str
     key: str
@@ -42,6 +45,9 @@ class SeriesFigure:
     x: FloatArray
     lines: Mapping[str, Line]
     band: str
+    log_y: bool = False
+    from_zero: bool = True
+    level: float | None = None
 
 
 def draw_series(series: SeriesFigure) -> Figure:
@@ -55,7 +61,12 @@ def draw_series(series: SeriesFigure) -> Figure:
         axes.set_xscale("log")
     axes.set_xlabel(_LABELS.get(series.key, series.key))
     axes.set_ylabel(series.y_label)
-    axes.set_ylim(bottom=0)
+    if series.log_y:
+        axes.set_yscale("log")
+    elif series.from_zero:
+        axes.set_ylim(bottom=0)
+    if series.level is not None:
+        axes.axhline(series.level, color="#666666", linestyle="--", linewidth=1.0)
     axes.set_title(series.title)
     legend = f"band: {series.band}" if series.band else None
     axes.legend(title=legend, fontsize=8, title_fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False)

@@ -20,7 +20,7 @@ LEVELS = [
     {"effects"},
     {"promises"},
     {"plan", "imaging"},
-    {"evaluate"},
+    {"evaluate", "recognition"},
     {"store", "problem", "figures"},
     {"series"},
     {"smooth", "limit"},
@@ -32,7 +32,14 @@ LEVELS = [
     {"cli"},
     {"__main__"},
 ]
-ONLY_USER = {"nlopt": "search", "joblib": "runner calibration", "moocore": "pareto", "jinja2": "report", "typer": "cli"}
+ONLY_USER = {
+    "nlopt": "search",
+    "joblib": "runner calibration",
+    "moocore": "pareto",
+    "jinja2": "report",
+    "typer": "cli",
+    "sklearn": "recognition",
+}
 
 
 def level(unit: str) -> int:

@@ -7,7 +7,7 @@ for each unit of the readout (a channel's mean, or a single pixel) and each chan
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,12 +23,14 @@ class Kernel:
     `light`: ndarray[n_cases, n_units, n_channels, n_wavelengths], what a unit gets of a signal's light through each
     channel's filter, relative to a uniform field on axis in clear air. `uniform`: ndarray[n_cases, n_units,
     n_channels], the same of a uniform background. `readout`: ndarray[n_cases, n_units, n_channels], weight of each
-    unit in the value of each channel. A case is a place of the light on the mosaic.
+    unit in the value of each channel, `spread`: of its variance in that of the channel. A case is a place of the light
+    on the mosaic.
     """
 
     light: FloatArray
     uniform: FloatArray
     readout: FloatArray
+    spread: FloatArray
 
 
 def make_kernel(
@@ -47,7 +49,7 @@ def make_kernel(
         light = made.light if knots is wavelength_nm else _interpolated(made.light, knots, wavelength_nm)
     falls = illumination.factor(setup, methods.illumination)
     dimmed = falls * extinction.transmittance(setup, methods.extinction, wavelength_nm)
-    return Kernel(light * dimmed, made.uniform * falls, made.readout)
+    return replace(made, light=light * dimmed, uniform=made.uniform * falls)
 
 
 def _interpolated(light: FloatArray, knots: FloatArray, wavelength_nm: FloatArray) -> FloatArray:
@@ -70,9 +72,9 @@ def _uniform(setup: Setup, methods: Methods, *, by_pixel: bool) -> Kernel:
     split = crosstalk.mixed(own[None], share, periodic=True).reshape(1, tile.size, n, 1)
     weights = own.reshape(-1, n) / setup.mosaic.counts
     if by_pixel and share:
-        return Kernel(split, split[..., 0], weights[None])
+        return Kernel(split, split[..., 0], weights[None], weights[None] ** 2)
     folded = np.einsum("uc,xukl->xckl", weights, split)
-    return Kernel(folded, folded[..., 0], np.eye(n)[None])
+    return Kernel(folded, folded[..., 0], np.eye(n)[None], np.diag(1 / setup.mosaic.counts)[None])
 
 
 def _ideal(setup: Setup, methods: Methods, wavelength_nm: FloatArray) -> Kernel:
@@ -89,7 +91,8 @@ def _ideal(setup: Setup, methods: Methods, wavelength_nm: FloatArray) -> Kernel:
         knots = blur.knots(wavelength_nm, methods.blur)
         kept = blur.mean_over_disc(radius, readout, knots * 1e-3, setup.scenario.optics.f_number, w20_um)
         lost = np.interp(wavelength_nm, knots, kept)
-    return Kernel(uniform[..., None] * lost, uniform, np.eye(uniform.shape[-1])[None])
+    own = np.eye(uniform.shape[-1])[None]
+    return Kernel(uniform[..., None] * lost, uniform, own, own)
 
 
 def _pixels(setup: Setup, methods: Methods, wavelength_nm: FloatArray, *, by_pixel: bool, work: Counter[str]) -> Kernel:
@@ -125,7 +128,8 @@ def _pixels(setup: Setup, methods: Methods, wavelength_nm: FloatArray, *, by_pix
     taken = spread[..., :, None] * own[..., None, :]
     shape = (len(weights), n, n)
     folded = light.folded(taken.reshape(*taken.shape[:3], n * n)).reshape(*shape, light.values.shape[1])
-    return Kernel(folded, taken.sum(axis=(1, 2)), np.repeat(np.eye(n)[None], len(weights), axis=0))
+    weights = np.repeat(np.eye(n)[None], len(weights), axis=0)
+    return Kernel(folded, taken.sum(axis=(1, 2)), weights, weights)
 
 
 def _apart(light: sampling.PixelLight, own: FloatArray, apart: FloatArray, share: float) -> Kernel:
@@ -135,4 +139,5 @@ def _apart(light: sampling.PixelLight, own: FloatArray, apart: FloatArray, share
     uniform = own[None]
     if share:
         split, uniform = crosstalk.mixed(split, share), crosstalk.mixed(uniform, share)
-    return Kernel(split[:, used], np.repeat(uniform[:, used], len(apart), axis=0), apart[:, used])
+    readout = apart[:, used]
+    return Kernel(split[:, used], np.repeat(uniform[:, used], len(apart), axis=0), readout, readout**2)

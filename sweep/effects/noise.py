@@ -1,7 +1,8 @@
-"""Photon, read and dark noise and PRNU: the mean readout in closed form, the variance, and Monte Carlo draws.
+"""Photon, read and dark noise and PRNU: mean and variance of the readout in closed form, and Monte Carlo draws.
 
 The CSD is the distance of mean values. Noise moves a mean only where the readout is not straight: at the full well, at
-the ends of the ADC and at the steps of its quantization. Variance (EMVA 1288): gain^2 (read^2 + n) + PRNU^2 + 1/12.
+the ends of the ADC and at the steps of its quantization. Variance where nothing clips (EMVA 1288), before rounding:
+gain^2 (read^2 + n + (PRNU n)^2).
 """
 
 from __future__ import annotations
@@ -19,11 +20,15 @@ from ..setup import Setup
 METHODS = ("skip", "expected")
 _NODES = 48
 _TAILS = 9.0
+_MOST_E = 1e100
+"""More electrons than this are as many as this."""
+_MOST_POISSON_E = 1e18
+"""NumPy's Poisson generator takes no larger mean."""
 
 
 def skip_is_exact(setup: Setup) -> str | None:
     """Why leaving it out changes nothing; None when it may."""
-    return None if setup.scenario.noise else "no noise asked for"
+    return None if setup.scenario.noise is not None else "no noise asked for"
 
 
 def variance_e(electrons: FloatArray, pixel: Pixel) -> FloatArray:
@@ -36,11 +41,6 @@ def least_sigma_dn(pixel: Pixel) -> float:
     return pixel.dn_per_e * pixel.read_noise_e
 
 
-def variance_dn(electrons: FloatArray, pixel: Pixel) -> FloatArray:
-    """Variance of a pixel's digital number below saturation, with the 1/12 of its quantization."""
-    return np.asarray(pixel.dn_per_e**2 * (pixel.read_noise_e**2 + variance_e(electrons, pixel)) + 1 / 12, dtype=float)
-
-
 def _density(z: FloatArray) -> FloatArray:
     return np.asarray(np.exp(-0.5 * z**2) / math.sqrt(2 * math.pi), dtype=float)
 
@@ -50,24 +50,39 @@ def _ramp(z: FloatArray) -> FloatArray:
     return np.asarray(z * ndtr(z) + _density(z), dtype=float)
 
 
-def _soft(mean: FloatArray, sigma: float, low: float, high: float) -> FloatArray:
-    """Mean of a Gaussian clipped to low..high."""
+def _clipped(mean: FloatArray, sigma: float, low: float, high: float) -> tuple[FloatArray, FloatArray]:
+    """Mean and variance of a Gaussian that is clipped to low..high."""
     if sigma == 0:
-        return np.clip(mean, low, high)
-    return np.asarray(low + sigma * (_ramp((mean - low) / sigma) - _ramp((mean - high) / sigma)), dtype=float)
+        return np.clip(mean, low, high), np.zeros_like(mean)
+    # Further outside than the tails, everything is at the end.
+    z_low, z_high = (np.clip((end - mean) / sigma, -_TAILS, _TAILS) for end in (low, high))
+    shift = _ramp(z_low) - _ramp(-z_high)
+    square = np.ones_like(mean)  # E[(clip(z) - 0)^2]: z^2 between the ends, an end's square beyond it
+    for z in (z_low, -z_high):
+        square += (z**2 - 1) * ndtr(z) + z * _density(z)
+    outside = (mean <= low - _TAILS * sigma) | (mean >= high + _TAILS * sigma)
+    clipped = np.where(outside, np.clip(mean, low, high), mean + sigma * shift)
+    return clipped, np.where(outside, 0.0, sigma**2 * np.maximum(square - shift**2, 0.0))
 
 
-def expected_dn(electrons: FloatArray, pixel: Pixel) -> FloatArray:
-    """Mean digital number before rounding: Gaussian electrons, full well, read noise, pedestal, ADC range."""
+def moments_dn(electrons: FloatArray, pixel: Pixel) -> tuple[FloatArray, FloatArray]:
+    """Mean (DN) and variance (DN^2) before rounding: Gaussian electrons, full well, read noise, pedestal, ADC range.
+
+    Arrays of the shape of `electrons`. Moments are taken around the readout without noise, so that neither a large
+    pedestal nor a far excess over the full well costs digits.
+    """
     gain, offset, top = pixel.dn_per_e, pixel.offset_dn, float(pixel.full_scale_dn)
-    read = gain * pixel.read_noise_e
-
-    def bent(held: FloatArray) -> FloatArray:
-        """What the ADC's ends and the read noise change in the mean of a given number of electrons."""
-        dn = gain * held + offset
-        return _soft(dn, read, 0.0, top) - dn
-
+    electrons = np.minimum(electrons, _MOST_E)
     sigma = np.sqrt(variance_e(electrons, pixel))
+    center = np.clip(gain * np.minimum(electrons, pixel.well_e) + offset, 0.0, top)
+    first, second = np.zeros_like(electrons), np.zeros_like(electrons)
+
+    def add(weight: FloatArray, held_e: FloatArray) -> None:
+        """Take in what is read from a number of electrons that occurs with this probability."""
+        mean, variance = _clipped(gain * held_e + offset, gain * pixel.read_noise_e, 0.0, top)
+        first[...] += weight * (mean - center)
+        second[...] += weight * (variance + (mean - center) ** 2)
+
     some = sigma > 0
     full = np.divide(pixel.well_e - electrons, sigma, out=np.full_like(sigma, _TAILS), where=some)
     end = np.clip(full, -_TAILS, _TAILS)
@@ -78,22 +93,19 @@ def expected_dn(electrons: FloatArray, pixel: Pixel) -> FloatArray:
         corners.append(np.clip(at, -_TAILS, end))
     corners.append(end)
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
-    found = gain * electrons + offset
     for left, right in pairwise(corners):
         for node, weight in zip((nodes + 1) / 2, weights / 2, strict=True):
             z = left + node * (right - left)
-            found += weight * (right - left) * _density(z) * bent(electrons + z * sigma)
-    beyond = np.maximum(_density(full) - full * ndtr(-full), 0.0) * sigma
-    found += bent(np.full_like(electrons, pixel.well_e)) * ndtr(-full) - gain * beyond
-    held = np.minimum(electrons, pixel.well_e)
-    return np.where(some, found, gain * held + offset + bent(held))
+            add(weight * (right - left) * _density(z), np.minimum(electrons + z * sigma, pixel.well_e))
+    add(ndtr(-full), np.full_like(electrons, pixel.well_e))
+    return center + first, np.maximum(second - first**2, 0.0)
 
 
-def draws_dn(electrons: float, pixel: Pixel, rng: np.random.Generator, count: int) -> FloatArray:
-    """Monte Carlo: `count` readouts of pixels that expect `electrons`, each with its own gain error; rounded."""
-    gains = 1 + pixel.prnu * rng.standard_normal(count)
-    held = np.minimum(rng.poisson(np.maximum(electrons * gains, 0.0)), pixel.well_e)
-    dn = (held + pixel.read_noise_e * rng.standard_normal(count)) * pixel.dn_per_e + pixel.offset_dn
+def draws_dn(electrons: FloatArray, pixel: Pixel, rng: np.random.Generator) -> FloatArray:
+    """Monte Carlo: a readout of each pixel, which expects `electrons` and has its own gain error; rounded."""
+    gains = 1 + pixel.prnu * rng.standard_normal(electrons.shape)
+    held = np.minimum(rng.poisson(np.clip(electrons * gains, 0.0, _MOST_POISSON_E)), pixel.well_e)
+    dn = (held + pixel.read_noise_e * rng.standard_normal(electrons.shape)) * pixel.dn_per_e + pixel.offset_dn
     return np.clip(np.floor(dn + 0.5), 0, pixel.full_scale_dn)
 
 

@@ -16,6 +16,9 @@ METHODS = ("skip", "round")
 _TERMS = 6
 _STEPS = 6
 _LITTLE_DN = 0.5
+_MUCH_DN = 1.5
+"""From here on the first term of the series, exp(-2 (pi 1.5)^2), is below the rounding of a float."""
+_LEAST_SIGMA_DN = 1e-12
 
 
 def skip_is_exact(_: Setup) -> str | None:
@@ -28,32 +31,58 @@ def rounded(dn: FloatArray, pixel: Pixel) -> FloatArray:
     return np.clip(np.floor(dn + 0.5), 0, pixel.full_scale_dn)
 
 
-def mean_step(dn: FloatArray, sigma_dn: FloatArray) -> FloatArray:
-    """Mean of round(x + noise) - x for Gaussian noise.
+def _by_series(rest: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean of e = round(x) - x, and variance of round(x), by the Fourier series of e in the mean of x.
 
-    sum over k of (-1)^k sin(2 pi k x) exp(-2 (pi k sigma)^2) / (pi k); where little noise lets that converge slowly,
-    the sum over the steps of the probability to pass each.
+    E[e] = sum over k of (-1)^k sin(2 pi k m) exp(-2 (pi k sigma)^2) / (pi k). Variance: sigma^2 + E[e^2] - E[e]^2 +
+    2 cov(x, e); Stein's lemma gives the covariance.
     """
-    found = np.zeros_like(dn)
+    shift, square, slope = np.zeros_like(rest), np.full_like(rest, 1 / 12), np.zeros_like(rest)
     for k in range(1, _TERMS + 1):
-        found += (-1) ** k / (math.pi * k) * np.sin(2 * math.pi * k * dn) * np.exp(-2 * (math.pi * k * sigma_dn) ** 2)
-    rest = dn - np.floor(dn + 0.5)
-    sigma = np.maximum(sigma_dn, 1e-12)
-    passed = -rest
+        decay = (-1) ** k * np.exp(-2 * (math.pi * k * sigma) ** 2)
+        cosine = np.cos(2 * math.pi * k * rest) * decay
+        shift += np.sin(2 * math.pi * k * rest) * decay / (math.pi * k)
+        square += cosine / (math.pi * k) ** 2
+        slope += 2 * cosine
+    return shift, sigma**2 * (1 + 2 * slope) + square - shift**2
+
+
+def _by_steps(rest: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The same from the probabilities to pass each step, where little noise lets the series converge slowly."""
+    mean, square = np.zeros_like(rest), np.zeros_like(rest)
+    least = np.maximum(sigma, _LEAST_SIGMA_DN)
     for step in range(_STEPS):
-        passed = passed + ndtr((rest - step - 0.5) / sigma) - ndtr((-rest - step - 0.5) / sigma)
-    return np.where(sigma_dn < _LITTLE_DN, passed, found)
+        up, down = ndtr((rest - step - 0.5) / least), ndtr((-rest - step - 0.5) / least)
+        mean += up - down
+        square += (2 * step + 1) * (up + down)
+    return mean - rest, np.maximum(square - mean**2, 0.0)
+
+
+def rounding(mean_dn: FloatArray, sigma_dn: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean of round(x) - x (DN) and variance of round(x) (DN^2) for Gaussian x."""
+    rest = mean_dn - np.floor(mean_dn + 0.5)
+    shift, variance = np.zeros_like(rest), sigma_dn**2 + 1 / 12
+    little = sigma_dn < _LITTLE_DN
+    for where, moments in ((little, _by_steps), (~little & (sigma_dn < _MUCH_DN), _by_series)):
+        if where.any():
+            shift[where], variance[where] = moments(rest[where], sigma_dn[where])
+    return shift, variance
 
 
 def dithered(dn: FloatArray, electrons: FloatArray, pixel: Pixel) -> FloatArray:
     """Mean of the rounded value where noise of the pixel dithers it."""
     sigma = pixel.dn_per_e * np.sqrt(variance_e(electrons, pixel) + pixel.read_noise_e**2)
-    return np.asarray(dn + mean_step(dn, sigma), dtype=float)
+    return np.asarray(dn + rounding(dn, sigma)[0], dtype=float)
+
+
+def variance_of_rounded(mean_dn: FloatArray, variance_dn: FloatArray) -> FloatArray:
+    """Variance of round(x), DN^2, for Gaussian x of this mean and variance."""
+    return rounding(mean_dn, np.sqrt(variance_dn))[1]
 
 
 def promise(setup: Setup) -> float:
     """Range of what leaving it out changes in one coordinate, DN: 1, or under noise twice the series' largest sum."""
-    if not setup.scenario.noise:
+    if setup.scenario.noise is None:
         return 1.0
     sigma = least_sigma_dn(setup.pixel)
     return min(1.0, 2 * sum(math.exp(-2 * (math.pi * k * sigma) ** 2) / (math.pi * k) for k in range(1, 50)))

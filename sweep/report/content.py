@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -91,28 +91,41 @@ def _points(output: Output, rows: pd.DataFrame, labels: Sequence[str] = ()) -> P
     return Points(x, rows[separation].to_numpy(dtype=float), tuple(map(str, labels)))
 
 
-def series_figures(output: Output) -> list[SeriesFigure]:
-    """A figure for each set of scenarios that differ in one number: the objective of every named design over it."""
+def scenario_series(output: Output) -> dict[tuple[str, str], dict[str, float]]:
+    """Sets of scenarios that differ in one number: (name, key) -> scenario -> number, in order of the numbers."""
     groups: dict[tuple[str, str], dict[str, float]] = {}
     for name in output.study["scenarios"]:
         base, _, last = str(name).rpartition(" ")
         key, equals, number = last.partition("=")
-        if base and equals and " " not in base:
+        if base and equals and "=" not in base:
             groups.setdefault((base, key), {})[name] = float(number)
+    ordered = {group: dict(sorted(found.items(), key=lambda item: item[1])) for group, found in groups.items()}
+    return {group: found for group, found in ordered.items() if len(found) > 1}
+
+
+def over_series(rows: pd.DataFrame, scenarios: Mapping[str, float], column: str) -> dict[str, np.ndarray]:
+    """Values of a column over a series' numbers for every design that has them all, ndarray[n_scenarios] each."""
+    found = {}
+    for name, own in rows[rows["scenario"].isin(list(scenarios))].groupby("name", observed=True, sort=False):
+        if len(own) == len(scenarios):
+            found[str(name)] = own.set_index("scenario")[column].reindex(list(scenarios)).to_numpy(dtype=float)
+    return found
+
+
+def series_figures(output: Output) -> list[SeriesFigure]:
+    """A figure for each set of scenarios that differ in one number: the separation of every named design over it."""
     rows = output.kind("reference", "design", "search")
     separation = output.trade_off[0]
+    best_place = BEST_PLACE + separation
     figures = []
-    for (base, key), scenarios in groups.items():
-        lines = {}
-        for name, own in rows[rows["scenario"].isin(scenarios)].groupby("name", observed=True, sort=False):
-            at = own.assign(x=own["scenario"].map(scenarios).astype(float)).sort_values("x")
-            upper = at[BEST_PLACE + separation].to_numpy() if BEST_PLACE + separation in at else None
-            if len(at) == len(scenarios):
-                lines[str(name)] = Line(at[separation].to_numpy(), upper)
-        x = np.array(sorted(scenarios.values()))
-        if len(x) > 1 and lines:
-            band = "over the places on the mosaic" if BEST_PLACE + separation in rows else ""
+    for (base, key), scenarios in scenario_series(output).items():
+        upper = over_series(rows, scenarios, best_place) if best_place in rows else {}
+        upper = {name: values for name, values in upper.items() if np.isfinite(values).all()}
+        lines = {n: Line(y, upper.get(n)) for n, y in over_series(rows, scenarios, separation).items()}
+        if lines:
+            band = "over the places on the mosaic" if upper else ""
             title = f"{output.study['study']}: {base}"
+            x = np.array(list(scenarios.values()))
             figures.append(SeriesFigure(title, key, f"{readable(separation)} / DN", x, lines, band))
     return figures
 

@@ -17,6 +17,7 @@ from ..series import draw_series
 from ..store import write_bytes, write_table, write_text
 from . import content
 from .comparison import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
+from .noise import noise_figures, recognition_table
 from .outputs import Output
 from .summary import answer_sentences, summary_lines
 
@@ -51,6 +52,7 @@ def make_report(output: Output) -> None:
         images=images,
         comparison=_rows(content.comparison_table(output)),
         best=_rows(content.best_table(output)),
+        recognition=_rows(recognition_table(output)),
         geometry=_rows(content.geometry_table(output)),
         published=_rows(published),
         plans=_rows(content.plan_table(output)),
@@ -70,7 +72,7 @@ def _drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
         yield ("pareto" if number == 0 else f"pareto-{number + 1}"), f"Trade-off{f' of {cfa}' if cfa else ''}", figure
     for number, cfa in enumerate(cfas):
         yield f"filters-{number + 1}", f"Filters of {cfa}", draw_curves(content.filters_figure(output, cfa))
-    for number, series in enumerate(content.series_figures(output)):
+    for number, series in enumerate([*content.series_figures(output), *noise_figures(output)]):
         yield f"series-{number + 1}", series.title, draw_series(series)
     yield "sensor", "Quantum efficiency of the sensor", draw_curves(content.sensor_figure(output))
     yield "signals", "Spectra of the signals", draw_curves(content.lights_figure(output))

@@ -18,7 +18,7 @@ from ..errors import Fault, OutputError
 from ..metrics import CSD
 from ..objectives import Objective
 from ..scenes import Geometry
-from ..store import CURVES, FRONT, POINTS, PROVENANCE, RESOLVED, RESULTS, read_table
+from ..store import CURVES, FRONT, POINTS, PROVENANCE, RECOGNITION, RESOLVED, RESULTS, read_table
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,7 @@ class Output:
     curves: pd.DataFrame
     points: pd.DataFrame
     front: pd.DataFrame | None
+    recognition: pd.DataFrame | None
 
     @property
     def objective(self) -> str:
@@ -89,8 +90,10 @@ def read_output(folder: Path) -> Output:
     study = _mapping(folder / RESOLVED, lambda text: YAML(typ="safe").load(text))
     provenance = _mapping(folder / PROVENANCE, json.loads)
     table, curves, points = (read_table(folder / name).to_pandas() for name in (RESULTS, CURVES, POINTS))
-    front = read_table(folder / FRONT).to_pandas() if (folder / FRONT).is_file() else None
-    return Output(folder, study, provenance, table, curves, points, front)
+    front, recognition = (
+        read_table(folder / name).to_pandas() if (folder / name).is_file() else None for name in (FRONT, RECOGNITION)
+    )
+    return Output(folder, study, provenance, table, curves, points, front, recognition)
 
 
 def _mapping(path: Path, parse: Any) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from typing import Any
 
 from .comparison import comparison_lines, comparison_with_published
 from .content import amount, geometry_table, readable
+from .noise import usable_lines
 from .outputs import Output
 
 _MOST_PARAMETERS = 10
@@ -60,6 +61,7 @@ def summary_lines(output: Output) -> list[str]:
         found = ", ".join(f"{name} {best[name]:.2f}" for name in own[:_MOST_PARAMETERS])
         more = f" and {len(own) - _MOST_PARAMETERS} more" if len(own) > _MOST_PARAMETERS else ""
         lines.append(f"Parameters: {found}{more}.")
+    lines += usable_lines(output)
     for row in geometry_table(output).to_dict("records"):
         lines.append(
             f"{row['scenario']}: {row['distance_m']:g} m, {row['fov_deg']:g} deg: "

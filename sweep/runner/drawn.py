@@ -24,7 +24,7 @@ def curves_table(study: Study, table: pa.Table, limit: Limit | None) -> pa.Table
     lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
     columns |= {f"light:{kind}:{name}": values for kind, name, values in lights}
     for row in drawn_rows(study, table):
-        for index, curve in enumerate(_row_curves(study, row)[1][0]):
+        for index, curve in enumerate(row_curves(study, row)[1][0]):
             columns[f"design:{row['design_id']}:{index}"] = curve
     if limit is not None and limit.curve is not None and study.search is not None:
         columns[f"limit:{study.search.space.cfa}"] = limit.curve
@@ -35,7 +35,7 @@ def points_table(study: Study, table: pa.Table) -> pa.Table:
     """Digital numbers of every signal in every channel of the drawn designs, a row each."""
     found: list[dict[str, Any]] = []
     for row in drawn_rows(study, table):
-        space, curves = _row_curves(study, row)
+        space, curves = row_curves(study, row)
         setup = study.setup(space, row["scenario"])
         response = imager_of(setup).read(curves)[0][0, 0]
         for signal, (kind, name) in enumerate(zip(study.lights.types, study.lights.names, strict=True)):
@@ -73,7 +73,7 @@ def row_space(study: Study, row: Mapping[Any, Any]) -> Space:
     return study.spaces[int(np.searchsorted(ends, within, side="right"))]
 
 
-def _row_curves(study: Study, row: dict[str, Any]) -> tuple[Space, Any]:
+def row_curves(study: Study, row: dict[str, Any]) -> tuple[Space, Any]:
     """The space that a row belongs to and its filters' curves, ndarray[1, n_modified, n_wavelengths]."""
     space = row_space(study, row)
     point = np.array([[row[name] for name in space.parameters]], dtype=float)

@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from ..arrays import BoolArray, FloatArray
 from ..constraints import FEASIBLE, Bound, total_violation
-from ..evaluate import WORST, evaluate, shiftable
+from ..evaluate import WORST, evaluate, noise_quantities, shiftable
 from ..imaging import imager_of
 from ..objectives import COMBINED, Objective
 from ..pareto import non_dominated
@@ -51,6 +51,7 @@ class Rules:
     front: tuple[str, str]
     edge_shift_nm: float
     plans: Mapping[str, Plan]
+    states: tuple[str, ...]
 
 
 def jobs_of(study: Study) -> Iterator[Job]:
@@ -93,7 +94,14 @@ def rules_of(study: Study) -> Rules:
     """The rules of a study."""
     schema = result_schema(study.parameters, study.columns)
     return Rules(
-        schema, study.columns, study.objective, study.constraints, study.trade_off, study.edge_shift_nm, study.plans
+        schema,
+        study.columns,
+        study.objective,
+        study.constraints,
+        study.trade_off,
+        study.edge_shift_nm,
+        study.plans,
+        study.states,
     )
 
 
@@ -101,7 +109,7 @@ def _columns(space: Space, setup: Setup, points: FloatArray, rules: Rules) -> di
     """Every quantity of a block of designs, ndarray[n_designs] each."""
     size = setup.grid.size
     imager = imager_of(setup)
-    columns = evaluate(imager, space.curves(points, size)) | space.dimensions(points)
+    columns = evaluate(imager, space.curves(points, size), rules.states) | space.dimensions(points)
     if rules.edge_shift_nm:
         shifts = [rules.edge_shift_nm * s for s in SHIFTS if s] if space.filter is not None else []
         cases = [columns, *(evaluate(imager, space.curves(points, size, shift)) for shift in shifts)]
@@ -130,7 +138,12 @@ def _quantities(
     except Exception:  # whatever fails in one design must not take the others with it
         columns, status = _one_by_one(space, setup, points, rules)
     lacking = _may_lack(setup, rules)
-    numbers = [values for name, values in columns.items() if name not in lacking]
+    unbounded = set(noise_quantities(rules.states))  # a signal without noise is told apart for certain
+    numbers = [
+        np.where(values == np.inf, 0.0, values) if name in unbounded else values
+        for name, values in columns.items()
+        if name not in lacking
+    ]
     for index in np.flatnonzero(~np.isfinite(numbers).all(axis=0)):
         if status[index] == "ok":
             status[index] = "not finite"

@@ -18,9 +18,9 @@ from ruamel.yaml import YAML
 from ..study import Study
 from .jobs import CHUNK
 
-MODEL_VERSION = "3"
+MODEL_VERSION = "4"
 """Raised whenever the same study would give other rows; part of every shard's key."""
-_PACKAGES = ("cfa-sweep", "numpy", "scipy", "pandas", "pyarrow", "joblib", "nlopt", "moocore")
+_PACKAGES = ("cfa-sweep", "numpy", "scipy", "scikit-learn", "pandas", "pyarrow", "joblib", "nlopt", "moocore")
 
 
 def fingerprint(study: Study) -> str:

@@ -20,6 +20,7 @@ from ..store import (
     FRONT,
     POINTS,
     PROVENANCE,
+    RECOGNITION,
     RESOLVED,
     RESULTS,
     SEARCH_LOG,
@@ -32,6 +33,7 @@ from ..store import (
 from ..study import Study
 from .drawn import curves_table, points_table
 from .jobs import Rules, jobs_of, mark_front, rules_of, run_job
+from .patches import recognition_table
 from .planning import with_plans
 from .provenance import fingerprint, plan_facts, provenance, resolved_yaml
 from .searching import Parallel, Progress, SearchAnswer, answer_row, front_table, run_search, search_facts, search_log
@@ -88,6 +90,7 @@ def _write(
         (FRONT, None if answer is None or not answer.front else front_table(answer)),
         (CURVES, curves_table(study, table, None if answer is None else answer.limit)),
         (POINTS, points_table(study, table)),
+        (RECOGNITION, recognition_table(study, table, parallel, progress)),
     ):
         if made is None:
             (output / name).unlink(missing_ok=True)  # of an earlier run of another study

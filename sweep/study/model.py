@@ -10,7 +10,7 @@ import numpy as np
 from ..constraints import Bound
 from ..datasets.lights import Lights
 from ..effects.bounds import Box
-from ..evaluate import BEST_PLACE, WORST, quantities, shiftable
+from ..evaluate import BEST_PLACE, WORST, noise_quantities, quantities, shiftable
 from ..filters import SensorCurves
 from ..metrics import CSD, Pair, class_pairs, csd_name
 from ..mosaics import Mosaic
@@ -74,7 +74,15 @@ class Study:
         worst = [WORST + name for name in shiftable(self.lights)] if self.edge_shift_nm else []
         combined = [COMBINED] if self.objective.column == COMBINED else []
         places = [BEST_PLACE + csd_name(pair) for pair in self.pairs] if self.any_place else []
-        return (*quantities(self.lights), *DIMENSIONS, *places, *worst, *combined)
+        return (*quantities(self.lights), *DIMENSIONS, *places, *worst, *noise_quantities(self.states), *combined)
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Signal types that noise may confuse; none where the study does not ask."""
+        asked = self.section.recognition
+        if asked is None:
+            return ()
+        return self.lights.classes if asked.states is None else tuple(asked.states)
 
     @property
     def any_place(self) -> bool:
@@ -106,7 +114,7 @@ class Study:
 
     def setup(self, space: Space, scenario: str) -> Setup:
         """What the designs of `space` share in a scenario."""
-        mosaic = self.mosaics[space.cfa]
+        mosaic, scene = self.mosaics[space.cfa], self.scenarios[scenario]
         replaced = dict(self.section.cfas[space.cfa].curves)
         modified: tuple[int, ...] = ()
         if space.filter is not None:
@@ -119,8 +127,8 @@ class Study:
             modified=modified,
             clear_qe=self.sensor.curve(self.sensor.clear),
             lights=self.lights,
-            pixel=self.pixel,
-            scenario=self.scenarios[scenario],
+            pixel=self.pixel if scene.noise is None else scene.noise.of(self.pixel),
+            scenario=scene,
             methods=self.plans[scenario].methods if scenario in self.plans else REFERENCE,
         )
 
@@ -148,7 +156,7 @@ class Study:
         boxes = [self.box(space, scenario) for space in self.spaces]
         used = [box for box in boxes if box.n_designs]
         tolerance = self.section.tolerance_dn if tolerance_dn is None else tolerance_dn
-        return Planner(used or boxes).plan(scenario, tolerance)
+        return Planner(used or boxes, for_noise=bool(self.states)).plan(scenario, tolerance)
 
     def problem(self, search: Search) -> Problem:
         """The search as a mathematical problem."""

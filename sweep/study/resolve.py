@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 from ..datasets.lights import Lights
+from ..discrimination import CNR, D_PRIME
 from ..effects import blur
-from ..errors import StudyError, SweepError, nearest
-from ..evaluate import DESIGNED, WORST, shiftable
-from ..families import CHANNELS, Parameter, build_family
-from ..filters import SensorCurves
+from ..errors import StudyError, SweepError
+from ..evaluate import DESIGNED, WORST, noise_quantities, shiftable
 from ..metrics import class_pairs, csd_name
 from ..mosaics import Mosaic
 from ..scenes import OBJECT_RESOLUTION, WhitePatchExposure
 from ..search import ALGORITHMS
-from ..spaces import DIMENSIONS, Filter, Kind, Space
-from ..surrogate import surrogate_parameters
+from ..spaces import DIMENSIONS, Space
 from .lines import Document, Key
 from .model import Search, Study
-from .schema import Axis, CfaSection, DesignSection, Modification, StudySection
+from .schema import Axis, CfaSection, StudySection
 from .sources import Sources
+from .space_builder import SpaceBuilder
 
 MOST_DESIGNS = 10**9
 
@@ -34,9 +33,7 @@ class _Resolver:
         self.sources = Sources(document, section.wavelengths, folders)
         self.faults = self.sources.faults
         self.add = self.sources.add
-
-    def unknown(self, path: tuple[Key, ...], what: str, value: str, known: list[str]) -> None:
-        self.add(path, f"unknown {what}", value, ", ".join(known), nearest(value, known))
+        self.unknown = self.sources.unknown
 
     def resolve(self) -> Study:
         section = self.section
@@ -45,9 +42,10 @@ class _Resolver:
         mosaics = {name: mosaic for name, cfa in section.cfas.items() if (mosaic := self.mosaic(name, cfa)) is not None}
         if sensor is None or lights is None:
             raise StudyError(self.faults)
-        spaces = self.spaces(sensor, mosaics)
+        spaces = SpaceBuilder(section, self.sources, sensor, mosaics).spaces()
         self.check_columns(lights)
         self.check_images()
+        self.check_recognition(lights)
         self.check_objective(lights)
         self.check_constraints(lights)
         self.check_published(lights, mosaics)
@@ -99,6 +97,23 @@ class _Resolver:
                 key, problem, value, allowed = refused
                 self.add(("scenarios", name, *key), problem, value, allowed)
 
+    def check_recognition(self, lights: Lights) -> None:
+        """Its states are signal types, each once, and every scenario has noise."""
+        asked = self.section.recognition
+        if asked is None:
+            return
+        for name in asked.states or ():
+            if name not in lights.classes:
+                self.unknown(("recognition", "states"), "signal type", name, list(lights.classes))
+        if asked.states is not None and len(set(asked.states)) < len(asked.states):
+            self.add(("recognition", "states"), "a signal type is named twice", asked.states)
+        if len(lights.classes) < 2:
+            self.add(("recognition",), "there is one signal type only", lights.classes[0], "two or more")
+        for name, scenario in self.section.scenarios.items():
+            if scenario.noise is None:
+                problem = "`recognition` needs noise in every scenario"
+                self.add(("scenarios", name, "noise"), problem, None, "noise: true")
+
     def mosaic(self, name: str, cfa: CfaSection) -> Mosaic | None:
         try:
             return Mosaic.from_name(name) if cfa.tile is None else Mosaic.from_rows(name, cfa.tile)
@@ -106,50 +121,6 @@ class _Resolver:
             for fault in error.faults:
                 self.add(("cfas", name), fault.problem, fault.value, fault.allowed)
             return None
-
-    def spaces(self, sensor: SensorCurves, mosaics: Mapping[str, Mosaic]) -> list[Space]:
-        """Plain CFAs (those whose every channel has a curve), then named designs, then sweeps."""
-        section = self.section
-        entries = (*section.designs.values(), *section.sweeps.values(), *section.boxes.values())
-        changed = {(entry.cfa, channel) for entry in entries for channel in entry.channel}
-        spaces = []
-        for name, mosaic in mosaics.items():
-            missing = False
-            for channel in mosaic.channels:
-                curve = section.cfas[name].curves.get(channel, sensor.curve_name(name, channel))
-                if curve not in sensor.qe:
-                    missing = True
-                    if (name, channel) not in changed:
-                        self.unknown(("cfas", name), f"curve of channel {channel!r}", curve, list(sensor.qe))
-            for channel in section.cfas[name].curves:
-                if channel not in mosaic.channels:
-                    self.unknown(("cfas", name, "curves", channel), "channel", channel, list(mosaic.channels))
-            if not missing:
-                spaces.append(Space("reference", name, name))
-        for name, design in section.designs.items():
-            axes: dict[str, tuple[float, ...]] = {key: (value,) for key, value in self.built_in(name, design).items()}
-            spaces += self.filtered(
-                "design", name, design, axes, ("designs", name, "at"), sensor=sensor, mosaics=mosaics
-            )
-        for name, sweep in section.sweeps.items():
-            axes = {key: axis.points() for key, axis in sweep.grid.items()}
-            spaces += self.filtered(
-                "sweep", name, sweep, axes, ("sweeps", name, "grid"), sensor=sensor, mosaics=mosaics
-            )
-        for name, box in section.boxes.items():
-            axes = {key: axis.points() for key, axis in box.box.items()}
-            spaces += self.filtered("search", name, box, axes, ("boxes", name, "box"), sensor=sensor, mosaics=mosaics)
-        return spaces
-
-    def built_in(self, name: str, design: DesignSection) -> Mapping[str, float]:
-        """A design's parameters, looked up when it names a built-in filter."""
-        if not isinstance(design.at, str):
-            return design.at
-        known = surrogate_parameters().stopbands
-        if design.at not in known:
-            self.unknown(("designs", name, "at"), "built-in filter", design.at, list(known))
-            return {}
-        return known[design.at].model_dump()
 
     def check_published(self, lights: Lights, mosaics: Mapping[str, Mosaic]) -> None:
         section = self.section
@@ -165,90 +136,15 @@ class _Resolver:
                     if row in known and quantity not in names:
                         self.unknown((*path, quantity), "quantity", quantity, names)
 
-    def check_channels(self, path: tuple[Key, ...], entry: Modification, mosaic: Mosaic | None) -> None:
-        """The channels that a family replaces: of the CFA, as many as the family wants, each once."""
-        for channel in entry.channel:
-            if mosaic is not None and channel not in mosaic.channels:
-                self.unknown((*path, "channel"), f"channel of {entry.cfa}", channel, list(mosaic.channels))
-        if entry.family not in CHANNELS:
-            self.unknown((*path, "family"), "family", entry.family, list(CHANNELS))
-        elif len(entry.channel) != CHANNELS[entry.family]:
-            self.add((*path, "channel"), f"{entry.family} replaces {CHANNELS[entry.family]} channel(s)", entry.channel)
-        elif len(set(entry.channel)) < len(entry.channel):
-            self.add((*path, "channel"), "a channel is named twice", entry.channel)
-
-    def filtered(
-        self,
-        kind: Kind,
-        name: str,
-        entry: Modification,
-        axes: Mapping[str, tuple[float, ...]],
-        axes_path: tuple[Key, ...],
-        *,
-        sensor: SensorCurves,
-        mosaics: Mapping[str, Mosaic],
-    ) -> list[Space]:
-        before = len(self.faults)
-        path = axes_path[:-1]
-        curves = list(sensor.qe)
-        mosaic = mosaics.get(entry.cfa)
-        if entry.cfa not in self.section.cfas:
-            self.unknown((*path, "cfa"), "CFA", entry.cfa, list(self.section.cfas))
-        if entry.base not in curves:
-            self.unknown((*path, "base"), "curve", entry.base, curves)
-        if isinstance(entry.to, str) and entry.to not in curves:
-            self.unknown((*path, "to"), "curve", entry.to, curves)
-        self.check_channels(path, entry, mosaic)
-        if len(self.faults) > before:
-            return []
-        base = sensor.curve(entry.base)
-        target = sensor.curve(entry.to) if isinstance(entry.to, str) else None if entry.to is None else base * entry.to
-        try:
-            family = build_family(entry.family, self.section.wavelengths.nodes_nm, base, target, entry.options)
-        except SweepError as error:
-            for fault in error.faults:
-                self.add((*path, "family"), fault.problem, fault.value, fault.allowed)
-            return []
-        ordered = self.axes(axes, axes_path, family.parameters, open_ended=kind == "search")
-        if len(self.faults) > before:
-            return []
-        made = Filter(family, tuple(entry.channel), entry.base, "" if entry.to is None else str(entry.to))
-        return [Space(kind, name, entry.cfa, made, tuple(ordered), gridded=kind != "search")]
-
-    def axes(
-        self,
-        axes: Mapping[str, tuple[float, ...]],
-        path: tuple[Key, ...],
-        parameters: Sequence[Parameter],
-        *,
-        open_ended: bool,
-    ) -> list[tuple[float, ...]]:
-        """The values of each parameter, in order; one not named has its default, or its range if `open_ended`."""
-        known = [parameter.name for parameter in parameters]
-        misspelled = [name for name in axes if name not in known]
-        for name in misspelled:
-            self.unknown((*path, name), "parameter", name, known)
-        meant = {nearest(name, known) for name in misspelled}
-        ordered = []
-        for parameter in parameters:
-            usual: tuple[float, ...] = () if parameter.default is None else (parameter.default,)
-            if open_ended and not usual:
-                usual = (parameter.low, parameter.high)
-            values = axes.get(parameter.name, usual)
-            if not values and parameter.name not in meant:
-                self.add((*path, parameter.name), "missing")
-            for value in (min(values), max(values)) if values else ():
-                if not parameter.low <= value <= parameter.high:
-                    allowed = f"{parameter.low:g} to {parameter.high:g}"
-                    self.add((*path, parameter.name), "out of range", value, allowed)
-                    break
-            ordered.append(values)
-        return ordered
-
     def named_quantities(self, lights: Lights) -> list[str]:
         """Quantities that an objective or a constraint can name."""
         worst = [WORST + name for name in shiftable(lights)] if self.section.production.edge_shift_nm else []
-        return [*DESIGNED, *DIMENSIONS, *(csd_name(pair) for pair in class_pairs(lights.classes)), *worst]
+        distances = (csd_name(pair) for pair in class_pairs(lights.classes))
+        return [*DESIGNED, *DIMENSIONS, *distances, *worst, *self.noise_quantities(lights)]
+
+    def noise_quantities(self, lights: Lights) -> tuple[str, ...]:
+        asked = self.section.recognition
+        return () if asked is None else noise_quantities(asked.states or lights.classes)
 
     def check_quantity(self, path: tuple[Key, ...], what: str, name: str, known: list[str]) -> bool:
         if name in known:
@@ -271,8 +167,12 @@ class _Resolver:
         for name, bound in self.section.constraints.items():
             path = ("constraints", name)
             known = self.check_quantity(path, "quantity", name, self.named_quantities(lights))
+            of_noise = name in self.noise_quantities(lights)
+            if of_noise and self.section.search is not None:
+                self.add(path, f"the search does not know {name}", None, "a study without `search`")
             if known and name not in ("sensitivity", "cfa_sensitivity"):
-                wrong = "min" if name == "slope_per_nm" else "max"
+                small = name == "slope_per_nm" or (of_noise and not name.startswith((CNR, D_PRIME)))
+                wrong = "min" if small else "max"
                 if getattr(bound, wrong) is not None:
                     right = "max" if wrong == "min" else "min"
                     self.add((*path, wrong), f"{name} has no `{wrong}`", getattr(bound, wrong), f"`{right}`")

@@ -17,6 +17,7 @@ from ..schema import NonNegative, Positive, Section
 from ..sensor import Pixel
 from ..spectra import Outside, Resampling, WavelengthGrid
 
+_FEWEST_PATCHES = 10
 Name = Annotated[str, Field(min_length=1, max_length=100)]
 
 
@@ -163,6 +164,25 @@ class Production(Section):
     edge_shift_nm: NonNegative = 0.0
 
 
+class Recognition(Section):
+    """How often noise confuses signal types.
+
+    `states`: the signal types to tell apart; all of them where it is left out. `patches`: raw patches that are drawn
+    of every signal for each plain CFA, named design and answer of the search, half of them to train the classifiers;
+    0 draws none. `error_max`: a CFA is usable while no two states are confused more often.
+    """
+
+    states: Annotated[list[Name], Field(min_length=2)] | None = None
+    patches: int = Field(default=200, ge=0, le=100_000)
+    error_max: float = Field(default=1e-3, gt=0, lt=0.5)
+
+    @model_validator(mode="after")
+    def _enough(self) -> Recognition:
+        if 0 < self.patches < _FEWEST_PATCHES:
+            raise ValueError(f"patches: 0, or at least {_FEWEST_PATCHES}: {self.patches} are too few to train and test")
+        return self
+
+
 class Levels(Section):
     """Equidistant levels of sensitivity."""
 
@@ -250,6 +270,8 @@ def _numbers(where: str, axis: Any) -> tuple[float, ...]:
 def _set(mapping: dict[str, Any], path: list[str], number: float) -> None:
     """Put a number at a dotted path."""
     for key in path[:-1]:
+        if mapping.get(key) is True:  # switched on, with its defaults
+            mapping[key] = {}
         mapping = mapping.setdefault(key, {})
         if not isinstance(mapping, dict):
             raise ValueError(f"each: {key} is no mapping")
@@ -274,6 +296,7 @@ class StudySection(Section):
     sweeps: dict[Name, SweepSection] = {}
     boxes: dict[Name, BoxSection] = {}
     production: Production = Production()
+    recognition: Recognition | None = None
     objective: Objective = Objective(minimum={"csd_yellow_red": 1.0})
     constraints: dict[Name, Bound] = {}
     search: SearchSection | None = None

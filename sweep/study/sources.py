@@ -35,6 +35,10 @@ class Sources:
     digests: dict[str, str] = field(default_factory=dict)
     _read: dict[str, Curves | None] = field(default_factory=dict)
 
+    def unknown(self, path: tuple[Key, ...], what: str, value: str, known: list[str]) -> None:
+        """Add the fault of a name that is not among the known ones, with the nearest of them."""
+        self.add(path, f"unknown {what}", value, ", ".join(known), nearest(value, known))
+
     def sensor(self, section: SensorSection) -> SensorCurves | None:
         """The study's sensor, or None after adding faults."""
         if section.builtin is not None:

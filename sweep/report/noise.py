@@ -1,0 +1,97 @@
+"""What noise does to the states of a study: figures, the level up to which each design is usable, recognition."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+
+from ..arrays import FloatArray
+from ..discrimination import STATE_ERROR_BOUND
+from ..evaluate import STATE_ERROR
+from ..recognition import CLASSIFIERS, MOST_LIKELY
+from ..series import Line, SeriesFigure
+from .content import over_series, scenario_series
+from .outputs import Output
+
+_LEAST = 1e-12
+_RULE_NAMES = {MOST_LIKELY: "most likely signal", "nearest_centroid": "nearest centroid", "lda": "LDA"}
+
+
+def _allowed(output: Output) -> float | None:
+    """The largest error at which a design is usable; None in a study that does not ask."""
+    asked = output.study.get("recognition")
+    return None if asked is None else float(asked["error_max"])
+
+
+def noise_figures(output: Output) -> Iterator[SeriesFigure]:
+    """For each series of scenarios the pairwise error, and the accuracy of each classifier on raw patches."""
+    allowed = _allowed(output)
+    if allowed is None:
+        return
+    rows = output.kind("reference", "design", "search")
+    for (base, key), scenarios in scenario_series(output).items():
+        x = np.array(list(scenarios.values()))
+        title = f"{output.study['study']}: {base}"
+        errors = {n: Line(np.maximum(y, _LEAST), None) for n, y in over_series(rows, scenarios, STATE_ERROR).items()}
+        label = f"how often the worst pair of states is confused ({_LEAST:g}: or less)"
+        yield SeriesFigure(title, key, label, x, errors, "", log_y=True, level=allowed)
+        for rule in CLASSIFIERS if output.recognition is not None else ():
+            lines = {n: Line(y, None) for n, y in _accuracies(output, scenarios, rule).items()}
+            yield SeriesFigure(
+                title, key, f"accuracy of {_RULE_NAMES[rule]} on raw patches", x, lines, "", from_zero=False
+            )
+
+
+def _accuracies(output: Output, scenarios: dict[str, float], rule: str) -> dict[str, FloatArray]:
+    assert output.recognition is not None
+    return over_series(output.recognition, scenarios, f"{rule}_accuracy")
+
+
+def usable_lines(output: Output) -> Iterator[str]:
+    """For each series of scenarios, the numbers at which each design is usable."""
+    allowed = _allowed(output)
+    if allowed is None:
+        return
+    rows = output.kind("reference", "design", "search")
+    for (base, key), scenarios in scenario_series(output).items():
+        each = over_series(rows, scenarios, STATE_ERROR)
+        found = [f"{name} {_range(np.array(list(scenarios.values())), y <= allowed)}" for name, y in each.items()]
+        if found:
+            yield f"{base}: states are confused at most {allowed:g} of the time at {key} " + ", ".join(found) + "."
+
+
+def _range(x: FloatArray, usable: np.ndarray) -> str:
+    """Where among the numbers `x` (ascending) a design is usable, in words."""
+    if usable.all():
+        return "everywhere"
+    if not usable.any():
+        return "nowhere"
+    ends = np.flatnonzero(np.diff(usable))
+    if len(ends) == 1:
+        at = ends[0]
+        if usable[0]:
+            return f"up to {x[at]:g} (not at {x[at + 1]:g})"
+        return f"from {x[at + 1]:g} (not at {x[at]:g})"
+    return "at " + " ".join(f"{v:g}" for v in x[usable])
+
+
+def recognition_table(output: Output) -> pd.DataFrame:
+    """Errors in closed form and accuracies on drawn patches, a row per design and scenario."""
+    if _allowed(output) is None:
+        return pd.DataFrame()
+    rows = output.kind("reference", "design", "search")
+    dprime = [name for name in rows.columns if name.startswith("dprime_")]
+    shown = pd.DataFrame({"name": rows["name"].astype(str), "scenario": rows["scenario"].astype(str)})
+    shown["smallest d'"] = rows[dprime].min(axis=1).map("{:.2f}".format)
+    for column, label in ((STATE_ERROR, "pairwise error"), (STATE_ERROR_BOUND, "bound of the error")):
+        shown[label] = rows[column].map("{:.2g}".format)
+    drawn = output.recognition
+    if drawn is not None:
+        by_id = drawn.set_index("design_id").reindex(rows["design_id"])
+        for rule in (MOST_LIKELY, *CLASSIFIERS):
+            low, high = by_id[f"{rule}_accuracy_low"], by_id[f"{rule}_accuracy_high"]
+            values = zip(by_id[f"{rule}_accuracy"], low, high, strict=True)
+            shown[f"accuracy, {_RULE_NAMES[rule]}"] = [f"{v:.4f} ({a:.4f} to {b:.4f})" for v, a, b in values]
+    return shown
