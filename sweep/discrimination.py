@@ -74,7 +74,7 @@ def pairwise_error(mean: FloatArray, variance: FloatArray, first: IndexArray, se
         whole = _length(z)
         some = ~np.isinf(whole)
         z = np.where(some[..., None], z, 0.0)
-        spread = sum(_length(z * np.sqrt(share)) for share in shares)
+        spread = _length(z * np.sqrt(shares[0])) + _length(z * np.sqrt(shares[1]))
         apart = np.where(some, whole * _ratio(whole, spread), np.inf)
         found[block] = ndtr(-apart.min(axis=1))
     return found
