@@ -35,6 +35,7 @@ def skip_is_exact(setup: Setup) -> str | None:
 
 def variance_e(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     """Variance of the collected electrons: photon noise and PRNU."""
+    electrons = np.minimum(electrons, _MOST_E)
     return np.asarray(electrons + (pixel.prnu * electrons) ** 2, dtype=float)
 
 
