@@ -54,7 +54,7 @@ def overlap(a: Point, b: Point) -> mp.mpf:
         peak, width = (p * t + q * s) / (s + t), mp.sqrt(2 * s * t / (s + t))
         # In units of the peak, since the quadrature stops at an absolute error.
         top, ends = root(peak), [peak + k * width for k in (-24, -6, -2, 0, 2, 6, 24)]
-        whole *= top * mp.quad(lambda x, root=root, top=top: root(x) / top, ends)
+        whole *= top * mp.quad(lambda x, root=root, top=top: root(x) / top, ends, method="gauss-legendre")
     return whole
 
 
