@@ -96,7 +96,7 @@ def channel_sensitivity(qe: FloatArray, reference_qe: FloatArray) -> FloatArray:
 
     The paper's sensitivity of a modified channel N, with the channel that it replaces (Y) as the reference.
     """
-    return np.asarray(qe.sum(axis=-1) / reference_qe.sum(), dtype=float)
+    return np.asarray(qe.sum(axis=-1, dtype=float) / reference_qe.sum(dtype=float), dtype=float)
 
 
 def cfa_sensitivity(qe: FloatArray, counts: IndexArray, clear_qe: FloatArray) -> FloatArray:
@@ -105,5 +105,5 @@ def cfa_sensitivity(qe: FloatArray, counts: IndexArray, clear_qe: FloatArray) ->
     `qe`: ndarray[..., n_channels, n_wavelengths]; `counts`: pixels per tile of each channel. 1 means a sensor without
     color filters. Returns ndarray[...].
     """
-    mean = (qe.sum(axis=-1) * counts).sum(axis=-1) / counts.sum()
-    return np.asarray(mean / clear_qe.sum(), dtype=float)
+    mean = (qe.sum(axis=-1, dtype=float) * counts).sum(axis=-1) / counts.sum()
+    return np.asarray(mean / clear_qe.sum(dtype=float), dtype=float)
