@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from . import (
+    hard_cases_chain,  # noqa: F401
     hard_cases_confusion,  # noqa: F401
     hard_cases_curves,  # noqa: F401
     hard_cases_metrics,  # noqa: F401
