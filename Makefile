@@ -3,7 +3,7 @@
 # make test                  install and run the tests
 # make slow                  run the tests that take minutes
 # make check                 ruff, mypy --strict
-# make accuracy              measure what accuracy costs in time, results in outputs/accuracy
+# make accuracy              run the hard cases, measure what accuracy costs in time, report in outputs/accuracy
 # make bench                 measure speed, JSON in outputs/bench
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
   $$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
@@ -27,7 +27,8 @@ test: $(VENV)/.ready-dev
 slow: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest -m slow $(ARGS)
 
-accuracy: $(VENV)/.ready
+accuracy: $(VENV)/.ready-dev
+	$(BIN)/python -m pytest tests/test_hard_cases.py --hard-cases outputs/accuracy/hard_cases.json
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/sweep accuracy studies/accuracy.yaml $(ARGS)
 
 check: $(VENV)/.ready-dev

@@ -1,11 +1,11 @@
-"""What accuracy costs in time: a ladder of tolerances for every scene, promised and realized error, time and work."""
+"""What accuracy costs in time: tolerances and single settings, promised and realized error, time and work, a report."""
 
 from __future__ import annotations
 
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,31 +18,58 @@ from .effects import blur
 from .evaluate import evaluate
 from .figures import rendered
 from .imaging import Imager
+from .knobs import Regridded, Setting, knob_measurements
 from .metrics import CSD
 from .plan import Plan
-from .series import draw_work_precision
+from .report import AccuracyReport, make_accuracy_report, read_hard_cases
+from .series import draw_knobs, draw_work_precision
 from .setup import REFERENCE, Setup
 from .store import write_bytes, write_table
 from .study import Study
 
 TOLERANCES_DN = (100.0, 30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001)
 TABLE, FIGURE = "accuracy.parquet", "accuracy"
+KNOBS_TABLE, KNOBS_FIGURE = "knobs.parquet", "knobs"
+_KNOB_DESIGNS = 50
 _REPEATS = 3
 _SHORT_S = 3.0
 """A measurement shorter than this is repeated; the median counts."""
 Progress = Callable[[str, int, int], None]
 
 
-def accuracy(study: Study, output: Path, progress: Progress, most_designs: int = 200) -> list[str]:
-    """Measure the ladder for all scenarios, write table and figure into `output`, and say what was found.
+def accuracy(
+    study: Study, regridded: Regridded, output: Path, progress: Progress, most_designs: int = 200
+) -> list[str]:
+    """Measure the ladder for all scenarios, and every knob; write tables, figures and a report, and say what was found.
 
-    At most `most_designs` of each space are computed. Raises OutputError when the folder cannot be written.
+    At most `most_designs` of each space are computed; `regridded` gives the study with another wavelength step. A
+    table of hard cases that lies in `output` goes into the report. Raises OutputError when the folder cannot be
+    written.
     """
+    hard = read_hard_cases(output)
     table = pd.DataFrame(_ladder(study, progress, most_designs))
-    write_table(pa.Table.from_pandas(table, preserve_index=False), output / TABLE)
-    for kind in ("png", "svg"):
-        write_bytes(rendered(draw_work_precision(table, study.name), kind), output / f"{FIGURE}.{kind}")
-    return [*_lines(table), f"Files: {output}/: {TABLE}, {FIGURE}.png, {FIGURE}.svg."]
+    settings: list[Setting] = []
+    measurements = knob_measurements(study, regridded, min(most_designs, _KNOB_DESIGNS))
+    for done, measure in enumerate(measurements):
+        settings += measure()
+        progress("knobs", done + 1, len(measurements))
+    knobs = pd.DataFrame([asdict(setting) for setting in settings])
+    figures = {}
+    for name, file, rows, figure in (
+        (TABLE, FIGURE, table, draw_work_precision(table, study.name)),
+        (KNOBS_TABLE, KNOBS_FIGURE, knobs, draw_knobs(knobs, study.name)),
+    ):
+        write_table(pa.Table.from_pandas(rows, preserve_index=False), output / name)
+        figures[file] = {kind: rendered(figure, kind) for kind in ("png", "svg")}
+        for kind, content in figures[file].items():
+            write_bytes(content, output / f"{file}.{kind}")
+    lines = _lines(table)
+    if hard is not None:
+        passed = int((hard["error"] <= hard["allowed"]).sum())
+        lines.append(f"{passed} of {len(hard)} hard cases are within their allowed error.")
+    images = {name: files["png"] for name, files in figures.items()}
+    make_accuracy_report(output, AccuracyReport(study.name, study.section.question, lines, images, table, knobs, hard))
+    return [*lines, f"Files: {output}/: report.html, {TABLE}, {FIGURE}.png, {KNOBS_TABLE}, {KNOBS_FIGURE}.png."]
 
 
 def _ladder(study: Study, progress: Progress, most_designs: int) -> Iterator[dict[str, Any]]:

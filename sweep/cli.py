@@ -104,14 +104,15 @@ def accuracy(
     data: DataFolder = None,
     output: Annotated[Path, typer.Option(help="Folder for the results of all studies.")] = Path("outputs"),
 ) -> None:
-    """Measure what accuracy costs: tolerances from 100 to 0.001 DN, promised and realized error, time and work."""
+    """Measure what accuracy costs: tolerances from 100 to 0.001 DN and single settings, with error, time and work."""
     from .accuracy import accuracy as measure
     from .progress import ProgressDisplay
     from .study import folder_name, load_study
 
     loaded = load_study(study, data)
     with ProgressDisplay() as display:
-        lines = measure(loaded, output / folder_name(loaded.name), display.update)
+        folder = output / folder_name(loaded.name)
+        lines = measure(loaded, lambda step_nm: load_study(study, data, step_nm), folder, display.update)
     for line in lines:
         typer.echo(line)
 

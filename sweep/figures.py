@@ -244,6 +244,15 @@ def canvas(width_in: float, height_in: float) -> tuple[Figure, Axes]:
     return figure, axes
 
 
+def canvas_grid(rows: int, columns: int, width_in: float, height_in: float) -> tuple[Figure, list[Axes]]:
+    """An empty figure with a grid of axes, row by row, sizes in inches."""
+    figure = _figure(width_in, height_in)
+    panels = [figure.add_subplot(rows, columns, at + 1) for at in range(rows * columns)]
+    for axes in panels:
+        _decorate(axes)
+    return figure, panels
+
+
 def _figure(width_in: float, height_in: float) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415  (slow to import)
     from matplotlib.figure import Figure  # noqa: PLC0415

@@ -15,6 +15,7 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import DTypeLike
 from scipy.interpolate import CubicSpline
 
 from .arrays import FloatArray
@@ -46,7 +47,8 @@ _MOST_E = 1e30
 class Imager:
     """A scene with its kernel made, ready for designs. `work` counts what is computed, by effect."""
 
-    def __init__(self, setup: Setup, work: Counter[str] | None = None) -> None:
+    def __init__(self, setup: Setup, work: Counter[str] | None = None, dtype: DTypeLike = np.float64) -> None:
+        """`dtype`: of the product of curves and scene, where the scene's table is small enough to be kept."""
         self.setup = setup
         self.work: Counter[str] = Counter() if work is None else work
         methods, grid = setup.methods, setup.grid
@@ -69,7 +71,7 @@ class Imager:
         self._touched = np.flatnonzero((kernel.light[:, :, modified] != 0).any(axis=(0, 2, 3)))
         self._modified = kernel.light[:, self._touched][:, :, modified]
         size = self._modified[..., 0].size * len(self.signals) * self._nodes.size
-        self._kept = self._table() if 0 < size <= _KEPT else None
+        self._kept = self._table().astype(dtype) if 0 < size <= _KEPT else None
 
     def _looked_at(self, qe: FloatArray) -> FloatArray:
         """QE as the quadrature sees it: itself, or linear between its nodes."""
@@ -104,7 +106,7 @@ class Imager:
         if self._kept is None:
             part = self._products(self._modified, curves)
         else:
-            qe = curves[:, :, self._nodes].reshape(len(curves), -1)
+            qe = curves[:, :, self._nodes].reshape(len(curves), -1).astype(self._kept.dtype)
             self.work["response"] += len(curves) * self._kept.size
             part = (qe @ self._kept).reshape(len(curves), *self._fixed.shape[:2], self._touched.size)
         found[..., self._touched] += part

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from .arrays import FloatArray
-from .figures import CURVE_CYCLE, canvas
+from .figures import CURVE_CYCLE, canvas, canvas_grid
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -93,4 +93,31 @@ def draw_work_precision(table: pd.DataFrame, name: str) -> Figure:
     axes.set_ylabel("error of a CSD / DN (full: realized, dashed: promised)")
     axes.set_title(f"{name}: what accuracy costs")
     axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0, frameon=False)
+    return figure
+
+
+def draw_knobs(table: pd.DataFrame, name: str) -> Figure:
+    """A panel per knob: the error of each of its settings against its time, named at the points.
+
+    `table`: columns knob, scenario, setting, error_dn, seconds, oracle. Errors below 1e-6 DN are drawn there.
+    """
+    knobs = list(table.groupby("knob", sort=False))
+    figure, panels = canvas_grid(2, 3, 12.0, 7.0)
+    for axes, (knob, rows) in zip(panels, knobs, strict=False):
+        axes.plot(rows["seconds"], rows["error_dn"].clip(lower=_LEAST_DN), "o", color=CURVE_CYCLE[0], markersize=4)
+        for row in rows.to_dict("records"):
+            at = (row["seconds"], max(row["error_dn"], _LEAST_DN))
+            axes.annotate(row["setting"], at, xytext=(4, 3), textcoords="offset points", fontsize=7)
+        if rows["seconds"].max() / rows["seconds"].min() > _WIDE:
+            axes.set_xscale("log")
+        else:
+            axes.set_xlim(0, 1.25 * rows["seconds"].max())
+        axes.set_yscale("log")
+        axes.margins(x=0.25, y=0.15)
+        axes.set_title(f"{knob} ({rows['scenario'].iloc[0]})", fontsize=9)
+        axes.set_xlabel("time / s", fontsize=8)
+        axes.set_ylabel(f"error / DN (against {rows['oracle'].iloc[0]})", fontsize=8)
+    for axes in panels[len(knobs) :]:
+        axes.set_visible(False)
+    figure.suptitle(f"{name}: what single settings cost")
     return figure

@@ -28,7 +28,8 @@ LEVELS = [
     {"study"},
     {"runner"},
     {"report", "calibration"},
-    {"audit", "accuracy"},
+    {"audit", "knobs"},
+    {"accuracy"},
     {"cli"},
     {"__main__"},
 ]

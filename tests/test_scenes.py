@@ -104,7 +104,13 @@ def test_an_audit_of_nothing_finds_nothing_broken() -> None:
 def test_accuracy_measures_a_ladder_of_tolerances(tmp_path: Path) -> None:
     path = tmp_path / "scenes.yaml"
     path.write_text(SCENES)
-    lines = accuracy(load_study(path), tmp_path / "out", lambda *_: None, most_designs=4)
+    lines = accuracy(
+        load_study(path),
+        lambda step_nm: load_study(path, None, step_nm),
+        tmp_path / "out",
+        lambda *_: None,
+        most_designs=4,
+    )
     table = pd.read_parquet(tmp_path / "out" / "accuracy.parquet")
     assert len(table) == 2 * len(TOLERANCES_DN)
     assert (table["promised_dn"] <= table["tolerance_dn"]).all()

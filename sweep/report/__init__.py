@@ -1,7 +1,16 @@
-"""What a person sees of a finished run: summary lines, figures, the HTML report."""
+"""What a person sees of a finished run: summary lines, figures, the HTML reports."""
 
+from .accuracy import AccuracyReport, make_accuracy_report, read_hard_cases
 from .make import make_report
 from .outputs import Output, read_output
 from .summary import summary_lines
 
-__all__ = ["Output", "make_report", "read_output", "summary_lines"]
+__all__ = [
+    "AccuracyReport",
+    "Output",
+    "make_accuracy_report",
+    "make_report",
+    "read_hard_cases",
+    "read_output",
+    "summary_lines",
+]

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import base64
-import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-import pandas as pd
 import pyarrow as pa
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ..figures import draw_chart, draw_clouds, draw_curves, draw_pareto, rendered
 from ..objectives import Objective
@@ -19,6 +15,7 @@ from . import content
 from .comparison import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
 from .noise import noise_figures, recognition_table
 from .outputs import Output
+from .pages import inlined, page, rows
 from .summary import answer_sentences, summary_lines
 
 if TYPE_CHECKING:
@@ -39,28 +36,28 @@ def make_report(output: Output) -> None:
         folder = output.folder if name.startswith("pareto") else output.folder / FIGURES
         for kind, content_bytes in files.items():
             write_bytes(content_bytes, folder / f"{name}.{kind}")
-        images.append((caption, "data:image/png;base64," + base64.b64encode(files["png"]).decode("ascii")))
+        images.append((caption, inlined(files["png"])))
     published = comparison_with_published(output)
     if len(published):
         write_text(published.to_csv(index=False), output.folder / PUBLISHED_CSV)
         write_table(pa.Table.from_pandas(published, preserve_index=False), output.folder / PUBLISHED_PARQUET)
-    template = _environment().get_template("report.html.j2")
-    page = template.render(
+    content_html = page(
+        "report.html.j2",
         study=output.study,
         objective=str(Objective.model_validate(output.study["objective"])),
         answer=answer_sentences(output),
         images=images,
-        comparison=_rows(content.comparison_table(output)),
-        best=_rows(content.best_table(output)),
-        recognition=_rows(recognition_table(output)),
-        geometry=_rows(content.geometry_table(output)),
-        published=_rows(published),
-        plans=_rows(content.plan_table(output)),
+        comparison=rows(content.comparison_table(output)),
+        best=rows(content.best_table(output)),
+        recognition=rows(recognition_table(output)),
+        geometry=rows(content.geometry_table(output)),
+        published=rows(published),
+        plans=rows(content.plan_table(output)),
         constraints={name: str(bound) for name, bound in output.constraints.items()},
         summary=summary_lines(output),
         provenance=output.provenance,
     )
-    write_text(page, output.folder / REPORT)
+    write_text(content_html, output.folder / REPORT)
 
 
 def _drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
@@ -81,31 +78,6 @@ def _drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
         ("clouds-cfas", "Signals in the channels of the plain CFAs", ("reference",)),
         ("clouds-designs", "Signals in the channels of the named and the found designs", ("design", "search")),
     ):
-        rows = content.clouds(output, *kinds)
-        if rows:
-            yield name, caption, draw_clouds(rows, caption, max(1.0, 1.05 * float(output.points["dn"].max())))
-
-
-def _rows(table: pd.DataFrame) -> list[list[str]]:
-    """Header and cells as text; what does not exist is a dash."""
-    if table.empty:
-        return []
-    body = [[_cell(value) for value in row] for row in table.itertuples(index=False)]
-    return [[str(name) for name in table.columns], *body]
-
-
-def _cell(value: object) -> str:
-    if value is None or (isinstance(value, float) and math.isnan(value)):
-        return "-"
-    return (
-        ("yes" if value else "no")
-        if isinstance(value, bool)
-        else f"{value:g}"
-        if isinstance(value, float)
-        else str(value)
-    )
-
-
-def _environment() -> Environment:
-    loader = PackageLoader("sweep", "templates")
-    return Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+        found = content.clouds(output, *kinds)
+        if found:
+            yield name, caption, draw_clouds(found, caption, max(1.0, 1.05 * float(output.points["dn"].max())))

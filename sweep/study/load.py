@@ -7,6 +7,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from ..errors import StudyError
+from ..spectra import WavelengthGrid
 from .lines import Document
 from .model import Study
 from .resolve import resolve
@@ -15,17 +16,23 @@ from .schema import StudySection
 _ALLOWED = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.")
 
 
-def load_study(path: Path, data: Path | None = None) -> Study:
+def load_study(path: Path, data: Path | None = None, step_nm: float | None = None) -> Study:
     """Read and check a study file.
 
-    Files that it names are looked for in `data`, when given, and then beside the study. Raises StudyError with one
-    fault per thing wrong: file:line, key, value, what is allowed, nearest name.
+    Files that it names are looked for in `data`, when given, and then beside the study. `step_nm` replaces the step of
+    its wavelength grid. Raises StudyError with one fault per thing wrong: file:line, key, value, what is allowed,
+    nearest name.
     """
     document = Document(path)
     try:
         section = StudySection.model_validate(document.data)
     except ValidationError as error:
         raise StudyError(document.faults(error, StudySection)) from None
+    if step_nm is not None:
+        grid = section.wavelengths
+        section = section.model_copy(
+            update={"wavelengths": WavelengthGrid(start_nm=grid.start_nm, stop_nm=grid.stop_nm, step_nm=step_nm)}
+        )
     if data is not None and not data.is_dir():
         raise StudyError(f"--data {data}: no such folder")
     return resolve(document, section, [*([data] if data is not None else []), path.parent])

@@ -1,0 +1,40 @@
+"""HTML pages from templates: one self-contained file each."""
+
+from __future__ import annotations
+
+import base64
+import math
+from typing import Any
+
+import pandas as pd
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+
+def page(template: str, **values: Any) -> str:
+    """A template filled in; every value is escaped."""
+    loader = PackageLoader("sweep", "templates")
+    templates = Environment(
+        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    return templates.get_template(template).render(**values)
+
+
+def inlined(png: bytes) -> str:
+    """A picture as the page itself carries it."""
+    return "data:image/png;base64," + base64.b64encode(png).decode("ascii")
+
+
+def rows(table: pd.DataFrame) -> list[list[str]]:
+    """Header and cells as text; what does not exist is a dash."""
+    if table.empty:
+        return []
+    body = [[_cell(value) for value in row] for row in table.itertuples(index=False)]
+    return [[str(name) for name in table.columns], *body]
+
+
+def _cell(value: object) -> str:
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:g}" if isinstance(value, float) else str(value)
