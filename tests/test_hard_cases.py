@@ -16,6 +16,7 @@ from . import (
     hard_cases_noise,  # noqa: F401
     hard_cases_optics,  # noqa: F401
     hard_cases_search,  # noqa: F401
+    hard_cases_simulation,  # noqa: F401
 )
 from .hard_cases import CASES, HardCase, Result, hard_case, worst, write_table
 
