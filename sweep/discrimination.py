@@ -37,10 +37,10 @@ def contrast_to_noise(mean: FloatArray, variance: FloatArray, first: IndexArray,
     """
     found = np.empty(len(mean))
     for block, difference, ours, theirs in _pairs(mean, variance, first, second):
-        distance = np.hypot.reduce(difference, axis=-1)
+        distance = _length(difference)
         nearest = distance == distance.min(axis=1, keepdims=True)
         along = np.divide(difference, distance[..., None], out=np.zeros_like(difference), where=distance[..., None] > 0)
-        floor = np.hypot.reduce(along * np.sqrt((ours + theirs) / 2), axis=-1)
+        floor = _length(along * np.sqrt((ours + theirs) / 2))
         floor = np.where(nearest, floor, -1.0).max(axis=1)
         contrast = distance.min(axis=1)
         found[block] = _ratio(contrast, floor)
@@ -55,7 +55,7 @@ def detectability(mean: FloatArray, variance: FloatArray, first: IndexArray, sec
     found = np.empty(len(mean))
     for block, difference, ours, theirs in _pairs(mean, variance, first, second):
         z = _ratio(difference, np.sqrt((ours + theirs) / 2))
-        found[block] = np.hypot.reduce(z, axis=-1).min(axis=1)
+        found[block] = _length(z).min(axis=1)
     return found
 
 
@@ -70,11 +70,11 @@ def pairwise_error(mean: FloatArray, variance: FloatArray, first: IndexArray, se
     for block, difference, ours, theirs in _pairs(mean, variance, first, second):
         total = ours + theirs
         z = _ratio(difference, np.sqrt(total))
-        share = np.divide(ours, total, out=np.full_like(total, 0.5), where=total > 0)
-        whole = np.hypot.reduce(z, axis=-1)
-        some = np.isfinite(whole)
+        shares = [np.divide(v, total, out=np.full_like(total, 0.5), where=total > 0) for v in (ours, theirs)]
+        whole = _length(z)
+        some = ~np.isinf(whole)
         z = np.where(some[..., None], z, 0.0)
-        spread = np.hypot.reduce(z * np.sqrt(share), axis=-1) + np.hypot.reduce(z * np.sqrt(1 - share), axis=-1)
+        spread = _length(z * np.sqrt(shares[0])) + _length(z * np.sqrt(shares[1]))
         apart = np.where(some, whole * _ratio(whole, spread), np.inf)
         found[block] = ndtr(-apart.min(axis=1))
     return found
@@ -111,18 +111,22 @@ def _distance(difference: FloatArray, ours: FloatArray, theirs: FloatArray) -> F
     """
     z = _ratio(difference, np.sqrt(ours + theirs))
     both = (ours > 0) & (theirs > 0)
-    small, large = np.minimum(ours, theirs), np.maximum(ours, theirs)
-    ratio = np.sqrt(np.divide(small, large, out=np.ones_like(small), where=both))
+    small, large = np.sqrt(np.minimum(ours, theirs)), np.sqrt(np.maximum(ours, theirs))
+    ratio = np.divide(small, large, out=np.ones_like(small), where=both)
     # (Sa + Sb) / (2 sqrt(Sa Sb)) - 1 = (1 - r)^2 / (2 r) for r = sqrt(small / large): no digits are lost near 1.
     with np.errstate(over="ignore"):
         return np.asarray((z**2 / 4 + np.log1p((1 - ratio) ** 2 / (2 * ratio)) / 2).sum(axis=-1), dtype=float)
 
 
 def _ratio(over: FloatArray, under: FloatArray) -> FloatArray:
-    """Ratio of non-negative numbers; 0 / 0 is 0, and anything else over 0 is infinite."""
-    with np.errstate(over="ignore"):
-        infinite = np.where(over > 0, np.inf, 0.0)
-        return np.divide(over, under, out=infinite, where=under > 0)
+    """Ratio of non-negative numbers; 0 / 0 is 0, anything else over 0 is infinite, and NaN stays NaN."""
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        return np.where((over == 0) & (under == 0), 0.0, over / under)
+
+
+def _length(vectors: FloatArray) -> FloatArray:
+    """L2 norm over the last axis without squares; NaN where any component is (to `hypot` an infinite one is enough)."""
+    return np.where(np.isnan(vectors).any(axis=-1), np.nan, np.hypot.reduce(vectors, axis=-1))
 
 
 def _pairs(

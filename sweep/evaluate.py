@@ -81,14 +81,15 @@ def designed_quantities(setup: Setup, curves: FloatArray) -> dict[str, FloatArra
     modified channel's QE. `min_transmission`: the smallest ratio of a modified channel to the curve it replaces.
     Without a modified channel all but `cfa_sensitivity` are NaN.
     """
+    curves, base_qe = np.asarray(curves, dtype=float), np.asarray(setup.base_qe, dtype=float)
     none = np.full(len(curves), np.nan)
     qe = all_channels(setup, curves)
     found = dict.fromkeys(DESIGNED, none)
     found["cfa_sensitivity"] = cfa_sensitivity(qe, setup.mosaic.counts, setup.clear_qe)
     if setup.modified:
-        found["sensitivity"] = channel_sensitivity(curves.sum(axis=1), setup.base_qe.sum(axis=0))
+        found["sensitivity"] = channel_sensitivity(curves.sum(axis=1), base_qe.sum(axis=0))
         found["slope_per_nm"] = np.abs(np.diff(curves, axis=-1)).max(axis=(1, 2)) / setup.grid.step_nm
-        ratio = np.divide(curves, setup.base_qe, out=np.ones_like(curves), where=setup.base_qe > 0)
+        ratio = np.divide(curves, base_qe, out=np.ones_like(curves), where=base_qe > 0)
         found["min_transmission"] = ratio.min(axis=(1, 2))
     return found
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -35,29 +35,41 @@ def separation(response: FloatArray, first: IndexArray, second: IndexArray) -> F
     Returns ndarray[n_designs], DN: the smallest L2 distance between a point of one and a point of the other (the
     paper's CSD). Differences are taken before squares, so nearly coincident points at large offsets lose no digits.
     """
-    n_designs, _, n_channels = response.shape
-    found = np.empty(n_designs)
-    step = max(1, _BLOCK_PAIRS // max(1, len(first) * len(second)))
-    for start in range(0, n_designs, step):
-        block = response[start : start + step]
-        squared = np.zeros((len(block), len(first), len(second)), dtype=response.dtype)
-        with np.errstate(over="ignore"):
-            for channel in range(n_channels):
-                values = block[:, :, channel]
-                difference = values[:, first, None] - values[:, None, second]
-                squared += difference * difference
-        found[start : start + step] = np.sqrt(squared.min(axis=(1, 2)))
+    response = np.asarray(response, dtype=float)
+    found = np.sqrt(_nearest(response, first, second, _add_square))
     doubtful = np.flatnonzero((found < _SMALLEST) | (found > 1 / _SMALLEST))
-    found[doubtful] = _unscaled_separation(response[doubtful], first, second)
+    found[doubtful] = _nearest(response[doubtful], first, second, _add_leg)
     return found
 
 
-def _unscaled_separation(response: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
-    """`separation` where squares would be too small or too large for a float."""
-    found = np.empty(len(response))
-    for block, one, other in pair_blocks(response.shape, first, second):
-        apart = np.hypot.reduce(response[block][:, one] - response[block][:, other], axis=-1)
-        found[block] = apart.min(axis=1)
+def _add_square(total: FloatArray, difference: FloatArray) -> None:
+    np.multiply(difference, difference, out=difference)
+    np.add(total, difference, out=total)
+
+
+def _add_leg(total: FloatArray, difference: FloatArray) -> None:
+    """For lengths whose squares would be too small or too large for a float."""
+    np.hypot(total, difference, out=total)
+
+
+def _nearest(
+    response: FloatArray, first: IndexArray, second: IndexArray, add: Callable[[FloatArray, FloatArray], None]
+) -> FloatArray:
+    """Smallest over all pairs of what `add` collects over the channels' differences, in blocks of designs and pairs."""
+    n_designs, _, n_channels = response.shape
+    found = np.full(n_designs, np.inf)
+    most = max(1, _BLOCK_PAIRS // max(1, len(second)))
+    for at in range(0, len(first), most):
+        some = first[at : at + most]
+        step = max(1, _BLOCK_PAIRS // max(1, len(some) * len(second)))
+        for start in range(0, n_designs, step):
+            block = response[start : start + step]
+            total = np.zeros((len(block), len(some), len(second)))
+            with np.errstate(over="ignore"):
+                for channel in range(n_channels):
+                    values = block[:, :, channel]
+                    add(total, values[:, some, None] - values[:, None, second])
+            found[start : start + step] = np.minimum(found[start : start + step], total.min(axis=(1, 2)))
     return found
 
 
@@ -84,7 +96,7 @@ def channel_sensitivity(qe: FloatArray, reference_qe: FloatArray) -> FloatArray:
 
     The paper's sensitivity of a modified channel N, with the channel that it replaces (Y) as the reference.
     """
-    return np.asarray(qe.sum(axis=-1) / reference_qe.sum(), dtype=float)
+    return np.asarray(qe.sum(axis=-1, dtype=float) / reference_qe.sum(dtype=float), dtype=float)
 
 
 def cfa_sensitivity(qe: FloatArray, counts: IndexArray, clear_qe: FloatArray) -> FloatArray:
@@ -93,5 +105,5 @@ def cfa_sensitivity(qe: FloatArray, counts: IndexArray, clear_qe: FloatArray) ->
     `qe`: ndarray[..., n_channels, n_wavelengths]; `counts`: pixels per tile of each channel. 1 means a sensor without
     color filters. Returns ndarray[...].
     """
-    mean = (qe.sum(axis=-1) * counts).sum(axis=-1) / counts.sum()
-    return np.asarray(mean / clear_qe.sum(), dtype=float)
+    mean = (qe.sum(axis=-1, dtype=float) * counts).sum(axis=-1) / counts.sum()
+    return np.asarray(mean / clear_qe.sum(dtype=float), dtype=float)

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
+
+from .hard_cases import write_table
 
 ROOT = Path(__file__).parent.parent
 STUDIES = ROOT / "studies"
@@ -17,6 +20,25 @@ needs_measured = pytest.mark.skipif(
 needs_reference = pytest.mark.skipif(
     not (SHARED / "reference").is_dir(), reason="the ISETCam run (../shared/reference) is not on this machine"
 )
+
+
+ROWS = pytest.StashKey[list[dict[str, Any]]]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--hard-cases", metavar="PATH", help="write a table of the hard cases that ran to PATH, as JSON")
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    path, rows = session.config.getoption("--hard-cases"), session.config.stash.get(ROWS, [])
+    if path and rows:
+        write_table(Path(path), rows)
+
+
+@pytest.fixture
+def hard_case_rows(request: pytest.FixtureRequest) -> list[dict[str, Any]]:
+    """Rows of the table of hard cases, one for each that ran in this session."""
+    return request.config.stash.setdefault(ROWS, [])
 
 
 @pytest.fixture

@@ -86,7 +86,7 @@ def transfer(nu_per_um: FloatArray, wavelength_um: FloatArray, f_number: float, 
     s = np.minimum(nu_per_um[:, None] * wavelength_um * f_number, 1.0)
     angle = np.arccos(s)
     if w20_um == 0:
-        return np.asarray((2 / math.pi) * (angle - s * np.sqrt(1 - s**2)), dtype=float)
+        return np.asarray((2 / math.pi) * (angle - s * np.sqrt((1 - s) * (1 + s))), dtype=float)
     phase = 8 * math.pi * w20_um * f_number * nu_per_um
     panels = 1 + int(phase.max(initial=0.0) / _PANEL_NODES)
     nodes, weights = np.polynomial.legendre.leggauss(_PANEL_NODES)

@@ -20,6 +20,8 @@ from ..setup import Setup
 METHODS = ("skip", "expected")
 _NODES = 48
 _TAILS = 9.0
+_ROUNDED = 7.0
+"""Read noise rounds a corner this many of its standard deviations to either side."""
 _MOST_E = 1e100
 """More electrons than this are as many as this."""
 _MOST_POISSON_E = 1e18
@@ -33,6 +35,7 @@ def skip_is_exact(setup: Setup) -> str | None:
 
 def variance_e(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     """Variance of the collected electrons: photon noise and PRNU."""
+    electrons = np.minimum(electrons, _MOST_E)
     return np.asarray(electrons + (pixel.prnu * electrons) ** 2, dtype=float)
 
 
@@ -84,16 +87,17 @@ def moments_dn(electrons: FloatArray, pixel: Pixel) -> tuple[FloatArray, FloatAr
         second[...] += weight * (variance + (mean - center) ** 2)
 
     some = sigma > 0
-    full = np.divide(pixel.well_e - electrons, sigma, out=np.full_like(sigma, _TAILS), where=some)
+    full = np.divide(pixel.well_e - electrons, sigma, out=np.full_like(sigma, np.inf), where=some)
     end = np.clip(full, -_TAILS, _TAILS)
-    # Where the read noise is small, the ADC's ends are corners: integrate between them.
-    corners = [np.full_like(end, -_TAILS)]
+    # The ADC's ends are corners that the read noise rounds: integrate between them and over each.
+    corners = [np.full_like(end, -_TAILS), end]
     for at_dn in (0.0, top):
-        at = np.divide((at_dn - offset) / gain - electrons, sigma, out=np.full_like(sigma, -_TAILS), where=some)
-        corners.append(np.clip(at, -_TAILS, end))
-    corners.append(end)
+        for read_e in (-_ROUNDED * pixel.read_noise_e, _ROUNDED * pixel.read_noise_e):
+            at_e = (at_dn - offset) / gain + read_e - electrons
+            at = np.divide(at_e, sigma, out=np.full_like(sigma, -_TAILS), where=some)
+            corners.append(np.clip(at, -_TAILS, end))
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
-    for left, right in pairwise(corners):
+    for left, right in pairwise(np.sort(corners, axis=0)):
         for node, weight in zip((nodes + 1) / 2, weights / 2, strict=True):
             z = left + node * (right - left)
             add(weight * (right - left) * _density(z), np.minimum(electrons + z * sigma, pixel.well_e))

@@ -32,11 +32,11 @@ def _area(x: FloatArray, y: FloatArray, radius: float) -> FloatArray:
     """Signed area of the disc over the rectangle from 0 to (x, y), odd in both."""
     sign = np.sign(x) * np.sign(y)
     x, y = np.minimum(np.abs(x), radius), np.minimum(np.abs(y), radius)
-    corner = np.sqrt(radius**2 - y**2)  # from here on the circle is lower than y
+    corner = np.sqrt((radius - y) * (radius + y))  # from here on the circle is lower than y
 
     def under(t: FloatArray) -> FloatArray:
-        share = np.clip(t / radius, 0.0, 1.0)
-        return np.asarray(0.5 * (t * np.sqrt(np.maximum(radius**2 - t**2, 0.0)) + radius**2 * np.arcsin(share)))
+        height = np.sqrt((radius - t) * (radius + t))
+        return np.asarray(0.5 * (t * height + radius**2 * np.arctan2(t, height)), dtype=float)
 
     return np.asarray(sign * np.where(x <= corner, x * y, corner * y + under(x) - under(corner)), dtype=float)
 

@@ -1,0 +1,92 @@
+"""Numerically hard cases: what each measures, what it is compared with, and which error that allows.
+
+A case returns its error and the largest error that its derivation allows. The oracle shares no code with the package.
+Where the outcome is yes or no (refused, exactly zero, raised) the error is 0 or infinite, and nothing is allowed.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mpmath as mp
+
+EPS = 2.0**-52
+"""Spacing of float64 at 1; one rounding errs by half of it, relative."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a case measured, and the largest error that is allowed."""
+
+    error: float
+    allowed: float
+
+    @property
+    def good(self) -> bool:
+        """Whether the error is within what is allowed; NaN is not."""
+        return self.error <= self.allowed
+
+
+@dataclass(frozen=True)
+class HardCase:
+    """A case: its name, what it is compared with, and how the allowed error is derived."""
+
+    name: str
+    oracle: str
+    why: str
+    run: Callable[[], Result]
+
+
+CASES: list[HardCase] = []
+
+
+def hard_case(name: str, *, oracle: str, why: str) -> Callable[[Callable[[], Result]], Callable[[], Result]]:
+    """Register a function as a case; it runs with 50 digits in mpmath."""
+
+    def register(run: Callable[[], Result]) -> Callable[[], Result]:
+        CASES.append(HardCase(name, oracle, why, mp.workdps(50)(run)))
+        return run
+
+    return register
+
+
+def relative(found: float, exact: Any) -> float:
+    """Relative error; 0 only where both are 0."""
+    if exact == 0:
+        return 0.0 if found == 0 else math.inf
+    return float(abs((type(exact)(found) - exact) / exact)) if math.isfinite(found) else math.inf
+
+
+def outcome(good: bool) -> Result:
+    """The result of a case whose outcome is yes or no."""
+    return Result(0.0 if good else math.inf, 0.0)
+
+
+def worst(results: Iterable[tuple[float, float]]) -> Result:
+    """Of several (error, allowed) the one that comes nearest to failing, or fails most."""
+    pairs = [Result(float(error), float(allowed)) for error, allowed in results]
+    failed = [result for result in pairs if not result.good]
+    return max(failed or pairs, key=lambda r: r.error / r.allowed if r.allowed else r.error)
+
+
+def refused(call: Callable[[], Any], error: type[Exception], *words: str) -> bool:
+    """Whether a call raises `error` with all the words in its text."""
+    try:
+        call()
+    except error as raised:
+        return all(word in str(raised) for word in words)
+    return False
+
+
+def write_table(path: Path, rows: list[dict[str, Any]]) -> None:
+    """Write the table of all cases that ran as JSON; a reader sees the old file or the whole new one."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    hidden = path.with_name(f".tmp-{os.getpid()}-{path.name}")
+    hidden.write_text(json.dumps(rows, indent=1) + "\n")
+    hidden.replace(path)
