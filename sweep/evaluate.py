@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import FloatArray, IndexArray
+from .blocks import Block, Curves
 from .datasets.lights import Lights
 from .discrimination import (
     STATE_ERROR_BOUND,
@@ -19,7 +20,7 @@ from .discrimination import (
     state_error_bound,
 )
 from .imaging import Imager, smooth_imager
-from .metrics import Pair, cfa_sensitivity, channel_sensitivity, class_pairs, csd_name, separation, separations
+from .metrics import Pair, cfa_sensitivity, class_pairs, csd_name, separation, separations, separations_along
 from .setup import Setup
 
 DESIGNED = ("sensitivity", "cfa_sensitivity", "slope_per_nm", "min_transmission")
@@ -50,18 +51,11 @@ def shiftable(lights: Lights) -> tuple[str, ...]:
     return (*distances, "sensitivity", "cfa_sensitivity")
 
 
-def all_channels(setup: Setup, curves: FloatArray) -> FloatArray:
-    """Put the modified channels among the fixed ones.
-
-    `curves`: ndarray[n_designs, n_modified, n_wavelengths]. Returns ndarray[n_designs, n_channels, n_wavelengths].
-    """
-    qe = np.repeat(setup.qe[None], len(curves), axis=0)
-    qe[:, list(setup.modified)] = curves
-    return qe
-
-
 def smooth_response(setup: Setup, curves: FloatArray) -> FloatArray:
-    """Unquantized, unclipped response, DN: ndarray[n_designs, n_cases, n_signals, n_channels]; `curves` as above."""
+    """Unquantized, unclipped response, DN: ndarray[n_designs, n_cases, n_signals, n_channels].
+
+    `curves`: ndarray[n_designs, n_modified, n_wavelengths].
+    """
     return smooth_imager(setup).smooth(curves)
 
 
@@ -74,23 +68,32 @@ def smooth_csd(setup: Setup, curves: FloatArray, pair: Pair) -> FloatArray:
 
 
 def designed_quantities(setup: Setup, curves: FloatArray) -> dict[str, FloatArray]:
-    """What a design gives without any light, each ndarray[n_designs]; `curves` as in `all_channels`.
+    """`block_quantities` of any filters; `curves`: ndarray[n_designs, n_modified, n_wavelengths]."""
+    return block_quantities(setup, Curves(np.asarray(curves, dtype=float)))
 
-    `sensitivity`: total QE of the modified channels over that of the curves they replace; of several modified channels
-    it is that of their sum. `cfa_sensitivity`: see `metrics.cfa_sensitivity`. `slope_per_nm`: the steepest slope of a
+
+def block_quantities(setup: Setup, block: Block) -> dict[str, FloatArray]:
+    """What a design gives without any light, each ndarray[n_designs].
+
+    `sensitivity`: total QE of the modified channels over that of the curves they replace (the paper's sensitivity of N,
+    with Y as the reference). `cfa_sensitivity`: see `metrics.cfa_sensitivity`. `slope_per_nm`: the steepest slope of a
     modified channel's QE. `min_transmission`: the smallest ratio of a modified channel to the curve it replaces.
     Without a modified channel all but `cfa_sensitivity` are NaN.
     """
-    curves, base_qe = np.asarray(curves, dtype=float), np.asarray(setup.base_qe, dtype=float)
-    none = np.full(len(curves), np.nan)
-    qe = all_channels(setup, curves)
-    found = dict.fromkeys(DESIGNED, none)
-    found["cfa_sensitivity"] = cfa_sensitivity(qe, setup.mosaic.counts, setup.clear_qe)
-    if setup.modified:
-        found["sensitivity"] = channel_sensitivity(curves.sum(axis=1), base_qe.sum(axis=0))
-        found["slope_per_nm"] = np.abs(np.diff(curves, axis=-1)).max(axis=(1, 2)) / setup.grid.step_nm
-        ratio = np.divide(curves, base_qe, out=np.ones_like(curves), where=base_qe > 0)
-        found["min_transmission"] = ratio.min(axis=(1, 2))
+    modified, counts = list(setup.modified), setup.mosaic.counts
+    each = np.repeat(np.eye(len(modified)), setup.grid.size, axis=0)  # the sum over wavelengths of each channel
+    totals = block.product(each, np.arange(setup.grid.size)) if modified else np.empty((len(block), 0))
+    found = dict.fromkeys(DESIGNED, np.full(len(block), np.nan))
+    every = np.empty((len(block), len(counts)))
+    every[:] = setup.qe.sum(axis=1, dtype=float)
+    every[:, modified] = totals
+    found["cfa_sensitivity"] = cfa_sensitivity(every, counts, setup.clear_qe)
+    if modified:
+        base_qe = np.asarray(setup.base_qe, dtype=float)
+        steepest, lowest = block.shapes(base_qe)
+        found["sensitivity"] = totals.sum(axis=1) / base_qe.sum()
+        found["slope_per_nm"] = steepest / setup.grid.step_nm
+        found["min_transmission"] = lowest
     return found
 
 
@@ -131,26 +134,34 @@ def _told_apart(mean: FloatArray, variance: FloatArray, members: Mapping[str, In
     return found
 
 
-def evaluate(imager: Imager, curves: FloatArray, states: Sequence[str] = ()) -> dict[str, FloatArray]:
+def evaluate(imager: Imager, designs: FloatArray | Block, states: Sequence[str] = ()) -> dict[str, FloatArray]:
     """Evaluate a block of designs as the camera reads them out, as far as the scene's methods go.
 
-    `curves` as in `all_channels`. Returns columns, each ndarray[n_designs]: `csd_<a>_<b>` (DN) of every pair of
-    signal types, the smallest over the places of the light; `best_place_csd_<a>_<b>`, the largest, where a scene has
-    several; those of `designed_quantities` and `exposure_s`; with `states`, those of `noise_quantities`, the worst over
-    the places.
+    `designs`: a block, or the QE of its modified channels, ndarray[n_designs, n_modified, n_wavelengths]. Returns
+    columns, each ndarray[n_designs]: `csd_<a>_<b>` (DN) of every pair of signal types, the smallest over the places of
+    the light; `best_place_csd_<a>_<b>`, the largest, where a scene has several; those of `block_quantities` and
+    `exposure_s`; with `states`, those of `noise_quantities`, the worst over the places.
     """
+    block = Curves(designs) if isinstance(designs, np.ndarray) else designs
     apart: dict[str, FloatArray] = {}
-    if states:
-        response, variance, exposure_s = imager.read_with_noise(curves)
-        apart = _told_apart(response, variance, {name: imager.setup.members[name] for name in states})
+    changing = None if states else imager.read_changing(block)
+    if changing is not None:
+        exposure_s = changing.exposure_s
+        cases = [
+            separations_along(fixed, changing.channel, changing.values[:, case], imager.setup.members)
+            for case, fixed in enumerate(changing.fixed)
+        ]
     else:
-        response, exposure_s = imager.read(curves)
+        if states:
+            response, variance, exposure_s = imager.read_with_noise(block.curves())
+            apart = _told_apart(response, variance, {name: imager.setup.members[name] for name in states})
+        else:
+            response, exposure_s = imager.read(block.curves())
+        cases = [separations(response[:, case], imager.setup.members) for case in range(response.shape[1])]
     columns: dict[str, FloatArray] = {}
     best: dict[str, FloatArray] = {}
-    members = imager.setup.members
-    cases = [separations(response[:, case], members) for case in range(response.shape[1])]
-    for pair in class_pairs(list(members)):
+    for pair in class_pairs(list(imager.setup.members)):
         over = np.stack([case[pair] for case in cases])
         columns[csd_name(pair)] = over.min(axis=0)
         best[BEST_PLACE + csd_name(pair)] = over.max(axis=0)
-    return columns | best | apart | designed_quantities(imager.setup, curves) | {"exposure_s": exposure_s}
+    return columns | best | apart | block_quantities(imager.setup, block) | {"exposure_s": exposure_s}

@@ -11,7 +11,7 @@ import pickle
 import threading
 from collections import Counter, OrderedDict
 from collections.abc import Iterator
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
 
@@ -20,6 +20,7 @@ from numpy.typing import DTypeLike
 from scipy.interpolate import CubicSpline
 
 from .arrays import FloatArray
+from .blocks import Block
 from .effects import flicker, noise, quadrature, quantization, saturation
 from .effects.kernel import make_kernel
 from .scenes import WhitePatchExposure
@@ -43,6 +44,26 @@ _TABLE_NODES = 2048
 _BEND_SIGMAS = 16.0
 _MOST_E = 1e30
 """More electrons than this are as many as this."""
+
+
+@dataclass(frozen=True)
+class Changing:
+    """A readout in which designs differ in one channel alone, DN.
+
+    `fixed`: ndarray[n_cases, n_signals, n_channels], what all designs share (that channel's values mean nothing);
+    `values`: ndarray[n_designs, n_cases, n_signals] of `channel`. `exposure_s`: ndarray[n_designs].
+    """
+
+    fixed: FloatArray
+    channel: int
+    values: FloatArray
+    exposure_s: FloatArray
+
+    def whole(self) -> FloatArray:
+        """ndarray[n_designs, n_cases, n_signals, n_channels]."""
+        found = np.repeat(self.fixed[None], len(self.values), axis=0)
+        found[..., self.channel] = self.values
+        return found
 
 
 class Imager:
@@ -112,6 +133,34 @@ class Imager:
             part = (qe @ self._kept).reshape(len(curves), *self._fixed.shape[:2], self._touched.size)
         found[..., self._touched] += part
         return found
+
+    def read_changing(self, block: Block) -> Changing | None:
+        """The readout of designs that differ in one channel alone; None where they do not, or more than that is read.
+
+        Needs a modified channel that no other unit looks through, one exposure for all designs, and a light that does
+        not pulse.
+        """
+        setup, n = self.setup, len(self.setup.mosaic.channels)
+        whole = self.straight or (setup.scenario.target is None and self.n_units == n)
+        touched = np.flatnonzero((self._modified_uniform != 0).any(axis=(0, 2)))
+        if len(setup.modified) != 1 or not whole or self._kept is None or self._touched.size != 1:
+            return None
+        if not np.array_equal(touched, self._touched) or len(block) == 0:
+            return None
+        everywhere = np.arange(setup.grid.size)
+        exposure_s = exposure_times(setup, block.product(self._white[:, None], everywhere))
+        if not np.isfinite(exposure_s[0]) or (exposure_s != exposure_s[0]).any():
+            return None
+        if self.scales(exposure_s[:1]).shape[1] > 1:
+            return None
+        unit, time_s = int(self._touched[0]), exposure_s[0]
+        self.work["response"] += len(block) * self._kept.size
+        part = block.product(self._kept, self._nodes).reshape(len(block), self.n_cases, -1)
+        uniform = block.product(self._background[:, None], everywhere) * self._modified_uniform[:, unit, 0]
+        uniform = self._fixed_uniform[:, unit] + uniform + setup.pixel.dark_e_per_s
+        rest = self._fixed + (self._fixed_uniform + setup.pixel.dark_e_per_s)[:, None]
+        values = self.transfer((self._fixed[:, :, unit] + part + uniform[:, :, None]) * time_s)
+        return Changing(self.transfer(rest * time_s), unit, values, exposure_s)
 
     def exposure_s(self, curves: FloatArray) -> FloatArray:
         """Exposure of each design, s, ndarray[n_designs]."""

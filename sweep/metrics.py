@@ -88,22 +88,80 @@ def pair_blocks(
 
 def separations(response: FloatArray, members: Mapping[str, IndexArray]) -> dict[Pair, FloatArray]:
     """CSD of every pair of signal types; `members` maps a type to its signal indices. Shapes as in `separation`."""
-    return {(a, b): separation(response, members[a], members[b]) for a, b in class_pairs(list(members))}
+    from .kernels import CHANNELS, nearest_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+    n_designs, _, n_channels = response.shape
+    pairs = class_pairs(list(members))
+    if n_channels > CHANNELS or not np.isfinite(response).all():
+        return {(a, b): separation(response, members[a], members[b]) for a, b in pairs}
+    order, bounds = _in_order(members)
+    filled = np.zeros((n_designs, CHANNELS, order.size))
+    filled[:, :n_channels] = np.moveaxis(response[:, order], 1, 2)
+    squared = np.empty((n_designs, len(pairs)))
+    nearest_squared(filled, bounds, squared)
+    return _distances(squared, members, lambda doubtful: response[doubtful])
 
 
-def channel_sensitivity(qe: FloatArray, reference_qe: FloatArray) -> FloatArray:
-    """Total QE over the grid divided by that of the reference: ndarray[..., n_wavelengths] -> ndarray[...].
+def separations_along(
+    fixed: FloatArray, channel: int, values: FloatArray, members: Mapping[str, IndexArray]
+) -> dict[Pair, FloatArray]:
+    """`separations` of designs that differ in one channel alone.
 
-    The paper's sensitivity of a modified channel N, with the channel that it replaces (Y) as the reference.
+    `fixed`: ndarray[n_signals, n_channels], DN, what they share in the others; `values`: ndarray[n_designs, n_signals],
+    that of `channel`.
     """
-    return np.asarray(qe.sum(axis=-1, dtype=float) / reference_qe.sum(dtype=float), dtype=float)
+    from .kernels import nearest_along_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+    def whole(some: IndexArray | slice) -> FloatArray:
+        response = np.repeat(fixed[None], len(values[some]), axis=0)
+        response[..., channel] = values[some]
+        return response
+
+    others = np.delete(fixed, channel, axis=1)
+    if not (np.isfinite(values).all() and np.isfinite(others).all()):
+        return separations(whole(slice(None)), members)
+    order, bounds = _in_order(members)
+    nearest: list[tuple[FloatArray, IndexArray, IndexArray]] = []
+    for a, b in class_pairs(list(members)):
+        one, other = np.repeat(members[a], len(members[b])), np.tile(members[b], len(members[a]))
+        apart = ((others[one] - others[other]) ** 2).sum(axis=1)
+        rank = np.argsort(apart, kind="stable")
+        nearest.append((apart[rank], one[rank], other[rank]))
+    starts = np.cumsum([0, *(len(apart) for apart, _, _ in nearest)])
+    place = np.empty(order.max() + 1, dtype=np.intp)  # of each signal in the order of the classes
+    place[order] = np.arange(order.size)
+    apart, one, other = (np.concatenate(parts) for parts in zip(*nearest, strict=True))
+    squared = np.empty((len(values), len(nearest)))
+    ordered = np.ascontiguousarray(values[:, order])
+    nearest_along_squared(ordered, bounds, apart, place[one], place[other], starts, squared)
+    return _distances(squared, members, whole)
 
 
-def cfa_sensitivity(qe: FloatArray, counts: IndexArray, clear_qe: FloatArray) -> FloatArray:
+def _in_order(members: Mapping[str, IndexArray]) -> tuple[IndexArray, IndexArray]:
+    """All signals, one type after the other, and where each begins."""
+    own = list(members.values())
+    return np.concatenate(own), np.cumsum([0, *(len(signals) for signals in own)])
+
+
+def _distances(
+    squared: FloatArray, members: Mapping[str, IndexArray], response: Callable[[IndexArray], FloatArray]
+) -> dict[Pair, FloatArray]:
+    """Roots; distances whose squares a float does not hold well are computed again, without squares."""
+    found = {}
+    for (a, b), column in zip(class_pairs(list(members)), squared.T, strict=True):
+        distance = np.sqrt(column)
+        doubtful = np.flatnonzero((distance < _SMALLEST) | (distance > 1 / _SMALLEST))
+        if doubtful.size:
+            distance[doubtful] = _nearest(response(doubtful), members[a], members[b], _add_leg)
+        found[a, b] = distance
+    return found
+
+
+def cfa_sensitivity(total_qe: FloatArray, counts: IndexArray, clear_qe: FloatArray) -> FloatArray:
     """Total QE, averaged over the pixels of the tile, divided by that of the clear pixel.
 
-    `qe`: ndarray[..., n_channels, n_wavelengths]; `counts`: pixels per tile of each channel. 1 means a sensor without
-    color filters. Returns ndarray[...].
+    `total_qe`: ndarray[..., n_channels], QE summed over the wavelengths; `counts`: pixels per tile of each channel. 1
+    means a sensor without color filters. Returns ndarray[...].
     """
-    mean = (qe.sum(axis=-1, dtype=float) * counts).sum(axis=-1) / counts.sum()
+    mean = (total_qe * counts).sum(axis=-1) / counts.sum()
     return np.asarray(mean / clear_qe.sum(dtype=float), dtype=float)

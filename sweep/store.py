@@ -104,7 +104,7 @@ def write_json(data: Mapping[str, Any], path: Path) -> None:
 def sliced(path: Path, sizes: Iterable[int]) -> Iterator[pa.Table]:
     """The rows of a Parquet file in tables of these sizes, a row group in memory; raises OutputError when damaged."""
     try:
-        batches = (pa.Table.from_batches([batch]) for batch in pq.ParquetFile(path).iter_batches(ROW_GROUP))
+        batches = (pa.Table.from_batches([batch]) for batch in pq.ParquetFile(path, pre_buffer=False).iter_batches(ROW_GROUP))
         rest = None
         for size in sizes:
             while rest is None or rest.num_rows < size:

@@ -281,8 +281,8 @@ def float32_curves() -> Result:
 
 @hard_case(
     "a NaN in one design of a block",
-    oracle="the block without it, bit for bit",
-    why="designs share nothing that a design changes",
+    oracle="the block without it",
+    why="designs share nothing but the order of a sum over the wavelengths: 64 eps of full scale",
 )
 def nan_in_one_design() -> Result:
     qe = random_qe(13, 4)
@@ -291,10 +291,13 @@ def nan_in_one_design() -> Result:
     clean = Stopband(WAVE, qe[2], 0.2 * qe[2]).curves(x)
     bad = clean.copy()
     bad[17, 0, RED] = np.nan
-    good = True
+    error = 0.0
     for scenario, pixel, methods in SCENES.values():
         imager = Imager(made(qe, lights, scenario, pixel, "RYNC", **methods))
         one, other = evaluate(imager, clean), evaluate(imager, bad)
-        good &= bool(np.isnan(other["csd_yellow_red"][17]))
-        good &= all(np.array_equal(np.delete(one[name], 17), np.delete(other[name], 17)) for name in one)
-    return outcome(good)
+        if not np.isnan(other["csd_yellow_red"][17]):
+            return Result(np.inf, 0.0)
+        for name in one:
+            off = np.abs(np.delete(one[name], 17) - np.delete(other[name], 17)).max()
+            error = max(error, float(off) / (imager.pixel.full_scale_dn if "csd" in name else 1.0))
+    return Result(error, 64 * EPS)

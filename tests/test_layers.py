@@ -13,10 +13,11 @@ PACKAGE = Path(__file__).parent.parent / "sweep"
 LEVELS = [
     {"errors", "arrays"},
     {"schema"},
-    {"spectra", "mosaics", "pareto", "constraints", "objectives", "edges", "progress"},
+    {"kernels", "spectra", "mosaics", "pareto", "constraints", "objectives", "edges", "progress"},
     {"metrics", "curve_files", "surrogate", "sensor", "chromaticity"},
     {"datasets", "filters", "scenes", "families", "discrimination"},
     {"spaces", "setup"},
+    {"blocks"},
     {"effects"},
     {"promises"},
     {"plan", "imaging"},
@@ -40,6 +41,7 @@ ONLY_USER = {
     "jinja2": "report",
     "typer": "cli",
     "sklearn": "recognition",
+    "numba": "kernels",
 }
 
 

@@ -17,7 +17,7 @@ from sweep.effects import quantization, saturation
 from sweep.errors import SweepError
 from sweep.families import Stopband
 from sweep.imaging import Imager
-from sweep.metrics import cfa_sensitivity, channel_sensitivity, separation
+from sweep.metrics import cfa_sensitivity, separation
 from sweep.mosaics import Mosaic
 from sweep.pareto import non_dominated
 from sweep.scenes import FixedExposure, Geometry, Scenario
@@ -74,11 +74,9 @@ def test_separation_of_near_points_at_a_large_offset() -> None:
 
 
 def test_sensitivities() -> None:
-    base = np.array([0.2, 0.4, 0.4])
-    assert channel_sensitivity(np.array([[0.2, 0.3, 0.4]]), base)[0] == pytest.approx(0.9, rel=1e-15)
-    qe = np.array([[0.1, 0.1], [0.5, 0.3]])
+    total_qe = np.array([0.1 + 0.1, 0.5 + 0.3])
     # one pixel of the first, three of the second: (0.2 + 3 * 0.8) / 4 = 0.65 over 1.3
-    assert cfa_sensitivity(qe, np.array([1, 3]), np.array([0.6, 0.7])) == pytest.approx(0.5, rel=1e-15)
+    assert cfa_sensitivity(total_qe, np.array([1, 3]), np.array([0.6, 0.7])) == pytest.approx(0.5, rel=1e-15)
 
 
 def test_non_dominated_keeps_ties_and_skips_nan() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol, Self
+from typing import Protocol, Self, runtime_checkable
 
 from ..arrays import FloatArray
 
@@ -63,3 +63,18 @@ class Family(Protocol):
 
     def violation_gradient(self, x: FloatArray) -> FloatArray:
         """Derivative of `violation` at one design: [n_parameters] to [n, n_parameters]."""
+
+
+@runtime_checkable
+class SeparableFamily(Protocol):
+    """A family whose filter is base + depth change (e(left) - e(right)).
+
+    Its parameters are left, left width, right, right width and depth.
+    """
+
+    @property
+    def separable(self) -> tuple[FloatArray, FloatArray] | None:
+        """Base and change, ndarray[n_wavelengths] each; None where this member of the family is not of that form."""
+
+    def edges(self, centers_and_widths: FloatArray) -> FloatArray:
+        """Rising edges, ndarray[n, 2] -> ndarray[n, n_wavelengths]."""

@@ -14,6 +14,8 @@ from .base import Parameter
 
 _HALF = SPAN_PER_WIDTH / 2
 _PER_BAND = 5
+_FEW = 64
+"""Edges of fewer designs are computed one by one."""
 LEFT, LEFT_WIDTH, RIGHT, RIGHT_WIDTH, DEPTH = range(_PER_BAND)
 
 
@@ -90,9 +92,21 @@ class Bands:
         assert x.shape == (self._count * _PER_BAND,)
         return self._conditions
 
+    def edges(self, centers_and_widths: FloatArray) -> FloatArray:
+        """Rising edges: ndarray[n, 2] -> ndarray[n, n_wavelengths]."""
+        return edge(self._wave, centers_and_widths[:, :1], centers_and_widths[:, 1:])
+
     def _open(self, x: FloatArray, band: int) -> FloatArray:
-        left, left_width, right, right_width = (x[:, band * _PER_BAND + i, None] for i in range(4))
-        return edge(self._wave, left, left_width) - edge(self._wave, right, right_width)
+        at = band * _PER_BAND
+        left, right = (self._each_once(x[:, at + i : at + i + 2]) for i in (LEFT, RIGHT))
+        return np.asarray(left - right, dtype=float)
+
+    def _each_once(self, centers_and_widths: FloatArray) -> FloatArray:
+        """`edges`, where the designs of a grid share many: each is computed once."""
+        if len(centers_and_widths) < _FEW:
+            return self.edges(centers_and_widths)
+        unique, which = np.unique(centers_and_widths, axis=0, return_inverse=True)
+        return self.edges(unique)[which.ravel()]
 
     def _depth(self, x: FloatArray, band: int) -> FloatArray:
         return x[:, band * _PER_BAND + DEPTH, None]
@@ -169,6 +183,15 @@ class Stopband(Banded):
     def curves(self, x: FloatArray) -> FloatArray:
         """QE of the modified channel, ndarray[n_designs, 1, n_wavelengths]; see `Family.curves`."""
         return (self._base + self._change * self._bands.shape(x))[:, None, :]
+
+    @property
+    def separable(self) -> tuple[FloatArray, FloatArray] | None:
+        """Of one band; see `SeparableFamily.separable`."""
+        return (self._base, self._change) if self.kind == "stopband" else None
+
+    def edges(self, centers_and_widths: FloatArray) -> FloatArray:
+        """See `SeparableFamily.edges`."""
+        return self._bands.edges(centers_and_widths)
 
     def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
         """The base, or the target where it is higher and a band can reach; see `Family.upper`."""

@@ -36,7 +36,7 @@ class Counts:
 def batches(path: Path) -> Iterator[pa.Table]:
     """A Parquet file in tables of a row group each; raises OutputError when it is missing or damaged."""
     try:
-        for batch in pq.ParquetFile(path).iter_batches(ROW_GROUP):
+        for batch in pq.ParquetFile(path, pre_buffer=False).iter_batches(ROW_GROUP):
             yield pa.Table.from_batches([batch])
     except (OSError, pa.ArrowException) as error:
         raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from ..arrays import BoolArray, FloatArray
+from ..blocks import Block, Curves, edges_of
 from ..constraints import FEASIBLE, Bound, total_violation
 from ..evaluate import WORST, evaluate, noise_quantities, shiftable
 from ..imaging import imager_of
@@ -24,6 +26,7 @@ from ..spaces import DIMENSIONS, Space
 from ..store import result_schema
 from ..study import Study
 
+_WORDS = pa.dictionary(pa.int32(), pa.string())
 CHUNK = 4096
 """Designs of one job; fixed, so that the rows do not depend on the number of workers."""
 
@@ -72,11 +75,11 @@ def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
     `pareto` marks the non-dominated designs of this chunk alone; `compaction.Front` finds those of the whole table.
     """
     points = job.space.points(job.start, job.stop)
-    columns, status = _quantities(job.space, setup, points, rules)
-    ok = np.array([text == "ok" for text in status])
+    columns, faults = _quantities(job, setup, points, rules)
+    ok = np.ones(len(points), dtype=bool)
+    ok[list(faults)] = False
     own = job.space.violation(points)
     violation = total_violation(columns, rules.constraints, own)
-    eligible = ok & (total_violation(columns, rules.constraints, own, leave_out=rules.front) <= FEASIBLE)
     values = (
         _labels(job)
         | _how(rules.plans.get(job.scenario), len(points))
@@ -86,10 +89,29 @@ def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
     values |= {
         "violation": np.where(ok, violation, np.nan),
         "feasible": ok & (violation <= FEASIBLE),
-        "pareto": non_dominated(np.stack([columns[name] for name in rules.front], axis=1), eligible),
-        "status": status,
+        "pareto": _local_front(columns, ok, own, rules),
+        "status": _status(faults, len(points)),
     }
     return _table(values, len(points), rules.schema)
+
+
+def _local_front(columns: Mapping[str, FloatArray], ok: BoolArray, own: FloatArray, rules: Rules) -> BoolArray:
+    """The non-dominated designs of a chunk among those that meet every constraint but those on the front's axes."""
+    eligible = ok & (total_violation(columns, rules.constraints, own, leave_out=rules.front) <= FEASIBLE)
+    return non_dominated(np.stack([columns[name] for name in rules.front], axis=1), eligible)
+
+
+def with_local_front(table: pa.Table, job: Job, rules: Rules) -> pa.Table:
+    """A job's rows from a finished table, `pareto` again as `run_job` marks it, with the words alone that they use."""
+    names = {*rules.front, *rules.constraints}
+    columns = {name: table[name].to_numpy() for name in names}
+    ok = pc.equal(table["status"].cast(pa.string()), "ok").to_numpy()
+    marked = _local_front(columns, ok, job.space.violation(job.space.points(job.start, job.stop)), rules)
+    found = [
+        pa.array(marked) if f.name == "pareto" else table[f.name].cast(pa.string() if f.type == _WORDS else f.type)
+        for f in rules.schema
+    ]
+    return pa.table(found, names=rules.schema.names).cast(rules.schema)
 
 
 def job_key(job: Job, fingerprint: str, plan: Plan | None) -> str:
@@ -107,7 +129,7 @@ def failed_rows(job: Job, rules: Rules, status: str) -> pa.Table:
         | {name: points[:, i] for i, name in enumerate(job.space.parameters)}
         | dict.fromkeys(("feasible", "pareto"), np.zeros(len(points), dtype=bool))
     )
-    return _table(values | {"status": [status] * len(points)}, len(points), rules.schema)
+    return _table(values | {"status": _word(status, len(points))}, len(points), rules.schema)
 
 
 def rules_of(study: Study) -> Rules:
@@ -125,11 +147,14 @@ def rules_of(study: Study) -> Rules:
     )
 
 
-def _columns(space: Space, setup: Setup, points: FloatArray, rules: Rules) -> dict[str, FloatArray]:
-    """Every quantity of a block of designs, ndarray[n_designs] each."""
+def _columns(
+    space: Space, setup: Setup, points: FloatArray, rules: Rules, block: Block | None = None
+) -> dict[str, FloatArray]:
+    """Every quantity of a block of designs, ndarray[n_designs] each; `block`: these very designs, if a faster one."""
     size = setup.grid.size
     imager = imager_of(setup)
-    columns = evaluate(imager, space.curves(points, size), rules.states) | space.dimensions(points)
+    designs = Curves(space.curves(points, size)) if block is None else block
+    columns = evaluate(imager, designs, rules.states) | space.dimensions(points)
     if rules.edge_shift_nm:
         shifts = [rules.edge_shift_nm * s for s in SHIFTS if s] if space.filter is not None else []
         cases = [columns, *(evaluate(imager, space.curves(points, size, shift)) for shift in shifts)]
@@ -150,13 +175,15 @@ def _may_lack(setup: Setup, rules: Rules) -> set[str]:
 
 
 def _quantities(
-    space: Space, setup: Setup, points: FloatArray, rules: Rules
-) -> tuple[dict[str, FloatArray], list[str]]:
+    job: Job, setup: Setup, points: FloatArray, rules: Rules
+) -> tuple[dict[str, FloatArray], dict[int, str]]:
+    """Every quantity, and what went wrong with which design."""
+    space = job.space
     try:
-        columns = _columns(space, setup, points, rules)
-        status = ["ok"] * len(points)
+        columns = _columns(space, setup, points, rules, edges_of(space, job.start, job.stop))
+        faults: dict[int, str] = {}
     except Exception:  # whatever fails in one design must not take the others with it
-        columns, status = _one_by_one(space, setup, points, rules)
+        columns, faults = _one_by_one(space, setup, points, rules)
     lacking = _may_lack(setup, rules)
     unbounded = set(noise_quantities(rules.states))  # a signal without noise is told apart for certain
     numbers = [
@@ -165,50 +192,63 @@ def _quantities(
         if name not in lacking
     ]
     for index in np.flatnonzero(~np.isfinite(numbers).all(axis=0)):
-        if status[index] == "ok":
-            status[index] = "not finite"
-    return columns, status
+        faults.setdefault(int(index), "not finite")
+    return columns, faults
 
 
 def _one_by_one(
     space: Space, setup: Setup, points: FloatArray, rules: Rules
-) -> tuple[dict[str, FloatArray], list[str]]:
+) -> tuple[dict[str, FloatArray], dict[int, str]]:
     found: list[dict[str, FloatArray] | None] = []
-    status = []
-    for point in points:
+    faults = {}
+    for index, point in enumerate(points):
         try:
             found.append(_columns(space, setup, point[None], rules))
-            status.append("ok")
         except Exception as error:  # the row says what happened
             found.append(None)
-            status.append(f"error: {type(error).__name__}: {error}"[:200])
+            faults[index] = f"error: {type(error).__name__}: {error}"[:200]
     nothing = np.array([np.nan])
-    return {n: np.concatenate([nothing if c is None else c[n] for c in found]) for n in rules.columns}, status
+    return {n: np.concatenate([nothing if c is None else c[n] for c in found]) for n in rules.columns}, faults
+
+
+def _word(text: str | None, n: int) -> pa.Array:
+    """The same word, or none, in n rows."""
+    if text is None:
+        return pa.nulls(n, _WORDS)
+    return pa.DictionaryArray.from_arrays(pa.array(np.zeros(n, dtype=np.int32)), pa.array([text]))
+
+
+def _status(faults: Mapping[int, str], n: int) -> pa.Array:
+    """`ok`, but for the designs with a fault."""
+    if not faults:
+        return _word("ok", n)
+    return pa.array([faults.get(index, "ok") for index in range(n)], type=_WORDS)
 
 
 def _labels(job: Job) -> dict[str, Any]:
     n, space = job.stop - job.start, job.space
     return {
         "design_id": np.arange(job.first_id, job.first_id + n),
-        "kind": [space.kind] * n,
-        "name": [None if space.kind == "sweep" else space.name] * n,
-        "cfa": [space.cfa] * n,
-        "family": ["none" if space.filter is None else space.filter.family.kind] * n,
-        "scenario": [job.scenario] * n,
+        "kind": _word(space.kind, n),
+        "name": _word(None if space.kind == "sweep" else space.name, n),
+        "cfa": _word(space.cfa, n),
+        "family": _word("none" if space.filter is None else space.filter.family.kind, n),
+        "scenario": _word(job.scenario, n),
     }
 
 
 def _how(plan: Plan | None, n: int) -> dict[str, Any]:
     """How the scene was simulated: the plan's key and its promise."""
-    return {} if plan is None else {"plan": [plan.key] * n, "promised_dn": np.full(n, plan.promised_dn)}
+    return {} if plan is None else {"plan": _word(plan.key, n), "promised_dn": np.full(n, plan.promised_dn)}
 
 
-def _table(values: Mapping[str, Sequence[Any] | FloatArray | BoolArray], n: int, schema: pa.Schema) -> pa.Table:
+def _table(values: Mapping[str, pa.Array | FloatArray | BoolArray], n: int, schema: pa.Schema) -> pa.Table:
     """Columns in the schema's order; a column that the space does not have is null, as is NaN."""
-    arrays = [
-        pa.array(values[field.name], type=field.type, from_pandas=True)
-        if field.name in values
-        else pa.nulls(n, field.type)
-        for field in schema
-    ]
-    return pa.Table.from_arrays(arrays, schema=schema)
+
+    def column(field: pa.Field) -> pa.Array:
+        made = values.get(field.name)
+        if made is None:
+            return pa.nulls(n, field.type)
+        return made if isinstance(made, pa.Array) else pa.array(made, type=field.type, from_pandas=True)
+
+    return pa.Table.from_arrays([column(field) for field in schema], schema=schema)

@@ -17,7 +17,7 @@ from ..journal import Journal
 from ..setup import Setup
 from ..store import sliced
 from ..study import Study
-from .jobs import Job, Rules, failed_rows, job_key, jobs_of, run_job
+from .jobs import Job, Rules, failed_rows, job_key, jobs_of, run_job, with_local_front
 from .provenance import fingerprint
 from .searching import Progress
 from .workers import Call, WorkerKilledError, Workers, alone
@@ -77,7 +77,8 @@ class Sweep:
         sizes = [job.stop - job.start for job in self.jobs]
         for index, table in enumerate(sliced(results, sizes)):
             if not failures(table):
-                self.journal.save(self.keys[index], index, _encoded(table, self.rules.schema), 0, 0.0)
+                kept = with_local_front(table, self.jobs[index], self.rules)
+                self.journal.save(self.keys[index], index, kept, 0, 0.0)
 
     def run(self, progress: Progress, *, fail_fast: bool, retry_failed: bool) -> None:
         """Compute what is not kept yet. Raises FailedDesignError, after its chunk is kept, if it is to `fail_fast`."""
@@ -109,13 +110,6 @@ class Sweep:
                 self.journal.save(key, index, table, failures(table), seconds)
             self.failed += self.journal.entries[key].failed
             yield table
-
-
-def _encoded(table: pa.Table, schema: pa.Schema) -> pa.Table:
-    """The table with the words alone that its own rows use."""
-    words = {field.name: field.type.value_type for field in schema if pa.types.is_dictionary(field.type)}
-    columns = [table[name].cast(words[name]) if name in words else table[name] for name in schema.names]
-    return pa.table(columns, names=schema.names).cast(schema)
 
 
 def _timed(job: Job, setup: Setup, rules: Rules) -> tuple[pa.Table, float]:
