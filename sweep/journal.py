@@ -19,11 +19,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import IO, Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from .errors import Fault, OutputError
-from .store import write_bytes
+from .store import holds, write_bytes
 
 SHARDS = "shards"
 _JOURNAL = "_journal.jsonl"
@@ -47,6 +48,28 @@ class Entry:
     failed: int
     seconds: float
     at: float
+
+
+@dataclass(frozen=True)
+class Shard:
+    """Finished rows as a Parquet file's bytes: how many, how many of them failed, and the seconds that they took."""
+
+    content: bytes
+    rows: int
+    failed: int
+    seconds: float
+
+    @staticmethod
+    def of(table: pa.Table, seconds: float) -> Shard:
+        """A table, encoded."""
+        sink = pa.BufferOutputStream()
+        pq.write_table(table, sink)
+        failed = int(np.count_nonzero(~holds(table, "status", "ok")))
+        return Shard(sink.getvalue().to_pybytes(), table.num_rows, failed, seconds)
+
+    def table(self) -> pa.Table:
+        """The rows."""
+        return pq.read_table(pa.BufferReader(self.content))
 
 
 class Journal:
@@ -80,13 +103,9 @@ class Journal:
         sizes = {item.name: item.stat().st_size for item in os.scandir(self.folder)} if self.folder.is_dir() else {}
         self.entries = {key: entry for key, entry in self.entries.items() if sizes.get(entry.file) == entry.size}
 
-    def save(self, key: str, index: int, table: pa.Table, failed: int, seconds: float) -> None:
-        """Keep a finished table under `key`; raises OutputError when the disk refuses."""
-        sink = pa.BufferOutputStream()
-        pq.write_table(table, sink)
-        self._keep(
-            key, f"{index:08d}-{key[:16]}.parquet", sink.getvalue().to_pybytes(), table.num_rows, failed, seconds
-        )
+    def save(self, key: str, index: int, shard: Shard) -> None:
+        """Keep finished rows under `key`; raises OutputError when the disk refuses."""
+        self._keep(key, f"{index:08d}-{key[:16]}.parquet", shard.content, shard.rows, shard.failed, shard.seconds)
 
     def keep(self, key: str, answer: object, seconds: float) -> None:
         """Keep any finished answer under `key`; errors as for `save`."""

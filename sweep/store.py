@@ -9,9 +9,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from .arrays import BoolArray
 from .errors import Fault, OutputError
 
 SCHEMA_VERSION = "2"
@@ -104,7 +106,9 @@ def write_json(data: Mapping[str, Any], path: Path) -> None:
 def sliced(path: Path, sizes: Iterable[int]) -> Iterator[pa.Table]:
     """The rows of a Parquet file in tables of these sizes, a row group in memory; raises OutputError when damaged."""
     try:
-        batches = (pa.Table.from_batches([batch]) for batch in pq.ParquetFile(path, pre_buffer=False).iter_batches(ROW_GROUP))
+        batches = (
+            pa.Table.from_batches([batch]) for batch in pq.ParquetFile(path, pre_buffer=False).iter_batches(ROW_GROUP)
+        )
         rest = None
         for size in sizes:
             while rest is None or rest.num_rows < size:
@@ -116,6 +120,20 @@ def sliced(path: Path, sizes: Iterable[int]) -> Iterator[pa.Table]:
             rest = rest.slice(size)
     except (OSError, pa.ArrowException) as error:
         raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
+
+
+def holds(table: pa.Table, column: str, *words: str) -> BoolArray:
+    """Where a column of words (dictionary-encoded) holds one of `words`, ndarray[n_rows]."""
+    found = [np.zeros(0, dtype=bool)]
+    for chunk in table[column].chunks:
+        at = [index for index, word in enumerate(chunk.dictionary.to_pylist()) if word in words]
+        found.append(np.isin(chunk.indices.fill_null(-1).to_numpy(), at))
+    return np.concatenate(found)
+
+
+def release_memory() -> None:
+    """Give memory that Arrow keeps for later back to the system."""
+    pa.default_memory_pool().release_unused()
 
 
 def read_table(path: Path) -> pa.Table:

@@ -13,9 +13,9 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from ..arrays import BoolArray, FloatArray
+from ..arrays import FloatArray
 from ..errors import Fault, OutputError
-from ..store import ROW_GROUP
+from ..store import ROW_GROUP, holds, release_memory
 
 MOST_ROWS = 150_000
 """A table of up to this many rows is kept whole."""
@@ -63,22 +63,18 @@ def thinned(path: Path, order: Sequence[str]) -> tuple[pd.DataFrame, Counts]:
         ok, on_front = table["feasible"].to_numpy(), table["pareto"].to_numpy()
         feasible += int(ok.sum())
         front += int(on_front.sum())
-        failed += int((~_equal(table, "status", "ok")).sum())
-        always = ~_equal(table, "kind", "sweep") | on_front
+        failed += int((~holds(table, "status", "ok")).sum())
+        always = ~holds(table, "kind", "sweep") | on_front
         kept.append(table.filter(pa.array(always | (table["design_id"].to_numpy() % every == 0))))
         if every > 1:
             few = table.filter(pa.array(ok & ~always))
             best = _best(few if best is None else pa.concat_tables([best, few]), order)
+        release_memory()
     if best is not None:
         kept.append(best)
     frame: pd.DataFrame = pa.concat_tables(kept).unify_dictionaries().to_pandas()
     frame = frame.drop_duplicates("design_id").sort_values("design_id", ignore_index=True)
     return frame, Counts(total, feasible, front, failed, total - len(frame))
-
-
-def _equal(table: pa.Table, column: str, text: str) -> BoolArray:
-    found: BoolArray = pc.equal(pc.cast(table[column], pa.string()), text).to_numpy()
-    return found
 
 
 def _best(table: pa.Table, order: Sequence[str]) -> pa.Table:

@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 
 from ..arrays import BoolArray, FloatArray, IndexArray
 from ..pareto import non_dominated
-from ..store import ROW_GROUP, atomic
+from ..store import ROW_GROUP, atomic, holds, release_memory
 from .jobs import Rules
 
 BEST_PER_CFA = 5
@@ -62,7 +62,7 @@ class Front:
     def _candidates(self, table: pa.Table) -> tuple[IndexArray, FloatArray, list[tuple[str, str]]]:
         wanted = table["pareto"].to_numpy()
         if self._kind is not None:
-            wanted = wanted & pc.equal(pc.cast(table["kind"], pa.string()), self._kind).to_numpy()
+            wanted = wanted & holds(table, "kind", self._kind)
         local = np.flatnonzero(wanted)
         few = table.select([*self._axes, "cfa", "scenario"]).take(pa.array(local))
         values = np.stack([few[name].to_numpy() for name in self._axes], axis=1)
@@ -89,14 +89,13 @@ class Highlights:
 
     def add(self, table: pa.Table) -> None:
         """Take in a table."""
-        kinds = pc.cast(table["kind"], pa.string())
-        always = table.filter(pc.is_in(kinds, pa.array(_ALWAYS)))
-        if always.num_rows:
-            self._always.append(always)
-        here = pc.equal(pc.cast(table["scenario"], pa.string()), self._scenario)
-        swept = table.filter(pc.and_(pc.and_(pc.equal(kinds, "sweep"), table["feasible"]), here))
-        for cfa in dict.fromkeys(pc.cast(swept["cfa"], pa.string()).to_pylist()):
-            own = swept.filter(pc.equal(pc.cast(swept["cfa"], pa.string()), cfa))
+        always = holds(table, "kind", *_ALWAYS)
+        if always.any():
+            self._always.append(table.filter(pa.array(always)))
+        candidates = holds(table, "kind", "sweep") & holds(table, "scenario", self._scenario)
+        swept = table.filter(pa.array(candidates & table["feasible"].to_numpy()))
+        for cfa in swept["cfa"].unique().to_pylist():
+            own = swept.filter(pa.array(holds(swept, "cfa", cfa)))
             both = pa.concat_tables([self._best[cfa], own]) if cfa in self._best else own
             keys = [(name, "descending") for name in dict.fromkeys(self._order)]
             best = pc.sort_indices(both, sort_keys=[*keys, ("design_id", "ascending")])[:BEST_PER_CFA]
@@ -130,6 +129,8 @@ def compact(
             if sum(part.num_rows for part in waiting) >= ROW_GROUP:
                 writer.write_table(pa.concat_tables(waiting).unify_dictionaries(), row_group_size=ROW_GROUP)
                 waiting = []
+                release_memory()
         if waiting:
             writer.write_table(pa.concat_tables(waiting).unify_dictionaries(), row_group_size=ROW_GROUP)
+    release_memory()
     return front, swept

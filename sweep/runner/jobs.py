@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from ..arrays import BoolArray, FloatArray
 from ..blocks import Block, Curves, edges_of
@@ -23,7 +22,7 @@ from ..plan import Plan
 from ..problem import SHIFTS
 from ..setup import Setup
 from ..spaces import DIMENSIONS, Space
-from ..store import result_schema
+from ..store import holds, result_schema
 from ..study import Study
 
 _WORDS = pa.dictionary(pa.int32(), pa.string())
@@ -105,8 +104,9 @@ def with_local_front(table: pa.Table, job: Job, rules: Rules) -> pa.Table:
     """A job's rows from a finished table, `pareto` again as `run_job` marks it, with the words alone that they use."""
     names = {*rules.front, *rules.constraints}
     columns = {name: table[name].to_numpy() for name in names}
-    ok = pc.equal(table["status"].cast(pa.string()), "ok").to_numpy()
-    marked = _local_front(columns, ok, job.space.violation(job.space.points(job.start, job.stop)), rules)
+    marked = _local_front(
+        columns, holds(table, "status", "ok"), job.space.violation(job.space.points(job.start, job.stop)), rules
+    )
     found = [
         pa.array(marked) if f.name == "pareto" else table[f.name].cast(pa.string() if f.type == _WORDS else f.type)
         for f in rules.schema

@@ -10,10 +10,9 @@ from pathlib import Path
 
 import joblib
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from ..errors import FailedDesignError, Fault
-from ..journal import Journal
+from ..journal import Journal, Shard
 from ..setup import Setup
 from ..store import sliced
 from ..study import Study
@@ -23,12 +22,6 @@ from .searching import Progress
 from .workers import Call, WorkerKilledError, Workers, alone
 
 KILLED = "error: its worker died twice"
-
-
-def failures(table: pa.Table) -> int:
-    """Rows of a table whose design failed."""
-    fine: int = pc.sum(pc.equal(pc.cast(table["status"], pa.string()), "ok")).as_py() or 0
-    return int(table.num_rows) - fine
 
 
 @dataclass
@@ -76,9 +69,9 @@ class Sweep:
         """Take the chunks of a finished run into the journal, but for those with failed designs."""
         sizes = [job.stop - job.start for job in self.jobs]
         for index, table in enumerate(sliced(results, sizes)):
-            if not failures(table):
-                kept = with_local_front(table, self.jobs[index], self.rules)
-                self.journal.save(self.keys[index], index, kept, 0, 0.0)
+            shard = Shard.of(with_local_front(table, self.jobs[index], self.rules), 0.0)
+            if not shard.failed:
+                self.journal.save(self.keys[index], index, shard)
 
     def run(self, progress: Progress, *, fail_fast: bool, retry_failed: bool) -> None:
         """Compute what is not kept yet. Raises FailedDesignError, after its chunk is kept, if it is to `fail_fast`."""
@@ -90,14 +83,13 @@ class Sweep:
         todo = [index for index, key in enumerate(self.keys) if key not in entries]
         done = sum(entries[key].rows for key in self.keys if key in entries)
         progress("designs", done, self.study.n_designs)
-        calls = (joblib.delayed(_timed)(self.jobs[i], self._setup(self.jobs[i]), self.rules) for i in todo)
-        for index, (table, seconds) in zip(todo, self.crew(calls, _quarantined), strict=False):
-            failed = failures(table)
-            self.journal.save(self.keys[index], index, table, failed, seconds)
-            done += table.num_rows
+        calls = (joblib.delayed(_shard)(self.jobs[i], self._setup(self.jobs[i]), self.rules) for i in todo)
+        for index, shard in zip(todo, self.crew(calls, _quarantined), strict=False):
+            self.journal.save(self.keys[index], index, shard)
+            done += shard.rows
             progress("designs", done, self.study.n_designs)
-            if failed and fail_fast:
-                raise _first_failure(table)
+            if shard.failed and fail_fast:
+                raise _first_failure(shard.table())
 
     def tables(self) -> Iterator[pa.Table]:
         """All finished chunks in order; one whose file is damaged is computed again."""
@@ -106,32 +98,38 @@ class Sweep:
             table = self.journal.table(key, self.rules.schema)
             if table is None:
                 self.warnings.append(f"chunk {index} was damaged on the disk and is computed again")
-                table, seconds = _timed(job, self._setup(job), self.rules)
-                self.journal.save(key, index, table, failures(table), seconds)
+                shard = _shard(job, self._setup(job), self.rules)
+                self.journal.save(key, index, shard)
+                table = shard.table()
             self.failed += self.journal.entries[key].failed
             yield table
 
 
-def _timed(job: Job, setup: Setup, rules: Rules) -> tuple[pa.Table, float]:
+def _shard(job: Job, setup: Setup, rules: Rules) -> Shard:
     started = time.monotonic()
-    return run_job(job, setup, rules), time.monotonic() - started
+    table = run_job(job, setup, rules)
+    return Shard.of(table, time.monotonic() - started)
 
 
-def _quarantined(call: Call) -> tuple[pa.Table, float]:
+def _quarantined(call: Call) -> Shard:
     """A job whose worker died twice: by halves, down to the design that kills, which becomes a row with its status."""
     started = time.monotonic()
+    return Shard.of(_halved(call), time.monotonic() - started)
+
+
+def _halved(call: Call) -> pa.Table:
     job, setup, rules = call[1]
     if job.stop - job.start == 1:
-        return failed_rows(job, rules, KILLED), time.monotonic() - started
+        return failed_rows(job, rules, KILLED)
     middle = (job.start + job.stop) // 2
     tables = []
     for half in (replace(job, stop=middle), replace(job, start=middle, first_id=job.first_id + middle - job.start)):
         part: Call = (call[0], (half, setup, rules), {})
         try:
-            tables.append(alone(part)[0])
+            tables.append(alone(part).table())
         except WorkerKilledError:
-            tables.append(_quarantined(part)[0])
-    return pa.concat_tables(tables).unify_dictionaries(), time.monotonic() - started
+            tables.append(_halved(part))
+    return pa.concat_tables(tables).unify_dictionaries()
 
 
 def _first_failure(table: pa.Table) -> FailedDesignError:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import joblib
@@ -17,6 +19,7 @@ from threadpoolctl import threadpool_limits
 from ..errors import InterruptedRunError, SweepError
 from .stopping import Stop, leave_signals_to_the_parent
 
+_LEAST_WINDOW, _WINDOW_PER_WORKER = 64, 16
 BACKENDS = ("loky", "threading", "dask")
 Call = tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
 """A call that `joblib.delayed` has put off."""
@@ -51,23 +54,28 @@ class Workers:
         InterruptedRunError after a stop was asked for and everything under way has been handed out.
         """
         rest = iter(calls)
+        # joblib goes on computing while results wait to be taken; a window bounds how many can wait.
+        window = max(_LEAST_WINDOW, _WINDOW_PER_WORKER * joblib.effective_n_jobs(self._n_jobs))
+        while not self.stop.requested and (some := list(islice(rest, window))):
+            yield from self._window(deque(some), killed)
+        if self.stop.requested:
+            raise InterruptedRunError("interrupted; finished chunks are kept, the same command continues")
+
+    def _window(self, waiting: deque[Call], killed: Callable[[Call], Any] | None) -> Iterator[Any]:
+        """Results of a few calls; those that are not handed out when a stop is asked for are left out."""
         flying: deque[Call] = deque()
 
         def taken() -> Iterator[Call]:
-            while not self.stop.requested:
-                call = next(rest, None)
-                if call is None:
-                    return
-                flying.append(call)
-                yield (_one_threaded, call, {})
+            while waiting and not self.stop.requested:
+                flying.append(waiting.popleft())
+                yield (_one_threaded, flying[-1], {})
 
-        while True:
+        while waiting and not self.stop.requested:
             try:
                 parallel = joblib.Parallel(n_jobs=self._n_jobs, return_as="generator", pre_dispatch="3*n_jobs")
                 for result in parallel(taken()):
                     flying.popleft()
                     yield result
-                break
             except Exception as error:
                 if not _is_death(error):
                     raise
@@ -75,8 +83,6 @@ class Workers:
             flying.clear()
             for call in suspects:
                 yield self._again(call, killed)
-        if self.stop.requested:
-            raise InterruptedRunError("interrupted; finished chunks are kept, the same command continues")
 
     @property
     def _n_jobs(self) -> int:
@@ -100,6 +106,9 @@ def workers(how: Workers) -> Iterator[Workers]:
     """
     settings: dict[str, Any] = {}
     with ExitStack() as stack:
+        stack.enter_context(warnings.catch_warnings())
+        # A run that ends early cancels what it has no use for.
+        warnings.filterwarnings("ignore", message=".*have been cancelled", category=UserWarning)
         if how.backend == "dask":
             stack.enter_context(_dask_client(how.scheduler))
         elif how.backend == "loky":
