@@ -17,7 +17,7 @@ import pytest
 from sweep.errors import FailedDesignError, OutputError, SweepError
 from sweep.families import Stopband
 from sweep.journal import SHARDS, Journal, locked
-from sweep.runner import Wishes, estimate, estimate_lines, output_folder, run_study, status_lines
+from sweep.runner import Wishes, estimate, estimate_lines, output_folder, run_study, status_lines, with_plans
 from sweep.runner.jobs import CHUNK
 from sweep.runner.stopping import Stop
 from sweep.runner.sweeping import KILLED
@@ -99,6 +99,18 @@ def test_a_design_that_kills_its_worker_is_a_row(plain: Study, tmp_path: Path) -
     same = [name for name in found.columns if name != "pareto"]
     words = {"status": str}  # the word of the killed rows is no category of the others
     pd.testing.assert_frame_equal(found.loc[~killed, same].astype(words), fine.loc[~killed, same].astype(words))
+
+
+def test_a_worker_that_is_killed_while_scenes_are_planned_costs_nothing(plain: Study, tmp_path: Path) -> None:
+    wish = tmp_path / "wish"
+    wish.write_text("kill 1 ")
+    study = mischievous(plain, wish)
+    single = replace(study.spaces[-1], axes=((590.0,), (5.0,), (660.0,), (5.0,), (1.0,)))  # a plan looks at its curves
+    study = replace(study, spaces=(*study.spaces[:-1], single))
+    plans = with_plans(study, 2, lambda *_: None).plans
+    assert wish.read_text().count("done") >= 2
+    wish.unlink()
+    assert plans == with_plans(study, 1, lambda *_: None).plans
 
 
 def test_failing_designs_stop_a_run_or_are_tried_again(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:

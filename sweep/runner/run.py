@@ -82,7 +82,7 @@ def run_study(
             return False
         facts = {"command": list(command), "designs": study.n_designs, "workers": crew.count, "backend": crew.backend}
         begin(output, study, facts)
-        study = with_plans(study, crew.count, progress)
+        study = with_plans(study, crew.count, progress, stop=stop)
         run = _Run(study, output, rules_of(study), crew, progress, wishes)
         run.whole(started, command, again=done)
     return True
