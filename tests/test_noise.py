@@ -170,3 +170,13 @@ def test_faults(tmp_path: Path, old: str, new: str, said: str) -> None:
     with pytest.raises(StudyError) as error:
         load_study(path)
     assert said in "\n".join(str(fault) for fault in error.value.faults)
+
+
+def test_columns_of_noise_must_differ(tmp_path: Path) -> None:
+    (tmp_path / "led.csv").write_text("wavelength_nm,x\n400,1\n700,1\n")
+    path = tmp_path / "noisy.yaml"
+    lights = "lights: {files: [{file: led.csv, quantity: energy, signals: {bound_a: [x], a: [x], b: [x]}}]}"
+    states = "recognition: {patches: 20}\nobjective: csd_a_b\n"
+    path.write_text(STUDY.split("recognition:", maxsplit=1)[0].replace("lights: tl16", lights) + states)
+    with pytest.raises(StudyError, match="the pairs bound_a/b and a/b share the column error_bound_a_b"):
+        load_study(path)
