@@ -23,6 +23,7 @@ from sweep.families import Stopband
 from sweep.imaging import imager_of
 from sweep.journal import Journal, locked
 from sweep.report import make_report, read_output
+from sweep.report.content import scenario_series
 from sweep.runner import run_study
 from sweep.runner.jobs import CHUNK, Job, jobs_of, rules_of, run_job
 from sweep.spaces import Filter, Space
@@ -278,3 +279,15 @@ def test_worst_cases_and_combined_objectives_are_columns(tmp_path: Path) -> None
     assert answer["objective"] >= frame[frame["feasible"] & (frame["kind"] == "sweep")]["objective"].max() - 4
     make_report(read_output(tmp_path / "out"))
     assert "smallest of 2 worst_csd_yellow_red, 300 sensitivity" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_a_scenario_may_have_any_name(tmp_path: Path) -> None:
+    path = study_file(tmp_path)
+    text = path.read_text().split("sweeps:")[0]
+    for old, new in (("chart", "road speed=high"), ("dim", "road speed=3")):
+        text = text.replace(f"  {old}:", f"  {new}:")
+    path.write_text(text)
+    ran(load_study(path), tmp_path / "out", 1)
+    output = read_output(tmp_path / "out")
+    make_report(output)
+    assert scenario_series(output) == {}
