@@ -18,9 +18,9 @@ from sweep.errors import FailedDesignError, OutputError, SweepError
 from sweep.families import Stopband
 from sweep.journal import SHARDS, Journal, locked
 from sweep.runner import Wishes, estimate, estimate_lines, output_folder, run_study, status_lines, with_plans
-from sweep.runner.jobs import CHUNK
+from sweep.runner.jobs import CHUNK, rules_of
 from sweep.runner.stopping import Stop
-from sweep.runner.sweeping import KILLED
+from sweep.runner.sweeping import KILLED, Sweep
 from sweep.runner.workers import Workers, workers
 from sweep.spaces import Filter
 from sweep.study import Study, load_study
@@ -127,6 +127,27 @@ def test_failing_designs_stop_a_run_or_are_tried_again(plain: Study, whole: pd.D
     assert run_study(study, folder, 1, lambda *_: None, wishes=Wishes(retry_failed=True))
     pd.testing.assert_frame_equal(rows(folder), whole)
     assert not run_study(study, folder, 1, lambda *_: None, wishes=Wishes(retry_failed=True))
+
+
+def test_a_finished_run_gives_its_chunks_back(plain: Study, tmp_path: Path) -> None:
+    named = next(space for space in plain.spaces if space.kind == "design")
+    best = replace(named, axes=((606.0,), (5.0,), (690.0,), (5.0,), (1.0,)))  # dominates swept designs
+    study = replace(plain, spaces=tuple(best if space is named else space for space in plain.spaces))
+    journal = half_done(study, tmp_path)
+    kept = {entry.key: pq.read_table(tmp_path / SHARDS / entry.file) for entry in journal.entries.values()}
+    ran(study, tmp_path, 1)
+    study = with_plans(study, 1, lambda *_: None)
+    sweep = Sweep(study, rules_of(study), journal, Workers(1, Stop()))
+    sweep.refill(tmp_path / "results.parquet")
+    whole = pq.read_table(tmp_path / "results.parquet")
+    fewer = 0
+    for key, table in kept.items():
+        again = journal.table(key, table.schema)
+        assert again is not None
+        assert again.equals(table)
+        ids = table["design_id"].to_pylist()
+        fewer += sum(table["pareto"].to_pylist()) - sum(whole["pareto"].to_pylist()[ids[0] : ids[-1] + 1])
+    assert fewer > 0
 
 
 class StoppedError(Exception):

@@ -76,7 +76,6 @@ def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
     ok = np.array([text == "ok" for text in status])
     own = job.space.violation(points)
     violation = total_violation(columns, rules.constraints, own)
-    eligible = ok & (total_violation(columns, rules.constraints, own, leave_out=rules.front) <= FEASIBLE)
     values = (
         _labels(job)
         | _how(rules.plans.get(job.scenario), len(points))
@@ -86,10 +85,24 @@ def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
     values |= {
         "violation": np.where(ok, violation, np.nan),
         "feasible": ok & (violation <= FEASIBLE),
-        "pareto": non_dominated(np.stack([columns[name] for name in rules.front], axis=1), eligible),
+        "pareto": _local_front(columns, own, ok, rules),
         "status": status,
     }
     return _table(values, len(points), rules.schema)
+
+
+def with_local_front(table: pa.Table, job: Job, rules: Rules) -> pa.Table:
+    """Rows of a job out of a whole table, `pareto` as `run_job` marks them."""
+    columns = {name: table[name].to_numpy() for name in rules.columns}
+    own = job.space.violation(job.space.points(job.start, job.stop))
+    ok = np.array([text == "ok" for text in table["status"].to_pylist()])
+    marks = pa.array(_local_front(columns, own, ok, rules))
+    return table.set_column(table.schema.get_field_index("pareto"), table.schema.field("pareto"), marks)
+
+
+def _local_front(columns: Mapping[str, FloatArray], own: FloatArray, ok: BoolArray, rules: Rules) -> BoolArray:
+    eligible = ok & (total_violation(columns, rules.constraints, own, leave_out=rules.front) <= FEASIBLE)
+    return non_dominated(np.stack([columns[name] for name in rules.front], axis=1), eligible)
 
 
 def job_key(job: Job, fingerprint: str, plan: Plan | None) -> str:

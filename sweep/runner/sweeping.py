@@ -17,7 +17,7 @@ from ..journal import Journal
 from ..setup import Setup
 from ..store import sliced
 from ..study import Study
-from .jobs import Job, Rules, failed_rows, job_key, jobs_of, run_job
+from .jobs import Job, Rules, failed_rows, job_key, jobs_of, run_job, with_local_front
 from .provenance import fingerprint
 from .searching import Progress
 from .workers import Call, WorkerKilledError, Workers, alone
@@ -73,11 +73,16 @@ class Sweep:
         return run_job(job, self._setup(job), self.rules)
 
     def refill(self, results: Path) -> None:
-        """Take the chunks of a finished run into the journal, but for those with failed designs."""
+        """Take the chunks of a finished run into the journal, but for those with failed designs.
+
+        The whole table marks the front over all kinds of rows, a chunk its own, from which that of the swept rows
+        alone follows, too.
+        """
         sizes = [job.stop - job.start for job in self.jobs]
-        for index, table in enumerate(sliced(results, sizes)):
+        for index, (job, table) in enumerate(zip(self.jobs, sliced(results, sizes), strict=True)):
             if not failures(table):
-                self.journal.save(self.keys[index], index, _encoded(table, self.rules.schema), 0, 0.0)
+                chunk = _encoded(with_local_front(table, job, self.rules), self.rules.schema)
+                self.journal.save(self.keys[index], index, chunk, 0, 0.0)
 
     def run(self, progress: Progress, *, fail_fast: bool, retry_failed: bool) -> None:
         """Compute what is not kept yet. Raises FailedDesignError, after its chunk is kept, if it is to `fail_fast`."""
