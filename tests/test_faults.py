@@ -17,6 +17,7 @@ import pytest
 from sweep.errors import FailedDesignError, OutputError, SweepError
 from sweep.families import Stopband
 from sweep.journal import SHARDS, Journal, locked
+from sweep.report import make_report, read_output
 from sweep.runner import Wishes, estimate, estimate_lines, output_folder, run_study, status_lines, with_plans
 from sweep.runner.jobs import CHUNK, rules_of
 from sweep.runner.stopping import Stop
@@ -127,6 +128,25 @@ def test_failing_designs_stop_a_run_or_are_tried_again(plain: Study, whole: pd.D
     assert run_study(study, folder, 1, lambda *_: None, wishes=Wishes(retry_failed=True))
     pd.testing.assert_frame_equal(rows(folder), whole)
     assert not run_study(study, folder, 1, lambda *_: None, wishes=Wishes(retry_failed=True))
+
+
+@pytest.mark.parametrize("all_fail", [False, True])
+def test_a_named_design_that_fails_is_a_row(plain: Study, tmp_path: Path, all_fail: bool) -> None:
+    wish = tmp_path / "wish"
+    named = next(space for space in plain.spaces if space.kind == "design")
+    bad = replace(mischievous(plain, wish).spaces[-1], kind="design", name="bad", axes=((590.0,), *named.axes[1:]))
+    study = replace(plain, spaces=(bad,) if all_fail else (*plain.spaces[:-1], bad))
+
+    def fail_from_here(phase: str, done: int, total: int) -> None:
+        if phase == "scenes planned" and done == total:
+            wish.write_text("fail ")
+
+    run_study(study, tmp_path / "out", 1, fail_from_here)
+    found = rows(tmp_path / "out")
+    failed = found["name"] == "bad"
+    assert found.loc[failed, "status"].str.contains("no such filter").all()
+    assert (found.loc[~failed, "status"] == "ok").all()
+    make_report(read_output(tmp_path / "out"))
 
 
 def test_a_finished_run_gives_its_chunks_back(plain: Study, tmp_path: Path) -> None:

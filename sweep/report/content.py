@@ -201,7 +201,7 @@ def _lights(output: Output) -> dict[str, np.ndarray]:
 def clouds(output: Output, *kinds: str) -> list[list[Cloud]]:
     """Point clouds of the designs of some kinds: a row per design, the first channel against each other one."""
     rows = output.kind(*kinds)
-    rows = rows[rows["scenario"] == next(iter(output.study["scenarios"]))]
+    rows = rows[(rows["scenario"] == next(iter(output.study["scenarios"]))) & (rows["status"] == "ok")]
     found = []
     for row in rows.to_dict("records"):
         points = output.points[output.points["design_id"] == row["design_id"]]
