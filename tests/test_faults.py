@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -130,6 +132,70 @@ def test_failing_designs_stop_a_run_or_are_tried_again(plain: Study, whole: pd.D
     assert not run_study(study, folder, 1, lambda *_: None, wishes=Wishes(retry_failed=True))
 
 
+@pytest.fixture(scope="module")
+def finished(plain: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("finished")
+    ran(plain, folder, 1)
+    return folder
+
+
+def cut(content: bytes) -> bytes:
+    return content[: len(content) // 2]
+
+
+def without_trade_off(content: bytes) -> bytes:
+    return content.replace(b"trade_off", b"trade_of")
+
+
+@pytest.mark.parametrize(
+    ("file", "damage", "computed"),
+    [
+        ("results.parquet", cut, True),
+        ("curves.parquet", cut, False),
+        ("points.parquet", None, False),
+        ("provenance.json", cut, False),
+        ("provenance.json", without_trade_off, False),
+        ("study.resolved.yaml", None, False),
+    ],
+)
+def test_a_damaged_result_is_one_line_and_the_same_command_mends_it(
+    plain: Study,
+    whole: pd.DataFrame,
+    finished: Path,
+    tmp_path: Path,
+    file: str,
+    damage: Callable[[bytes], bytes] | None,
+    computed: bool,
+) -> None:
+    folder = tmp_path / "out"
+    shutil.copytree(finished, folder)
+    if damage is None:
+        (folder / file).unlink()
+    else:
+        (folder / file).write_bytes(damage((folder / file).read_bytes()))
+    assert status_lines(folder)[0].startswith("interrupted")
+    with pytest.raises(OutputError, match=file):
+        read_output(folder)
+    seen = ran(plain, folder, 1)
+    designs = [done for phase, done, _ in seen if phase == "designs"]
+    assert (designs[0] == 0) == computed  # what stands in the table is not computed again
+    pd.testing.assert_frame_equal(rows(folder), whole)
+    read_output(folder)
+    assert status_lines(folder)[0].startswith("finished")
+
+
+def test_a_cut_study_says_how_to_mend_it(plain: Study, finished: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    shutil.copytree(finished, folder)
+    path = folder / "study.resolved.yaml"
+    path.write_text(path.read_text().split("objective:")[0])
+    with pytest.raises(OutputError, match="lacks objective; delete it, and `sweep run` of the study makes it again"):
+        read_output(folder)
+    path.unlink()
+    ran(plain, folder, 1)
+    read_output(folder)
+
+
 @pytest.mark.parametrize("all_fail", [False, True])
 def test_a_named_design_that_fails_is_a_row(plain: Study, tmp_path: Path, all_fail: bool) -> None:
     wish = tmp_path / "wish"
@@ -156,7 +222,7 @@ def test_a_finished_run_gives_its_chunks_back(plain: Study, tmp_path: Path) -> N
     journal = half_done(study, tmp_path)
     kept = {entry.key: pq.read_table(tmp_path / SHARDS / entry.file) for entry in journal.entries.values()}
     ran(study, tmp_path, 1)
-    study = with_plans(study, 1, lambda *_: None)
+    study, journal = with_plans(study, 1, lambda *_: None), Journal(tmp_path)
     sweep = Sweep(study, rules_of(study), journal, Workers(1, Stop()))
     sweep.refill(tmp_path / "results.parquet")
     whole = pq.read_table(tmp_path / "results.parquet")

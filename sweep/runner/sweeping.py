@@ -12,7 +12,7 @@ import joblib
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from ..errors import FailedDesignError, Fault
+from ..errors import FailedDesignError, Fault, OutputError
 from ..journal import Journal
 from ..setup import Setup
 from ..store import sliced
@@ -73,16 +73,24 @@ class Sweep:
         return run_job(job, self._setup(job), self.rules)
 
     def refill(self, results: Path) -> None:
-        """Take the chunks of a finished run into the journal, but for those with failed designs.
+        """Take what the journal lacks out of a result table of this study, but for chunks with failed designs.
 
-        The whole table marks the front over all kinds of rows, a chunk its own, from which that of the swept rows
-        alone follows, too.
+        Up to the first row that cannot be read. The whole table marks the front over all kinds of rows, a chunk its
+        own, from which that of the swept rows alone follows, too.
         """
-        sizes = [job.stop - job.start for job in self.jobs]
-        for index, (job, table) in enumerate(zip(self.jobs, sliced(results, sizes), strict=True)):
-            if not failures(table):
+        if self.journal.entries.keys() >= set(self.keys):
+            return
+        chunks = sliced(results, [job.stop - job.start for job in self.jobs])
+        for index, (job, key) in enumerate(zip(self.jobs, self.keys, strict=True)):
+            try:
+                table = next(chunks)
+                if table.schema != self.rules.schema:
+                    return
+            except OutputError:
+                return
+            if key not in self.journal.entries and not failures(table):
                 chunk = _encoded(with_local_front(table, job, self.rules), self.rules.schema)
-                self.journal.save(self.keys[index], index, chunk, 0, 0.0)
+                self.journal.save(key, index, chunk, 0, 0.0)
 
     def run(self, progress: Progress, *, fail_fast: bool, retry_failed: bool) -> None:
         """Compute what is not kept yet. Raises FailedDesignError, after its chunk is kept, if it is to `fail_fast`."""
