@@ -100,6 +100,20 @@ def test_more_noise_is_never_better() -> None:
             assert values == sorted(values), name
 
 
+@pytest.mark.parametrize("pixel", [{"offset_dn": 4090}, {"bits": 2}])
+def test_readouts_that_are_certain_and_the_same_tell_nothing(pixel: dict[str, float]) -> None:
+    made = scene("patch", "RGGB", {"noise": {"read_noise_e": 3}}, pixel)
+    imager = Imager(replace(made.setup, pixel=made.setup.pixel.model_copy(update={"read_noise_e": 3.0})))
+    mean, variance, _ = imager.read_with_noise(made.curves)
+    certain = variance == 0
+    assert certain.any()
+    assert (mean[certain] == np.rint(mean[certain])).all()
+    states = made.setup.lights.classes
+    found = evaluate(imager, made.curves, states)
+    drawn = recognize(imager, made.curves, states, 200, np.random.default_rng(3))
+    assert 1 - drawn[f"{MOST_LIKELY}_accuracy_worst_state"] <= found["state_error_bound"][0] + 0.05
+
+
 STUDY = """
 study: noisy
 seed: 5
