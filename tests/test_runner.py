@@ -17,7 +17,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from sweep.errors import OutputError
+from sweep.errors import OutputError, StudyError
 from sweep.evaluate import evaluate, quantities
 from sweep.families import Stopband
 from sweep.imaging import imager_of
@@ -291,3 +291,16 @@ def test_a_scenario_may_have_any_name(tmp_path: Path) -> None:
     output = read_output(tmp_path / "out")
     make_report(output)
     assert scenario_series(output) == {}
+
+
+@pytest.mark.parametrize(
+    ("pixel", "scene"),
+    [("{pitch_um: 1.0e+200}", "noise: true"), ("{}", "optics: {f_number: 1.0e+300}")],
+)
+def test_numbers_that_no_float_holds_are_one_line(tmp_path: Path, pixel: str, scene: str) -> None:
+    path = study_file(tmp_path)
+    text = path.read_text().split("sweeps:")[0].replace("lights: tl16", f"lights: tl16\npixel: {pixel}")
+    path.write_text(text.replace("exposure: {kind: white_patch}", f"exposure: {{kind: white_patch}}, {scene}"))
+    with pytest.raises(StudyError, match=r"^scenarios\.chart: .* too large or too small"):
+        ran(load_study(path), tmp_path / "out", 1)
+    assert not (tmp_path / "out").exists()

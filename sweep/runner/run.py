@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from ..errors import InfeasibleError
+from ..errors import InfeasibleError, StudyError
 from ..journal import Journal, locked
 from ..pareto import hypervolume
 from ..store import (
@@ -84,7 +84,11 @@ def run_study(
             return False
         facts = {"command": list(command), "designs": study.n_designs, "workers": crew.count, "backend": crew.backend}
         begin(output, study, facts)
-        study = with_plans(study, crew.count, progress, stop=stop)
+        try:
+            study = with_plans(study, crew.count, progress, stop=stop)
+        except StudyError:
+            discard(output)
+            raise
         run = _Run(study, output, rules_of(study), crew, progress, wishes)
         run.whole(started, command, again=mine)
     return True
