@@ -349,9 +349,23 @@ def test_a_changed_study_goes_beside_the_old_one(plain: Study, tmp_path: Path) -
 
 def test_an_output_that_cannot_be_written_is_one_line(plain: Study, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    for folder in (tmp_path / "file" / "out", Path("/proc/nothing")):
+    for folder in (tmp_path / "file" / "out", Path("/proc/nothing"), tmp_path / ("long" * 100)):
+        assert output_folder(folder, plain) == (folder, None)
         with pytest.raises(OutputError, match="cannot be written"):
             ran(plain, folder, 1)
+
+
+def test_a_disk_without_a_byte_left_is_one_line(plain: Study, tmp_path: Path) -> None:
+    (tmp_path / ".lock").symlink_to("/dev/full")
+    with pytest.raises(OutputError, match="cannot be written"):
+        ran(plain, tmp_path, 1)
+
+
+def test_other_folders_beside_the_chunks_stay(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
+    (tmp_path / SHARDS / ".ipynb_checkpoints").mkdir(parents=True)
+    ran(plain, tmp_path, 1)
+    pd.testing.assert_frame_equal(rows(tmp_path), whole)
+    assert [path.name for path in (tmp_path / SHARDS).iterdir()] == [".ipynb_checkpoints"]
 
 
 def test_threads_give_the_same_rows(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:

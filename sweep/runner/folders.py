@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import count
@@ -37,7 +38,7 @@ def held_by(folder: Path) -> Held | None:
     """
     run = _read(folder / RUN)
     finished = _read(folder / PROVENANCE)
-    if not run and not finished and not (folder / RESULTS).exists():
+    if not run and not finished and not os.path.lexists(folder / RESULTS):
         return None
     mine = str(run.get("fingerprint", finished.get("fingerprint", "")))
     whole = finished.get("fingerprint") == mine and finished.keys() >= set(PROVENANCE_KEYS)
