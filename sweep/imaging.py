@@ -261,10 +261,14 @@ class Imager:
         Pixels are read one by one, so saturation and quantization must be among the setup's methods.
         """
         exposure_s = self.exposure_s(curves)
-        parts = [
-            (self._folded(self.transfer(e)), self._weighed(self.variance_dn(e), self._spread))
-            for e in self._blocks(curves, exposure_s)
-        ]
+        parts = []
+        for electrons in self._blocks(curves, exposure_s):
+            dn, variance_dn = self.transfer(electrons), self.variance_dn(electrons)
+            # A digital number that is the same in all but one of a billion readouts: what is left of its noise is
+            # rounding of the arithmetic, by which two signals would seem told apart for certain.
+            certain = variance_dn < _CERTAIN_DN2
+            dn, variance_dn = np.where(certain, np.rint(dn), dn), np.where(certain, 0.0, variance_dn)
+            parts.append((self._folded(dn), self._weighed(variance_dn, self._spread)))
         mean, variance = (np.concatenate(values) for values in zip(*parts, strict=True))
         return mean, variance, exposure_s
 
@@ -309,6 +313,7 @@ class Imager:
         return quantization.variance_of_rounded(*_moments(electrons, self.pixel))
 
 
+_CERTAIN_DN2 = 1e-9
 _KEPT_IMAGERS = 16
 _imagers: OrderedDict[bytes, Imager] = OrderedDict()
 _one_at_a_time = threading.Lock()

@@ -14,7 +14,7 @@ import pickle
 import socket
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import IO, Any
@@ -134,8 +134,10 @@ class Journal:
         """Drop all of it, after the rows stand in the result table; the journal goes last."""
         if self.folder.is_dir():
             for path in sorted(self.folder.iterdir(), key=lambda path: path.name == _JOURNAL):
-                path.unlink()
-            self.folder.rmdir()
+                if not path.is_dir():  # what someone else put there stays
+                    path.unlink()
+            with suppress(OSError):
+                self.folder.rmdir()
         self.entries.clear()
 
     def _intact(self, key: str) -> bytes | None:
@@ -189,10 +191,7 @@ def locked(output: Path) -> Iterator[None]:
                 if attempt == _ATTEMPTS - 1:
                     raise OutputError(Fault(f"in use by another run ({_said(handle)})", str(output))) from None
                 time.sleep(_PAUSE_S)  # someone may just be looking who holds it
-        handle.seek(0)
-        handle.truncate()
-        handle.write(f"process {os.getpid()} on {socket.gethostname()}")
-        handle.flush()
+        _say(handle, output)
         for left_over in output.rglob(".tmp-*"):
             left_over.unlink(missing_ok=True)
         yield
@@ -210,6 +209,15 @@ def holder(output: Path) -> str | None:
         except OSError:
             return _said(handle)
         return None
+
+
+def _say(handle: IO[str], output: Path) -> None:
+    """Write into the lock who holds it; raises OutputError when the disk refuses."""
+    try:
+        os.ftruncate(handle.fileno(), 0)
+        os.write(handle.fileno(), f"process {os.getpid()} on {socket.gethostname()}".encode())
+    except OSError as error:
+        raise OutputError(Fault(f"cannot be written: {error.strerror or error}", str(output))) from None
 
 
 def _said(handle: IO[str]) -> str:

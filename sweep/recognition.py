@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -64,7 +65,9 @@ def recognize(
     train, test = (part.reshape(-1, part.shape[-1]) for part in (drawn[:half], drawn[half:]))
     for name, make in CLASSIFIERS.items():
         if np.ptp(train, axis=0).any():
-            said = make(len(states)).fit(train, truth[:half].ravel()).predict(test)
+            with warnings.catch_warnings():  # scikit-learn's, where a pixel reads the same in every patch of a state
+                warnings.simplefilter("ignore", UserWarning)
+                said = make(len(states)).fit(train, truth[:half].ravel()).predict(test)
         else:  # every pixel of every patch reads the same
             said = np.full(len(test), states[0])
         found |= dict(_accuracy(name, truth[half:].ravel(), said))

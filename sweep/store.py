@@ -24,6 +24,18 @@ CURVES = "curves.parquet"
 POINTS = "points.parquet"
 RECOGNITION = "recognition.parquet"
 PROVENANCE = "provenance.json"
+PROVENANCE_KEYS = (
+    "designs",
+    "duration_s",
+    "fingerprint",
+    "lights",
+    "plans",
+    "sensor",
+    "trade_off",
+    "warnings",
+    "workers",
+)
+"""What is read there again; one of an earlier version may lack some."""
 RESOLVED = "study.resolved.yaml"
 ROW_GROUP = 131_072
 """Rows that are read and written at once."""
@@ -101,6 +113,15 @@ def write_text(text: str, path: Path) -> None:
 def write_json(data: Mapping[str, Any], path: Path) -> None:
     """Write one JSON file atomically; errors as for `atomic`."""
     write_text(json.dumps(data, indent=2, sort_keys=True, allow_nan=False) + "\n", path)
+
+
+def has_footer(path: Path) -> bool:
+    """Whether there is a Parquet file that was written to its end."""
+    try:
+        pq.read_metadata(path)
+    except (OSError, pa.ArrowException):
+        return False
+    return True
 
 
 def sliced(path: Path, sizes: Iterable[int]) -> Iterator[pa.Table]:

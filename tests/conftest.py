@@ -6,7 +6,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
+
+from sweep.study import Study
 
 from .hard_cases import write_table
 
@@ -44,3 +47,25 @@ def hard_case_rows(request: pytest.FixtureRequest) -> list[dict[str, Any]]:
 @pytest.fixture
 def sweep_command() -> list[str]:
     return [sys.executable, "-m", "sweep"]
+
+
+@pytest.fixture(scope="session")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    """A sweep alone, of two kinds of chunks."""
+    from sweep.study import load_study
+
+    from .test_runner import study_file
+
+    folder = tmp_path_factory.mktemp("study")
+    path = study_file(folder)
+    path.write_text(path.read_text().split("constraints:")[0])
+    return load_study(path)
+
+
+@pytest.fixture(scope="session")
+def whole(plain: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
+    from .test_runner import ran
+
+    folder = tmp_path_factory.mktemp("whole")
+    ran(plain, folder, 1)
+    return pd.read_parquet(folder / "results.parquet")

@@ -15,51 +15,17 @@ import pyarrow.parquet as pq
 import pytest
 
 from sweep.errors import FailedDesignError, OutputError, SweepError
-from sweep.families import Stopband
 from sweep.journal import SHARDS, Journal, locked
-from sweep.runner import Wishes, estimate, estimate_lines, output_folder, run_study, status_lines
+from sweep.report import make_report, read_output
+from sweep.runner import Wishes, estimate, estimate_lines, output_folder, run_study, status_lines, with_plans
 from sweep.runner.jobs import CHUNK
 from sweep.runner.stopping import Stop
 from sweep.runner.sweeping import KILLED
 from sweep.runner.workers import Workers, workers
-from sweep.spaces import Filter
 from sweep.study import Study, load_study
 
+from .mischief import StoppedError, half_done, mischievous, rows
 from .test_runner import ran, started, study_file
-
-
-class Mischief(Stopband):
-    """A stopband that does as its file says where its left edge is at 590 nm: `kill N` (N times), or `fail`."""
-
-    file: Path
-    separable = None  # its curves are asked for
-
-    def curves(self, x: np.ndarray) -> np.ndarray:
-        if (x[:, 0] == 590).any() and self.file.exists():
-            wish = self.file.read_text().split()
-            with self.file.open("a") as handle:
-                handle.write("done\n")
-            if wish[0] == "kill" and len(wish) <= int(wish[1]) + 1:
-                os.kill(os.getpid(), signal.SIGKILL)
-            if wish[0] == "fail":
-                raise ValueError("no such filter")
-        return super().curves(x)
-
-
-@pytest.fixture(scope="module")
-def plain(tmp_path_factory: pytest.TempPathFactory) -> Study:
-    """A sweep alone, of two kinds of chunks."""
-    folder = tmp_path_factory.mktemp("study")
-    path = study_file(folder)
-    path.write_text(path.read_text().split("constraints:")[0])
-    return load_study(path)
-
-
-@pytest.fixture(scope="module")
-def whole(plain: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
-    folder = tmp_path_factory.mktemp("whole")
-    ran(plain, folder, 1)
-    return pd.read_parquet(folder / "results.parquet")
 
 
 @pytest.fixture(scope="module")
@@ -67,20 +33,6 @@ def unharmed(plain: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataF
     """What a mischievous study gives when its file is missing."""
     folder = tmp_path_factory.mktemp("unharmed")
     ran(mischievous(plain, folder / "missing"), folder, 1)
-    return pd.read_parquet(folder / "results.parquet")
-
-
-def mischievous(study: Study, file: Path) -> Study:
-    """The study with a sweep whose first left edge does what `file` says."""
-    sweep = study.spaces[-1]
-    assert sweep.filter is not None
-    family = Mischief(study.grid.nodes_nm, study.sensor.qe["Y"], study.sensor.qe["G"])
-    family.file = file
-    made = replace(sweep, filter=Filter(family, sweep.filter.channels, sweep.filter.base, sweep.filter.target))
-    return replace(study, spaces=(*study.spaces[:-1], made))
-
-
-def rows(folder: Path) -> pd.DataFrame:
     return pd.read_parquet(folder / "results.parquet")
 
 
@@ -110,6 +62,18 @@ def test_a_design_that_kills_its_worker_is_a_row(plain: Study, tmp_path: Path) -
     pd.testing.assert_frame_equal(found.loc[~killed, same].astype(words), fine.loc[~killed, same].astype(words))
 
 
+def test_a_worker_that_is_killed_while_scenes_are_planned_costs_nothing(plain: Study, tmp_path: Path) -> None:
+    wish = tmp_path / "wish"
+    wish.write_text("kill 1 ")
+    study = mischievous(plain, wish)
+    single = replace(study.spaces[-1], axes=((590.0,), (5.0,), (660.0,), (5.0,), (1.0,)))  # a plan looks at its curves
+    study = replace(study, spaces=(*study.spaces[:-1], single))
+    plans = with_plans(study, 2, lambda *_: None).plans
+    assert wish.read_text().count("done") >= 2
+    wish.unlink()
+    assert plans == with_plans(study, 1, lambda *_: None).plans
+
+
 def test_failing_designs_stop_a_run_or_are_tried_again(plain: Study, unharmed: pd.DataFrame, tmp_path: Path) -> None:
     wish = tmp_path / "wish"
     wish.write_text("fail ")
@@ -126,46 +90,23 @@ def test_failing_designs_stop_a_run_or_are_tried_again(plain: Study, unharmed: p
     assert not run_study(study, folder, 1, lambda *_: None, wishes=Wishes(retry_failed=True))
 
 
-class StoppedError(Exception):
-    pass
+@pytest.mark.parametrize("all_fail", [False, True])
+def test_a_named_design_that_fails_is_a_row(plain: Study, tmp_path: Path, all_fail: bool) -> None:
+    wish = tmp_path / "wish"
+    named = next(space for space in plain.spaces if space.kind == "design")
+    bad = replace(mischievous(plain, wish).spaces[-1], kind="design", name="bad", axes=((590.0,), *named.axes[1:]))
+    study = replace(plain, spaces=(bad,) if all_fail else (*plain.spaces[:-1], bad))
 
+    def fail_from_here(phase: str, done: int, total: int) -> None:
+        if phase == "scenes planned" and done == total:
+            wish.write_text("fail ")
 
-def half_done(study: Study, folder: Path) -> Journal:
-    """A run that was broken off after two whole chunks."""
-
-    def stop(phase: str, done: int, _total: int) -> None:
-        if phase == "designs" and done > 2 * CHUNK:
-            raise StoppedError
-
-    with pytest.raises(StoppedError):
-        run_study(study, folder, 1, stop)
-    return Journal(folder)
-
-
-def test_damaged_shards_are_computed_again_and_named(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
-    journal = half_done(plain, tmp_path)
-    large = [tmp_path / SHARDS / entry.file for entry in journal.entries.values() if entry.rows > 1000]
-    content = bytearray(large[0].read_bytes())
-    content[len(content) // 2] ^= 0xFF
-    large[0].write_bytes(content)
-    large[1].write_bytes(large[1].read_bytes()[:-7])
-    (tmp_path / SHARDS / ".tmp-1-left-over").write_bytes(b"x")
-    ran(plain, tmp_path, 1)
-    pd.testing.assert_frame_equal(rows(tmp_path), whole)
-    said = (tmp_path / "provenance.json").read_text()
-    assert said.count("was damaged on the disk and is computed again") == 1  # the torn one was missed from the start
-    assert not (tmp_path / SHARDS).exists()
-
-
-@pytest.mark.parametrize("cut", [1, 20, 200])
-def test_a_torn_journal_costs_its_last_line_alone(plain: Study, whole: pd.DataFrame, tmp_path: Path, cut: int) -> None:
-    known = len(half_done(plain, tmp_path).entries)
-    path = tmp_path / SHARDS / "_journal.jsonl"
-    path.write_bytes(path.read_bytes()[:-cut])
-    left = len(Journal(tmp_path).entries)
-    assert left == (known if cut == 1 else known - 1)
-    ran(plain, tmp_path, 1)
-    pd.testing.assert_frame_equal(rows(tmp_path), whole)
+    run_study(study, tmp_path / "out", 1, fail_from_here)
+    found = rows(tmp_path / "out")
+    failed = found["name"] == "bad"
+    assert found.loc[failed, "status"].str.contains("no such filter").all()
+    assert (found.loc[~failed, "status"] == "ok").all()
+    make_report(read_output(tmp_path / "out"))
 
 
 def test_a_clock_that_goes_back_changes_nothing(
@@ -237,11 +178,10 @@ def test_a_changed_study_goes_beside_the_old_one(plain: Study, tmp_path: Path) -
     assert output_folder(base, load_study(path))[0] == tmp_path / "tiny-3"
 
 
-def test_an_output_that_cannot_be_written_is_one_line(plain: Study, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    for folder in (tmp_path / "file" / "out", Path("/proc/nothing")):
-        with pytest.raises(OutputError, match="cannot be written"):
-            ran(plain, folder, 1)
+def test_a_disk_without_a_byte_left_is_one_line(plain: Study, tmp_path: Path) -> None:
+    (tmp_path / ".lock").symlink_to("/dev/full")
+    with pytest.raises(OutputError, match="cannot be written"):
+        ran(plain, tmp_path, 1)
 
 
 def test_threads_give_the_same_rows(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:

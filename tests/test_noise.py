@@ -100,6 +100,20 @@ def test_more_noise_is_never_better() -> None:
             assert values == sorted(values), name
 
 
+@pytest.mark.parametrize("pixel", [{"offset_dn": 4090}, {"bits": 2}])
+def test_readouts_that_are_certain_and_the_same_tell_nothing(pixel: dict[str, float]) -> None:
+    made = scene("patch", "RGGB", {"noise": {"read_noise_e": 3}}, pixel)
+    imager = Imager(replace(made.setup, pixel=made.setup.pixel.model_copy(update={"read_noise_e": 3.0})))
+    mean, variance, _ = imager.read_with_noise(made.curves)
+    certain = variance == 0
+    assert certain.any()
+    assert (mean[certain] == np.rint(mean[certain])).all()
+    states = made.setup.lights.classes
+    found = evaluate(imager, made.curves, states)
+    drawn = recognize(imager, made.curves, states, 200, np.random.default_rng(3))
+    assert 1 - drawn[f"{MOST_LIKELY}_accuracy_worst_state"] <= found["state_error_bound"][0] + 0.05
+
+
 STUDY = """
 study: noisy
 seed: 5
@@ -170,3 +184,13 @@ def test_faults(tmp_path: Path, old: str, new: str, said: str) -> None:
     with pytest.raises(StudyError) as error:
         load_study(path)
     assert said in "\n".join(str(fault) for fault in error.value.faults)
+
+
+def test_columns_of_noise_must_differ(tmp_path: Path) -> None:
+    (tmp_path / "led.csv").write_text("wavelength_nm,x\n400,1\n700,1\n")
+    path = tmp_path / "noisy.yaml"
+    lights = "lights: {files: [{file: led.csv, quantity: energy, signals: {bound_a: [x], a: [x], b: [x]}}]}"
+    states = "recognition: {patches: 20}\nobjective: csd_a_b\n"
+    path.write_text(STUDY.split("recognition:", maxsplit=1)[0].replace("lights: tl16", lights) + states)
+    with pytest.raises(StudyError, match="the pairs bound_a/b and a/b share the column error_bound_a_b"):
+        load_study(path)

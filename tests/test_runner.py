@@ -17,12 +17,13 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from sweep.errors import OutputError
+from sweep.errors import OutputError, StudyError
 from sweep.evaluate import evaluate, quantities
 from sweep.families import Stopband
 from sweep.imaging import imager_of
 from sweep.journal import Journal, locked
 from sweep.report import make_report, read_output
+from sweep.report.content import scenario_series
 from sweep.runner import run_study
 from sweep.runner.jobs import CHUNK, Job, jobs_of, rules_of, run_job
 from sweep.spaces import Filter, Space
@@ -280,3 +281,28 @@ def test_worst_cases_and_combined_objectives_are_columns(tmp_path: Path) -> None
     assert answer["objective"] >= frame[frame["feasible"] & (frame["kind"] == "sweep")]["objective"].max() - 4
     make_report(read_output(tmp_path / "out"))
     assert "smallest of 2 worst_csd_yellow_red, 300 sensitivity" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_a_scenario_may_have_any_name(tmp_path: Path) -> None:
+    path = study_file(tmp_path)
+    text = path.read_text().split("sweeps:")[0]
+    for old, new in (("chart", "road speed=high"), ("dim", "road speed=3")):
+        text = text.replace(f"  {old}:", f"  {new}:")
+    path.write_text(text)
+    ran(load_study(path), tmp_path / "out", 1)
+    output = read_output(tmp_path / "out")
+    make_report(output)
+    assert scenario_series(output) == {}
+
+
+@pytest.mark.parametrize(
+    ("pixel", "scene"),
+    [("{pitch_um: 1.0e+200}", "noise: true"), ("{}", "optics: {f_number: 1.0e+300}")],
+)
+def test_numbers_that_no_float_holds_are_one_line(tmp_path: Path, pixel: str, scene: str) -> None:
+    path = study_file(tmp_path)
+    text = path.read_text().split("sweeps:")[0].replace("lights: tl16", f"lights: tl16\npixel: {pixel}")
+    path.write_text(text.replace("exposure: {kind: white_patch}", f"exposure: {{kind: white_patch}}, {scene}"))
+    with pytest.raises(StudyError, match=r"^scenarios\.chart: .* too large or too small"):
+        ran(load_study(path), tmp_path / "out", 1)
+    assert not (tmp_path / "out").exists()

@@ -97,10 +97,20 @@ def scenario_series(output: Output) -> dict[tuple[str, str], dict[str, float]]:
     for name in output.study["scenarios"]:
         base, _, last = str(name).rpartition(" ")
         key, equals, number = last.partition("=")
-        if base and equals and "=" not in base:
-            groups.setdefault((base, key), {})[name] = float(number)
+        value = _number(number)
+        if base and equals and "=" not in base and value is not None:
+            groups.setdefault((base, key), {})[name] = value
     ordered = {group: dict(sorted(found.items(), key=lambda item: item[1])) for group, found in groups.items()}
     return {group: found for group, found in ordered.items() if len(found) > 1}
+
+
+def _number(text: str) -> float | None:
+    """A finite number, or None: a scenario that a person named may have an `=` followed by anything."""
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if np.isfinite(value) else None
 
 
 def over_series(rows: pd.DataFrame, scenarios: Mapping[str, float], column: str) -> dict[str, np.ndarray]:
@@ -191,7 +201,7 @@ def _lights(output: Output) -> dict[str, np.ndarray]:
 def clouds(output: Output, *kinds: str) -> list[list[Cloud]]:
     """Point clouds of the designs of some kinds: a row per design, the first channel against each other one."""
     rows = output.kind(*kinds)
-    rows = rows[rows["scenario"] == next(iter(output.study["scenarios"]))]
+    rows = rows[(rows["scenario"] == next(iter(output.study["scenarios"]))) & (rows["status"] == "ok")]
     found = []
     for row in rows.to_dict("records"):
         points = output.points[output.points["design_id"] == row["design_id"]]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -18,8 +18,20 @@ from ..errors import Fault, OutputError
 from ..metrics import CSD
 from ..objectives import Objective
 from ..scenes import Geometry
-from ..store import CURVES, FRONT, POINTS, PROVENANCE, RECOGNITION, RESOLVED, RESULTS, read_table
+from ..store import (
+    CURVES,
+    FRONT,
+    POINTS,
+    PROVENANCE,
+    PROVENANCE_KEYS,
+    RECOGNITION,
+    RESOLVED,
+    RESULTS,
+    read_table,
+)
 from .thinning import Counts, thinned
+
+_STUDY_KEYS = ("study", "seed", "wavelengths", "scenarios", "objective")
 
 
 @dataclass(frozen=True)
@@ -89,8 +101,8 @@ def read_output(folder: Path) -> Output:
     """Read a finished run; raises OutputError when a file is missing or damaged."""
     if not (folder / RESULTS).is_file():
         raise OutputError(Fault("no finished run here", str(folder), allowed=f"a folder with {RESULTS}"))
-    study = _mapping(folder / RESOLVED, lambda text: YAML(typ="safe").load(text))
-    provenance = _mapping(folder / PROVENANCE, json.loads)
+    study = _mapping(folder / RESOLVED, lambda text: YAML(typ="safe").load(text), _STUDY_KEYS)
+    provenance = _mapping(folder / PROVENANCE, json.loads, PROVENANCE_KEYS)
     objective = Objective.model_validate(study["objective"]).column
     table, counts = thinned(folder / RESULTS, [objective, *provenance["trade_off"]])
     curves, points = (read_table(folder / name).to_pandas() for name in (CURVES, POINTS))
@@ -100,11 +112,15 @@ def read_output(folder: Path) -> Output:
     return Output(folder, study, provenance, table, counts, curves, points, front, recognition)
 
 
-def _mapping(path: Path, parse: Any) -> dict[str, Any]:
+def _mapping(path: Path, parse: Any, keys: Sequence[str]) -> dict[str, Any]:
     try:
         found = parse(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, YAMLError) as error:
         raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
     if not isinstance(found, dict):
         raise OutputError(Fault("not a mapping", str(path)))
+    lacking = [key for key in keys if key not in found]
+    if lacking:
+        again = "delete it, and `sweep run` of the study makes it again"
+        raise OutputError(Fault(f"lacks {', '.join(lacking)}; {again}", str(path)))
     return found

@@ -54,7 +54,10 @@ def thinned(path: Path, order: Sequence[str]) -> tuple[pd.DataFrame, Counts]:
     Kept are all rows that are no sweep, the whole Pareto front, the best feasible designs by `order` (columns, all
     maximized) and of the others every n-th.
     """
-    total = int(pq.read_metadata(path).num_rows) if path.is_file() else 0
+    try:
+        total = int(pq.read_metadata(path).num_rows)
+    except (OSError, pa.ArrowException) as error:
+        raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
     every = max(1, -(-total // MOST_ROWS))
     kept: list[pa.Table] = []
     best: pa.Table | None = None

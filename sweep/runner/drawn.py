@@ -31,6 +31,10 @@ def curves_table(study: Study, rows: pd.DataFrame, limit: Limit | None) -> pa.Ta
 
 def points_table(study: Study, rows: pd.DataFrame) -> pa.Table:
     """Digital numbers of every signal in every channel of the drawn designs, a row each."""
+    text, number = pa.string(), pa.float64()
+    schema = pa.schema(
+        [("design_id", pa.int64()), ("signal_type", text), ("signal", text), ("channel", text), ("dn", number)]
+    )
     found: list[dict[str, Any]] = []
     for row in _drawn(study, rows):
         space, curves = row_curves(study, row)
@@ -47,12 +51,16 @@ def points_table(study: Study, rows: pd.DataFrame) -> pa.Table:
                         "dn": float(values[signal]),
                     }
                 )
-    return pa.Table.from_pylist(found)
+    return pa.Table.from_pylist(found, schema=schema)
 
 
 def _drawn(study: Study, rows: pd.DataFrame) -> list[dict[Hashable, Any]]:
-    """Of the highlights those in the first scenario, and the search's answer."""
-    shown = rows[(rows["scenario"] == next(iter(study.scenarios))) | (rows["kind"] == "search")]
+    """Of the highlights those in the first scenario, and the search's answer.
+
+    Not those that failed: what killed a worker would kill this process.
+    """
+    first = (rows["scenario"] == next(iter(study.scenarios))) | (rows["kind"] == "search")
+    shown = rows[first & (rows["status"] == "ok")]
     return shown.to_dict("records")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import count
@@ -12,7 +13,7 @@ from typing import Any
 
 from ..errors import Fault, OutputError
 from ..journal import LOCK
-from ..store import PROVENANCE, RESULTS, write_json
+from ..store import CURVES, POINTS, PROVENANCE, PROVENANCE_KEYS, RESOLVED, RESULTS, has_footer, write_json
 from ..study import Study
 from .provenance import fingerprint, identity
 
@@ -30,13 +31,19 @@ class Held:
 
 
 def held_by(folder: Path) -> Held | None:
-    """The run in a folder, or None; a folder with results of unknown origin has an empty fingerprint."""
+    """The run in a folder, or None; a folder with results of unknown origin has an empty fingerprint.
+
+    A run is finished when all that its report needs is there; where something was deleted or cut, the same command
+    makes it again.
+    """
     run = _read(folder / RUN)
     finished = _read(folder / PROVENANCE)
-    if not run and not finished and not (folder / RESULTS).exists():
+    if not run and not finished and not os.path.lexists(folder / RESULTS):
         return None
     mine = str(run.get("fingerprint", finished.get("fingerprint", "")))
-    whole = (folder / RESULTS).is_file() and finished.get("fingerprint") == mine
+    whole = finished.get("fingerprint") == mine and finished.keys() >= set(PROVENANCE_KEYS)
+    whole = whole and (folder / RESOLVED).is_file()
+    whole = whole and all(has_footer(folder / name) for name in (RESULTS, CURVES, POINTS))
     return Held(mine, run.get("identity", {}), whole)
 
 

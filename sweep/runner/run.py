@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from ..errors import InfeasibleError
+from ..errors import InfeasibleError, StudyError
 from ..journal import Journal, locked
 from ..pareto import hypervolume
 from ..store import (
@@ -26,6 +26,7 @@ from ..store import (
     RESOLVED,
     RESULTS,
     SEARCH_LOG,
+    has_footer,
     write_json,
     write_table,
     write_text,
@@ -77,14 +78,19 @@ def run_study(
     started = time.monotonic()
     with stop_on_signals() as stop, workers(Workers(n_jobs, stop, backend, scheduler)) as crew, locked(output):
         held = held_by(output)
-        done = held is not None and held.finished and held.fingerprint == fingerprint(study)
+        mine = held is not None and held.fingerprint == fingerprint(study)
+        done = mine and held is not None and held.finished
         if done and not (wishes.retry_failed and _failed(output)):
             return False
         facts = {"command": list(command), "designs": study.n_designs, "workers": crew.count, "backend": crew.backend}
         begin(output, study, facts)
-        study = with_plans(study, crew.count, progress)
+        try:
+            study = with_plans(study, crew.count, progress, stop=stop)
+        except StudyError:
+            discard(output)
+            raise
         run = _Run(study, output, rules_of(study), crew, progress, wishes)
-        run.whole(started, command, again=done)
+        run.whole(started, command, again=mine)
     return True
 
 
@@ -134,12 +140,12 @@ class _Run:
     facts: dict[str, Any] = field(default_factory=dict)
 
     def whole(self, started: float, command: Sequence[str], *, again: bool) -> None:
-        """Search, sweep, and write everything; `again`: of a finished run, the chunks with failed designs."""
+        """Search, sweep, and write everything; `again`: the folder may have this study's results already."""
         study, output = self.study, self.output
         journal = Journal(output)
         journal.check()
         sweep = Sweep(study, self.rules, journal, self.crew)
-        if again:
+        if again and has_footer(output / RESULTS):
             sweep.refill(output / RESULTS)
         answer = self._searched(journal, sweep.fingerprint)
         sweep.run(self.progress, fail_fast=self.wishes.fail_fast, retry_failed=self.wishes.retry_failed)

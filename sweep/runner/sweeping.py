@@ -11,7 +11,7 @@ from pathlib import Path
 import joblib
 import pyarrow as pa
 
-from ..errors import FailedDesignError, Fault
+from ..errors import FailedDesignError, Fault, OutputError
 from ..journal import Journal, Shard
 from ..setup import Setup
 from ..store import sliced
@@ -66,12 +66,25 @@ class Sweep:
         return run_job(job, self._setup(job), self.rules)
 
     def refill(self, results: Path) -> None:
-        """Take the chunks of a finished run into the journal, but for those with failed designs."""
-        sizes = [job.stop - job.start for job in self.jobs]
-        for index, table in enumerate(sliced(results, sizes)):
-            shard = Shard.of(with_local_front(table, self.jobs[index], self.rules), 0.0)
-            if not shard.failed:
-                self.journal.save(self.keys[index], index, shard)
+        """Take what the journal lacks out of a result table of this study, but for chunks with failed designs.
+
+        Up to the first row that cannot be read. The whole table marks the front over all kinds of rows, a chunk its
+        own, from which that of the swept rows alone follows, too.
+        """
+        if self.journal.entries.keys() >= set(self.keys):
+            return
+        chunks = sliced(results, [job.stop - job.start for job in self.jobs])
+        for index, (job, key) in enumerate(zip(self.jobs, self.keys, strict=True)):
+            try:
+                table = next(chunks)
+                if table.schema != self.rules.schema:
+                    return
+            except OutputError:
+                return
+            if key not in self.journal.entries:
+                shard = Shard.of(with_local_front(table, job, self.rules), 0.0)
+                if not shard.failed:
+                    self.journal.save(key, index, shard)
 
     def run(self, progress: Progress, *, fail_fast: bool, retry_failed: bool) -> None:
         """Compute what is not kept yet. Raises FailedDesignError, after its chunk is kept, if it is to `fail_fast`."""

@@ -10,6 +10,7 @@ import numpy as np
 from ..constraints import Bound
 from ..datasets.lights import Lights
 from ..effects.bounds import Box
+from ..errors import Fault, StudyError
 from ..evaluate import BEST_PLACE, WORST, noise_quantities, quantities, shiftable
 from ..filters import SensorCurves
 from ..metrics import CSD, Pair, class_pairs, csd_name
@@ -152,11 +153,18 @@ class Study:
         return Box(setup, low, high, space.size + evaluations)
 
     def plan(self, scenario: str, tolerance_dn: float | None = None) -> Plan:
-        """The cheapest plan of a scenario that holds for all designs of the study."""
-        boxes = [self.box(space, scenario) for space in self.spaces]
-        used = [box for box in boxes if box.n_designs]
+        """The cheapest plan of a scenario that holds for all designs of the study.
+
+        Raises StudyError for numbers that are allowed one by one, but that no float can hold together.
+        """
         tolerance = self.section.tolerance_dn if tolerance_dn is None else tolerance_dn
-        return Planner(used or boxes, for_noise=bool(self.states)).plan(scenario, tolerance)
+        try:
+            boxes = [self.box(space, scenario) for space in self.spaces]
+            used = [box for box in boxes if box.n_designs]
+            return Planner(used or boxes, for_noise=bool(self.states)).plan(scenario, tolerance)
+        except ArithmeticError:
+            problem = "the numbers of this scene, or of the pixel, are too large or too small to compute with"
+            raise StudyError(Fault(problem, key=f"scenarios.{scenario}")) from None
 
     def problem(self, search: Search) -> Problem:
         """The search as a mathematical problem."""

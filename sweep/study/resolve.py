@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ..datasets.lights import Lights
-from ..discrimination import CNR, D_PRIME
+from ..discrimination import CNR, D_PRIME, noise_names
 from ..effects import blur
 from ..errors import StudyError, SweepError
 from ..evaluate import DESIGNED, WORST, noise_quantities, shiftable
-from ..metrics import class_pairs, csd_name
+from ..metrics import Pair, class_pairs, csd_name
 from ..mosaics import Mosaic
 from ..scenes import OBJECT_RESOLUTION, WhitePatchExposure
 from ..search import ALGORITHMS
@@ -102,6 +102,12 @@ class _Resolver:
         asked = self.section.recognition
         if asked is None:
             return
+        seen: dict[str, Pair] = {}
+        for pair in class_pairs(asked.states or lights.classes):
+            for column in noise_names(pair):  # error_bound_a_b: the bound of a and b, or the error of bound_a and b
+                if seen.setdefault(column, pair) != pair and len(set(pair)) == 2:
+                    problem = f"the pairs {'/'.join(seen[column])} and {'/'.join(pair)} share the column {column}"
+                    self.add(("lights",), problem, None, "other names of signal types")
         for name in asked.states or ():
             if name not in lights.classes:
                 self.unknown(("recognition", "states"), "signal type", name, list(lights.classes))

@@ -1,0 +1,67 @@
+"""Studies that misbehave on demand, and runs that are broken off."""
+
+from __future__ import annotations
+
+import os
+import signal
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sweep.families import Stopband
+from sweep.journal import Journal
+from sweep.runner import run_study
+from sweep.runner.jobs import CHUNK
+from sweep.spaces import Filter
+from sweep.study import Study
+
+
+class Mischief(Stopband):
+    """A stopband that does as its file says where its left edge is at 590 nm: `kill N` (N times), or `fail`."""
+
+    file: Path
+    separable = None  # its curves are asked for
+
+    def curves(self, x: np.ndarray) -> np.ndarray:
+        if (x[:, 0] == 590).any() and self.file.exists():
+            wish = self.file.read_text().split()
+            with self.file.open("a") as handle:
+                handle.write("done\n")
+            if wish[0] == "kill" and len(wish) <= int(wish[1]) + 1:
+                os.kill(os.getpid(), signal.SIGKILL)
+            if wish[0] == "fail":
+                raise ValueError("no such filter")
+        return super().curves(x)
+
+
+def mischievous(study: Study, file: Path) -> Study:
+    """The study with a sweep whose first left edge does what `file` says."""
+    sweep = study.spaces[-1]
+    assert sweep.filter is not None
+    family = Mischief(study.grid.nodes_nm, study.sensor.qe["Y"], study.sensor.qe["G"])
+    family.file = file
+    made = replace(sweep, filter=Filter(family, sweep.filter.channels, sweep.filter.base, sweep.filter.target))
+    return replace(study, spaces=(*study.spaces[:-1], made))
+
+
+def rows(folder: Path) -> pd.DataFrame:
+    return pd.read_parquet(folder / "results.parquet")
+
+
+class StoppedError(Exception):
+    pass
+
+
+def half_done(study: Study, folder: Path) -> Journal:
+    """A run that was broken off after two whole chunks."""
+
+    def stop(phase: str, done: int, _total: int) -> None:
+        if phase == "designs" and done > 2 * CHUNK:
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        run_study(study, folder, 1, stop)
+    return Journal(folder)
