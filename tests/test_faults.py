@@ -8,11 +8,13 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import joblib
 import numpy as np
 import pandas as pd
 import psutil
 import pyarrow.parquet as pq
 import pytest
+from threadpoolctl import threadpool_info
 
 from sweep.errors import FailedDesignError, OutputError, SweepError
 from sweep.journal import SHARDS, Journal, locked
@@ -187,6 +189,20 @@ def test_a_disk_without_a_byte_left_is_one_line(plain: Study, tmp_path: Path) ->
 def test_threads_give_the_same_rows(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
     run_study(plain, tmp_path, 2, lambda *_: None, backend="threading")
     pd.testing.assert_frame_equal(rows(tmp_path), whole)
+
+
+def most_threads(pause_s: float) -> int:
+    found = []
+    for _ in range(20):
+        time.sleep(pause_s)
+        found += [library["num_threads"] for library in threadpool_info()]
+    return max(found)
+
+
+def test_threads_beside_each_other_do_not_give_their_libraries_more() -> None:
+    with workers(Workers(2, Stop(), "threading")) as crew:
+        calls = (joblib.delayed(most_threads)(0.001 * (i % 3 + 1)) for i in range(20))
+        assert set(crew(calls)) == {1}
 
 
 def test_workers_never_outnumber_the_cores(plain: Study, tmp_path: Path) -> None:

@@ -113,6 +113,8 @@ def workers(how: Workers) -> Iterator[Workers]:
             stack.enter_context(_dask_client(how.scheduler))
         elif how.backend == "loky":
             settings = {"inner_max_num_threads": 1, "initializer": leave_signals_to_the_parent}
+        else:  # a call that ends gives back what it found, also to the calls beside it: let that be one thread
+            stack.enter_context(threadpool_limits(1))
         stack.enter_context(joblib.parallel_config(how.backend, **settings))
         yield how
 
