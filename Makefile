@@ -3,7 +3,7 @@
 # make test                  install and run the tests
 # make slow                  run the tests that take minutes
 # make check                 ruff, mypy --strict
-# make accuracy              run the hard cases, measure what accuracy costs in time, report in outputs/accuracy
+# make accuracy              run the hard cases, measure what accuracy costs in time, outputs/accuracy/accuracy.html
 # make bench                 measure speed, JSON in outputs/bench
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
   $$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)

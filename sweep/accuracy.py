@@ -69,7 +69,7 @@ def accuracy(
         lines.append(f"{passed} of {len(hard)} hard cases are within their allowed error.")
     images = {name: files["png"] for name, files in figures.items()}
     make_accuracy_report(output, AccuracyReport(study.name, study.section.question, lines, images, table, knobs, hard))
-    return [*lines, f"Files: {output}/: report.html, {TABLE}, {FIGURE}.png, {KNOBS_TABLE}, {KNOBS_FIGURE}.png."]
+    return [*lines, f"Files: {output}/: accuracy.html, {TABLE}, {FIGURE}.png, {KNOBS_TABLE}, {KNOBS_FIGURE}.png."]
 
 
 def _ladder(study: Study, progress: Progress, most_designs: int) -> Iterator[dict[str, Any]]:

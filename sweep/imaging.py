@@ -12,16 +12,13 @@ import threading
 from collections import Counter, OrderedDict
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
-from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import DTypeLike
-from scipy.interpolate import CubicSpline
 
 from .arrays import FloatArray
 from .blocks import Block
-from .effects import flicker, noise, quadrature, quantization, saturation
+from .effects import flicker, noise_table, quadrature, quantization, saturation
 from .effects.kernel import make_kernel
 from .scenes import WhitePatchExposure
 from .sensor import Pixel, unquantized
@@ -39,11 +36,6 @@ _BLOCK = 2_000_000
 """Values of a block of pixels that are held at once."""
 _KEPT = 15_000_000
 """Largest table of signals times kernel that is kept."""
-_TABLE_NODES = 2048
-"""Nodes of each piece of the table of readouts."""
-_BEND_SIGMAS = 16.0
-_MOST_E = 1e30
-"""More electrons than this are as many as this."""
 
 
 @dataclass(frozen=True)
@@ -298,7 +290,7 @@ class Imager:
             dn = unquantized(electrons, pixel)
         elif noisy and methods.noise == "expected":
             self.work["noise"] += electrons.size
-            dn = _moments(electrons, pixel)[0]
+            dn = noise_table.moments(electrons, pixel)[0]
         else:
             self.work["saturation"] += electrons.size
             dn = unquantized(saturation.clipped(electrons, pixel), pixel)
@@ -310,7 +302,7 @@ class Imager:
     def variance_dn(self, electrons: FloatArray) -> FloatArray:
         """Variance of the units' digital numbers, DN^2, with their rounding."""
         self.work["variance"] += electrons.size
-        return quantization.variance_of_rounded(*_moments(electrons, self.pixel))
+        return quantization.variance_of_rounded(*noise_table.moments(electrons, self.pixel))
 
 
 _CERTAIN_DN2 = 1e-9
@@ -337,36 +329,3 @@ def smooth_imager(setup: Setup) -> Imager:
     if setup.methods.flicker == "fine":  # of a straight response the ends are the extremes
         straight["flicker"] = "ends"
     return imager_of(replace(setup, methods=Methods(**{**asdict(setup.methods), **straight})))
-
-
-def _moments(electrons: FloatArray, pixel: Pixel) -> tuple[FloatArray, FloatArray]:
-    """`noise.moments_dn` from a table over the square root of the signal, in which both are smooth."""
-    electrons = np.minimum(electrons, _MOST_E)
-    most = np.nanmax(electrons, initial=1.0)
-    brightest = float(2 ** np.ceil(np.log2(most)))
-    mean, variance = np.moveaxis(_moments_table(pixel, brightest)(np.sqrt(electrons + pixel.read_noise_e**2)), -1, 0)
-    return mean, np.maximum(variance, 0.0)
-
-
-@lru_cache(maxsize=8)
-def _moments_table(pixel: Pixel, brightest_e: float) -> CubicSpline:
-    read = pixel.read_noise_e
-    roots = _table_roots(pixel, np.sqrt(brightest_e + read**2))
-    return CubicSpline(roots, np.stack(noise.moments_dn(np.maximum(roots**2 - read**2, 0.0), pixel), axis=1))
-
-
-def _table_roots(pixel: Pixel, last: float) -> FloatArray:
-    """Nodes from the dark to `last`: dense where the readout bends (in the dark, at full well, at the ADC's end).
-
-    Between these it is straight, and beyond them it hardly changes, however bright the brightest signal is.
-    """
-    read, ends = pixel.read_noise_e, {pixel.read_noise_e, last}
-    for bend_e in (0.0, pixel.well_e, (pixel.full_scale_dn - pixel.offset_dn) / pixel.dn_per_e):
-        root = np.sqrt(bend_e + read**2)
-        sigma = np.sqrt(noise.variance_e(np.array(bend_e), pixel) + read**2) / (2 * root) if root else 0.5
-        ends |= {float(np.clip(root + side * _BEND_SIGMAS * sigma, read, last)) for side in (-1, 0, 1)}
-    pieces = [
-        np.geomspace(left, right, _TABLE_NODES) if left else np.linspace(left, right, _TABLE_NODES)
-        for left, right in pairwise(sorted(ends))
-    ]
-    return np.unique(np.concatenate(pieces))

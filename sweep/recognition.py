@@ -17,6 +17,9 @@ MOST_LIKELY = "most_likely"
 """Name of the rule that knows mean and variance of every signal's channels."""
 _CONFIDENCE = 0.95
 _LEAST_VARIANCE = 1e-6
+_MOST_PIXELS = 1024
+_AT_ONCE = 4_000_000
+"""Pixels that are drawn at once."""
 
 
 def _nearest_centroid(_: int) -> Any:
@@ -49,8 +52,9 @@ def recognize(
     """Accuracy of every rule for one design, as `columns` names it; `curves`: ndarray[1, n_modified, n_wavelengths].
 
     `patches` raw patches (the pixels that the scene's readout takes) of every signal are drawn, each at one of the
-    scene's places with its own Poisson electrons and gain errors. The classifiers see raw digital numbers, train on
-    one half and are tested on the other. The most likely rule takes the channels' readout and the signal with the
+    scene's places with its own Poisson electrons and gain errors. The classifiers see raw digital numbers (of a patch
+    with more than 1,024 pixels a random choice of so many, the same for all), train on one half and are tested on the
+    other. The most likely rule takes the channels' readout and the signal with the
     largest Gaussian likelihood at the patch's place, and says its state. Intervals are Wilson's.
     """
     members = {name: imager.setup.members[name] for name in states}
@@ -58,9 +62,18 @@ def recognize(
     state = np.concatenate([np.full(len(own), name) for name, own in members.items()])
     electrons = imager.pixel_electrons(curves)[0]
     place = rng.integers(len(electrons), size=(patches, len(signals)))
-    drawn = noise.draws_dn(electrons[place, signals], imager.pixel, rng)  # [patches, n_signals, n_pixels]
     truth = np.broadcast_to(state, place.shape)
-    found = dict(_accuracy(MOST_LIKELY, truth, state[_most_likely(imager, curves, drawn, place, signals)]))
+    n_pixels = electrons.shape[2]
+    seen = np.sort(rng.permutation(n_pixels)[:_MOST_PIXELS])
+    drawn = np.empty((*place.shape, seen.size), dtype=np.float32)  # [patches, n_signals, pixels that are seen]
+    said = np.empty(place.shape, dtype=state.dtype)
+    rule = _MostLikely(imager, curves, signals)
+    step = max(1, _AT_ONCE // (len(signals) * n_pixels))
+    for block in (slice(start, start + step) for start in range(0, patches, step)):
+        whole = noise.draws_dn(electrons[place[block], signals], imager.pixel, rng)
+        drawn[block] = whole[..., seen]
+        said[block] = state[rule.of(whole, place[block])]
+    found = dict(_accuracy(MOST_LIKELY, truth, said))
     half = patches // 2
     train, test = (part.reshape(-1, part.shape[-1]) for part in (drawn[:half], drawn[half:]))
     for name, make in CLASSIFIERS.items():
@@ -74,19 +87,25 @@ def recognize(
     return found
 
 
-def _most_likely(
-    imager: Imager, curves: FloatArray, drawn: FloatArray, place: IndexArray, signals: IndexArray
-) -> IndexArray:
-    """Index among `signals` of the most likely one for each patch, ndarray[n_patches, n_signals]."""
-    mean, variance, _ = imager.read_with_noise(curves)
-    best = np.empty(place.shape, dtype=np.intp)
-    for at in np.unique(place):
-        here = place == at
-        values = imager.channels_of(drawn[here], int(at) * imager.n_cases // mean.shape[1])  # [n, n_channels]
-        m, v = mean[0, at, signals], np.maximum(variance[0, at, signals], _LEAST_VARIANCE)
-        likelihood = -0.5 * ((values[:, None] - m) ** 2 / v + np.log(v)).sum(axis=2)
-        best[here] = likelihood.argmax(axis=1)
-    return best
+class _MostLikely:
+    """The most likely of `signals` for drawn patches of one design."""
+
+    def __init__(self, imager: Imager, curves: FloatArray, signals: IndexArray) -> None:
+        mean, variance, _ = imager.read_with_noise(curves)
+        self._imager = imager
+        self._mean, self._variance = mean[0][:, signals], np.maximum(variance[0][:, signals], _LEAST_VARIANCE)
+
+    def of(self, drawn: FloatArray, place: IndexArray) -> IndexArray:
+        """Its index for each patch, ndarray[n_patches, n_signals]; `drawn` has an axis more, of the pixels."""
+        best = np.empty(place.shape, dtype=np.intp)
+        for at in np.unique(place):
+            here = place == at
+            kernel = int(at) * self._imager.n_cases // len(self._mean)
+            values = self._imager.channels_of(drawn[here], kernel)  # [n, n_channels]
+            m, v = self._mean[at], self._variance[at]
+            likelihood = -0.5 * ((values[:, None] - m) ** 2 / v + np.log(v)).sum(axis=2)
+            best[here] = likelihood.argmax(axis=1)
+        return best
 
 
 def _accuracy(rule: str, truth: Any, said: Any) -> Iterator[tuple[str, float]]:

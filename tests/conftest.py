@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -42,11 +41,6 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 def hard_case_rows(request: pytest.FixtureRequest) -> list[dict[str, Any]]:
     """Rows of the table of hard cases, one for each that ran in this session."""
     return request.config.stash.setdefault(ROWS, [])
-
-
-@pytest.fixture
-def sweep_command() -> list[str]:
-    return [sys.executable, "-m", "sweep"]
 
 
 @pytest.fixture(scope="session")

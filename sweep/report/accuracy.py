@@ -14,7 +14,7 @@ from ..store import write_text
 from .pages import inlined, page, rows
 
 HARD_CASES = "hard_cases.json"
-REPORT = "report.html"
+REPORT = "accuracy.html"
 _HARD_COLUMNS = ("case", "oracle", "error", "allowed", "why")
 
 
@@ -44,7 +44,7 @@ def read_hard_cases(folder: Path) -> pd.DataFrame | None:
 
 
 def make_accuracy_report(folder: Path, report: AccuracyReport) -> None:
-    """Write `report.html` into the folder; errors as for `store.atomic`."""
+    """Write `accuracy.html` into the folder; errors as for `store.atomic`."""
     ladder = report.ladder.assign(
         faster=(report.ladder["reference_s"] / report.ladder["seconds"]).map("{:.3g}x".format)
     )

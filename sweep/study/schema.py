@@ -173,7 +173,7 @@ class Recognition(Section):
     """
 
     states: Annotated[list[Name], Field(min_length=2)] | None = None
-    patches: int = Field(default=200, ge=0, le=100_000)
+    patches: int = Field(default=200, ge=0, le=5000)
     error_max: float = Field(default=1e-3, gt=0, lt=0.5)
 
     @model_validator(mode="after")
