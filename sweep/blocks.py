@@ -58,7 +58,8 @@ class Curves:
 
     def product(self, weights: FloatArray, nodes: IndexArray) -> FloatArray:
         """See `Block.product`; in the precision of the weights."""
-        flat = self.qe[:, :, nodes].reshape(len(self.qe), -1)
+        seen = self.qe if nodes.size == self.qe.shape[2] else self.qe[:, :, nodes]
+        flat = seen.reshape(len(self.qe), -1)
         return np.asarray(flat.astype(weights.dtype, copy=False) @ weights)
 
     def shapes(self, base_qe: FloatArray) -> tuple[FloatArray, FloatArray]:
