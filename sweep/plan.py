@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 
 from .effects.bounds import Box
 from .promises import EFFECTS, READOUT, Promises
@@ -53,7 +54,7 @@ class Plan:
         """No CSD differs by more from the reference."""
         return sum(choice.promised_dn for choice in self.choices)
 
-    @property
+    @cached_property
     def key(self) -> str:
         """Hash of the methods: part of every cache key, and in every row."""
         return hashlib.sha256(json.dumps(asdict(self.methods), sort_keys=True).encode()).hexdigest()[:12]

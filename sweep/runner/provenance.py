@@ -21,7 +21,7 @@ from .workers import Workers
 
 MODEL_VERSION = "5"
 """Raised whenever the same study would give other rows; part of every shard's key."""
-_PACKAGES = ("cfa-sweep", "numpy", "scipy", "scikit-learn", "pandas", "pyarrow", "joblib", "nlopt", "moocore")
+_PACKAGES = ("cfa-sweep", "numpy", "scipy", "numba", "scikit-learn", "pandas", "pyarrow", "joblib", "nlopt", "moocore")
 
 
 def identity(study: Study) -> dict[str, Any]:
