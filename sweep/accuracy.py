@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from .imaging import Imager
 from .knobs import Regridded, Setting, knob_measurements
 from .metrics import CSD
 from .plan import Plan
+from .progress import Progress
 from .report import AccuracyReport, make_accuracy_report, read_hard_cases
 from .series import draw_knobs, draw_work_precision
 from .setup import REFERENCE, Setup
@@ -34,7 +35,6 @@ _KNOB_DESIGNS = 50
 _REPEATS = 3
 _SHORT_S = 3.0
 """A measurement shorter than this is repeated; the median counts."""
-Progress = Callable[[str, int, int], None]
 
 
 def accuracy(

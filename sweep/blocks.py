@@ -163,12 +163,7 @@ def edges_of(space: Space, start: int, stop: int) -> Edges | None:
         _tables[key] = Tables(base, change, *(family.edges(pair) for pair in pairs))
         if len(_tables) > _KEPT_TABLES:
             _tables.popitem(last=False)
-    digits = []
-    rest = np.arange(start, stop)
-    for axis in reversed(space.axes):
-        rest, digit = np.divmod(rest, len(axis))
-        digits.append(digit)
-    left, left_width, right, right_width, depth = digits[::-1]
+    left, left_width, right, right_width, depth = space.digits(start, stop)
     at_left = left * len(space.axes[_LEFT_WIDTH]) + left_width
     at_right = right * len(space.axes[_RIGHT_WIDTH]) + right_width
     return Edges(

@@ -51,12 +51,6 @@ class Changing:
     values: FloatArray
     exposure_s: FloatArray
 
-    def whole(self) -> FloatArray:
-        """ndarray[n_designs, n_cases, n_signals, n_channels]."""
-        found = np.repeat(self.fixed[None], len(self.values), axis=0)
-        found[..., self.channel] = self.values
-        return found
-
 
 class Imager:
     """A scene with its kernel made, ready for designs. `work` counts what is computed, by effect."""

@@ -24,7 +24,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from .errors import Fault, OutputError
-from .store import holds, write_bytes
+from .store import encoded, holds, write_bytes
 
 SHARDS = "shards"
 _JOURNAL = "_journal.jsonl"
@@ -62,10 +62,8 @@ class Shard:
     @staticmethod
     def of(table: pa.Table, seconds: float) -> Shard:
         """A table, encoded."""
-        sink = pa.BufferOutputStream()
-        pq.write_table(table, sink)
         failed = int(np.count_nonzero(~holds(table, "status", "ok")))
-        return Shard(sink.getvalue().to_pybytes(), table.num_rows, failed, seconds)
+        return Shard(encoded(table), table.num_rows, failed, seconds)
 
     def table(self) -> pa.Table:
         """The rows."""

@@ -80,10 +80,15 @@ def pair_blocks(
 
     `shape`: (n_designs, n_signals, n_channels).
     """
-    one, other = np.repeat(first, len(second)), np.tile(second, len(first))
+    one, other = _all_pairs(first, second)
     step = max(1, _BLOCK_PAIRS // max(1, one.size * shape[2]))
     for start in range(0, shape[0], step):
         yield slice(start, min(start + step, shape[0])), one, other
+
+
+def _all_pairs(first: IndexArray, second: IndexArray) -> tuple[IndexArray, IndexArray]:
+    """Both signal indices of every pair."""
+    return np.repeat(first, len(second)), np.tile(second, len(first))
 
 
 def separations(response: FloatArray, members: Mapping[str, IndexArray]) -> dict[Pair, FloatArray]:
@@ -123,7 +128,7 @@ def separations_along(
     order, bounds = _in_order(members)
     nearest: list[tuple[FloatArray, IndexArray, IndexArray]] = []
     for a, b in class_pairs(list(members)):
-        one, other = np.repeat(members[a], len(members[b])), np.tile(members[b], len(members[a]))
+        one, other = _all_pairs(members[a], members[b])
         apart = ((others[one] - others[other]) ** 2).sum(axis=1)
         rank = np.argsort(apart, kind="stable")
         nearest.append((apart[rank], one[rank], other[rank]))

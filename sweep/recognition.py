@@ -54,8 +54,8 @@ def recognize(
     `patches` raw patches (the pixels that the scene's readout takes) of every signal are drawn, each at one of the
     scene's places with its own Poisson electrons and gain errors. The classifiers see raw digital numbers (of a patch
     with more than 1,024 pixels a random choice of so many, the same for all), train on one half and are tested on the
-    other. The most likely rule takes the channels' readout and the signal with the
-    largest Gaussian likelihood at the patch's place, and says its state. Intervals are Wilson's.
+    other. The most likely rule takes the channels' readout and the signal with the largest Gaussian likelihood at the
+    patch's place, and says its state. Intervals are Wilson's.
     """
     members = {name: imager.setup.members[name] for name in states}
     signals = np.concatenate(list(members.values()))

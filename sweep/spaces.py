@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from .arrays import FloatArray
+from .arrays import FloatArray, IndexArray
 from .families import Family
 
 DIMENSIONS = ("edge_width_nm", "band_width_nm")
@@ -51,14 +51,20 @@ class Space:
         """Names of the family's parameters, with units."""
         return () if self.filter is None else tuple(p.name for p in self.filter.family.parameters)
 
-    def points(self, start: int, stop: int) -> FloatArray:
-        """Parameters of designs start..stop-1: ndarray[stop - start, n_parameters]."""
+    def digits(self, start: int, stop: int) -> list[IndexArray]:
+        """For each axis the index of its value in designs start..stop-1, ndarray[stop - start]."""
         rest = np.arange(start, stop)
-        columns = []
+        found = []
         for axis in reversed(self.axes):  # mixed radix: NumPy's own unravel_index stops at 64 axes
             rest, digit = np.divmod(rest, len(axis))
-            columns.append(np.asarray(axis, dtype=float)[digit])
-        return np.stack(columns[::-1], axis=1) if columns else np.empty((stop - start, 0))
+            found.append(digit)
+        return found[::-1]
+
+    def points(self, start: int, stop: int) -> FloatArray:
+        """Parameters of designs start..stop-1: ndarray[stop - start, n_parameters]."""
+        digits = zip(self.axes, self.digits(start, stop), strict=True)
+        columns = [np.asarray(axis, dtype=float)[digit] for axis, digit in digits]
+        return np.stack(columns, axis=1) if columns else np.empty((stop - start, 0))
 
     def curves(self, points: FloatArray, n_wavelengths: int, shift_nm: float = 0.0) -> FloatArray:
         """QE of the modified channels: ndarray[n_designs, n_modified, n_wavelengths]; none for a plain CFA.

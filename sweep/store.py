@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from .arrays import BoolArray
@@ -124,23 +125,41 @@ def has_footer(path: Path) -> bool:
     return True
 
 
-def sliced(path: Path, sizes: Iterable[int]) -> Iterator[pa.Table]:
-    """The rows of a Parquet file in tables of these sizes, a row group in memory; raises OutputError when damaged."""
+def encoded(table: pa.Table) -> bytes:
+    """A table as the bytes of a Parquet file."""
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink)
+    return bytes(sink.getvalue().to_pybytes())
+
+
+def batches(path: Path) -> Iterator[pa.Table]:
+    """A Parquet file in tables of a row group each; raises OutputError when it is missing or damaged."""
     try:
-        batches = (
-            pa.Table.from_batches([batch]) for batch in pq.ParquetFile(path, pre_buffer=False).iter_batches(ROW_GROUP)
-        )
-        rest = None
-        for size in sizes:
-            while rest is None or rest.num_rows < size:
-                more = next(batches, None)
-                if more is None:
-                    raise OutputError(Fault("has too few rows", str(path)))
-                rest = more if rest is None else pa.concat_tables([rest, more])
-            yield rest.slice(0, size)
-            rest = rest.slice(size)
+        # Buffered ahead, a whole file would be in memory.
+        for batch in pq.ParquetFile(path, pre_buffer=False).iter_batches(ROW_GROUP):
+            yield pa.Table.from_batches([batch])
     except (OSError, pa.ArrowException) as error:
         raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
+
+
+def best_rows(table: pa.Table, order: Sequence[str], most: int) -> pa.Table:
+    """The best rows by columns that are maximized, in their order; of equal ones the smallest `design_id`."""
+    keys = [*((name, "descending") for name in dict.fromkeys(order)), ("design_id", "ascending")]
+    return table.take(pc.sort_indices(table, sort_keys=keys)[:most]).combine_chunks()
+
+
+def sliced(path: Path, sizes: Iterable[int]) -> Iterator[pa.Table]:
+    """The rows of a Parquet file in tables of these sizes, a row group in memory; raises OutputError when damaged."""
+    groups = batches(path)
+    rest = None
+    for size in sizes:
+        while rest is None or rest.num_rows < size:
+            more = next(groups, None)
+            if more is None:
+                raise OutputError(Fault("has too few rows", str(path)))
+            rest = more if rest is None else pa.concat_tables([rest, more])
+        yield rest.slice(0, size)
+        rest = rest.slice(size)
 
 
 def holds(table: pa.Table, column: str, *words: str) -> BoolArray:

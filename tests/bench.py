@@ -26,12 +26,13 @@ import pyarrow.parquet as pq
 from scipy.signal import fftconvolve
 from scipy.spatial.distance import cdist
 from scipy.special import j1
+from test_scale import large
 
 from sweep.blocks import Curves, edges_of
 from sweep.datasets.lights import Lights
 from sweep.evaluate import evaluate
 from sweep.imaging import Imager
-from sweep.metrics import separations_along
+from sweep.metrics import class_pairs, separation, separations_along
 from sweep.runner import run_study
 from sweep.scenes import Scenario
 from sweep.setup import Setup
@@ -137,36 +138,22 @@ def kernels(study: Study, found: dict[str, Any]) -> None:
         rate = found[f"{route}_designs_per_s"]
         found[f"{route}_over_script"] = rate / found["script_designs_per_s"]
         found[f"{route}_on_all_cores_over_script"] = cores * rate / found["script_designs_per_s"]
+    changing = imager.read_changing(edges)
+    assert changing is not None
+    fixed, values = changing.fixed[0], changing.values[:, 0]
+    response = np.repeat(fixed[None], BLOCK, axis=0)
+    response[..., changing.channel] = values
+    arrays = median_s(lambda: [separation(response, members[a], members[b]) for a, b in class_pairs(list(members))])
+    compiled = median_s(lambda: separations_along(fixed, changing.channel, values, members))
+    found["compiled_pairs_over_numpy_pairs"] = arrays / compiled
     found["separable_over_dense"] = found["separable_designs_per_s"] / found["dense_designs_per_s"]
     found["dense_over_colour"] = found["dense_designs_per_s"] / found["colour_designs_per_s"]
-
-
-STUDY = """
-study: bench
-sensor: ar0820
-lights: tl16
-cfas: [RGGB, RYNCy]
-sweeps:
-  edges:
-    cfa: RYNCy
-    channel: N
-    base: Y
-    to: G
-    grid:
-      left_nm: {min: 580, max: 620, count: 20}
-      left_width_nm: {min: 5, max: 40, count: 25}
-      right_nm: {min: 640, max: 680, count: 50}
-      right_width_nm: {min: 5, max: 40, count: 40}
-constraints: {sensitivity: {min: 0.9}}
-"""
 
 
 def end_to_end(found: dict[str, Any]) -> None:
     """(b, c) A million designs to Parquet against a bare write of the same table, with one worker and two."""
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "bench.yaml"
-        path.write_text(STUDY)
-        study = load_study(path)
+        study = load_study(large(Path(folder), 20))
         seconds = {}
         for jobs in (1, 2):
             times = []

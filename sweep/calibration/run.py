@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +10,7 @@ import joblib
 import numpy as np
 from scipy.optimize import least_squares
 
+from ..progress import Progress
 from ..surrogate import parameter_tree
 from .fit import Fit, Task, best_of, fit_from
 from .model import Figures, figures
@@ -19,8 +20,6 @@ from .parameters import checked
 _EDGES = ("left_nm", "left_width_nm", "right_nm", "right_width_nm")
 _SET_BY = ("sensitivity", "csd_yellow_red")
 _BAND = ("left_nm", "right_nm")
-
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)

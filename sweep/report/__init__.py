@@ -4,13 +4,10 @@ from .accuracy import AccuracyReport, make_accuracy_report, read_hard_cases
 from .make import make_report
 from .outputs import Output, read_output
 from .summary import summary_lines
-from .thinning import batches, hashed
 
 __all__ = [
     "AccuracyReport",
     "Output",
-    "batches",
-    "hashed",
     "make_accuracy_report",
     "make_report",
     "read_hard_cases",

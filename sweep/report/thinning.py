@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from ..arrays import FloatArray
 from ..errors import Fault, OutputError
-from ..store import ROW_GROUP, holds, release_memory
+from ..store import batches, best_rows, holds, release_memory
 
 MOST_ROWS = 150_000
 """A table of up to this many rows is kept whole."""
@@ -31,21 +27,6 @@ class Counts:
     front: int
     failed: int
     left_out: int
-
-
-def batches(path: Path) -> Iterator[pa.Table]:
-    """A Parquet file in tables of a row group each; raises OutputError when it is missing or damaged."""
-    try:
-        for batch in pq.ParquetFile(path, pre_buffer=False).iter_batches(ROW_GROUP):
-            yield pa.Table.from_batches([batch])
-    except (OSError, pa.ArrowException) as error:
-        raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
-
-
-def hashed(design_id: FloatArray) -> FloatArray:
-    """A number from 0 to 1 for each id, the same for ever."""
-    digests = [hashlib.sha256(str(i).encode()).digest()[:4] for i in design_id]
-    return np.array([int.from_bytes(digest, "big") / 2**32 for digest in digests], dtype=float)
 
 
 def thinned(path: Path, order: Sequence[str]) -> tuple[pd.DataFrame, Counts]:
@@ -71,15 +52,10 @@ def thinned(path: Path, order: Sequence[str]) -> tuple[pd.DataFrame, Counts]:
         kept.append(table.filter(pa.array(always | (table["design_id"].to_numpy() % every == 0))))
         if every > 1:
             few = table.filter(pa.array(ok & ~always))
-            best = _best(few if best is None else pa.concat_tables([best, few]), order)
+            best = best_rows(few if best is None else pa.concat_tables([best, few]), order, _BEST)
         release_memory()
     if best is not None:
         kept.append(best)
     frame: pd.DataFrame = pa.concat_tables(kept).unify_dictionaries().to_pandas()
     frame = frame.drop_duplicates("design_id").sort_values("design_id", ignore_index=True)
     return frame, Counts(total, feasible, front, failed, total - len(frame))
-
-
-def _best(table: pa.Table, order: Sequence[str]) -> pa.Table:
-    keys = [(name, "descending") for name in dict.fromkeys(order)]
-    return table.take(pc.sort_indices(table, sort_keys=[*keys, ("design_id", "ascending")])[:_BEST]).combine_chunks()

@@ -4,13 +4,11 @@ from .estimate import estimate, estimate_lines
 from .folders import output_folder
 from .planning import with_plans
 from .run import Wishes, run_study
-from .searching import Progress
 from .status import status_lines
 from .workers import BACKENDS
 
 __all__ = [
     "BACKENDS",
-    "Progress",
     "Wishes",
     "estimate",
     "estimate_lines",

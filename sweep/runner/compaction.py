@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from ..arrays import BoolArray, FloatArray, IndexArray
 from ..pareto import non_dominated
-from ..store import ROW_GROUP, atomic, holds, release_memory
+from ..store import ROW_GROUP, atomic, best_rows, holds, release_memory
 from .jobs import Rules
 
 BEST_PER_CFA = 5
@@ -36,7 +35,7 @@ class Front:
 
     def add(self, table: pa.Table) -> None:
         """Take in the rows that a table marks."""
-        for group, values in self._marked(table).items():
+        for group, values in self._by_group(table).items():
             both = np.concatenate([self._groups.get(group, np.empty((0, 2))), values])
             if len(both) > _MOST_CANDIDATES:
                 both = _thinned(both)
@@ -68,7 +67,7 @@ class Front:
         values = np.stack([few[name].to_numpy() for name in self._axes], axis=1)
         return local, values, list(zip(few["cfa"].to_pylist(), few["scenario"].to_pylist(), strict=True))
 
-    def _marked(self, table: pa.Table) -> dict[tuple[str, str], FloatArray]:
+    def _by_group(self, table: pa.Table) -> dict[tuple[str, str], FloatArray]:
         _, values, groups = self._candidates(table)
         return {g: values[[other == g for other in groups]] for g in dict.fromkeys(groups)}
 
@@ -97,9 +96,7 @@ class Highlights:
         for cfa in swept["cfa"].unique().to_pylist():
             own = swept.filter(pa.array(holds(swept, "cfa", cfa)))
             both = pa.concat_tables([self._best[cfa], own]) if cfa in self._best else own
-            keys = [(name, "descending") for name in dict.fromkeys(self._order)]
-            best = pc.sort_indices(both, sort_keys=[*keys, ("design_id", "ascending")])[:BEST_PER_CFA]
-            self._best[cfa] = both.take(best).combine_chunks()
+            self._best[cfa] = best_rows(both, self._order, BEST_PER_CFA)
 
     def frame(self, front: Front) -> pd.DataFrame:
         """All of them, `pareto` as on the whole front; ordered by their ids."""

@@ -10,16 +10,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 from threadpoolctl import threadpool_limits
 
 from ..journal import Journal
+from ..progress import Progress
+from ..store import encoded
 from ..study import Study
 from .folders import held_by
 from .jobs import Job, rules_of
 from .planning import with_plans
-from .provenance import fingerprint
-from .searching import Progress
 from .stopping import Stop
 from .sweeping import Sweep
 from .workers import Workers
@@ -45,7 +44,7 @@ class Estimate:
 def estimate(study: Study, output: Path, n_jobs: int, progress: Progress) -> Estimate:
     """Plan, look at what is kept, and compute a few designs of every kind of chunk in this process."""
     held = held_by(output)
-    whole = held is not None and held.finished and held.fingerprint == fingerprint(study)
+    whole = held is not None and held.finished and held.is_of(study)
     crew = Workers(n_jobs, Stop())
     study = with_plans(study, crew.count, progress)
     journal = Journal(output)
@@ -87,14 +86,8 @@ def _sampled(sweep: Sweep, todo: list[Job]) -> tuple[float, float]:
             measured += rows[kind]
             tables.append(table)
     sample = pa.concat_tables(tables).unify_dictionaries()
-    bytes_per_row = (_file_size(sample) - _file_size(sample.slice(0, 1))) / max(1, sample.num_rows - 1)
+    bytes_per_row = (len(encoded(sample)) - len(encoded(sample.slice(0, 1)))) / max(1, sample.num_rows - 1)
     return total * sum(rows.values()) / measured, bytes_per_row
-
-
-def _file_size(table: pa.Table) -> int:
-    sink = pa.BufferOutputStream()
-    pq.write_table(table, sink)
-    return int(sink.getvalue().size)
 
 
 def _measured(sweep: Sweep, kinds: list[tuple[_Kind, Job]]) -> Iterator[tuple[float, pa.Table, _Kind]]:

@@ -29,6 +29,10 @@ class Held:
     identity: Mapping[str, Any]
     finished: bool
 
+    def is_of(self, study: Study) -> bool:
+        """Whether it is the run of this very study."""
+        return self.fingerprint == fingerprint(study)
+
 
 def held_by(folder: Path) -> Held | None:
     """The run in a folder, or None; a folder with results of unknown origin has an empty fingerprint.
@@ -36,8 +40,8 @@ def held_by(folder: Path) -> Held | None:
     A run is finished when all that its report needs is there; where something was deleted or cut, the same command
     makes it again.
     """
-    run = _read(folder / RUN)
-    finished = _read(folder / PROVENANCE)
+    run = read_facts(folder / RUN)
+    finished = read_facts(folder / PROVENANCE)
     if not run and not finished and not os.path.lexists(folder / RESULTS):
         return None
     mine = str(run.get("fingerprint", finished.get("fingerprint", "")))
@@ -49,11 +53,11 @@ def held_by(folder: Path) -> Held | None:
 
 def output_folder(base: Path, study: Study) -> tuple[Path, str | None]:
     """`base`, or, where that holds another study, `base-2` and so on; and in that case what is different, in words."""
-    mine, note = fingerprint(study), None
+    note = None
     for number in count(1):
         folder = base if number == 1 else base.with_name(f"{base.name}-{number}")
         held = held_by(folder)
-        if held is None or held.fingerprint == mine:
+        if held is None or held.is_of(study):
             return folder, None if note is None else f"{note}; this one is in {folder}"
         note = f"{folder} holds another study of this name ({_changed(held.identity, identity(study))})"
     raise AssertionError
@@ -69,11 +73,11 @@ def discard(folder: Path) -> None:
 
 def begin(folder: Path, study: Study, facts: Mapping[str, Any]) -> None:
     """Say in the folder which run it holds; raises OutputError when it holds another one."""
-    held, mine = held_by(folder), fingerprint(study)
-    if held is not None and held.fingerprint != mine:
+    held = held_by(folder)
+    if held is not None and not held.is_of(study):
         problem = f"holds another study ({_changed(held.identity, identity(study))})"
         raise OutputError(Fault(problem, str(folder), allowed="another folder"))
-    write_json({"fingerprint": mine, "identity": identity(study)} | dict(facts), folder / RUN)
+    write_json({"fingerprint": fingerprint(study), "identity": identity(study)} | dict(facts), folder / RUN)
 
 
 def _changed(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
@@ -100,7 +104,7 @@ def _short(value: object) -> str:
     return text if len(text) <= 40 else text[:37] + "..."
 
 
-def _read(path: Path) -> dict[str, Any]:
+def read_facts(path: Path) -> dict[str, Any]:
     """A JSON mapping; an empty one where there is none that can be read."""
     try:
         found = json.loads(path.read_text(encoding="utf-8"))

@@ -11,11 +11,12 @@ import pyarrow as pa
 
 from ..arrays import FloatArray
 from ..imaging import imager_of
+from ..progress import Progress
 from ..recognition import columns, recognize
 from ..setup import Setup
 from ..study import Study
 from .drawn import row_curves
-from .searching import Parallel, Progress
+from .searching import Parallel
 
 _KINDS = ("reference", "design", "search")
 

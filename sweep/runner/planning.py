@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import joblib
 
+from ..progress import Progress
 from ..study import Study
 from .stopping import Stop
 from .workers import Workers, workers
-
-Progress = Callable[[str, int, int], None]
 
 
 def with_plans(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -17,6 +16,7 @@ import pyarrow as pa
 from ..errors import InfeasibleError, StudyError
 from ..journal import Journal, locked
 from ..pareto import hypervolume
+from ..progress import Progress
 from ..store import (
     CURVES,
     FRONT,
@@ -34,12 +34,12 @@ from ..store import (
 from ..study import Study
 from .compaction import Front, Highlights, compact
 from .drawn import curves_table, points_table
-from .folders import begin, discard, held_by
+from .folders import begin, discard, held_by, read_facts
 from .jobs import Rules, rules_of
 from .patches import recognition_table
 from .planning import with_plans
-from .provenance import fingerprint, plan_facts, provenance, resolved_yaml
-from .searching import Progress, SearchAnswer, answer_row, front_table, run_search, search_facts, search_log
+from .provenance import plan_facts, provenance, resolved_yaml
+from .searching import SearchAnswer, answer_row, front_table, run_search, search_facts, search_log
 from .stopping import stop_on_signals
 from .sweeping import Sweep
 from .workers import Call, Workers, workers
@@ -78,9 +78,8 @@ def run_study(
     started = time.monotonic()
     with stop_on_signals() as stop, workers(Workers(n_jobs, stop, backend, scheduler)) as crew, locked(output):
         held = held_by(output)
-        mine = held is not None and held.fingerprint == fingerprint(study)
-        done = mine and held is not None and held.finished
-        if done and not (wishes.retry_failed and _failed(output)):
+        failed = wishes.retry_failed and read_facts(output / PROVENANCE).get("failed", 0)
+        if held is not None and held.finished and held.is_of(study) and not failed:
             return False
         facts = {"command": list(command), "designs": study.n_designs, "workers": crew.count, "backend": crew.backend}
         begin(output, study, facts)
@@ -90,13 +89,8 @@ def run_study(
             discard(output)
             raise
         run = _Run(study, output, rules_of(study), crew, progress, wishes)
-        run.whole(started, command, again=mine)
+        run.whole(started, command, again=held is not None)
     return True
-
-
-def _failed(output: Path) -> int:
-    """Failed designs of a finished run."""
-    return int(json.loads((output / PROVENANCE).read_text(encoding="utf-8")).get("failed", 0))
 
 
 @dataclass

@@ -15,6 +15,7 @@ from ..constraints import Bound
 from ..errors import Fault, InfeasibleError
 from ..limit import Limit, limit_of, why_not
 from ..problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
+from ..progress import Progress
 from ..search import best_reachable, search_from
 from ..spaces import Space
 from ..store import front_schema, search_schema
@@ -23,7 +24,6 @@ from .jobs import Job, Rules, run_job
 
 Parallel = Callable[[Iterable[Any]], Iterator[Any]]
 """Results of delayed calls, in their order."""
-Progress = Callable[[str, int, int], None]
 _FRONT_STARTS = 4
 _FRONT_LIMIT_DN = 0.02
 _NO_LIMIT = 0.05

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from ..errors import Fault, OutputError
 from ..journal import SHARDS, Entry, Journal, holder
 from ..store import PROVENANCE, RESULTS
-from .folders import RUN, held_by
+from .folders import RUN, held_by, read_facts
 
 _RECENT = 200
 
@@ -23,10 +21,10 @@ def status_lines(folder: Path) -> list[str]:
         raise OutputError(Fault("no run here", str(folder), allowed="a folder that `sweep run` made"))
     running = holder(folder)
     if held.finished and running is None:
-        facts = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
+        facts = read_facts(folder / PROVENANCE)
         failed = f", {facts['failed']:,} failed" if facts.get("failed") else ""
         return [f"finished: {facts['designs']:,} designs{failed} in {facts['duration_s']:.1f} s.", _files(folder)]
-    facts = _begun(folder)
+    facts = read_facts(folder / RUN)
     entries = Journal(folder).entries.values()
     rows = [entry for entry in entries if entry.rows]
     done, total = sum(entry.rows for entry in rows), int(facts.get("designs", 0))
@@ -41,14 +39,6 @@ def status_lines(folder: Path) -> list[str]:
     if running and rate and total:
         lines.append(f"{rate:,.0f} designs/s, about {(total - done) / rate:,.0f} s left.")
     return [*lines, _files(folder)] if rows else lines
-
-
-def _begun(folder: Path) -> dict[str, Any]:
-    try:
-        found = json.loads((folder / RUN).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return found if isinstance(found, dict) else {}
 
 
 def _rate(entries: Sequence[Entry]) -> float | None:

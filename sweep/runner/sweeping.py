@@ -13,12 +13,12 @@ import pyarrow as pa
 
 from ..errors import FailedDesignError, Fault, OutputError
 from ..journal import Journal, Shard
+from ..progress import Progress
 from ..setup import Setup
 from ..store import sliced
 from ..study import Study
 from .jobs import Job, Rules, failed_rows, job_key, jobs_of, run_job, with_local_front
 from .provenance import fingerprint
-from .searching import Progress
 from .workers import Call, WorkerKilledError, Workers, alone
 
 KILLED = "error: its worker died twice"
