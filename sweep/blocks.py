@@ -145,22 +145,35 @@ def _inverse(base: FloatArray) -> tuple[FloatArray, FloatArray]:
 _tables: OrderedDict[bytes, Tables] = OrderedDict()
 
 
-def edges_of(space: Space, start: int, stop: int) -> Edges | None:
-    """The designs of a grid by their edges; None where the family is not separable, or its tables were too large."""
+def by_edges(space: Space) -> bool:
+    """Whether `edges_of` takes the designs of a space."""
+    return _separable(space) is not None
+
+
+def _separable(space: Space) -> tuple[SeparableFamily, FloatArray, FloatArray] | None:
+    """Family, base and change of a grid; None where the family is not separable, or its tables were too large."""
     family = None if space.filter is None else space.filter.family
     if not space.gridded or not isinstance(family, SeparableFamily) or not family.separable:
         return None
     n_left, n_right = (len(space.axes[at]) * len(space.axes[at + 1]) for at in (_LEFT, _RIGHT))
     base, change = family.separable
-    if (n_left + n_right) * base.size * base.itemsize > _MOST_BYTES:
+    return (family, base, change) if (n_left + n_right) * base.size * base.itemsize <= _MOST_BYTES else None
+
+
+def edges_of(space: Space, start: int, stop: int) -> Edges | None:
+    """The designs of a grid by their edges; None where the family is not separable, or its tables were too large."""
+    found = _separable(space)
+    if found is None:
         return None
+    family, base, change = found
     key = hashlib.sha256(pickle.dumps((space.axes, base, change, family.edges(np.array([[600.0, 10.0]]))))).digest()
     if key not in _tables:
         pairs = [
             np.stack([a.ravel() for a in np.meshgrid(space.axes[at], space.axes[at + 1], indexing="ij")], axis=1)
             for at in (_LEFT, _RIGHT)
         ]
-        _tables[key] = Tables(base, change, *(family.edges(pair) for pair in pairs))
+        left_edges, right_edges = (family.edges(pair) for pair in pairs)
+        _tables[key] = Tables(base, change, left_edges, right_edges)
         if len(_tables) > _KEPT_TABLES:
             _tables.popitem(last=False)
     left, left_width, right, right_width, depth = space.digits(start, stop)

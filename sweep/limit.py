@@ -1,10 +1,11 @@
 """The physical limit: the best of all filters for one modified channel, not only those of a family.
 
 Over all N(l) with 0 <= N <= base, a least transmission, a slope bound and the study's sensitivity, the largest t such
-that every pair of a first and a second signal is at least t apart. For fixed t that is a linear program, so bisection
-on t finds the global optimum. The certificate is a bracket: a filter that attains the lower end, and a linear program
-that proves the upper end infeasible. What only some families have (edges and bands, and their shifts in production) is
-left out: that makes the set of filters larger, so the upper end stays true for them.
+that every pair of a first and a second signal is at least t apart. For fixed t that is a linear program, whose margin
+also bounds how much larger t can be, so a few steps on t find the global optimum. The certificate is a bracket: a
+filter that attains the lower end, and a linear program that proves the upper end infeasible. What only some families
+have (edges and bands, and their shifts in production) is left out: that makes the set of filters larger, so the upper
+end stays true for them.
 """
 
 from __future__ import annotations
@@ -70,7 +71,7 @@ def limit_of(problem: Problem, tolerance_dn: float = 1e-3) -> Limit:
     sided = program.undecided
     best, proven = Limit(-np.inf, -np.inf, None), -np.inf
     for signs in product((1.0, -1.0), repeat=len(sided)):
-        found = _bisect(program, dict(zip(sided, signs, strict=True)), best.attained, tolerance)
+        found = _bracket(program, dict(zip(sided, signs, strict=True)), best.attained, tolerance)
         proven = max(proven, found.proven)
         best = found if found.attained > best.attained else best
     return replace(best, proven=proven, left_out=left_out)
@@ -225,12 +226,23 @@ class _Program:
             c=np.append(np.zeros(size), -1.0),
             A_ub=np.vstack(rows),
             b_ub=np.concatenate(limits),
-            bounds=[*zip(self.low, self.base, strict=True), (None, max(t, 1.0))],
+            bounds=[*zip(self.low, self.base, strict=True), (None, _most_margin(t))],
             method="highs",
         )
         if found.status not in (0, 2):  # 2: proven infeasible
             raise SweepError(Fault(f"the limit's linear program ended without an answer: {found.message}"))
         return (float(found.x[-1]), found.x[:-1]) if found.status == 0 else (-np.inf, None)
+
+    def beyond(self, t: float, margin: float, signs: Signs) -> float:
+        """No filter reaches more than this, given the best margin at t; infinite where the margin does not say.
+
+        What a pair with fixed part f needs, sqrt((t / weight)^2 - f), grows with t by 1 / weight or more.
+        """
+        weights = self.problem.objective.weights
+        moving = all(name in weights and self._needed(name, t) > self._least(name) for name in signs)
+        if not moving or margin >= _most_margin(t) * (1 - _ROUNDING):
+            return np.inf
+        return t + (margin + _MARGIN_DN) * max(weights[name] for name in signs)
 
     def reach(self, signs: Signs) -> float:
         """No filter comes further: each distance with a filter that is open where it helps, else closed."""
@@ -267,17 +279,26 @@ class _Program:
         return clipped
 
 
-def _bisect(program: _Program, signs: Signs, known: float, tolerance: float) -> Limit:
-    """The bracket for one choice of sides; `known` is attained elsewhere, below which nothing is looked for."""
+def _most_margin(t: float) -> float:
+    """Margins above this are not looked for: without a pair that binds, the program had no end."""
+    return max(t, 1.0)
+
+
+def _bracket(program: _Program, signs: Signs, known: float, tolerance: float) -> Limit:
+    """The bracket for one choice of sides; `known` is attained elsewhere, below which nothing is looked for.
+
+    By turns just above the lower end, where the margin shows how far the upper end can be, and halfway.
+    """
     low, high = max(known, 0.0), program.reach(signs) + tolerance
     attained, curve = -np.inf, None
     at = low
-    for _ in range(_MOST_STEPS):
+    for step in range(_MOST_STEPS):
         margin, found = program.best_margin(at, signs)
         if found is None or margin < -_MARGIN_DN:
             high = min(high, at)
         else:
             low = max(low, at)
+            high = min(high, program.beyond(at, margin, signs)) if signs else high
         if found is not None:
             candidate = program.inside(found)
             reached = program.attained(candidate)
@@ -286,5 +307,5 @@ def _bisect(program: _Program, signs: Signs, known: float, tolerance: float) -> 
             low = max(low, attained)
         if high - low <= tolerance:
             break
-        at = (low + high) / 2
+        at = low + tolerance / 2 if step % 2 == 0 else (low + high) / 2
     return Limit(attained, high, curve)

@@ -137,7 +137,7 @@ def separations_along(
     place[order] = np.arange(order.size)
     apart, one, other = (np.concatenate(parts) for parts in zip(*nearest, strict=True))
     squared = np.empty((len(values), len(nearest)))
-    ordered = np.ascontiguousarray(values[:, order])
+    ordered = np.take(values, order, axis=1)
     nearest_along_squared(ordered, bounds, apart, place[one], place[other], starts, squared)
     return _distances(squared, members, whole)
 

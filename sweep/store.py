@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -38,6 +39,7 @@ PROVENANCE_KEYS = (
 )
 """What is read there again; one of an earlier version may lack some."""
 RESOLVED = "study.resolved.yaml"
+_REPEATING = "cfa_sweep_parameters"
 ROW_GROUP = 131_072
 """Rows that are read and written at once."""
 
@@ -50,7 +52,7 @@ def result_schema(parameters: Sequence[str], quantities: Sequence[str]) -> pa.Sc
     fields += [pa.field(name, number) for name in (*parameters, *quantities, "violation", "limit", "gap")]
     fields += [pa.field("feasible", pa.bool_()), pa.field("pareto", pa.bool_())]
     fields += [pa.field("plan", text), pa.field("promised_dn", number), pa.field("status", text)]
-    return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION})
+    return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION, _REPEATING: json.dumps(list(parameters))})
 
 
 def search_schema(parameters: Sequence[str]) -> pa.Schema:
@@ -97,7 +99,7 @@ def atomic(path: Path) -> Iterator[Path]:
 def write_table(table: pa.Table, path: Path) -> None:
     """Write one Parquet file atomically; errors as for `atomic`."""
     with atomic(path) as hidden:
-        pq.write_table(table, hidden, row_group_size=ROW_GROUP)
+        pq.write_table(table, hidden, row_group_size=ROW_GROUP, use_dictionary=_repeating(table.schema))
 
 
 def write_bytes(content: bytes, path: Path) -> None:
@@ -128,8 +130,46 @@ def has_footer(path: Path) -> bool:
 def encoded(table: pa.Table) -> bytes:
     """A table as the bytes of a Parquet file."""
     sink = pa.BufferOutputStream()
-    pq.write_table(table, sink)
+    pq.write_table(table, sink, use_dictionary=_repeating(table.schema))
     return bytes(sink.getvalue().to_pybytes())
+
+
+def write_tables(tables: Iterable[pa.Table], schema: pa.Schema, path: Path) -> None:
+    """Write tables as one Parquet file, in full row groups, one of which is in memory; errors as for `atomic`.
+
+    The next table is made while one is written.
+    """
+    with atomic(path) as hidden, pq.ParquetWriter(hidden, schema, use_dictionary=_repeating(schema)) as writer:
+        waiting: list[pa.Table] = []
+
+        def write() -> None:
+            writer.write_table(pa.concat_tables(waiting).unify_dictionaries(), row_group_size=ROW_GROUP)
+            waiting.clear()
+            release_memory()
+
+        for table in _ahead(iter(tables)):
+            waiting.append(table)
+            if sum(part.num_rows for part in waiting) >= ROW_GROUP:
+                write()
+        if waiting:
+            write()
+
+
+def _ahead(tables: Iterator[pa.Table]) -> Iterator[pa.Table]:
+    """The same tables; a thread makes the next one while one is used."""
+    with ThreadPoolExecutor(1) as thread:
+        coming = thread.submit(next, tables, None)
+        while (table := coming.result()) is not None:
+            coming = thread.submit(next, tables, None)
+            yield table
+
+
+def _repeating(schema: pa.Schema) -> list[str] | bool:
+    """Columns to store as a dictionary of their values: words and parameters; measured values hardly repeat."""
+    parameters = (schema.metadata or {}).get(_REPEATING.encode())
+    if parameters is None:
+        return True
+    return [field.name for field in schema if pa.types.is_dictionary(field.type)] + list(json.loads(parameters))
 
 
 def batches(path: Path) -> Iterator[pa.Table]:

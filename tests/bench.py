@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import colour
+import joblib
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -33,10 +34,12 @@ from sweep.datasets.lights import Lights
 from sweep.evaluate import evaluate
 from sweep.imaging import Imager
 from sweep.metrics import class_pairs, separation, separations_along
+from sweep.mosaics import Mosaic
 from sweep.runner import run_study
 from sweep.scenes import Scenario
 from sweep.setup import Setup
 from sweep.spaces import Space
+from sweep.spectra import WavelengthGrid
 from sweep.study import Study, load_study
 
 ROOT = Path(__file__).parent.parent
@@ -106,26 +109,68 @@ def image_per_design(setup: Setup, radius_um: float, pixels: int = 24, per_pixel
         np.tensordot(setup.lights.photons * qe, light, axes=1)
 
 
+def swept(study: Study) -> tuple[Space, Setup]:
+    """The study's sweep and its setup."""
+    space = next(s for s in study.spaces if s.kind == "sweep")
+    return space, study.setup(space, "chart")
+
+
+def distances(imager: Imager, block: Any) -> None:
+    """All CSDs of a block."""
+    changing = imager.read_changing(block)
+    assert changing is not None
+    separations_along(changing.fixed[0], changing.channel, changing.values[:, 0], imager.setup.members)
+
+
+def rate_of(route: str, study: Study, seconds: float) -> float:
+    """Designs per second of a route in this process, over some seconds."""
+    space, setup = swept(study)
+    imager, points = Imager(setup), space.points(0, BLOCK)
+    edges = edges_of(space, 0, BLOCK)
+    assert edges is not None
+    work: dict[str, Callable[[], object]] = {
+        "separable": lambda: distances(imager, edges),
+        "dense": lambda: distances(imager, Curves(space.curves(points, setup.grid.size))),
+        "all_columns": lambda: evaluate(imager, edges),
+    }
+    work[route]()
+    blocks, start = 0, time.perf_counter()
+    while time.perf_counter() - start < seconds:
+        work[route]()
+        blocks += 1
+    return blocks * BLOCK / (time.perf_counter() - start)
+
+
+def on_all_cores(study: Study, found: dict[str, Any], seconds: float = 2.0) -> None:
+    """(a, c) The same routes in one process per core at once, against one process."""
+    cores = os.cpu_count() or 1
+    parallel = joblib.Parallel(n_jobs=cores)
+    for route in ("separable", "dense", "all_columns"):
+        rates: dict[int, list[float]] = {1: [], cores: []}
+        for _ in range(3):
+            for count, measured in rates.items():
+                measured.append(sum(parallel(joblib.delayed(rate_of)(route, study, seconds) for _ in range(count))))
+        one, all_of_them = (statistics.median(measured) for measured in rates.values())
+        found[f"{route}_designs_per_s_on_all_cores"] = all_of_them
+        found[f"{route}_on_all_cores_over_script"] = all_of_them / found["script_designs_per_s"]
+        found[f"{route}_on_all_cores_over_one"] = all_of_them / one
+
+
 def kernels(study: Study, found: dict[str, Any]) -> None:
     """(a) Both routes against the scripts and the machine."""
-    space = next(s for s in study.spaces if s.kind == "sweep")
-    setup = study.setup(space, "chart")
+    space, setup = swept(study)
     points = space.points(0, BLOCK)
     imager, members = Imager(setup), setup.members
     edges = edges_of(space, 0, BLOCK)
     assert edges is not None
-
-    def distances(block: Any) -> None:
-        changing = imager.read_changing(block)
-        assert changing is not None
-        separations_along(changing.fixed[0], changing.channel, changing.values[:, 0], members)
-
     curves = space.curves(points, setup.grid.size)
     flat, table = curves[:, 0], np.ascontiguousarray(setup.lights.photons.T)
     found["script_designs_per_s"] = 300 / median_s(lambda: script(setup, space, points[:300]), 3)
     found["colour_designs_per_s"] = 2 / median_s(lambda: colour_script(setup, space, points[:2]), 1)
-    found["separable_designs_per_s"] = BLOCK / median_s(lambda: distances(edges))
-    found["dense_designs_per_s"] = BLOCK / median_s(lambda: distances(Curves(space.curves(points, setup.grid.size))))
+    found["separable_designs_per_s"] = BLOCK / median_s(lambda: distances(imager, edges), 30)
+    found["dense_designs_per_s"] = BLOCK / median_s(
+        lambda: distances(imager, Curves(space.curves(points, setup.grid.size)))
+    )
     found["all_columns_designs_per_s"] = BLOCK / median_s(lambda: evaluate(imager, edges))
     bare = median_s(lambda: flat @ table, 30)
     ours = median_s(lambda: Curves(curves).product(table, np.arange(setup.grid.size)), 30)
@@ -133,11 +178,14 @@ def kernels(study: Study, found: dict[str, Any]) -> None:
     found["dgemm_gflops"] = 2 * flat.shape[0] * flat.shape[1] * table.shape[1] / bare / 1e9
     large = np.ones(20_000_000)
     found["copy_gbytes_per_s"] = 2 * large.nbytes / median_s(large.copy, 3) / 1e9
-    cores = os.cpu_count() or 1
     for route in ("separable", "dense", "all_columns"):
-        rate = found[f"{route}_designs_per_s"]
-        found[f"{route}_over_script"] = rate / found["script_designs_per_s"]
-        found[f"{route}_on_all_cores_over_script"] = cores * rate / found["script_designs_per_s"]
+        found[f"{route}_over_script"] = found[f"{route}_designs_per_s"] / found["script_designs_per_s"]
+    flops = 2 * flat.shape[1] * table.shape[1] * found["dense_designs_per_s"]
+    found["dense_over_machine_product"] = flops / 1e9 / found["dgemm_gflops"]
+    # A dense design writes its curve to memory and reads it; a separable one its response.
+    for route, numbers in (("dense", flat.shape[1]), ("separable", table.shape[1])):
+        moved = 2 * 8 * numbers * found[f"{route}_designs_per_s"] / 1e9
+        found[f"{route}_bytes_over_machine_copy"] = moved / found["copy_gbytes_per_s"]
     changing = imager.read_changing(edges)
     assert changing is not None
     fixed, values = changing.fixed[0], changing.values[:, 0]
@@ -151,9 +199,9 @@ def kernels(study: Study, found: dict[str, Any]) -> None:
 
 
 def end_to_end(found: dict[str, Any]) -> None:
-    """(b, c) A million designs to Parquet against a bare write of the same table, with one worker and two."""
-    with tempfile.TemporaryDirectory() as folder:
-        study = load_study(large(Path(folder), 20))
+    """(b, c) Four million designs to Parquet against a bare write of the same table, with one worker and two."""
+    with tempfile.TemporaryDirectory(dir=OUTPUT) as folder:
+        study = load_study(large(Path(folder), 80))
         seconds = {}
         for jobs in (1, 2):
             times = []
@@ -168,21 +216,22 @@ def end_to_end(found: dict[str, Any]) -> None:
     found["run_designs_per_s_2_workers"] = study.n_designs / seconds[2]
     found["two_workers_over_one"] = seconds[1] / seconds[2]
     found["bare_write_designs_per_s"] = study.n_designs / write
-    kernel = (os.cpu_count() or 1) * found["all_columns_designs_per_s"]
     found["run_over_slower_of_kernel_and_write"] = found["run_designs_per_s_2_workers"] / min(
-        found["bare_write_designs_per_s"], kernel
+        found["bare_write_designs_per_s"], found["all_columns_designs_per_s_on_all_cores"]
     )
 
 
 def exponents(study: Study, found: dict[str, Any]) -> None:
     """(d) How the dense route's time grows, in blocks as a run has them: d log(time) / d log(size), from a fit."""
-    space = next(s for s in study.spaces if s.kind == "sweep")
-    setup = study.setup(space, "chart")
+    space, setup = swept(study)
 
     def timed(made: Setup, designs: int) -> float:
         imager = Imager(made)
         size = min(designs, BLOCK)
-        block = Curves(space.curves(space.points(0, size), setup.grid.size))
+        some = space.curves(space.points(0, size), setup.grid.size)
+        if made.grid != setup.grid:
+            some = np.array([[np.interp(made.grid.nodes_nm, setup.grid.nodes_nm, c) for c in d] for d in some])
+        block = Curves(np.repeat(some, len(made.modified), axis=1))
 
         def all_blocks() -> None:
             for _ in range(designs // size):
@@ -198,18 +247,39 @@ def exponents(study: Study, found: dict[str, Any]) -> None:
         lights = Lights("many", names, types, setup.lights.photons[at], setup.lights.photon_ratio, "", True)
         return replace(setup, lights=lights)
 
+    def with_channels(n: int) -> Setup:
+        """A camera whose n channels are all modified."""
+        names = tuple(f"N{k}" for k in range(n))
+        mosaic = Mosaic.from_rows("many", [names])
+        qe = np.repeat(setup.base_qe, n, axis=0)
+        return replace(setup, mosaic=mosaic, qe=qe, modified=tuple(range(n)))
+
+    def with_wavelengths(n: int) -> Setup:
+        old = setup.grid.nodes_nm
+        grid = WavelengthGrid(start_nm=old[0], stop_nm=old[-1], step_nm=(old[-1] - old[0]) / (n - 1))
+
+        def of(curves: np.ndarray) -> np.ndarray:
+            return np.array([np.interp(grid.nodes_nm, old, curve) for curve in curves])
+
+        lights = replace(setup.lights, photons=of(setup.lights.photons))
+        return replace(setup, grid=grid, qe=of(setup.qe), clear_qe=of(setup.clear_qe[None])[0], lights=lights)
+
+    def exponent(sizes: tuple[int, ...], times: list[float]) -> float:
+        return float(np.polyfit(np.log(sizes), np.log(times), 1)[0])
+
     designs, signals = (4096, 8192, 16384, 32768), (40, 80, 160, 320)
-    times = [timed(setup, n) for n in designs]
-    found["exponent_designs"] = float(np.polyfit(np.log(designs), np.log(times), 1)[0])
-    times = [timed(with_signals(n), 1024) for n in signals]
-    found["exponent_signals"] = float(np.polyfit(np.log(signals), np.log(times), 1)[0])
+    channels, wavelengths = (1, 2, 3, 4), (151, 301, 601, 1201)
+    found["exponent_designs"] = exponent(designs, [timed(setup, n) for n in designs])
+    found["exponent_signals"] = exponent(signals, [timed(with_signals(n), 1024) for n in signals])
+    found["exponent_channels"] = exponent(channels, [timed(with_channels(n), 1024) for n in channels])
+    found["exponent_wavelengths"] = exponent(wavelengths, [timed(with_wavelengths(n), 1024) for n in wavelengths])
 
 
 def scene(study: Study, found: dict[str, Any]) -> None:
     """(f) A light at 250 m: each further design, and the first one with its kernels, against an image per design."""
-    space = next(s for s in study.spaces if s.kind == "sweep")
+    space, setup = swept(study)
     far = {"target": {"distance_m": 250, "fov_deg": 30}, "optics": {"f_number": 2}}
-    setup = replace(study.setup(space, "chart"), scenario=Scenario.model_validate(far))
+    setup = replace(setup, scenario=Scenario.model_validate(far))
     target = setup.scenario.target
     assert target is not None
     radius_um = target.object_resolution_px / 2 * setup.pixel.pitch_um
@@ -240,7 +310,9 @@ def drawn(found: dict[str, Any]) -> None:
 def main() -> None:
     study = load_study(ROOT / "studies" / "stopband.yaml")
     found: dict[str, Any] = {}
+    OUTPUT.mkdir(parents=True, exist_ok=True)
     kernels(study, found)
+    on_all_cores(study, found)
     exponents(study, found)
     scene(study, found)
     end_to_end(found)
@@ -248,7 +320,6 @@ def main() -> None:
         lambda: subprocess.run([sys.executable, "-m", "sweep", "--help"], capture_output=True, check=True)
     )
     found |= {"cores": os.cpu_count(), "platform": platform.platform()}
-    OUTPUT.mkdir(parents=True, exist_ok=True)
     (OUTPUT / "bench.json").write_text(json.dumps(found, indent=2) + "\n")
     drawn(found)
     for name, value in found.items():

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from ..arrays import BoolArray, FloatArray, IndexArray
 from ..pareto import non_dominated
-from ..store import ROW_GROUP, atomic, best_rows, holds, release_memory
+from ..store import best_rows, holds
 from .jobs import Rules
 
 BEST_PER_CFA = 5
@@ -32,6 +30,7 @@ class Front:
         """`kind`: of the rows that take part; all without one."""
         self._axes, self._kind = axes, kind
         self._groups: dict[tuple[str, str], FloatArray] = {}
+        self._on_it: dict[tuple[str, str], set[tuple[float, ...]]] = {}
 
     def add(self, table: pa.Table) -> None:
         """Take in the rows that a table marks."""
@@ -44,16 +43,16 @@ class Front:
     def finish(self) -> None:
         """Nothing more comes."""
         self._groups = {group: _thinned(values) for group, values in self._groups.items()}
+        self._on_it = {group: set(map(tuple, values.tolist())) for group, values in self._groups.items()}
 
     def points(self, cfa: str, scenario: str) -> FloatArray:
         """The two quantities of a front's rows, ndarray[n, 2], each pair once."""
         return self._groups.get((cfa, scenario), np.empty((0, 2)))
 
     def marked(self, table: pa.Table) -> pa.Table:
-        """The table with `pareto` only where a row is on the whole front."""
+        """The table with `pareto` only where a row is on the whole front, which is finished."""
         local, values, groups = self._candidates(table)
-        points = {group: set(map(tuple, found.tolist())) for group, found in self._groups.items()}
-        kept = [tuple(v) in points.get(g, ()) for v, g in zip(values.tolist(), groups, strict=True)]
+        kept = [tuple(v) in self._on_it.get(g, ()) for v, g in zip(values.tolist(), groups, strict=True)]
         front: BoolArray = np.zeros(table.num_rows, dtype=bool)
         front[local] = kept
         return table.set_column(table.schema.get_field_index("pareto"), table.schema.field("pareto"), pa.array(front))
@@ -77,57 +76,52 @@ def _thinned(values: FloatArray) -> FloatArray:
     return np.unique(values[non_dominated(values)], axis=0)
 
 
-class Highlights:
-    """Rows that figures and summaries need: every plain CFA, named design and answer, and the best swept designs."""
+@dataclass
+class Gathered:
+    """What a run keeps of its rows: the front of all of them, that of the swept ones, and those that reports draw.
 
-    def __init__(self, schema: pa.Schema, order: list[str], scenario: str) -> None:
-        """`order`: columns that say what is best, all maximized; swept designs count in `scenario` alone."""
-        self._order, self._scenario = order, scenario
-        self._always: list[pa.Table] = [schema.empty_table()]
+    Those are every plain CFA, named design and answer, and the best swept designs of each CFA in the first scenario.
+    """
+
+    rules: Rules
+    scenario: str
+    front: Front = field(init=False)
+    swept: Front = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.front, self.swept = Front(self.rules.front), Front(self.rules.front, "sweep")
+        self._always: list[pa.Table] = [self.rules.schema.empty_table()]
         self._best: dict[str, pa.Table] = {}
 
-    def add(self, table: pa.Table) -> None:
-        """Take in a table."""
-        always = holds(table, "kind", *_ALWAYS)
+    def add(self, few: pa.Table) -> None:
+        """Take in what `few_of` a table gives."""
+        self.front.add(few)
+        self.swept.add(few)
+        always = holds(few, "kind", *_ALWAYS)
         if always.any():
-            self._always.append(table.filter(pa.array(always)))
-        candidates = holds(table, "kind", "sweep") & holds(table, "scenario", self._scenario)
-        swept = table.filter(pa.array(candidates & table["feasible"].to_numpy()))
+            self._always.append(few.filter(pa.array(always)))
+        candidates = holds(few, "kind", "sweep") & holds(few, "scenario", self.scenario)
+        swept = few.filter(pa.array(candidates & few["feasible"].to_numpy()))
         for cfa in swept["cfa"].unique().to_pylist():
             own = swept.filter(pa.array(holds(swept, "cfa", cfa)))
             both = pa.concat_tables([self._best[cfa], own]) if cfa in self._best else own
-            self._best[cfa] = best_rows(both, self._order, BEST_PER_CFA)
+            self._best[cfa] = best_rows(both, self.rules.order, BEST_PER_CFA)
 
-    def frame(self, front: Front) -> pd.DataFrame:
-        """All of them, `pareto` as on the whole front; ordered by their ids."""
+    def finish(self) -> None:
+        """Nothing more comes."""
+        self.front.finish()
+        self.swept.finish()
+
+    def frame(self) -> pd.DataFrame:
+        """The rows to draw, `pareto` as on the whole front; ordered by their ids."""
         tables = [*self._always, *self._best.values()]
-        frame: pd.DataFrame = front.marked(pa.concat_tables(tables).unify_dictionaries()).to_pandas()
+        frame: pd.DataFrame = self.front.marked(pa.concat_tables(tables).unify_dictionaries()).to_pandas()
         return frame.sort_values("design_id", ignore_index=True)
 
 
-def compact(
-    tables: Callable[[], Iterator[pa.Table]], path: Path, rules: Rules, highlights: Highlights
-) -> tuple[Front, Front]:
-    """Write all tables as one file, atomically; the front of all rows and that of the swept ones alone.
-
-    `tables` is run through twice. No more than a row group is in memory at a time. Raises OutputError when the disk
-    refuses.
-    """
-    front, swept = Front(rules.front), Front(rules.front, "sweep")
-    for table in tables():
-        for each in (front, swept, highlights):
-            each.add(table)
-    front.finish()
-    swept.finish()
-    with atomic(path) as hidden, pq.ParquetWriter(hidden, rules.schema) as writer:
-        waiting: list[pa.Table] = []
-        for table in tables():
-            waiting.append(front.marked(table))
-            if sum(part.num_rows for part in waiting) >= ROW_GROUP:
-                writer.write_table(pa.concat_tables(waiting).unify_dictionaries(), row_group_size=ROW_GROUP)
-                waiting = []
-                release_memory()
-        if waiting:
-            writer.write_table(pa.concat_tables(waiting).unify_dictionaries(), row_group_size=ROW_GROUP)
-    release_memory()
-    return front, swept
+def few_of(table: pa.Table, rules: Rules) -> pa.Table:
+    """The rows of a chunk that `Gathered` may keep: those on its front, those that are no sweep, its best designs."""
+    wanted = table["pareto"].to_numpy() | holds(table, "kind", *_ALWAYS)
+    rest = table.filter(pa.array(table["feasible"].to_numpy() & ~wanted))
+    few = pa.concat_tables([table.filter(pa.array(wanted)), best_rows(rest, rules.order, BEST_PER_CFA)])
+    return few.combine_chunks()

@@ -5,14 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
 from ..arrays import BoolArray, FloatArray
-from ..blocks import Block, Curves, edges_of
+from ..blocks import Block, Curves, by_edges, edges_of
 from ..constraints import FEASIBLE, Bound, total_violation
 from ..evaluate import WORST, evaluate, noise_quantities, shiftable
 from ..imaging import imager_of
@@ -27,7 +27,8 @@ from ..study import Study
 
 _WORDS = pa.dictionary(pa.int32(), pa.string())
 CHUNK = 4096
-"""Designs of one job; fixed, so that the rows do not depend on the number of workers."""
+"""Designs that are computed at once, and the least of one job."""
+_MOST_CHUNKS, _LEAST_JOBS = 16, 64
 
 
 @dataclass(frozen=True)
@@ -57,21 +58,37 @@ class Rules:
     plans: Mapping[str, Plan]
     states: tuple[str, ...]
 
+    @property
+    def order(self) -> tuple[str, ...]:
+        """Quantities that say which design is best, the first one first, all maximized."""
+        return (self.objective.column, *self.front)
+
 
 def jobs_of(study: Study) -> Iterator[Job]:
     """All jobs in the order of their rows."""
     first_id = 0
     for scenario in study.scenarios:
         for space in study.spaces:
-            for start in range(0, space.size, CHUNK):
-                yield Job(space, scenario, start, min(start + CHUNK, space.size), first_id + start)
+            size = _job_size(study, space)
+            for start in range(0, space.size, size):
+                yield Job(space, scenario, start, min(start + size, space.size), first_id + start)
             first_id += space.size
 
 
-def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
-    """Evaluate a job; a design that fails is a row with its status, and the others of its chunk are kept.
+def _job_size(study: Study, space: Space) -> int:
+    """Designs of a job: several chunks where many designs cost next to nothing, so that a job is not mostly overhead.
 
-    `pareto` marks the non-dominated designs of this chunk alone; `compaction.Front` finds those of the whole table.
+    It does not depend on the workers, and so neither do the rows.
+    """
+    if study.states or not by_edges(space):
+        return CHUNK
+    return CHUNK * min(max(1, space.size // (CHUNK * _LEAST_JOBS)), _MOST_CHUNKS)
+
+
+def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
+    """Evaluate a job; a design that fails is a row with its status, and the others are kept.
+
+    `pareto` marks the non-dominated designs of this job alone; `compaction.Front` finds those of the whole table.
     """
     points = job.space.points(job.start, job.stop)
     columns, faults = _quantities(job, setup, points, rules)
@@ -177,7 +194,21 @@ def _may_lack(setup: Setup, rules: Rules) -> set[str]:
 def _quantities(
     job: Job, setup: Setup, points: FloatArray, rules: Rules
 ) -> tuple[dict[str, FloatArray], dict[int, str]]:
-    """Every quantity, and what went wrong with which design."""
+    """Every quantity, and what went wrong with which design; a chunk at a time, which stays in the cache."""
+    parts: list[dict[str, FloatArray]] = []
+    faults: dict[int, str] = {}
+    for start in range(job.start, job.stop, CHUNK):
+        at = start - job.start
+        part = replace(job, start=start, stop=min(start + CHUNK, job.stop))
+        columns, found = _chunk_quantities(part, setup, points[at : at + CHUNK], rules)
+        parts.append(columns)
+        faults |= {at + index: text for index, text in found.items()}
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}, faults
+
+
+def _chunk_quantities(
+    job: Job, setup: Setup, points: FloatArray, rules: Rules
+) -> tuple[dict[str, FloatArray], dict[int, str]]:
     space = job.space
     try:
         columns = _columns(space, setup, points, rules, edges_of(space, job.start, job.stop))

@@ -6,6 +6,7 @@ import hashlib
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -29,10 +30,11 @@ from ..store import (
     has_footer,
     write_json,
     write_table,
+    write_tables,
     write_text,
 )
 from ..study import Study
-from .compaction import Front, Highlights, compact
+from .compaction import Front, Gathered
 from .drawn import curves_table, points_table
 from .folders import begin, discard, held_by, read_facts
 from .jobs import Rules, rules_of
@@ -142,17 +144,15 @@ class _Run:
         if again and has_footer(output / RESULTS):
             sweep.refill(output / RESULTS)
         answer = self._searched(journal, sweep.fingerprint)
-        sweep.run(self.progress, fail_fast=self.wishes.fail_fast, retry_failed=self.wishes.retry_failed)
+        gathered = Gathered(self.rules, next(iter(study.scenarios)))
+        sweep.run(gathered, self.progress, fail_fast=self.wishes.fail_fast, retry_failed=self.wishes.retry_failed)
         answered = [] if answer is None else [answer_row(study, answer, self.rules, study.n_designs)]
-        order = [study.objective.column, *study.trade_off]
-        highlights = Highlights(self.rules.schema, order, next(iter(study.scenarios)))
-
-        def tables() -> Iterator[pa.Table]:
-            yield from sweep.tables()
-            yield from answered
-
-        front, swept = compact(tables, output / RESULTS, self.rules, highlights)
-        rows = highlights.frame(front)
+        for row in answered:
+            gathered.add(row)
+        gathered.finish()
+        tables = map(gathered.front.marked, chain(sweep.tables(), answered))
+        write_tables(tables, self.rules.schema, output / RESULTS)
+        rows = gathered.frame()
         self.facts |= {
             "designs": study.n_designs + len(answered),
             "failed": sweep.failed,
@@ -160,7 +160,7 @@ class _Run:
             "trade_off": study.trade_off,
             "warnings": [*study.warnings, *sweep.warnings],
         }
-        self._write_search(answer, swept)
+        self._write_search(answer, gathered.swept)
         self._write_drawn(rows, answer)
         write_text(resolved_yaml(study), output / RESOLVED)
         duration = time.monotonic() - started

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any
 
 import joblib
@@ -85,9 +86,7 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
         raise _infeasible(study, problem, starts[:_REACH_STARTS], each)
     no_limit = why_not(problem)
     limit = limit_of(problem) if no_limit is None else None
-    front = (
-        tuple(_front(problem, search, starts, each, study.section.seed, parallel, progress)) if search.levels else ()
-    )
+    front = _front(problem, search, starts, each, study.section.seed, parallel, progress) if search.levels else ()
     return SearchAnswer(search, tuple(runs), best, limit, no_limit, front)
 
 
@@ -103,21 +102,36 @@ def _infeasible(study: Study, problem: Problem, starts: FloatArray, each: int) -
 
 def _front(
     problem: Problem, search: Search, starts: FloatArray, each: int, seed: int, parallel: Parallel, progress: Progress
-) -> Iterator[FrontPoint]:
-    """The same search at each level of sensitivity, started from the neighboring level's answer and a few points."""
+) -> tuple[FrontPoint, ...]:
+    """The same search at each level of sensitivity, from a few points, then from what the neighboring levels found."""
     at_level = [replace(problem, constraints=_with_sensitivity(problem, level)) for level in search.levels]
     limits: list[Limit | None] = [None] * len(at_level)
     if why_not(problem) is None:
         limits = list(parallel(joblib.delayed(limit_of)(p, _FRONT_LIMIT_DN) for p in at_level))
-    warm: list[FloatArray] = []
-    for index, (level, leveled) in enumerate(zip(search.levels, at_level, strict=True)):
-        points = [*warm, *starts[:_FRONT_STARTS]]
-        tasks = (joblib.delayed(search_from)(leveled, i, u, search.algorithm, each, seed) for i, u in enumerate(points))
-        runs = tuple(parallel(tasks))
-        best = best_feasible([e for run in runs for e in run.log])
-        warm = [] if best is None else [problem.to_unit(best.x)]
-        yield FrontPoint(level, best, runs, limits[index])
-        progress("front levels", index + 1, len(at_level))
+    runs: list[list[SearchRun]] = [[] for _ in at_level]
+    done, total = 0, 2 * len(at_level)
+
+    def searched(points: Sequence[Sequence[FloatArray]]) -> None:
+        nonlocal done
+        found = parallel(
+            [
+                joblib.delayed(search_from)(at_level[k], len(runs[k]) + i, u, search.algorithm, each, seed)
+                for k, own in enumerate(points)
+                for i, u in enumerate(own)
+            ]
+        )
+        for k, own in enumerate(points):
+            runs[k] += islice(found, len(own))
+            done += 1
+            progress("front levels", done, total)
+
+    def best(k: int) -> Evaluation | None:
+        return best_feasible([e for run in runs[k] for e in run.log]) if 0 <= k < len(runs) else None
+
+    searched([[*starts[:_FRONT_STARTS]]] * len(at_level))
+    found = [(best(k - 1), best(k + 1)) for k in range(len(at_level))]
+    searched([[problem.to_unit(e.x) for e in both if e is not None] for both in found])
+    return tuple(FrontPoint(level, best(k), tuple(runs[k]), limits[k]) for k, level in enumerate(search.levels))
 
 
 def _with_sensitivity(problem: Problem, level: float) -> dict[str, Bound]:

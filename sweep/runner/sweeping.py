@@ -17,6 +17,7 @@ from ..progress import Progress
 from ..setup import Setup
 from ..store import sliced
 from ..study import Study
+from .compaction import Gathered, few_of
 from .jobs import Job, Rules, failed_rows, job_key, jobs_of, run_job, with_local_front
 from .provenance import fingerprint
 from .workers import Call, WorkerKilledError, Workers, alone
@@ -86,19 +87,24 @@ class Sweep:
                 if not shard.failed:
                     self.journal.save(key, index, shard)
 
-    def run(self, progress: Progress, *, fail_fast: bool, retry_failed: bool) -> None:
-        """Compute what is not kept yet. Raises FailedDesignError, after its chunk is kept, if it is to `fail_fast`."""
+    def run(self, gathered: Gathered, progress: Progress, *, fail_fast: bool, retry_failed: bool) -> None:
+        """Compute what is not kept yet; `gathered` takes in all rows.
+
+        Raises FailedDesignError, after its chunk is kept, if it is to `fail_fast`.
+        """
         entries = self.journal.entries
-        if retry_failed:
-            for key in self.keys:
-                if key in entries and entries[key].failed:
-                    self.journal.forget(key)
+        for index, key in enumerate(self.keys):
+            if key in entries and retry_failed and entries[key].failed:
+                self.journal.forget(key)
+            elif key in entries and (table := self._kept(index)) is not None:
+                gathered.add(few_of(table, self.rules))
         todo = [index for index, key in enumerate(self.keys) if key not in entries]
         done = sum(entries[key].rows for key in self.keys if key in entries)
         progress("designs", done, self.study.n_designs)
         calls = (joblib.delayed(_shard)(self.jobs[i], self._setup(self.jobs[i]), self.rules) for i in todo)
-        for index, shard in zip(todo, self.crew(calls, _quarantined), strict=False):
+        for index, (shard, few) in zip(todo, self.crew(calls, _quarantined), strict=False):
             self.journal.save(self.keys[index], index, shard)
+            gathered.add(few)
             done += shard.rows
             progress("designs", done, self.study.n_designs)
             if shard.failed and fail_fast:
@@ -108,26 +114,34 @@ class Sweep:
         """All finished chunks in order; one whose file is damaged is computed again."""
         self.failed = 0
         for index, (job, key) in enumerate(zip(self.jobs, self.keys, strict=True)):
-            table = self.journal.table(key, self.rules.schema)
+            table = self._kept(index)
             if table is None:
-                self.warnings.append(f"chunk {index} was damaged on the disk and is computed again")
-                shard = _shard(job, self._setup(job), self.rules)
+                shard, _ = _shard(job, self._setup(job), self.rules)
                 self.journal.save(key, index, shard)
                 table = shard.table()
             self.failed += self.journal.entries[key].failed
             yield table
 
+    def _kept(self, index: int) -> pa.Table | None:
+        """A finished chunk; None, and it counts as not finished, if its file is damaged."""
+        table = self.journal.table(self.keys[index], self.rules.schema)
+        if table is None:
+            self.warnings.append(f"chunk {index} was damaged on the disk and is computed again")
+        return table
 
-def _shard(job: Job, setup: Setup, rules: Rules) -> Shard:
+
+def _shard(job: Job, setup: Setup, rules: Rules) -> tuple[Shard, pa.Table]:
+    """A job's rows as a file's content, and the few that `Gathered` takes in."""
     started = time.monotonic()
     table = run_job(job, setup, rules)
-    return Shard.of(table, time.monotonic() - started)
+    return Shard.of(table, time.monotonic() - started), few_of(table, rules)
 
 
-def _quarantined(call: Call) -> Shard:
+def _quarantined(call: Call) -> tuple[Shard, pa.Table]:
     """A job whose worker died twice: by halves, down to the design that kills, which becomes a row with its status."""
     started = time.monotonic()
-    return Shard.of(_halved(call), time.monotonic() - started)
+    table = _halved(call)
+    return Shard.of(table, time.monotonic() - started), few_of(table, call[1][2])
 
 
 def _halved(call: Call) -> pa.Table:
@@ -139,7 +153,7 @@ def _halved(call: Call) -> pa.Table:
     for half in (replace(job, stop=middle), replace(job, start=middle, first_id=job.first_id + middle - job.start)):
         part: Call = (call[0], (half, setup, rules), {})
         try:
-            tables.append(alone(part).table())
+            tables.append(alone(part)[0].table())
         except WorkerKilledError:
             tables.append(_halved(part))
     return pa.concat_tables(tables).unify_dictionaries()
