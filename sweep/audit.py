@@ -18,11 +18,10 @@ from .metrics import CSD
 from .report import read_output
 from .runner.drawn import row_space
 from .setup import REFERENCE
-from .store import RESOLVED, RESULTS, batches, write_table
+from .store import AUDIT, RESOLVED, RESULTS, batches, write_table
 from .study import Study, load_study
 
 SHARE = 0.01
-AUDIT = "audit.parquet"
 _COLUMNS = ("design_id", "scenario", "plan", "promised_dn", "realized_dn")
 
 

@@ -122,7 +122,8 @@ def audit(
     data: DataFolder = None,
 ) -> None:
     """Recompute the front and 1 % of a run's rows with every effect on: promised beside realized error."""
-    from .audit import AUDIT, audit_output
+    from .audit import audit_output
+    from .store import AUDIT
 
     for line in audit_output(folder, data):
         typer.echo(line)

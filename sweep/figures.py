@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .arrays import FloatArray
+from .arrays import FloatArray, IndexArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -102,9 +102,16 @@ def thin(points: Points, most: int = _DRAWN_POINTS) -> Points:
     """At most `most` of the points, spread evenly and not in step with a grid; labeled points are all kept."""
     if points.labels or points.x.size <= most:
         return points
-    golden = (np.arange(most) * ((5**0.5 - 1) / 2)) % 1
-    kept = np.unique((golden * points.x.size).astype(np.intp))
+    kept = even(points.x.size, most)
     return Points(points.x[kept], points.y[kept])
+
+
+def even(size: int, most: int) -> IndexArray:
+    """At most `most` of `size` indices, in order, spread evenly and not in step with a grid."""
+    if size <= most:
+        return np.arange(size)
+    golden = (np.arange(most) * ((5**0.5 - 1) / 2)) % 1
+    return np.unique((golden * size).astype(np.intp))
 
 
 def draw_pareto(figure: ParetoFigure) -> Figure:
@@ -277,4 +284,5 @@ def rendered(figure: Figure, kind: str) -> bytes:
     metadata = {"Date": None} if kind == "svg" else {"Software": None}
     with mpl.rc_context({"svg.hashsalt": "cfa-sweep", "svg.fonttype": "path"}):
         figure.savefig(buffer, format=kind, dpi=160, metadata=metadata)
+    figure.set_layout_engine("none")  # found once, the layout holds for the other kind, too
     return buffer.getvalue()

@@ -15,6 +15,23 @@ def hypervolume(values: FloatArray, reference: FloatArray) -> float:
     return float(moocore.hypervolume(values[inside], ref=reference, maximise=True)) if inside.any() else 0.0
 
 
+def knee(values: FloatArray) -> int | None:
+    """Row of a front, ndarray[n, 2], that is farthest beyond the straight line between the front's ends.
+
+    Both quantities are maximized and scaled to the front's own range. None for fewer than three different points, or
+    where none is beyond the line.
+    """
+    if len(values) < 3 or not np.isfinite(values).all():
+        return None
+    span = np.ptp(values, axis=0)
+    if not (span > 0).all():
+        return None
+    scaled = (values - values.min(axis=0)) / span  # the line between the ends is then x + y = 1
+    beyond = scaled.sum(axis=1) - 1.0
+    best = int(np.argmax(beyond))
+    return best if beyond[best] > 1e-9 else None
+
+
 def non_dominated(values: FloatArray, eligible: BoolArray | None = None) -> BoolArray:
     """Return which rows of ndarray[n, n_objectives], all maximized, no other eligible row dominates: bool ndarray[n].
 

@@ -25,6 +25,7 @@ FRONT = "front.parquet"
 CURVES = "curves.parquet"
 POINTS = "points.parquet"
 RECOGNITION = "recognition.parquet"
+AUDIT = "audit.parquet"
 PROVENANCE = "provenance.json"
 PROVENANCE_KEYS = (
     "designs",

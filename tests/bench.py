@@ -36,6 +36,7 @@ from sweep.imaging import Imager
 from sweep.metrics import class_pairs, separation, separations_along
 from sweep.mosaics import Mosaic
 from sweep.runner import run_study
+from sweep.runner.processes import keep_freed_memory
 from sweep.scenes import Scenario
 from sweep.setup import Setup
 from sweep.spaces import Space
@@ -124,6 +125,7 @@ def distances(imager: Imager, block: Any) -> None:
 
 def rate_of(route: str, study: Study, seconds: float) -> float:
     """Designs per second of a route in this process, over some seconds."""
+    keep_freed_memory()
     space, setup = swept(study)
     imager, points = Imager(setup), space.points(0, BLOCK)
     edges = edges_of(space, 0, BLOCK)

@@ -140,34 +140,6 @@ def series_figures(output: Output) -> list[SeriesFigure]:
     return figures
 
 
-def plan_table(output: Output) -> pd.DataFrame:
-    """What was computed in each scenario, and what the rest changes at most; scenarios of one plan share a row."""
-    groups: dict[tuple[str, str], list[str]] = {}
-    for name, plan in output.provenance["plans"].items():
-        computed = [f"{e['effect']}: {e['method']}" for e in plan["effects"] if e["method"] not in ("skip", "one")]
-        skipped = [
-            f"{e['effect']}: {e['promised_dn']:.2g} DN ({e['reason']})"
-            if e["promised_dn"]
-            else f"{e['effect']}: {e['reason']}"
-            for e in plan["effects"]
-            if e["method"] in ("skip", "one")
-        ]
-        groups.setdefault(("; ".join(computed), "; ".join(skipped)), []).append(name)
-    plans = output.provenance["plans"]
-    return pd.DataFrame(
-        [
-            {
-                "scenarios": ", ".join(names),
-                "computed": computed,
-                "left out": skipped,
-                "promised / DN": f"{max(plans[name]['promised_dn'] for name in names):.2g}",
-                "tolerance / DN": f"{plans[names[0]]['tolerance_dn']:g}",
-            }
-            for (computed, skipped), names in groups.items()
-        ]
-    )
-
-
 def sensor_figure(output: Output) -> CurvesFigure:
     """The sensor's QE curves."""
     curves = _curves(output, "qe:")
@@ -224,8 +196,7 @@ def filters_figure(output: Output, cfa: str) -> CurvesFigure:
     """
     rows = drawn(output)
     rows = rows[rows["cfa"] == cfa]
-    entries = [entry for entry in modifications(output) if entry["cfa"] == cfa]
-    ends = {end for entry in entries for end in (entry["base"], entry.get("to")) if isinstance(end, str)} | {"G", "Y"}
+    ends = end_curves(output, cfa)
     curves = {name: values for name, values in _curves(output, "qe:").items() if name in ends}
     for row in rows.to_dict("records"):
         made = [c for c in output.curves.columns if c.startswith(f"design:{row['design_id']}:")]
@@ -236,6 +207,13 @@ def filters_figure(output: Output, cfa: str) -> CurvesFigure:
         curves[LIMIT_NAME] = output.curves[f"limit:{cfa}"].to_numpy()
     dashed = (*ends, LIMIT_NAME)
     return CurvesFigure(f"{cfa}: modified channel", "QE", _wave(output), curves, dashed, {LIMIT_NAME: "#000000"})
+
+
+def end_curves(output: Output, cfa: str) -> list[str]:
+    """Names of the sensor's curves that a CFA's filters go between, and those of the green and the yellow pixel."""
+    entries = [entry for entry in modifications(output) if entry["cfa"] == cfa]
+    ends = {end for entry in entries for end in (entry["base"], entry.get("to")) if isinstance(end, str)} | {"G", "Y"}
+    return [name for name in _curves(output, "qe:") if name in ends]
 
 
 def modifications(output: Output) -> list[dict[str, object]]:

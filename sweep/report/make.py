@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+import pandas as pd
 import pyarrow as pa
 
 from ..figures import draw_chart, draw_clouds, draw_curves, draw_pareto, rendered
@@ -13,10 +14,13 @@ from ..series import draw_series
 from ..store import write_bytes, write_table, write_text
 from . import content
 from .comparison import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
+from .interactive import payload
 from .noise import noise_figures, recognition_table
 from .outputs import Output
-from .pages import inlined, page, rows
-from .summary import answer_sentences, summary_lines
+from .pages import inlined, library, page, rows, script
+from .profiles import profile_table
+from .scenes import effect_table, scene_groups, scene_table
+from .summary import answer_sentences, counts_line, summary_lines
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,23 +45,39 @@ def make_report(output: Output) -> None:
     if len(published):
         write_text(published.to_csv(index=False), output.folder / PUBLISHED_CSV)
         write_table(pa.Table.from_pandas(published, preserve_index=False), output.folder / PUBLISHED_PARQUET)
-    content_html = page(
+    write_text(_html(output, images, published), output.folder / REPORT)
+
+
+def _html(output: Output, images: Sequence[tuple[str, str]], published: pd.DataFrame) -> str:
+    drawn = payload(output)
+    groups = scene_groups(output)
+    return page(
         "report.html.j2",
         study=output.study,
+        folder=output.folder.as_posix(),
         objective=str(Objective.model_validate(output.study["objective"])),
+        objective_words=content.readable(output.objective),
         answer=answer_sentences(output),
+        counts=counts_line(output),
+        interactive=drawn if drawn["views"] else None,
+        profiles={cfa: rows(profile_table(found)) for cfa, found in output.profiles.items()},
+        history=drawn["history"],
+        plotly=library(),
+        script=script("report.js"),
+        groups=groups,
+        scenes=rows(scene_table(groups)),
+        group_rows=[rows(effect_table(group)) for group in groups],
+        audited=output.audited is not None,
         images=images,
         comparison=rows(content.comparison_table(output)),
         best=rows(content.best_table(output)),
         recognition=rows(recognition_table(output)),
         geometry=rows(content.geometry_table(output)),
         published=rows(published),
-        plans=rows(content.plan_table(output)),
         constraints={name: str(bound) for name, bound in output.constraints.items()},
         summary=summary_lines(output),
         provenance=output.provenance,
     )
-    write_text(content_html, output.folder / REPORT)
 
 
 def _drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:

@@ -19,6 +19,7 @@ from ..metrics import CSD
 from ..objectives import Objective
 from ..scenes import Geometry
 from ..store import (
+    AUDIT,
     CURVES,
     FRONT,
     POINTS,
@@ -27,8 +28,10 @@ from ..store import (
     RECOGNITION,
     RESOLVED,
     RESULTS,
+    SEARCH_LOG,
     read_table,
 )
+from .profiles import Profile, Profiles
 from .thinning import Counts, thinned
 
 _STUDY_KEYS = ("study", "seed", "wavelengths", "scenarios", "objective")
@@ -36,7 +39,10 @@ _STUDY_KEYS = ("study", "seed", "wavelengths", "scenarios", "objective")
 
 @dataclass(frozen=True)
 class Output:
-    """What a run left in its folder; of a long result table, `table` holds what a report shows."""
+    """What a run left in its folder; of a long result table, `table` holds what a report shows.
+
+    `profiles`: over the whole table, per CFA. `searched`: the search's evaluations. `audited`: rows of `sweep audit`.
+    """
 
     folder: Path
     study: Mapping[str, Any]
@@ -47,6 +53,9 @@ class Output:
     points: pd.DataFrame
     front: pd.DataFrame | None
     recognition: pd.DataFrame | None
+    searched: pd.DataFrame | None
+    audited: pd.DataFrame | None
+    profiles: Mapping[str, Sequence[Profile]]
 
     @property
     def objective(self) -> str:
@@ -104,12 +113,18 @@ def read_output(folder: Path) -> Output:
     study = _mapping(folder / RESOLVED, lambda text: YAML(typ="safe").load(text), _STUDY_KEYS)
     provenance = _mapping(folder / PROVENANCE, json.loads, PROVENANCE_KEYS)
     objective = Objective.model_validate(study["objective"]).column
-    table, counts = thinned(folder / RESULTS, [objective, *provenance["trade_off"]])
+    profiles = Profiles(objective, next(iter(study["scenarios"])))
+    table, counts = thinned(folder / RESULTS, [objective, *provenance["trade_off"]], profiles.add)
     curves, points = (read_table(folder / name).to_pandas() for name in (CURVES, POINTS))
-    front, recognition = (
-        read_table(folder / name).to_pandas() if (folder / name).is_file() else None for name in (FRONT, RECOGNITION)
+    front, recognition, searched, audited = (
+        read_table(folder / name).to_pandas() if (folder / name).is_file() else None
+        for name in (FRONT, RECOGNITION, SEARCH_LOG, AUDIT)
     )
-    return Output(folder, study, provenance, table, counts, curves, points, front, recognition)
+    if searched is not None and not profiles.found:
+        profiles.add_search(searched, next(iter(table[table["kind"] == "search"]["cfa"]), ""))
+    return Output(
+        folder, study, provenance, table, counts, curves, points, front, recognition, searched, audited, profiles.found
+    )
 
 
 def _mapping(path: Path, parse: Any, keys: Sequence[str]) -> dict[str, Any]:

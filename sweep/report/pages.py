@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import base64
 import math
+from importlib import resources
 from typing import Any
 
 import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 
 
 def page(template: str, **values: Any) -> str:
@@ -16,7 +18,20 @@ def page(template: str, **values: Any) -> str:
     templates = Environment(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
+    templates.policies["json.dumps_kwargs"] = {"sort_keys": False, "allow_nan": False}
     return templates.get_template(template).render(**values)
+
+
+def library() -> Markup:
+    """Plotly's script, as the page itself carries it."""
+    from plotly.offline import get_plotlyjs  # noqa: PLC0415  (slow to import)
+
+    return Markup(get_plotlyjs().replace("</script", "<\\/script"))
+
+
+def script(name: str) -> Markup:
+    """A script of ours, as the page itself carries it."""
+    return Markup(resources.files("sweep").joinpath("templates", name).read_text(encoding="utf-8"))
 
 
 def inlined(png: bytes) -> str:

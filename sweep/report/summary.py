@@ -68,7 +68,7 @@ def summary_lines(output: Output) -> list[str]:
             f"{row['object_resolution_px']:g} px across the light."
         )
     lines += comparison_lines(comparison_with_published(output))
-    lines.append(_counts(output))
+    lines.append(counts_line(output))
     lines.append(_plan_line(output))
     search = output.provenance.get("search")
     if search:
@@ -98,7 +98,8 @@ def _plan_line(output: Output) -> str:
     return f"Simulated: {', '.join(computed)}; all else changes a CSD by at most {promised:.2g} of {tolerance:g} DN."
 
 
-def _counts(output: Output) -> str:
+def counts_line(output: Output) -> str:
+    """How many designs there are, and what the report leaves out."""
     counts = output.counts
     text = f"{counts.rows:,} designs, {counts.feasible:,} feasible, {counts.front:,} on the Pareto front"
     if counts.failed:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,11 +29,13 @@ class Counts:
     left_out: int
 
 
-def thinned(path: Path, order: Sequence[str]) -> tuple[pd.DataFrame, Counts]:
+def thinned(
+    path: Path, order: Sequence[str], see: Callable[[pa.Table], None] = lambda _: None
+) -> tuple[pd.DataFrame, Counts]:
     """The table to show and the counts of the whole one; no more than a row group and what is kept are in memory.
 
     Kept are all rows that are no sweep, the whole Pareto front, the best feasible designs by `order` (columns, all
-    maximized) and of the others every n-th.
+    maximized) and of the others every n-th. `see` is handed every row group of the whole table.
     """
     try:
         total = int(pq.read_metadata(path).num_rows)
@@ -44,6 +46,7 @@ def thinned(path: Path, order: Sequence[str]) -> tuple[pd.DataFrame, Counts]:
     best: pa.Table | None = None
     feasible = front = failed = 0
     for table in batches(path):
+        see(table)
         ok, on_front = table["feasible"].to_numpy(), table["pareto"].to_numpy()
         feasible += int(ok.sum())
         front += int(on_front.sum())

@@ -15,6 +15,8 @@ from .jobs import Rules
 
 BEST_PER_CFA = 5
 """Best feasible designs of each CFA's sweeps that the report lists and draws."""
+FRONT_ROWS = 200
+"""Designs of a front, spread evenly over it, whose curves and signals a report can show."""
 _MOST_CANDIDATES = 50_000
 _ALWAYS = ("reference", "design", "search")
 
@@ -80,7 +82,8 @@ def _thinned(values: FloatArray) -> FloatArray:
 class Gathered:
     """What a run keeps of its rows: the front of all of them, that of the swept ones, and those that reports draw.
 
-    Those are every plain CFA, named design and answer, and the best swept designs of each CFA in the first scenario.
+    Those are every plain CFA, named design and answer, and in the first scenario the best swept designs of each CFA and
+    some of its front.
     """
 
     rules: Rules
@@ -92,6 +95,7 @@ class Gathered:
         self.front, self.swept = Front(self.rules.front), Front(self.rules.front, "sweep")
         self._always: list[pa.Table] = [self.rules.schema.empty_table()]
         self._best: dict[str, pa.Table] = {}
+        self._feasible: dict[str, pa.Table] = {}
 
     def add(self, few: pa.Table) -> None:
         """Take in what `few_of` a table gives."""
@@ -106,6 +110,13 @@ class Gathered:
             own = swept.filter(pa.array(holds(swept, "cfa", cfa)))
             both = pa.concat_tables([self._best[cfa], own]) if cfa in self._best else own
             self._best[cfa] = best_rows(both, self.rules.order, BEST_PER_CFA)
+            marked = own.filter(own["pareto"])
+            both = pa.concat_tables([self._feasible[cfa], marked]) if cfa in self._feasible else marked
+            self._feasible[cfa] = self._non_dominated(both) if both.num_rows > _MOST_CANDIDATES else both
+
+    def _non_dominated(self, table: pa.Table) -> pa.Table:
+        values = np.stack([table[name].to_numpy() for name in self.rules.front], axis=1)
+        return table.filter(pa.array(non_dominated(values))).combine_chunks()
 
     def finish(self) -> None:
         """Nothing more comes."""
@@ -114,7 +125,19 @@ class Gathered:
 
     def frame(self) -> pd.DataFrame:
         """The rows to draw, `pareto` as on the whole front; ordered by their ids."""
-        tables = [*self._always, *self._best.values()]
+        return self._frame([*self._always, *self._best.values()])
+
+    def front_frame(self) -> pd.DataFrame:
+        """Feasible swept rows of the whole front in the first scenario, of each CFA evenly up to FRONT_ROWS."""
+        tables = [self.rules.schema.empty_table()]
+        for table in self._feasible.values():
+            found = self.front.marked(table)
+            found = found.filter(found["pareto"]).sort_by([(self.rules.front[1], "ascending")])
+            spread = np.linspace(0, max(0, found.num_rows - 1), min(FRONT_ROWS, found.num_rows)).round().astype(int)
+            tables.append(found.take(pa.array(spread)))
+        return self._frame(tables)
+
+    def _frame(self, tables: list[pa.Table]) -> pd.DataFrame:
         frame: pd.DataFrame = self.front.marked(pa.concat_tables(tables).unify_dictionaries()).to_pandas()
         return frame.sort_values("design_id", ignore_index=True)
 

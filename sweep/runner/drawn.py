@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,43 +15,52 @@ from ..spaces import Space
 from ..study import Study
 
 
-def curves_table(study: Study, rows: pd.DataFrame, limit: Limit | None) -> pa.Table:
-    """Columns `wavelength_nm`, `qe:<curve>`, `light:<type>:<name>`, `design:<design_id>:<k>`, `limit:<cfa>`."""
+def curves_table(study: Study, rows: pd.DataFrame, on_front: pd.DataFrame, limit: Limit | None) -> pa.Table:
+    """Columns `wavelength_nm`, `qe:<curve>`, `light:<type>:<name>`, `design:<design_id>:<k>`, `front:<design_id>:<k>`
+    of those rows of the front that are not drawn anyway, `limit:<cfa>`.
+    """
     columns: dict[str, Any] = {"wavelength_nm": study.grid.nodes_nm}
     columns |= {f"qe:{name}": values for name, values in study.sensor.qe.items()}
     lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
     columns |= {f"light:{kind}:{name}": values for kind, name, values in lights}
-    for row in _drawn(study, rows):
-        for index, curve in enumerate(row_curves(study, row)[1][0]):
-            columns[f"design:{row['design_id']}:{index}"] = curve
+    drawn = _drawn(study, rows)
+    for what, some in (("design", drawn), ("front", _others(on_front, drawn))):
+        for row in some:
+            for index, curve in enumerate(row_curves(study, row)[1][0]):
+                columns[f"{what}:{row['design_id']}:{index}"] = curve
     if limit is not None and limit.curve is not None and study.search is not None:
         columns[f"limit:{study.search.space.cfa}"] = limit.curve
     return pa.table(columns)
 
 
-def points_table(study: Study, rows: pd.DataFrame) -> pa.Table:
-    """Digital numbers of every signal in every channel of the drawn designs, a row each."""
+def points_table(study: Study, rows: pd.DataFrame, on_front: pd.DataFrame) -> pa.Table:
+    """Digital numbers of every signal in every channel of the drawn designs and those on the front, a row each."""
     text, number = pa.string(), pa.float64()
     schema = pa.schema(
         [("design_id", pa.int64()), ("signal_type", text), ("signal", text), ("channel", text), ("dn", number)]
     )
-    found: list[dict[str, Any]] = []
-    for row in _drawn(study, rows):
+    drawn = _drawn(study, rows)
+    found = [schema.empty_table()]
+    for row in [*drawn, *_others(on_front, drawn)]:
         space, curves = row_curves(study, row)
         setup = study.setup(space, row["scenario"])
         response = imager_of(setup).read(curves)[0][0, 0]
-        for signal, (kind, name) in enumerate(zip(study.lights.types, study.lights.names, strict=True)):
-            for channel, values in zip(setup.mosaic.channels, response.T, strict=True):
-                found.append(
-                    {
-                        "design_id": row["design_id"],
-                        "signal_type": kind,
-                        "signal": name,
-                        "channel": channel,
-                        "dn": float(values[signal]),
-                    }
-                )
-    return pa.Table.from_pylist(found, schema=schema)
+        signals, channels = response.shape
+        columns = (
+            np.full(response.size, row["design_id"]),
+            np.repeat(study.lights.types, channels),
+            np.repeat(study.lights.names, channels),
+            np.tile(setup.mosaic.channels, signals),
+            response.ravel(),
+        )
+        arrays = [pa.array(values, type=kind) for values, kind in zip(columns, schema.types, strict=True)]
+        found.append(pa.Table.from_arrays(arrays, schema=schema))
+    return pa.concat_tables(found).combine_chunks()
+
+
+def _others(rows: pd.DataFrame, drawn: Sequence[Mapping[Hashable, Any]]) -> list[dict[Hashable, Any]]:
+    """Rows that are not drawn already."""
+    return rows[~rows["design_id"].isin([row["design_id"] for row in drawn])].to_dict("records")
 
 
 def _drawn(study: Study, rows: pd.DataFrame) -> list[dict[Hashable, Any]]:

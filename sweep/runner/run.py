@@ -152,7 +152,7 @@ class _Run:
         gathered.finish()
         tables = map(gathered.front.marked, chain(sweep.tables(), answered))
         write_tables(tables, self.rules.schema, output / RESULTS)
-        rows = gathered.frame()
+        rows, on_front = gathered.frame(), gathered.front_frame()
         self.facts |= {
             "designs": study.n_designs + len(answered),
             "failed": sweep.failed,
@@ -161,7 +161,7 @@ class _Run:
             "warnings": [*study.warnings, *sweep.warnings],
         }
         self._write_search(answer, gathered.swept)
-        self._write_drawn(rows, answer)
+        self._write_drawn(rows, on_front, answer)
         write_text(resolved_yaml(study), output / RESOLVED)
         duration = time.monotonic() - started
         write_json(provenance(study, self.crew, command, duration) | self.facts, output / PROVENANCE)
@@ -193,9 +193,9 @@ class _Run:
         self._write(SEARCH_LOG, log)
         self._write(FRONT, trade_off)
 
-    def _write_drawn(self, rows: pd.DataFrame, answer: SearchAnswer | None) -> None:
-        self._write(CURVES, curves_table(self.study, rows, None if answer is None else answer.limit))
-        self._write(POINTS, points_table(self.study, rows))
+    def _write_drawn(self, rows: pd.DataFrame, on_front: pd.DataFrame, answer: SearchAnswer | None) -> None:
+        self._write(CURVES, curves_table(self.study, rows, on_front, None if answer is None else answer.limit))
+        self._write(POINTS, points_table(self.study, rows, on_front))
         self._write(RECOGNITION, recognition_table(self.study, rows, self.crew, self.progress))
 
     def _write(self, name: str, table: pa.Table | None) -> None:

@@ -42,8 +42,3 @@ def stop_on_signals() -> Iterator[Stop]:
     finally:
         for number, handler in before:
             signal.signal(number, handler)
-
-
-def leave_signals_to_the_parent() -> None:
-    """In a worker: a Ctrl-C reaches the whole process group, and the parent alone decides what becomes of the work."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -17,7 +17,8 @@ from joblib.externals.loky import ProcessPoolExecutor
 from threadpoolctl import threadpool_limits
 
 from ..errors import InterruptedRunError, SweepError
-from .stopping import Stop, leave_signals_to_the_parent
+from .processes import keep_freed_memory, prepare_worker
+from .stopping import Stop
 
 _LEAST_WINDOW, _WINDOW_PER_WORKER = 64, 16
 BACKENDS = ("loky", "threading", "dask")
@@ -105,14 +106,17 @@ def workers(how: Workers) -> Iterator[Workers]:
     Raises SweepError when Dask is not installed or its scheduler does not answer.
     """
     settings: dict[str, Any] = {}
+    keep_freed_memory()  # with one worker, and with threads, the work is done in this process
     with ExitStack() as stack:
         stack.enter_context(warnings.catch_warnings())
         # A run that ends early cancels what it has no use for.
         warnings.filterwarnings("ignore", message=".*have been cancelled", category=UserWarning)
+        # loky starts a worker anew whose caches have grown, and hands it the calls again.
+        warnings.filterwarnings("ignore", message="A worker stopped while some jobs", category=UserWarning)
         if how.backend == "dask":
             stack.enter_context(_dask_client(how.scheduler))
         elif how.backend == "loky":
-            settings = {"inner_max_num_threads": 1, "initializer": leave_signals_to_the_parent}
+            settings = {"inner_max_num_threads": 1, "initializer": prepare_worker}
         else:  # a call that ends gives back what it found, also to the calls beside it: let that be one thread
             stack.enter_context(threadpool_limits(1))
         stack.enter_context(joblib.parallel_config(how.backend, **settings))
@@ -121,7 +125,7 @@ def workers(how: Workers) -> Iterator[Workers]:
 
 def alone(call: Call) -> Any:
     """Result of a call in a process of its own; raises WorkerKilledError when that dies."""
-    with ProcessPoolExecutor(max_workers=1, initializer=leave_signals_to_the_parent) as process:
+    with ProcessPoolExecutor(max_workers=1, initializer=prepare_worker) as process:
         try:
             return process.submit(_one_threaded, *call).result()
         except BrokenProcessPool:

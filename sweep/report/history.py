@@ -1,0 +1,65 @@
+"""How a search went: the best separation and the hypervolume against the number of evaluations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from ..arrays import FloatArray, IndexArray
+from ..constraints import FEASIBLE
+from ..pareto import hypervolume
+from .outputs import Output
+
+_PLACES = 80
+
+
+@dataclass(frozen=True)
+class Start:
+    """One start of the search: its number and the best feasible objective after each evaluation (NaN: none yet)."""
+
+    number: int
+    best: FloatArray
+
+
+@dataclass(frozen=True)
+class History:
+    """`starts`: of the search itself. `evaluations`, `best`, `volume`: ndarray[n], over all starts and levels of the
+    front, in the order of the log: the best feasible objective, and the hypervolume of everything feasible so far.
+
+    The best one is over the designs that meet the study's own constraints; the hypervolume is above an objective of 0
+    and `least_sensitivity`.
+    """
+
+    starts: tuple[Start, ...]
+    evaluations: IndexArray
+    best: FloatArray
+    volume: FloatArray
+    least_sensitivity: float
+
+
+def history_of(output: Output) -> History | None:
+    """The history of a study's search; None where it has none."""
+    log = output.searched
+    if log is None or log.empty:
+        return None
+    own = log[log["sensitivity_min"].isna()]
+    starts = tuple(Start(int(str(number)), _best_so_far(rows)) for number, rows in own.groupby("start"))
+    bound = output.constraints.get("sensitivity")
+    asked = 0.0 if bound is None or bound.min is None else bound.min
+    met = (log["violation"] <= FEASIBLE) & (log["sensitivity"] >= asked * (1 - FEASIBLE))
+    best = np.fmax.accumulate(log["objective"].where(met).to_numpy(dtype=float))
+    at = np.unique(np.geomspace(1, len(log), min(_PLACES, len(log))).round().astype(np.intp))
+    feasible = log["violation"].to_numpy() <= FEASIBLE
+    pairs = log[["objective", "sensitivity"]].to_numpy(dtype=float)
+    levels = log["sensitivity_min"].dropna()
+    least = float(min([asked, *levels])) if len(levels) else asked
+    reference = np.array([0.0, least - 1e-6])
+    volume = [hypervolume(pairs[:n][feasible[:n]], reference) for n in at]
+    return History(starts, at, best[at - 1], np.array(volume), least)
+
+
+def _best_so_far(rows: pd.DataFrame) -> FloatArray:
+    feasible = rows["objective"].where(rows["violation"] <= FEASIBLE).to_numpy(dtype=float)
+    return np.asarray(np.fmax.accumulate(feasible), dtype=float)

@@ -1,0 +1,34 @@
+"""What each worker process sets for itself."""
+
+from __future__ import annotations
+
+import ctypes
+import signal
+from contextlib import suppress
+
+_KEPT_BYTES, _LARGE_BYTES = 2**26, 2**24
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
+"""Numbers of mallopt's options in glibc's malloc.h."""
+
+
+def prepare_worker() -> None:
+    """Leave signals to the parent, and keep freed memory."""
+    leave_signals_to_the_parent()
+    keep_freed_memory()
+
+
+def leave_signals_to_the_parent() -> None:
+    """In a worker: a Ctrl-C reaches the whole process group, and the parent alone decides what becomes of the work."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def keep_freed_memory() -> None:
+    """Keep up to 64 MiB that were freed for the next block of designs, where the C library is glibc.
+
+    By default it gives every block's arrays back to the system, and taking them anew costs as much as the work on them.
+    Arrays above 16 MiB still go back at once.
+    """
+    with suppress(OSError, AttributeError, TypeError):
+        libc = ctypes.CDLL(None)
+        libc.mallopt(_M_TRIM_THRESHOLD, _KEPT_BYTES)
+        libc.mallopt(_M_MMAP_THRESHOLD, _LARGE_BYTES)

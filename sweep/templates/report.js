@@ -1,0 +1,373 @@
+"use strict";
+/* The interactive part of a report. Everything that it draws stands in the element #data. */
+(() => {
+const data = JSON.parse(document.getElementById("data").textContent);
+const kinds = {u1: Uint8Array, u2: Uint16Array, f4: Float32Array, f8: Float64Array};
+const config = {responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"]};
+const grid = {gridcolor: "#e4e4e4", zeroline: false, automargin: true};
+const dashes = ["solid", "dash", "dot", "dashdot"];
+const cycle = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"];
+const byId = (id) => document.getElementById(id);
+/* One kind for all: what WebGL draws lies above what is drawn without it. */
+const drawnBy = document.createElement("canvas").getContext("webgl") ? "scattergl" : "scatter";
+const narrow = () => window.innerWidth < 700;
+
+function unpack(packed) {
+  const raw = atob(packed.bdata);
+  const bytes = new Uint8Array(raw.length);
+  for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
+  return new kinds[packed.dtype](bytes.buffer);
+}
+
+/* Plotly reads a small part of HTML in its texts. */
+function plain(text) {
+  return String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
+}
+
+const columns = {};
+for (const [name, column] of Object.entries(data.columns)) columns[name] = unpack(column.values);
+const group = unpack(data.group), ids = unpack(data.design_id);
+const scenario = unpack(data.scenario.codes), cfa = unpack(data.cfa.codes);
+const wavelength = Array.from(unpack(data.curves.wavelength_nm));
+const G = Object.fromEntries(data.groups.map((name, i) => [name, i]));
+const x = columns[data.axes.x], y = columns[data.axes.y];
+let view = data.views[0];
+let chosen = null;
+
+const shown = (name, value) => Number.isFinite(value) ? value.toFixed(data.columns[name].digits) : "-";
+const title = (row) => data.names[row] || `design ${ids[row]}`;
+
+function rowsOf(name) {
+  const at = data.scenario.words.indexOf(view.scenario), own = data.cfa.words.indexOf(view.cfa), found = [];
+  for (let i = 0; i < group.length; i++)
+    if (group[i] === G[name] && scenario[i] === at && cfa[i] === own) found.push(i);
+  return found;
+}
+
+function described(row) {
+  const lines = [title(row)];
+  for (const name of Object.keys(data.columns)) {
+    const value = columns[name][row];
+    if (Number.isFinite(value) && !(name === "violation" && value <= 0))
+      lines.push(`${data.columns[name].label}: ${shown(name, value)}`);
+  }
+  return lines.slice(0, 26);
+}
+
+function hover(event) {
+  const box = byId("hover"), row = event.points[0].customdata;
+  if (row === undefined) return;
+  box.replaceChildren(...described(row).map((line) => {
+    const part = document.createElement("div");
+    part.textContent = line;
+    return part;
+  }));
+  box.hidden = false;
+  const left = Math.min(event.event.clientX + 14, window.innerWidth - box.offsetWidth - 8);
+  const top = Math.min(event.event.clientY + 14, window.innerHeight - box.offsetHeight - 8);
+  box.style.transform = `translate(${Math.max(4, left)}px, ${Math.max(4, top)}px)`;
+}
+
+function points(rows, name, marker, extra) {
+  return Object.assign({
+    type: drawnBy, mode: "markers", name, marker, customdata: rows, hoverinfo: "none",
+    x: rows.map((i) => x[i]), y: rows.map((i) => y[i]),
+  }, extra);
+}
+
+function traces() {
+  const color = data.colors.groups, found = [];
+  const count = (rows) => rows.length.toLocaleString("en");
+  const bad = byId("infeasible").checked ? rowsOf("infeasible") : [];
+  if (bad.length) {
+    const violation = bad.map((i) => columns.violation[i]);
+    const top = violation.filter(Number.isFinite).sort((a, b) => a - b)[Math.floor(0.95 * (violation.length - 1))];
+    found.push(points(bad, `not feasible (${count(bad)} drawn)`, {
+      symbol: "x", size: 4, opacity: 0.6, color: violation, cmin: 0, cmax: top || 1,
+      colorscale: [[0, "#8c8c8c"], [1, "#e6c9a8"]], showscale: !narrow(),
+      colorbar: {title: {text: "violation", side: "right"}, thickness: 8, len: 0.45, y: 0.2, x: 1.0},
+    }));
+  }
+  const good = rowsOf("feasible"), front = rowsOf("front");
+  if (good.length)
+    found.push(points(good, `feasible (${count(good)} drawn)`, {size: 4, opacity: 0.6, color: color.feasible}));
+  if (front.length) found.push(points(front, `Pareto front (${count(front)})`, {size: 7, color: color.front}));
+  Object.entries(view.lines).forEach(([name, [u, v]], i) => found.push({
+    type: drawnBy, mode: "lines", name, x: u, y: v, hoverinfo: "x+y+name",
+    line: {color: i ? "#009e73" : "#d55e00", dash: dashes[i % 4], width: 2},
+  }));
+  if (view.knee !== null)
+    found.push(points([view.knee], "knee of the front",
+      {size: 15, symbol: "hexagon-open", color: "#000000", line: {width: 2}}));
+  const named = rowsOf("named");
+  if (named.length)
+    found.push(points(named, "named designs", {size: 10, symbol: "diamond", color: color.named}, {
+      mode: "markers+text", texttemplate: named.map((i) => plain(title(i).split(" (")[0])), textposition: "top center",
+      name: named.length === 1 ? plain(title(named[0])) : "named designs",
+    }));
+  const best = rowsOf("best");
+  if (best.length)
+    found.push(points(best, "best of the search",
+      {size: 17, symbol: "star", color: color.best, line: {color: "#000000", width: 1}}));
+  return found;
+}
+
+function levels() {
+  const entries = Object.entries(view.levels).sort((a, b) => a[1] - b[1]);
+  const shapes = entries.map(([, level]) => (
+    {type: "line", xref: "paper", x0: 0, x1: 1, y0: level, y1: level, line: {color: "#7a7a7a", width: 1, dash: "dot"}}));
+  let top = 1;
+  for (let i = 0; i < y.length; i++) if (y[i] > top) top = y[i];
+  const merged = [];
+  for (const [name, level] of entries) {
+    const text = `${plain(name)} ${level.toFixed(0)}`, last = merged[merged.length - 1];
+    if (last && level - last.y < 0.035 * top) last.text += `, ${text}`;
+    else merged.push({xref: "paper", x: 0, y: level, text, showarrow: false, xanchor: "left", yanchor: "bottom",
+      font: {size: 11, color: "#555"}, bgcolor: "rgba(255,255,255,0.7)"});
+  }
+  if (view.bound !== null)
+    shapes.push({type: "line", yref: "paper", y0: 0, y1: 1, x0: view.bound, x1: view.bound,
+      line: {color: "#000000", width: 1, dash: "dash"}});
+  return {shapes, annotations: merged};
+}
+
+function legend() {
+  return narrow() ? {orientation: "h", y: -0.28, font: {size: 11}} : {x: 1.12, y: 1, font: {size: 12}};
+}
+
+function drawPareto() {
+  const layout = Object.assign({
+    xaxis: Object.assign({title: {text: plain(view.x_label).replace(" (", narrow() ? "<br>(" : " (")}}, grid),
+    yaxis: Object.assign({title: {text: plain(view.y_label)}}, grid),
+    height: narrow() ? 520 : 560, margin: {l: 60, r: 10, t: 30, b: 60}, legend: legend(), hovermode: "closest",
+    plot_bgcolor: "#fff",
+    title: {text: plain(view.title), font: {size: narrow() ? 12 : 15}},
+  }, levels());
+  Plotly.react("pareto", traces(), layout, config);
+}
+
+function drawCurves(row) {
+  const own = data.curves.designs[ids[row]] || [], found = [];
+  const line = (name, packed, color, dash, width) => found.push({
+    type: "scatter", mode: "lines", name: plain(name), x: wavelength, y: Array.from(unpack(packed)),
+    line: {color, dash, width},
+  });
+  for (const name of data.curves.ends[view.cfa] || [])
+    line(name, data.curves.sensor[name], data.colors.curves[name] || "#777777", "dot", 1.5);
+  if (data.curves.limits[view.cfa]) line("limit of any filter", data.curves.limits[view.cfa], "#000000", "dash", 1.2);
+  own.forEach((packed, i) => line(own.length > 1 ? `${title(row)}, ${"ab"[i]}` : title(row), packed, cycle[i], "solid", 2.5));
+  Plotly.react("curves", found, {
+    title: {text: `QE of ${plain(title(row))}`, font: {size: 14}}, height: 340, margin: {l: 50, r: 10, t: 36, b: 45},
+    xaxis: Object.assign({title: {text: "wavelength / nm"}}, grid),
+    yaxis: Object.assign({title: {text: "QE"}, rangemode: "tozero"}, grid), legend: {orientation: "h", y: -0.25},
+  }, config);
+}
+
+function drawClouds(row) {
+  const packed = data.clouds.designs[ids[row]];
+  byId("clouds").hidden = !packed;
+  if (!packed) return;
+  const channels = data.clouds.channels[view.cfa], types = data.clouds.types, n = types.length, dn = unpack(packed);
+  const of = (channel) => dn.subarray(channel * n, (channel + 1) * n);
+  const found = [], pairs = channels.length - 1, wide = narrow() ? 1 : pairs, rows = Math.ceil(pairs / wide);
+  const layout = {
+    title: {text: `Signals of ${plain(title(row))}`, font: {size: 14}}, height: 60 + 280 * rows,
+    margin: {l: 50, r: 10, t: 60, b: 45}, grid: {rows, columns: wide, pattern: "independent"},
+    legend: {orientation: "h", y: rows === 1 ? 1.14 : 1.03, x: 0},
+  };
+  let top = 1;
+  for (let i = 0; i < dn.length; i++) if (dn[i] > top) top = dn[i];
+  for (let pair = 0; pair < pairs; pair++) {
+    const at = pair ? String(pair + 1) : "";
+    [...new Set(types)].forEach((type, k) => {
+      const own = types.map((t, i) => t === type ? i : -1).filter((i) => i >= 0);
+      found.push({
+        type: "scatter", mode: "markers", name: plain(type), legendgroup: type, showlegend: pair === 0,
+        x: own.map((i) => of(0)[i]), y: own.map((i) => of(pair + 1)[i]), xaxis: `x${at}`, yaxis: `y${at}`,
+        marker: {size: 6, symbol: ["circle", "square", "diamond", "triangle-up", "triangle-down", "cross"][k % 6],
+          color: data.colors.types[type] || cycle[k % 7]},
+      });
+    });
+    layout[`xaxis${at}`] = Object.assign({title: {text: `${channels[0]} / DN`}, range: [0, 1.05 * top]}, grid);
+    layout[`yaxis${at}`] = Object.assign({title: {text: `${channels[pair + 1]} / DN`}, range: [0, 1.05 * top]}, grid);
+  }
+  Plotly.react("clouds", found, layout, config);
+}
+
+function choose(row) {
+  chosen = row;
+  const box = byId("details"), list = document.createElement("dl");
+  for (const name of Object.keys(data.columns)) {
+    const value = columns[name][row];
+    if (!Number.isFinite(value)) continue;
+    const pair = document.createElement("div"), term = document.createElement("dt"), text = document.createElement("dd");
+    term.textContent = data.columns[name].label;
+    text.textContent = shown(name, value);
+    pair.append(term, text);
+    list.append(pair);
+  }
+  const head = document.createElement("h3");
+  head.textContent = title(row);
+  const note = document.createElement("p"), kept = ids[row] in data.curves.designs;
+  note.textContent = (kept ? "" : "This page holds no curve of this design. ") +
+    `To keep it as CSV and for ISETCam: sweep export ${data.folder} --design ${ids[row]}` +
+    (kept && !(ids[row] in data.clouds.designs) ? `. Its signals are kept in ${data.cloud_scenario} alone.` : "");
+  box.replaceChildren(head, list, note);
+  box.dataset.design = ids[row];
+  byId("curves").hidden = !kept;
+  if (kept) drawCurves(row);
+  drawClouds(row);
+}
+
+function drawParallel() {
+  const box = byId("parallel");
+  if (!box) return;
+  const some = [...rowsOf("front"), ...rowsOf("feasible"), ...rowsOf("best")];
+  const every = Math.max(1, Math.ceil(some.length / 4000));
+  const rows = some.filter((row, i) => i % every === 0 || group[row] !== G.feasible);
+  box.hidden = rows.length === 0;
+  if (!rows.length) return void (byId("brushed").textContent = "No feasible design here.");
+  const profiled = (data.profiles[view.cfa] || []).map((p) => p.parameter);
+  const parameters = data.parameters.filter((name) => profiled.length === 0 || profiled.includes(name));
+  const names = [...parameters, ...Object.keys(data.columns).filter((n) => n.startsWith("csd_")), data.axes.x, data.axes.y, data.objective];
+  const dimensions = [...new Set(names)].map((name) => ({name, values: rows.map((i) => columns[name] ? columns[name][i] : NaN)}))
+    .filter(({values}) => values.every(Number.isFinite) && Math.max(...values) > Math.min(...values))
+    .map(({name, values}) => ({label: plain(data.columns[name].label.replace(" CSD", "")), values}));
+  const objective = columns[data.objective] || y;
+  box.style.minWidth = `${Math.max(600, 75 * dimensions.length)}px`;
+  Plotly.react(box, [{
+    type: "parcoords", dimensions, labelfont: {size: 10}, tickfont: {size: 9}, rangefont: {size: 9},
+    labelangle: -20, line: {color: rows.map((i) => objective[i]), colorscale: "Viridis", showscale: true,
+      colorbar: {thickness: 8, title: {text: plain(data.columns[data.objective] ? data.columns[data.objective].label : "objective"), side: "right"}}},
+  }], {height: 420, margin: {l: 50, r: 20, t: 90, b: 20}}, config);
+  const count = () => {
+    const trace = box.data[0];
+    const kept = rows.filter((row, i) => trace.dimensions.every((d) => {
+      const range = d.constraintrange;
+      if (!range) return true;
+      const several = Array.isArray(range[0]) ? range : [range];
+      return several.some(([low, high]) => d.values[i] >= low && d.values[i] <= high);
+    }));
+    const top = kept.reduce((best, row) => best === null || objective[row] > objective[best] ? row : best, null);
+    byId("brushed").textContent = `${kept.length.toLocaleString("en")} of ${rows.length.toLocaleString("en")} feasible designs drawn are within the brushed ranges` +
+      (top === null ? "." : `; the best of them: ${title(top)}, ${objective[top].toFixed(1)}.`);
+  };
+  box.removeAllListeners("plotly_restyle");
+  box.on("plotly_restyle", count);
+  count();
+}
+
+function panels(box, entries, draw, height) {
+  const wide = narrow() ? 1 : Math.min(3, entries.length), rows = Math.ceil(entries.length / wide);
+  const layout = {grid: {rows, columns: wide, pattern: "independent", ygap: 0.35}, height: height * rows + 40,
+    margin: {l: 55, r: 10, t: 20, b: 45}, showlegend: false};
+  const found = [];
+  entries.forEach((entry, i) => draw(entry, i ? String(i + 1) : "", found, layout));
+  Plotly.react(box, found, layout, config);
+}
+
+function drawProfiles() {
+  const box = byId("profiles");
+  if (!box) return;
+  const entries = data.profiles[view.cfa] || [];
+  box.hidden = entries.length === 0;
+  if (!entries.length) return;
+  const top = Math.max(...entries.flatMap((e) => e.best)), label = view.y_label;
+  panels(box, entries, (entry, at, found, layout) => {
+    found.push({type: "scatter", mode: "lines+markers", x: entry.values, y: entry.best, xaxis: `x${at}`, yaxis: `y${at}`,
+      line: {color: "#0072b2"}, marker: {size: 4}, hovertemplate: `${plain(entry.parameter)} %{x:.4g}: %{y:.4g}<extra></extra>`});
+    layout[`xaxis${at}`] = Object.assign({title: {text: plain(entry.parameter)}}, grid);
+    layout[`yaxis${at}`] = Object.assign({range: [0, 1.05 * top], title: {text: entries.indexOf(entry) % 3 ? "" : "best left"}}, grid);
+  }, 210);
+}
+
+function drawHistory() {
+  const box = byId("history"), h = data.history;
+  if (!box || !h) return;
+  const axis = {mode: "lines", type: "scatter", connectgaps: false};
+  const found = h.starts.map((start) => Object.assign({
+    x: start.best.map((_, i) => i + 1), y: start.best, name: `start ${start.number}`, line: {width: 1, color: "#9aa7b3"},
+    hovertemplate: `start ${start.number}, evaluation %{x}: %{y:.4g}<extra></extra>`}, axis));
+  const all = Object.assign({xaxis: "x2", yaxis: "y2", x: h.evaluations, hovertemplate: "%{x} evaluations: %{y:.5g}<extra></extra>"}, axis);
+  found.push(Object.assign({}, all, {y: h.best, line: {color: "#d55e00", width: 2}}));
+  found.push(Object.assign({}, all, {y: h.volume, xaxis: "x3", yaxis: "y3", line: {color: "#0072b2", width: 2}}));
+  const wide = narrow() ? 1 : 3;
+  Plotly.react(box, found, {
+    grid: {rows: 3 / wide, columns: wide, pattern: "independent"}, height: narrow() ? 760 : 320, showlegend: false,
+    margin: {l: 55, r: 10, t: 20, b: 50},
+    xaxis: Object.assign({title: {text: "evaluations of one start"}}, grid),
+    yaxis: Object.assign({title: {text: `best feasible ${plain(h.label)}`}}, grid),
+    xaxis2: Object.assign({type: "log", title: {text: "evaluations, search and front"}}, grid), yaxis2: Object.assign({title: {text: "best feasible"}, rangemode: "tozero"}, grid),
+    xaxis3: Object.assign({type: "log", title: {text: "evaluations, search and front"}}, grid),
+    yaxis3: Object.assign({title: {text: "hypervolume"}, rangemode: "tozero"}, grid),
+  }, config);
+}
+
+function saveFront() {
+  const cell = (value) => {
+    const text = value === null ? "" : String(value);
+    return /[",\n]/.test(text) ? `"${text.replace(/"/g, '""')}"` : text;
+  };
+  const lines = [data.front.columns, ...data.front.rows].map((row) => row.map(cell).join(","));
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([lines.join("\n") + "\n"], {type: "text/csv"}));
+  link.download = "front.csv";
+  link.click();
+  URL.revokeObjectURL(link.href);
+}
+
+function select(id, words, key) {
+  const box = byId(id);
+  box.replaceChildren(...words.map((word) => {
+    const option = document.createElement("option");
+    option.value = option.textContent = word;
+    return option;
+  }));
+  box.closest("label").hidden = words.length < 2;
+  box.addEventListener("change", () => {
+    const wanted = Object.assign({scenario: view.scenario, cfa: view.cfa}, {[key]: box.value});
+    view = data.views.find((v) => v.scenario === wanted.scenario && v.cfa === wanted.cfa) || view;
+    drawAll();
+  });
+}
+
+/* What is further down is drawn when it comes near the window, and again after another view was chosen. */
+const drawers = new Map();
+const near = new IntersectionObserver((entries) => entries.filter((e) => e.isIntersecting).forEach((e) => {
+  near.unobserve(e.target);
+  drawers.get(e.target)();
+}), {rootMargin: "400px"});
+
+function later(id, draw) {
+  const box = byId(id);
+  if (!box) return;
+  drawers.set(box, draw);
+  near.unobserve(box);
+  near.observe(box);
+}
+
+function drawAll() {
+  drawPareto();
+  const first = [...rowsOf("best"), ...rowsOf("front").sort((a, b) => y[b] - y[a]), ...rowsOf("named"), ...rowsOf("feasible"), ...rowsOf("infeasible")][0];
+  if (first !== undefined) choose(first);
+  later("parallel-section", drawParallel);
+  later("profiles-section", drawProfiles);
+}
+
+if (view) {
+  select("scenario", [...new Set(data.views.map((v) => v.scenario))], "scenario");
+  select("cfa", [...new Set(data.views.map((v) => v.cfa))], "cfa");
+  byId("infeasible").addEventListener("change", drawPareto);
+  byId("save").addEventListener("click", saveFront);
+  byId("save").disabled = data.front.rows.length === 0;
+  drawAll();
+  byId("pareto").on("plotly_hover", hover);
+  byId("pareto").on("plotly_unhover", () => { byId("hover").hidden = true; });
+  byId("pareto").on("plotly_click", (event) => {
+    const row = event.points[0].customdata;
+    if (row !== undefined) choose(row);
+  });
+}
+later("history", drawHistory);
+document.body.dataset.readyMs = Math.round(performance.now());
+})();
