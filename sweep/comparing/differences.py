@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -64,8 +63,10 @@ def _texts(values: Sequence[Any]) -> list[str]:
     """Values in words; of long ones the part where they begin to differ."""
     there = [_text(value) for value in values if value is not _ABSENT]
     distinct = list(dict.fromkeys(there))
+    shortest = min(map(len, distinct))
+    alike = next((i for i in range(shortest) if len({text[i] for text in distinct}) > 1), shortest)
     cut = len(distinct) > 1 and max(map(len, distinct)) > _SHOWN
-    start = max(0, len(os.path.commonprefix(distinct)) - _BEFORE) if cut else 0
+    start = max(0, alike - _BEFORE) if cut else 0
     meant: dict[str, str] = {}
     for text in distinct:
         part = text[start : start + _SHOWN]
