@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 
 from .arrays import FloatArray
 from .errors import Fault, OutputError, SweepError, nearest
-from .filter_files import color_hints, csv_text, isetcam_mat, unique_names
+from .filter_files import color_hints, csv_text, filter_names, isetcam_mat, unique_names
 from .mosaics import Mosaic
 from .report import Output, read_output
 from .report.content import amount, readable
@@ -92,7 +92,7 @@ def export_design(folder: Path, key: str, data: Path | None, to: Path | None) ->
         write_bytes(content, path)
     lines = [*_lines(output, row, filters), *_remarks(filters, transmissions)]
     csv_path, mat_path = contents
-    names = ", ".join(unique_names(h + c for h, c in zip(hints, filters.curves, strict=True)))
+    names = ", ".join(filter_names(hints, filters.curves))
     lines.append(f"Files: {csv_path} ({', '.join(unique_names(tables))}),")
     lines.append(f"       {mat_path} ({names}: QE, so set the pixel's spectral QE to 1 in ISETCam).")
     return lines

@@ -63,6 +63,11 @@ def _own_hint(name: str) -> str:
     return folded[:1] if folded[:1] in HINTS else ""
 
 
+def filter_names(hints: Sequence[str], channels: Iterable[str]) -> list[str]:
+    """Names of ISETCam's filters: the hint, then the channel's own name."""
+    return [hint + name for hint, name in zip(hints, unique_names(channels), strict=True)]
+
+
 def isetcam_mat(
     wavelength_nm: FloatArray, curves: Mapping[str, FloatArray], hints: Sequence[str], tile: IndexArray, comment: str
 ) -> bytes:
@@ -75,7 +80,7 @@ def isetcam_mat(
     """
     from scipy.io import savemat  # noqa: PLC0415  (slow to import, seldom needed)
 
-    names = unique_names(hint + name for hint, name in zip(hints, curves, strict=True))
+    names = filter_names(hints, curves)
     cells = np.empty((1, len(names)), dtype=object)
     cells[0] = names
     content = io.BytesIO()

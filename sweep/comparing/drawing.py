@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..arrays import FloatArray
 from ..figures import CURVE_CYCLE, canvas, rendered
 
@@ -52,7 +54,10 @@ class FrontsFigure:
 
 
 def draw_fronts(figure: FrontsFigure) -> Figure:
-    """Draw the fronts: a color and a dash per run, a mark per front, so that they differ in gray, too."""
+    """Draw the fronts: a color and a dash per run, a mark per front, so that they differ in gray, too.
+
+    Of designs the front is a staircase: between two of them there is none. What the search traces is continuous.
+    """
     drawn, axes = canvas(9.0, 5.0)
     for line, marker in zip(figure.lines, itertools.cycle(_MARKERS)):
         color = CURVE_CYCLE[line.run % len(CURVE_CYCLE)]
@@ -65,7 +70,8 @@ def draw_fronts(figure: FrontsFigure) -> Figure:
             marker=marker,
             markersize=6,
             markerfacecolor="white" if line.traced else color,
-            markevery=max(1, -(-len(line.x) // _MARKS_PER_LINE)),
+            markevery=np.unique(np.linspace(0, len(line.x) - 1, _MARKS_PER_LINE).round().astype(int)).tolist(),
+            drawstyle="default" if line.traced else "steps-pre",
             label=_plain(line.name),
         )
     for mark in figure.best:

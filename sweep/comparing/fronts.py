@@ -117,19 +117,19 @@ def hypervolumes(found: list[Front], box: Box) -> pd.DataFrame:
     """A row per front: its ends, the area that it dominates in the box, and that as a share of the box."""
     rows = []
     for front in found:
-        area = hypervolume(front.points, box.reference)
+        area, (low, high) = (
+            hypervolume(front.points, box.reference),
+            (front.points.min(axis=0), front.points.max(axis=0)),
+        )
         rows.append(
             {
                 "run": front.run,
-                "scenario": front.scenario,
                 "CFA": front.cfa,
                 "front": "traced by the search" if front.traced else "designs",
                 "points": len(front.points),
-                "separation from / DN": front.points[:, 0].min().round(1),
-                "to / DN": front.points[:, 0].max().round(1),
-                "sensitivity from": front.points[:, 1].min().round(4),
-                "to": front.points[:, 1].max().round(4),
-                "hypervolume": round(area, 4),
+                "separation / DN": f"{low[0]:.1f} to {high[0]:.1f}",
+                "sensitivity": f"{low[1]:.4f} to {high[1]:.4f}",
+                "hypervolume": area,
                 "of the box": f"{area / box.area:.1%}" if box.area > 0 else "-",
             }
         )

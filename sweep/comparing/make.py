@@ -18,7 +18,7 @@ from ..study import folder_name
 from .best import best_rows, parameters_of, plain_differences, ranking, side_by_side
 from .differences import curve_notes, origin_differences, study_differences
 from .drawing import FrontsFigure, Line, Mark, pictures
-from .fronts import Front, box_of, common_scenarios, fronts, hypervolumes, on_the_same_axes
+from .fronts import Box, Front, box_of, common_scenarios, fronts, hypervolumes, on_the_same_axes
 
 PAGE, PICTURE, TABLE = "compare.html", "fronts", "compare.csv"
 _LETTERS = string.ascii_uppercase
@@ -28,10 +28,26 @@ _MOST_SCENARIOS = 4
 
 
 @dataclass(frozen=True)
-class Fronts:
-    """What there is to say of the fronts: a sentence and a table per scenario, and the picture's data."""
+class Areas:
+    """What the fronts of a scenario dominate in a box; `table` as `fronts.hypervolumes` gives it."""
 
-    areas: Sequence[tuple[str, pd.DataFrame]]
+    scenario: str
+    box: Box
+    table: pd.DataFrame
+
+    def __str__(self) -> str:
+        low, high = self.box.reference, self.box.top
+        return (
+            f"Fronts in {self.scenario}; hypervolume (DN x sensitivity) above the reference of {low[0]:g} DN at a "
+            f"sensitivity of {low[1]:g}, in the box up to {high[0]:.1f} DN at {high[1]:.4f} ({self.box.area:.4g}):"
+        )
+
+
+@dataclass(frozen=True)
+class Fronts:
+    """What there is to say of the fronts, scenario by scenario, and the picture's data."""
+
+    areas: Sequence[Areas]
     figure: FrontsFigure | None
     notes: Sequence[str]
 
@@ -48,7 +64,7 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> list[str]:
     outputs = [read_output(folder) for folder in folders]
     runs = {f"{letter} {_one_line(o.study['study'])}": o for letter, o in zip(_LETTERS, outputs, strict=False)}
     compared = compare_fronts(runs)
-    answer = ranking(runs)
+    answer = [*ranking(runs), *_largest(compared)]
     notes = [*_same_folders(runs), *curve_notes(runs), *_constraint_note(runs), *compared.notes]
     best = best_rows(runs)
     shown, left_out = side_by_side(best, _MOST_PARAMETERS, parameters_of(runs))
@@ -65,7 +81,7 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> list[str]:
         left_out=left_out,
         picture=inlined(drawn["png"]) if drawn else None,
         caption="" if compared.figure is None else compared.figure.title,
-        hypervolumes=[(sentence, rows(table)) for sentence, table in compared.areas],
+        hypervolumes=[(str(areas), rows(areas.table)) for areas in compared.areas],
         plain=rows(plain),
         same=same or "The runs share no plain CFA and no named design.",
         studies=rows(studies),
@@ -81,8 +97,8 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> list[str]:
     lines += _section("Best designs", shown, "none")
     lines += [f"({left_out} more parameters in {TABLE}.)"] if left_out else []
     lines += _section("Plain CFAs and named designs", plain, same or "none in common")
-    for sentence, table in compared.areas[:_MOST_SCENARIOS]:
-        lines += ["", sentence, *_aligned(table)]
+    for areas in compared.areas[:_MOST_SCENARIOS]:
+        lines += ["", str(areas), *_aligned(areas.table)]
     if len(compared.areas) > _MOST_SCENARIOS:
         lines.append(f"({len(compared.areas) - _MOST_SCENARIOS} more scenarios in {PAGE}.)")
     lines += ["", *answer, *(f"Note: {note}" for note in notes)]
@@ -103,20 +119,20 @@ def compare_fronts(runs: Mapping[str, Output]) -> Fronts:
         notes.append(f"Fronts are compared in the scenarios that all have: {', '.join(scenarios)}.")
     found = {name: fronts(group, name) for name in scenarios}
     notes += _cfa_note([front for own in found.values() for front in own])
-    areas = []
-    for name, own in found.items():
-        if own:
-            box = box_of(own)
-            low, high = box.reference, box.top
-            areas.append(
-                (
-                    f"Fronts in {name}; hypervolume (DN x sensitivity) above the reference of {low[0]:g} DN at a "
-                    f"sensitivity of {low[1]:g}, in the box up to {high[0]:.1f} DN at {high[1]:.4f} ({box.area:.4g}):",
-                    hypervolumes(own, box),
-                )
-            )
-    shown = next((name for name, own in found.items() if own), None)
+    boxes = {name: box_of(own) for name, own in found.items() if own}
+    areas = [Areas(name, box, hypervolumes(found[name], box)) for name, box in boxes.items()]
+    shown = next(iter(boxes), None)
     return Fronts(areas, None if shown is None else _figure(group, list(runs), shown, found[shown]), notes)
+
+
+def _largest(compared: Fronts) -> list[str]:
+    """Which front dominates most, where there are several to compare."""
+    if not compared.areas or compared.areas[0].table["run"].nunique() < 2:
+        return []
+    areas = compared.areas[0]
+    most = areas.table.nlargest(1, "hypervolume").to_dict("records")[0]
+    share = f"{most['hypervolume']:.4g} of {areas.box.area:.4g} DN x sensitivity"
+    return [f"Largest hypervolume in {areas.scenario}: {most['run']}, {most['CFA']} ({most['front']}): {share}."]
 
 
 def _figure(group: Mapping[str, Output], order: Sequence[str], scenario: str, found: Sequence[Front]) -> FrontsFigure:
