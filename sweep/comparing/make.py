@@ -38,8 +38,9 @@ class Areas:
     def __str__(self) -> str:
         low, high = self.box.reference, self.box.top
         return (
-            f"Fronts in {self.scenario}; hypervolume (DN x sensitivity) above the reference of {low[0]:g} DN at a "
-            f"sensitivity of {low[1]:g}, in the box up to {high[0]:.1f} DN at {high[1]:.4f} ({self.box.area:.4g}):"
+            f"Fronts in {self.scenario}, whatever the constraints ask of the two axes; hypervolume (DN x sensitivity) "
+            f"above the reference of {low[0]:g} DN at a sensitivity of {low[1]:g}, in the box up to {high[0]:.1f} DN "
+            f"at {high[1]:.4f} ({self.box.area:.4g}):"
         )
 
 
