@@ -131,6 +131,36 @@ def audit(
 
 
 @app.command()
+def export(
+    folder: Annotated[Path, typer.Argument(help="Output folder of a study.", show_default=False)],
+    design: Annotated[str, typer.Option(help="A design_id, a name (RYN_4Cy, RGGB), or best.", show_default=False)],
+    data: Annotated[
+        Path | None, typer.Option(help="Folder with the run's curve files, which are then read again and compared.")
+    ] = None,
+    to: Annotated[Path | None, typer.Option(help="Folder for the files.", show_default="FOLDER/export")] = None,
+) -> None:
+    """Write a filter of a finished run as CSV and as ISETCam color filters (.mat)."""
+    from .exporting import export_design
+
+    for line in export_design(folder, design, data, to):
+        typer.echo(line)
+
+
+@app.command()
+def compare(
+    folders: Annotated[list[Path], typer.Argument(help="Output folders of two or more studies.", show_default=False)],
+    output: Annotated[
+        Path | None, typer.Option(help="Folder for the comparison.", show_default="outputs/compare-A-B")
+    ] = None,
+) -> None:
+    """Compare finished runs: what their studies ask, best designs, fronts, versions."""
+    from .comparing import compare_runs
+
+    for line in compare_runs(folders, output):
+        typer.echo(line)
+
+
+@app.command()
 def accuracy(
     study: StudyPath,
     data: DataFolder = None,

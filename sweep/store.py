@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -94,7 +94,8 @@ def atomic(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise OutputError(Fault(f"cannot be written: {error.strerror or error}", str(path))) from None
     finally:
-        hidden.unlink(missing_ok=True)
+        with suppress(OSError):  # where it could not be made, for example below a file
+            hidden.unlink()
 
 
 def write_table(table: pa.Table, path: Path) -> None:

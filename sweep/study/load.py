@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from pydantic import ValidationError
 
+from ..arrays import FloatArray
 from ..errors import StudyError
 from ..spectra import WavelengthGrid
 from .lines import Document
@@ -16,12 +18,18 @@ from .schema import StudySection
 _ALLOWED = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.")
 
 
-def load_study(path: Path, data: Path | None = None, step_nm: float | None = None) -> Study:
+def load_study(
+    path: Path,
+    data: Path | None = None,
+    step_nm: float | None = None,
+    kept: Mapping[str, FloatArray] | None = None,
+) -> Study:
     """Read and check a study file.
 
     Files that it names are looked for in `data`, when given, and then beside the study. `step_nm` replaces the step of
-    its wavelength grid. Raises StudyError with one fault per thing wrong: file:line, key, value, what is allowed,
-    nearest name.
+    its wavelength grid. `kept`: curves on that grid to take instead of those in files, `qe:<curve>` and
+    `light:<type>:<name>`, each ndarray[n_wavelengths]. Raises StudyError with one fault per thing wrong: file:line,
+    key, value, what is allowed, nearest name.
     """
     document = Document(path)
     try:
@@ -35,7 +43,7 @@ def load_study(path: Path, data: Path | None = None, step_nm: float | None = Non
         )
     if data is not None and not data.is_dir():
         raise StudyError(f"--data {data}: no such folder")
-    return resolve(document, section, [*([data] if data is not None else []), path.parent])
+    return resolve(document, section, [*([data] if data is not None else []), path.parent], kept)
 
 
 def folder_name(study_name: str) -> str:

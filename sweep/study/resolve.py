@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from ..arrays import FloatArray
 from ..datasets.lights import Lights
 from ..discrimination import CNR, D_PRIME, noise_names
 from ..effects import blur
@@ -27,10 +28,12 @@ MOST_DESIGNS = 10**9
 class _Resolver:
     """Turns a checked schema into a Study, collecting every fault that it finds."""
 
-    def __init__(self, document: Document, section: StudySection, folders: list[Path]) -> None:
+    def __init__(
+        self, document: Document, section: StudySection, folders: list[Path], kept: Mapping[str, FloatArray] | None
+    ) -> None:
         self.document = document
         self.section = section
-        self.sources = Sources(document, section.wavelengths, folders)
+        self.sources = Sources(document, section.wavelengths, folders, kept)
         self.faults = self.sources.faults
         self.add = self.sources.add
         self.unknown = self.sources.unknown
@@ -232,6 +235,11 @@ class _Resolver:
             self.add(("search", "front"), problem, None, "an objective of CSDs")
 
 
-def resolve(document: Document, section: StudySection, folders: list[Path]) -> Study:
-    """Make the study; `folders` are searched in order for its files. Raises StudyError with every fault found."""
-    return _Resolver(document, section, folders).resolve()
+def resolve(
+    document: Document, section: StudySection, folders: list[Path], kept: Mapping[str, FloatArray] | None = None
+) -> Study:
+    """Make the study; `folders` are searched in order for its files. Raises StudyError with every fault found.
+
+    `kept`: curves to take instead of those in files, see `Sources`.
+    """
+    return _Resolver(document, section, folders, kept).resolve()

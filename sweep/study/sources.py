@@ -25,11 +25,15 @@ _CUT_OFF = 0.01
 
 @dataclass
 class Sources:
-    """Reads the files of one study, each once; collects faults, warnings and digests."""
+    """Reads the files of one study, each once; collects faults, warnings and digests.
+
+    `kept`: the curves of a finished run (`store.CURVES`) by their columns; no file is read then.
+    """
 
     document: Document
     grid: WavelengthGrid
     folders: Sequence[Path]
+    kept: Mapping[str, FloatArray] | None = None
     faults: list[Fault] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     digests: dict[str, str] = field(default_factory=dict)
@@ -49,11 +53,16 @@ class Sources:
             path: tuple[Key, ...] = ("sensor", "files", index)
             curves = self._curves(path, entry)
             for name, column in entry.columns.items():
+                place: tuple[Key, ...] = (*path, "columns", name)
                 if name in qe:
-                    self.add((*path, "columns", name), "the curve is defined twice", name)
-                values = self._column((*path, "columns", name), curves, column, entry)
+                    self.add(place, "the curve is defined twice", name)
+                if self.kept is not None:
+                    values = self._kept(place, f"qe:{name}")
+                else:
+                    values = self._column(place, curves, column, entry)
+                    values = None if values is None else values * entry.scale
                 if values is not None:
-                    qe[name] = values * entry.scale
+                    qe[name] = values
         if len(self.faults) > before:
             return None
         name = section.name or "sensor"
@@ -81,9 +90,12 @@ class Sources:
             for signal_type, columns in entry.signals.items():
                 for position, column in enumerate(columns):
                     place = (*path, "signals", signal_type, position)
-                    photons = self._photons(place, curves, column, entry)
+                    label = f"{Path(entry.file).stem}:{column}"
+                    if self.kept is not None:
+                        photons = self._kept(place, f"light:{signal_type}:{label}")
+                    else:
+                        photons = self._photons(place, curves, column, entry)
                     if photons is not None:
-                        label = f"{Path(entry.file).stem}:{column}"
                         by_type.setdefault(signal_type, []).append((label, signal_type, photons))
         if len(self.faults) > before:
             return None
@@ -153,7 +165,15 @@ class Sources:
                 self.add(path, f"{entry.file}, column {column}: {fault.problem}", fault.value, fault.allowed)
             return None
 
+    def _kept(self, path: tuple[Key, ...], name: str) -> FloatArray | None:
+        assert self.kept is not None
+        if name not in self.kept:
+            self.add(path, "the run kept no such curve", name)
+        return self.kept.get(name)
+
     def _curves(self, path: tuple[Key, ...], entry: CurveFile | LightFile) -> Curves | None:
+        if self.kept is not None:
+            return None
         if entry.file in self._read:
             return self._read[entry.file]
         self._read[entry.file] = None
