@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +27,8 @@ needs_reference = pytest.mark.skipif(
 )
 
 
+Finished = Callable[[str], Path]
+"""Name of a study of the project -> folder of its finished run."""
 ROWS = pytest.StashKey[list[dict[str, Any]]]()
 
 
@@ -41,6 +46,22 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 def hard_case_rows(request: pytest.FixtureRequest) -> list[dict[str, Any]]:
     """Rows of the table of hard cases, one for each that ran in this session."""
     return request.config.stash.setdefault(ROWS, [])
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
+    """Runs of the project's studies by the command, each once; what it said is in `said.txt` beside the folder."""
+    outputs = tmp_path_factory.mktemp("outputs")
+
+    def folder_of(name: str) -> Path:
+        if not (outputs / name).is_dir():
+            command = [sys.executable, "-m", "sweep", "run", str(STUDIES / f"{name}.yaml"), "--output", str(outputs)]
+            done = subprocess.run([*command, "--jobs", "2"], capture_output=True, text=True, check=False)
+            assert done.returncode == 0, done.stderr
+            (outputs / f"{name}.said.txt").write_text(done.stdout)
+        return outputs / name
+
+    return folder_of
 
 
 @pytest.fixture(scope="session")

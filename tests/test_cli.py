@@ -10,17 +10,15 @@ import pytest
 
 from sweep.curve_files import read_curves
 
-from .conftest import SHARED, STUDIES, needs_measured
+from .conftest import SHARED, STUDIES, Finished, needs_measured
 from .test_runner import study_file
 from .test_scenes import SCENES
 
 
 @pytest.fixture(scope="module")
-def stopband(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
-    output = tmp_path_factory.mktemp("outputs")
-    done = sweep("run", str(STUDIES / "stopband.yaml"), "--output", str(output), "--jobs", "2")
-    assert done.returncode == 0, done.stderr
-    return output / "stopband", done.stdout.splitlines()
+def stopband(finished: Finished) -> tuple[Path, list[str]]:
+    folder = finished("stopband")
+    return folder, folder.with_name("stopband.said.txt").read_text().splitlines()
 
 
 def sweep(*arguments: str) -> subprocess.CompletedProcess[str]:

@@ -54,8 +54,17 @@ function described(row) {
   return lines.slice(0, 26);
 }
 
+/* The design that is meant: one of the front, or with a name, within a few pixels, else the nearest. */
+function meant(event) {
+  const row = event.points[0].customdata, {xaxis, yaxis} = byId("pareto")._fullLayout;
+  if (row === undefined) return undefined;
+  const far = (i) => Math.hypot(xaxis.d2p(x[i]) - xaxis.d2p(x[row]), yaxis.d2p(y[i]) - yaxis.d2p(y[row]));
+  const marked = [...rowsOf("best"), ...rowsOf("named"), ...rowsOf("front")].filter((i) => far(i) < 6);
+  return marked.reduce((near, i) => near === undefined || far(i) < far(near) ? i : near, undefined) ?? row;
+}
+
 function hover(event) {
-  const box = byId("hover"), row = event.points[0].customdata;
+  const box = byId("hover"), row = meant(event);
   if (row === undefined) return;
   box.replaceChildren(...described(row).map((line) => {
     const part = document.createElement("div");
@@ -100,11 +109,10 @@ function traces() {
     found.push(points([view.knee], "knee of the front",
       {size: 15, symbol: "hexagon-open", color: "#000000", line: {width: 2}}));
   const named = rowsOf("named");
-  if (named.length)
-    found.push(points(named, "named designs", {size: 10, symbol: "diamond", color: color.named}, {
-      mode: "markers+text", texttemplate: named.map((i) => plain(title(i).split(" (")[0])), textposition: "top center",
-      name: named.length === 1 ? plain(title(named[0])) : "named designs",
-    }));
+  for (const some of named.length > 6 ? [named] : named.map((i) => [i]))
+    found.push(points(some, some.length > 1 ? "named designs" : plain(title(some[0])),
+      {size: 10, symbol: "diamond", color: color.named},
+      {mode: "markers+text", texttemplate: some.map((i) => plain(title(i).split(" (")[0])), textposition: "top center"}));
   const best = rowsOf("best");
   if (best.length)
     found.push(points(best, "best of the search",
@@ -364,7 +372,7 @@ if (view) {
   byId("pareto").on("plotly_hover", hover);
   byId("pareto").on("plotly_unhover", () => { byId("hover").hidden = true; });
   byId("pareto").on("plotly_click", (event) => {
-    const row = event.points[0].customdata;
+    const row = meant(event);
     if (row !== undefined) choose(row);
   });
 }
