@@ -49,6 +49,16 @@ class SeriesFigure:
     from_zero: bool = True
     level: float | None = None
 
+    @property
+    def x_label(self) -> str:
+        """What the scenarios' number is, with its unit."""
+        return _LABELS.get(self.key, self.key)
+
+    @property
+    def log_x(self) -> bool:
+        """Whether the numbers span more than a decade."""
+        return bool(self.x.min() > 0 and self.x.max() / self.x.min() > _WIDE)
+
 
 def draw_series(series: SeriesFigure) -> Figure:
     """Draw a line with its band per design; numbers over more than a decade are drawn on a logarithmic axis."""
@@ -57,9 +67,9 @@ def draw_series(series: SeriesFigure) -> Figure:
         axes.plot(series.x, line.y, "o-", color=color, label=name, linewidth=1.5, markersize=3.5)
         if line.upper is not None:
             axes.fill_between(series.x, line.y, line.upper, color=color, alpha=0.2, linewidth=0)
-    if series.x.min() > 0 and series.x.max() / series.x.min() > _WIDE:
+    if series.log_x:
         axes.set_xscale("log")
-    axes.set_xlabel(_LABELS.get(series.key, series.key))
+    axes.set_xlabel(series.x_label)
     axes.set_ylabel(series.y_label)
     if series.log_y:
         axes.set_yscale("log")

@@ -38,6 +38,7 @@ ONLY_USER = {
     "nlopt": "search",
     "joblib": "runner calibration",
     "moocore": "pareto",
+    "plotly": "report",
     "jinja2": "report",
     "typer": "cli",
     "sklearn": "recognition",

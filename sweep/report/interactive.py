@@ -12,8 +12,10 @@ import pandas as pd
 from ..figures import COLORS, CURVE_COLORS, TYPE_COLORS, ParetoFigure, even
 from ..objectives import COMBINED
 from ..pareto import knee
+from ..series import SeriesFigure
 from . import content
 from .history import history_of
+from .noise import all_series
 from .outputs import Output
 
 _MOST_POINTS = 6_000
@@ -47,6 +49,8 @@ def payload(output: Output) -> dict[str, Any]:
         "profiles": _profiles(output),
         "history": _history(output),
         "front": _front(output, rows),
+        "series": [_series(series) for series in all_series(output)],
+        "swept": bool((rows["kind"] != "design").any()),
         "colors": {"groups": COLORS, "curves": CURVE_COLORS, "types": TYPE_COLORS},
         "folder": output.folder.as_posix(),
     }
@@ -211,6 +215,24 @@ def _history(output: Output) -> dict[str, Any] | None:
 
 def _finite(values: np.ndarray) -> list[float | None]:
     return [float(value) if np.isfinite(value) else None for value in values]
+
+
+def _series(series: SeriesFigure) -> dict[str, Any]:
+    return {
+        "title": series.title,
+        "x_label": series.x_label,
+        "y_label": series.y_label,
+        "x": series.x.tolist(),
+        "lines": {
+            name: {"y": _finite(line.y), "upper": None if line.upper is None else _finite(line.upper)}
+            for name, line in series.lines.items()
+        },
+        "band": series.band,
+        "log_x": series.log_x,
+        "log_y": series.log_y,
+        "from_zero": series.from_zero,
+        "level": series.level,
+    }
 
 
 def _front(output: Output, rows: pd.DataFrame) -> dict[str, Any]:

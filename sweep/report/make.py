@@ -15,7 +15,7 @@ from ..store import write_bytes, write_table, write_text
 from . import content
 from .comparison import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
 from .interactive import payload
-from .noise import noise_figures, recognition_table
+from .noise import all_series, recognition_table
 from .outputs import Output
 from .pages import inlined, library, page, rows, script
 from .profiles import profile_table
@@ -59,7 +59,7 @@ def _html(output: Output, images: Sequence[tuple[str, str]], published: pd.DataF
         objective_words=content.readable(output.objective),
         answer=answer_sentences(output),
         counts=counts_line(output),
-        interactive=drawn if drawn["views"] else None,
+        interactive=drawn if drawn["views"] or drawn["series"] else None,
         profiles={cfa: rows(profile_table(found)) for cfa, found in output.profiles.items()},
         history=drawn["history"],
         plotly=library(),
@@ -89,7 +89,7 @@ def _drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
         yield ("pareto" if number == 0 else f"pareto-{number + 1}"), f"Trade-off{f' of {cfa}' if cfa else ''}", figure
     for number, cfa in enumerate(cfas):
         yield f"filters-{number + 1}", f"Filters of {cfa}", draw_curves(content.filters_figure(output, cfa))
-    for number, series in enumerate([*content.series_figures(output), *noise_figures(output)]):
+    for number, series in enumerate(all_series(output)):
         yield f"series-{number + 1}", series.title, draw_series(series)
     yield "sensor", "Quantum efficiency of the sensor", draw_curves(content.sensor_figure(output))
     yield "signals", "Spectra of the signals", draw_curves(content.lights_figure(output))

@@ -12,7 +12,7 @@ from ..discrimination import STATE_ERROR_BOUND
 from ..evaluate import STATE_ERROR
 from ..recognition import CLASSIFIERS, MOST_LIKELY
 from ..series import Line, SeriesFigure
-from .content import over_series, scenario_series
+from .content import over_series, scenario_series, series_figures
 from .outputs import Output
 
 _LEAST = 1e-12
@@ -23,6 +23,11 @@ def _allowed(output: Output) -> float | None:
     """The largest error at which a design is usable; None in a study that does not ask."""
     asked = output.study.get("recognition")
     return None if asked is None else float(asked["error_max"])
+
+
+def all_series(output: Output) -> list[SeriesFigure]:
+    """Every figure of a quantity over scenarios: separations, then errors and accuracies."""
+    return [*series_figures(output), *noise_figures(output)]
 
 
 def noise_figures(output: Output) -> Iterator[SeriesFigure]:

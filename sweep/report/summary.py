@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any
 
+import numpy as np
+
+from ..series import SeriesFigure
 from .comparison import comparison_lines, comparison_with_published
-from .content import amount, geometry_table, readable
+from .content import amount, geometry_table, readable, series_figures
 from .noise import usable_lines
 from .outputs import Output
 
@@ -15,7 +19,7 @@ _MOST_SCENARIOS = 8
 
 
 def answer_sentences(output: Output) -> list[str]:
-    """The question's answer: the best feasible design beside the CFAs that a study compares with."""
+    """The question's answer: the best feasible design, and who leads over the scenarios, or in the only one."""
     limits = " and ".join(f"{readable(q)} {bound}" for q, bound in output.constraints.items())
     under = f" with {limits}" if limits else ""
     found = []
@@ -28,13 +32,27 @@ def answer_sentences(output: Output) -> list[str]:
             f"The best {readable(output.objective)}{under} is {amount(output.objective, best[output.objective], 1)} "
             f"(sensitivity {best['sensitivity']:.4f}, {best['cfa']}, found by the {best['kind']}{where})."
         )
-    return found + _scene_lines(output)
+    found += [_leaders(series) for series in series_figures(output)]
+    return found + (_scene_lines(output) if len(output.study["scenarios"]) == 1 else [])
+
+
+def _leaders(series: SeriesFigure) -> str:
+    """Which design has the largest separation from where to where."""
+    names = list(series.lines)
+    first = np.argmax([np.nan_to_num(line.y, nan=-np.inf) for line in series.lines.values()], axis=0)
+    starts = [0, *(np.flatnonzero(np.diff(first)) + 1), len(first)]
+    parts = []
+    for start, stop in pairwise(starts):
+        low, high = series.x[start], series.x[stop - 1]
+        parts.append(f"{names[first[start]]} {f'at {low:g}' if start + 1 == stop else f'from {low:g} to {high:g}'}")
+    what, unit = series.y_label.split(" / ")[0], series.x_label
+    return f"The largest {what} over {unit}: {', '.join(parts)}."
 
 
 def _scene_lines(output: Output) -> list[str]:
     """CFAs and named designs in each scenario; of many scenarios the first and the last ones."""
     shown = output.trade_off[0]
-    title = f"{readable(shown)} of the named CFAs and designs:"
+    title = f"{readable(shown).capitalize().replace('csd', 'CSD')} of the named CFAs and designs:"
     rows = output.kind("reference", "design")
     scenarios = list(output.study["scenarios"])
     lines = []
@@ -55,6 +73,8 @@ def _scene_lines(output: Output) -> list[str]:
 def summary_lines(output: Output) -> list[str]:
     """What a run found and where its files are."""
     lines = answer_sentences(output)
+    if len(output.study["scenarios"]) > 1:
+        lines += _scene_lines(output)
     if not output.best.empty:
         best = output.best.iloc[0]
         own = [name for name in output.parameters if best[name] == best[name]]

@@ -31,7 +31,7 @@ const scenario = unpack(data.scenario.codes), cfa = unpack(data.cfa.codes);
 const wavelength = Array.from(unpack(data.curves.wavelength_nm));
 const G = Object.fromEntries(data.groups.map((name, i) => [name, i]));
 const x = columns[data.axes.x], y = columns[data.axes.y];
-let view = data.views[0];
+let view = data.views[0] || null;
 let chosen = null;
 
 const shown = (name, value) => Number.isFinite(value) ? value.toFixed(data.columns[name].digits) : "-";
@@ -289,6 +289,28 @@ function drawProfiles() {
   }, 210);
 }
 
+function drawSeries(series, box) {
+  const found = [];
+  Object.entries(series.lines).forEach(([name, line], i) => {
+    const color = cycle[i % cycle.length], shared = {type: "scatter", x: series.x, legendgroup: name};
+    if (line.upper) {
+      found.push(Object.assign({mode: "lines", y: line.y, line: {width: 0}, showlegend: false, hoverinfo: "skip"}, shared));
+      found.push(Object.assign({mode: "lines", y: line.upper, line: {width: 0}, fill: "tonexty", fillcolor: `${color}33`, showlegend: false, hoverinfo: "skip"}, shared));
+    }
+    found.push(Object.assign({mode: "lines+markers", y: line.y, name: plain(name), line: {color, width: 2},
+      marker: {size: 6, symbol: ["circle", "square", "diamond", "triangle-up", "x", "star"][i % 6]}}, shared));
+  });
+  const shapes = series.level === null ? [] : [{type: "line", xref: "paper", x0: 0, x1: 1, y0: series.level, y1: series.level,
+    line: {color: "#666666", width: 1, dash: "dash"}}];
+  Plotly.react(box, found, {
+    title: {text: plain(series.title), font: {size: 14}}, height: narrow() ? 460 : 420, shapes, hovermode: "x unified",
+    margin: {l: 60, r: 10, t: 36, b: 50}, legend: narrow() ? {orientation: "h", y: -0.25} : {},
+    xaxis: Object.assign({title: {text: plain(series.x_label)}, type: series.log_x ? "log" : "linear"}, grid),
+    yaxis: Object.assign({title: {text: plain(series.y_label)}, type: series.log_y ? "log" : "linear",
+      rangemode: series.from_zero && !series.log_y ? "tozero" : "normal"}, grid),
+  }, config);
+}
+
 function drawHistory() {
   const box = byId("history"), h = data.history;
   if (!box || !h) return;
@@ -377,5 +399,6 @@ if (view) {
   });
 }
 later("history", drawHistory);
+data.series.forEach((series, i) => later(`series-${i}`, () => drawSeries(series, byId(`series-${i}`))));
 document.body.dataset.readyMs = Math.round(performance.now());
 })();
