@@ -11,15 +11,14 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from .errors import Fault, OutputError
 from .evaluate import evaluate
 from .imaging import imager_of
 from .metrics import CSD
-from .report import read_output
+from .report import read_output, study_of
 from .runner.drawn import row_space
 from .setup import REFERENCE
-from .store import AUDIT, RESOLVED, RESULTS, batches, write_table
-from .study import Study, load_study
+from .store import AUDIT, RESULTS, batches, write_table
+from .study import Study
 
 SHARE = 0.01
 _COLUMNS = ("design_id", "scenario", "plan", "promised_dn", "realized_dn")
@@ -63,9 +62,7 @@ def audit(study: Study, tables: Iterable[pd.DataFrame]) -> Audit:
 def audit_output(folder: Path, data: Path | None) -> list[str]:
     """Audit a finished run, write its rows beside it, and say what was found."""
     output = read_output(folder)
-    if output.provenance["data_sha256"] and data is None:
-        raise OutputError(Fault("the run read curve files", str(folder), allowed="--data FOLDER with these files"))
-    study = load_study(folder / RESOLVED, data)
+    study = study_of(output, data)
     found = audit(study, (table.to_pandas() for table in batches(folder / RESULTS)))
     write_table(pa.Table.from_pandas(found.rows, preserve_index=False), folder / AUDIT)
     broken = len(found.broken)

@@ -15,11 +15,11 @@ from .arrays import FloatArray
 from .errors import Fault, OutputError, SweepError, nearest
 from .filter_files import color_hints, csv_text, filter_names, isetcam_mat, unique_names
 from .mosaics import Mosaic
-from .report import Output, read_output
+from .report import Output, read_output, study_of
 from .report.content import amount, readable
 from .runner.drawn import row_curves
-from .store import RESOLVED, RESULTS, batches, write_bytes
-from .study import Study, folder_name, load_study
+from .store import RESULTS, batches, write_bytes
+from .study import Study, folder_name
 
 BEST = "best"
 EXPORT = "export"
@@ -72,7 +72,7 @@ def export_design(folder: Path, key: str, data: Path | None, to: Path | None) ->
     """
     output = read_output(folder)
     row = find_row(output, key)
-    study = _study(output, data)
+    study = study_of(output, data)
     filters = filters_of(study, row)
     _verify(output, study, row, filters)
     transmissions = filters.transmissions()
@@ -133,13 +133,6 @@ def _streamed(path: Path, design_id: int) -> dict[str, Any]:
     raise OutputError(Fault("has too few rows", str(path), None, "design_id", design_id))
 
 
-def _study(output: Output, data: Path | None) -> Study:
-    path = output.folder / RESOLVED
-    if data is not None or not output.provenance.get("data_sha256"):
-        return load_study(path, data)
-    return load_study(path, kept={str(name): values.to_numpy() for name, values in output.curves.items()})
-
-
 def filters_of(study: Study, row: Mapping[Any, Any]) -> Filters:
     """The channels of a row's CFA, with its filters computed from its parameters."""
     space, made = row_curves(study, row)
@@ -156,7 +149,7 @@ def _verify(output: Output, study: Study, row: Mapping[Any, Any], filters: Filte
     kept = output.curves
     made = [filters.curves[channel] for channel in filters.bases]
     pairs = {f"qe:{name}": values for name, values in study.sensor.qe.items()}
-    pairs |= {f"design:{row['design_id']}:{index}": values for index, values in enumerate(made)}
+    pairs |= {f"{what}:{row['design_id']}:{k}": v for what in ("design", "front") for k, v in enumerate(made)}
     faults = []
     for name, values in pairs.items():
         if name in kept:

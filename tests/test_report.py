@@ -154,3 +154,13 @@ def test_a_job_of_several_chunks_has_their_rows(tmp_path: Path) -> None:
 def test_a_small_study_has_one_chunk_per_job(tmp_path: Path) -> None:
     study = load_study(study_file(tmp_path))
     assert all(job.stop - job.start <= CHUNK for job in jobs_of(study))
+
+
+def test_a_dollar_in_a_name_is_no_formula() -> None:
+    from sweep.figures import CurvesFigure, draw_curves, rendered
+
+    wave = np.linspace(400, 700, 4)
+    for name in (r"$\nonsense{", "a$b$c"):
+        figure = draw_curves(CurvesFigure(name, "QE", wave, {name: np.ones(4)}))
+        assert rendered(figure, "svg").startswith(b"<?xml")
+        assert not figure.axes[0].title.get_parse_math()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -72,18 +71,16 @@ def draw_fronts(figure: FrontsFigure) -> Figure:
             markerfacecolor="white" if line.traced else color,
             markevery=np.unique(np.linspace(0, len(line.x) - 1, _MARKS_PER_LINE).round().astype(int)).tolist(),
             drawstyle="default" if line.traced else "steps-pre",
-            label=_plain(line.name),
+            label=line.name,
         )
     for mark in figure.best:
         color = CURVE_CYCLE[mark.run % len(CURVE_CYCLE)]
         style: dict[str, Any] = {"s": 220, "edgecolors": "black", "linewidths": 0.8, "zorder": 6}
         axes.scatter([mark.x], [mark.y], marker="*", color=color, **style)
-        axes.annotate(
-            _plain(mark.name), (mark.x, mark.y), textcoords="offset points", xytext=(8, 6), fontsize=9, zorder=7
-        )
-    axes.set_xlabel(_plain(figure.x_label))
-    axes.set_ylabel(_plain(figure.y_label))
-    axes.set_title(_plain(figure.title))
+        axes.annotate(mark.name, (mark.x, mark.y), textcoords="offset points", xytext=(8, 6), fontsize=9, zorder=7)
+    axes.set_xlabel(figure.x_label)
+    axes.set_ylabel(figure.y_label)
+    axes.set_title(figure.title)
     if figure.lines:
         title = "stars: best design of each run"
         place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0}
@@ -94,12 +91,4 @@ def draw_fronts(figure: FrontsFigure) -> Figure:
 def pictures(figure: FrontsFigure) -> dict[str, bytes]:
     """The drawing as the bytes of a `png` and an `svg` file."""
     drawn = draw_fronts(figure)
-    with warnings.catch_warnings():
-        # A study may have a name in a script that the font lacks; the run's letter still tells it.
-        warnings.filterwarnings("ignore", message="Glyph")
-        return {kind: rendered(drawn, kind) for kind in ("png", "svg")}
-
-
-def _plain(text: str) -> str:
-    """Text that matplotlib does not read as a formula."""
-    return text.replace("$", r"\$")
+    return {kind: rendered(drawn, kind) for kind in ("png", "svg")}

@@ -2,7 +2,7 @@
 
 from .accuracy import AccuracyReport, make_accuracy_report, read_hard_cases
 from .make import make_report
-from .outputs import Output, read_output
+from .outputs import Output, read_output, study_of
 from .summary import summary_lines
 
 __all__ = [
@@ -12,5 +12,6 @@ __all__ = [
     "make_report",
     "read_hard_cases",
     "read_output",
+    "study_of",
     "summary_lines",
 ]

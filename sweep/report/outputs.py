@@ -31,6 +31,7 @@ from ..store import (
     SEARCH_LOG,
     read_table,
 )
+from ..study import Study, load_study
 from .profiles import Profile, Profiles
 from .thinning import Counts, thinned
 
@@ -125,6 +126,14 @@ def read_output(folder: Path) -> Output:
     return Output(
         folder, study, provenance, table, counts, curves, points, front, recognition, searched, audited, profiles.found
     )
+
+
+def study_of(output: Output, data: Path | None) -> Study:
+    """The study of a finished run again: with its files, looked for in `data`, or with the curves that the run kept."""
+    path = output.folder / RESOLVED
+    if data is not None or not output.provenance.get("data_sha256"):
+        return load_study(path, data)
+    return load_study(path, kept={str(name): values.to_numpy() for name, values in output.curves.items()})
 
 
 def _mapping(path: Path, parse: Any, keys: Sequence[str]) -> dict[str, Any]:
