@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from .errors import Fault, StudyError, SweepError
+from .errors import DataError, Fault, StudyError, SweepError
 
 if TYPE_CHECKING:
     from .report import Output
@@ -23,6 +23,7 @@ app = typer.Typer(
 )
 
 StudyPath = Annotated[Path, typer.Argument(help="The study file, YAML.", show_default=False)]
+Quantity = Literal["energy", "photons"]
 DataFolder = Annotated[
     Path | None, typer.Option("--data", help="Folder that the study's files are looked for in first.")
 ]
@@ -175,6 +176,24 @@ def calibrate(
     for line in lines(found):
         typer.echo(line)
     typer.echo(f"Files: {output}/: surrogate.yaml (ships as sweep/data/surrogate.yaml), calibration.json.")
+
+
+@app.command()
+def describe(
+    file: Annotated[Path, typer.Argument(help="A file of curves, .csv or .mat.", show_default=False)],
+    output: Annotated[Path, typer.Option(help="Folder for the picture.")] = Path("outputs/describe"),
+    quantity: Annotated[
+        Quantity | None, typer.Option(help="Of light spectra; without it, lights or QE is guessed.", show_default=False)
+    ] = None,
+) -> None:
+    """Plot and check a file of curves: what it holds, what is wrong with it, which colors its lights have."""
+    from .describing import describe as described
+
+    found = described(file, output, quantity)
+    for line in found.lines:
+        typer.echo(line)
+    if found.faults:
+        raise DataError(found.faults)
 
 
 def _finish(folder: Path) -> None:

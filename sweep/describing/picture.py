@@ -1,0 +1,93 @@
+"""The picture of a file of curves: over wavelength, and the chromaticity diagram of lights."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..chromaticity import REGIONS, display_colors
+from ..figures import CURVE_COLORS, CURVE_CYCLE, TYPE_COLORS, canvas_grid
+from ..signals import VISIBLE, LightColor, outline, spectral_locus
+from .facts import Curve, Facts
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_MOST_NAMED = 16
+_TICKS_NM = (460, 480, 490, 500, 510, 520, 540, 560, 580, 600, 620, 700)
+
+
+def draw(title: str, facts: Facts, colors: Mapping[str, LightColor | None]) -> Figure:
+    """Draw the curves; `colors` are those of lights, empty for QE."""
+    lights = bool(colors)
+    figure, panels = canvas_grid(1, 2 if lights else 1, 12.0 if lights else 8.0, 5.0 if lights else 4.2)
+    paints = {curve.name: _paint(curve, at, lights=lights) for at, curve in enumerate(facts.curves)}
+    _draw_curves(panels[0], facts, paints)
+    panels[0].set_title(title, parse_math=False)
+    if lights:
+        _draw_diagram(panels[1], colors, paints)
+    return figure
+
+
+def _paint(curve: Curve, at: int, *, lights: bool) -> tuple[float, ...] | str:
+    """A light's own color; of a QE curve the usual one of its name."""
+    if lights and curve.visible.max() > 0:
+        rgb = display_colors(VISIBLE, curve.visible[None] / curve.visible.max())[0]
+        return tuple(0.85 * float(channel) for channel in rgb)  # darker, to be seen on white
+    return CURVE_COLORS.get(curve.name) or CURVE_CYCLE[at % len(CURVE_CYCLE)]
+
+
+def _draw_curves(axes: Axes, facts: Facts, paints: Mapping[str, tuple[float, ...] | str]) -> None:
+    width = 1.6 if len(facts.curves) <= _MOST_NAMED else 0.7
+    drawn = [
+        axes.plot(
+            curve.wavelength_nm,
+            curve.values,
+            color=paints[curve.name],
+            linewidth=width,
+            marker="." if curve.values.size < 20 else None,
+        )[0]
+        for curve in facts.curves
+    ]
+    axes.set_xlabel("wavelength / nm")
+    axes.set_ylabel("value in the file")
+    lowest = min((float(curve.values.min(initial=0.0)) for curve in facts.curves), default=0.0)
+    if lowest >= 0:
+        axes.set_ylim(bottom=0)
+    axes.axvspan(400, 700, color="#000000", alpha=0.04, linewidth=0)
+    axes.text(402, 0.99, "400-700 nm", transform=axes.get_xaxis_transform(), va="top", fontsize=7, color="#777777")
+    if len(facts.curves) <= _MOST_NAMED:
+        # A leading underscore would hide a name.
+        names = [f" {curve.name}" for curve in facts.curves]
+        legend = axes.legend(drawn, names, fontsize=8, frameon=False)
+        for text in legend.get_texts():
+            text.set_parse_math(False)
+
+
+def _draw_diagram(
+    axes: Axes, colors: Mapping[str, LightColor | None], paints: Mapping[str, tuple[float, ...] | str]
+) -> None:
+    """CIE 1931 x, y with the regions of EN 12368 (and the orange between) and a point for each light."""
+    locus = spectral_locus()
+    closed = np.vstack([locus, locus[:1]])
+    axes.plot(closed[:, 0], closed[:, 1], color="#555555", linewidth=1.0)
+    for tick in _TICKS_NM:
+        x, y = locus[int(tick - VISIBLE.start_nm)]
+        axes.plot(x, y, "|", color="#555555", markersize=5)
+        axes.annotate(f"{tick}", (x, y), (6 if y < x + 0.4 else -4, 4), textcoords="offset points", fontsize=7)
+    for kind in REGIONS:
+        polygon = outline(kind)
+        axes.fill(polygon[:, 0], polygon[:, 1], color=TYPE_COLORS[kind], alpha=0.30, linewidth=0)
+        axes.fill(polygon[:, 0], polygon[:, 1], fill=False, edgecolor=TYPE_COLORS[kind], linewidth=0.8)
+    named = [(name, color) for name, color in colors.items() if color is not None]
+    for name, color in named:
+        axes.plot(*color.xy, "o", color=paints[name], markeredgecolor="black", markeredgewidth=0.6, markersize=6)
+        if len(named) <= _MOST_NAMED:
+            axes.annotate(
+                name, color.xy, (-7, 0), textcoords="offset points", fontsize=7, ha="right", va="center", parse_math=False
+            )
+    axes.set(xlim=(-0.06, 0.8), ylim=(0, 0.9), aspect="equal", xlabel="CIE 1931 x", ylabel="y")
+    axes.set_title("chromaticity; filled: EN 12368's regions and orange between")
