@@ -83,7 +83,10 @@ def spectral_locus() -> FloatArray:
 
 @cache
 def outline(kind: str) -> FloatArray:
-    """The part of a color region that light can have, as a polygon: ndarray[n, 2] (Sutherland and Hodgman's clipping)."""
+    """The part of a color region that light can have, as a polygon, ndarray[n, 2].
+
+    The spectral locus is cut at each bound (Sutherland and Hodgman, "Reentrant polygon clipping").
+    """
     polygon = spectral_locus()
     for a, b, c in REGIONS[kind].bounds:
         over = polygon @ np.array([a, b]) - c

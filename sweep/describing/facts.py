@@ -1,4 +1,4 @@
-"""Facts of a file of curves, also of one that is not clean: its curves on sorted wavelengths, a guess of what they are."""
+"""Facts of a file of curves, also of one that is not clean: curves on sorted wavelengths, a guess of what they are."""
 
 from __future__ import annotations
 
@@ -41,19 +41,16 @@ class Curve:
         """Where the largest value lies."""
         return float(self.wavelength_nm[np.argmax(self.values)])
 
-    @property
-    def visible(self) -> FloatArray:
-        """The curve on VISIBLE, 0 where it is negative or has no samples: ndarray[471]."""
-        if self.values.size < 2:
-            return np.zeros(VISIBLE.size)
-        return resample(self.wavelength_nm, np.clip(self.values, 0, None), VISIBLE, "mean", "zero")
+    def on(self, grid: WavelengthGrid) -> FloatArray:
+        """The curve over its largest value, ndarray[grid.size]; 0 where it is negative or has no samples."""
+        if self.values.size < 2 or not self.peak > 0:
+            return np.zeros(grid.size)
+        return resample(self.wavelength_nm, np.clip(self.values / self.peak, 0, None), grid, "mean", "zero")
 
     @property
     def width_nm(self) -> float:
         """Equivalent width inside 400 to 700 nm: integral over peak; 0 for a curve that is 0 there."""
-        if self.values.size < 2:
-            return 0.0
-        inside = resample(self.wavelength_nm, np.clip(self.values, 0, None), _NEEDED, "mean", "zero")
+        inside = self.on(_NEEDED)
         return float(_NEEDED.integrate(inside) / inside.max()) if inside.max() > 0 else 0.0
 
     @property
@@ -88,10 +85,9 @@ class Facts:
         """The color of each curve read as a light."""
         found = {}
         for curve in self.curves:
-            values = curve.visible
-            scaled = values / values.max() if values.max() > 0 else values
+            values = curve.on(VISIBLE)
             energy = quantity == "energy"
-            found[curve.name] = light_color(photons_from_energy(VISIBLE.nodes_nm, scaled) if energy else scaled)
+            found[curve.name] = light_color(photons_from_energy(VISIBLE.nodes_nm, values) if energy else values)
         return found
 
 
@@ -103,7 +99,8 @@ def facts_of(scan: Scan) -> Facts:
     for name, column in zip(scan.names, scan.values.T, strict=True):
         kept = usable & np.isfinite(column)
         wave, at = np.unique(scan.wavelength_nm[kept] * factor, return_index=True)
-        curves.append(Curve(name, wave, column[kept][at]))
+        shown = name if name.isprintable() else repr(name)[1:-1]  # nothing that steers a terminal
+        curves.append(Curve(shown, wave, column[kept][at]))
     return Facts(tuple(curves), read_as)
 
 
@@ -130,8 +127,14 @@ def notes(facts: Facts, *, as_qe: bool) -> list[str]:
     if gap > _COARSE_NM:
         found.append(f"sparse samples: up to {gap:g} nm apart; between them the curves are taken as straight lines")
     few = [c for c in facts.curves if c.peak > 0 and c.samples_in_peak < _FEWEST_IN_PEAK]
-    found += [f"{c.name}: its peak at {c.peak_nm:g} nm has {c.samples_in_peak} samples of half its height" for c in few]
-    found += [f"{c.name}: no value is above 0" for c in facts.curves if not c.peak > 0]
+    if few:
+        worst = min(few, key=lambda curve: curve.samples_in_peak)
+        samples = "1 sample" if worst.samples_in_peak == 1 else f"{worst.samples_in_peak} samples"
+        place = f"only {samples} of half its height or more around its peak at {worst.peak_nm:g} nm"
+        found.append(f"{worst.name} has {place}" + (f", and {len(few) - 1} more curves likewise" if few[1:] else ""))
+    dark = [curve.name for curve in facts.curves if not curve.peak > 0]
+    if dark:
+        found.append(f"no value is above 0: {', '.join(dark)}")
     if as_qe:
         top = max(curve.peak for curve in facts.curves)
         if top > 1:
@@ -149,7 +152,7 @@ def qe_scale(top: float) -> float:
 
 
 def condensed(faults: Sequence[Fault]) -> list[Fault]:
-    """One fault for many that say the same of one column, or of several; with their number, and the first one's place."""
+    """One fault for many that say the same of one column, or of several; their number, and the first one's place."""
     alike: dict[tuple[str, str | None], list[Fault]] = {}
     for fault in faults:
         alike.setdefault((fault.problem, fault.key), []).append(fault)

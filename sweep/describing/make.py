@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -37,8 +38,8 @@ def describe(path: Path, folder: Path, quantity: Quantity | None = None) -> Desc
     scan = scan_curves(path)
     faults = tuple(condensed(list(chain.from_iterable(scan.faults))))
     facts = facts_of(scan)
-    shown = f"{len(scan.names)} curve{'' if len(scan.names) == 1 else 's'}"
-    lines = [f"{path}: {shown}{': ' if scan.names else ''}{_some(scan.names)}."]
+    names = [curve.name for curve in facts.curves]
+    lines = [f"{path}: {len(names)} curve{'' if len(names) == 1 else 's'}{': ' if names else ''}{_some(names)}."]
     if not any(curve.values.size for curve in facts.curves):
         return Description((*lines, "Nothing in it can be drawn."), faults)
     as_qe = facts.looks_like_qe and quantity is None
@@ -49,13 +50,16 @@ def describe(path: Path, folder: Path, quantity: Quantity | None = None) -> Desc
         lines += _as_energy(facts)
     lines += [f"Note: {note}." for note in notes(facts, as_qe=as_qe)]
     if not faults:
-        lines.append("A study can read this file.")
+        lines.append("Its samples are clean: a study can read it.")
     picture = folder / f"{path.stem}.png"
-    write_bytes(rendered(draw(path.name, facts, colors), "png"), picture)
+    with warnings.catch_warnings(), np.errstate(over="ignore"):
+        warnings.filterwarnings("ignore", "Glyph")  # names in scripts that the font lacks
+        content = rendered(draw(path.name, facts, colors), "png")
+    write_bytes(content, picture)
     return Description((*lines, f"Picture: {picture}"), faults)
 
 
-def _some(names: tuple[str, ...]) -> str:
+def _some(names: Sequence[str]) -> str:
     if len(names) <= _MOST_NAMES:
         return ", ".join(names)
     return f"{', '.join(names[: _MOST_NAMES - 1])}, ... {names[-1]}"
@@ -64,8 +68,10 @@ def _some(names: tuple[str, ...]) -> str:
 def _range(facts: Facts) -> str:
     wave = facts.samples_nm
     steps = np.round(np.diff(wave), 6)
-    step = "one sample" if not steps.size else f"step {steps.min():g} nm"
-    if steps.size and steps.max() > steps.min():
+    if not steps.size:
+        return f"Wavelengths: one sample, at {wave[0]:g} nm."
+    step = f"step {steps.min():g} nm"
+    if steps.max() > steps.min():
         step = f"steps of {steps.min():g} to {steps.max():g} nm"
     read_as = f" ({facts.read_as})" if facts.read_as else ""
     return f"Wavelengths: {wave[0]:g} to {wave[-1]:g} nm{read_as}, {step}, {wave.size:,} samples."
@@ -75,7 +81,9 @@ def _guess(facts: Facts, quantity: Quantity | None) -> str:
     if quantity is not None:
         return f"Read as light spectra in {quantity}, as --quantity says."
     broad, top = np.median([c.width_nm for c in facts.curves]), max(c.peak for c in facts.curves)
-    reason = f"a typical curve is {broad:.0f} nm wide (integral over peak, 400 to 700 nm), the largest value is {top:.6g}"
+    reason = (
+        f"a typical curve is {broad:.0f} nm wide (integral over peak, 400 to 700 nm), the largest value is {top:.6g}"
+    )
     if facts.looks_like_qe:
         return f"A guess: QE of a sensor, for {reason}. `--quantity energy` reads it as lights."
     return f"A guess: light spectra, for {reason}. Read as energy; `--quantity photons` reads photons."
