@@ -51,6 +51,12 @@ class Layout:
     to: str
 
     @property
+    def cfas(self) -> tuple[str, ...]:
+        """What the study lists; a CFA of one channel tells no colors apart, so there is nothing to compare with."""
+        several = tuple(name for name in self.plain if name != self.base * 4)
+        return (*several, self.changed)
+
+    @property
     def clear(self) -> str | None:
         """The unfiltered channel, where it is the base."""
         return self.base if self.base in ("W", "C") else None

@@ -72,7 +72,7 @@ scenarios:
   #   noise: true
 
 # 2x2 pixels by name, row by row; or `NAME: {{tile: [[R, G], [B, W]]}}`. {NEW} is the new channel.
-cfas: [{", ".join(dict.fromkeys([*layout.plain, layout.changed]))}]
+cfas: [{", ".join(layout.cfas)}]
 
 sweeps:
   edges:                # every combination of the values below
@@ -138,7 +138,7 @@ def _sensor(sensor: SensorText) -> str:
 
 def _lights(lights: LightsText) -> str:
     if lights.file is None:
-        return "lights: tl16            # built-in surrogate: 16 traffic lights; `sweep new NAME --lights FILE` for yours\n"
+        return "lights: tl16            # built-in surrogate; `sweep new NAME --lights FILE` takes your own\n"
     lines = ["lights:", f"  name: {scalar(lights.name)}", "  files:"]
     lines += [f"    - file: {scalar(lights.file)}"]
     other = "photons" if lights.quantity == "energy" else "energy"
