@@ -23,7 +23,7 @@ from .test_new import made
 from .test_runner import study_file
 
 FILES = sorted(STUDIES.glob("*.yaml"))
-HEAVY = "matplotlib pandas numba colour pyarrow scipy sklearn pydantic".split()
+HEAVY = ["matplotlib", "pandas", "numba", "colour", "pyarrow", "scipy", "sklearn", "pydantic"]
 
 
 def errors(data: Any) -> list[str]:

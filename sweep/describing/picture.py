@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MOST_NAMED = 16
+_MOST_LETTERS = 32
 _TICKS_NM = (460, 480, 490, 500, 510, 520, 540, 560, 580, 600, 620, 700)
 _CORNER_X, _CORNER_Y = (0.53, 0.74), (0.25, 0.46)
 _INSET = (0.49, 0.55, 0.35, 0.35)
@@ -33,6 +34,10 @@ def draw(title: str, facts: Facts, colors: Mapping[str, LightColor | None]) -> F
     if lights:
         _draw_diagram(panels[1], colors, paints)
     return figure
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= _MOST_LETTERS else f"{name[: _MOST_LETTERS - 3]}..."
 
 
 def _paint(curve: Curve, at: int, *, lights: bool) -> Paint:
@@ -64,7 +69,7 @@ def _draw_curves(axes: Axes, facts: Facts, paints: Mapping[str, Paint]) -> None:
     axes.text(402, 0.99, "400-700 nm", transform=axes.get_xaxis_transform(), va="top", fontsize=7, color="#777777")
     if len(facts.curves) <= _MOST_NAMED:
         # A leading underscore would hide a name.
-        names = [f" {curve.name}" for curve in facts.curves]
+        names = [f" {_short(curve.name)}" for curve in facts.curves]
         legend = axes.legend(
             drawn, names, fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0, frameon=False
         )
@@ -118,8 +123,10 @@ def _in_corner(x: float, y: float) -> bool:
 def _name(axes: Axes, name: str, xy: tuple[float, float], place: tuple[float, float] | None = None) -> None:
     """Write a light's name beside its point, or at a place of the panel (0..1) with a line to the point."""
     if place is None:
-        text = axes.annotate(name, xy, (-5, 0), textcoords="offset points", fontsize=7, ha="right", va="center")
+        text = axes.annotate(_short(name), xy, (-5, 0), textcoords="offset points", fontsize=7, ha="right", va="center")
     else:
         line = {"arrowstyle": "-", "color": "#999999", "linewidth": 0.5}
-        text = axes.annotate(name, xy, place, textcoords="axes fraction", fontsize=7, va="center", arrowprops=line)
+        text = axes.annotate(
+            _short(name), xy, place, textcoords="axes fraction", fontsize=7, va="center", arrowprops=line
+        )
     text.set_parse_math(False)
