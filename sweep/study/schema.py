@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from copy import deepcopy
 from itertools import product
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, ConfigDict, Field, ValidationError, WithJsonSchema, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from ..constraints import Bound
 from ..datasets import BUILT_IN_LIGHTS
@@ -18,78 +17,10 @@ from ..objectives import Objective
 from ..scenes import Geometry, Scenario
 from ..schema import NonNegative, Positive, Section
 from ..sensor import Pixel
-from ..spectra import Outside, Resampling, WavelengthGrid
+from ..spectra import WavelengthGrid
+from .curve_sections import Documented, LightsSection, Name, SensorSection, builtin, named
 
 _FEWEST_PATCHES = 10
-Name = Annotated[str, Field(min_length=1, max_length=100)]
-FilePath = Annotated[str, Field(min_length=1, max_length=4096)]
-
-
-class Documented(Section):
-    """A section whose keys are described by the text below them, for editors."""
-
-    model_config = ConfigDict(use_attribute_docstrings=True)
-
-
-class CurveFile(Documented):
-    """QE curves from one file: `columns` maps the sensor's curve names to the file's column names."""
-
-    file: FilePath
-    """Path of a .csv or .mat file, relative to the study or to the folder of --data."""
-    columns: Annotated[dict[Name, Name], Field(min_length=1)]
-    """Channel of the sensor -> column of the file."""
-    scale: Positive = 1.0
-    """Factor on the file's values: 0.01 for percent."""
-    resampling: Resampling = "linear"
-    """`mean` over each bin keeps the integral of lines that are finer than the grid."""
-    outside: Outside = "refuse"
-    """`zero` takes 0 where the samples end inside the grid."""
-
-
-class SensorSection(Documented):
-    """A built-in sensor by its name, or curves from files."""
-
-    builtin: str | None = None
-    name: Name | None = None
-    files: list[CurveFile] = []
-    clear: Name | None = None
-    """The reference of the CFA's sensitivity; the curve with the largest total where it is left out."""
-
-    @model_validator(mode="after")
-    def _one_source(self) -> SensorSection:
-        if (self.builtin is None) == (not self.files):
-            raise ValueError("a sensor is either the name of a built-in one or a mapping with `files`")
-        return self
-
-
-class LightFile(Documented):
-    """Lights from one file: `signals` maps a signal type to the file's columns."""
-
-    file: FilePath
-    """Path of a .csv or .mat file, relative to the study or to the folder of --data."""
-    quantity: Annotated[str, Field(pattern="^(energy|photons)$"), WithJsonSchema({"enum": ["energy", "photons"]})]
-    """What the file's numbers are."""
-    signals: Annotated[dict[Name, Annotated[list[Name], Field(min_length=1)]], Field(min_length=1)]
-    resampling: Resampling = "linear"
-    """`mean` over each bin keeps the integral of lines that are finer than the grid."""
-    outside: Outside = "refuse"
-    """`zero` takes 0 where the samples end inside the grid."""
-
-
-class LightsSection(Documented):
-    """A built-in data set by its name, or lights from files."""
-
-    builtin: str | None = None
-    name: Name | None = None
-    files: list[LightFile] = []
-    photon_ratio: float | None = Field(default=None, gt=0)
-    """K: photons of a signal patch over those of the white patch; from the spectra where it is left out."""
-
-    @model_validator(mode="after")
-    def _one_source(self) -> LightsSection:
-        if (self.builtin is None) == (not self.files):
-            raise ValueError("lights are either the name of a built-in data set or a mapping with `files`")
-        return self
 
 
 class CfaSection(Section):
@@ -248,15 +179,6 @@ class SearchSection(Documented):
     max_evaluations: int = Field(default=2000, ge=10, le=10_000_000)
 
 
-def _named(names: Iterable[str]) -> Any:
-    """The type of built-in names, as editors complete them; what is not among them is refused with the nearest."""
-    return Annotated[str, WithJsonSchema({"type": "string", "enum": list(names)})]
-
-
-def _builtin(value: Any) -> Any:
-    return {"builtin": value} if isinstance(value, str) else value
-
-
 def _cfas(value: Any) -> Any:
     if isinstance(value, list):
         names = [name for name in value if isinstance(name, str)]
@@ -339,13 +261,13 @@ class StudySection(Documented):
     wavelengths: WavelengthGrid = WavelengthGrid()
     """The grid that all curves are brought to, nm."""
     sensor: Annotated[
-        SensorSection, BeforeValidator(_builtin, json_schema_input_type=_named(BUILT_IN_SENSORS) | SensorSection)
+        SensorSection, BeforeValidator(builtin, json_schema_input_type=named(BUILT_IN_SENSORS) | SensorSection)
     ]
     """QE curves: `ar0820`, a built-in surrogate, or a mapping with `files`."""
     pixel: Pixel = Pixel()
     """The pixel and its readout."""
     lights: Annotated[
-        LightsSection, BeforeValidator(_builtin, json_schema_input_type=_named(BUILT_IN_LIGHTS) | LightsSection)
+        LightsSection, BeforeValidator(builtin, json_schema_input_type=named(BUILT_IN_LIGHTS) | LightsSection)
     ]
     """Traffic lights: `tl16`, a built-in surrogate, or a mapping with `files`."""
     scenarios: Annotated[
