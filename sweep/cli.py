@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from .errors import Fault, StudyError, SweepError
+from .completion import run_folders, study_files
+from .errors import DataError, Fault, StudyError, SweepError
 
 if TYPE_CHECKING:
     from .report import Output
@@ -19,10 +20,16 @@ app = typer.Typer(
     help="Sweeps and design-space exploration for color filter arrays that must tell traffic light colors apart.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    add_completion=False,
 )
 
-StudyPath = Annotated[Path, typer.Argument(help="The study file, YAML.", show_default=False)]
+StudyPath = Annotated[
+    Path, typer.Argument(help="The study file, YAML.", show_default=False, autocompletion=study_files)
+]
+RunFolder = Annotated[
+    Path, typer.Argument(help="Output folder of a study.", show_default=False, autocompletion=run_folders)
+]
+Outputs = Annotated[Path, typer.Option(help="Folder for the results of all studies.")]
+Quantity = Literal["energy", "photons"]
 DataFolder = Annotated[
     Path | None, typer.Option("--data", help="Folder that the study's files are looked for in first.")
 ]
@@ -32,7 +39,7 @@ DataFolder = Annotated[
 def run(
     study: StudyPath,
     data: DataFolder = None,
-    output: Annotated[Path, typer.Option(help="Folder for the results of all studies.")] = Path("outputs"),
+    output: Outputs = Path("outputs"),
     jobs: Annotated[int | None, typer.Option(min=1, help="Workers.", show_default="all cores")] = None,
     backend: Annotated[str, typer.Option(help="loky (processes), threading, or dask (a cluster).")] = "loky",
     scheduler: Annotated[str | None, typer.Option(help="Of Dask: tcp://HOST:PORT.", show_default=False)] = None,
@@ -70,7 +77,7 @@ def run(
 
 
 @app.command()
-def status(folder: Annotated[Path, typer.Argument(help="Output folder of a study.", show_default=False)]) -> None:
+def status(folder: RunFolder) -> None:
     """Say how far a run is, from another terminal."""
     from .runner import status_lines
 
@@ -79,7 +86,7 @@ def status(folder: Annotated[Path, typer.Argument(help="Output folder of a study
 
 
 @app.command()
-def report(folder: Annotated[Path, typer.Argument(help="Output folder of a study.", show_default=False)]) -> None:
+def report(folder: RunFolder) -> None:
     """Draw figures and report of a finished run again."""
     _finish(folder)
 
@@ -118,7 +125,7 @@ def plan(
 
 @app.command()
 def audit(
-    folder: Annotated[Path, typer.Argument(help="Output folder of a study.", show_default=False)],
+    folder: RunFolder,
     data: DataFolder = None,
 ) -> None:
     """Recompute the front and 1 % of a run's rows with every effect on: promised beside realized error."""
@@ -164,7 +171,7 @@ def compare(
 def accuracy(
     study: StudyPath,
     data: DataFolder = None,
-    output: Annotated[Path, typer.Option(help="Folder for the results of all studies.")] = Path("outputs"),
+    output: Outputs = Path("outputs"),
 ) -> None:
     """Measure what accuracy costs: tolerances from 100 to 0.001 DN and single settings, with error, time and work."""
     from .accuracy import accuracy as measure
@@ -208,6 +215,68 @@ def calibrate(
     typer.echo(f"Files: {output}/: surrogate.yaml (ships as sweep/data/surrogate.yaml), calibration.json.")
 
 
+@app.command()
+def describe(
+    file: Annotated[Path, typer.Argument(help="A file of curves, .csv or .mat.", show_default=False)],
+    output: Annotated[Path, typer.Option(help="Folder for the picture.")] = Path("outputs/describe"),
+    quantity: Annotated[
+        Quantity | None, typer.Option(help="Of light spectra; without it, lights or QE is guessed.", show_default=False)
+    ] = None,
+) -> None:
+    """Plot and check a file of curves: what it holds, what is wrong with it, which colors its lights have."""
+    from .describing import describe as described
+
+    found = described(file, output, quantity)
+    for line in found.lines:
+        typer.echo(line)
+    if found.faults:
+        raise DataError(found.faults)
+
+
+@app.command()
+def new(
+    name: Annotated[str, typer.Argument(help="Name of the study and of its file.", show_default=False)],
+    qe: Annotated[Path | None, typer.Option(help="QE curves of a sensor, .csv or .mat.", show_default=False)] = None,
+    lights: Annotated[Path | None, typer.Option(help="Spectra of lights, .csv or .mat.", show_default=False)] = None,
+    quantity: Annotated[Quantity, typer.Option(help="What the lights' numbers are.")] = "energy",
+    folder: Annotated[Path, typer.Option(help="Folder of the studies.")] = Path("studies"),
+) -> None:
+    """Write a commented study that runs as it is, for the built-in curves or for files of your own."""
+    from .newstudy import new_study
+
+    for line in new_study(name, folder, qe, lights, quantity):
+        typer.echo(line)
+
+
+@app.command("list")
+def list_(
+    folder: Annotated[Path, typer.Argument(help="Folder of the studies.")] = Path("studies"),
+    data: DataFolder = None,
+    output: Outputs = Path("outputs"),
+) -> None:
+    """List the studies of a folder: question, number of designs, and whether they have been run."""
+    from .listing import list_lines
+
+    for line in list_lines(folder, output, data):
+        typer.echo(line)
+
+
+@app.command()
+def schema(
+    output: Annotated[Path | None, typer.Option(help="File to write.", show_default="the terminal")] = None,
+) -> None:
+    """Make the JSON Schema of study files, with which editors complete and check them."""
+    from .store import write_text
+    from .study.json_schema import schema_text
+
+    if output is None:
+        typer.echo(schema_text(), nl=False)
+        return
+    write_text(schema_text(), output)
+    typer.echo(f"Schema: {output}. A study beside it names it in its first line:")
+    typer.echo(f"# yaml-language-server: $schema={output.name}")
+
+
 def _finish(folder: Path) -> None:
     from .report import make_report, read_output, summary_lines
 
@@ -220,7 +289,7 @@ def _finish(folder: Path) -> None:
 def main() -> None:
     """Run the command; a fault of the input is one line each on stderr and exit code 2."""
     try:
-        app(standalone_mode=True)
+        app(prog_name="sweep", standalone_mode=True)
     except SweepError as error:
         for fault in error.faults:
             typer.echo(f"sweep: {fault}", err=True)

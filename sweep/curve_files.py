@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import hashlib
 import io
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from .arrays import FloatArray
 from .errors import DataError, Fault, nearest
 from .spectra import Curves, check_samples
 
@@ -22,16 +25,41 @@ def digest(path: Path) -> str:
     return hashlib.sha256(_read_bytes(path)).hexdigest()
 
 
+@dataclass(frozen=True)
+class Scan:
+    """A file of curves, read as far as it can be.
+
+    `wavelength_nm`: ndarray[n_samples] as the file has it. `values`: ndarray[n_samples, n_curves], a column per name.
+    What is not a number is NaN in both. `faults`: what is wrong, in groups; `read_curves` stops at the first group.
+    """
+
+    wavelength_nm: FloatArray
+    names: tuple[str, ...]
+    values: FloatArray
+    faults: tuple[tuple[Fault, ...], ...]
+
+
 def read_curves(path: Path) -> Curves:
     """Read every curve of a CSV or `.mat` file, unscaled and in the file's own quantity.
 
     Raises DataError (file, line, column, value) on anything that is not clean: see `spectra.check_samples`.
     """
+    scan = scan_curves(path)
+    if scan.faults:
+        raise DataError(scan.faults[0])
+    return Curves(scan.wavelength_nm, dict(zip(scan.names, scan.values.T, strict=True)), str(path))
+
+
+def scan_curves(path: Path) -> Scan:
+    """Read a CSV or `.mat` file as far as possible, and say everything that is wrong with it.
+
+    Raises DataError where nothing can be read at all: no file, an unknown kind, no numbers.
+    """
     suffix = path.suffix.casefold()
     if suffix == ".csv":
-        return _read_csv(path)
+        return _scan_csv(path)
     if suffix == ".mat":
-        return _read_mat(path)
+        return _scan_mat(path)
     raise DataError(Fault("unknown kind of curve file", str(path), value=path.suffix, allowed=".csv, .mat"))
 
 
@@ -42,45 +70,75 @@ def _read_bytes(path: Path) -> bytes:
         raise DataError(Fault(f"cannot be read: {error.strerror or error}", str(path))) from None
 
 
-def _read_csv(path: Path) -> Curves:
+def _decoded(path: Path) -> tuple[str, list[Fault]]:
+    """A file's text, and the fault of one that is not UTF-8."""
+    content = _read_bytes(path)
     try:
-        text = _read_bytes(path).decode("utf-8-sig")
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise DataError(Fault(f"not UTF-8 text ({error.reason} at byte {error.start})", str(path))) from None
-    reader = csv.reader(io.StringIO(text, newline=None))
+        fault = Fault(f"not UTF-8 text ({error.reason} at byte {error.start})", str(path))
+        wide = content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+        return content.decode("utf-16" if wide else "latin-1", errors="replace"), [fault]
+    return text, []
+
+
+def _scan_csv(path: Path) -> Scan:
+    text, layout = _decoded(path)
+    first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
+    delimiter = next((mark for mark in (",", ";", "\t") if mark in first), ",")
+    reader = csv.reader(io.StringIO(text, newline=None), delimiter=delimiter)
     try:
         rows = [(reader.line_num, row) for row in reader if any(c.strip() for c in row) and not row[0].startswith("#")]
     except csv.Error as error:
-        raise DataError(Fault(f"not a readable CSV: {error}", str(path), reader.line_num)) from None
+        raise DataError([*layout, Fault(f"not a readable CSV: {error}", str(path), reader.line_num)]) from None
     if not rows:
         raise DataError(
-            Fault("the file is empty", str(path), allowed=f"a header `{WAVELENGTH},...` and rows of numbers")
+            [*layout, Fault("the file is empty", str(path), allowed=f"a header `{WAVELENGTH},...` and rows of numbers")]
         )
-    header_line, header = rows[0][0], [cell.strip() for cell in rows[0][1]]
-    faults = _header_faults(str(path), header_line, header)
-    if faults:
-        raise DataError(faults)
-    values = np.full((len(rows) - 1, len(header)), np.nan)
-    for index, (line, row) in enumerate(rows[1:]):
+    line, header = rows[0][0], [cell.strip() for cell in rows[0][1]]
+    if delimiter != ",":
+        problem, allowed = "columns are not separated by commas", "`,` between columns, `.` in numbers"
+        layout.append(Fault(problem, str(path), line, value=delimiter, allowed=allowed))
+    layout += _header_faults(str(path), line, header)
+    table, cells = _scan_cells(str(path), header, rows[1:], decimal="," if delimiter != "," else ".")
+    wave, values, names = table[:, 0], table[:, 1:], _distinct(header[1:])
+    clean = not layout and not cells
+    samples = _sample_faults(path, wave, names, values) if clean else _unit_faults(path, wave)
+    return Scan(wave, names, values, tuple(tuple(group) for group in (layout, cells, *samples) if group))
+
+
+def _scan_cells(
+    file: str, header: list[str], rows: list[tuple[int, list[str]]], decimal: str
+) -> tuple[FloatArray, list[Fault]]:
+    """The numbers, ndarray[n_samples, n_columns], NaN where a cell is none; and the faults of cells and rows."""
+    faults = []
+    values = np.full((len(rows), len(header)), np.nan)
+    for index, (line, row) in enumerate(rows):
         if len(row) != len(header):
-            faults.append(Fault("wrong number of columns", str(path), line, value=len(row), allowed=str(len(header))))
+            faults.append(Fault("wrong number of columns", file, line, value=len(row), allowed=str(len(header))))
             continue
         for column, cell in enumerate(row):
-            number = _number(cell)
-            if number is None or (column > 0 and number < 0):
-                faults.append(
-                    Fault("not a usable number", str(path), line, header[column], cell.strip(), "finite, >= 0")
-                )
-            else:
-                values[index, column] = number
+            number = _number(cell.replace(decimal, "."))
+            if number is None:
+                faults.append(Fault("not a usable number", file, line, header[column], cell.strip(), "finite, >= 0"))
+                continue
+            values[index, column] = number
+            if column > 0 and number < 0:
+                faults.append(Fault("negative value", file, line, header[column], cell.strip(), "finite, >= 0"))
         if index and values[index, 0] <= values[index - 1, 0]:
             problem = (
                 "wavelength occurs twice" if values[index, 0] == values[index - 1, 0] else "wavelengths are not sorted"
             )
-            faults.append(Fault(problem, str(path), line, WAVELENGTH, values[index, 0].item(), "strictly increasing"))
-    if faults:
-        raise DataError(faults)
-    return _checked(path, values[:, 0], header[1:], values[:, 1:])
+            faults.append(Fault(problem, file, line, WAVELENGTH, values[index, 0].item(), "strictly increasing"))
+    return values, faults
+
+
+def _distinct(names: Sequence[str]) -> tuple[str, ...]:
+    """Column names, numbered where one is empty or occurs twice."""
+    found: list[str] = []
+    for index, name in enumerate(names):
+        found.append(name if name and name not in found else f"{name or 'column'} ({index + 2})")
+    return tuple(found)
 
 
 def _header_faults(file: str, line: int, header: list[str]) -> list[Fault]:
@@ -105,7 +163,7 @@ def _number(cell: str) -> float | None:
     return number if math.isfinite(number) else None
 
 
-def _read_mat(path: Path) -> Curves:
+def _scan_mat(path: Path) -> Scan:
     """ISETCam color filters and spectra: `wavelength`, `data` (a column per curve), `filterNames` if there.
 
     Version 5 files are read by SciPy as plain arrays; nothing in them is executed.
@@ -137,24 +195,30 @@ def _read_mat(path: Path) -> Curves:
         raise DataError(
             Fault("`data` does not fit `wavelength`", str(path), value=data.shape, allowed=f"({wave.size}, n)")
         )
-    return _checked(path, wave, _mat_names(fields.get("filterNames"), data.shape[1]), data)
+    columns = _mat_names(fields.get("filterNames"), data.shape[1])
+    return Scan(wave, columns, data, tuple(map(tuple, _sample_faults(path, wave, columns, data))))
 
 
-def _mat_names(raw: object, count: int) -> list[str]:
+def _mat_names(raw: object, count: int) -> tuple[str, ...]:
     items = [] if raw is None else [np.asarray(item).ravel() for item in np.asarray(raw, dtype=object).ravel()]
-    names = [str(item[0]).strip() if item.size else "" for item in items]
+    names = tuple(str(item[0]).strip() if item.size else "" for item in items)
     if len(names) == count and len(set(names)) == count and all(names):
         return names
-    return [f"curve_{index + 1}" for index in range(count)]
+    return tuple(f"curve_{index + 1}" for index in range(count))
 
 
-def _checked(path: Path, wave: np.ndarray, names: Sequence[str], data: np.ndarray) -> Curves:
-    values = {}
+def _sample_faults(path: Path, wave: FloatArray, names: Sequence[str], data: FloatArray) -> list[list[Fault]]:
+    """What `check_samples` refuses, a group for each curve."""
+    found = []
     for index, name in enumerate(names):
         try:
-            wave, values[name] = check_samples(wave, data[:, index])
+            check_samples(wave, data[:, index])
         except DataError as error:
-            raise DataError(
-                [Fault(f.problem, str(path), None, name, f.value, f.allowed) for f in error.faults]
-            ) from None
-    return Curves(wave, values, str(path))
+            found.append([Fault(f.problem, str(path), None, name, f.value, f.allowed) for f in error.faults])
+    return found
+
+
+def _unit_faults(path: Path, wave: FloatArray) -> list[list[Fault]]:
+    """What is wrong with the wavelengths beside faults that have a line of their own."""
+    sorted_nm = np.unique(wave[np.isfinite(wave)])
+    return _sample_faults(path, sorted_nm, [WAVELENGTH], np.zeros((sorted_nm.size, 1)))

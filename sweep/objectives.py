@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, GetJsonSchemaHandler, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from .arrays import FloatArray
 from .schema import Section
@@ -33,6 +35,12 @@ class Objective(Section):
         if isinstance(names, list) and all(isinstance(name, str) for name in names):
             return {"minimum": dict.fromkeys(names, 1.0)}
         return value
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """What a file may say: a name, a list of names, or the mapping."""
+        name = {"type": "string"}
+        return {"anyOf": [name, {"type": "array", "items": name, "minItems": 1}, handler(core_schema)]}
 
     @model_validator(mode="after")
     def _one_rule(self) -> Objective:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, PlainValidator, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from .schema import NonNegative, Positive, Section
 from .sensor import Optics, Pixel
@@ -55,6 +55,9 @@ class Geometry(Section):
         return pitch_um * self.width_px / math.radians(self.fov_deg)
 
 
+_PlacePx = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
 def _place(value: Any) -> Any:
     """`any`, or two finite numbers."""
     if value == "any":
@@ -74,7 +77,9 @@ class Target(Geometry):
     `center`.
     """
 
-    phase_px: Annotated[Literal["any"] | tuple[float, float], PlainValidator(_place)] = (0.0, 0.0)
+    phase_px: Annotated[
+        Literal["any"] | tuple[float, float], BeforeValidator(_place, json_schema_input_type=Literal["any"] | _PlacePx)
+    ] = (0.0, 0.0)
     readout: Literal["mean", "center"] = "mean"
 
 
@@ -124,7 +129,7 @@ class Scenario(Section):
     visibility_m: Positive | None = None
     background_cd_m2: NonNegative = 0.0
     drive: Drive | None = None
-    noise: Annotated[Noise | None, BeforeValidator(_noise)] = None
+    noise: Annotated[Noise | None, BeforeValidator(_noise, json_schema_input_type=bool | Noise | None)] = None
 
     @model_validator(mode="after")
     def _goes_together(self) -> Scenario:

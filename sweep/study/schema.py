@@ -10,65 +10,17 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from ..constraints import Bound
+from ..datasets import BUILT_IN_LIGHTS
 from ..families import FamilyOptions
+from ..filters import BUILT_IN_SENSORS
 from ..objectives import Objective
 from ..scenes import Geometry, Scenario
 from ..schema import NonNegative, Positive, Section
 from ..sensor import Pixel
-from ..spectra import Outside, Resampling, WavelengthGrid
+from ..spectra import WavelengthGrid
+from .curve_sections import Documented, LightsSection, Name, SensorSection, builtin, named
 
 _FEWEST_PATCHES = 10
-Name = Annotated[str, Field(min_length=1, max_length=100)]
-
-
-class CurveFile(Section):
-    """QE curves from one file: `columns` maps the sensor's curve names to the file's column names."""
-
-    file: Name
-    columns: Annotated[dict[Name, Name], Field(min_length=1)]
-    scale: Positive = 1.0
-    resampling: Resampling = "linear"
-    outside: Outside = "refuse"
-
-
-class SensorSection(Section):
-    """A built-in sensor by its name, or curves from files."""
-
-    builtin: str | None = None
-    name: Name | None = None
-    files: list[CurveFile] = []
-    clear: Name | None = None
-
-    @model_validator(mode="after")
-    def _one_source(self) -> SensorSection:
-        if (self.builtin is None) == (not self.files):
-            raise ValueError("a sensor is either the name of a built-in one or a mapping with `files`")
-        return self
-
-
-class LightFile(Section):
-    """Lights from one file: `signals` maps a signal type to the file's columns."""
-
-    file: Name
-    quantity: Annotated[str, Field(pattern="^(energy|photons)$")]
-    signals: Annotated[dict[Name, Annotated[list[Name], Field(min_length=1)]], Field(min_length=1)]
-    resampling: Resampling = "linear"
-    outside: Outside = "refuse"
-
-
-class LightsSection(Section):
-    """A built-in data set by its name, or lights from files."""
-
-    builtin: str | None = None
-    name: Name | None = None
-    files: list[LightFile] = []
-    photon_ratio: float | None = Field(default=None, gt=0)
-
-    @model_validator(mode="after")
-    def _one_source(self) -> LightsSection:
-        if (self.builtin is None) == (not self.files):
-            raise ValueError("lights are either the name of a built-in data set or a mapping with `files`")
-        return self
 
 
 class CfaSection(Section):
@@ -82,7 +34,7 @@ def _listed(value: Any) -> Any:
     return [value] if isinstance(value, str) else value
 
 
-class Modification(Section):
+class Modification(Documented):
     """A family of filters put into `channel` of a CFA: it starts from curve `base` and goes `to` a curve or a floor.
 
     A number for `to` is a floor: that fraction of the base curve. `dual` replaces two channels (a list) and goes `to` a
@@ -90,10 +42,17 @@ class Modification(Section):
     """
 
     cfa: Name
+    """One of `cfas`."""
     family: Name = "stopband"
-    channel: Annotated[list[Name], BeforeValidator(_listed), Field(min_length=1)]
+    """stopband, multi_stopband (options: {bands: 2}), dual, or free_form (options: {nodes: {...}})."""
+    channel: Annotated[
+        list[Name], BeforeValidator(_listed, json_schema_input_type=list[Name] | Name), Field(min_length=1)
+    ]
+    """The channel of the CFA that the filter replaces; `dual` takes a list of two."""
     base: Name
+    """The curve that the filter starts from."""
     to: Name | Annotated[float, Field(ge=0, le=1)] | None = None
+    """The curve that it follows inside the band; a number is a floor, that share of the base."""
     options: FamilyOptions = FamilyOptions()
 
 
@@ -141,21 +100,26 @@ def _span(value: Any) -> Any:
 
 
 def _axis(value: Any) -> Any:
+    """A number or a list of numbers as an axis."""
     if isinstance(value, list):
         return {"values": value}
     return {"values": [value]} if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
+Values = Annotated[Axis, BeforeValidator(_axis, json_schema_input_type=float | list[float] | Axis)]
+Span = Annotated[Axis, BeforeValidator(_span, json_schema_input_type=float | list[float] | Axis)]
+
+
 class SweepSection(Modification):
     """A full-factorial grid over the family's parameters."""
 
-    grid: dict[Name, Annotated[Axis, BeforeValidator(_axis)]]
+    grid: dict[Name, Values]
 
 
 class BoxSection(Modification):
     """A box that is searched but not swept; a parameter that is not named may take all its family's values."""
 
-    box: dict[Name, Annotated[Axis, BeforeValidator(_span)]] = {}
+    box: dict[Name, Span] = {}
 
 
 class Production(Section):
@@ -199,22 +163,20 @@ class Levels(Section):
         return self
 
 
-class SearchSection(Section):
+class SearchSection(Documented):
     """A search in a box, or in that of a sweep's grid (from the smallest to the largest value of each axis).
 
     `front`: repeat the search over these levels of the least sensitivity.
     """
 
     space: Name | None = None
+    """The sweep or box to search; may be left out where there is one."""
     front: Levels | None = None
     scenario: Name | None = None
     algorithm: Name = "SLSQP"
+    """SLSQP, MMA, CCSAQ; without gradients COBYLA, ISRES, ORIG_DIRECT_L, AGS."""
     starts: int = Field(default=16, ge=1, le=10_000)
     max_evaluations: int = Field(default=2000, ge=10, le=10_000_000)
-
-
-def _builtin(value: Any) -> Any:
-    return {"builtin": value} if isinstance(value, str) else value
 
 
 def _cfas(value: Any) -> Any:
@@ -229,6 +191,15 @@ def _cfas(value: Any) -> Any:
 
 
 _MOST_SCENARIOS = 2000
+
+
+class ScenarioTemplate(Scenario):
+    """What the file says of a scenario; with `each`, of one for every combination of its values.
+
+    `each`: dotted keys of the scenario (target.distance_m) -> values.
+    """
+
+    each: Annotated[dict[Name, Values], Field(min_length=1)] | None = None
 
 
 def _expanded(value: Any) -> Any:
@@ -278,27 +249,58 @@ def _set(mapping: dict[str, Any], path: list[str], number: float) -> None:
     mapping[path[-1]] = number
 
 
-class StudySection(Section):
+class StudySection(Documented):
     """A whole study file."""
 
     study: Annotated[str, Field(min_length=1, max_length=100)]
+    """The name of the study, and of the folder of its results."""
     question: str = ""
+    """What the study asks; heads its report."""
     seed: int = Field(default=1, ge=0, lt=2**32)
+    """Of every random draw."""
     wavelengths: WavelengthGrid = WavelengthGrid()
-    sensor: Annotated[SensorSection, BeforeValidator(_builtin)]
+    """The grid that all curves are brought to, nm."""
+    sensor: Annotated[
+        SensorSection, BeforeValidator(builtin, json_schema_input_type=named(BUILT_IN_SENSORS) | SensorSection)
+    ]
+    """QE curves: `ar0820`, a built-in surrogate, or a mapping with `files`."""
     pixel: Pixel = Pixel()
-    lights: Annotated[LightsSection, BeforeValidator(_builtin)]
-    scenarios: Annotated[dict[Name, Scenario], BeforeValidator(_expanded), Field(min_length=1)] = {"chart": Scenario()}
+    """The pixel and its readout."""
+    lights: Annotated[
+        LightsSection, BeforeValidator(builtin, json_schema_input_type=named(BUILT_IN_LIGHTS) | LightsSection)
+    ]
+    """Traffic lights: `tl16`, a built-in surrogate, or a mapping with `files`."""
+    scenarios: Annotated[
+        dict[Name, Scenario],
+        BeforeValidator(_expanded, json_schema_input_type=dict[Name, ScenarioTemplate]),
+        Field(min_length=1),
+    ] = {"chart": Scenario()}
+    """Scenes, by name: exposure, target, optics, weather, noise."""
     tolerance_dn: Positive = 0.1
+    """By how much the simulation may change any CSD, DN."""
     geometry: dict[Name, Geometry] = {}
-    cfas: Annotated[dict[Name, CfaSection], BeforeValidator(_cfas), Field(min_length=1)]
+    """Distances at which the size of a light on the sensor is told, by name."""
+    cfas: Annotated[
+        dict[Name, CfaSection],
+        BeforeValidator(_cfas, json_schema_input_type=list[Name] | dict[Name, CfaSection | None]),
+        Field(min_length=1),
+    ]
+    """CFAs to compare: a list of names of 2x2 pixels (RGGB, RYYCy), or NAME: {tile: [[R, G], [B, W]]}."""
     designs: dict[Name, DesignSection] = {}
+    """Single filters to compare with, by name."""
     sweeps: dict[Name, SweepSection] = {}
+    """Full-factorial grids of filters, by name."""
     boxes: dict[Name, BoxSection] = {}
+    """Ranges of filters that are searched but not swept, by name."""
     production: Production = Production()
+    """What production does to a filter; then worst_... quantities exist."""
     recognition: Recognition | None = None
+    """How often noise confuses signal types; needs noise in every scenario."""
     objective: Objective = Objective(minimum={"csd_yellow_red": 1.0})
+    """What is maximized: a CSD or sensitivity, or several: {minimum: {...}} or {sum: {...}} with weights."""
     constraints: dict[Name, Bound] = {}
+    """Quantity -> {min: ...}, {max: ...} or both."""
     search: SearchSection | None = None
+    """A constrained search beside the sweep."""
     published: dict[Name, dict[Name, dict[Name, float]]] = {}
     """Printed figures to compare with: table -> CFA, design or geometry -> quantity -> value."""

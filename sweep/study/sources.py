@@ -15,8 +15,8 @@ from ..errors import DataError, Fault, nearest
 from ..filters import BUILT_IN_SENSORS, SensorCurves, make_sensor
 from ..spectra import Curves, WavelengthGrid, photons_from_energy
 from ..surrogate import BUILT_IN_RANGE_NM
+from .curve_sections import CurveFile, LightFile, LightsSection, SensorSection
 from .lines import Document, Key
-from .schema import CurveFile, LightFile, LightsSection, SensorSection
 
 _Made = TypeVar("_Made", SensorCurves, Lights)
 _CUT_OFF = 0.01
