@@ -287,12 +287,13 @@ def _most_margin(t: float) -> float:
 def _bracket(program: _Program, signs: Signs, known: float, tolerance: float) -> Limit:
     """The bracket for one choice of sides; `known` is attained elsewhere, below which nothing is looked for.
 
-    By turns just above the lower end, where the margin shows how far the upper end can be, and halfway.
+    Just above the lower end the margin shows how far the upper end can be; when that does not help, halfway.
     """
     low, high = max(known, 0.0), program.reach(signs) + tolerance
     attained, curve = -np.inf, None
     at = low
-    for step in range(_MOST_STEPS):
+    for _ in range(_MOST_STEPS):
+        before = high - low
         margin, found = program.best_margin(at, signs)
         if found is None or margin < -_MARGIN_DN:
             high = min(high, at)
@@ -307,5 +308,5 @@ def _bracket(program: _Program, signs: Signs, known: float, tolerance: float) ->
             low = max(low, attained)
         if high - low <= tolerance:
             break
-        at = low + tolerance / 2 if step % 2 == 0 else (low + high) / 2
+        at = low + tolerance / 2 if high - low < before / 2 else (low + high) / 2
     return Limit(attained, high, curve)

@@ -164,3 +164,15 @@ def test_a_dollar_in_a_name_is_no_formula() -> None:
         figure = draw_curves(CurvesFigure(name, "QE", wave, {name: np.ones(4)}))
         assert rendered(figure, "svg").startswith(b"<?xml")
         assert not figure.axes[0].title.get_parse_math()
+
+
+def test_a_camera_of_one_channel_has_a_report(tmp_path: Path) -> None:
+    from sweep.report import make_report
+
+    path = tmp_path / "one.yaml"
+    path.write_text("study: one\nsensor: ar0820\nlights: tl16\ncfas: {CCCC: {tile: [[C, C], [C, C]]}}\n")
+    ran(load_study(path), tmp_path / "out", 1)
+    output = read_output(tmp_path / "out")
+    make_report(output)
+    assert payload(output)["views"] == []
+    assert "CCCC" in (tmp_path / "out" / "report.html").read_text()

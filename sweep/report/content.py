@@ -171,14 +171,18 @@ def _lights(output: Output) -> dict[str, np.ndarray]:
 
 
 def clouds(output: Output, *kinds: str) -> list[list[Cloud]]:
-    """Point clouds of the designs of some kinds: a row per design, the first channel against each other one."""
+    """Point clouds of the designs of some kinds: a row per design, the first channel against each other one.
+
+    A CFA of one channel has none.
+    """
     rows = output.kind(*kinds)
     rows = rows[(rows["scenario"] == next(iter(output.study["scenarios"]))) & (rows["status"] == "ok")]
     found = []
     for row in rows.to_dict("records"):
         points = output.points[output.points["design_id"] == row["design_id"]]
         first, *others = dict.fromkeys(points["channel"])
-        found.append([_cloud(points, f"{label(row)}: {first}, {other}", first, other) for other in others])
+        if others:
+            found.append([_cloud(points, f"{label(row)}: {first}, {other}", first, other) for other in others])
     return found
 
 

@@ -25,7 +25,7 @@ from .jobs import Job, Rules, run_job
 
 Parallel = Callable[[Iterable[Any]], Iterator[Any]]
 """Results of delayed calls, in their order."""
-_FRONT_STARTS = 4
+_FRONT_STARTS = 2
 _FRONT_LIMIT_DN = 0.02
 _NO_LIMIT = 0.05
 _REACH_STARTS = 8

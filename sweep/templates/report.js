@@ -172,10 +172,10 @@ function drawCurves(row) {
 }
 
 function drawClouds(row) {
-  const packed = data.clouds.designs[ids[row]];
-  byId("clouds").hidden = !packed;
-  if (!packed) return;
-  const channels = data.clouds.channels[view.cfa], types = data.clouds.types, n = types.length, dn = unpack(packed);
+  const packed = data.clouds.designs[ids[row]], channels = data.clouds.channels[view.cfa] || [];
+  byId("clouds").hidden = !packed || channels.length < 2;
+  if (byId("clouds").hidden) return;
+  const types = data.clouds.types, n = types.length, dn = unpack(packed);
   const of = (channel) => dn.subarray(channel * n, (channel + 1) * n);
   const found = [], pairs = channels.length - 1, wide = narrow() ? 1 : pairs, rows = Math.ceil(pairs / wide);
   const layout = {
