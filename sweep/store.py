@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
@@ -17,6 +17,9 @@ import pyarrow.parquet as pq
 
 from .arrays import BoolArray
 from .errors import Fault, OutputError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SCHEMA_VERSION = "2"
 RESULTS = "results.parquet"
@@ -113,6 +116,18 @@ def write_bytes(content: bytes, path: Path) -> None:
 def write_text(text: str, path: Path) -> None:
     """Write one UTF-8 text file atomically; errors as for `atomic`."""
     write_bytes(text.encode("utf-8"), path)
+
+
+def write_csv(table: pd.DataFrame, path: Path) -> None:
+    """Write one CSV file with every digit, atomically; errors as for `atomic`.
+
+    Pandas alone would print numbers as NumPy's print options say, which other libraries change.
+    """
+    write_text(table.to_csv(index=False, float_format=_every_digit), path)
+
+
+def _every_digit(value: Any) -> str:
+    return repr(float(value))
 
 
 def write_json(data: Mapping[str, Any], path: Path) -> None:

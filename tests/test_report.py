@@ -176,3 +176,15 @@ def test_a_camera_of_one_channel_has_a_report(tmp_path: Path) -> None:
     make_report(output)
     assert payload(output)["views"] == []
     assert "CCCC" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_a_csv_has_every_digit_whatever_numpy_prints(tmp_path: Path) -> None:
+    from sweep.store import write_csv
+
+    value = 37.322915213043046
+    with np.printoptions(legacy="1.13"):
+        write_csv(pd.DataFrame({"a": [value, np.nan], "b": ["x,y", None]}), tmp_path / "t.csv")
+    found = pd.read_csv(tmp_path / "t.csv", float_precision="round_trip")
+    assert found["a"][0] == value
+    assert np.isnan(found["a"][1])
+    assert found["b"][0] == "x,y"

@@ -42,6 +42,7 @@ class Opened:
         """Place on the page of a trace's first point, and its row in the page's data."""
         found = self.page.evaluate(
             """(name) => {
+                document.getElementById('pareto').scrollIntoView();
                 const box = document.getElementById('pareto'), layout = box._fullLayout, place = box.getBoundingClientRect();
                 const trace = box.data.find((t) => t.name.startsWith(name));
                 return [place.left + layout._size.l + layout.xaxis.d2p(trace.x[0]),

@@ -13,7 +13,7 @@ from ..errors import Fault, OutputError, SweepError
 from ..report import Output, read_output
 from ..report.content import readable
 from ..report.pages import inlined, page, rows
-from ..store import write_bytes, write_text
+from ..store import write_bytes, write_csv, write_text
 from ..study import folder_name
 from .best import best_rows, parameters_of, plain_differences, ranking, side_by_side
 from .differences import curve_notes, origin_differences, study_differences
@@ -89,7 +89,7 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> list[str]:
         origins=rows(origins),
     )
     write_text(html, target / PAGE)
-    write_text(best.to_csv(index=False), target / TABLE)
+    write_csv(best, target / TABLE)
     for kind in ("png", "svg"):
         _write_or_remove(drawn.get(kind), target / f"{PICTURE}.{kind}")
     lines = [f"{run}: {output.folder}" for run, output in runs.items()]

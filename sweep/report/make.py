@@ -11,7 +11,7 @@ import pyarrow as pa
 from ..figures import draw_chart, draw_clouds, draw_curves, draw_pareto, rendered
 from ..objectives import Objective
 from ..series import draw_series
-from ..store import write_bytes, write_table, write_text
+from ..store import write_bytes, write_csv, write_table, write_text
 from . import content
 from .comparison import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
 from .interactive import payload
@@ -43,7 +43,7 @@ def make_report(output: Output) -> None:
         images.append((caption, inlined(files["png"])))
     published = comparison_with_published(output)
     if len(published):
-        write_text(published.to_csv(index=False), output.folder / PUBLISHED_CSV)
+        write_csv(published, output.folder / PUBLISHED_CSV)
         write_table(pa.Table.from_pandas(published, preserve_index=False), output.folder / PUBLISHED_PARQUET)
     write_text(_html(output, images, published), output.folder / REPORT)
 
