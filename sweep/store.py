@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -46,6 +47,7 @@ RESOLVED = "study.resolved.yaml"
 _REPEATING = "cfa_sweep_parameters"
 ROW_GROUP = 131_072
 """Rows that are read and written at once."""
+_TABLES_AHEAD = 3
 
 
 def result_schema(parameters: Sequence[str], quantities: Sequence[str]) -> pa.Schema:
@@ -173,11 +175,11 @@ def write_tables(tables: Iterable[pa.Table], schema: pa.Schema, path: Path) -> N
 
 
 def _ahead(tables: Iterator[pa.Table]) -> Iterator[pa.Table]:
-    """The same tables; a thread makes the next one while one is used."""
+    """The same tables; a thread makes the next few while one is used."""
     with ThreadPoolExecutor(1) as thread:
-        coming = thread.submit(next, tables, None)
-        while (table := coming.result()) is not None:
-            coming = thread.submit(next, tables, None)
+        coming = deque(thread.submit(next, tables, None) for _ in range(_TABLES_AHEAD))
+        while (table := coming.popleft().result()) is not None:
+            coming.append(thread.submit(next, tables, None))
             yield table
 
 
