@@ -31,8 +31,10 @@ from .sensor import unquantized
 
 _MARGIN_DN = 1e-6
 """A linear program whose best margin is below minus this is infeasible beyond its solver's own tolerance."""
+_SOLVER_TOLERANCE = 1e-7
+"""HiGHS keeps bounds and rows up to this."""
 _INSIDE_DN = 2e-7
-"""Constrained distances are kept this far inside, beyond the solver's own tolerance of 1e-7."""
+"""Constrained distances are kept this far inside, beyond the solver's own tolerance."""
 _SENSITIVITY_TOLERANCE = 1e-6
 _MOST_STEPS = 80
 _ROUNDING = 1e-9
@@ -236,13 +238,17 @@ class _Program:
     def beyond(self, t: float, margin: float, signs: Signs) -> float:
         """No filter reaches more than this, given the best margin at t; infinite where the margin does not say.
 
-        What a pair with fixed part f needs, sqrt((t / weight)^2 - f), grows with t by 1 / weight or more.
+        What a pair with fixed part f needs, sqrt((t / weight)^2 - f), grows with t by 1 / weight or more. So a margin
+        of 0 or more bounds what t can still gain; a negative one bounds nothing, since what is needed jumps where a
+        pair begins to need something. The solver's margin is that of a filter that may be off by its tolerance at
+        every wavelength.
         """
         weights = self.problem.objective.weights
         moving = all(name in weights and self._needed(name, t) > self._least(name) for name in signs)
-        if not moving or margin >= _most_margin(t) * (1 - _ROUNDING):
+        if not signs or not moving or not 0 <= margin < _most_margin(t) * (1 - _ROUNDING):
             return np.inf
-        return t + (margin + _MARGIN_DN) * max(weights[name] for name in signs)
+        off = max(float(np.abs(self.difference[name]).sum(axis=1).max()) for name in signs) * _SOLVER_TOLERANCE
+        return t + (margin + off + _MARGIN_DN) * max(weights[name] for name in signs)
 
     def reach(self, signs: Signs) -> float:
         """No filter comes further: each distance with a filter that is open where it helps, else closed."""
@@ -299,7 +305,7 @@ def _bracket(program: _Program, signs: Signs, known: float, tolerance: float) ->
             high = min(high, at)
         else:
             low = max(low, at)
-            high = min(high, program.beyond(at, margin, signs)) if signs else high
+            high = min(high, program.beyond(at, margin, signs))
         if found is not None:
             candidate = program.inside(found)
             reached = program.attained(candidate)
@@ -309,4 +315,4 @@ def _bracket(program: _Program, signs: Signs, known: float, tolerance: float) ->
         if high - low <= tolerance:
             break
         at = low + tolerance / 2 if high - low < before / 2 else (low + high) / 2
-    return Limit(attained, high, curve)
+    return Limit(attained, max(high, attained), curve)
