@@ -37,6 +37,8 @@ CURVE_COLORS = {
     "C": "#555555",
 }
 LINE_COLORS = {"front of the search": "#d55e00", "limit of any filter": "#009e73"}
+LINE_STEPS = {"front of the search": "steps-pre", "limit of any filter": "steps-post"}
+"""Between two levels of sensitivity holds what was found at the next one, and what was proven at the last one."""
 TYPE_COLORS = {"green": "#009e73", "yellow": "#c9a800", "orange": "#e66100", "red": "#b2182b"}
 CURVE_CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 _LABEL_BOX = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0}
@@ -141,7 +143,8 @@ def draw_pareto(figure: ParetoFigure) -> Figure:
             for x, y, label in zip(points.x, points.y, points.labels, strict=False):
                 axes.annotate(label, (x, y), textcoords="offset points", xytext=(7, 5), fontsize=9, zorder=7)
     for (name, points), style in zip(figure.lines.items(), itertools.cycle(("-", "--"))):
-        axes.plot(points.x, points.y, style, color=LINE_COLORS.get(name, "black"), label=name, linewidth=1.5, zorder=4)
+        drawn: Any = {"drawstyle": LINE_STEPS.get(name, "default"), "linewidth": 1.5, "zorder": 4}
+        axes.plot(points.x, points.y, style, color=LINE_COLORS.get(name, "black"), label=name, **drawn)
     low, high = axes.get_xlim()
     heights = sorted(figure.levels.items(), key=lambda item: item[1])
     for _, level in heights:

@@ -11,7 +11,6 @@ from ..chromaticity import display_colors
 from ..evaluate import BEST_PLACE, WORST
 from ..figures import TYPE_COLORS, ChartFigure, Cloud, CurvesFigure, ParetoFigure, Points
 from ..metrics import CSD
-from ..objectives import COMBINED
 from ..series import Line, SeriesFigure
 from ..spectra import WavelengthGrid
 from .outputs import Output
@@ -26,18 +25,20 @@ _SENSITIVITY_LABELS = {
 
 def readable(column: str) -> str:
     """A column's name as people write it."""
-    worst = "worst-case " if column.startswith(WORST) else ""
+    worst = _worst(column)
     plain = column.removeprefix(WORST)
     if plain.startswith(CSD):
         return worst + plain.removeprefix(CSD).replace("_", "/") + " CSD"
     return worst + {"cfa_sensitivity": "CFA sensitivity"}.get(plain, plain)
 
 
+def _worst(column: str) -> str:
+    return "worst-case " if column.startswith(WORST) else ""
+
+
 def amount(column: str, value: float, digits: int = 0) -> str:
-    """A quantity's value with its unit; ratios with four digits."""
-    if "csd_" in column or column == COMBINED:
-        return f"{value:.{digits}f} DN"
-    return f"{value:.4f}"
+    """A quantity's value with its unit; ratios, and combined objectives, have none and four digits."""
+    return f"{value:.{digits}f} DN" if CSD in column else f"{value:.4f}"
 
 
 def pareto_figure(output: Output, scenario: str, cfa: str | None) -> ParetoFigure:
@@ -61,13 +62,13 @@ def pareto_figure(output: Output, scenario: str, cfa: str | None) -> ParetoFigur
     where = "" if cfa is None else f", {cfa}"
     return ParetoFigure(
         title=f"{output.study['study']}{where}: what separation costs in sensitivity",
-        x_label=_SENSITIVITY_LABELS[output.trade_off[1].removeprefix(WORST)],
-        y_label=f"{readable(output.trade_off[0])} / DN",
+        x_label=_worst(output.trade_off[1]) + _SENSITIVITY_LABELS[output.trade_off[1].removeprefix(WORST)],
+        y_label=readable(output.trade_off[0]) + (" / DN" if CSD in output.trade_off[0] else ""),
         groups=groups,
         lines=_trade_offs(output, scenario, cfa),
         levels=dict(zip(references["cfa"], references[output.trade_off[0]], strict=True)),
         bound=limit,
-        bound_text="" if limit is None else f"sensitivity >= {limit:g}",
+        bound_text="" if limit is None else f"{_worst(output.trade_off[1])}sensitivity >= {limit:g}",
     )
 
 
@@ -276,7 +277,7 @@ def geometry_table(output: Output) -> pd.DataFrame:
 def _shown(rows: pd.DataFrame, columns: list[str]) -> pd.DataFrame:
     shown = rows[columns].copy()
     for column in columns:
-        if column.removeprefix(WORST).startswith(CSD) or column == COMBINED:
+        if column.removeprefix(WORST).startswith(CSD):
             shown[column] = shown[column].round(1)
         elif shown[column].dtype == np.float64:
             shown[column] = shown[column].round(4)

@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 
 from ..arrays import FloatArray, IndexArray
-from ..constraints import FEASIBLE
+from ..constraints import FEASIBLE, Bound
+from ..metrics import CSD
 from ..pareto import hypervolume
 from .outputs import Output
 
@@ -29,13 +30,13 @@ class History:
     front, in the order of the log: the best feasible objective, and the hypervolume of everything feasible so far.
 
     The best one is over the designs that meet the study's own constraints; the hypervolume is above an objective of 0
-    and `least_sensitivity`.
+    and `least_sensitivity`, and there is none for an objective that is no CSD.
     """
 
     starts: tuple[Start, ...]
     evaluations: IndexArray
     best: FloatArray
-    volume: FloatArray
+    volume: FloatArray | None
     least_sensitivity: float
 
 
@@ -46,18 +47,17 @@ def history_of(output: Output) -> History | None:
         return None
     own = log[log["sensitivity_min"].isna()]
     starts = tuple(Start(int(str(number)), _best_so_far(rows)) for number, rows in own.groupby("start"))
-    bound = output.constraints.get("sensitivity")
-    asked = 0.0 if bound is None or bound.min is None else bound.min
-    met = (log["violation"] <= FEASIBLE) & (log["sensitivity"] >= asked * (1 - FEASIBLE))
+    feasible = log["violation"].to_numpy() <= FEASIBLE
+    bound = output.constraints.get("sensitivity", Bound.model_construct(min=None, max=None))
+    met = feasible & (bound.violation(log["sensitivity"].to_numpy()) <= FEASIBLE)
     best = np.fmax.accumulate(log["objective"].where(met).to_numpy(dtype=float))
     at = np.unique(np.geomspace(1, len(log), min(_PLACES, len(log))).round().astype(np.intp))
-    feasible = log["violation"].to_numpy() <= FEASIBLE
     pairs = log[["objective", "sensitivity"]].to_numpy(dtype=float)
     levels = log["sensitivity_min"].dropna()
-    least = float(min([asked, *levels])) if len(levels) else asked
+    least = float(min(levels)) if len(levels) else bound.min or 0.0
     reference = np.array([0.0, least - 1e-6])
-    volume = [hypervolume(pairs[:n][feasible[:n]], reference) for n in at]
-    return History(starts, at, best[at - 1], np.array(volume), least)
+    volume = [hypervolume(pairs[:n][feasible[:n]], reference) for n in at] if CSD in output.objective else None
+    return History(starts, at, best[at - 1], None if volume is None else np.array(volume), least)
 
 
 def _best_so_far(rows: pd.DataFrame) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -10,7 +11,6 @@ import numpy as np
 import pandas as pd
 
 from ..figures import COLORS, CURVE_COLORS, TYPE_COLORS, ParetoFigure, even
-from ..objectives import COMBINED
 from ..pareto import knee
 from ..series import SeriesFigure
 from . import content
@@ -41,7 +41,7 @@ def payload(output: Output) -> dict[str, Any]:
         "design_id": _packed(rows["design_id"], "f8"),
         "scenario": _words(rows["scenario"]),
         "cfa": _words(rows["cfa"]),
-        "names": {str(at): _label(output, row) for at, row in enumerate(rows.to_dict("records")) if _is_named(row)},
+        "names": {str(at): _names(output, row) for at, row in enumerate(rows.to_dict("records")) if _is_named(row)},
         "views": list(_views(output, rows)),
         "curves": _curves(output),
         "clouds": _clouds(output, rows),
@@ -50,9 +50,9 @@ def payload(output: Output) -> dict[str, Any]:
         "history": _history(output),
         "front": _front(output, rows),
         "series": [_series(series) for series in all_series(output)],
-        "swept": bool((rows["kind"] != "design").any()),
+        "swept": bool((rows["kind"] == "sweep").any()),
         "colors": {"groups": COLORS, "curves": CURVE_COLORS, "types": TYPE_COLORS},
-        "folder": output.folder.as_posix(),
+        "folder": shlex.quote(output.folder.as_posix()),
     }
 
 
@@ -91,10 +91,11 @@ def _is_named(row: Mapping[Any, Any]) -> bool:
     return isinstance(row["name"], str)
 
 
-def _label(output: Output, row: Mapping[Any, Any]) -> str:
-    """A design's name; the published one says so."""
+def _names(output: Output, row: Mapping[Any, Any]) -> dict[str, str]:
+    """A design's name, to write beside its point and in full; the published one says so."""
     entry = output.study.get("designs", {}).get(row["name"], {})
-    return f"{row['name']} ({_PUBLISHED_LABEL})" if entry.get("at") == _PUBLISHED else str(row["name"])
+    name = str(row["name"])
+    return {"short": name, "long": f"{name} ({_PUBLISHED_LABEL})" if entry.get("at") == _PUBLISHED else name}
 
 
 def _columns(output: Output, rows: pd.DataFrame) -> dict[str, dict[str, Any]]:
@@ -110,8 +111,8 @@ def _columns(output: Output, rows: pd.DataFrame) -> dict[str, dict[str, Any]]:
     found = {}
     for name in dict.fromkeys(wanted):
         values = rows[name].to_numpy(dtype=float)
-        if np.isfinite(values).any():
-            digits = 1 if "csd_" in name or name == COMBINED else 2 if name in output.parameters else 4
+        if np.isfinite(values).any() or name in output.trade_off:
+            digits = 1 if "csd_" in name else 2 if name in output.parameters else 4
             label = name if name in output.parameters else content.readable(name)
             found[name] = {"label": label, "digits": digits, "values": _packed(values, "f4")}
     return found
@@ -193,7 +194,7 @@ def _profiles(output: Output) -> dict[str, Any]:
                 "drop": p.drop,
                 "keeps": list(p.keeps),
             }
-            for p in found[:_MOST_AXES]
+            for p in found
         ]
         for cfa, found in output.profiles.items()
     }
@@ -207,7 +208,7 @@ def _history(output: Output) -> dict[str, Any] | None:
         "starts": [{"number": start.number, "best": _finite(start.best)} for start in history.starts],
         "evaluations": history.evaluations.tolist(),
         "best": _finite(history.best),
-        "volume": history.volume.tolist(),
+        "volume": None if history.volume is None else history.volume.tolist(),
         "least_sensitivity": history.least_sensitivity,
         "label": content.readable(output.objective),
     }

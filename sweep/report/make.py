@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -55,6 +56,7 @@ def _html(output: Output, images: Sequence[tuple[str, str]], published: pd.DataF
         "report.html.j2",
         study=output.study,
         folder=output.folder.as_posix(),
+        quoted=shlex.quote(output.folder.as_posix()),
         objective=str(Objective.model_validate(output.study["objective"])),
         objective_words=content.readable(output.objective),
         answer=answer_sentences(output),

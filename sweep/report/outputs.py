@@ -121,8 +121,6 @@ def read_output(folder: Path) -> Output:
         read_table(folder / name).to_pandas() if (folder / name).is_file() else None
         for name in (FRONT, RECOGNITION, SEARCH_LOG, AUDIT)
     )
-    if searched is not None and not profiles.found:
-        profiles.add_search(searched, next(iter(table[table["kind"] == "search"]["cfa"]), ""))
     return Output(
         folder, study, provenance, table, counts, curves, points, front, recognition, searched, audited, profiles.found
     )

@@ -10,12 +10,11 @@ import pandas as pd
 import pyarrow as pa
 
 from ..arrays import FloatArray
-from ..constraints import FEASIBLE
 from ..metrics import CSD
 from ..store import holds
 
 _KEEPS = 0.95
-_MOST_PLACES = 60
+_MOST_PLACES, _MOST_PROFILES = 60, 9
 
 
 @dataclass(frozen=True)
@@ -63,12 +62,6 @@ class Profiles:
         for cfa, rows in feasible.to_pandas().groupby("cfa", observed=True):
             self._take(str(cfa), rows, parameters, self.objective)
 
-    def add_search(self, log: pd.DataFrame, cfa: str) -> None:
-        """Take in the evaluations of a search, where nothing was swept."""
-        names = list(log.columns)
-        parameters = names[names.index("evaluation") + 1 : names.index("objective")]
-        self._take(cfa, log[log["violation"] <= FEASIBLE], parameters, "objective")
-
     def _take(self, cfa: str, rows: pd.DataFrame, parameters: list[str], objective: str) -> None:
         mine = self._best.setdefault(cfa, {})
         for name in parameters:
@@ -82,7 +75,7 @@ class Profiles:
 
     @property
     def found(self) -> dict[str, list[Profile]]:
-        """CFA -> profiles of all parameters that have more than one value, those that matter most first."""
+        """CFA -> profiles of the parameters that matter most, of those that have more than one value."""
         made = {
             cfa: [
                 Profile(name, best.index.to_numpy(dtype=float), best.to_numpy(dtype=float))
@@ -91,7 +84,7 @@ class Profiles:
             ]
             for cfa, mine in self._best.items()
         }
-        return {cfa: sorted(found, key=lambda p: -p.drop) for cfa, found in made.items() if found}
+        return {cfa: sorted(found, key=lambda p: -p.drop)[:_MOST_PROFILES] for cfa, found in made.items() if found}
 
 
 def _places(best: pd.Series) -> pd.Series:

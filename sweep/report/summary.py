@@ -23,8 +23,11 @@ def answer_sentences(output: Output) -> list[str]:
     limits = " and ".join(f"{readable(q)} {bound}" for q, bound in output.constraints.items())
     under = f" with {limits}" if limits else ""
     found = []
-    if len(output.kind("sweep", "search")) and output.best.empty:
-        found.append(f"No design is feasible{under}.")
+    searched = output.kind("sweep", "search")
+    if len(searched) and output.best.empty:
+        failed = searched[searched["status"] != "ok"]
+        every = len(failed) == len(searched)
+        found.append(f"Every design failed: {failed['status'].iloc[0]}." if every else f"No design is feasible{under}.")
     elif not output.best.empty:
         best = output.best.iloc[0]
         where = f", in {best['scenario']}" if len(output.study["scenarios"]) > 1 else ""
@@ -63,7 +66,7 @@ def _scene_lines(output: Output) -> list[str]:
         each = ", ".join(
             f"{row['name']} {amount(shown, row[shown])}"
             + (f" at {row['sensitivity']:.3f}" if row["kind"] == "design" and len(scenarios) == 1 else "")
-            for row in rows[rows["scenario"] == name].to_dict("records")
+            for row in rows[(rows["scenario"] == name) & rows[shown].notna()].to_dict("records")
         )
         if each:
             lines.append(f"{title} {each}." if len(scenarios) == 1 else f"{name}: {each}.")
@@ -100,7 +103,8 @@ def summary_lines(output: Output) -> list[str]:
     areas = output.provenance.get("hypervolume")
     if areas:
         both = ", ".join(f"{name} {area:.3f}" for name, area in areas.items() if area > 0)
-        lines.append(f"Hypervolume (DN x sensitivity): {both}.")
+        least = output.provenance["hypervolume_least_sensitivity"]
+        lines.append(f"Hypervolume (DN x sensitivity, above 0 and a sensitivity of {least:g}): {both}.")
     lines += [f"Note: {warning}." for warning in output.provenance["warnings"]]
     if output.provenance["sensor"]["surrogate"] or output.provenance["lights"]["surrogate"]:
         lines.append("Note: built-in curves are surrogates, modeled from stated parameters, not measured.")

@@ -49,7 +49,7 @@ def thinned(
         see(table)
         ok, on_front = table["feasible"].to_numpy(), table["pareto"].to_numpy()
         feasible += int(ok.sum())
-        front += int(on_front.sum())
+        front += int((ok & on_front).sum())
         failed += int((~holds(table, "status", "ok")).sum())
         always = ~holds(table, "kind", "sweep") | on_front
         kept.append(table.filter(pa.array(always | (table["design_id"].to_numpy() % every == 0))))

@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from ..constraints import FEASIBLE
 from ..errors import InfeasibleError, StudyError
 from ..journal import Journal, locked
 from ..pareto import hypervolume
@@ -190,6 +191,7 @@ class _Run:
             if answer.front:
                 trade_off = front_table(answer)
                 self.facts["hypervolume"] = _hypervolumes(answer, swept)
+                self.facts["hypervolume_least_sensitivity"] = answer.search.levels[0]
         self._write(SEARCH_LOG, log)
         self._write(FRONT, trade_off)
 
@@ -207,9 +209,10 @@ class _Run:
 
 
 def _hypervolumes(answer: SearchAnswer, swept: Front) -> dict[str, float]:
-    """Area that the sweep's and the search's front dominate above no separation and the lowest level of sensitivity."""
+    """Area that the designs of sweep and search dominate above no separation and the lowest level of sensitivity."""
     reference = np.array([0.0, answer.search.levels[0] - 1e-6])
-    found = [[p.best.objective, p.best.sensitivity] for p in answer.front if p.best is not None]
+    runs = (*answer.runs, *(run for point in answer.front for run in point.runs))
+    found = [[e.objective, e.sensitivity] for run in runs for e in run.log if e.violation <= FEASIBLE]
     return {
         "sweep": hypervolume(swept.points(answer.search.space.cfa, answer.search.scenario), reference),
         "search": hypervolume(np.array(found).reshape(-1, 2), reference),

@@ -31,11 +31,12 @@ const scenario = unpack(data.scenario.codes), cfa = unpack(data.cfa.codes);
 const wavelength = Array.from(unpack(data.curves.wavelength_nm));
 const G = Object.fromEntries(data.groups.map((name, i) => [name, i]));
 const x = columns[data.axes.x], y = columns[data.axes.y];
+const lineShapes = {"front of the search": "vh", "limit of any filter": "hv"};  // what holds between two levels
 let view = data.views[0] || null;
 let chosen = null;
 
 const shown = (name, value) => Number.isFinite(value) ? value.toFixed(data.columns[name].digits) : "-";
-const title = (row) => data.names[row] || `design ${ids[row]}`;
+const title = (row) => data.names[row] ? data.names[row].long : `design ${ids[row]}`;
 
 function rowsOf(name) {
   const at = data.scenario.words.indexOf(view.scenario), own = data.cfa.words.indexOf(view.cfa), found = [];
@@ -102,8 +103,8 @@ function traces() {
     found.push(points(good, `feasible (${count(good)} drawn)`, {size: 4, opacity: 0.6, color: color.feasible}));
   if (front.length) found.push(points(front, `Pareto front (${count(front)})`, {size: 7, color: color.front}));
   Object.entries(view.lines).forEach(([name, [u, v]], i) => found.push({
-    type: drawnBy, mode: "lines", name, x: u, y: v, hoverinfo: "x+y+name",
-    line: {color: i ? "#009e73" : "#d55e00", dash: dashes[i % 4], width: 2},
+    type: drawnBy, mode: "lines", name, x: u, y: v, hoverinfo: "skip",
+    line: {shape: lineShapes[name] || "linear", color: i ? "#009e73" : "#d55e00", dash: dashes[i % 4], width: 2},
   }));
   if (view.knee !== null)
     found.push(points([view.knee], "knee of the front",
@@ -111,8 +112,7 @@ function traces() {
   const named = rowsOf("named");
   for (const some of named.length > 6 ? [named] : named.map((i) => [i]))
     found.push(points(some, some.length > 1 ? "named designs" : plain(title(some[0])),
-      {size: 10, symbol: "diamond", color: color.named},
-      {mode: "markers+text", texttemplate: some.map((i) => plain(title(i).split(" (")[0])), textposition: "top center"}));
+      {size: 10, symbol: "diamond", color: color.named}));
   const best = rowsOf("best");
   if (best.length)
     found.push(points(best, "best of the search",
@@ -133,6 +133,8 @@ function levels() {
     else merged.push({xref: "paper", x: 0, y: level, text, showarrow: false, xanchor: "left", yanchor: "bottom",
       font: {size: 11, color: "#555"}, bgcolor: "rgba(255,255,255,0.7)"});
   }
+  for (const row of rowsOf("named"))
+    merged.push({x: x[row], y: y[row], text: plain(data.names[row].short), showarrow: false, yshift: 13, font: {size: 11}});
   if (view.bound !== null)
     shapes.push({type: "line", yref: "paper", y0: 0, y1: 1, x0: view.bound, x1: view.bound,
       line: {color: "#000000", width: 1, dash: "dash"}});
@@ -233,8 +235,6 @@ function drawParallel() {
   const some = [...rowsOf("front"), ...rowsOf("feasible"), ...rowsOf("best")];
   const every = Math.max(1, Math.ceil(some.length / 4000));
   const rows = some.filter((row, i) => i % every === 0 || group[row] !== G.feasible);
-  box.hidden = rows.length === 0;
-  if (!rows.length) return void (byId("brushed").textContent = "No feasible design here.");
   const profiled = (data.profiles[view.cfa] || []).map((p) => p.parameter);
   const parameters = data.parameters.filter((name) => profiled.length === 0 || profiled.includes(name));
   const names = [...parameters, ...Object.keys(data.columns).filter((n) => n.startsWith("csd_")), data.axes.x, data.axes.y, data.objective];
@@ -242,6 +242,8 @@ function drawParallel() {
     .filter(({values}) => values.every(Number.isFinite) && Math.max(...values) > Math.min(...values))
     .map(({name, values}) => ({label: plain(data.columns[name].label.replace(" CSD", "")), values}));
   const objective = columns[data.objective] || y;
+  byId("parallel-section").classList.toggle("empty", rows.length < 2 || dimensions.length < 2);
+  if (rows.length < 2 || dimensions.length < 2) return;
   box.style.minWidth = `${Math.max(600, 75 * dimensions.length)}px`;
   Plotly.react(box, [{
     type: "parcoords", dimensions, labelfont: {size: 10}, tickfont: {size: 9}, rangefont: {size: 9},
@@ -320,10 +322,10 @@ function drawHistory() {
     hovertemplate: `start ${start.number}, evaluation %{x}: %{y:.4g}<extra></extra>`}, axis));
   const all = Object.assign({xaxis: "x2", yaxis: "y2", x: h.evaluations, hovertemplate: "%{x} evaluations: %{y:.5g}<extra></extra>"}, axis);
   found.push(Object.assign({}, all, {y: h.best, line: {color: "#d55e00", width: 2}}));
-  found.push(Object.assign({}, all, {y: h.volume, xaxis: "x3", yaxis: "y3", line: {color: "#0072b2", width: 2}}));
-  const wide = narrow() ? 1 : 3;
+  if (h.volume) found.push(Object.assign({}, all, {y: h.volume, xaxis: "x3", yaxis: "y3", line: {color: "#0072b2", width: 2}}));
+  const panes = h.volume ? 3 : 2, wide = narrow() ? 1 : panes;
   Plotly.react(box, found, {
-    grid: {rows: 3 / wide, columns: wide, pattern: "independent"}, height: narrow() ? 760 : 320, showlegend: false,
+    grid: {rows: panes / wide, columns: wide, pattern: "independent"}, height: narrow() ? 255 * panes : 320, showlegend: false,
     margin: {l: 55, r: 10, t: 20, b: 50},
     xaxis: Object.assign({title: {text: "evaluations of one start"}}, grid),
     yaxis: Object.assign({title: {text: `best feasible ${plain(h.label)}`}}, grid),
