@@ -68,7 +68,7 @@ def audit_output(folder: Path, data: Path | None) -> list[str]:
     broken = len(found.broken)
     lines = [
         f"{len(found.rows):,} of {found.n_designs:,} designs recomputed with every effect on: "
-        f"{'no' if not broken else f'{broken:,}'} error is larger than promised."
+        f"{'no error is' if not broken else f'{broken:,} errors are'} larger than promised."
     ]
     worst = found.rows.groupby("scenario", observed=True, sort=False)[["promised_dn", "realized_dn"]].max()
     lines += [f"{name}: promised {p:.3g} DN, realized {r:.3g} DN." for name, p, r in worst.itertuples()]

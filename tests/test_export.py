@@ -10,6 +10,7 @@ import pytest
 from scipy.io import loadmat
 from scipy.spatial.distance import cdist
 
+from sweep.audit import audit_output
 from sweep.curve_files import read_curves
 from sweep.errors import OutputError, SweepError
 from sweep.exporting import Filters, export_design
@@ -158,6 +159,11 @@ def test_other_curves_than_those_of_the_run_are_refused(from_files: Path, tmp_pa
     with pytest.raises(OutputError, match=r"not what the run has: qe:"):
         export_design(from_files, "3", data, tmp_path / "to")
     assert not (tmp_path / "to").exists()
+    with pytest.raises(OutputError, match=r"not what the run has: qe:"):
+        audit_output(from_files, data)
+    assert not (from_files / "audit.parquet").exists()
+    audit_output(from_files, None)  # with the curves that the run kept
+    assert (from_files / "audit.parquet").exists()
 
 
 def test_a_row_that_was_tampered_with_is_refused(tiny: Path, tmp_path: Path) -> None:

@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
+from sweep.errors import OutputError
 from sweep.pareto import knee
 from sweep.report import read_output
 from sweep.report.history import history_of
@@ -188,3 +190,49 @@ def test_a_csv_has_every_digit_whatever_numpy_prints(tmp_path: Path) -> None:
     assert found["a"][0] == value
     assert np.isnan(found["a"][1])
     assert found["b"][0] == "x,y"
+
+
+@pytest.mark.parametrize("column", ["feasible", "status", "promised_dn", "csd_yellow_red", "sensitivity", "scenario"])
+def test_a_table_that_lacks_a_column_is_one_line(tmp_path: Path, column: str) -> None:
+    folder = tmp_path / "out"
+    ran(load_study(study_file(tmp_path, 2)), folder, 1)
+    path = folder / "results.parquet"
+    pq.write_table(pq.read_table(path).drop_columns([column]), path)
+    with pytest.raises(OutputError, match=f"results.parquet: lacks {column}; delete it"):
+        read_output(folder)
+
+
+def test_a_study_whose_designs_all_failed_says_why(tmp_path: Path) -> None:
+    from sweep.report import make_report, summary_lines
+
+    folder = tmp_path / "out"
+    path = study_file(tmp_path, 2)
+    path.write_text(path.read_text().split("search:")[0])
+    ran(load_study(path), folder, 1)
+    frame = pd.read_parquet(folder / "results.parquet")
+    swept = frame["kind"] == "sweep"
+    frame["status"] = frame["status"].astype(object)
+    frame.loc[swept, "status"] = "error: no light"
+    frame.loc[swept, ["feasible", "pareto"]] = False
+    schema = pq.read_schema(folder / "results.parquet")
+    pq.write_table(pa.Table.from_pandas(frame, schema=schema, preserve_index=False), folder / "results.parquet")
+    output = read_output(folder)
+    make_report(output)
+    assert summary_lines(output)[0] == "Every design failed: error: no light."
+    assert payload(output)["front"]["rows"] == []
+
+
+def test_a_single_design_has_a_report(tmp_path: Path) -> None:
+    from sweep.report import make_report
+
+    path = tmp_path / "single.yaml"
+    grid = "{left_nm: 610, left_width_nm: 5, right_nm: 650, right_width_nm: 5}"
+    path.write_text(
+        "study: single\nsensor: ar0820\nlights: tl16\ncfas: [RYNCy]\n"
+        f"sweeps: {{s: {{cfa: RYNCy, channel: N, base: Y, to: G, grid: {grid}}}}}\n"
+    )
+    ran(load_study(path), tmp_path / "out", 1)
+    output = read_output(tmp_path / "out")
+    make_report(output)
+    assert payload(output)["views"][0]["knee"] is None
+    assert len(output.best) == 1

@@ -9,10 +9,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
+from ..arrays import FloatArray
 from ..constraints import Bound
 from ..errors import Fault, OutputError
 from ..metrics import CSD
@@ -35,6 +39,13 @@ from ..study import Study, load_study
 from .profiles import Profile, Profiles
 from .thinning import Counts, thinned
 
+_SAME = 1e-12
+"""Curves that were computed twice, on other machines, differ by no more."""
+_MOST_SHOWN = 10
+_RESULT_COLUMNS = (
+    *("design_id", "kind", "name", "cfa", "family", "scenario", "sensitivity", "cfa_sensitivity", "violation"),
+    *("feasible", "pareto", "plan", "promised_dn", "status"),
+)
 _STUDY_KEYS = ("study", "seed", "wavelengths", "scenarios", "objective")
 
 
@@ -114,6 +125,13 @@ def read_output(folder: Path) -> Output:
     study = _mapping(folder / RESOLVED, lambda text: YAML(typ="safe").load(text), _STUDY_KEYS)
     provenance = _mapping(folder / PROVENANCE, json.loads, PROVENANCE_KEYS)
     objective = Objective.model_validate(study["objective"]).column
+    if len(provenance["trade_off"]) != 2 or any("name" not in provenance[what] for what in ("sensor", "lights")):
+        raise _lacking(folder / PROVENANCE, ["trade_off, or the names of sensor and lights"])
+    _check_columns(folder / RESULTS, [*_RESULT_COLUMNS, objective, *provenance["trade_off"]])
+    for name, columns in ((CURVES, ["wavelength_nm"]), (POINTS, ["design_id", "signal_type", "channel", "dn"])):
+        _check_columns(folder / name, columns)
+    if (folder / FRONT).is_file():
+        _check_columns(folder / FRONT, ["sensitivity_min", "objective", "sensitivity", "limit"])
     profiles = Profiles(objective, next(iter(study["scenarios"])))
     table, counts = thinned(folder / RESULTS, [objective, *provenance["trade_off"]], profiles.add)
     curves, points = (read_table(folder / name).to_pandas() for name in (CURVES, POINTS))
@@ -127,11 +145,33 @@ def read_output(folder: Path) -> Output:
 
 
 def study_of(output: Output, data: Path | None) -> Study:
-    """The study of a finished run again: with its files, looked for in `data`, or with the curves that the run kept."""
+    """The study of a finished run again: with its files, looked for in `data`, or with the curves that the run kept.
+
+    Raises OutputError when the curves are not those that the run kept.
+    """
     path = output.folder / RESOLVED
-    if data is not None or not output.provenance.get("data_sha256"):
-        return load_study(path, data)
-    return load_study(path, kept={str(name): values.to_numpy() for name, values in output.curves.items()})
+    if data is None and output.provenance.get("data_sha256"):
+        return load_study(path, kept={str(name): values.to_numpy() for name, values in output.curves.items()})
+    study = load_study(path, data)
+    lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
+    made = {f"qe:{name}": values for name, values in study.sensor.qe.items()}
+    made |= {f"light:{kind}:{name}": values for kind, name, values in lights}
+    check_kept(output, made)
+    return study
+
+
+def check_kept(output: Output, made: Mapping[str, FloatArray]) -> None:
+    """Compare curves with those that the run kept under these names; raises OutputError where they differ."""
+    kept = output.curves
+    other = [name for name, values in made.items() if name in kept and not _same(kept[name].to_numpy(), values)]
+    if other:
+        shown = ", ".join(other[:_MOST_SHOWN]) + (" and more" if len(other) > _MOST_SHOWN else "")
+        problem = f"computed again, these are not what the run has: {shown}"
+        raise OutputError(Fault(problem, str(output.folder), allowed="the curve files and the version of that run"))
+
+
+def _same(one: FloatArray, other: FloatArray) -> bool:
+    return one.shape == other.shape and bool(np.abs(one - other).max(initial=0.0) <= _SAME)
 
 
 def _mapping(path: Path, parse: Any, keys: Sequence[str]) -> dict[str, Any]:
@@ -143,6 +183,20 @@ def _mapping(path: Path, parse: Any, keys: Sequence[str]) -> dict[str, Any]:
         raise OutputError(Fault("not a mapping", str(path)))
     lacking = [key for key in keys if key not in found]
     if lacking:
-        again = "delete it, and `sweep run` of the study makes it again"
-        raise OutputError(Fault(f"lacks {', '.join(lacking)}; {again}", str(path)))
+        raise _lacking(path, lacking)
     return found
+
+
+def _lacking(path: Path, what: Sequence[str]) -> OutputError:
+    again = "delete it, and `sweep run` of the study makes it again"
+    return OutputError(Fault(f"lacks {', '.join(what)}; {again}", str(path)))
+
+
+def _check_columns(path: Path, wanted: Sequence[str]) -> None:
+    try:
+        names = pq.read_schema(path).names
+    except (OSError, pa.ArrowException) as error:
+        raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
+    lacking = [name for name in dict.fromkeys(wanted) if name not in names]
+    if lacking:
+        raise _lacking(path, lacking)
