@@ -269,13 +269,12 @@ def schema(
     output: Annotated[Path | None, typer.Option(help="File to write.", show_default="the terminal")] = None,
 ) -> None:
     """Make the JSON Schema of study files, with which editors complete and check them."""
-    from .store import write_text
-    from .study.json_schema import schema_text
+    from .study.json_schema import schema_text, write_schema
 
     if output is None:
         typer.echo(schema_text(), nl=False)
         return
-    write_text(schema_text(), output)
+    write_schema(output)
     typer.echo(f"Schema: {output}. A study beside it names it in its first line:")
     typer.echo(f"# yaml-language-server: $schema={output.name}")
 

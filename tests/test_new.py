@@ -161,22 +161,25 @@ def test_a_bad_name_is_refused(tmp_path: Path, name: str) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["R", "yes", "1e5", "null", "a, b", "[x]", "it's", "# no", "a: b", '"', "\u4fe1", "a\nb", " x"]
-    + [
-        "? red",
-        ": green",
-        "green\x85x",
-        "?a",
-        "a\u2028b",
-        "a\u2029",
-        "\x07",
-        "\ufeffx",
-        "True",
-        "Off",
-        "~",
-        "\\n",
-        "&a",
-        "a.b-c",
+    [
+        *(
+            "R",
+            "yes",
+            "1e5",
+            "null",
+            "a, b",
+            "[x]",
+            "it's",
+            "# no",
+            "a: b",
+            '"',
+            "\u4fe1",
+            "a\nb",
+            " x",
+            "? red",
+            ": green",
+        ),
+        *("green\x85x", "?a", "a\u2028b", "a\u2029", "\x07", "\ufeffx", "True", "Off", "~", "\\n", "&a", "a.b-c"),
     ],
 )
 def test_any_column_name_survives_yaml(tmp_path: Path, text: str) -> None:
