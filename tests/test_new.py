@@ -151,6 +151,27 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
     assert not [p for p in (tmp_path / "studies").iterdir() if p.name.startswith(".")]
 
 
+def test_a_study_that_cannot_be_made_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OutputError("full")
+
+    monkeypatch.setattr("sweep.newstudy.make.write_text", full)
+    with pytest.raises(OutputError, match="full"):
+        new_study("mine", tmp_path / "a" / "b", None, None, "energy")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_names_that_look_the_same_are_two_lights(tmp_path: Path) -> None:
+    lights = csv(tmp_path, "wavelength_nm,r\x07,r\\x07", WAVE, bell(505, 8), bell(628, 8))
+    (section,) = load_study(made(tmp_path, lights=lights)).section.lights.files
+    assert section.signals == {"green": ["r\x07"], "red": ["r\\x07"]}
+
+
+def test_what_is_next_can_be_pasted(tmp_path: Path) -> None:
+    lines = new_study("mine", tmp_path / "my studies", None, None, "energy")
+    assert lines[-1] == f"Next: sweep run '{tmp_path / 'my studies' / 'mine.yaml'}'"
+
+
 @pytest.mark.parametrize("name", ["", "a/b", "../up", "mine.yaml", ".hidden", "-x", "a b", "\u00fc", "x" * 101])
 def test_a_bad_name_is_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(StudyError) as caught:
