@@ -139,7 +139,7 @@ def audit(
 
 @app.command()
 def export(
-    folder: Annotated[Path, typer.Argument(help="Output folder of a study.", show_default=False)],
+    folder: RunFolder,
     design: Annotated[str, typer.Option(help="A design_id, a name (RYN_4Cy, RGGB), or best.", show_default=False)],
     data: Annotated[
         Path | None, typer.Option(help="Folder with the run's curve files, which are then read again and compared.")
@@ -155,7 +155,10 @@ def export(
 
 @app.command()
 def compare(
-    folders: Annotated[list[Path], typer.Argument(help="Output folders of two or more studies.", show_default=False)],
+    folders: Annotated[
+        list[Path],
+        typer.Argument(help="Output folders of two or more studies.", show_default=False, autocompletion=run_folders),
+    ],
     output: Annotated[
         Path | None, typer.Option(help="Folder for the comparison.", show_default="outputs/compare-A-B")
     ] = None,
@@ -266,13 +269,12 @@ def schema(
     output: Annotated[Path | None, typer.Option(help="File to write.", show_default="the terminal")] = None,
 ) -> None:
     """Make the JSON Schema of study files, with which editors complete and check them."""
-    from .store import write_text
-    from .study.json_schema import schema_text
+    from .study.json_schema import schema_text, write_schema
 
     if output is None:
         typer.echo(schema_text(), nl=False)
         return
-    write_text(schema_text(), output)
+    write_schema(output)
     typer.echo(f"Schema: {output}. A study beside it names it in its first line:")
     typer.echo(f"# yaml-language-server: $schema={output.name}")
 

@@ -7,6 +7,7 @@ import csv
 import hashlib
 import io
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,8 @@ from .errors import DataError, Fault, nearest
 from .spectra import Curves, check_samples
 
 WAVELENGTH = "wavelength_nm"
+_NO_UTF_16 = "UTF-8; UTF-16? save as UTF-8"
+_DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
 
 def digest(path: Path) -> str:
@@ -76,9 +79,12 @@ def _decoded(path: Path) -> tuple[str, list[Fault]]:
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        fault = Fault(f"not UTF-8 text ({error.reason} at byte {error.start})", str(path))
         wide = content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+        problem = f"not UTF-8 text ({error.reason} at byte {error.start})"
+        fault = Fault(problem, str(path), allowed=_NO_UTF_16 if wide else None)
         return content.decode("utf-16" if wide else "latin-1", errors="replace"), [fault]
+    if "\0" in text:
+        return text.replace("\0", ""), [Fault("NUL characters in the text", str(path), allowed=_NO_UTF_16)]
     return text, []
 
 
@@ -101,7 +107,7 @@ def _scan_csv(path: Path) -> Scan:
         layout.append(Fault(problem, str(path), line, value=delimiter, allowed=allowed))
     layout += _header_faults(str(path), line, header)
     table, cells = _scan_cells(str(path), header, rows[1:], decimal="," if delimiter != "," else ".")
-    wave, values, names = table[:, 0], table[:, 1:], _distinct(header[1:])
+    wave, values, names = table[:, 0], table[:, 1:], distinct(header[1:])
     clean = not layout and not cells
     samples = _sample_faults(path, wave, names, values) if clean else _unit_faults(path, wave)
     return Scan(wave, names, values, tuple(tuple(group) for group in (layout, cells, *samples) if group))
@@ -120,7 +126,9 @@ def _scan_cells(
         for column, cell in enumerate(row):
             number = _number(cell.replace(decimal, "."))
             if number is None:
-                faults.append(Fault("not a usable number", file, line, header[column], cell.strip(), "finite, >= 0"))
+                comma = "; a decimal comma? use a point" if _DECIMAL_COMMA.fullmatch(cell.strip()) else ""
+                allowed = f"finite, >= 0{comma}"
+                faults.append(Fault("not a usable number", file, line, header[column], cell.strip(), allowed))
                 continue
             values[index, column] = number
             if column > 0 and number < 0:
@@ -133,11 +141,14 @@ def _scan_cells(
     return values, faults
 
 
-def _distinct(names: Sequence[str]) -> tuple[str, ...]:
+def distinct(names: Sequence[str]) -> tuple[str, ...]:
     """Column names, numbered where one is empty or occurs twice."""
     found: list[str] = []
     for index, name in enumerate(names):
-        found.append(name if name and name not in found else f"{name or 'column'} ({index + 2})")
+        own = name or f"column ({index + 2})"
+        while own in found:
+            own = f"{own} ({index + 2})"
+        found.append(own)
     return tuple(found)
 
 
@@ -185,10 +196,12 @@ def _scan_mat(path: Path) -> Scan:
         if needed not in fields:
             raise DataError(Fault(f"no variable `{needed}`", str(path), value=names, nearest=nearest(needed, names)))
     try:
+        if any(np.iscomplexobj(fields[needed]) for needed in ("wavelength", "data")):
+            raise TypeError
         wave = np.asarray(fields["wavelength"], dtype=float).ravel()
         data = np.atleast_2d(np.asarray(fields["data"], dtype=float))
     except (TypeError, ValueError):
-        raise DataError(Fault("`wavelength` and `data` must be numbers", str(path))) from None
+        raise DataError(Fault("`wavelength` and `data` must be real numbers", str(path))) from None
     if data.shape[0] != wave.size and data.shape[1] == wave.size:
         data = data.T
     if data.ndim != 2 or data.shape[0] != wave.size or not data.size:

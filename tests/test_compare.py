@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
+from shutil import copytree
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from sweep.comparing import compare_runs
@@ -35,6 +39,9 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "brighter": CHART.replace("study: tiny", "study: brighter").replace("white_patch}", "white_patch, level: 0.8}"),
         "plain": PLAIN.replace("study: tiny", "study: plain"),
         "orange": CHART.replace("study: tiny", "study: orange") + "objective: csd_orange_red\n",
+        "combined": CHART.replace("study: tiny", "study: combined")
+        + "objective: {sum: {csd_yellow_red: 1, csd_orange_red: 2}}\n",
+        "deep": CHART.replace("study: tiny", "study: deep\npixel: {bits: 20}"),
         "infeasible": CHART.replace("study: tiny", "study: infeasible").replace("min: 0.9", "min: 1.9"),
         "hostile": CHART.replace("study: tiny", "study: '<script>alert(\"$x_1\")</script> 猫'").replace(
             "mine:", "'<b>&$m':"
@@ -124,7 +131,8 @@ def test_scenarios_and_fronts_that_all_have_are_compared(runs: dict[str, Path], 
 
 
 def test_plain_cfas_alone_are_compared(runs: dict[str, Path], tmp_path: Path) -> None:
-    (tmp_path / "fronts.png").write_bytes(b"of an older comparison")
+    compared([runs["chart"], runs["chart"]], tmp_path)
+    assert (tmp_path / "fronts.png").exists()
     said, page = compared([runs["plain"], runs["plain"]], tmp_path)
     assert said.count("has no design that was swept or searched.") == 2
     assert "There are no fronts to compare." in page
@@ -141,6 +149,42 @@ def test_other_objectives_and_axes_are_not_mixed(runs: dict[str, Path], tmp_path
     assert "Best orange/red CSD: B orange with" in said
     said, _ = compared([runs["orange"], runs["chart"], runs["brighter"]], tmp_path)
     assert "compared are those of B chart and C brighter." in said
+
+
+def test_a_combined_objective_has_its_own_words(runs: dict[str, Path], tmp_path: Path) -> None:
+    said, _ = compared([runs["combined"], runs["combined"]], tmp_path)
+    assert "Best csd_yellow_red + 2 csd_orange_red: A combined with" in said
+
+
+def test_best_designs_of_different_scenarios_name_them(runs: dict[str, Path], tmp_path: Path) -> None:
+    copytree(runs["chart"], tmp_path / "other")
+    path = tmp_path / "other" / "results.parquet"
+    table = pq.read_table(path)
+    at = table.schema.get_field_index("scenario")
+    names = pa.array(["dusk"] * len(table)).dictionary_encode()
+    pq.write_table(table.set_column(at, table.schema.field(at), names), path)
+    study = tmp_path / "other" / "study.resolved.yaml"
+    study.write_text(re.sub(r"^  chart:", "  dusk:", study.read_text(), flags=re.MULTILINE))
+    said, _ = compared([runs["chart"], tmp_path / "other"], tmp_path / "to")
+    assert re.search(r"A chart with [0-9.]+ DN in chart; B chart is equal in dusk", said)
+
+
+def test_dn_of_other_meaning_are_not_ranked(runs: dict[str, Path], tmp_path: Path) -> None:
+    said, _ = compared([runs["chart"], runs["deep"]], tmp_path)
+    assert "Best yellow/red CSD in DN of 20 bits: B deep with" in said
+    assert "These are DN of different meaning, which are not ranked" in said
+    assert "so none are compared" in said
+    assert "Note: pixel differs: bits 12 / 20 (A chart, B deep)." in said
+    said, _ = compared([runs["chart"], runs["brighter"]], tmp_path)
+    assert "Note: scenario chart differs: exposure.level 0.95 / 0.8 (A chart, B brighter)." in said
+
+
+@pytest.mark.parametrize("name", ["compare.html", "compare.csv", "fronts.png", "fronts.svg"])
+def test_files_of_others_stay(runs: dict[str, Path], tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_bytes(b"mine")
+    with pytest.raises(OutputError, match="holds something else already"):
+        compare_runs([runs["plain"], runs["plain"]], tmp_path)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {name: b"mine"}
 
 
 def test_no_feasible_design_and_other_constraints_are_said(runs: dict[str, Path], tmp_path: Path) -> None:
@@ -160,8 +204,6 @@ def test_hostile_names_are_text(runs: dict[str, Path], tmp_path: Path) -> None:
 
 
 def test_other_curves_are_said(runs: dict[str, Path], tmp_path: Path) -> None:
-    from shutil import copytree
-
     copytree(runs["chart"], tmp_path / "other")
     curves = pd.read_parquet(tmp_path / "other" / "curves.parquet")
     curves.loc[100, "qe:R"] += 1e-9
@@ -214,6 +256,8 @@ def test_by_default_a_folder_of_both_names(
     said = compare_runs([runs["chart"], runs["plain"]], None)
     assert "outputs/compare-chart-plain/" in said[-1]
     assert (tmp_path / "outputs" / "compare-chart-plain" / "compare.html").is_file()
+    compare_runs([runs["chart"]] * 26, None)
+    assert max(len(path.name) for path in (tmp_path / "outputs").iterdir()) == 100
 
 
 def test_every_front_has_its_own_mark_and_runs_their_dash() -> None:

@@ -6,6 +6,7 @@ from itertools import chain
 from pathlib import Path
 
 import colour
+import matplotlib.image
 import numpy as np
 import pytest
 from scipy.io import savemat
@@ -13,8 +14,9 @@ from scipy.io import savemat
 from sweep.curve_files import scan_curves
 from sweep.describing import describe
 from sweep.describing.facts import condensed, facts_of
-from sweep.errors import DataError
+from sweep.errors import DataError, OutputError
 from sweep.signals import VISIBLE, dominant_ranges_nm, light_color, outline
+from sweep.study.json_schema import schema_text, write_schema
 
 from .conftest import SHARED, needs_measured
 from .test_cli import sweep
@@ -212,3 +214,46 @@ def test_measured_files_are_taken_for_what_they_are(tmp_path: Path) -> None:
         found = describe(SHARED / "data" / f"{name}.csv", tmp_path)
         assert any(f"A guess: {guess}" in line for line in found.lines)
         assert not found.faults
+
+
+def test_names_that_look_the_same_keep_their_colors(tmp_path: Path) -> None:
+    path = csv(tmp_path, "wavelength_nm,r\x07,r\\x07", WAVE, bell(505, 8), bell(628, 8))
+    green, red = (line for line in describe(path, tmp_path, "energy").lines if line.startswith("  r"))
+    assert "r\\x07  " in green
+    assert "r\\x07 (3)" in red
+    assert ("green" in green, "red of EN" in red) == (True, True)
+
+
+def test_a_picture_of_another_stays(tmp_path: Path) -> None:
+    path = csv(tmp_path, "wavelength_nm,G", WAVE, 0.5 * bell(540, 50))
+    describe(path, tmp_path)
+    picture = tmp_path / "curves.png"
+    assert matplotlib.image.imread(picture).shape[2] == 4
+    describe(path, tmp_path)
+    picture.write_bytes(b"mine")
+    with pytest.raises(OutputError, match="holds something else already"):
+        describe(path, tmp_path)
+    assert picture.read_bytes() == b"mine"
+
+
+def test_what_other_programs_save_is_named(tmp_path: Path) -> None:
+    savemat(tmp_path / "c.mat", {"wavelength": WAVE, "data": np.ones((WAVE.size, 1)) * 1j})
+    with pytest.raises(DataError, match="must be real numbers"):
+        scan_curves(tmp_path / "c.mat")
+    (tmp_path / "d.csv").write_text('wavelength_nm,a\n400,"0,01"\n500,1\n')
+    assert "a decimal comma? use a point" in faults(tmp_path / "d.csv")[0]
+    for encoding in ("utf-16", "utf-16-le"):
+        (tmp_path / "u.csv").write_text("wavelength_nm,a\n400,1\n500,1\n", encoding=encoding)
+        assert "UTF-16? save as UTF-8" in faults(tmp_path / "u.csv")[0]
+
+
+def test_a_schema_replaces_only_a_schema(tmp_path: Path) -> None:
+    path = tmp_path / "study.schema.json"
+    path.write_text('{"title": "A study of sweep", "older": true}')
+    write_schema(path)
+    assert path.read_text() == schema_text()
+    for held in ("mine", '{"title": "mine"}', "[]"):
+        path.write_text(held)
+        with pytest.raises(OutputError, match="holds something else already"):
+            write_schema(path)
+        assert path.read_text() == held

@@ -88,6 +88,15 @@ def test_a_column_says_its_channel(column: str, channel: str | None) -> None:
     assert channel_of(column) == channel
 
 
+def test_what_an_export_holds_is_taken_for_what_it_is(tmp_path: Path) -> None:
+    header = "wavelength_nm,QE Cy,N_over_Y,N,rR,cCy,yY,wC,xN,gG"
+    qe = csv(tmp_path, header, WAVE, *[0.5 * bell(460 + 20 * at, 45) for at in range(9)])
+    lines = new_study("mine", tmp_path, qe, None, "energy")
+    (sensor,) = load_study(tmp_path / "mine.yaml").section.sensor.files
+    assert sensor.columns == {"R": "rR", "G": "gG", "C": "wC", "Y": "yY", "Cy": "QE Cy"}
+    assert "Left out, see the file: N_over_Y, N, xN, cCy." in lines
+
+
 @pytest.mark.parametrize(
     ("channels", "changed", "base", "to"),
     [
@@ -142,6 +151,27 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
     assert not [p for p in (tmp_path / "studies").iterdir() if p.name.startswith(".")]
 
 
+def test_a_study_that_cannot_be_made_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OutputError("full")
+
+    monkeypatch.setattr("sweep.newstudy.make.write_text", full)
+    with pytest.raises(OutputError, match="full"):
+        new_study("mine", tmp_path / "a" / "b", None, None, "energy")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_names_that_look_the_same_are_two_lights(tmp_path: Path) -> None:
+    lights = csv(tmp_path, "wavelength_nm,r\x07,r\\x07", WAVE, bell(505, 8), bell(628, 8))
+    (section,) = load_study(made(tmp_path, lights=lights)).section.lights.files
+    assert section.signals == {"green": ["r\x07"], "red": ["r\\x07"]}
+
+
+def test_what_is_next_can_be_pasted(tmp_path: Path) -> None:
+    lines = new_study("mine", tmp_path / "my studies", None, None, "energy")
+    assert lines[-1] == f"Next: sweep run '{tmp_path / 'my studies' / 'mine.yaml'}'"
+
+
 @pytest.mark.parametrize("name", ["", "a/b", "../up", "mine.yaml", ".hidden", "-x", "a b", "\u00fc", "x" * 101])
 def test_a_bad_name_is_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(StudyError) as caught:
@@ -151,12 +181,35 @@ def test_a_bad_name_is_refused(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["R", "yes", "1e5", "null", "a, b", "[x]", "it's", "# no", "a: b", '"', "\u4fe1", "a\nb", " x"]
+    "text",
+    [
+        *(
+            "R",
+            "yes",
+            "1e5",
+            "null",
+            "a, b",
+            "[x]",
+            "it's",
+            "# no",
+            "a: b",
+            '"',
+            "\u4fe1",
+            "a\nb",
+            " x",
+            "? red",
+            ": green",
+        ),
+        *("green\x85x", "?a", "a\u2028b", "a\u2029", "\x07", "\ufeffx", "True", "Off", "~", "\\n", "&a", "a.b-c"),
+    ],
 )
 def test_any_column_name_survives_yaml(tmp_path: Path, text: str) -> None:
     path = tmp_path / "x.yaml"
-    path.write_text(f"a: {{b: {scalar(text)}}}\nc:\n  - {scalar(text)}  # x\n", encoding="utf-8")
-    assert Document(path).data == {"a": {"b": text}, "c": [text]}
+    path.write_text(
+        f"a: {{b: {scalar(text)}}}\nc:\n  - {scalar(text)}  # x\nd: [{scalar(text)}, 1]\n", encoding="utf-8"
+    )
+    assert Document(path).data == {"a": {"b": text}, "c": [text], "d": [text, 1]}
+    assert scalar(text).isprintable()
 
 
 @needs_measured

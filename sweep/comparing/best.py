@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..objectives import Objective
+from ..metrics import CSD
+from ..objectives import COMBINED, Objective
 from ..report import Output
 from ..report.content import QUANTITIES, amount, label, readable
+from .fronts import dn_of
 
 _SAME = 1e-9
 """Relative; CSDs of one study that were computed on two machines differ by less."""
@@ -91,28 +93,39 @@ def _alike(values: list[float]) -> bool:
 
 
 def ranking(runs: Mapping[str, Output]) -> list[str]:
-    """Who is best and by how much, among runs that maximize the same quantity; and who has nothing to compare."""
-    lines, groups = [], dict[str, dict[str, float]]()
+    """Who is best and by how much, among runs that maximize the same in the same DN; and who has nothing to compare."""
+    lines, groups = [], dict[tuple[str, str], dict[str, float]]()
     for run, output in runs.items():
         if output.best.empty:
             asked = len(output.kind("sweep", "search")) > 0
             lines.append(f"{run} has no {'feasible design' if asked else 'design that was swept or searched'}.")
         else:
-            objective = str(Objective.model_validate(output.study["objective"]))
-            groups.setdefault(objective, {})[run] = float(output.best.iloc[0][output.objective])
+            groups.setdefault(_maximized(output), {})[run] = float(output.best.iloc[0][output.objective])
     found = []
-    for objective, values in groups.items():
+    several = len({dn for _, dn in groups}) > 1
+    for (objective, dn), values in groups.items():
         column = next(iter(runs[run].objective for run in values))
         ordered = sorted(values.items(), key=lambda item: -item[1])
         (first, most), *others = ordered
-        text = f"Best {readable(objective)}: {first} with {amount(column, most, 1)}"
+        scenes = {run: " ".join(str(runs[run].best.iloc[0]["scenario"]).split()) for run in values}
+        place = {run: f" in {scene}" if len(set(scenes.values())) > 1 else "" for run, scene in scenes.items()}
+        text = f"Best {objective}{f' in {dn}' if several and dn else ''}: {first}"
+        text += f" with {amount(column, most, 1)}{place[first]}"
         for run, value in others:
             if most - value <= _SAME * abs(most):
-                text += f"; {run} is equal"
+                text += f"; {run} is equal{place[run]}"
             else:
-                text += f"; {run} has {amount(column, value, 1)}, {amount(column, most - value, 1)}"
+                text += f"; {run} has {amount(column, value, 1)}{place[run]}, {amount(column, most - value, 1)}"
                 text += f" ({(most - value) / most:.1%}) less" if most > 0 else " less"
         found.append(f"{text}.")
     if len(groups) > 1:
-        found.append("These are different objectives, which are not ranked against each other.")
+        what = "different objectives" if len({objective for objective, _ in groups}) > 1 else "DN of different meaning"
+        found.append(f"These are {what}, which are not ranked against each other.")
     return found + lines
+
+
+def _maximized(output: Output) -> tuple[str, str]:
+    """The objective in words, and what its DN are, where it has any."""
+    objective = Objective.model_validate(output.study["objective"])
+    text = str(objective) if objective.column == COMBINED else readable(objective.column)
+    return text, dn_of(output) if any(CSD in name for name in objective.weights) else ""

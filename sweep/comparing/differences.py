@@ -12,6 +12,7 @@ import pandas as pd
 from ..report import Output
 
 _SHOWN = 48
+_MOST_KEYS = 3
 _BEFORE = 20
 """Characters of a long value that are shown before what differs."""
 
@@ -78,6 +79,26 @@ def _texts(values: Sequence[Any]) -> list[str]:
 def _text(value: Any) -> str:
     plain = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False, default=str)
     return " ".join(plain.split())
+
+
+def scene_notes(runs: Mapping[str, Output]) -> list[str]:
+    """A sentence for each scenario of one name that is not the same in all runs that have it, and for the pixel."""
+    studies = {run: output.study for run, output in runs.items()}
+    names = dict.fromkeys(name for study in studies.values() for name in study["scenarios"])
+    parts = {
+        f"scenario {' '.join(name.split())}": {
+            r: s["scenarios"][name] for r, s in studies.items() if name in s["scenarios"]
+        }
+        for name in names
+    }
+    parts["pixel"] = {run: study.get("pixel", {}) for run, study in studies.items()}
+    notes = []
+    for what, own in parts.items():
+        found = [f"{key} {' / '.join(_texts(values))}" for key, values in _walk("", list(own.values()))]
+        if found:
+            more = f"; {len(found) - _MOST_KEYS} more" if len(found) > _MOST_KEYS else ""
+            notes.append(f"{what} differs: {'; '.join(found[:_MOST_KEYS])}{more} ({', '.join(own)}).")
+    return notes
 
 
 def curve_notes(runs: Mapping[str, Output]) -> list[str]:

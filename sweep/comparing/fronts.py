@@ -11,10 +11,12 @@ import pandas as pd
 
 from ..arrays import FloatArray
 from ..evaluate import WORST
+from ..metrics import CSD
 from ..objectives import COMBINED, Objective
 from ..pareto import hypervolume
 from ..report import Output
 from ..report.content import readable
+from ..sensor import Pixel
 
 _STEP = 0.01
 _BELOW = 1e-9
@@ -67,15 +69,20 @@ def on_the_same_axes(runs: Mapping[str, Output]) -> tuple[dict[str, Output], lis
     return chosen, [f"The fronts have different axes ({each}); compared are those of {' and '.join(chosen)}."]
 
 
+def dn_of(output: Output) -> str:
+    """What a DN of a run is: only of the same full scale and pedestal do they compare."""
+    pixel = Pixel.model_validate(output.study.get("pixel", {}))
+    return f"DN of {pixel.bits} bits" + (f", pedestal {pixel.offset_dn:g} DN" if pixel.offset_dn else "")
+
+
 def _meaning(output: Output) -> tuple[str, ...]:
-    """What the two axes are; of a combined objective, of a worst case, with all that it depends on."""
+    """What the two axes are; of a combined objective, of a worst case, of DN with all that it depends on."""
     shift = output.study.get("production", {}).get("edge_shift_nm", 0.0)
     words = []
     for axis in output.trade_off:
         text = str(Objective.model_validate(output.study["objective"])) if axis == COMBINED else readable(axis)
-        words.append(
-            f"{text} (edges {shift:g} nm off)" if WORST in axis or (axis == COMBINED and WORST in text) else text
-        )
+        dependent = f" (edges {shift:g} nm off)" if WORST in axis or (axis == COMBINED and WORST in text) else ""
+        words.append(f"{text}{dependent}" + (f" in {dn_of(output)}" if CSD in axis or axis == COMBINED else ""))
     return tuple(words)
 
 

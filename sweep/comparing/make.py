@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 import string
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,12 +18,17 @@ from ..report.pages import inlined, page, rows
 from ..store import write_bytes, write_csv, write_text
 from ..study import folder_name
 from .best import best_rows, parameters_of, plain_differences, ranking, side_by_side
-from .differences import curve_notes, origin_differences, study_differences
+from .differences import curve_notes, origin_differences, scene_notes, study_differences
 from .drawing import FrontsFigure, Line, Mark, pictures
 from .fronts import Box, Front, box_of, common_scenarios, fronts, hypervolumes, on_the_same_axes
 
 PAGE, PICTURE, TABLE = "compare.html", "fronts", "compare.csv"
+_KINDS = ("png", "svg")
+_MARK = b'<meta name="generator" content="sweep compare">'
+"""The line of the page's template by which a folder is known to hold a comparison."""
+_MARK_WITHIN = 1024
 _LETTERS = string.ascii_uppercase
+_MOST_LETTERS = 100
 _MOST_PARAMETERS = 12
 _MOST_SCENARIOS = 4
 """Scenarios whose hypervolumes are printed; the page has all."""
@@ -57,22 +64,23 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> list[str]:
     """Compare finished runs, write `compare.html`, `compare.csv`, `fronts.png`, `fronts.svg`, and say what was found.
 
     `to`: default outputs/compare-<a>-<b>. Raises SweepError unless there are 2 to 26; OutputError for a folder without
-    a finished run and as `store.atomic` does.
+    a finished run, where a file would be replaced that no comparison wrote, and as `store.atomic` does.
     """
     if not 2 <= len(folders) <= len(_LETTERS):
         allowed = f"2 to {len(_LETTERS)} folders"
         raise SweepError(Fault("cannot be compared", None, None, "FOLDERS", len(folders), allowed))
+    target = to or Path("outputs") / _folder_of(folders)
+    _refuse_other(target)
     outputs = [read_output(folder) for folder in folders]
     runs = {f"{letter} {_one_line(o.study['study'])}": o for letter, o in zip(_LETTERS, outputs, strict=False)}
     compared = compare_fronts(runs)
     answer = [*ranking(runs), *_largest(compared)]
-    notes = [*_same_folders(runs), *curve_notes(runs), *_constraint_note(runs), *compared.notes]
+    notes = [*_same_folders(runs), *curve_notes(runs), *scene_notes(runs), *_constraint_note(runs), *compared.notes]
     best = best_rows(runs)
     shown, left_out = side_by_side(best, _MOST_PARAMETERS, parameters_of(runs))
     plain, same = plain_differences(runs)
     studies, origins = study_differences(runs), origin_differences(runs)
     drawn = {} if compared.figure is None else pictures(compared.figure)
-    target = to or Path("outputs") / "-".join(["compare", *(folder_name(f.resolve().name) for f in folders)])
     html = page(
         "compare.html.j2",
         runs={run: str(output.folder) for run, output in runs.items()},
@@ -90,7 +98,7 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> list[str]:
     )
     write_text(html, target / PAGE)
     write_csv(best, target / TABLE)
-    for kind in ("png", "svg"):
+    for kind in _KINDS:
         _write_or_remove(drawn.get(kind), target / f"{PICTURE}.{kind}")
     lines = [f"{run}: {output.folder}" for run, output in runs.items()]
     lines += _section("What differs in the studies", studies, "nothing")
@@ -173,6 +181,28 @@ def _constraint_note(runs: Mapping[str, Output]) -> list[str]:
     if len(set(each.values())) < 2:
         return []
     return [f"The best designs meet different constraints ({'; '.join(f'{r}: {c}' for r, c in each.items())})."]
+
+
+def _folder_of(folders: Sequence[Path]) -> str:
+    """A name from those of the runs, short enough for every file system."""
+    name = "-".join(["compare", *(folder_name(folder.resolve().name) for folder in folders)])
+    if len(name) <= _MOST_LETTERS:
+        return name
+    digest = hashlib.sha256(name.encode("utf-8")).hexdigest()[:8]
+    return f"{name[: _MOST_LETTERS - len(digest) - 1]}-{digest}"
+
+
+def _refuse_other(target: Path) -> None:
+    """Raises OutputError where one of the files is there without a page that says a comparison wrote it."""
+    try:
+        with (target / PAGE).open("rb") as handle:
+            if _MARK in handle.read(_MARK_WITHIN):
+                return
+    except OSError:
+        pass  # what is there, if anything, is told below
+    for name in (PAGE, TABLE, *(f"{PICTURE}.{kind}" for kind in _KINDS)):
+        if os.path.lexists(target / name):
+            raise OutputError(Fault("holds something else already", str(target / name), allowed="another --output"))
 
 
 def _write_or_remove(content: bytes | None, path: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from ..arrays import FloatArray
-from ..curve_files import Scan
+from ..curve_files import Scan, distinct
 from ..errors import Fault
 from ..signals import VISIBLE, LightColor, light_color
 from ..spectra import WavelengthGrid, photons_from_energy, resample
@@ -96,11 +96,12 @@ def facts_of(scan: Scan) -> Facts:
     factor, read_as = _unit(scan.wavelength_nm)
     usable = np.isfinite(scan.wavelength_nm)
     curves = []
-    for name, column in zip(scan.names, scan.values.T, strict=True):
+    # Nothing that steers a terminal; two names that then look the same stay two.
+    shown = distinct([name if name.isprintable() else repr(name)[1:-1] for name in scan.names])
+    for name, column in zip(shown, scan.values.T, strict=True):
         kept = usable & np.isfinite(column)
         wave, at = np.unique(scan.wavelength_nm[kept] * factor, return_index=True)
-        shown = name if name.isprintable() else repr(name)[1:-1]  # nothing that steers a terminal
-        curves.append(Curve(shown, wave, column[kept][at]))
+        curves.append(Curve(name, wave, column[kept][at]))
     return Facts(tuple(curves), read_as)
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import struct
 import warnings
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
@@ -11,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..curve_files import scan_curves
-from ..errors import Fault
+from ..errors import Fault, OutputError
 from ..figures import rendered
 from ..signals import LightColor
 from ..store import write_bytes
@@ -19,6 +22,18 @@ from .facts import Facts, Quantity, condensed, facts_of, notes
 from .picture import draw
 
 _MOST_NAMES = 12
+_HEADER_BYTES = 33
+"""Of a PNG: its signature and its first chunk."""
+
+
+def _text_chunk(key: str, text: str) -> bytes:
+    """A PNG chunk of text: length, type and data, CRC-32 of these two (PNG specification, 11.3.3.2)."""
+    body = b"tEXt" + key.encode("latin-1") + b"\0" + text.encode("latin-1")
+    return struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
+
+
+_MARK = _text_chunk("Software", "sweep describe")
+"""By it a picture is known to be a description's."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +48,8 @@ def describe(path: Path, folder: Path, quantity: Quantity | None = None) -> Desc
     """Describe a CSV or `.mat` file of curves and draw it to `folder`/<stem>.png.
 
     `quantity`: the curves are lights, in energy or photons; None guesses whether they are lights (then in energy) or
-    QE. Raises DataError where nothing can be read, OutputError where the picture cannot be written.
+    QE. Raises DataError where nothing can be read, OutputError where the picture cannot be written or would replace
+    a file that no description wrote.
     """
     scan = scan_curves(path)
     faults = tuple(condensed(list(chain.from_iterable(scan.faults))))
@@ -52,11 +68,24 @@ def describe(path: Path, folder: Path, quantity: Quantity | None = None) -> Desc
     if not faults:
         lines.append("Its samples are clean: a study can read it.")
     picture = folder / f"{path.stem}.png"
+    _refuse_other(picture)
     with warnings.catch_warnings(), np.errstate(over="ignore"):
         warnings.filterwarnings("ignore", "Glyph")  # names in scripts that the font lacks
         content = rendered(draw(path.name, facts, colors), "png")
-    write_bytes(content, picture)
+    write_bytes(content[:_HEADER_BYTES] + _MARK + content[_HEADER_BYTES:], picture)
     return Description((*lines, f"Picture: {picture}"), faults)
+
+
+def _refuse_other(picture: Path) -> None:
+    if not os.path.lexists(picture):
+        return
+    try:
+        with picture.open("rb") as handle:
+            ours = handle.read(_HEADER_BYTES + len(_MARK)).endswith(_MARK)
+    except OSError as error:
+        raise OutputError(Fault(f"cannot be read: {error.strerror or error}", str(picture))) from None
+    if not ours:
+        raise OutputError(Fault("holds something else already", str(picture), allowed="another --output"))
 
 
 def _some(names: Sequence[str]) -> str:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..describing.facts import Curve
+from ..filter_files import HINTS
 
 _WORDS = {
     "red": "R",
@@ -28,6 +29,8 @@ _ORDER = ("R", "G", "B", "W", "C", "Y", "Cy", "M")
 _TOKEN = re.compile(r"[A-Z]?[a-z]+|[A-Z]+")
 _CLEAR_NM = 180.0
 """Equivalent width from which on a curve is rather that of a clear pixel."""
+_RATIO = "_over_"
+"""In the name of a filter's transmission over another curve, as `sweep export` writes it."""
 NEW = "N"
 """The channel that a study designs."""
 
@@ -63,7 +66,14 @@ class Layout:
 
 
 def channel_of(column: str) -> str | None:
-    """The channel that a column's name says, by a word or a letter in any case (`red`, `QE_R`, `rRed`), else None."""
+    """The channel that a column's name says, else None.
+
+    The whole name (`R`), or a filter's after ISETCam's hint (`wC`, `cCy`); else a word or a letter in any case (`red`,
+    `QE_R`, `rRed`). N says none: it is the channel that a study designs.
+    """
+    whole = column[1:] if column[:1] in tuple(HINTS) and column[1:] in (*_ORDER, NEW) else column
+    if whole in (*_ORDER, NEW):
+        return None if whole == NEW else whole
     tokens = [token.casefold() for token in _TOKEN.findall(column)]
     for known in (_WORDS, _LETTERS):
         found = {known[token] for token in tokens if token in known}
@@ -75,11 +85,13 @@ def channel_of(column: str) -> str | None:
 def channels_of(curves: Mapping[str, Curve]) -> Channels:
     """Channels by the columns' names, or, where no name says one, by the curves' shapes."""
     lit = {column: curve for column, curve in curves.items() if curve.width_nm > 0}
+    left_out = {column: "0 from 400 to 700 nm" for column in curves if column not in lit}
+    left_out |= {column: reason for column in lit if (reason := _no_channel(column))}
+    lit = {column: curve for column, curve in lit.items() if column not in left_out}
     named = {column: channel for column in lit if (channel := channel_of(column)) is not None}
     meant = named or {column: _by_shape(curve) for column, curve in lit.items()}
     columns: dict[str, str] = {}
-    left_out = {column: "0 from 400 to 700 nm" for column in curves if column not in lit}
-    for column in lit:
+    for column in sorted(lit, key=lambda column: column != meant.get(column)):  # a whole name before a part of one
         channel = meant.get(column)
         if channel is None:
             left_out[column] = "the name says no channel"
@@ -89,6 +101,14 @@ def channels_of(curves: Mapping[str, Curve]) -> Channels:
             columns[channel] = column
     ordered = {channel: columns[channel] for channel in _ORDER if channel in columns}
     return Channels(ordered, left_out, guessed=not named)
+
+
+def _no_channel(column: str) -> str:
+    """Why a column that `sweep export` writes is no channel to begin with; empty for others."""
+    if _RATIO in column:
+        return "a transmission, no QE"
+    hinted = column[:1] in tuple(HINTS) and column[1:] == NEW
+    return f"{NEW} is the channel that the study designs" if column == NEW or hinted else ""
 
 
 def _by_shape(curve: Curve) -> str:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import os
+import shlex
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
@@ -13,10 +15,10 @@ import numpy as np
 
 from ..curve_files import scan_curves
 from ..describing.facts import Curve, Facts, Quantity, condensed, facts_of, qe_scale
-from ..errors import DataError, Fault, OutputError, StudyError
+from ..errors import DataError, Fault, OutputError, StudyError, SweepError
 from ..spectra import WavelengthGrid
 from ..store import atomic, write_text
-from ..study import folder_name, load_study
+from ..study import Study, folder_name, load_study
 from ..study.json_schema import SCHEMA_FILE, schema_text
 from .channels import Layout, channels_of, layout_of
 from .template import TYPICAL_NM, LightsText, SensorText, one_line, study_text
@@ -41,18 +43,31 @@ def new_study(name: str, folder: Path, qe: Path | None, lights: Path | None, qua
     sensor = SensorText(Layout(_BUILT_IN_CFAS, "RYNCy", "Y", "G")) if qe is None else _sensor(qe, folder)
     start_nm, stop_nm = sensor.range_nm
     chosen = _built_in_lights() if lights is None else _lights(lights, folder, quantity, start_nm, stop_nm)
+    new_folders = [place for place in (folder, *folder.parents) if not os.path.lexists(place)]
+    try:
+        made = _write(path, study_text(name, sensor, chosen))
+    except SweepError:
+        with suppress(OSError):  # one that something else is in by now stays
+            for place in new_folders:
+                place.rmdir()
+        raise
+    lines = [f"{path}: {made.n_designs:,} designs on {', '.join(made.mosaics)}; objective {made.objective}."]
+    lines += _said(sensor, chosen)
+    lines += [f"Note: {warning}." for warning in made.warnings]
+    return [*lines, f"Next: sweep run {shlex.quote(str(path))}"]
+
+
+def _write(path: Path, text: str) -> Study:
+    """Write a study that loads, and the schema before it, so that no study is without the one that it names."""
     with atomic(path) as hidden:
-        hidden.write_text(study_text(name, sensor, chosen), encoding="utf-8")
+        hidden.write_text(text, encoding="utf-8")
         try:
             made = load_study(hidden)
         except StudyError as error:
             raise DataError([replace(fault, file=None, line=None) for fault in error.faults]) from None
-    if not os.path.lexists(folder / SCHEMA_FILE):
-        write_text(schema_text(), folder / SCHEMA_FILE)
-    lines = [f"{path}: {made.n_designs:,} designs on {', '.join(made.mosaics)}; objective {made.objective}."]
-    lines += _said(sensor, chosen)
-    lines += [f"Note: {warning}." for warning in made.warnings]
-    return [*lines, f"Next: sweep run {path}"]
+        if not os.path.lexists(path.with_name(SCHEMA_FILE)):
+            write_text(schema_text(), path.with_name(SCHEMA_FILE))
+    return made
 
 
 def _checked(name: str) -> str:

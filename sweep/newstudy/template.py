@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from io import StringIO
-from typing import Any
 
 from ruamel.yaml import YAML
 
@@ -14,6 +14,10 @@ from .channels import NEW, Channels, Layout
 
 TYPICAL_NM = {"green": 505, "yellow": 590, "orange": 605, "red": 635}
 """Signal types in the order of a study, and about where their lights peak."""
+_PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
+_OLD_BOOLEANS = ("yes", "no", "on", "off")
+"""Words that readers of YAML 1.1 take for booleans."""
+_MOST_OF_FOUR_DIGITS = 0xFFFF
 
 
 @dataclass(frozen=True)
@@ -174,11 +178,19 @@ def one_line(text: str) -> str:
     return text if text.isprintable() else repr(text)
 
 
-def scalar(text: Any) -> str:
+def scalar(text: str) -> str:
     """A text as YAML writes it, quoted where it must be; it can stand anywhere, also between brackets."""
-    yaml = YAML(typ="safe", pure=True)
-    yaml.default_flow_style = True
-    yaml.width = 100_000
-    stream = StringIO()
-    yaml.dump([text], stream)
-    return stream.getvalue().strip().removeprefix("[").removesuffix("]")
+    if (
+        _PLAIN.fullmatch(text)
+        and YAML(typ="safe", pure=True).load(text) == text
+        and text.casefold() not in _OLD_BOOLEANS
+    ):
+        return text
+    quoted = json.dumps(text, ensure_ascii=False)
+    return "".join(c if c.isprintable() else _escaped(c) for c in quoted)
+
+
+def _escaped(char: str) -> str:
+    """A line break, a control character or another that does not print, as double quotes of YAML have it."""
+    code = ord(char)
+    return f"\\u{code:04x}" if code <= _MOST_OF_FOUR_DIGITS else f"\\U{code:08x}"

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
+from ..errors import Fault, OutputError
+from ..store import write_text
 from .schema import StudySection
 
 SCHEMA_FILE = "study.schema.json"
 """Its name beside the studies, which their first line gives."""
+_TITLE = "A study of sweep"
 _REF = "#/$defs/"
 _TEMPLATE = "ScenarioTemplate"
 Json = dict[str, Any]
@@ -44,12 +49,26 @@ def study_schema() -> Json:
             section["required"] = ["kind", *section.get("required", [])]
     _loosen_each(sections)
     # Editors know this dialect; nothing in the schema needs a later one.
-    return {"$schema": "http://json-schema.org/draft-07/schema#", "title": "A study of sweep"} | schema
+    return {"$schema": "http://json-schema.org/draft-07/schema#", "title": _TITLE} | schema
 
 
 def schema_text() -> str:
     """The schema as the text of a file."""
     return json.dumps(study_schema(), indent=1, ensure_ascii=False) + "\n"
+
+
+def write_schema(path: Path) -> None:
+    """Write the schema; raises OutputError, also where the file holds anything but such a schema."""
+    if os.path.lexists(path):
+        try:
+            held = json.loads(path.read_bytes())
+        except OSError as error:
+            raise OutputError(Fault(f"cannot be read: {error.strerror or error}", str(path))) from None
+        except (ValueError, RecursionError):
+            held = None
+        if not (isinstance(held, dict) and held.get("title") == _TITLE):
+            raise OutputError(Fault("holds something else already", str(path), allowed="another --output"))
+    write_text(schema_text(), path)
 
 
 def _describe_keys(section: Json) -> None:
