@@ -83,7 +83,7 @@ def test_mat_of_one_spectrum(tmp_path: Path) -> None:
         ({"wavelength": [400.0, 410.0], "dat": [1.0, 1.0]}, "did you mean 'dat'"),
         ({"wavelength": [400.0, 410.0], "data": [[1.0, 1.0, 1.0]]}, "does not fit"),
         ({"wavelength": [400.0, 410.0], "data": [1.0, np.nan]}, "not a finite"),
-        ({"wavelength": "text", "data": [1.0, 1.0]}, "must be numbers"),
+        ({"wavelength": "text", "data": [1.0, 1.0]}, "must be real numbers"),
     ],
 )
 def test_a_wrong_mat_is_one_line(tmp_path: Path, fields: dict[str, object], word: str) -> None:
