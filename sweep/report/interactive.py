@@ -20,7 +20,7 @@ from .outputs import Output
 
 _MOST_POINTS = 6_000
 """Swept designs of each group, feasible or not, that the page holds; the front and the named designs are all there."""
-_MOST_AXES = 9
+_BEST_ROWS = 9
 GROUPS = ("infeasible", "feasible", "front", "named", "best")
 _PUBLISHED = "RYN_4Cy"
 _PUBLISHED_LABEL = "our counterpart of the paper's N_4"
@@ -72,7 +72,7 @@ def _rows(output: Output) -> pd.DataFrame:
     table = output.table[(output.table["status"] == "ok") & (output.table["kind"] != "reference")]
     swept = table["kind"] == "sweep"
     always = ~swept | (table["pareto"] & table["feasible"])
-    parts = [table[always], output.best.head(_MOST_AXES)]
+    parts = [table[always], output.best.head(_BEST_ROWS)]
     for feasible in (False, True):
         others = table[~always & (table["feasible"] == feasible)]
         parts.append(others.iloc[even(len(others), _MOST_POINTS)])

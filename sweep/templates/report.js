@@ -33,7 +33,6 @@ const G = Object.fromEntries(data.groups.map((name, i) => [name, i]));
 const x = columns[data.axes.x], y = columns[data.axes.y];
 const lineShapes = {"front of the search": "vh", "limit of any filter": "hv"};  // what holds between two levels
 let view = data.views[0] || null;
-let chosen = null;
 
 const shown = (name, value) => Number.isFinite(value) ? value.toFixed(data.columns[name].digits) : "-";
 const title = (row) => data.names[row] ? data.names[row].long : `design ${ids[row]}`;
@@ -205,7 +204,6 @@ function drawClouds(row) {
 }
 
 function choose(row) {
-  chosen = row;
   const box = byId("details"), list = document.createElement("dl");
   for (const name of Object.keys(data.columns)) {
     const value = columns[name][row];
