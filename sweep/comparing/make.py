@@ -13,7 +13,7 @@ import pandas as pd
 
 from ..errors import Fault, OutputError, SweepError
 from ..report import Output, read_output
-from ..report.content import readable
+from ..report.content import axis_label, readable
 from ..report.pages import inlined, page, rows
 from ..store import write_bytes, write_csv, write_text
 from ..study import folder_name
@@ -156,7 +156,7 @@ def _figure(group: Mapping[str, Output], order: Sequence[str], scenario: str, fo
     title = (
         f"{', '.join(group)}: fronts in {scenario}" if len(group) <= 3 else f"Fronts of {len(group)} runs in {scenario}"
     )
-    return FrontsFigure(title, readable(sensitivity), f"{readable(separation)} / DN", lines, marks)
+    return FrontsFigure(title, readable(sensitivity), axis_label(separation), lines, marks)
 
 
 def _cfa_note(found: Sequence[Front]) -> list[str]:

@@ -36,6 +36,11 @@ def _worst(column: str) -> str:
     return "worst-case " if column.startswith(WORST) else ""
 
 
+def axis_label(column: str) -> str:
+    """A quantity's name with its unit, if it has one."""
+    return readable(column) + (" / DN" if CSD in column else "")
+
+
 def amount(column: str, value: float, digits: int = 0) -> str:
     """A quantity's value with its unit; ratios, and combined objectives, have none and four digits."""
     return f"{value:.{digits}f} DN" if CSD in column else f"{value:.4f}"
@@ -63,7 +68,7 @@ def pareto_figure(output: Output, scenario: str, cfa: str | None) -> ParetoFigur
     return ParetoFigure(
         title=f"{output.study['study']}{where}: what separation costs in sensitivity",
         x_label=_worst(output.trade_off[1]) + _SENSITIVITY_LABELS[output.trade_off[1].removeprefix(WORST)],
-        y_label=readable(output.trade_off[0]) + (" / DN" if CSD in output.trade_off[0] else ""),
+        y_label=axis_label(output.trade_off[0]),
         groups=groups,
         lines=_trade_offs(output, scenario, cfa),
         levels=dict(zip(references["cfa"], references[output.trade_off[0]], strict=True)),
@@ -137,7 +142,7 @@ def series_figures(output: Output) -> list[SeriesFigure]:
             band = "over the places on the mosaic" if upper else ""
             title = f"{output.study['study']}: {base}"
             x = np.array(list(scenarios.values()))
-            figures.append(SeriesFigure(title, key, f"{readable(separation)} / DN", x, lines, band))
+            figures.append(SeriesFigure(title, key, axis_label(separation), x, lines, band))
     return figures
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 import pandas as pd
 import pyarrow as pa
@@ -78,7 +76,6 @@ def _thinned(values: FloatArray) -> FloatArray:
     return np.unique(values[non_dominated(values)], axis=0)
 
 
-@dataclass
 class Gathered:
     """What a run keeps of its rows: the front of all of them, that of the swept ones, and those that reports draw.
 
@@ -86,13 +83,10 @@ class Gathered:
     some of its front.
     """
 
-    rules: Rules
-    scenario: str
-    front: Front = field(init=False)
-    swept: Front = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.front, self.swept = Front(self.rules.front), Front(self.rules.front, "sweep")
+    def __init__(self, rules: Rules, scenario: str) -> None:
+        """`scenario`: the first one, in which swept designs are drawn."""
+        self.rules, self.scenario = rules, scenario
+        self.front, self.swept = Front(rules.front), Front(rules.front, "sweep")
         self._always: list[pa.Table] = [self.rules.schema.empty_table()]
         self._best: dict[str, pa.Table] = {}
         self._feasible: dict[str, pa.Table] = {}

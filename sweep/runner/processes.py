@@ -25,8 +25,8 @@ def leave_signals_to_the_parent() -> None:
 def keep_freed_memory() -> None:
     """Keep up to 64 MiB that were freed for the next block of designs, where the C library is glibc.
 
-    By default it gives every block's arrays back to the system, and taking them anew costs as much as the work on them.
-    Arrays above 16 MiB still go back at once.
+    By default it gives every block's arrays back to the system, and the next block pays for new pages. Arrays above
+    16 MiB still go back at once.
     """
     with suppress(OSError, AttributeError, TypeError):
         libc = ctypes.CDLL(None)
