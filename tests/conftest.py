@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import subprocess
 import sys
 from collections.abc import Callable
@@ -49,16 +50,25 @@ def hard_case_rows(request: pytest.FixtureRequest) -> list[dict[str, Any]]:
 
 
 @pytest.fixture(scope="session")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    """Runs of the project's studies by the command, each once; what it said is in `said.txt` beside the folder."""
-    outputs = tmp_path_factory.mktemp("outputs")
+def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Finished:
+    """Runs of the project's studies by the command, each once; what it said is in `said.txt` beside the folder.
+
+    Processes that test side by side share the runs.
+    """
+    base = tmp_path_factory.getbasetemp()
+    outputs = (base if worker_id == "master" else base.parent) / "finished"
+    outputs.mkdir(exist_ok=True)
 
     def folder_of(name: str) -> Path:
-        if not (outputs / name).is_dir():
-            command = [sys.executable, "-m", "sweep", "run", str(STUDIES / f"{name}.yaml"), "--output", str(outputs)]
-            done = subprocess.run([*command, "--jobs", "2"], capture_output=True, text=True, check=False)
-            assert done.returncode == 0, done.stderr
-            (outputs / f"{name}.said.txt").write_text(done.stdout)
+        said = outputs / f"{name}.said.txt"
+        with (outputs / f"{name}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not said.exists():
+                command = [sys.executable, "-m", "sweep", "run", str(STUDIES / f"{name}.yaml")]
+                command += ["--output", str(outputs), "--jobs", "2"]
+                done = subprocess.run(command, capture_output=True, text=True, check=False)
+                assert done.returncode == 0, done.stderr
+                said.write_text(done.stdout)
         return outputs / name
 
     return folder_of
