@@ -49,13 +49,16 @@ class Limit:
 
     `attained`: the objective for `curve` (ndarray[n_wavelengths]), evaluated like any design; no filter whose first
     signals all lie on one side of the second ones reaches `proven` or more. `curve` is None when no filter meets the
-    constraints. `left_out`: what the study asks for beyond the limit's own constraints.
+    constraints. `left_out`: what the study asks for beyond the limit's own constraints. `programs`: number of
+    linear programs solved for it; `open_parts`: parts of the proof that were left open when that number ran out.
     """
 
     attained: float
     proven: float
     curve: FloatArray | None
     left_out: tuple[str, ...] = ()
+    programs: int = 0
+    open_parts: int = 0
 
 
 def limit_of(problem: Problem, tolerance_dn: float = 1e-3) -> Limit:
