@@ -77,6 +77,12 @@ class FailedDesignError(SweepError):
     exit_code = 4
 
 
+class BrokenProofError(SweepError):
+    """A design that is better than what is proven to be out of reach: the program has a fault."""
+
+    exit_code = 5
+
+
 class InterruptedRunError(SweepError):
     """A run that a signal stopped."""
 

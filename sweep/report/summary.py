@@ -134,10 +134,21 @@ def counts_line(output: Output) -> str:
 
 
 def _limit_line(output: Output, search: Mapping[str, Any]) -> str:
+    """The bracket of the limit: what is proven, for which filters and which response."""
     if search["no_limit"] is not None:
         return f"Limit: none computed ({search['no_limit']})."
+    attained, proven = (amount(output.objective, search[f"limit_{end}"], 3) for end in ("attained", "proven"))
+    gap = "nothing is left to gain" if search["gap"] is None else f"the search's answer is {search['gap']:.1%} below"
+    if "limit_open_parts" not in search:
+        return f"Limit: {proven}, by an earlier version, not proven for every filter (run the study again); {gap}."
     without = f" but {', '.join(search['limit_left_out'])}" if search["limit_left_out"] else ""
-    ends = [amount(output.objective, search[f"limit_{end}"], 3) for end in ("attained", "proven")]
-    return f"Limit of any filter under the same constraints{without}: between {ends[0]} and {ends[1]}; " + (
-        "nothing is left to gain." if search["gap"] is None else f"the search's answer is {search['gap']:.1%} below."
+    proof = f"no filter exceeds {proven} (proven) and one attains {attained}"
+    if search["limit_open_parts"]:
+        programs, parts = search["limit_programs"], search["limit_open_parts"]
+        proof += f", but the limit itself is not proven: {parts} parts are open after {programs} linear programs"
+    levels = search["front_limits_open"]
+    return (
+        f"Limit of any filter: {proof}; {gap}. This is for filters between the least transmission and the curve that "
+        f"they replace, under the same constraints{without}, before clipping and quantization."
+        + (f" At {levels} levels of the front the line is an upper bound, not yet the limit." if levels else "")
     )

@@ -13,7 +13,7 @@ import pyarrow as pa
 
 from ..arrays import FloatArray
 from ..constraints import Bound
-from ..errors import Fault, InfeasibleError
+from ..errors import BrokenProofError, Fault, InfeasibleError
 from ..limit import Limit, limit_of, why_not
 from ..problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
 from ..progress import Progress
@@ -27,6 +27,10 @@ Parallel = Callable[[Iterable[Any]], Iterator[Any]]
 """Results of delayed calls, in their order."""
 _FRONT_STARTS = 2
 _FRONT_LIMIT_DN = 0.02
+_FRONT_PROGRAMS = 1000
+"""Linear programs for the limit at each level; a level of the built-in studies takes about ten."""
+_PROOF_TOLERANCE = 1e-9
+"""A design may exceed a proven limit by this share, which is rounding, and no more."""
 _NO_LIMIT = 0.05
 _REACH_STARTS = 8
 
@@ -58,16 +62,28 @@ class SearchAnswer:
         return None if self.limit is None else _gap(self.best, self.limit)
 
 
+def _checked(best: Evaluation | None, limit: Limit | None, where: str) -> None:
+    """Raise BrokenProofError where a design that the search found is better than what is proven to be out of reach."""
+    if best is None or limit is None or best.objective <= limit.proven + _PROOF_TOLERANCE * max(1.0, limit.proven):
+        return
+    raise BrokenProofError(
+        Fault(
+            f"broken proof{where}: the search found {best.objective:.9g}, but the limit says that no filter has more "
+            f"than {limit.proven:.9g}; what is finished is kept; this is a fault of the program, not of the study"
+        )
+    )
+
+
 def _gap(best: Evaluation, limit: Limit) -> float | None:
     """Relative distance of an answer from the limit; none where the limit itself is no more than its own accuracy."""
-    return None if limit.proven <= _NO_LIMIT else 1 - best.objective / limit.proven
+    return None if limit.proven <= _NO_LIMIT else max(0.0, 1 - best.objective / limit.proven)
 
 
 def run_search(study: Study, search: Search, parallel: Parallel, progress: Progress) -> SearchAnswer:
     """Search from Sobol points; the evaluations are shared evenly among the starts.
 
     Raises InfeasibleError, naming each constraint with the best value that is reachable, when no start found a feasible
-    design.
+    design; BrokenProofError when the search, anywhere, found more than is proven to be out of reach.
     """
     problem = study.problem(search)
     n_starts = min(search.starts, search.max_evaluations)
@@ -86,6 +102,7 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
         raise _infeasible(study, problem, starts[:_REACH_STARTS], each)
     no_limit = why_not(problem)
     limit = limit_of(problem) if no_limit is None else None
+    _checked(best, limit, "")
     front = _front(problem, search, starts, each, study.section.seed, parallel, progress) if search.levels else ()
     return SearchAnswer(search, tuple(runs), best, limit, no_limit, front)
 
@@ -107,7 +124,7 @@ def _front(
     at_level = [replace(problem, constraints=_with_sensitivity(problem, level)) for level in search.levels]
     limits: list[Limit | None] = [None] * len(at_level)
     if why_not(problem) is None:
-        limits = list(parallel(joblib.delayed(limit_of)(p, _FRONT_LIMIT_DN) for p in at_level))
+        limits = list(parallel(joblib.delayed(limit_of)(p, _FRONT_LIMIT_DN, _FRONT_PROGRAMS) for p in at_level))
     runs: list[list[SearchRun]] = [[] for _ in at_level]
     done, total = 0, 2 * len(at_level)
 
@@ -131,7 +148,10 @@ def _front(
     searched([[*starts[:_FRONT_STARTS]]] * len(at_level))
     found = [(best(k - 1), best(k + 1)) for k in range(len(at_level))]
     searched([[problem.to_unit(e.x) for e in both if e is not None] for both in found])
-    return tuple(FrontPoint(level, best(k), tuple(runs[k]), limits[k]) for k, level in enumerate(search.levels))
+    points = tuple(FrontPoint(level, best(k), tuple(runs[k]), limits[k]) for k, level in enumerate(search.levels))
+    for point in points:
+        _checked(point.best, point.limit, f" at a sensitivity of {point.level:g} and more")
+    return points
 
 
 def _with_sensitivity(problem: Problem, level: float) -> dict[str, Bound]:
@@ -169,6 +189,9 @@ def search_facts(study: Study, answer: SearchAnswer) -> dict[str, Any]:
         "limit_attained": None if answer.limit is None else answer.limit.attained,
         "limit_proven": None if answer.limit is None else answer.limit.proven,
         "limit_left_out": [] if answer.limit is None else list(answer.limit.left_out),
+        "limit_programs": None if answer.limit is None else answer.limit.programs,
+        "limit_open_parts": None if answer.limit is None else answer.limit.open_parts,
+        "front_limits_open": sum(p.limit is not None and p.limit.open_parts > 0 for p in answer.front),
         "gap": answer.gap,
         "no_limit": answer.no_limit,
         "front_evaluations": sum(len(run.log) for point in answer.front for run in point.runs),
@@ -207,7 +230,7 @@ def front_table(answer: SearchAnswer) -> pa.Table:
         if point.best is not None:
             row |= {"objective": point.best.objective, "sensitivity": point.best.sensitivity}
             row |= dict(zip(names, map(float, point.best.x), strict=True))
-        if point.limit is not None and point.limit.curve is not None:
+        if point.limit is not None and np.isfinite(point.limit.proven):
             row["limit"] = point.limit.proven
             row["gap"] = None if point.best is None else _gap(point.best, point.limit)
         rows.append(row)
