@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import hashlib
 import pickle
-from collections import OrderedDict
 from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 
 from .arrays import FloatArray, IndexArray
+from .cache import Cache
 from .families import SeparableFamily
 from .spaces import Space
 
@@ -85,18 +85,19 @@ class Tables:
     change: FloatArray
     left: FloatArray
     right: FloatArray
-    _products: OrderedDict[bytes, tuple[FloatArray, FloatArray, FloatArray]] = field(default_factory=OrderedDict)
+    _products: Cache[bytes, tuple[FloatArray, FloatArray, FloatArray]] = field(
+        default_factory=lambda: Cache(_KEPT_TABLES)
+    )
 
     def product(self, weights: FloatArray, nodes: IndexArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The weighted sums of the base, and of the change times each edge."""
-        key = hashlib.sha256(weights.tobytes() + nodes.tobytes()).digest()
-        if key not in self._products:
+
+        def made() -> tuple[FloatArray, FloatArray, FloatArray]:
             changed = self.change[nodes, None] * weights
             edges = (self.left[:, nodes] @ changed, self.right[:, nodes] @ changed)
-            self._products[key] = (self.base[nodes] @ weights, *edges)
-            if len(self._products) > _KEPT_TABLES:
-                self._products.popitem(last=False)
-        return self._products[key]
+            return (self.base[nodes] @ weights, *edges)
+
+        return self._products.get(hashlib.sha256(weights.tobytes() + nodes.tobytes()).digest(), made)
 
 
 @dataclass(frozen=True)
@@ -142,7 +143,7 @@ def _inverse(base: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.divide(1.0, base, out=np.zeros_like(base), where=base > 0), np.where(base > 0, 0.0, 1.0)
 
 
-_tables: OrderedDict[bytes, Tables] = OrderedDict()
+_tables: Cache[bytes, Tables] = Cache(_KEPT_TABLES)
 
 
 def by_edges(space: Space) -> bool:
@@ -167,18 +168,17 @@ def edges_of(space: Space, start: int, stop: int) -> Edges | None:
         return None
     family, base, change = found
     key = hashlib.sha256(pickle.dumps((space.axes, base, change, family.edges(np.array([[600.0, 10.0]]))))).digest()
-    if key not in _tables:
+
+    def made() -> Tables:
         pairs = [
             np.stack([a.ravel() for a in np.meshgrid(space.axes[at], space.axes[at + 1], indexing="ij")], axis=1)
             for at in (_LEFT, _RIGHT)
         ]
         left_edges, right_edges = (family.edges(pair) for pair in pairs)
-        _tables[key] = Tables(base, change, left_edges, right_edges)
-        if len(_tables) > _KEPT_TABLES:
-            _tables.popitem(last=False)
+        return Tables(base, change, left_edges, right_edges)
+
+    tables = _tables.get(key, made)
     left, left_width, right, right_width, depth = space.digits(start, stop)
     at_left = left * len(space.axes[_LEFT_WIDTH]) + left_width
     at_right = right * len(space.axes[_RIGHT_WIDTH]) + right_width
-    return Edges(
-        space, start, stop, _tables[key], at_left, at_right, np.asarray(space.axes[_DEPTH], dtype=float)[depth]
-    )
+    return Edges(space, start, stop, tables, at_left, at_right, np.asarray(space.axes[_DEPTH], dtype=float)[depth])

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import pickle
-import threading
-from collections import Counter, OrderedDict
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 
@@ -18,6 +17,7 @@ from numpy.typing import DTypeLike
 
 from .arrays import FloatArray
 from .blocks import Block
+from .cache import Cache
 from .effects import flicker, noise_table, quadrature, quantization, saturation
 from .effects.kernel import make_kernel
 from .scenes import WhitePatchExposure
@@ -300,21 +300,12 @@ class Imager:
 
 
 _CERTAIN_DN2 = 1e-9
-_KEPT_IMAGERS = 16
-_imagers: OrderedDict[bytes, Imager] = OrderedDict()
-_one_at_a_time = threading.Lock()
+_imagers: Cache[bytes, Imager] = Cache(16)
 
 
 def imager_of(setup: Setup) -> Imager:
     """The imager of a setup; the latest ones are kept, so that a kernel is made once in a process."""
-    key = hashlib.sha256(pickle.dumps(setup)).digest()
-    with _one_at_a_time:
-        if key not in _imagers:
-            _imagers[key] = Imager(setup)
-            if len(_imagers) > _KEPT_IMAGERS:
-                _imagers.popitem(last=False)
-        _imagers.move_to_end(key)
-        return _imagers[key]
+    return _imagers.get(hashlib.sha256(pickle.dumps(setup)).digest(), lambda: Imager(setup))
 
 
 def smooth_imager(setup: Setup) -> Imager:
