@@ -14,7 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
-from .arrays import FloatArray, IndexArray
+from .arrays import FloatArray, IndexArray, row_products
 from .cache import Cache
 from .families import SeparableFamily
 from .spaces import Space
@@ -42,6 +42,9 @@ class Block(Protocol):
         Over all modified channels; `base_qe`: ndarray[n_modified, n_wavelengths]. Where it is 0 the ratio is 1.
         """
 
+    def some(self, which: IndexArray) -> Block:
+        """Those of its designs."""
+
 
 @dataclass(frozen=True)
 class Curves:
@@ -60,7 +63,11 @@ class Curves:
         """See `Block.product`; in the precision of the weights."""
         seen = self.qe if nodes.size == self.qe.shape[2] else self.qe[:, :, nodes]
         flat = seen.reshape(len(self.qe), -1)
-        return np.asarray(flat.astype(weights.dtype, copy=False) @ weights)
+        return row_products(flat.astype(weights.dtype, copy=False), weights)
+
+    def some(self, which: IndexArray) -> Curves:
+        """See `Block.some`."""
+        return Curves(self.qe[which])
 
     def shapes(self, base_qe: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See `Block.shapes`."""
@@ -102,7 +109,7 @@ class Tables:
 
 @dataclass(frozen=True)
 class Edges:
-    """Designs `start`..`stop`-1 of a grid of stopbands, by the numbers of their edges."""
+    """Designs `start`..`stop`-1 of a grid of stopbands, or the `chosen` ones of these, by their edges' numbers."""
 
     space: Space
     start: int
@@ -111,13 +118,21 @@ class Edges:
     at_left: IndexArray
     at_right: IndexArray
     depth: FloatArray
+    chosen: IndexArray | None = None
 
     def __len__(self) -> int:
-        return self.stop - self.start
+        return len(self.depth)
 
     def curves(self) -> FloatArray:
         """See `Block.curves`."""
-        return self.space.curves(self.space.points(self.start, self.stop), self.tables.base.size)
+        points = self.space.points(self.start, self.stop)
+        return self.space.curves(points if self.chosen is None else points[self.chosen], self.tables.base.size)
+
+    def some(self, which: IndexArray) -> Edges:
+        """See `Block.some`."""
+        chosen = which if self.chosen is None else self.chosen[which]
+        ends = (self.at_left[which], self.at_right[which], self.depth[which])
+        return Edges(self.space, self.start, self.stop, self.tables, *ends, chosen)
 
     def product(self, weights: FloatArray, nodes: IndexArray) -> FloatArray:
         """See `Block.product`."""

@@ -38,10 +38,11 @@ from ..study import Study
 from .compaction import Front, Gathered
 from .drawn import curves_table, points_table
 from .folders import begin, discard, held_by, read_facts
-from .jobs import Rules, rules_of
+from .jobs import Rules, detours_of, rules_of
 from .patches import recognition_table
 from .planning import with_plans
 from .provenance import plan_facts, provenance, resolved_yaml
+from .routes import detours_in_words
 from .searching import SearchAnswer, answer_row, front_table, run_search, search_facts, search_log
 from .stopping import stop_on_signals
 from .sweeping import Sweep
@@ -153,13 +154,15 @@ class _Run:
         gathered.finish()
         tables = map(gathered.front.marked, chain(sweep.tables(), answered))
         write_tables(tables, self.rules.schema, output / RESULTS)
+        detours = sum(map(detours_of, answered), sweep.detours)
         rows, on_front = gathered.frame(), gathered.front_frame()
         self.facts |= {
             "designs": study.n_designs + len(answered),
             "failed": sweep.failed,
             "plans": plan_facts(study),
             "trade_off": study.trade_off,
-            "warnings": [*study.warnings, *sweep.warnings],
+            "warnings": [*study.warnings, *sweep.warnings, *detours_in_words(detours)],
+            "detours": [{"how": how, "why": why, "designs": n} for (how, why), n in detours.items()],
         }
         self._write_search(answer, gathered.swept)
         self._write_drawn(rows, on_front, answer)
