@@ -90,7 +90,8 @@ class Sweep:
             if key not in self.journal.entries:
                 shard = Shard.of(with_local_front(table, job, self.rules), 0.0)
                 if not shard.failed:
-                    self.journal.save(key, index, shard)
+                    with self.crew.stop.held():
+                        self.journal.save(key, index, shard)
 
     def run(self, gathered: Gathered, progress: Progress, *, fail_fast: bool, retry_failed: bool) -> None:
         """Compute what is not kept yet; `gathered` takes in all rows.
@@ -107,8 +108,11 @@ class Sweep:
         done = sum(entries[key].rows for key in self.keys if key in entries)
         progress("designs", done, self.study.n_designs)
         calls = (joblib.delayed(_shard)(self.jobs[i], self._setup(self.jobs[i]), self.rules) for i in todo)
-        for index, (shard, few) in zip(todo, self.crew(calls, _quarantined), strict=False):
-            self.journal.save(self.keys[index], index, shard)
+
+        def keep(at: int, found: tuple[Shard, pa.Table]) -> None:
+            self.journal.save(self.keys[todo[at]], todo[at], found[0])
+
+        for shard, few in self.crew(calls, _quarantined, keep):
             gathered.add(few)
             done += shard.rows
             progress("designs", done, self.study.n_designs)
