@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import hashlib
 import pickle
-from collections import OrderedDict
 from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 
-from .arrays import FloatArray, IndexArray
+from .arrays import FloatArray, IndexArray, row_products
+from .cache import Cache
 from .families import SeparableFamily
 from .spaces import Space
 
@@ -42,6 +42,9 @@ class Block(Protocol):
         Over all modified channels; `base_qe`: ndarray[n_modified, n_wavelengths]. Where it is 0 the ratio is 1.
         """
 
+    def some(self, which: IndexArray) -> Block:
+        """Those of its designs."""
+
 
 @dataclass(frozen=True)
 class Curves:
@@ -60,7 +63,11 @@ class Curves:
         """See `Block.product`; in the precision of the weights."""
         seen = self.qe if nodes.size == self.qe.shape[2] else self.qe[:, :, nodes]
         flat = seen.reshape(len(self.qe), -1)
-        return np.asarray(flat.astype(weights.dtype, copy=False) @ weights)
+        return row_products(flat.astype(weights.dtype, copy=False), weights)
+
+    def some(self, which: IndexArray) -> Curves:
+        """See `Block.some`."""
+        return Curves(self.qe[which])
 
     def shapes(self, base_qe: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See `Block.shapes`."""
@@ -85,23 +92,24 @@ class Tables:
     change: FloatArray
     left: FloatArray
     right: FloatArray
-    _products: OrderedDict[bytes, tuple[FloatArray, FloatArray, FloatArray]] = field(default_factory=OrderedDict)
+    _products: Cache[bytes, tuple[FloatArray, FloatArray, FloatArray]] = field(
+        default_factory=lambda: Cache(_KEPT_TABLES)
+    )
 
     def product(self, weights: FloatArray, nodes: IndexArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The weighted sums of the base, and of the change times each edge."""
-        key = hashlib.sha256(weights.tobytes() + nodes.tobytes()).digest()
-        if key not in self._products:
+
+        def made() -> tuple[FloatArray, FloatArray, FloatArray]:
             changed = self.change[nodes, None] * weights
             edges = (self.left[:, nodes] @ changed, self.right[:, nodes] @ changed)
-            self._products[key] = (self.base[nodes] @ weights, *edges)
-            if len(self._products) > _KEPT_TABLES:
-                self._products.popitem(last=False)
-        return self._products[key]
+            return (self.base[nodes] @ weights, *edges)
+
+        return self._products.get(hashlib.sha256(weights.tobytes() + nodes.tobytes()).digest(), made)
 
 
 @dataclass(frozen=True)
 class Edges:
-    """Designs `start`..`stop`-1 of a grid of stopbands, by the numbers of their edges."""
+    """Designs `start`..`stop`-1 of a grid of stopbands, or the `chosen` ones of these, by their edges' numbers."""
 
     space: Space
     start: int
@@ -110,13 +118,21 @@ class Edges:
     at_left: IndexArray
     at_right: IndexArray
     depth: FloatArray
+    chosen: IndexArray | None = None
 
     def __len__(self) -> int:
-        return self.stop - self.start
+        return len(self.depth)
 
     def curves(self) -> FloatArray:
         """See `Block.curves`."""
-        return self.space.curves(self.space.points(self.start, self.stop), self.tables.base.size)
+        points = self.space.points(self.start, self.stop)
+        return self.space.curves(points if self.chosen is None else points[self.chosen], self.tables.base.size)
+
+    def some(self, which: IndexArray) -> Edges:
+        """See `Block.some`."""
+        chosen = which if self.chosen is None else self.chosen[which]
+        ends = (self.at_left[which], self.at_right[which], self.depth[which])
+        return Edges(self.space, self.start, self.stop, self.tables, *ends, chosen)
 
     def product(self, weights: FloatArray, nodes: IndexArray) -> FloatArray:
         """See `Block.product`."""
@@ -142,7 +158,7 @@ def _inverse(base: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.divide(1.0, base, out=np.zeros_like(base), where=base > 0), np.where(base > 0, 0.0, 1.0)
 
 
-_tables: OrderedDict[bytes, Tables] = OrderedDict()
+_tables: Cache[bytes, Tables] = Cache(_KEPT_TABLES)
 
 
 def by_edges(space: Space) -> bool:
@@ -167,18 +183,17 @@ def edges_of(space: Space, start: int, stop: int) -> Edges | None:
         return None
     family, base, change = found
     key = hashlib.sha256(pickle.dumps((space.axes, base, change, family.edges(np.array([[600.0, 10.0]]))))).digest()
-    if key not in _tables:
+
+    def made() -> Tables:
         pairs = [
             np.stack([a.ravel() for a in np.meshgrid(space.axes[at], space.axes[at + 1], indexing="ij")], axis=1)
             for at in (_LEFT, _RIGHT)
         ]
         left_edges, right_edges = (family.edges(pair) for pair in pairs)
-        _tables[key] = Tables(base, change, left_edges, right_edges)
-        if len(_tables) > _KEPT_TABLES:
-            _tables.popitem(last=False)
+        return Tables(base, change, left_edges, right_edges)
+
+    tables = _tables.get(key, made)
     left, left_width, right, right_width, depth = space.digits(start, stop)
     at_left = left * len(space.axes[_LEFT_WIDTH]) + left_width
     at_right = right * len(space.axes[_RIGHT_WIDTH]) + right_width
-    return Edges(
-        space, start, stop, _tables[key], at_left, at_right, np.asarray(space.axes[_DEPTH], dtype=float)[depth]
-    )
+    return Edges(space, start, stop, tables, at_left, at_right, np.asarray(space.axes[_DEPTH], dtype=float)[depth])

@@ -19,7 +19,7 @@ from .discrimination import (
     pairwise_error,
     state_error_bound,
 )
-from .imaging import Imager, smooth_imager
+from .imaging import Changing, Imager, smooth_imager
 from .metrics import Pair, cfa_sensitivity, class_pairs, csd_name, separation, separations, separations_along
 from .setup import Setup
 
@@ -31,6 +31,7 @@ STATE_ERROR = "state_error"
 """Name of the largest pairwise error over all pairs of states."""
 BEST_PLACE = "best_place_"
 """Prefix of a CSD that is the largest over the places where the light may fall on the mosaic."""
+Columns = dict[str, FloatArray]
 
 
 def quantities(lights: Lights) -> tuple[str, ...]:
@@ -143,25 +144,50 @@ def evaluate(imager: Imager, designs: FloatArray | Block, states: Sequence[str] 
     `exposure_s`; with `states`, those of `noise_quantities`, the worst over the places.
     """
     block = Curves(designs) if isinstance(designs, np.ndarray) else designs
-    apart: dict[str, FloatArray] = {}
     changing = None if states else imager.read_changing(block)
-    if changing is not None:
-        exposure_s = changing.exposure_s
-        cases = [
-            separations_along(fixed, changing.channel, changing.values[:, case], imager.setup.members)
-            for case, fixed in enumerate(changing.fixed)
-        ]
+    if changing is None:
+        columns = _distances(imager, block, states)
+    elif changing.which.all():
+        columns = _distances_along(imager, changing)
     else:
-        if states:
-            response, variance, exposure_s = imager.read_with_noise(block.curves())
-            apart = _told_apart(response, variance, {name: imager.setup.members[name] for name in states})
-        else:
-            response, exposure_s = imager.read(block.curves())
-        cases = [separations(response[:, case], imager.setup.members) for case in range(response.shape[1])]
-    columns: dict[str, FloatArray] = {}
-    best: dict[str, FloatArray] = {}
-    for pair in class_pairs(list(imager.setup.members)):
-        over = np.stack([case[pair] for case in cases])
-        columns[csd_name(pair)] = over.min(axis=0)
-        best[BEST_PLACE + csd_name(pair)] = over.max(axis=0)
-    return columns | best | apart | block_quantities(imager.setup, block) | {"exposure_s": exposure_s}
+        columns = {name: np.empty(len(block)) for name in (*_distance_names(imager), "exposure_s")}
+        rest = block.some(np.flatnonzero(~changing.which))
+        parts = ((changing.which, _distances_along(imager, changing)), (~changing.which, _distances(imager, rest)))
+        for which, part in parts:
+            for name, values in part.items():
+                columns[name][which] = values
+    exposure_s = columns.pop("exposure_s")
+    return columns | block_quantities(imager.setup, block) | {"exposure_s": exposure_s}
+
+
+def _distances_along(imager: Imager, changing: Changing) -> Columns:
+    """CSDs and exposure of designs that differ in one channel alone."""
+    cases = [
+        separations_along(fixed, changing.channel, changing.values[:, case], imager.setup.members)
+        for case, fixed in enumerate(changing.fixed)
+    ]
+    return _over(cases) | {"exposure_s": np.full(len(changing.values), changing.exposure_s)}
+
+
+def _distances(imager: Imager, block: Block, states: Sequence[str] = ()) -> Columns:
+    """CSDs and exposure of any designs; with `states`, `noise_quantities`, too."""
+    apart: Columns = {}
+    if states:
+        response, variance, exposure_s = imager.read_with_noise(block.curves())
+        apart = _told_apart(response, variance, {name: imager.setup.members[name] for name in states})
+    else:
+        response, exposure_s = imager.read(block.curves())
+    cases = [separations(response[:, case], imager.setup.members) for case in range(response.shape[1])]
+    return _over(cases) | apart | {"exposure_s": exposure_s}
+
+
+def _distance_names(imager: Imager) -> list[str]:
+    names = [csd_name(pair) for pair in class_pairs(list(imager.setup.members))]
+    return names + [BEST_PLACE + name for name in names]
+
+
+def _over(cases: Sequence[Mapping[Pair, FloatArray]]) -> Columns:
+    """The smallest and the largest CSD of each pair over the places of the light."""
+    over = {csd_name(pair): np.stack([case[pair] for case in cases]) for pair in cases[0]}
+    least = {name: values.min(axis=0) for name, values in over.items()}
+    return least | {BEST_PLACE + name: values.max(axis=0) for name, values in over.items()}

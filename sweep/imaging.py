@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import hashlib
 import pickle
-import threading
-from collections import Counter, OrderedDict
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import DTypeLike
 
-from .arrays import FloatArray
+from .arrays import BoolArray, FloatArray, row_products
 from .blocks import Block
+from .cache import Cache
 from .effects import flicker, noise_table, quadrature, quantization, saturation
 from .effects.kernel import make_kernel
 from .scenes import WhitePatchExposure
@@ -40,16 +40,17 @@ _KEPT = 15_000_000
 
 @dataclass(frozen=True)
 class Changing:
-    """A readout in which designs differ in one channel alone, DN.
+    """A readout of those designs of a block that differ in one channel alone, DN.
 
-    `fixed`: ndarray[n_cases, n_signals, n_channels], what all designs share (that channel's values mean nothing);
-    `values`: ndarray[n_designs, n_cases, n_signals] of `channel`. `exposure_s`: ndarray[n_designs].
+    `fixed`: ndarray[n_cases, n_signals, n_channels], what they share (that channel's values mean nothing); `values`:
+    ndarray[n, n_cases, n_signals] of `channel`; `exposure_s`: that of each. `which`: ndarray[n_designs], the n designs.
     """
 
     fixed: FloatArray
     channel: int
     values: FloatArray
-    exposure_s: FloatArray
+    exposure_s: float
+    which: BoolArray
 
 
 class Imager:
@@ -91,8 +92,9 @@ class Imager:
         size, n, n_signals = self.setup.grid.size, len(qe), len(self.signals)
         weights = np.broadcast_to(light, (cases, units, channels, size)).reshape(cases * units, channels * size)
         seen = self._looked_at(qe)[:, :, None] * self.signals  # [n_designs, channels, n_signals, n_wavelengths]
-        moved = np.moveaxis(seen, 2, 1).reshape(n * n_signals, channels * size)
+        moved = np.moveaxis(seen, 2, 1).reshape(n, n_signals, channels * size)
         self.work["response"] += weights.shape[0] * moved.size
+        # A product for each design, so that its bits do not depend on how many there are.
         found = (moved @ weights.T).reshape(n, n_signals, cases, units)
         return np.asarray(np.moveaxis(found, 1, 2), dtype=float)
 
@@ -116,37 +118,37 @@ class Imager:
         else:
             qe = curves[:, :, self._nodes].reshape(len(curves), -1).astype(self._kept.dtype)
             self.work["response"] += len(curves) * self._kept.size
-            part = (qe @ self._kept).reshape(len(curves), *self._fixed.shape[:2], self._touched.size)
+            part = row_products(qe, self._kept).reshape(len(curves), *self._fixed.shape[:2], self._touched.size)
         found[..., self._touched] += part
         return found
 
     def read_changing(self, block: Block) -> Changing | None:
         """The readout of designs that differ in one channel alone; None where they do not, or more than that is read.
 
-        Needs a modified channel that no other unit looks through, one exposure for all designs, and a light that does
-        not pulse.
+        Needs a modified channel that no other unit looks through, and a light that does not pulse. Designs whose
+        modified channel sets the exposure are left out.
         """
         setup, n = self.setup, len(self.setup.mosaic.channels)
         whole = self.straight or (setup.scenario.target is None and self.n_units == n)
         touched = np.flatnonzero((self._modified_uniform != 0).any(axis=(0, 2)))
         if len(setup.modified) != 1 or not whole or self._kept is None or self._touched.size != 1:
             return None
-        if not np.array_equal(touched, self._touched) or len(block) == 0:
+        if not np.array_equal(touched, self._touched):
             return None
         everywhere = np.arange(setup.grid.size)
-        exposure_s = exposure_times(setup, block.product(self._white[:, None], everywhere))
-        if not np.isfinite(exposure_s[0]) or (exposure_s != exposure_s[0]).any():
+        time_s = exposure_times(setup, np.zeros((1, 1)))
+        which = exposure_times(setup, block.product(self._white[:, None], everywhere)) == time_s
+        if not which.any() or not np.isfinite(time_s[0]) or self.scales(time_s).shape[1] > 1:
             return None
-        if self.scales(exposure_s[:1]).shape[1] > 1:
-            return None
-        unit, time_s = int(self._touched[0]), exposure_s[0]
-        self.work["response"] += len(block) * self._kept.size
-        part = block.product(self._kept, self._nodes).reshape(len(block), self.n_cases, -1)
-        uniform = block.product(self._background[:, None], everywhere) * self._modified_uniform[:, unit, 0]
+        some = block if which.all() else block.some(np.flatnonzero(which))
+        unit = int(self._touched[0])
+        self.work["response"] += len(some) * self._kept.size
+        part = some.product(self._kept, self._nodes).reshape(len(some), self.n_cases, -1)
+        uniform = some.product(self._background[:, None], everywhere) * self._modified_uniform[:, unit, 0]
         uniform = self._fixed_uniform[:, unit] + uniform + setup.pixel.dark_e_per_s
         rest = self._fixed + (self._fixed_uniform + setup.pixel.dark_e_per_s)[:, None]
-        values = self.transfer((self._fixed[:, :, unit] + part + uniform[:, :, None]) * time_s)
-        return Changing(self.transfer(rest * time_s), unit, values, exposure_s)
+        values = self.transfer((self._fixed[:, :, unit] + part + uniform[:, :, None]) * time_s[0])
+        return Changing(self.transfer(rest * time_s[0]), unit, values, float(time_s[0]), which)
 
     def exposure_s(self, curves: FloatArray) -> FloatArray:
         """Exposure of each design, s, ndarray[n_designs]."""
@@ -161,11 +163,21 @@ class Imager:
 
     def electrons(self, curves: FloatArray, scales: FloatArray, exposure_s: FloatArray) -> FloatArray:
         """Expected electrons before the full well, ndarray[n_designs, n_cases x n_scales, n_signals, n_units]."""
-        uniform = self._fixed_uniform + np.einsum("cuk,dk->dcu", self._modified_uniform, curves @ self._background)
+        uniform = self._fixed_uniform + self._through_filters(curves @ self._background)
         uniform = uniform + self.setup.pixel.dark_e_per_s
         both = self.rates(curves)[:, :, None] * scales[:, None, :, None, None] + uniform[:, :, None, None, :]
         flat = both.reshape(len(curves), -1, *both.shape[3:])
         return np.asarray(flat * exposure_s[:, None, None, None], dtype=float)
+
+    def _through_filters(self, rates: FloatArray) -> FloatArray:
+        """What the units get of a uniform light, ndarray[n_designs, n_cases, n_units].
+
+        `rates`: electrons/s of the modified channels, ndarray[n_designs, n_modified].
+        """
+        found = np.zeros((len(rates), *self._modified_uniform.shape[:2]))
+        for index in range(rates.shape[1]):
+            found += self._modified_uniform[:, :, index] * rates[:, index, None, None]
+        return found
 
     def _folded(self, dn: FloatArray) -> FloatArray:
         """Value of each channel from those of the units: the last axis n_units -> n_channels."""
@@ -177,7 +189,7 @@ class Imager:
         """Sums over the units by their `weights`, ndarray[n_cases, n_units, n_channels]."""
         self.work["readout"] += values.size
         repeats = values.shape[1] // self.n_cases
-        return np.asarray(np.einsum("dcsu,cuk->dcsk", values, np.repeat(weights, repeats, axis=0), optimize=True))
+        return np.asarray(values @ np.repeat(weights, repeats, axis=0))
 
     def smooth(self, curves: FloatArray) -> FloatArray:
         """Unquantized, unclipped response, DN, ndarray[n_designs, n_cases, n_signals, n_channels]."""
@@ -195,7 +207,7 @@ class Imager:
         scales = self.scales(exposure_s)
         whole = self.electrons(one, scales, exposure_s)[0]
         light = (self.rates(curves_gradient) - self._fixed)[:, :, None] * scales[0][None, None, :, None, None]
-        uniform = np.einsum("cuk,dk->dcu", self._modified_uniform, curves_gradient @ self._background)
+        uniform = self._through_filters(curves_gradient @ self._background)
         slope = (light + uniform[:, :, None, None, :]).reshape(len(curves_gradient), *whole.shape) * exposure_s
         if isinstance(self.setup.scenario.exposure, WhitePatchExposure):
             rates = one[0] @ self._white
@@ -300,21 +312,12 @@ class Imager:
 
 
 _CERTAIN_DN2 = 1e-9
-_KEPT_IMAGERS = 16
-_imagers: OrderedDict[bytes, Imager] = OrderedDict()
-_one_at_a_time = threading.Lock()
+_imagers: Cache[bytes, Imager] = Cache(16)
 
 
 def imager_of(setup: Setup) -> Imager:
     """The imager of a setup; the latest ones are kept, so that a kernel is made once in a process."""
-    key = hashlib.sha256(pickle.dumps(setup)).digest()
-    with _one_at_a_time:
-        if key not in _imagers:
-            _imagers[key] = Imager(setup)
-            if len(_imagers) > _KEPT_IMAGERS:
-                _imagers.popitem(last=False)
-        _imagers.move_to_end(key)
-        return _imagers[key]
+    return _imagers.get(hashlib.sha256(pickle.dumps(setup)).digest(), lambda: Imager(setup))
 
 
 def smooth_imager(setup: Setup) -> Imager:

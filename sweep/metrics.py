@@ -123,8 +123,9 @@ def separations_along(
         return response
 
     others = np.delete(fixed, channel, axis=1)
-    if not (np.isfinite(values).all() and np.isfinite(others).all()):
+    if not np.isfinite(others).all():
         return separations(whole(slice(None)), members)
+    bad = np.flatnonzero(~np.isfinite(values).all(axis=1))  # what is wrong with one design changes no other
     order, bounds = _in_order(members)
     nearest: list[tuple[FloatArray, IndexArray, IndexArray]] = []
     for a, b in class_pairs(list(members)):
@@ -138,8 +139,13 @@ def separations_along(
     apart, one, other = (np.concatenate(parts) for parts in zip(*nearest, strict=True))
     squared = np.empty((len(values), len(nearest)))
     ordered = np.take(values, order, axis=1)
+    ordered[bad] = 0.0
     nearest_along_squared(ordered, bounds, apart, place[one], place[other], starts, squared)
-    return _distances(squared, members, whole)
+    found = _distances(squared, members, whole)
+    if bad.size:
+        for pair, distance in separations(whole(bad), members).items():
+            found[pair][bad] = distance
+    return found
 
 
 def _in_order(members: Mapping[str, IndexArray]) -> tuple[IndexArray, IndexArray]:

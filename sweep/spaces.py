@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from .arrays import FloatArray, IndexArray
+from .arrays import FloatArray, IndexArray, row_products
 from .families import Family
 
 DIMENSIONS = ("edge_width_nm", "band_width_nm")
@@ -79,8 +79,9 @@ class Space:
     def dimensions(self, points: FloatArray) -> dict[str, FloatArray]:
         """The narrowest edge and band of each design, nm, ndarray[n_designs]; NaN for what the family does not have."""
         rows = {} if self.filter is None else self.filter.family.dimensions
-        nothing = np.full(len(points), np.nan)
-        return {name: (points @ rows[name].T).min(axis=1) if name in rows else nothing for name in DIMENSIONS}
+        nothing = np.full((len(points), 1), np.nan)
+        lengths = {name: row_products(points, rows[name].T) if name in rows else nothing for name in DIMENSIONS}
+        return {name: values.min(axis=1) for name, values in lengths.items()}
 
     def violation(self, points: FloatArray) -> FloatArray:
         """Largest violation of the family's own conditions, ndarray[n_designs]; 0 where a design is well formed."""

@@ -75,16 +75,23 @@ def test_no_spectrum_is_made_by_the_separable_route(monkeypatch: pytest.MonkeyPa
     evaluate(Imager(SETUPS["rounded"]), edges)
 
 
-def test_where_the_exposure_varies_the_dense_route_is_taken() -> None:
+def test_designs_that_set_the_exposure_take_the_dense_route() -> None:
     # Crossed edges lift N above Y, which sets the exposure then.
-    crossed = replace(SPACE, axes=((690.0,), (5.0,), (410.0,), (5.0,), (0.0, 1.0)))
-    edges = edges_of(crossed, 0, 2)
+    crossed = replace(SPACE, axes=((690.0, 600.0), (5.0,), (410.0, 650.0), (5.0,), (0.5, 1.0)))
+    edges = edges_of(crossed, 0, crossed.size)
     assert edges is not None
     imager = Imager(SETUPS["chart"])
-    assert imager.read_changing(edges) is None
+    changing = imager.read_changing(edges)
+    assert changing is not None
     found, dense = evaluate(imager, edges), evaluate(imager, edges.curves())
+    brighter = edges.curves().sum(axis=(1, 2)) > SENSOR.qe["Y"].sum()
+    np.testing.assert_array_equal(changing.which, ~brighter)
+    assert 0 < np.count_nonzero(brighter) < len(brighter)
     assert np.ptp(found["exposure_s"]) > 0
-    np.testing.assert_array_equal(found["csd_yellow_red"], dense["csd_yellow_red"])
+    np.testing.assert_array_equal(found["csd_yellow_red"][brighter], dense["csd_yellow_red"][brighter])
+    np.testing.assert_allclose(found["csd_yellow_red"], dense["csd_yellow_red"], rtol=1e-10)
+    every = imager.read_changing(edges.some(np.flatnonzero(brighter)))
+    assert every is None
 
 
 def test_the_separable_route_refuses_what_is_not_separable(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, row_products
 from ..errors import Fault, SweepError
 from .base import Parameter
 
@@ -42,7 +42,7 @@ class FreeForm:
 
     def curves(self, x: FloatArray) -> FloatArray:
         """QE of the modified channel, ndarray[n_designs, 1, n_wavelengths]; see `Family.curves`."""
-        return np.asarray((self._fixed + x @ self._hats)[:, None, :], dtype=float)
+        return np.asarray((self._fixed + row_products(x, self._hats))[:, None, :], dtype=float)
 
     def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
         """Every transmission at its largest; see `Family.upper`."""

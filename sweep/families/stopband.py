@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, row_products
 from ..edges import SPAN_PER_WIDTH, edge, edge_gradient
 from .base import Parameter
 
@@ -85,7 +85,7 @@ class Bands:
         Start and end of a left edge must not lie behind those of its right edge, and a band must end before the next
         begins.
         """
-        return np.asarray(x @ self._conditions.T, dtype=float)
+        return row_products(x, self._conditions.T)
 
     def violation_gradient(self, x: FloatArray) -> FloatArray:
         """Constant, ndarray[3 k - 1, 5 k]."""

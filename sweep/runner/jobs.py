@@ -4,31 +4,31 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
 from ..arrays import BoolArray, FloatArray
-from ..blocks import Block, Curves, by_edges, edges_of
+from ..blocks import by_edges
 from ..constraints import FEASIBLE, Bound, total_violation
-from ..evaluate import WORST, evaluate, noise_quantities, shiftable
-from ..imaging import imager_of
-from ..objectives import COMBINED, Objective
+from ..objectives import Objective
 from ..pareto import non_dominated
 from ..plan import Plan
-from ..problem import SHIFTS
 from ..setup import Setup
-from ..spaces import DIMENSIONS, Space
+from ..spaces import Space
 from ..store import holds, result_schema
 from ..study import Study
+from .routes import Asked, Detours, Found, block_of
 
 _WORDS = pa.dictionary(pa.int32(), pa.string())
 CHUNK = 4096
 """Designs that are computed at once, and the least of one job."""
 _MOST_CHUNKS, _LEAST_JOBS = 16, 64
+_DETOURS = b"cfa_sweep_detours"
 
 
 @dataclass(frozen=True)
@@ -57,6 +57,11 @@ class Rules:
     edge_shift_nm: float
     plans: Mapping[str, Plan]
     states: tuple[str, ...]
+
+    @property
+    def asked(self) -> Asked:
+        """What is asked of each design."""
+        return Asked(self.columns, self.objective, self.edge_shift_nm, self.states)
 
     @property
     def order(self) -> tuple[str, ...]:
@@ -89,9 +94,11 @@ def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
     """Evaluate a job; a design that fails is a row with its status, and the others are kept.
 
     `pareto` marks the non-dominated designs of this job alone; `compaction.Front` finds those of the whole table.
+    `detours_of` the table says which designs took another route than their block's own.
     """
     points = job.space.points(job.start, job.stop)
-    columns, faults = _quantities(job, setup, points, rules)
+    found = _quantities(job, setup, rules)
+    columns, faults = found.columns, found.faults
     ok = np.ones(len(points), dtype=bool)
     ok[list(faults)] = False
     own = job.space.violation(points)
@@ -108,7 +115,7 @@ def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
         "pareto": _local_front(columns, ok, own, rules),
         "status": _status(faults, len(points)),
     }
-    return _table(values, len(points), rules.schema)
+    return _with_detours(_table(values, len(points), rules.schema), found.detours)
 
 
 def _local_front(columns: Mapping[str, FloatArray], ok: BoolArray, own: FloatArray, rules: Rules) -> BoolArray:
@@ -164,82 +171,36 @@ def rules_of(study: Study) -> Rules:
     )
 
 
-def _columns(
-    space: Space, setup: Setup, points: FloatArray, rules: Rules, block: Block | None = None
-) -> dict[str, FloatArray]:
-    """Every quantity of a block of designs, ndarray[n_designs] each; `block`: these very designs, if a faster one."""
-    size = setup.grid.size
-    imager = imager_of(setup)
-    designs = Curves(space.curves(points, size)) if block is None else block
-    columns = evaluate(imager, designs, rules.states) | space.dimensions(points)
-    if rules.edge_shift_nm:
-        shifts = [rules.edge_shift_nm * s for s in SHIFTS if s] if space.filter is not None else []
-        cases = [columns, *(evaluate(imager, space.curves(points, size, shift)) for shift in shifts)]
-        columns |= {WORST + n: np.min([case[n] for case in cases], axis=0) for n in shiftable(setup.lights)}
-    if rules.objective.column == COMBINED:
-        columns[COMBINED] = rules.objective.of(columns)
-    return columns
-
-
-def _may_lack(setup: Setup, rules: Rules) -> set[str]:
-    """Quantities that a design may not have: dimensions; of a plain CFA, all that a modified channel has."""
-    lacking = {*DIMENSIONS}
-    if not setup.modified:
-        lacking |= {"sensitivity", "slope_per_nm", "min_transmission", WORST + "sensitivity"}
-        if lacking & set(rules.objective.weights):
-            lacking.add(COMBINED)
-    return lacking
-
-
-def _quantities(
-    job: Job, setup: Setup, points: FloatArray, rules: Rules
-) -> tuple[dict[str, FloatArray], dict[int, str]]:
-    """Every quantity, and what went wrong with which design; a chunk at a time, which stays in the cache."""
-    parts: list[dict[str, FloatArray]] = []
+def _quantities(job: Job, setup: Setup, rules: Rules) -> Found:
+    """Every quantity, what went wrong with which design, and detours; a chunk at a time, which stays in the cache."""
+    parts: list[Found] = []
     faults: dict[int, str] = {}
     for start in range(job.start, job.stop, CHUNK):
-        at = start - job.start
-        part = replace(job, start=start, stop=min(start + CHUNK, job.stop))
-        columns, found = _chunk_quantities(part, setup, points[at : at + CHUNK], rules)
-        parts.append(columns)
-        faults |= {at + index: text for index, text in found.items()}
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}, faults
+        part = block_of(job.space, start, min(start + CHUNK, job.stop), setup, rules.asked)
+        parts.append(part)
+        faults |= {start - job.start + index: text for index, text in part.faults.items()}
+    columns = {name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns}
+    return Found(columns, faults, sum((part.detours for part in parts), Counter()))
 
 
-def _chunk_quantities(
-    job: Job, setup: Setup, points: FloatArray, rules: Rules
-) -> tuple[dict[str, FloatArray], dict[int, str]]:
-    space = job.space
-    try:
-        columns = _columns(space, setup, points, rules, edges_of(space, job.start, job.stop))
-        faults: dict[int, str] = {}
-    except Exception:  # whatever fails in one design must not take the others with it
-        columns, faults = _one_by_one(space, setup, points, rules)
-    lacking = _may_lack(setup, rules)
-    unbounded = set(noise_quantities(rules.states))  # a signal without noise is told apart for certain
-    numbers = [
-        np.where(values == np.inf, 0.0, values) if name in unbounded else values
-        for name, values in columns.items()
-        if name not in lacking
-    ]
-    for index in np.flatnonzero(~np.isfinite(numbers).all(axis=0)):
-        faults.setdefault(int(index), "not finite")
-    return columns, faults
+def joined(tables: Sequence[pa.Table]) -> pa.Table:
+    """The rows of several tables of jobs, with the detours of all."""
+    detours = sum((detours_of(table) for table in tables), Counter())
+    return _with_detours(pa.concat_tables(tables).unify_dictionaries(), detours)
 
 
-def _one_by_one(
-    space: Space, setup: Setup, points: FloatArray, rules: Rules
-) -> tuple[dict[str, FloatArray], dict[int, str]]:
-    found: list[dict[str, FloatArray] | None] = []
-    faults = {}
-    for index, point in enumerate(points):
-        try:
-            found.append(_columns(space, setup, point[None], rules))
-        except Exception as error:  # the row says what happened
-            found.append(None)
-            faults[index] = f"error: {type(error).__name__}: {error}"[:200]
-    nothing = np.array([np.nan])
-    return {n: np.concatenate([nothing if c is None else c[n] for c in found]) for n in rules.columns}, faults
+def detours_of(table: pa.Table) -> Detours:
+    """How many designs of a job took another route than their block's own, and why."""
+    kept = (table.schema.metadata or {}).get(_DETOURS)
+    return Counter({(kind, fault): n for kind, fault, n in json.loads(kept)} if kept else {})
+
+
+def _with_detours(table: pa.Table, detours: Detours) -> pa.Table:
+    """The table with its detours in its metadata, which go where its rows go."""
+    if not detours:
+        return table
+    kept = json.dumps([(kind, fault, n) for (kind, fault), n in detours.items()]).encode()
+    return table.replace_schema_metadata({**(table.schema.metadata or {}), _DETOURS: kept})
 
 
 def _word(text: str | None, n: int) -> pa.Array:

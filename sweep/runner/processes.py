@@ -6,20 +6,29 @@ import ctypes
 import signal
 from contextlib import suppress
 
+_PR_SET_PDEATHSIG = 1
+"""Number of prctl's option in Linux's sys/prctl.h."""
 _KEPT_BYTES, _LARGE_BYTES = 2**26, 2**24
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 """Numbers of mallopt's options in glibc's malloc.h."""
 
 
 def prepare_worker() -> None:
-    """Leave signals to the parent, and keep freed memory."""
+    """Leave signals to the parent, end with it, and keep freed memory."""
     leave_signals_to_the_parent()
+    end_with_the_parent()
     keep_freed_memory()
 
 
 def leave_signals_to_the_parent() -> None:
     """In a worker: a Ctrl-C reaches the whole process group, and the parent alone decides what becomes of the work."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def end_with_the_parent() -> None:
+    """In a worker: when the parent is killed, end at once, where the system can do that (Linux)."""
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def keep_freed_memory() -> None:

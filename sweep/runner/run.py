@@ -38,12 +38,13 @@ from ..study import Study
 from .compaction import Front, Gathered
 from .drawn import curves_table, points_table
 from .folders import begin, discard, held_by, read_facts
-from .jobs import Rules, rules_of
+from .jobs import Rules, detours_of, rules_of
 from .patches import recognition_table
 from .planning import with_plans
 from .provenance import plan_facts, provenance, resolved_yaml
+from .routes import detours_in_words
 from .searching import SearchAnswer, answer_row, front_table, run_search, search_facts, search_log
-from .stopping import stop_on_signals
+from .stopping import Stop, stop_on_signals
 from .sweeping import Sweep
 from .workers import Call, Workers, workers
 
@@ -69,6 +70,7 @@ def run_study(
     backend: str = "loky",
     scheduler: str | None = None,
     wishes: Wishes = Wishes(),
+    stop: Stop | None = None,
 ) -> bool:
     """Run a study into `output`; what an earlier, interrupted run of the same study finished is kept.
 
@@ -76,10 +78,11 @@ def run_study(
     `recognition.parquet` (when the study asks for it), `study.resolved.yaml` and `provenance.json`, each atomically.
     Returns False when there was nothing left to do. Raises OutputError when the folder is in use, holds another study
     or cannot be written; InfeasibleError, before anything is left behind, when the search finds no feasible design;
-    FailedDesignError for the first failing design, if it is wished.
+    FailedDesignError for the first failing design, if it is wished; InterruptedRunError after SIGINT or SIGTERM, which
+    are taken here unless the caller takes them into `stop`.
     """
     started = time.monotonic()
-    with stop_on_signals() as stop, workers(Workers(n_jobs, stop, backend, scheduler)) as crew, locked(output):
+    with stop_on_signals(stop) as own, workers(Workers(n_jobs, own, backend, scheduler)) as crew, locked(output):
         held = held_by(output)
         failed = wishes.retry_failed and read_facts(output / PROVENANCE).get("failed", 0)
         if held is not None and held.finished and held.is_of(study) and not failed:
@@ -87,7 +90,7 @@ def run_study(
         facts = {"command": list(command), "designs": study.n_designs, "workers": crew.count, "backend": crew.backend}
         begin(output, study, facts)
         try:
-            study = with_plans(study, crew.count, progress, stop=stop)
+            study = with_plans(study, crew.count, progress, stop=own)
         except StudyError:
             discard(output)
             raise
@@ -153,13 +156,15 @@ class _Run:
         gathered.finish()
         tables = map(gathered.front.marked, chain(sweep.tables(), answered))
         write_tables(tables, self.rules.schema, output / RESULTS)
+        detours = sum(map(detours_of, answered), sweep.detours)
         rows, on_front = gathered.frame(), gathered.front_frame()
         self.facts |= {
             "designs": study.n_designs + len(answered),
             "failed": sweep.failed,
             "plans": plan_facts(study),
             "trade_off": study.trade_off,
-            "warnings": [*study.warnings, *sweep.warnings],
+            "warnings": [*study.warnings, *sweep.warnings, *detours_in_words(detours)],
+            "detours": [{"how": how, "why": why, "designs": n} for (how, why), n in detours.items()],
         }
         self._write_search(answer, gathered.swept)
         self._write_drawn(rows, on_front, answer)

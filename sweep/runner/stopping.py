@@ -1,44 +1,129 @@
-"""Stop a run at a signal without losing what is under way."""
+"""Stop a run at a signal within seconds, without losing what is finished."""
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import FrameType
 
+from ..errors import InterruptedRunError
+
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+GRACE_S = 2.0
+"""What is computed when a stop is asked for may still be finished for so long."""
+_KNOCK_S, _AGAIN_S, _LAST_S = 0.05, 3.0, 4.5
+_SAID = "interrupted; finished chunks are kept, the same command continues"
+
+
+class BrokenOffError(KeyboardInterrupt):
+    """Raised in the main thread, wherever it is, when a stop was asked for and nothing has to be finished first."""
 
 
 @dataclass
 class Stop:
-    """Whether a signal asked the run to stop."""
+    """Whether a signal asked the run to stop, and whether its main thread may be broken off where it is.
+
+    It may, but while it is `held`, and not before the end of a `grace`. `ends_process`: a call into a library that
+    does not come back is ended with the process.
+    """
 
     requested: bool = False
+    ends_process: bool = False
+    _since: float = 0.0
+    _broken_off: float | None = None
+    _held: int = 0
+    _grace_s: float = 0.0
+    _over: threading.Event = field(default_factory=threading.Event)
+    _sending: threading.Lock = field(default_factory=threading.Lock)
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """What must be whole, such as an entry of the journal."""
+        self._held += 1
+        try:
+            yield
+        finally:
+            self._held -= 1
+
+    @contextmanager
+    def grace(self) -> Iterator[None]:
+        """What may be finished when it takes no longer than GRACE_S."""
+        self._grace_s = GRACE_S
+        try:
+            yield
+        finally:
+            self._grace_s = 0.0
+
+    def check(self) -> None:
+        """Raise InterruptedRunError when a stop was asked for; nothing has to be broken off then."""
+        if self.requested:
+            self._broken_off = time.monotonic()
+            raise InterruptedRunError(_SAID)
+
+    def _asked(self, number: int, _frame: FrameType | None) -> None:
+        """A signal: the first one asks; a second one ends the grace; `_knock` sends it again when it is time."""
+        now = time.monotonic()
+        if not self.requested:
+            self.requested, self._since = True, now
+            threading.Thread(target=self._knock, args=(number, threading.get_ident()), daemon=True).start()
+        if self._may_break(now):
+            self._broken_off = now
+            raise BrokenOffError
+
+    def _may_break(self, now: float) -> bool:
+        """Once; and once more where someone swallowed the exception."""
+        if self._held or self._over.is_set() or now < self._since + self._grace_s:
+            return False
+        return self._broken_off is None or now > self._broken_off + _AGAIN_S
+
+    def _knock(self, number: int, main_thread: int) -> None:
+        """In a thread of its own: interrupt the main thread as soon as it may be broken off."""
+        while not self._over.wait(_KNOCK_S):
+            now = time.monotonic()
+            if self.ends_process and now > self._since + _LAST_S and not self._held:
+                os.write(2, f"sweep: {_SAID}\n".encode())
+                os._exit(InterruptedRunError.exit_code)
+            with self._sending:
+                if self._may_break(now):
+                    signal.pthread_kill(main_thread, number)
 
 
 @contextmanager
-def stop_on_signals() -> Iterator[Stop]:
-    """SIGINT and SIGTERM set `requested`; a second one raises KeyboardInterrupt at once.
+def stop_on_signals(outer: Stop | None = None, *, ends_process: bool = False) -> Iterator[Stop]:
+    """SIGINT and SIGTERM ask for a stop: no more work is handed out, and what takes longer than a moment is broken off.
 
-    The run then hands out no more work and keeps what its workers finish. Outside the main thread, where Python takes
-    no signals, nothing is changed.
+    Raises InterruptedRunError then. With `outer`, whoever made that takes the signals. Outside the main thread, where
+    Python takes no signals, nothing is changed.
     """
-    stop = Stop()
-
-    def ask(_number: int, _frame: FrameType | None) -> None:
-        if stop.requested:
-            raise KeyboardInterrupt
-        stop.requested = True
-
+    if outer is not None:
+        yield outer
+        return
+    stop = Stop(ends_process=ends_process)
     if threading.current_thread() is not threading.main_thread():
         yield stop
         return
-    before = [(number, signal.signal(number, ask)) for number in SIGNALS]
+    before = [(number, signal.signal(number, stop._asked)) for number in SIGNALS]
     try:
         yield stop
+    except BrokenOffError:
+        raise InterruptedRunError(_SAID) from None
     finally:
-        for number, handler in before:
-            signal.signal(number, handler)
+        stop._over.set()
+        with stop._sending:
+            for number, handler in before:
+                signal.signal(number, handler)
+
+
+@contextmanager
+def without_interrupts() -> Iterator[None]:
+    """A Ctrl-C waits for the end of the block; processes that are started in it never see one."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -15,11 +16,13 @@ from ..errors import FailedDesignError, Fault, OutputError
 from ..journal import Journal, Shard
 from ..progress import Progress
 from ..setup import Setup
-from ..store import sliced
+from ..store import PROVENANCE, sliced
 from ..study import Study
 from .compaction import Gathered, few_of
-from .jobs import Job, Rules, failed_rows, job_key, jobs_of, run_job, with_local_front
+from .folders import read_facts
+from .jobs import Job, Rules, detours_of, failed_rows, job_key, jobs_of, joined, run_job, with_local_front
 from .provenance import fingerprint
+from .routes import Detours
 from .workers import Call, WorkerKilledError, Workers, alone
 
 KILLED = "error: its worker died twice"
@@ -35,6 +38,7 @@ class Sweep:
     crew: Workers
     warnings: list[str] = field(default_factory=list)
     failed: int = 0
+    detours: Detours = field(default_factory=Counter)
 
     @cached_property
     def fingerprint(self) -> str:
@@ -69,10 +73,11 @@ class Sweep:
     def refill(self, results: Path) -> None:
         """Take what the journal lacks out of a result table of this study, but for chunks with failed designs.
 
-        Up to the first row that cannot be read. The whole table marks the front over all kinds of rows, a chunk its
+        Up to the first row that cannot be read; nothing out of a table in which designs took detours, which only its
+        provenance knows. The whole table marks the front over all kinds of rows, a chunk its
         own, from which that of the swept rows alone follows, too.
         """
-        if self.journal.entries.keys() >= set(self.keys):
+        if self.journal.entries.keys() >= set(self.keys) or read_facts(results.parent / PROVENANCE).get("detours"):
             return
         chunks = sliced(results, [job.stop - job.start for job in self.jobs])
         for index, (job, key) in enumerate(zip(self.jobs, self.keys, strict=True)):
@@ -85,7 +90,8 @@ class Sweep:
             if key not in self.journal.entries:
                 shard = Shard.of(with_local_front(table, job, self.rules), 0.0)
                 if not shard.failed:
-                    self.journal.save(key, index, shard)
+                    with self.crew.stop.held():
+                        self.journal.save(key, index, shard)
 
     def run(self, gathered: Gathered, progress: Progress, *, fail_fast: bool, retry_failed: bool) -> None:
         """Compute what is not kept yet; `gathered` takes in all rows.
@@ -102,8 +108,11 @@ class Sweep:
         done = sum(entries[key].rows for key in self.keys if key in entries)
         progress("designs", done, self.study.n_designs)
         calls = (joblib.delayed(_shard)(self.jobs[i], self._setup(self.jobs[i]), self.rules) for i in todo)
-        for index, (shard, few) in zip(todo, self.crew(calls, _quarantined), strict=False):
-            self.journal.save(self.keys[index], index, shard)
+
+        def keep(at: int, found: tuple[Shard, pa.Table]) -> None:
+            self.journal.save(self.keys[todo[at]], todo[at], found[0])
+
+        for shard, few in self.crew(calls, _quarantined, keep):
             gathered.add(few)
             done += shard.rows
             progress("designs", done, self.study.n_designs)
@@ -111,8 +120,8 @@ class Sweep:
                 raise _first_failure(shard.table())
 
     def tables(self) -> Iterator[pa.Table]:
-        """All finished chunks in order; one whose file is damaged is computed again."""
-        self.failed = 0
+        """All finished chunks in order; one whose file is damaged is computed again. Counts failures and detours."""
+        self.failed, self.detours = 0, Counter()
         for index, (job, key) in enumerate(zip(self.jobs, self.keys, strict=True)):
             table = self._kept(index)
             if table is None:
@@ -120,6 +129,7 @@ class Sweep:
                 self.journal.save(key, index, shard)
                 table = shard.table()
             self.failed += self.journal.entries[key].failed
+            self.detours += detours_of(table)
             yield table
 
     def _kept(self, index: int) -> pa.Table | None:
@@ -156,7 +166,7 @@ def _halved(call: Call) -> pa.Table:
             tables.append(alone(part)[0].table())
         except WorkerKilledError:
             tables.append(_halved(part))
-    return pa.concat_tables(tables).unify_dictionaries()
+    return joined(tables)
 
 
 def _first_failure(table: pa.Table) -> FailedDesignError:

@@ -16,14 +16,15 @@ import joblib
 from joblib.externals.loky import ProcessPoolExecutor
 from threadpoolctl import threadpool_limits
 
-from ..errors import InterruptedRunError, SweepError
+from ..errors import SweepError
 from .processes import keep_freed_memory, prepare_worker
-from .stopping import Stop
+from .stopping import Stop, without_interrupts
 
 _LEAST_WINDOW, _WINDOW_PER_WORKER = 64, 16
 BACKENDS = ("loky", "threading", "dask")
 Call = tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
 """A call that `joblib.delayed` has put off."""
+_Numbered = tuple[int, Call]
 
 
 class WorkerKilledError(SweepError):
@@ -47,43 +48,73 @@ class Workers:
         """Workers on this machine."""
         return max(1, min(self.n_jobs, os.cpu_count() or 1))
 
-    def __call__(self, calls: Iterable[Call], killed: Callable[[Call], Any] | None = None) -> Iterator[Any]:
-        """Results of delayed calls in their order.
+    def __call__(
+        self,
+        calls: Iterable[Call],
+        killed: Callable[[Call], Any] | None = None,
+        finished: Callable[[int, Any], None] | None = None,
+    ) -> Iterator[Any]:
+        """Results of delayed calls in their order; `finished` gets each with its number as soon as it is there.
 
         When a worker dies, the calls under way run again, each in a process of its own. One that dies again goes to
         `killed`, whose answer counts as its result; without it, WorkerKilledError is raised. Raises
-        InterruptedRunError after a stop was asked for and everything under way has been handed out.
+        InterruptedRunError after a stop was asked for and what came within its grace has been handed out. A result
+        that was handed out may be kept in peace: the stop waits until the next one is asked for.
         """
-        rest = iter(calls)
+        rest = enumerate(calls)
+        early: dict[int, Any] = {}
+        turn = 0
         # joblib goes on computing while results wait to be taken; a window bounds how many can wait.
         window = max(_LEAST_WINDOW, _WINDOW_PER_WORKER * joblib.effective_n_jobs(self._n_jobs))
         while not self.stop.requested and (some := list(islice(rest, window))):
-            yield from self._window(deque(some), killed)
-        if self.stop.requested:
-            raise InterruptedRunError("interrupted; finished chunks are kept, the same command continues")
+            for at, result in self._window(deque(some), killed):
+                with self.stop.held():
+                    if finished is not None:
+                        finished(at, result)
+                    early[at] = result
+                    while turn in early:
+                        yield early.pop(turn)
+                        turn += 1
+        self.stop.check()
 
-    def _window(self, waiting: deque[Call], killed: Callable[[Call], Any] | None) -> Iterator[Any]:
-        """Results of a few calls; those that are not handed out when a stop is asked for are left out."""
-        flying: deque[Call] = deque()
+    def _window(self, waiting: deque[_Numbered], killed: Callable[[Call], Any] | None) -> Iterator[tuple[int, Any]]:
+        """Results of a few calls with their numbers, as they come; those that a stop leaves behind are left out."""
+        flying: dict[int, Call] = {}
 
         def taken() -> Iterator[Call]:
             while waiting and not self.stop.requested:
-                flying.append(waiting.popleft())
-                yield (_one_threaded, flying[-1], {})
+                at, call = waiting.popleft()
+                flying[at] = call
+                yield (_numbered, (at, call), {})
 
         while waiting and not self.stop.requested:
             try:
-                parallel = joblib.Parallel(n_jobs=self._n_jobs, return_as="generator", pre_dispatch="3*n_jobs")
-                for result in parallel(taken()):
-                    flying.popleft()
-                    yield result
+                parallel = joblib.Parallel(self._n_jobs, return_as="generator_unordered", pre_dispatch="3*n_jobs")
+                with without_interrupts():
+                    results = iter(parallel(taken()))
+                for at, result in self._gracefully(results):
+                    del flying[at]
+                    yield at, result
             except Exception as error:
                 if not _is_death(error):
                     raise
-            suspects = list(flying)
+            suspects = list(flying.items())
             flying.clear()
-            for call in suspects:
-                yield self._again(call, killed)
+            for at, call in suspects:
+                if self.stop.requested:  # it may have ended the workers, too
+                    return
+                with self.stop.grace():
+                    result = self._again(call, killed)
+                yield at, result
+
+    def _gracefully(self, results: Iterator[Any]) -> Iterator[Any]:
+        """The same results; each is waited for as long as a stop allows."""
+        while True:
+            with self.stop.grace():
+                result = next(results, None)
+            if result is None:
+                return
+            yield result
 
     @property
     def _n_jobs(self) -> int:
@@ -117,25 +148,37 @@ def workers(how: Workers) -> Iterator[Workers]:
             stack.enter_context(_dask_client(how.scheduler))
         elif how.backend == "loky":
             settings = {"inner_max_num_threads": 1, "initializer": prepare_worker}
-        else:  # a call that ends gives back what it found, also to the calls beside it: let that be one thread
-            stack.enter_context(threadpool_limits(1))
+        # This process computes, too; and a thread that ends gives back what it found, also to those beside it.
+        stack.enter_context(threadpool_limits(1))
         stack.enter_context(joblib.parallel_config(how.backend, **settings))
         yield how
 
 
 def alone(call: Call) -> Any:
     """Result of a call in a process of its own; raises WorkerKilledError when that dies."""
-    with ProcessPoolExecutor(max_workers=1, initializer=prepare_worker) as process:
-        try:
-            return process.submit(_one_threaded, *call).result()
-        except BrokenProcessPool:
-            raise WorkerKilledError("a worker died twice at the same work: out of memory, or killed") from None
+    process = ProcessPoolExecutor(max_workers=1, initializer=prepare_worker)
+    ended = False
+    try:
+        with without_interrupts():
+            coming = process.submit(_one_threaded, *call)
+        result = coming.result()
+        ended = True
+        return result
+    except BrokenProcessPool:
+        raise WorkerKilledError("a worker died twice at the same work: out of memory, or killed") from None
+    finally:
+        process.shutdown(kill_workers=not ended)
 
 
 def _one_threaded(function: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
     """A call whose libraries use one thread: the same sums in the same order with any number of workers."""
     with threadpool_limits(1):
         return function(*arguments, **named)
+
+
+def _numbered(at: int, call: Call) -> tuple[int, Any]:
+    """The result of a call, and its number."""
+    return at, _one_threaded(*call)
 
 
 def _is_death(error: Exception) -> bool:
