@@ -19,7 +19,8 @@ from .errors import DataError, Fault, nearest
 from .spectra import Curves, check_samples
 
 WAVELENGTH = "wavelength_nm"
-_NO_UTF_16 = "UTF-8; UTF-16? save as UTF-8"
+NO_UTF_16 = "UTF-8; UTF-16? save as UTF-8"
+"""What is allowed where the text of a file looks like that."""
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
 
@@ -81,10 +82,10 @@ def _decoded(path: Path) -> tuple[str, list[Fault]]:
     except UnicodeDecodeError as error:
         wide = content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
         problem = f"not UTF-8 text ({error.reason} at byte {error.start})"
-        fault = Fault(problem, str(path), allowed=_NO_UTF_16 if wide else None)
+        fault = Fault(problem, str(path), allowed=NO_UTF_16 if wide else None)
         return content.decode("utf-16" if wide else "latin-1", errors="replace"), [fault]
     if "\0" in text:
-        return text.replace("\0", ""), [Fault("NUL characters in the text", str(path), allowed=_NO_UTF_16)]
+        return text.replace("\0", ""), [Fault("NUL characters in the text", str(path), allowed=NO_UTF_16)]
     return text, []
 
 

@@ -12,7 +12,7 @@ PACKAGE = Path(__file__).parent.parent / "sweep"
 # From the bottom. A unit is a module or a folder of the package.
 LEVELS = [
     {"errors", "arrays", "completion"},
-    {"schema"},
+    {"schema", "inputs"},
     {"kernels", "spectra", "mosaics", "pareto", "constraints", "objectives", "edges", "progress"},
     {"metrics", "curve_files", "surrogate", "sensor", "chromaticity"},
     {"datasets", "filters", "filter_files", "scenes", "families", "discrimination", "signals"},
