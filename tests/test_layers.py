@@ -13,7 +13,7 @@ PACKAGE = Path(__file__).parent.parent / "sweep"
 LEVELS = [
     {"errors", "arrays", "completion"},
     {"schema", "inputs"},
-    {"kernels", "spectra", "mosaics", "pareto", "constraints", "objectives", "edges", "progress"},
+    {"kernels", "spectra", "mosaics", "pareto", "constraints", "objectives", "edges", "progress", "mat_files"},
     {"metrics", "curve_files", "surrogate", "sensor", "chromaticity"},
     {"datasets", "filters", "filter_files", "scenes", "families", "discrimination", "signals"},
     {"spaces", "setup"},

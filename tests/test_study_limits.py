@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
 
 from sweep.errors import MOST_FAULTS, Fault, StudyError, SweepError, nearest
 from sweep.store import RESOLVED
@@ -87,7 +88,6 @@ TOO_MUCH: dict[str, tuple[Callable[[], str | bytes], str]] = {
         "5: not UTF-8 text (invalid continuation byte at byte 63)",
     ),
     "a bell": (lambda: SMALL + "question: \x07\n", "5: not valid YAML: the character"),
-    "an escaped bell": (lambda: SMALL + 'question: "\\a"\n', "5: question: not a character of a text (got '\\x07')"),
     "half a character": (lambda: SMALL + 'question: "\\ud800"\n', "question: not a character of a text"),
     "an endless quote": (lambda: SMALL + 'question: "' + "x y\n" * 100_000, "5: question: not valid YAML"),
     "a key of a megabyte": (lambda: SMALL + "? " + "x" * 400_000 + "\n: 1\n", "unknown key"),
@@ -184,10 +184,16 @@ values = st.recursive(
 
 @given(values)
 @settings(max_examples=60, deadline=None)
-def test_what_the_library_writes_is_read_back(value: object) -> None:
-    text = StringIO()
-    YAML(typ="safe", pure=True).dump({"top": value}, text)
-    assert Tree(text.getvalue(), "a.yaml", 10_000).root == {"top": value}
+def test_what_the_library_writes_is_read_as_it_reads_it(value: object) -> None:
+    yaml, text = YAML(typ="safe", pure=True), StringIO()
+    yaml.dump({"top": value}, text)
+    try:
+        expected = yaml.load(text.getvalue())
+    except YAMLError:  # it does not read all that it writes: {:0: null}
+        with pytest.raises(StudyError, match="not valid YAML"):
+            Tree(text.getvalue(), "a.yaml", 10_000)
+        return
+    assert Tree(text.getvalue(), "a.yaml", 10_000).root == expected
 
 
 def test_aliases_may_be_used_up_to_the_limit(tmp_path: Path) -> None:

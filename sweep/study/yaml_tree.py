@@ -38,7 +38,8 @@ _INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 _BASES = {"0o": 8, "0x": 16}
 _LOOKS_LIKE_A_NUMBER = re.compile(r"[-+.0-9eExXoO_a-fA-F]+")
-_CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff]")
+_HALF = re.compile("[\ud800-\udfff]")
+"""Half of a character: `\\ud800`. No file takes it."""
 
 Key = str | int
 Lines = dict[Key, int]
@@ -116,9 +117,9 @@ class Tree:
 
     def _scalar(self, event: ScalarEvent, line: int) -> None:
         text = event.value
-        control = _CONTROL.search(text)
-        if control:
-            raise self._refused("not a character of a text", line, control.group())
+        half = _HALF.search(text)
+        if half:
+            raise self._refused("not a character of a text", line, half.group())
         parent = self._open[-1] if self._open else None
         is_key = parent is not None and isinstance(parent.value, dict) and parent.key is None
         plain = bool(event.implicit[0])
