@@ -9,23 +9,34 @@ import io
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from .arrays import FloatArray
 from .errors import DataError, Fault, nearest
+from .inputs import read_input
+from .mat_files import DamagedError, read_variables
 from .spectra import Curves, check_samples
 
 WAVELENGTH = "wavelength_nm"
-_NO_UTF_16 = "UTF-8; UTF-16? save as UTF-8"
+NO_UTF_16 = "UTF-8; UTF-16? save as UTF-8"
+"""What is allowed where the text of a file looks like that."""
+MOST_BYTES = 40_000_000
+MOST_CURVES = 2_000
+MOST_VALUES = 2_000_000
+"""Limits of a file of curves: 2,000 curves of 1,000 samples are read in a second."""
+_MOST_CELL_FAULTS = 10_000
+_MAT_VARIABLES = ("wavelength", "data", "filterNames")
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+_ODD = re.compile(r"[^0-9eE+\-. \t]")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
 
 def digest(path: Path) -> str:
     """SHA-256 of a file's bytes, hexadecimal; raises DataError when it cannot be read."""
-    return hashlib.sha256(_read_bytes(path)).hexdigest()
+    return hashlib.sha256(read_input(path, MOST_BYTES, DataError)).hexdigest()
 
 
 @dataclass(frozen=True)
@@ -66,89 +77,126 @@ def scan_curves(path: Path) -> Scan:
     raise DataError(Fault("unknown kind of curve file", str(path), value=path.suffix, allowed=".csv, .mat"))
 
 
-def _read_bytes(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise DataError(Fault(f"cannot be read: {error.strerror or error}", str(path))) from None
-
-
 def _decoded(path: Path) -> tuple[str, list[Fault]]:
     """A file's text, and the fault of one that is not UTF-8."""
-    content = _read_bytes(path)
+    content = read_input(path, MOST_BYTES, DataError)
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         wide = content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
         problem = f"not UTF-8 text ({error.reason} at byte {error.start})"
-        fault = Fault(problem, str(path), allowed=_NO_UTF_16 if wide else None)
+        fault = Fault(problem, str(path), allowed=NO_UTF_16 if wide else None)
         return content.decode("utf-16" if wide else "latin-1", errors="replace"), [fault]
     if "\0" in text:
-        return text.replace("\0", ""), [Fault("NUL characters in the text", str(path), allowed=_NO_UTF_16)]
+        return text.replace("\0", ""), [Fault("NUL characters in the text", str(path), allowed=NO_UTF_16)]
     return text, []
 
 
 def _scan_csv(path: Path) -> Scan:
     text, layout = _decoded(path)
-    first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
+    file = str(path)
+    first = next((line for line in io.StringIO(text) if line.strip() and not line.startswith("#")), "")
     delimiter = next((mark for mark in (",", ";", "\t") if mark in first), ",")
+    _check_size(file, None, text.count("\n") or text.count("\r"), first.count(delimiter))
     reader = csv.reader(io.StringIO(text, newline=None), delimiter=delimiter)
     try:
         rows = [(reader.line_num, row) for row in reader if any(c.strip() for c in row) and not row[0].startswith("#")]
     except csv.Error as error:
-        raise DataError([*layout, Fault(f"not a readable CSV: {error}", str(path), reader.line_num)]) from None
+        raise DataError([*layout, Fault(f"not a readable CSV: {error}", file, reader.line_num)]) from None
     if not rows:
         raise DataError(
-            [*layout, Fault("the file is empty", str(path), allowed=f"a header `{WAVELENGTH},...` and rows of numbers")]
+            [*layout, Fault("the file is empty", file, allowed=f"a header `{WAVELENGTH},...` and rows of numbers")]
         )
     line, header = rows[0][0], [cell.strip() for cell in rows[0][1]]
+    _check_size(file, line, len(rows), len(header) - 1)
     if delimiter != ",":
         problem, allowed = "columns are not separated by commas", "`,` between columns, `.` in numbers"
-        layout.append(Fault(problem, str(path), line, value=delimiter, allowed=allowed))
-    layout += _header_faults(str(path), line, header)
-    table, cells = _scan_cells(str(path), header, rows[1:], decimal="," if delimiter != "," else ".")
+        layout.append(Fault(problem, file, line, value=delimiter, allowed=allowed))
+    layout += _header_faults(file, line, header)
+    table, cells = _Cells(file, header, decimal="," if delimiter != "," else ".").read(rows[1:])
     wave, values, names = table[:, 0], table[:, 1:], distinct(header[1:])
     clean = not layout and not cells
     samples = _sample_faults(path, wave, names, values) if clean else _unit_faults(path, wave)
     return Scan(wave, names, values, tuple(tuple(group) for group in (layout, cells, *samples) if group))
 
 
-def _scan_cells(
-    file: str, header: list[str], rows: list[tuple[int, list[str]]], decimal: str
-) -> tuple[FloatArray, list[Fault]]:
-    """The numbers, ndarray[n_samples, n_columns], NaN where a cell is none; and the faults of cells and rows."""
-    faults = []
-    values = np.full((len(rows), len(header)), np.nan)
-    for index, (line, row) in enumerate(rows):
-        if len(row) != len(header):
-            faults.append(Fault("wrong number of columns", file, line, value=len(row), allowed=str(len(header))))
-            continue
-        for column, cell in enumerate(row):
-            number = _number(cell.replace(decimal, "."))
-            if number is None:
-                comma = "; a decimal comma? use a point" if _DECIMAL_COMMA.fullmatch(cell.strip()) else ""
-                allowed = f"finite, >= 0{comma}"
-                faults.append(Fault("not a usable number", file, line, header[column], cell.strip(), allowed))
+def _check_size(file: str, line: int | None, n_samples: int, n_curves: int) -> None:
+    """Refuse what would take minutes to read, before it is read."""
+    for what, count, most in (
+        ("curves", n_curves, MOST_CURVES),
+        ("values", n_samples * n_curves, MOST_VALUES),
+    ):
+        if count > most:
+            raise DataError(Fault(f"too many {what} in one file", file, line, None, count, f"at most {most:,}"))
+
+
+@dataclass
+class _Cells:
+    """The numbers of a CSV, and the faults of its cells and rows: at most MOST_CELL_FAULTS."""
+
+    file: str
+    header: list[str]
+    decimal: str
+    faults: list[Fault] = field(default_factory=list)
+
+    def read(self, rows: list[tuple[int, list[str]]]) -> tuple[FloatArray, list[Fault]]:
+        """ndarray[n_samples, n_columns], NaN where a cell is no number; and the faults, row by row."""
+        values = np.full((len(rows), len(self.header)), np.nan)
+        before = np.nan
+        for index, (line, row) in enumerate(rows):
+            if len(self.faults) >= _MOST_CELL_FAULTS:
+                self.faults.append(Fault("too many faults; what follows was not read", self.file, line))
+                break
+            if len(row) != len(self.header):
+                self.add("wrong number of columns", line, None, len(row), str(len(self.header)))
+                before = np.nan
                 continue
-            values[index, column] = number
-            if column > 0 and number < 0:
-                faults.append(Fault("negative value", file, line, header[column], cell.strip(), "finite, >= 0"))
-        if index and values[index, 0] <= values[index - 1, 0]:
-            problem = (
-                "wavelength occurs twice" if values[index, 0] == values[index - 1, 0] else "wavelengths are not sorted"
-            )
-            faults.append(Fault(problem, file, line, WAVELENGTH, values[index, 0].item(), "strictly increasing"))
-    return values, faults
+            values[index] = self.row(line, row)
+            if values[index, 0] <= before:
+                same = values[index, 0] == before
+                problem = "wavelength occurs twice" if same else "wavelengths are not sorted"
+                self.add(problem, line, WAVELENGTH, values[index, 0].item(), "strictly increasing")
+            before = values[index, 0]
+        return values, self.faults
+
+    def row(self, line: int, row: list[str]) -> list[float]:
+        """The numbers of a row, NaN for what is none."""
+        try:
+            if not any(map(_ODD.search, row)):
+                numbers = list(map(float, row))
+                if min(numbers[1:], default=0.0) >= 0 and all(map(math.isfinite, numbers)):
+                    return [number + 0.0 for number in numbers]
+        except ValueError:
+            pass  # which cell it is, is found below
+        return [
+            self.cell(line, name, cell, first=index == 0)
+            for index, (name, cell) in enumerate(zip(self.header, row, strict=True))
+        ]
+
+    def cell(self, line: int, name: str, cell: str, *, first: bool) -> float:
+        """One cell's number, NaN when it is none."""
+        number = _number(cell.replace(self.decimal, "."))
+        if number is None:
+            comma = "; a decimal comma? use a point" if _DECIMAL_COMMA.fullmatch(cell.strip()) else ""
+            self.add("not a usable number", line, name, cell.strip(), f"finite, >= 0{comma}")
+            return math.nan
+        if not first and number < 0:
+            self.add("negative value", line, name, cell.strip(), "finite, >= 0")
+        return number
+
+    def add(self, problem: str, line: int, key: str | None, value: object, allowed: str) -> None:
+        """Add a fault."""
+        self.faults.append(Fault(problem, self.file, line, key, value, allowed))
 
 
 def distinct(names: Sequence[str]) -> tuple[str, ...]:
     """Column names, numbered where one is empty or occurs twice."""
-    found: list[str] = []
+    found: dict[str, None] = {}
     for index, name in enumerate(names):
         own = name or f"column ({index + 2})"
         while own in found:
             own = f"{own} ({index + 2})"
-        found.append(own)
+        found[own] = None
     return tuple(found)
 
 
@@ -156,9 +204,9 @@ def _header_faults(file: str, line: int, header: list[str]) -> list[Fault]:
     if header[0] != WAVELENGTH:
         unit = "wrong unit of " if header[0].startswith("wavelength_") and ";" not in header[0] else "no column "
         return [Fault(f"{unit}wavelength", file, line, header[0], header[0], f"`{WAVELENGTH}` as the first column")]
-    faults = [
-        Fault("column occurs twice", file, line, name) for index, name in enumerate(header) if name in header[:index]
-    ]
+    seen: set[str] = set()
+    twice = [name for name in header if name in seen or seen.add(name)]  # type: ignore[func-returns-value]
+    faults = [Fault("column occurs twice", file, line, name) for name in twice]
     if "" in header:
         faults.append(Fault("a column has no name", file, line, value=header))
     if len(header) < 2:
@@ -167,11 +215,9 @@ def _header_faults(file: str, line: int, header: list[str]) -> list[Fault]:
 
 
 def _number(cell: str) -> float | None:
-    try:
-        number = float(cell)
-    except ValueError:
-        return None
-    return number if math.isfinite(number) else None
+    """A finite number as tables have it; Python's own underscores and other scripts' digits are none."""
+    number = float(cell) if _NUMBER.fullmatch(cell.strip()) else math.nan
+    return number + 0.0 if math.isfinite(number) else None
 
 
 def _scan_mat(path: Path) -> Scan:
@@ -179,35 +225,32 @@ def _scan_mat(path: Path) -> Scan:
 
     Version 5 files are read by SciPy as plain arrays; nothing in them is executed.
     """
-    from scipy.io import loadmat  # noqa: PLC0415  (slow to import, seldom needed)
-    from scipy.io.matlab import MatReadError  # noqa: PLC0415
-
-    content = _read_bytes(path)
+    file = str(path)
     try:
-        fields = loadmat(io.BytesIO(content), squeeze_me=False, chars_as_strings=True)
+        fields, names = read_variables(read_input(path, MOST_BYTES, DataError), _MAT_VARIABLES, MOST_BYTES)
     except NotImplementedError:
         raise DataError(
-            Fault("a version 7.3 (HDF5) .mat file", str(path), allowed="version 5: save with -v6 or -v7")
+            Fault("a version 7.3 (HDF5) .mat file", file, allowed="version 5: save with -v6 or -v7")
         ) from None
-    except (MatReadError, ValueError, TypeError, KeyError, IndexError, EOFError, OSError) as error:
-        raise DataError(Fault(f"not a readable .mat file: {error}", str(path))) from None
-    names = [name for name in fields if not name.startswith("__")]
+    except DamagedError as error:
+        raise DataError(Fault(f"not a readable .mat file: {error}", file)) from None
     for needed in ("wavelength", "data"):
-        if needed not in fields:
-            raise DataError(Fault(f"no variable `{needed}`", str(path), value=names, nearest=nearest(needed, names)))
+        if needed not in names:
+            raise DataError(Fault(f"no variable `{needed}`", file, value=names, nearest=nearest(needed, names)))
+    if "filterNames" in names and "filterNames" not in fields:
+        raise DataError(Fault("`filterNames` must be texts", file))
     try:
         if any(np.iscomplexobj(fields[needed]) for needed in ("wavelength", "data")):
             raise TypeError
         wave = np.asarray(fields["wavelength"], dtype=float).ravel()
-        data = np.atleast_2d(np.asarray(fields["data"], dtype=float))
-    except (TypeError, ValueError):
-        raise DataError(Fault("`wavelength` and `data` must be real numbers", str(path))) from None
-    if data.shape[0] != wave.size and data.shape[1] == wave.size:
+        data = np.atleast_2d(np.asarray(fields["data"], dtype=float)) + 0.0
+    except (TypeError, ValueError, KeyError):
+        raise DataError(Fault("`wavelength` and `data` must be real numbers", file)) from None
+    if data.shape[0] != wave.size and data.shape[-1] == wave.size:
         data = data.T
     if data.ndim != 2 or data.shape[0] != wave.size or not data.size:
-        raise DataError(
-            Fault("`data` does not fit `wavelength`", str(path), value=data.shape, allowed=f"({wave.size}, n)")
-        )
+        raise DataError(Fault("`data` does not fit `wavelength`", file, value=data.shape, allowed=f"({wave.size}, n)"))
+    _check_size(file, None, *data.shape)
     columns = _mat_names(fields.get("filterNames"), data.shape[1])
     return Scan(wave, columns, data, tuple(map(tuple, _sample_faults(path, wave, columns, data))))
 

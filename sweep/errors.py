@@ -5,11 +5,23 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import islice
+
+MOST_FAULTS = 50
+"""So many are told; of more, how many there are."""
+_MOST_KNOWN = 1000
+_MOST_LETTERS = 100
+_MOST_OF_A_PART = 2000
 
 
 def nearest(name: object, known: Iterable[str]) -> str | None:
-    """Return the known name that is most like `name`, or None when none is alike."""
-    folded = {str(candidate).casefold(): str(candidate) for candidate in known}
+    """Return the known name that is most like `name`, or None when none is alike.
+
+    Looks at the first 1000 names, and nowhere for the like of a name beyond 100 letters, so that it never takes long.
+    """
+    if len(str(name)) > _MOST_LETTERS:
+        return None
+    folded = {str(c).casefold(): str(c) for c in islice(known, _MOST_KNOWN) if len(str(c)) <= _MOST_LETTERS}
     found = difflib.get_close_matches(str(name).casefold(), list(folded), n=1, cutoff=0.5)
     return folded[found[0]] if found else None
 
@@ -28,19 +40,23 @@ class Fault:
 
     def __str__(self) -> str:
         place = "" if self.file is None else self.file if self.line is None else f"{self.file}:{self.line}"
-        parts = [part for part in (place, self.key) if part]
-        text = ": ".join([*parts, self.problem])
+        parts = [_cut(part) for part in (place, self.key) if part]
+        text = ": ".join([*parts, _cut(self.problem)])
         if self.value is not None:
             text += f" (got {_short(self.value)})"
         if self.allowed is not None:
-            text += f"; allowed: {self.allowed}"
+            text += f"; allowed: {_cut(self.allowed)}"
         if self.nearest is not None:
             text += f"; did you mean {self.nearest!r}?"
-        return " ".join(text.split())
+        # Nothing of a file steers a terminal, or fails to be written to it.
+        return "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))
 
 
 class SweepError(Exception):
-    """Base of all errors that a user can cause or mend. `exit_code` is what the command returns."""
+    """Base of all errors that a user can cause or mend. `exit_code` is what the command returns.
+
+    `faults`: at most MOST_FAULTS of them; where there are more, the last one says how many.
+    """
 
     exit_code = 2
 
@@ -49,7 +65,7 @@ class SweepError(Exception):
             faults = (Fault(faults),)
         elif isinstance(faults, Fault):
             faults = (faults,)
-        self.faults: tuple[Fault, ...] = tuple(faults)
+        self.faults = _told(faults)
         super().__init__("\n".join(str(fault) for fault in self.faults))
 
 
@@ -89,6 +105,16 @@ class InterruptedRunError(SweepError):
     exit_code = 130
 
 
+def _told(faults: Sequence[Fault]) -> tuple[Fault, ...]:
+    if len(faults) <= MOST_FAULTS:
+        return tuple(faults)
+    more = len(faults) - MOST_FAULTS + 1
+    return (*faults[: MOST_FAULTS - 1], Fault(f"and {more:,} more faults", faults[0].file))
+
+
 def _short(value: object, limit: int = 60) -> str:
-    text = repr(value)
+    return _cut(repr(value[: limit + 1] if isinstance(value, str) else value), limit)
+
+
+def _cut(text: str, limit: int = _MOST_OF_A_PART) -> str:
     return text if len(text) <= limit else text[: limit - 3] + "..."

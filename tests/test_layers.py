@@ -12,8 +12,8 @@ PACKAGE = Path(__file__).parent.parent / "sweep"
 # From the bottom. A unit is a module or a folder of the package.
 LEVELS = [
     {"errors", "arrays", "cache", "completion"},
-    {"schema"},
-    {"kernels", "spectra", "mosaics", "pareto", "constraints", "objectives", "edges", "progress"},
+    {"schema", "inputs"},
+    {"kernels", "spectra", "mosaics", "pareto", "constraints", "objectives", "edges", "progress", "mat_files"},
     {"metrics", "curve_files", "surrogate", "sensor", "chromaticity"},
     {"datasets", "filters", "filter_files", "scenes", "families", "discrimination", "signals"},
     {"spaces", "setup"},

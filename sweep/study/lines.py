@@ -2,46 +2,37 @@
 
 from __future__ import annotations
 
+import codecs
 from collections.abc import Sequence
-from io import StringIO
+from itertools import islice
 from pathlib import Path
 from types import UnionType
 from typing import Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.constructor import DuplicateKeyError
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
-from ..errors import Fault, StudyError, nearest
+from ..curve_files import NO_UTF_16
+from ..errors import MOST_FAULTS, Fault, StudyError, nearest
+from ..inputs import read_input
+from .yaml_tree import Key, Tree
 
-Key = str | int
+_MOST = (500_000, 50_000)
+"""Bytes of a study file, and keys and values in it."""
+_RESOLVED = ".resolved.yaml"
+_MOST_RESOLVED = (8_000_000, 400_000)
+"""Of a file of that name, as a run writes it: with every default, and each of up to 2000 scenarios."""
+_MOST_LOOKED_AT = 2 * MOST_FAULTS
+"""Of the faults that the schema finds; of a value that may have several types there is one for each."""
 
 
 class Document:
-    """A parsed YAML file that knows the line of each of its keys."""
+    """A parsed YAML file that knows the line of each of its keys. `data`: its keys with plain values."""
 
     def __init__(self, path: Path) -> None:
         self.file = str(path)
-        try:
-            text = path.read_text(encoding="utf-8-sig")
-        except OSError as error:
-            raise StudyError(Fault(f"cannot be read: {error.strerror or error}", self.file)) from None
-        except UnicodeDecodeError as error:
-            raise StudyError(Fault(f"not UTF-8 text ({error.reason} at byte {error.start})", self.file)) from None
-        try:
-            self._root = YAML(typ="rt").load(StringIO(text))
-        except DuplicateKeyError as error:
-            line = None if error.problem_mark is None else error.problem_mark.line + 1
-            problem = str(error.problem or "a key occurs twice").splitlines()[0]
-            raise StudyError(Fault(problem, self.file, line)) from None
-        except MarkedYAMLError as error:
-            line = None if error.problem_mark is None else error.problem_mark.line + 1
-            raise StudyError(Fault(f"not valid YAML: {error.problem or error.context}", self.file, line)) from None
-        except (YAMLError, RecursionError, ValueError) as error:
-            raise StudyError(Fault(f"not valid YAML: {type(error).__name__} {error}", self.file)) from None
-        if not isinstance(self._root, CommentedMap):
+        most_bytes, most_values = _MOST_RESOLVED if path.name.endswith(_RESOLVED) else _MOST
+        self._tree = Tree(_text(path, most_bytes), self.file, most_values)
+        if not isinstance(self._tree.root, dict):
             raise StudyError(
                 Fault(
                     "a study file is a mapping of keys",
@@ -50,21 +41,18 @@ class Document:
                     allowed="`study: name` and further keys",
                 )
             )
-        self.data = _plain(self._root)
+        self.data: dict[str, Any] = self._tree.root
 
     def line(self, path: Sequence[Key]) -> int:
         """Line of the deepest key of `path` that the file has, from 1."""
-        node: Any = self._root
+        node: Any = self.data
         line = 1
         for key in path:
             if not _has(node, key):
                 break
-            if isinstance(node, CommentedMap) and key in node.lc.data:
-                line = node.lc.key(key)[0] + 1
-            elif isinstance(node, CommentedSeq):
-                line = node.lc.item(key)[0] + 1
+            line = self._tree.line(node, key) or line
             node = _child(node, key)
-        return int(line)
+        return line
 
     def fault(
         self,
@@ -81,14 +69,17 @@ class Document:
         """Pydantic's errors as faults of this file."""
         found: dict[tuple[tuple[Key, ...], str], Fault] = {}
         meant = set()
-        for item in error.errors():
+        items = error.errors(include_url=False)
+        for item in islice(items, _MOST_LOOKED_AT):
             path = self._known_path(item["loc"])
             fault = self._fault(path, item, model)
             found.setdefault((path, fault.problem), fault)
             if item["type"] == "extra_forbidden":
                 meant.add((*path[:-1], fault.nearest))
         # A misspelled key is one fault, not a second one because the right key is missing.
-        return [fault for (path, problem), fault in found.items() if not (problem == "missing" and path in meant)]
+        told = [fault for (path, problem), fault in found.items() if not (problem == "missing" and path in meant)]
+        more = len(items) - _MOST_LOOKED_AT
+        return [*told, Fault(f"and about {more:,} more faults", self.file)] if more > 0 else told
 
     def _known_path(self, loc: Sequence[Key]) -> tuple[Key, ...]:
         """`loc` without the tags that pydantic adds for unions, and with a missing last key kept."""
@@ -201,15 +192,16 @@ def _readable(message: str) -> str:
     return "mapping" if plain.startswith("dictionary") else plain
 
 
-def _plain(node: Any) -> Any:
-    """Round-trip nodes as plain Python values."""
-    if isinstance(node, dict):
-        return {str(key): _plain(value) for key, value in node.items()}
-    if isinstance(node, list):
-        return [_plain(value) for value in node]
-    if isinstance(node, bool) or node is None:
-        return node
-    for plain in (int, float, str):
-        if isinstance(node, plain):
-            return plain(node)
-    return node
+def _text(path: Path, most_bytes: int) -> str:
+    content = read_input(path, most_bytes, StudyError)
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        wide = content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+        problem = f"not UTF-8 text ({error.reason} at byte {error.start})"
+        line = None if wide else content.count(b"\n", 0, error.start) + 1
+        raise StudyError(Fault(problem, str(path), line, allowed=NO_UTF_16 if wide else "UTF-8")) from None
+    if "\0" in text:
+        line = text.count("\n", 0, text.index("\0")) + 1
+        raise StudyError(Fault("NUL characters in the text", str(path), line, allowed=NO_UTF_16))
+    return text

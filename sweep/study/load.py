@@ -8,7 +8,8 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from ..arrays import FloatArray
-from ..errors import StudyError
+from ..errors import Fault, StudyError
+from ..inputs import is_folder
 from ..spectra import WavelengthGrid
 from .lines import Document
 from .model import Study
@@ -41,8 +42,8 @@ def load_study(
         section = section.model_copy(
             update={"wavelengths": WavelengthGrid(start_nm=grid.start_nm, stop_nm=grid.stop_nm, step_nm=step_nm)}
         )
-    if data is not None and not data.is_dir():
-        raise StudyError(f"--data {data}: no such folder")
+    if data is not None and not is_folder(data):
+        raise StudyError(Fault("no such folder", None, None, "--data", str(data)))
     return resolve(document, section, [*([data] if data is not None else []), path.parent], kept)
 
 

@@ -16,11 +16,12 @@ from ..mosaics import Mosaic
 from ..scenes import OBJECT_RESOLUTION, WhitePatchExposure
 from ..search import ALGORITHMS
 from ..spaces import DIMENSIONS, Space
-from .lines import Document, Key
+from .lines import Document
 from .model import Search, Study
 from .schema import Axis, CfaSection, StudySection
 from .sources import Sources
 from .space_builder import SpaceBuilder
+from .yaml_tree import Key
 
 MOST_DESIGNS = 10**9
 

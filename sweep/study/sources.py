@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
@@ -11,12 +12,14 @@ from ..arrays import FloatArray
 from ..curve_files import digest, read_curves
 from ..datasets import BUILT_IN_LIGHTS
 from ..datasets.lights import Lights, make_lights
-from ..errors import DataError, Fault, nearest
+from ..errors import MOST_FAULTS, DataError, Fault, nearest
 from ..filters import BUILT_IN_SENSORS, SensorCurves, make_sensor
+from ..inputs import is_file
 from ..spectra import Curves, WavelengthGrid, photons_from_energy
 from ..surrogate import BUILT_IN_RANGE_NM
 from .curve_sections import CurveFile, LightFile, LightsSection, SensorSection
-from .lines import Document, Key
+from .lines import Document
+from .yaml_tree import Key
 
 _Made = TypeVar("_Made", SensorCurves, Lights)
 _CUT_OFF = 0.01
@@ -41,7 +44,11 @@ class Sources:
 
     def unknown(self, path: tuple[Key, ...], what: str, value: str, known: list[str]) -> None:
         """Add the fault of a name that is not among the known ones, with the nearest of them."""
-        self.add(path, f"unknown {what}", value, ", ".join(known), nearest(value, known))
+        self.add(path, f"unknown {what}", value, ", ".join(known), self._near(value, known))
+
+    def _near(self, value: str, known: Iterable[str]) -> str | None:
+        """The nearest known name, as long as somebody is told of it."""
+        return nearest(value, known) if len(self.faults) < MOST_FAULTS else None
 
     def sensor(self, section: SensorSection) -> SensorCurves | None:
         """The study's sensor, or None after adding faults."""
@@ -156,7 +163,7 @@ class Sources:
             return None
         if column not in curves.values:
             known = list(curves.values)
-            self.add(path, f"{entry.file} has no such column", column, ", ".join(known), nearest(column, known))
+            self.add(path, f"{entry.file} has no such column", column, ", ".join(known), self._near(column, known))
             return None
         try:
             return curves.on(self.grid, column, entry.resampling, entry.outside)
@@ -177,11 +184,10 @@ class Sources:
         if entry.file in self._read:
             return self._read[entry.file]
         self._read[entry.file] = None
-        found = next((folder / entry.file for folder in self.folders if (folder / entry.file).is_file()), None)
+        found = next((folder / entry.file for folder in self.folders if is_file(folder / entry.file)), None)
         if found is None:
             searched = ", ".join(str(folder) for folder in self.folders)
-            beside = [item.name for folder in self.folders if folder.is_dir() for item in folder.iterdir()]
-            near = nearest(entry.file, beside)
+            near = self._near(entry.file, _names(self.folders))
             self.add((*path, "file"), "no such file", entry.file, f"a path relative to {searched}", near)
             return None
         try:
@@ -201,3 +207,10 @@ class Sources:
     ) -> None:
         """Add a fault at `path` of the study file."""
         self.faults.append(self.document.fault(path, problem, value, allowed, near))
+
+
+def _names(folders: Iterable[Path]) -> Iterator[str]:
+    """Names of what lies in folders, as far as they can be read."""
+    for folder in folders:
+        with suppress(OSError):
+            yield from (item.name for item in folder.iterdir())

@@ -11,9 +11,9 @@ from ..filters import SensorCurves
 from ..mosaics import Mosaic
 from ..spaces import Filter, Kind, Space
 from ..surrogate import surrogate_parameters
-from .lines import Key
 from .schema import DesignSection, Modification, StudySection
 from .sources import Sources
+from .yaml_tree import Key
 
 
 @dataclass(frozen=True)

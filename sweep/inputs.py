@@ -1,0 +1,51 @@
+"""Read a user's file: a regular one, no larger than its kind can be."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+from .errors import Fault, SweepError
+
+
+def read_input(path: Path, most_bytes: int, refused: type[SweepError]) -> bytes:
+    """The content of a regular file of at most `most_bytes`.
+
+    Raises `refused` for what is absent, larger or no file (a pipe, a device, a folder), before anything of it is read:
+    such a thing may block forever, or never end.
+    """
+    try:
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise refused(Fault("not a file", str(path), allowed="a file on a disk; no folder, pipe or device"))
+        with open(path, "rb", opener=_opened) as handle:
+            size = os.fstat(handle.fileno()).st_size
+            content = handle.read(most_bytes + 1) if size <= most_bytes else b""
+    except (OSError, ValueError) as error:  # a ValueError: NUL in a path
+        reason = (error.strerror if isinstance(error, OSError) else None) or error
+        raise refused(Fault(f"cannot be read: {reason}", str(path))) from None
+    size = max(size, len(content))  # what the kernel makes up as it is read has no size
+    if size > most_bytes:
+        raise refused(Fault("the file is too large", str(path), None, None, f"{size:,} bytes", f"up to {most_bytes:,}"))
+    return content
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is such a file; False also for a path that no file system takes."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def is_folder(path: Path) -> bool:
+    """Whether there is such a folder; False also for a path that no file system takes."""
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):
+        return False
+
+
+def _opened(path: str, flags: int) -> int:
+    """Without waiting, should a pipe have come to the place of the file."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
