@@ -20,7 +20,7 @@ from .discrimination import (
     state_error_bound,
 )
 from .imaging import Changing, Imager, smooth_imager
-from .metrics import Pair, cfa_sensitivity, class_pairs, csd_name, separation, separations, separations_along
+from .metrics import CSD, Pair, cfa_sensitivity, class_pairs, csd_name, separation, separations, separations_along
 from .setup import Setup
 
 DESIGNED = ("sensitivity", "cfa_sensitivity", "slope_per_nm", "min_transmission")
@@ -32,6 +32,11 @@ STATE_ERROR = "state_error"
 BEST_PLACE = "best_place_"
 """Prefix of a CSD that is the largest over the places where the light may fall on the mosaic."""
 Columns = dict[str, FloatArray]
+
+
+def is_promised(column: str) -> bool:
+    """Whether a plan's promise holds for a column: each CSD, that of the best place, and that of the worst edges."""
+    return column.removeprefix(WORST).removeprefix(BEST_PLACE).startswith(CSD)
 
 
 def quantities(lights: Lights) -> tuple[str, ...]:

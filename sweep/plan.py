@@ -77,7 +77,9 @@ class Planner:
     def _why_exact(self, effect: str) -> str | None:
         """The reason when skipping an effect changes nothing in any box."""
         if effect == "saturation":
-            if any(scene.promise(effect, REFERENCE, replace(REFERENCE, saturation="skip")) for scene in self._scenes):
+            # Rounding ends at the ADC's range, too: only where that is left out, all of the excess shows.
+            before = replace(REFERENCE, quantization="skip")
+            if any(scene.promise(effect, before, replace(before, saturation="skip")) for scene in self._scenes):
                 return None
             if self._noisy:
                 return None

@@ -94,14 +94,9 @@ class Promises:
         elif effect == "quantization":
             each = [quantization.promise(self.setup)] * tops.size
         elif effect == "saturation":
-            each = [saturation.promise(self.setup, top / pixel.dn_per_e) for top in tops]
+            each = [saturation.promise(self.setup, top / pixel.dn_per_e, after) for top in tops]
         else:
-            soft = self.setup.scenario.noise is not None and after.noise == "expected"
-            clipped = after.saturation == "clip"
-            each = [
-                pixel.offset_dn if soft and clipped else pedestal.promise(self.setup, top, clipped=clipped)
-                for top in tops
-            ]
+            each = [pedestal.promise(self.setup, top, after) for top in tops]
         return float(np.linalg.norm(each))
 
     def _kernel(self, methods: Methods) -> FloatArray:

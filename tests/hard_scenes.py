@@ -1,8 +1,8 @@
-"""Scenes in which single effects are strong, weak or at an edge case, and a random generator of scenes."""
+"""Scenes in which single effects are strong, weak or at an edge case."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -80,8 +80,8 @@ def scene(
     curves = FAMILY.curves(x[None]) if modified else np.empty((1, 0, GRID.size))
     low, high = setup.qe.copy(), setup.qe.copy()
     if modified:
-        low[list(modified)] = FAMILY.lower(LOW, HIGH) if wide else curves[0]
-        high[list(modified)] = FAMILY.upper(LOW, HIGH) if wide else curves[0]
+        hull = FAMILY.hull(LOW, HIGH) if wide else (curves[0], curves[0])
+        low[list(modified)], high[list(modified)] = hull
     return Scene(name, setup, curves, Box(setup, low, high, 1000))
 
 
@@ -190,46 +190,3 @@ HARD: tuple[Scene, ...] = (
         DARK | {"crosstalk": 0.02},
     ),
 )
-
-
-def random_scene(seed: int) -> Scene:
-    """Any mixture of effects, in moderate strength."""
-    rng = np.random.default_rng([seed, 17])
-
-    def now(probability: float) -> bool:
-        return bool(rng.uniform() < probability)
-
-    given: dict[str, Any] = {"optics": {"f_number": float(2 ** rng.uniform(0.3, 4))}}
-    if now(0.7):
-        given["target"] = target(
-            float(10 ** rng.uniform(1.5, 2.7)),
-            float(rng.uniform(20, 120)),
-            readout="center" if now(0.3) else "mean",
-            phase_px="any" if now(0.15) else [float(v) for v in rng.uniform(0, 2, 2)],
-        )
-        if now(0.3):
-            given["visibility_m"] = float(10 ** rng.uniform(2, 4.5))
-        if now(0.15):
-            given["optics"]["focus_m"] = float(10 ** rng.uniform(0.5, 2))
-    if now(0.3):
-        given["off_axis_deg"] = float(rng.uniform(0, 50))
-    if now(0.5):
-        given["exposure"] = {"kind": "fixed", "exposure_s": float(10 ** rng.uniform(-3.5, -1.5))}
-        if now(0.6):
-            given["intensity_cd"] = 200.0
-    if now(0.2):
-        given["background_cd_m2"] = float(10 ** rng.uniform(0, 3.5))
-    if now(0.2):
-        given["drive"] = {"duty": float(rng.uniform(0.1, 1)), "frequency_hz": float(10 ** rng.uniform(1.7, 3.5))}
-    given["noise"] = now(0.4)
-    pixel: dict[str, Any] = {"fill_factor": float(rng.uniform(0.3, 1)), "offset_dn": 64.0 if now(0.5) else 0.0}
-    if now(0.3):
-        pixel["crosstalk"] = float(rng.uniform(0, 0.15))
-    if given["noise"]:
-        pixel |= {"read_noise_e": float(rng.uniform(0.2, 5)), "prnu": 0.01 if now(0.5) else 0.0}
-    cfa = str(rng.choice(list(TILES)))
-    return scene(f"random {seed}", cfa, given, pixel, wide=now(0.3), seed=seed)
-
-
-def with_methods(made: Scene, **methods: str) -> Setup:
-    return replace(made.setup, methods=replace(made.setup.methods, **methods))

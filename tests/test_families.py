@@ -193,3 +193,37 @@ def test_no_filter_of_a_box_exceeds_its_upper_curve(name: str) -> None:
     points = points[(family.violation(points) <= 0).all(axis=1)]
     assert len(points) > 100
     assert (family.curves(points) <= family.upper(low, high) + 1e-12).all()
+
+
+@pytest.mark.parametrize("shift_nm", [0.0, 4.0])
+@pytest.mark.parametrize("name", list(FAMILIES))
+def test_every_filter_of_a_box_lies_in_its_hull(name: str, shift_nm: float) -> None:
+    """Also where edges come out of order; and of a box of one design the hull is its filter."""
+    family, x = FAMILIES[name]
+    family = family.shifted(shift_nm)
+    rng = np.random.default_rng(4)
+    disordered = 0
+    for _ in range(20):
+        half = rng.uniform(0, 1, x.size) * np.where(x > 100, 40.0, 0.9 * x)
+        low, high = x - half, np.minimum(x + half, [p.high for p in family.parameters])
+        points = low + (high - low) * np.round(rng.uniform(-0.3, 1.3, (300, x.size)).clip(0, 1), 1)
+        curves = family.curves(points)
+        disordered += int((family.violation(points) > 0).any(axis=1).sum())
+        lower, upper = family.hull(low, high)
+        assert (curves >= lower - 1e-12).all()
+        assert (curves <= upper + 1e-12).all()
+    assert disordered > 100 or name == "free_form"
+    for end in family.hull(x, x):
+        np.testing.assert_allclose(end, family.curves(x[None])[0], atol=1e-15)
+
+
+def test_the_hull_of_a_box_is_reached_where_one_edge_moves() -> None:
+    family = Stopband(WAVE, BASE, TARGET)
+    low, high = np.array([590.0, 5.0, 650.0, 10.0, 0.7]), np.array([620.0, 25.0, 650.0, 10.0, 0.7])
+    lefts, widths = np.meshgrid(np.linspace(590, 620, 61), np.linspace(5, 25, 41))
+    points = np.tile(low, (lefts.size, 1))
+    points[:, 0], points[:, 1] = lefts.ravel(), widths.ravel()
+    curves = family.curves(points)[:, 0]
+    lower, upper = family.hull(low, high)
+    np.testing.assert_allclose(curves.min(axis=0), lower[0], atol=1e-12)
+    np.testing.assert_allclose(curves.max(axis=0), upper[0], atol=1e-12)

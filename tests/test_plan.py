@@ -20,11 +20,10 @@ from sweep.setup import REFERENCE, Methods
 from sweep.study import load_study
 
 from .conftest import STUDIES
-from .hard_scenes import F2, FAR, HARD, Scene, random_scene, scene
+from .hard_scenes import F2, FAR, HARD, Scene, scene
 
 _ARITHMETIC_DN = 1e-9
 """Rounding of double precision itself."""
-_RANDOM = 1000
 
 
 def csds(made: Scene, methods: Methods) -> np.ndarray:
@@ -79,25 +78,6 @@ def test_no_method_changes_more_than_it_promises() -> None:
 def test_promises_are_not_uselessly_wide() -> None:
     ratios = [promised / realized for *_, promised, realized in all_contracts() if realized > 1e-3]
     assert len(ratios) > 200
-    assert np.median(ratios) <= 10
-
-
-def keep_a_plan(seed: int) -> tuple[float, float, float]:
-    """(tolerance, promised, realized) of the plan for a random scene and tolerance."""
-    made = random_scene(seed)
-    tolerance = float(10 ** np.random.default_rng([seed, 3]).uniform(-2, 2))
-    plan = Planner([made.box]).plan(made.name, tolerance)
-    realized = np.abs(csds(made, plan.methods) - csds(made, REFERENCE)).max()
-    return tolerance, plan.promised_dn, float(realized)
-
-
-def test_plans_of_a_thousand_random_scenes_keep_their_promise() -> None:
-    found = joblib.Parallel(n_jobs=2, batch_size=10)(joblib.delayed(keep_a_plan)(seed) for seed in range(_RANDOM))
-    for seed, (tolerance, promised, realized) in enumerate(found):
-        assert promised <= tolerance, seed
-        assert realized <= promised * (1 + 1e-9) + _ARITHMETIC_DN, seed
-    ratios = [promised / realized for _, promised, realized in found if realized > 1e-3]
-    assert len(ratios) > 100
     assert np.median(ratios) <= 10
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..arrays import FloatArray
 from ..sensor import Pixel
-from ..setup import Setup
+from ..setup import Methods, Setup
 
 METHODS = ("skip", "clip")
 
@@ -26,6 +28,18 @@ def clipped(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     return np.minimum(electrons, top_e(pixel))
 
 
-def promise(setup: Setup, brightest_e: float) -> float:
-    """Range of what leaving it out changes in one coordinate, DN: the excess of the brightest signal."""
-    return max(0.0, brightest_e - top_e(setup.pixel)) * setup.pixel.dn_per_e
+def promise(setup: Setup, brightest_e: float, methods: Methods) -> float:
+    """Range of what leaving it out changes in one coordinate, DN: that of the brightest signal, which grows with it.
+
+    Where the value is rounded afterwards, the change of the rounded one, which the end of the ADC still bounds; where
+    noise dithers it, up to a step more. `methods`: those of the rest of the readout, which is switched before.
+    """
+    pixel = setup.pixel
+    excess = max(0.0, brightest_e - top_e(pixel)) * pixel.dn_per_e
+    if excess == 0 or methods.quantization == "skip":
+        return excess
+    if setup.scenario.noise is not None:
+        return excess + 1.0
+    ends = (top_e(pixel), brightest_e)
+    held, whole = (math.floor(end * pixel.dn_per_e + pixel.offset_dn + 0.5) for end in ends)
+    return float(min(whole, pixel.full_scale_dn) - min(held, pixel.full_scale_dn))

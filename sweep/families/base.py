@@ -40,10 +40,10 @@ class Family(Protocol):
         """QE of the modified channels: [n_designs, n_parameters] -> [n_designs, n_modified, n_wavelengths]."""
 
     def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """No filter of the box `low`..`high` ([n_parameters] each) exceeds this: [n_modified, n_wavelengths]."""
+        """No well-formed filter of the box `low`..`high` exceeds this, ndarray[n_modified, n_wavelengths]."""
 
-    def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """No filter of the box is below this: [n_modified, n_wavelengths]; see `upper`."""
+    def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """No filter of the box, well formed or not, is below the first or above the second: see `upper`."""
 
     def gradient(self, x: FloatArray) -> FloatArray:
         """Derivative of `curves` at one design: [n_parameters] -> [n_parameters, n_modified, n_wavelengths]."""

@@ -65,6 +65,27 @@ class Bands:
             open_at[(self._wave >= start) & (self._wave <= end)] = 1.0
         return open_at
 
+    def range(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """No `shape` of the box lies outside, whatever the order of its edges: ndarray[n_wavelengths] each.
+
+        An edge falls with its center, and with its width it falls behind the center and rises before it. So its
+        extremes are at the ends of both.
+        """
+        least, most = np.zeros(self._wave.size), np.zeros(self._wave.size)
+        for at in range(0, self._count * _PER_BAND, _PER_BAND):
+            ends = []
+            for edge_at in (at + LEFT, at + RIGHT):
+                early, late = (
+                    self.edges(np.array([[box[edge_at], width[edge_at + 1]] for width in (low, high)]))
+                    for box in (low, high)
+                )
+                ends.append((late.min(axis=0), early.max(axis=0)))
+            (left_low, left_high), (right_low, right_high) = ends
+            depths = np.array([low[at + DEPTH], high[at + DEPTH]])
+            least += np.outer(depths, left_low - right_high).min(axis=0)
+            most += np.outer(depths, left_high - right_low).max(axis=0)
+        return least, most
+
     def shifted(self, shift_nm: float) -> Bands:
         """The bands that come out with every edge `shift_nm` too far toward the red."""
         return Bands(self._wave - shift_nm, self._count)
@@ -197,9 +218,10 @@ class Stopband(Banded):
         """The base, or the target where it is higher and a band can reach; see `Family.upper`."""
         return (self._base + np.maximum(self._change, 0.0) * self._bands.reach(low, high))[None, :]
 
-    def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """The base, or the target where it is lower and a band can reach; see `Family.lower`."""
-        return (self._base + np.minimum(self._change, 0.0) * self._bands.reach(low, high))[None, :]
+    def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Base and change where the bands are least and most open; see `Family.hull`."""
+        ends = np.stack([self._base + self._change * shape for shape in self._bands.range(low, high)])
+        return ends.min(axis=0)[None, :], ends.max(axis=0)[None, :]
 
     def gradient(self, x: FloatArray) -> FloatArray:
         """Derivative by each parameter, ndarray[n_parameters, 1, n_wavelengths]; see `Family.gradient`."""

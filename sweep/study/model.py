@@ -141,11 +141,7 @@ class Study:
             ends = [np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max)]
             shifts = [self.edge_shift_nm * s for s in SHIFTS] if self.edge_shift_nm else [0.0]
             families = [space.filter.family.shifted(shift) for shift in shifts]
-            if space.size == 1:
-                curves = [family.curves(ends[0][None])[0] for family in families]
-                lows = highs = curves
-            else:
-                lows, highs = [f.lower(*ends) for f in families], [f.upper(*ends) for f in families]
+            lows, highs = zip(*(family.hull(*ends) for family in families), strict=True)
             low[list(setup.modified)] = np.min(lows, axis=0)
             high[list(setup.modified)] = np.max(highs, axis=0)
         searched = self.search is not None and self.search.space is space and self.search.scenario == scenario
