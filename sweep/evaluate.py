@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,8 +20,10 @@ from .discrimination import (
     pairwise_error,
     state_error_bound,
 )
+from .effects.phase import Cases
 from .imaging import Changing, Imager, smooth_imager
 from .metrics import CSD, Pair, cfa_sensitivity, class_pairs, csd_name, separation, separations, separations_along
+from .places import Extremes
 from .setup import Setup
 
 DESIGNED = ("sensitivity", "cfa_sensitivity", "slope_per_nm", "min_transmission")
@@ -30,7 +33,8 @@ WORST = "worst_"
 STATE_ERROR = "state_error"
 """Name of the largest pairwise error over all pairs of states."""
 BEST_PLACE = "best_place_"
-"""Prefix of a CSD that is the largest over the places where the light may fall on the mosaic."""
+"""Prefix of a CSD that is the largest over the places where the light may fall on the mosaic, each at its worst moment
+of a pulsed light."""
 Columns = dict[str, FloatArray]
 
 
@@ -140,13 +144,59 @@ def _told_apart(mean: FloatArray, variance: FloatArray, members: Mapping[str, In
     return found
 
 
+def _over_all_places(
+    imager: Imager,
+    curves: FloatArray,
+    exposure_s: FloatArray,
+    columns: Columns,
+) -> None:
+    """Put the extremes over all places into the columns, which hold those over the lattice."""
+    assert imager.anywhere is not None
+    for design in np.flatnonzero(np.isfinite(exposure_s)):
+        light = imager.light_dn(curves[design], exposure_s[design])
+        if not np.isfinite(light).all():
+            continue
+        found = imager.anywhere.extremes(light)
+        if not imager.straight:
+            found = _as_read(imager, curves[design : design + 1], found)
+        for pair, extremes in found.items():
+            name = csd_name(pair)
+            smallest, largest = (np.nan, np.nan) if extremes is None else (extremes.smallest, extremes.largest)
+            best = columns[BEST_PLACE + name]
+            columns[name][design] = np.minimum(columns[name][design], smallest)
+            best[design] = np.maximum(best[design], largest)
+
+
+def _as_read(imager: Imager, curves: FloatArray, found: Mapping[Pair, Extremes | None]) -> dict[Pair, Extremes | None]:
+    """Extremes of one design at the places where those of the straight response are, as the camera reads them out."""
+    kept = [extremes for extremes in found.values() if extremes is not None]
+    at = [case for extremes in kept for case in (extremes.at_smallest, extremes.at_largest)]
+    if not at:
+        return dict(found)
+    there = Imager(imager.setup, imager.work, cases=Cases(*np.moveaxis(np.array(at), 1, 0)))
+    response = there.read(curves)[0].reshape(len(at), -1, *imager.signals.shape[:1], len(imager.setup.mosaic.channels))
+    read = [separations(moments, imager.setup.members) for moments in response]
+    return {
+        pair: None
+        if extremes is None
+        else replace(
+            extremes,
+            smallest=min(float(distances[pair].min()) for distances in read),
+            largest=max(float(distances[pair].min()) for distances in read),
+        )
+        for pair, extremes in found.items()
+    }
+
+
 def evaluate(imager: Imager, designs: FloatArray | Block, states: Sequence[str] = ()) -> dict[str, FloatArray]:
     """Evaluate a block of designs as the camera reads them out, as far as the scene's methods go.
 
     `designs`: a block, or the QE of its modified channels, ndarray[n_designs, n_modified, n_wavelengths]. Returns
     columns, each ndarray[n_designs]: `csd_<a>_<b>` (DN) of every pair of signal types, the smallest over the places of
-    the light; `best_place_csd_<a>_<b>`, the largest, where a scene has several; those of `block_quantities` and
-    `exposure_s`; with `states`, those of `noise_quantities`, the worst over the places.
+    the light and the moments of its pulses; `best_place_csd_<a>_<b>`, where a scene has several places, the largest
+    over the places of the smallest over the moments; those of `block_quantities` and `exposure_s`; with `states`, those
+    of `noise_quantities`, the worst over the places of the lattice. Distances are NaN where the extremes over all
+    places take more cells than `places` allows.
     """
     block = Curves(designs) if isinstance(designs, np.ndarray) else designs
     changing = None if states else imager.read_changing(block)
@@ -162,6 +212,8 @@ def evaluate(imager: Imager, designs: FloatArray | Block, states: Sequence[str] 
             for name, values in part.items():
                 columns[name][which] = values
     exposure_s = columns.pop("exposure_s")
+    if imager.anywhere is not None:
+        _over_all_places(imager, block.curves(), exposure_s, columns)
     return columns | block_quantities(imager.setup, block) | {"exposure_s": exposure_s}
 
 
@@ -171,7 +223,7 @@ def _distances_along(imager: Imager, changing: Changing) -> Columns:
         separations_along(fixed, changing.channel, changing.values[:, case], imager.setup.members)
         for case, fixed in enumerate(changing.fixed)
     ]
-    return _over(cases) | {"exposure_s": np.full(len(changing.values), changing.exposure_s)}
+    return _over(imager, cases) | {"exposure_s": np.full(len(changing.values), changing.exposure_s)}
 
 
 def _distances(imager: Imager, block: Block, states: Sequence[str] = ()) -> Columns:
@@ -183,7 +235,7 @@ def _distances(imager: Imager, block: Block, states: Sequence[str] = ()) -> Colu
     else:
         response, exposure_s = imager.read(block.curves())
     cases = [separations(response[:, case], imager.setup.members) for case in range(response.shape[1])]
-    return _over(cases) | apart | {"exposure_s": exposure_s}
+    return _over(imager, cases) | apart | {"exposure_s": exposure_s}
 
 
 def _distance_names(imager: Imager) -> list[str]:
@@ -191,8 +243,9 @@ def _distance_names(imager: Imager) -> list[str]:
     return names + [BEST_PLACE + name for name in names]
 
 
-def _over(cases: Sequence[Mapping[Pair, FloatArray]]) -> Columns:
-    """The smallest and the largest CSD of each pair over the places of the light."""
+def _over(imager: Imager, cases: Sequence[Mapping[Pair, FloatArray]]) -> Columns:
+    """Each pair's smallest CSD over all cases, and the largest over the places of the smallest over the moments."""
     over = {csd_name(pair): np.stack([case[pair] for case in cases]) for pair in cases[0]}
-    least = {name: values.min(axis=0) for name, values in over.items()}
-    return least | {BEST_PLACE + name: values.max(axis=0) for name, values in over.items()}
+    moments = {name: values.reshape(imager.n_cases, -1, values.shape[-1]).min(axis=1) for name, values in over.items()}
+    least = {name: values.min(axis=0) for name, values in moments.items()}
+    return least | {BEST_PLACE + name: values.max(axis=0) for name, values in moments.items()}

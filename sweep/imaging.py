@@ -11,6 +11,7 @@ import pickle
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -18,8 +19,9 @@ from numpy.typing import DTypeLike
 from .arrays import BoolArray, FloatArray, row_products
 from .blocks import Block
 from .cache import Cache
-from .effects import flicker, noise_table, quadrature, quantization, saturation
+from .effects import flicker, noise_table, phase, quadrature, quantization, saturation
 from .effects.kernel import make_kernel
+from .places import AnyPlace
 from .scenes import WhitePatchExposure
 from .sensor import Pixel, unquantized
 from .setup import (
@@ -56,13 +58,22 @@ class Changing:
 class Imager:
     """A scene with its kernel made, ready for designs. `work` counts what is computed, by effect."""
 
-    def __init__(self, setup: Setup, work: Counter[str] | None = None, dtype: DTypeLike = np.float64) -> None:
-        """`dtype`: of the product of curves and scene, where the scene's table is small enough to be kept."""
+    def __init__(
+        self,
+        setup: Setup,
+        work: Counter[str] | None = None,
+        dtype: DTypeLike = np.float64,
+        cases: phase.Cases | None = None,
+    ) -> None:
+        """`dtype`: of the product of curves and scene, where the scene's table is small enough to be kept. `cases`:
+        places of the light instead of those of the method of `phase`.
+        """
         self.setup = setup
         self.work: Counter[str] = Counter() if work is None else work
         methods, grid = setup.methods, setup.grid
         self.straight = methods.saturation == "skip" and methods.quantization == "skip"
-        kernel = make_kernel(setup, methods, grid.nodes_nm, by_pixel=not self.straight, work=self.work)
+        by_pixel = not self.straight
+        kernel = make_kernel(setup, methods, grid.nodes_nm, by_pixel=by_pixel, work=self.work, cases=cases)
         self.n_cases, self.n_units = kernel.light.shape[:2]
         self._readout, self._light, self._uniform = kernel.readout, kernel.light, kernel.uniform
         self._spread = kernel.spread
@@ -217,6 +228,21 @@ class Imager:
                 relative = (curves_gradient[:, top] @ self._white) / rates[top]
                 slope = slope - relative[:, None, None, None] * whole
         return self._folded(slope * self.pixel.dn_per_e)
+
+    @cached_property
+    def anywhere(self) -> AnyPlace | None:
+        """The scene with the light at any place, where that is asked for and more than a lattice of places counts."""
+        return AnyPlace(self.setup, self.work) if phase.all_count(self.setup) else None
+
+    def light_dn(self, curves: FloatArray, exposure_s: float) -> FloatArray:
+        """What each signal gives through each channel's filter where its image is whole, in a pulse's darkest moment.
+
+        `curves`: of one design, ndarray[n_modified, n_wavelengths]. DN, ndarray[n_signals, n_channels, n_wavelengths].
+        """
+        qe = self.setup.qe.copy()
+        qe[list(self.setup.modified)] = curves
+        scale = self.scales(np.array([exposure_s]))[0].min() * exposure_s * self.pixel.dn_per_e
+        return np.asarray(self.signals[:, None] * self._looked_at(qe) * scale, dtype=float)
 
     def per_qe(self, modified: int, curves: FloatArray) -> FloatArray:
         """DN per QE of one modified channel at every wavelength, with the exposure of the design `curves`.

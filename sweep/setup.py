@@ -25,7 +25,7 @@ class Methods:
     pedestal: str = "add"
     quadrature: str = "grid"
     sampling: str = "pixels"
-    phase: str = "quarter pixel"
+    phase: str = "within 0.0001 DN"
     demosaic: str = "tent"
     blur: str = "every wavelength"
     crosstalk: str = "neighbors"

@@ -19,7 +19,7 @@ LEVELS = [
     {"spaces", "setup"},
     {"blocks"},
     {"effects"},
-    {"promises"},
+    {"promises", "places"},
     {"plan", "imaging"},
     {"evaluate", "recognition"},
     {"store", "problem", "figures"},

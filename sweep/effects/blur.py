@@ -14,7 +14,8 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import BSpline, make_interp_spline
+from scipy.sparse import csr_matrix
 from scipy.special import j0, j1
 
 from ..arrays import FloatArray
@@ -119,7 +120,8 @@ class Profile:
         r = np.linspace(0.0, reach_um + step, max(8, 2 + int(reach_um / step)))
         spectrum = (2 * math.pi * radius_um * j1(2 * math.pi * radius_um * nu) * weight)[:, None]
         table = j0(2 * math.pi * np.outer(r, nu)) @ (spectrum * transfer(nu, wavelength_um, f_number, w20_um))
-        self._spline = CubicSpline(r, table, axis=0)
+        self._spline = make_interp_spline(r, table, k=3, axis=0)
+        self.r_um, self.values = r, table
         self._highest = float(nu[-1])
         self.n_wavelengths = wavelength_um.size
         self.work = r.size * nu.size * wavelength_um.size
@@ -131,6 +133,24 @@ class Profile:
     def at(self, r_um: FloatArray) -> FloatArray:
         """h, ndarray[..., n_wavelengths]."""
         return np.asarray(self._spline(r_um), dtype=float)
+
+    def sums(self, r_um: FloatArray, weights: FloatArray) -> FloatArray:
+        """Sums of h over the last axis of `r_um`, by their weights: ndarray[n, m], ndarray[m] -> [n, n_wavelengths].
+
+        The weights go to the spline's coefficients first, so that no more is done at each wavelength than one product.
+        """
+        n, size = len(r_um), len(self._spline.c)
+        basis = BSpline.design_matrix(r_um.ravel(), self._spline.t, 3)  # four values for each radius
+        at = np.arange(n)[:, None] * size + basis.indices.reshape(n, -1)
+        each = (basis.data.reshape(*r_um.shape, 4) * weights[:, None]).reshape(n, -1)
+        folded = np.bincount(at.ravel(), each.ravel(), minlength=n * size).reshape(n, size)
+        # A sparse product sums each row by itself: the same values in whatever company a radius is asked for.
+        return np.asarray(csr_matrix(folded) @ self._spline.c, dtype=float)
+
+    @property
+    def slopes(self) -> FloatArray:
+        """Derivative of h at the radii `r_um`, 1/um, ndarray[n_radii, n_wavelengths]."""
+        return np.asarray(self._spline.derivative()(self.r_um), dtype=float)
 
 
 @lru_cache(maxsize=8)

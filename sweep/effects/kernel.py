@@ -7,13 +7,16 @@ for each unit of the readout (a channel's mean, or a single pixel) and each chan
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from ..arrays import FloatArray
 from ..setup import Methods, Setup
 from . import blur, crosstalk, demosaic, extinction, illumination, phase, sampling
+
+_HELD = 4_000_000
+"""Weights of pixels that are held at once."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +37,18 @@ class Kernel:
 
 
 def make_kernel(
-    setup: Setup, methods: Methods, wavelength_nm: FloatArray, *, by_pixel: bool, work: Counter[str]
+    setup: Setup,
+    methods: Methods,
+    wavelength_nm: FloatArray,
+    *,
+    by_pixel: bool,
+    work: Counter[str],
+    cases: phase.Cases | None = None,
 ) -> Kernel:
-    """The kernel at some wavelengths; `by_pixel` keeps the pixels apart, for a readout that is not straight."""
+    """The kernel at some wavelengths; `by_pixel` keeps the pixels apart, for a readout that is not straight.
+
+    `cases`: places of the light instead of those of the method of `phase`.
+    """
     if setup.scenario.target is None:
         made = _uniform(setup, methods, by_pixel=by_pixel)
         light = made.light
@@ -45,7 +57,13 @@ def make_kernel(
         light = made.light
     else:
         knots = blur.knots(wavelength_nm, methods.blur)
-        made = _pixels(setup, methods, knots, by_pixel=by_pixel, work=work)
+        cases = phase.cases(setup, methods.phase) if cases is None else cases
+        if by_pixel:
+            made = _pixels(setup, methods, knots, cases, by_pixel=True, work=work)
+        else:
+            step = _places_at_once(setup)
+            blocks = [cases.some(slice(at, at + step)) for at in range(0, len(cases.places_px), step)]
+            made = _joined([_pixels(setup, methods, knots, block, by_pixel=False, work=work) for block in blocks])
         light = made.light if knots is wavelength_nm else _interpolated(made.light, knots, wavelength_nm)
     falls = illumination.factor(setup, methods.illumination)
     dimmed = falls * extinction.transmittance(setup, methods.extinction, wavelength_nm)
@@ -95,31 +113,67 @@ def _ideal(setup: Setup, methods: Methods, wavelength_nm: FloatArray) -> Kernel:
     return Kernel(uniform[..., None] * lost, uniform, own, own)
 
 
-def _pixels(setup: Setup, methods: Methods, wavelength_nm: FloatArray, *, by_pixel: bool, work: Counter[str]) -> Kernel:
+def _places_at_once(setup: Setup) -> int:
+    """Places whose pixels are held at once: as many as `_HELD` values allow."""
+    return max(1, _HELD // (pixels_per_place(setup) * len(setup.mosaic.channels) ** 2))
+
+
+def pixels_per_place(setup: Setup) -> int:
+    """About how many pixels are looked at around each place of a light."""
+    target, rows_columns = setup.scenario.target, setup.mosaic.indices.shape
+    if target is None:
+        return int(np.prod(rows_columns))
+    reach = sampling.reach_px(setup, target)
+    return int(np.prod([2 * reach + n + 3 for n in rows_columns]))
+
+
+def _joined(parts: list[Kernel]) -> Kernel:
+    if len(parts) == 1:
+        return parts[0]
+    names = [field.name for field in fields(Kernel)]
+    return Kernel(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
+def profile_of(setup: Setup, methods: Methods, wavelength_nm: FloatArray) -> blur.Profile | None:
+    """The light's blurred image, as far as any pixel of the readout can be; None where blur is left out."""
+    target = setup.scenario.target
+    if target is None or methods.blur == "skip":
+        return None
+    pitch_um = setup.pixel.pitch_um
+    furthest_px = 2**0.5 * (sampling.reach_px(setup, target) + 2.5)
+    sizes = (sampling.radii_px(setup, target)[0] * pitch_um, furthest_px * pitch_um)
+    w20_um = blur.defocus_um(setup.scenario, pitch_um)
+    return blur.profile(*sizes, tuple(wavelength_nm * 1e-3), setup.scenario.optics.f_number, w20_um)
+
+
+def _pixels(
+    setup: Setup,
+    methods: Methods,
+    wavelength_nm: FloatArray,
+    cases: phase.Cases,
+    *,
+    by_pixel: bool,
+    work: Counter[str],
+) -> Kernel:
     """Every pixel of the readout, for every place of the light."""
     target, mosaic, pixel = setup.scenario.target, setup.mosaic, setup.pixel
     assert target is not None
     n = len(mosaic.channels)
     radius, readout = sampling.radii_px(setup, target)
     half = pixel.fill_factor**0.5 / 2
-    reach = readout + 0.5 if target.readout == "mean" else float(max(mosaic.indices.shape))
-    seen = sampling.window(mosaic, phase.places_px(setup, methods.phase), reach)
+    reach = sampling.reach_px(setup, target)
+    seen = sampling.window(mosaic, cases.places_px, reach)
     if target.readout == "mean":
         weights = sampling.mean_weights(seen, half, readout, n)
     else:
-        weights = demosaic.center_weights(seen, methods.demosaic, mosaic.indices.shape, n)
+        weights = demosaic.center_weights(seen, cases.home_px - cases.places_px, methods.demosaic, mosaic)
     share = _share(setup, methods)
     own = (seen.channel[..., None] == np.arange(n)).astype(float)
     apart = weights[..., None] * own  # [cases, rows, columns, channels]
     spread = crosstalk.mixed(apart, share) if share else apart
     wanted = np.asarray((spread > 0).any(axis=3))
-    profile = None
-    if methods.blur != "skip":
-        furthest = float(np.hypot(seen.dx, seen.dy)[wanted].max()) + 2**0.5 * half
-        w20_um = blur.defocus_um(setup.scenario, pixel.pitch_um)
-        sizes = (radius * pixel.pitch_um, furthest * pixel.pitch_um)
-        profile = blur.profile(*sizes, tuple(wavelength_nm * 1e-3), setup.scenario.optics.f_number, w20_um)
-        work["blur"] += profile.work
+    profile = profile_of(setup, methods, wavelength_nm)
+    work["blur"] += 0 if profile is None else profile.work
     light = sampling.light_on_pixels(seen, wanted, half, radius, profile, pixel.pitch_um)
     work["sampling"] += light.values.size
     if by_pixel:

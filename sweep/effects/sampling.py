@@ -61,6 +61,13 @@ def radii_px(setup: Setup, target: Target) -> tuple[float, float]:
     return radius, max(radius, math.hypot(rows, columns) / 2)
 
 
+def reach_px(setup: Setup, target: Target) -> float:
+    """How far from the light's center a pixel may have a weight in the readout, along a row or column."""
+    if target.readout == "mean":
+        return radii_px(setup, target)[1] + 0.5
+    return float(max(setup.mosaic.indices.shape))
+
+
 def window(mosaic: Mosaic, phases_px: FloatArray, reach_px: float) -> Window:
     """All pixels within `reach_px` (and the margin) of the light's centers, ndarray[n_cases, 2] as (column, row)."""
     low = np.floor(phases_px.min(axis=0) - reach_px).astype(int) - 1
@@ -98,12 +105,11 @@ class PixelLight:
 
     def folded(self, weights: FloatArray) -> FloatArray:
         """Weighted sums over the pixels: ndarray[n_cases, rows, columns, n] -> ndarray[n_cases, n, n_wavelengths]."""
-        cases, n = len(weights), weights.shape[-1]
-        flat = weights.reshape(cases, -1, n)
-        sums = np.zeros((cases, len(self.values), n))
-        for case in range(cases):
-            np.add.at(sums[case], self.place[case].ravel(), flat[case])
-        return np.asarray(np.swapaxes(sums, 1, 2) @ self.values, dtype=float)
+        found = np.empty((len(weights), weights.shape[-1], self.values.shape[1]))
+        for case, own in enumerate(weights):
+            some = np.flatnonzero(own.any(axis=2))
+            found[case] = own.reshape(-1, own.shape[2])[some].T @ self.values[self.place[case].ravel()[some]]
+        return found
 
 
 def light_on_pixels(
@@ -136,5 +142,5 @@ def _means(apart: FloatArray, half: float, profile: Profile, pitch_um: float) ->
     for start in range(0, len(apart), _AT_ONCE):
         x, y = apart[start : start + _AT_ONCE].T
         r = np.hypot(x[:, None] + u, y[:, None] + v) * pitch_um
-        values[start : start + _AT_ONCE] = np.einsum("pql,q->pl", profile.at(r), both)
+        values[start : start + _AT_ONCE] = profile.sums(r, both)
     return values
