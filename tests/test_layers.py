@@ -11,8 +11,8 @@ PACKAGE = Path(__file__).parent.parent / "sweep"
 
 # From the bottom. A unit is a module or a folder of the package.
 LEVELS = [
-    {"errors", "arrays", "completion"},
-    {"schema"},
+    {"errors", "arrays", "completion", "records"},
+    {"schema", "disk"},
     {"kernels", "spectra", "mosaics", "pareto", "constraints", "objectives", "edges", "progress"},
     {"metrics", "curve_files", "surrogate", "sensor", "chromaticity"},
     {"datasets", "filters", "filter_files", "scenes", "families", "discrimination", "signals"},
@@ -23,7 +23,8 @@ LEVELS = [
     {"plan", "imaging"},
     {"evaluate", "recognition"},
     {"store", "problem", "figures"},
-    {"series", "journal", "describing"},
+    {"series", "journal", "describing", "inventory"},
+    {"lock"},
     {"smooth", "limit"},
     {"search"},
     {"study"},

@@ -124,7 +124,8 @@ class Sweep:
 
     def _kept(self, index: int) -> pa.Table | None:
         """A finished chunk; None, and it counts as not finished, if its file is damaged."""
-        table = self.journal.table(self.keys[index], self.rules.schema)
+        job = self.jobs[index]
+        table = self.journal.table(self.keys[index], self.rules.schema, job.stop - job.start)
         if table is None:
             self.warnings.append(f"chunk {index} was damaged on the disk and is computed again")
         return table
