@@ -13,11 +13,13 @@ import pyarrow as pa
 
 from .evaluate import evaluate
 from .imaging import imager_of
+from .inventory import Inventory
+from .lock import locked
 from .metrics import CSD
 from .report import read_output, study_of
 from .runner.drawn import row_space
 from .setup import REFERENCE
-from .store import AUDIT, RESULTS, batches, write_table
+from .store import AUDIT, RESULTS, batches
 from .study import Study
 
 SHARE = 0.01
@@ -60,11 +62,12 @@ def audit(study: Study, tables: Iterable[pd.DataFrame]) -> Audit:
 
 
 def audit_output(folder: Path, data: Path | None) -> list[str]:
-    """Audit a finished run, write its rows beside it, and say what was found."""
-    output = read_output(folder)
+    """Audit a finished run, write its rows beside it, and say what was found; errors as for `Inventory.write`."""
+    output = read_output(folder, audited=False)
     study = study_of(output, data)
     found = audit(study, (table.to_pandas() for table in batches(folder / RESULTS)))
-    write_table(pa.Table.from_pandas(found.rows, preserve_index=False), folder / AUDIT)
+    with locked(folder):
+        Inventory(folder).write_table(AUDIT, pa.Table.from_pandas(found.rows, preserve_index=False))
     broken = len(found.broken)
     lines = [
         f"{len(found.rows):,} of {found.n_designs:,} designs recomputed with every effect on: "
@@ -73,6 +76,13 @@ def audit_output(folder: Path, data: Path | None) -> list[str]:
     worst = found.rows.groupby("scenario", observed=True, sort=False)[["promised_dn", "realized_dn"]].max()
     lines += [f"{name}: promised {p:.3g} DN, realized {r:.3g} DN." for name, p, r in worst.itertuples()]
     return lines
+
+
+def mend_audit(folder: Path, data: Path | None) -> None:
+    """Audit a run again whose audited rows are missing or damaged."""
+    inventory = Inventory(folder)
+    if AUDIT in inventory.files and inventory.wrong([AUDIT]):
+        audit_output(folder, data)
 
 
 def _rows(study: Study, sample: pd.DataFrame) -> Iterator[dict[str, object]]:

@@ -48,6 +48,7 @@ def run(
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Compute failed designs again.")] = False,
 ) -> None:
     """Run a study: results, figures and report go to OUTPUT/<study>. The same command continues an interrupted run."""
+    from .audit import mend_audit
     from .progress import ProgressDisplay
     from .runner import BACKENDS, Wishes, estimate, estimate_lines, output_folder, run_study
     from .study import folder_name, load_study
@@ -64,24 +65,28 @@ def run(
             found = estimate(loaded, folder, workers, display.update)
         else:
             wishes = Wishes(fail_fast, retry_failed)
-            computed = run_study(
+            made = run_study(
                 loaded, folder, workers, display.update, sys.argv, backend=backend, scheduler=scheduler, wishes=wishes
             )
     if dry_run:
         for line in estimate_lines(found, folder):
             typer.echo(line)
         return
-    if not computed:
+    if not made:
         typer.echo(f"Note: {folder} holds this very study, finished; nothing was computed.", err=True)
-    _finish(folder)
+    mend_audit(folder, data)
+    _finish(folder, mend=True)
 
 
 @app.command()
-def status(folder: RunFolder) -> None:
-    """Say how far a run is, from another terminal."""
+def status(
+    folder: RunFolder,
+    verify: Annotated[bool, typer.Option("--verify", help="Compare the digests of all its files.")] = False,
+) -> None:
+    """Say how far a run is, from another terminal; of a finished one, which of its files are missing or damaged."""
     from .runner import status_lines
 
-    for line in status_lines(folder):
+    for line in status_lines(folder, verify=verify):
         typer.echo(line)
 
 
@@ -279,11 +284,11 @@ def schema(
     typer.echo(f"# yaml-language-server: $schema={output.name}")
 
 
-def _finish(folder: Path) -> None:
+def _finish(folder: Path, *, mend: bool = False) -> None:
     from .report import make_report, read_output, summary_lines
 
     found: Output = read_output(folder)
-    make_report(found)
+    make_report(found, mend=mend)
     for line in summary_lines(found):
         typer.echo(line)
 

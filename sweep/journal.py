@@ -6,31 +6,33 @@ bytes, and is synced. What the journal does not list, or what no longer has its 
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
+import math
 import os
-import pickle
-import socket
+import re
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import IO, Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from .disk import is_folder, is_link, opened, read_plain
 from .errors import Fault, OutputError
-from .store import encoded, holds, write_bytes
+from .store import decoded, encoded, holds, write_bytes
 
 SHARDS = "shards"
 _JOURNAL = "_journal.jsonl"
 """Readers of Parquet folders skip names that begin so."""
-LOCK = ".lock"
-_ATTEMPTS, _PAUSE_S = 5, 0.02
+_SHARD, _ANSWER = "{index:08d}-{key}.parquet", "_answer-{key}.json"
+_NAMES = re.compile(r"(?:\d{8,}-([0-9a-f]{16})\.parquet|_answer-([0-9a-f]{16})\.json)")
+"""Names that a journal gives, by which its files are known; 16 digits of the key are part of them."""
+_MOST_BYTES, _MOST_LINE = 2**30, 4096
+"""Of a file and of a line of the journal, more than any has."""
+_MOST_ROWS, _MOST_SECONDS = 2**40, 1e12
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,31 @@ class Entry:
     failed: int
     seconds: float
     at: float
+
+    @staticmethod
+    def of(line: bytes) -> Entry | None:
+        """The entry of a line; None unless it is one that a journal writes, of a file beside it."""
+        try:
+            held = json.loads(line)
+            entry = Entry(**held)
+        except (ValueError, TypeError, RecursionError):
+            return None
+        return entry if entry.is_sound() else None
+
+    def is_sound(self) -> bool:
+        """Whether every field is of its type and range, and the file's name follows from the key."""
+        if not all(isinstance(text, str) for text in (self.key, self.file, self.sha256)):
+            return False
+        counts = ((self.size, _MOST_BYTES), (self.rows, _MOST_ROWS), (self.failed, self.rows))
+        if not all(type(n) is int and type(most) is int and 0 <= n <= most for n, most in counts):
+            return False
+        times = (self.seconds, self.at)
+        if not all(type(t) in (int, float) and abs(t) <= _MOST_SECONDS and math.isfinite(t) for t in times):
+            return False
+        named = _NAMES.fullmatch(self.file)
+        if named is None or re.fullmatch("[0-9a-f]{64}", self.key) is None:
+            return False
+        return self.key[:16] in named.groups()
 
 
 @dataclass(frozen=True)
@@ -77,63 +104,66 @@ class Journal:
         self.folder = output / SHARDS
         self.entries: dict[str, Entry] = {}
         self._torn = False
+        if os.path.lexists(self.folder) and not is_folder(self.folder):
+            raise OutputError(Fault("is no folder of this run; move it away", str(self.folder)))
         self._read()
 
     def _read(self) -> None:
-        """Every whole line; a later one replaces an earlier one of its key. A line that a kill cut is ignored."""
+        """Every whole line; a later one replaces an earlier one of its key.
+
+        A line that a kill cut, or that no journal writes, is ignored, and so is a journal that is no plain file.
+        """
         path = self.folder / _JOURNAL
-        if not path.is_file():
+        if not path.is_file() or is_link(path):
             return
         try:
-            content = path.read_bytes()
+            with opened(path) as file:
+                while line := file.readline(_MOST_LINE):
+                    self._torn = not line.endswith(b"\n")
+                    entry = Entry.of(line)
+                    if entry is not None:
+                        self.entries[entry.key] = entry
         except OSError as error:
             raise OutputError(Fault(f"cannot be read: {error.strerror or error}", str(path))) from None
-        self._torn = bool(content) and not content.endswith(b"\n")
-        for line in content.splitlines():
-            try:
-                entry = Entry(**json.loads(line))
-            except (ValueError, TypeError):
-                continue
-            self.entries[entry.key] = entry
 
     def check(self) -> None:
         """Forget what is missing or has another size; a file of the right size is checked when it is used."""
-        sizes = {item.name: item.stat().st_size for item in os.scandir(self.folder)} if self.folder.is_dir() else {}
+        here = list(os.scandir(self.folder)) if is_folder(self.folder) else []
+        sizes = {item.name: item.stat().st_size for item in here if item.is_file(follow_symlinks=False)}
         self.entries = {key: entry for key, entry in self.entries.items() if sizes.get(entry.file) == entry.size}
 
     def save(self, key: str, index: int, shard: Shard) -> None:
         """Keep finished rows under `key`; raises OutputError when the disk refuses."""
-        self._keep(key, f"{index:08d}-{key[:16]}.parquet", shard.content, shard.rows, shard.failed, shard.seconds)
+        name = _SHARD.format(index=index, key=key[:16])
+        self._keep(key, name, shard.content, shard.rows, shard.failed, shard.seconds)
 
-    def keep(self, key: str, answer: object, seconds: float) -> None:
-        """Keep any finished answer under `key`; errors as for `save`."""
-        self._keep(key, f"_answer-{key[:16]}.pickle", pickle.dumps(answer), 0, 0, seconds)
+    def keep(self, key: str, answer: bytes, seconds: float) -> None:
+        """Keep the text of any finished answer under `key`; errors as for `save`."""
+        self._keep(key, _ANSWER.format(key=key[:16]), answer, 0, 0, seconds)
 
-    def table(self, key: str, schema: pa.Schema) -> pa.Table | None:
-        """The table kept under `key`; None, and forgotten, when it is missing, damaged or has another schema."""
+    def table(self, key: str, schema: pa.Schema, rows: int) -> pa.Table | None:
+        """The table kept under `key`; None, and forgotten, when it is missing, damaged or of other columns or size."""
         content = self._intact(key)
-        if content is not None:
-            table = pq.read_table(pa.BufferReader(content))
-            if table.schema.equals(schema):
-                return table
-        self.entries.pop(key, None)
-        return None
+        table = None if content is None else decoded(content, schema, rows)
+        if table is None:
+            self.entries.pop(key, None)
+        return table
 
-    def answer(self, key: str) -> Any:
-        """The answer kept under `key`, or None. Only a file whose digest the journal holds is unpickled."""
-        content = self._intact(key)
-        return None if content is None else pickle.loads(content)
+    def answer(self, key: str) -> bytes | None:
+        """The text of the answer kept under `key`, or None."""
+        return self._intact(key)
 
     def forget(self, key: str) -> None:
         """Do not use a finished piece again."""
         self.entries.pop(key, None)
 
     def remove(self) -> None:
-        """Drop all of it, after the rows stand in the result table; the journal goes last."""
-        if self.folder.is_dir():
-            for path in sorted(self.folder.iterdir(), key=lambda path: path.name == _JOURNAL):
-                if not path.is_dir():  # what someone else put there stays
-                    path.unlink()
+        """Drop all of it, after the rows stand in the result table; the journal goes last. Files of others stay."""
+        if is_folder(self.folder):
+            own = [path.name for path in self.folder.iterdir() if _NAMES.fullmatch(path.name)]
+            for name in (*own, _JOURNAL):
+                with suppress(IsADirectoryError, FileNotFoundError):
+                    (self.folder / name).unlink()
             with suppress(OSError):
                 self.folder.rmdir()
         self.entries.clear()
@@ -144,7 +174,7 @@ class Journal:
         if entry is None:
             return None
         try:
-            content = (self.folder / entry.file).read_bytes()
+            content = read_plain(self.folder / entry.file, entry.size)
         except OSError:
             return None
         return content if hashlib.sha256(content).hexdigest() == entry.sha256 else None
@@ -157,67 +187,13 @@ class Journal:
         self._torn = True  # until the whole line is on the disk
         journal = self.folder / _JOURNAL
         try:
-            with journal.open("a", encoding="utf-8") as handle:
-                handle.write(line)
+            if is_link(journal):
+                journal.unlink()  # the link alone
+            with opened(journal, os.O_WRONLY | os.O_APPEND | os.O_CREAT, "ab") as handle:
+                handle.write(line.encode("utf-8"))
                 handle.flush()
                 os.fsync(handle.fileno())
         except OSError as error:
             raise OutputError(Fault(f"cannot be written: {error.strerror or error}", str(journal))) from None
         self._torn = False
         self.entries[key] = entry
-
-
-@contextmanager
-def locked(output: Path) -> Iterator[None]:
-    """Hold the output folder for one run; raises OutputError, naming the other run, when it is in use.
-
-    The kernel drops the lock with its process, so a lock cannot go stale. Hidden files that a killed run left behind
-    are removed.
-    """
-    lock = output / LOCK
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-        handle: IO[str] = lock.open("a+", encoding="utf-8")
-    except OSError as error:
-        raise OutputError(Fault(f"cannot be written: {error.strerror or error}", str(output))) from None
-    with handle:
-        for attempt in range(_ATTEMPTS):
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-            except OSError:
-                if attempt == _ATTEMPTS - 1:
-                    raise OutputError(Fault(f"in use by another run ({_said(handle)})", str(output))) from None
-                time.sleep(_PAUSE_S)  # someone may just be looking who holds it
-        _say(handle, output)
-        for left_over in output.rglob(".tmp-*"):
-            left_over.unlink(missing_ok=True)
-        yield
-
-
-def holder(output: Path) -> str | None:
-    """Which run holds the folder, in words; None when none does."""
-    try:
-        handle = (output / LOCK).open("r", encoding="utf-8")
-    except OSError:
-        return None
-    with handle:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except OSError:
-            return _said(handle)
-        return None
-
-
-def _say(handle: IO[str], output: Path) -> None:
-    """Write into the lock who holds it; raises OutputError when the disk refuses."""
-    try:
-        os.ftruncate(handle.fileno(), 0)
-        os.write(handle.fileno(), f"process {os.getpid()} on {socket.gethostname()}".encode())
-    except OSError as error:
-        raise OutputError(Fault(f"cannot be written: {error.strerror or error}", str(output))) from None
-
-
-def _said(handle: IO[str]) -> str:
-    handle.seek(0)
-    return handle.read().strip() or "process ?"

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from .disk import read_facts
 from .errors import Fault, StudyError
-from .journal import holder
+from .lock import holder
 from .report.content import amount
 from .runner import output_folder
-from .runner.folders import held_by, read_facts
+from .runner.folders import held_by
 from .store import PROVENANCE
 from .study import Study, folder_name, load_study
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -48,6 +48,8 @@ _REPEATING = "cfa_sweep_parameters"
 ROW_GROUP = 131_072
 """Rows that are read and written at once."""
 _TABLES_AHEAD = 3
+Seal = Callable[[Path], None]
+"""Sees a file that is written to its end, before it takes its name."""
 
 
 def result_schema(parameters: Sequence[str], quantities: Sequence[str]) -> pa.Schema:
@@ -82,19 +84,27 @@ def front_schema(parameters: Sequence[str]) -> pa.Schema:
     return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION})
 
 
+def _unsealed(_: Path) -> None:
+    """Nothing is noted of a file before it takes its name."""
+
+
 @contextmanager
-def atomic(path: Path) -> Iterator[Path]:
+def atomic(path: Path, seal: Seal = _unsealed) -> Iterator[Path]:
     """Give a hidden name beside `path`; on success it is synced and takes the name of `path`, else it is removed.
 
+    `seal` sees the whole hidden file before it takes its name. A symbolic link at `path` is replaced, not followed.
     Raises OutputError when the disk refuses (full, read-only, no permission). A reader sees the old file or the new
     one, never a part.
     """
     hidden = path.with_name(f".tmp-{os.getpid()}-{path.name}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        hidden.unlink(missing_ok=True)
+        hidden.touch(exist_ok=False)  # a new file, not what a link of this name leads to
         yield hidden
         with hidden.open("rb") as handle:
             os.fsync(handle.fileno())
+        seal(hidden)
         hidden.replace(path)
     except OSError as error:
         raise OutputError(Fault(f"cannot be written: {error.strerror or error}", str(path))) from None
@@ -103,15 +113,15 @@ def atomic(path: Path) -> Iterator[Path]:
             hidden.unlink()
 
 
-def write_table(table: pa.Table, path: Path) -> None:
-    """Write one Parquet file atomically; errors as for `atomic`."""
-    with atomic(path) as hidden:
-        pq.write_table(table, hidden, row_group_size=ROW_GROUP, use_dictionary=_repeating(table.schema))
+def write_table(table: pa.Table, path: Path, seal: Seal = _unsealed) -> None:
+    """Write one Parquet file atomically, with a checksum of each page; `seal` and errors as for `atomic`."""
+    with atomic(path, seal) as hidden:
+        _write_table(table, hidden, row_group_size=ROW_GROUP)
 
 
-def write_bytes(content: bytes, path: Path) -> None:
-    """Write one file atomically; errors as for `atomic`."""
-    with atomic(path) as hidden:
+def write_bytes(content: bytes, path: Path, seal: Seal = _unsealed) -> None:
+    """Write one file atomically; `seal` and errors as for `atomic`."""
+    with atomic(path, seal) as hidden:
         hidden.write_bytes(content)
 
 
@@ -121,44 +131,68 @@ def write_text(text: str, path: Path) -> None:
 
 
 def write_csv(table: pd.DataFrame, path: Path) -> None:
-    """Write one CSV file with every digit, atomically; errors as for `atomic`.
+    """Write one CSV file with every digit, atomically; errors as for `atomic`."""
+    write_text(csv_of(table), path)
+
+
+def csv_of(table: pd.DataFrame) -> str:
+    """A table as CSV with every digit.
 
     Pandas alone would print numbers as NumPy's print options say, which other libraries change.
     """
-    write_text(table.to_csv(index=False, float_format=_every_digit), path)
+    return table.to_csv(index=False, float_format=_every_digit)
 
 
 def _every_digit(value: Any) -> str:
     return repr(float(value))
 
 
+def json_of(data: Mapping[str, Any]) -> str:
+    """A mapping as the text of a JSON file, its keys in order."""
+    return json.dumps(data, indent=2, sort_keys=True, allow_nan=False) + "\n"
+
+
 def write_json(data: Mapping[str, Any], path: Path) -> None:
     """Write one JSON file atomically; errors as for `atomic`."""
-    write_text(json.dumps(data, indent=2, sort_keys=True, allow_nan=False) + "\n", path)
+    write_text(json_of(data), path)
 
 
-def has_footer(path: Path) -> bool:
-    """Whether there is a Parquet file that was written to its end."""
-    try:
-        pq.read_metadata(path)
-    except (OSError, pa.ArrowException):
-        return False
-    return True
+def _write_table(table: pa.Table, where: Any, **options: Any) -> None:
+    """Write a Parquet file whose pages carry checksums (CRC-32), which readers can verify."""
+    pq.write_table(table, where, use_dictionary=_repeating(table.schema), write_page_checksum=True, **options)
 
 
 def encoded(table: pa.Table) -> bytes:
     """A table as the bytes of a Parquet file."""
     sink = pa.BufferOutputStream()
-    pq.write_table(table, sink, use_dictionary=_repeating(table.schema))
+    _write_table(table, sink)
     return bytes(sink.getvalue().to_pybytes())
 
 
-def write_tables(tables: Iterable[pa.Table], schema: pa.Schema, path: Path) -> None:
-    """Write tables as one Parquet file, in full row groups, one of which is in memory; errors as for `atomic`.
+def decoded(content: bytes, schema: pa.Schema, rows: int) -> pa.Table | None:
+    """The table of a Parquet file's bytes; None where they hold no such table of so many rows.
+
+    Nothing but its size and its schema is looked at before these fit, so that no more memory is taken than they need.
+    """
+    try:
+        file = pq.ParquetFile(pa.BufferReader(content), page_checksum_verification=True)
+        if file.metadata.num_rows != rows or not file.schema_arrow.equals(schema):
+            return None
+        return file.read().replace_schema_metadata(schema.metadata)
+    except (OSError, pa.ArrowException):
+        return None
+
+
+def write_tables(tables: Iterable[pa.Table], schema: pa.Schema, path: Path, seal: Seal = _unsealed) -> None:
+    """Write tables as one Parquet file, in full row groups, one of which is in memory; else as `write_table`.
 
     The next table is made while one is written.
     """
-    with atomic(path) as hidden, pq.ParquetWriter(hidden, schema, use_dictionary=_repeating(schema)) as writer:
+    words = _repeating(schema)
+    with (
+        atomic(path, seal) as hidden,
+        pq.ParquetWriter(hidden, schema, use_dictionary=words, write_page_checksum=True) as writer,
+    ):
         waiting: list[pa.Table] = []
 
         def write() -> None:
@@ -195,7 +229,8 @@ def batches(path: Path) -> Iterator[pa.Table]:
     """A Parquet file in tables of a row group each; raises OutputError when it is missing or damaged."""
     try:
         # Buffered ahead, a whole file would be in memory.
-        for batch in pq.ParquetFile(path, pre_buffer=False).iter_batches(ROW_GROUP):
+        file = pq.ParquetFile(path, pre_buffer=False, page_checksum_verification=True)
+        for batch in file.iter_batches(ROW_GROUP):
             yield pa.Table.from_batches([batch])
     except (OSError, pa.ArrowException) as error:
         raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
@@ -238,6 +273,6 @@ def release_memory() -> None:
 def read_table(path: Path) -> pa.Table:
     """Read a Parquet file; raises OutputError when it is missing or damaged."""
     try:
-        return pq.read_table(path)
+        return pq.read_table(path, page_checksum_verification=True)
     except (OSError, pa.ArrowException) as error:
         raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None

@@ -41,6 +41,7 @@ def test_stopband_makes_its_files(stopband: tuple[Path, list[str]]) -> None:
         "study.resolved.yaml",
         "provenance.json",
         "run.json",
+        "SHA256SUMS",
         "pareto.png",
         "pareto.svg",
         "report.html",

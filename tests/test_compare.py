@@ -21,6 +21,7 @@ from sweep.errors import OutputError, SweepError
 from sweep.report import read_output
 from sweep.study import load_study
 
+from .tampering import listed_anew
 from .test_cli import sweep
 from .test_runner import STUDY, ran
 
@@ -165,6 +166,7 @@ def test_best_designs_of_different_scenarios_name_them(runs: dict[str, Path], tm
     pq.write_table(table.set_column(at, table.schema.field(at), names), path)
     study = tmp_path / "other" / "study.resolved.yaml"
     study.write_text(re.sub(r"^  chart:", "  dusk:", study.read_text(), flags=re.MULTILINE))
+    listed_anew(tmp_path / "other")
     said, _ = compared([runs["chart"], tmp_path / "other"], tmp_path / "to")
     assert re.search(r"A chart with [0-9.]+ DN in chart; B chart is equal in dusk", said)
 
@@ -210,6 +212,7 @@ def test_other_curves_are_said(runs: dict[str, Path], tmp_path: Path) -> None:
     lights = [name for name in curves.columns if name.startswith("light:")]
     curves.loc[100, lights[0]] *= 1.1
     curves.to_parquet(tmp_path / "other" / "curves.parquet", index=False)
+    listed_anew(tmp_path / "other")
     said, _ = compared([runs["chart"], tmp_path / "other"], tmp_path / "to")
     assert f"used other curves (sensor: R; lights: 1 of {len(lights)}): their results do not compare" in said
 

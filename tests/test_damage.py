@@ -22,6 +22,7 @@ from sweep.runner.workers import Workers
 from sweep.study import Study
 
 from .mischief import half_done, rows
+from .tampering import listed_anew
 from .test_runner import ran
 
 
@@ -66,12 +67,11 @@ def test_a_damaged_result_is_one_line_and_the_same_command_mends_it(
         (folder / file).unlink()
     else:
         (folder / file).write_bytes(damage((folder / file).read_bytes()))
-    assert status_lines(folder)[0].startswith("interrupted")
-    with pytest.raises(OutputError, match=file):
-        read_output(folder)
+    for look in (status_lines, read_output):
+        with pytest.raises(OutputError, match=file):
+            look(folder)
     seen = ran(plain, folder, 1)
-    designs = [done for phase, done, _ in seen if phase == "designs"]
-    assert (designs[0] == 0) == computed  # what stands in the table is not computed again
+    assert any(phase == "designs" for phase, *_ in seen) == computed  # what stands in the table is not computed again
     pd.testing.assert_frame_equal(rows(folder), whole)
     read_output(folder)
     assert status_lines(folder)[0].startswith("finished")
@@ -82,6 +82,7 @@ def test_a_cut_study_says_how_to_mend_it(plain: Study, finished: Path, tmp_path:
     shutil.copytree(finished, folder)
     path = folder / "study.resolved.yaml"
     path.write_text(path.read_text().split("objective:")[0])
+    listed_anew(folder)
     with pytest.raises(OutputError, match="lacks objective; delete it, and `sweep run` of the study makes it again"):
         read_output(folder)
     path.unlink()
@@ -102,7 +103,7 @@ def test_a_finished_run_gives_its_chunks_back(plain: Study, tmp_path: Path) -> N
     whole = pq.read_table(tmp_path / "results.parquet")
     fewer = 0
     for key, table in kept.items():
-        again = journal.table(key, table.schema)
+        again = journal.table(key, table.schema, table.num_rows)
         assert again is not None
         assert again.equals(table)
         ids = table["design_id"].to_pylist()
@@ -117,7 +118,7 @@ def test_damaged_shards_are_computed_again_and_named(plain: Study, whole: pd.Dat
     content[len(content) // 2] ^= 0xFF
     large[0].write_bytes(content)
     large[1].write_bytes(large[1].read_bytes()[:-7])
-    (tmp_path / SHARDS / ".tmp-1-left-over").write_bytes(b"x")
+    (tmp_path / SHARDS / ".tmp-1-00000007-0123456789abcdef.parquet").write_bytes(b"x")
     ran(plain, tmp_path, 1)
     pd.testing.assert_frame_equal(rows(tmp_path), whole)
     said = (tmp_path / "provenance.json").read_text()

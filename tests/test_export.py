@@ -19,6 +19,7 @@ from sweep.mosaics import Mosaic
 from sweep.study import load_study
 from sweep.surrogate import surrogate_parameters
 
+from .tampering import listed_anew
 from .test_cli import sweep
 from .test_runner import ran, study_file
 
@@ -177,6 +178,7 @@ def test_a_row_that_was_tampered_with_is_refused(tiny: Path, tmp_path: Path) -> 
     status[31] = "error: KeyError: x"
     frame["status"] = status.astype("category")
     frame.to_parquet(tmp_path / "run" / "results.parquet", index=False)
+    listed_anew(tmp_path / "run")
     with pytest.raises(OutputError, match="not what the run has: sensitivity"):
         export_design(tmp_path / "run", "30", None, None)
     with pytest.raises(SweepError, match=r"the design failed .got 'error: KeyError: x'"):

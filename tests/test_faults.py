@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import time
@@ -17,7 +18,8 @@ import pytest
 from threadpoolctl import threadpool_info
 
 from sweep.errors import FailedDesignError, OutputError, SweepError
-from sweep.journal import SHARDS, Journal, locked
+from sweep.journal import SHARDS, Journal
+from sweep.lock import locked
 from sweep.report import make_report, read_output
 from sweep.runner import Wishes, estimate, estimate_lines, output_folder, run_study, status_lines, with_plans
 from sweep.runner.jobs import CHUNK
@@ -180,9 +182,12 @@ def test_a_changed_study_goes_beside_the_old_one(plain: Study, tmp_path: Path) -
     assert output_folder(base, load_study(path))[0] == tmp_path / "tiny-3"
 
 
-def test_a_disk_without_a_byte_left_is_one_line(plain: Study, tmp_path: Path) -> None:
-    (tmp_path / ".lock").symlink_to("/dev/full")
-    with pytest.raises(OutputError, match="cannot be written"):
+def test_a_disk_without_a_byte_left_is_one_line(plain: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "pwrite", full)
+    with pytest.raises(OutputError, match="cannot be written: No space left on device"):
         ran(plain, tmp_path, 1)
 
 

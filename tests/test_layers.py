@@ -11,8 +11,8 @@ PACKAGE = Path(__file__).parent.parent / "sweep"
 
 # From the bottom. A unit is a module or a folder of the package.
 LEVELS = [
-    {"errors", "arrays", "cache", "completion"},
-    {"schema", "inputs"},
+    {"errors", "arrays", "cache", "completion", "records"},
+    {"schema", "inputs", "disk"},
     {"kernels", "spectra", "mosaics", "pareto", "constraints", "objectives", "edges", "progress", "mat_files"},
     {"metrics", "curve_files", "surrogate", "sensor", "chromaticity"},
     {"datasets", "filters", "filter_files", "scenes", "families", "discrimination", "signals"},
@@ -23,7 +23,8 @@ LEVELS = [
     {"plan", "imaging"},
     {"evaluate", "recognition"},
     {"store", "problem", "figures"},
-    {"series", "journal", "describing"},
+    {"series", "journal", "describing", "inventory"},
+    {"lock"},
     {"smooth", "filter_program"},
     {"sides"},
     {"limit"},

@@ -24,6 +24,7 @@ from sweep.runner.jobs import CHUNK, Job, jobs_of, rules_of, run_job
 from sweep.study import Study, load_study
 
 from .conftest import Finished
+from .tampering import listed_anew
 from .test_runner import ran, study_file
 from .test_scale import large
 
@@ -198,6 +199,7 @@ def test_a_table_that_lacks_a_column_is_one_line(tmp_path: Path, column: str) ->
     ran(load_study(study_file(tmp_path, 2)), folder, 1)
     path = folder / "results.parquet"
     pq.write_table(pq.read_table(path).drop_columns([column]), path)
+    listed_anew(folder)
     with pytest.raises(OutputError, match=f"results.parquet: lacks {column}; delete it"):
         read_output(folder)
 
@@ -216,6 +218,7 @@ def test_a_study_whose_designs_all_failed_says_why(tmp_path: Path) -> None:
     frame.loc[swept, ["feasible", "pareto"]] = False
     schema = pq.read_schema(folder / "results.parquet")
     pq.write_table(pa.Table.from_pandas(frame, schema=schema, preserve_index=False), folder / "results.parquet")
+    listed_anew(folder)
     output = read_output(folder)
     make_report(output)
     assert summary_lines(output)[0] == "Every design failed: error: no light."

@@ -21,7 +21,8 @@ from sweep.errors import OutputError, StudyError
 from sweep.evaluate import evaluate, quantities
 from sweep.families import Stopband
 from sweep.imaging import imager_of
-from sweep.journal import Journal, locked
+from sweep.journal import Journal
+from sweep.lock import locked
 from sweep.report import make_report, read_output
 from sweep.report.content import scenario_series
 from sweep.runner import run_study

@@ -10,9 +10,11 @@ import pandas as pd
 import pyarrow as pa
 
 from ..figures import draw_chart, draw_clouds, draw_curves, draw_pareto, rendered
+from ..inventory import FIGURES, REPORT, Inventory, is_drawn
+from ..lock import locked
 from ..objectives import Objective
 from ..series import draw_series
-from ..store import write_bytes, write_csv, write_table, write_text
+from ..store import csv_of, encoded
 from . import content
 from .comparison import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
 from .interactive import payload
@@ -26,27 +28,37 @@ from .summary import answer_sentences, counts_line, summary_lines
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-REPORT = "report.html"
-FIGURES = "figures"
 
-
-def make_report(output: Output) -> None:
+def make_report(output: Output, *, mend: bool = False) -> None:
     """Write `pareto.png`/`.svg`, `figures/*`, the comparison with published figures and `report.html`.
 
-    Errors as for `store.atomic`.
+    `mend`: those alone that are missing, damaged or out of date. Raises OutputError where a file of others has the name
+    of one of them or the disk refuses.
     """
-    images = []
+    with locked(output.folder):
+        inventory = Inventory(output.folder)
+        listed = [name for name in inventory.files if is_drawn(name)]
+        wrong = inventory.wrong({REPORT, *listed})
+        if mend and not wrong:
+            return
+        contents = _contents(output)
+        inventory.write({name: made for name, made in contents.items() if not mend or inventory.wrong([name])})
+        inventory.remove(name for name in listed if name not in contents)
+
+
+def _contents(output: Output) -> dict[str, bytes]:
+    """Every file of the report -> what it holds."""
+    images, contents = [], dict[str, bytes]()
     for name, caption, figure in _drawings(output):
         files = {kind: rendered(figure, kind) for kind in ("png", "svg")}
-        folder = output.folder if name.startswith("pareto") else output.folder / FIGURES
-        for kind, content_bytes in files.items():
-            write_bytes(content_bytes, folder / f"{name}.{kind}")
+        where = name if name.startswith("pareto") else f"{FIGURES}/{name}"
+        contents |= {f"{where}.{kind}": made for kind, made in files.items()}
         images.append((caption, inlined(files["png"])))
     published = comparison_with_published(output)
     if len(published):
-        write_csv(published, output.folder / PUBLISHED_CSV)
-        write_table(pa.Table.from_pandas(published, preserve_index=False), output.folder / PUBLISHED_PARQUET)
-    write_text(_html(output, images, published), output.folder / REPORT)
+        contents[PUBLISHED_CSV] = csv_of(published).encode("utf-8")
+        contents[PUBLISHED_PARQUET] = encoded(pa.Table.from_pandas(published, preserve_index=False))
+    return contents | {REPORT: _html(output, images, published).encode("utf-8")}
 
 
 def _html(output: Output, images: Sequence[tuple[str, str]], published: pd.DataFrame) -> str:

@@ -19,6 +19,7 @@ from ruamel.yaml.error import YAMLError
 from ..arrays import FloatArray
 from ..constraints import Bound
 from ..errors import Fault, OutputError
+from ..inventory import Inventory
 from ..metrics import CSD
 from ..objectives import Objective
 from ..scenes import Geometry
@@ -118,10 +119,18 @@ class Output:
         return self.table[self.table["kind"].isin(kinds)]
 
 
-def read_output(folder: Path) -> Output:
-    """Read a finished run; raises OutputError when a file is missing or damaged."""
-    if not (folder / RESULTS).is_file():
-        raise OutputError(Fault("no finished run here", str(folder), allowed=f"a folder with {RESULTS}"))
+def read_output(folder: Path, *, audited: bool = True) -> Output:
+    """Read a finished run; raises OutputError, naming each, where files are missing or not as the run wrote them.
+
+    `audited`: with the rows of `sweep audit`, where there are some.
+    """
+    inventory = Inventory(folder)
+    if PROVENANCE not in inventory.files:
+        raise OutputError(Fault("no finished run here", str(folder), allowed="a folder that `sweep run` finished"))
+    optional = [name for name in (FRONT, RECOGNITION, SEARCH_LOG, AUDIT) if name in inventory.files]
+    if not audited and AUDIT in optional:
+        optional.remove(AUDIT)
+    inventory.require([RESULTS, CURVES, POINTS, RESOLVED, PROVENANCE, *optional])
     study = _mapping(folder / RESOLVED, lambda text: YAML(typ="safe").load(text), _STUDY_KEYS)
     provenance = _mapping(folder / PROVENANCE, json.loads, PROVENANCE_KEYS)
     objective = Objective.model_validate(study["objective"]).column
@@ -130,17 +139,17 @@ def read_output(folder: Path) -> Output:
     _check_columns(folder / RESULTS, [*_RESULT_COLUMNS, objective, *provenance["trade_off"]])
     for name, columns in ((CURVES, ["wavelength_nm"]), (POINTS, ["design_id", "signal_type", "channel", "dn"])):
         _check_columns(folder / name, columns)
-    if (folder / FRONT).is_file():
+    if FRONT in optional:
         _check_columns(folder / FRONT, ["sensitivity_min", "objective", "sensitivity", "limit"])
     profiles = Profiles(objective, next(iter(study["scenarios"])))
     table, counts = thinned(folder / RESULTS, [objective, *provenance["trade_off"]], profiles.add)
     curves, points = (read_table(folder / name).to_pandas() for name in (CURVES, POINTS))
-    front, recognition, searched, audited = (
-        read_table(folder / name).to_pandas() if (folder / name).is_file() else None
+    front, recognition, searched, audit = (
+        read_table(folder / name).to_pandas() if name in optional else None
         for name in (FRONT, RECOGNITION, SEARCH_LOG, AUDIT)
     )
     return Output(
-        folder, study, provenance, table, counts, curves, points, front, recognition, searched, audited, profiles.found
+        folder, study, provenance, table, counts, curves, points, front, recognition, searched, audit, profiles.found
     )
 
 
@@ -177,7 +186,7 @@ def _same(one: FloatArray, other: FloatArray) -> bool:
 def _mapping(path: Path, parse: Any, keys: Sequence[str]) -> dict[str, Any]:
     try:
         found = parse(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, YAMLError) as error:
+    except (OSError, ValueError, RecursionError, YAMLError) as error:
         raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
     if not isinstance(found, dict):
         raise OutputError(Fault("not a mapping", str(path)))

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import count
@@ -12,22 +10,25 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import Fault, OutputError
-from ..journal import LOCK
-from ..store import CURVES, POINTS, PROVENANCE, PROVENANCE_KEYS, RESOLVED, RESULTS, has_footer, write_json
+from ..inventory import MADE_BY_RUN, Inventory
+from ..store import PROVENANCE
 from ..study import Study
 from .provenance import fingerprint, identity
 
-RUN = "run.json"
 _MOST_SHOWN = 3
 
 
 @dataclass(frozen=True)
 class Held:
-    """The run that a folder holds: its fingerprint, its identity, whether it is finished."""
+    """The run that a folder holds: its fingerprint, its identity, whether it is finished.
+
+    `stranger`: a file of others under the name of one of a run's.
+    """
 
     fingerprint: str
     identity: Mapping[str, Any]
     finished: bool
+    stranger: str | None
 
     def is_of(self, study: Study) -> bool:
         """Whether it is the run of this very study."""
@@ -35,20 +36,21 @@ class Held:
 
 
 def held_by(folder: Path) -> Held | None:
-    """The run in a folder, or None; a folder with results of unknown origin has an empty fingerprint.
+    """The run in a folder, or None; one of unknown origin has an empty fingerprint, as have files of others under the
+    names of a run's files.
 
-    A run is finished when all that its report needs is there; where something was deleted or cut, the same command
-    makes it again.
+    A run is finished when all that its report needs is there, by the sizes of the files.
     """
-    run = read_facts(folder / RUN)
-    finished = read_facts(folder / PROVENANCE)
-    if not run and not finished and not os.path.lexists(folder / RESULTS):
+    inventory = Inventory(folder)
+    strangers = inventory.strangers()
+    if not inventory.fingerprint and not strangers:
         return None
-    mine = str(run.get("fingerprint", finished.get("fingerprint", "")))
-    whole = finished.get("fingerprint") == mine and finished.keys() >= set(PROVENANCE_KEYS)
-    whole = whole and (folder / RESOLVED).is_file()
-    whole = whole and all(has_footer(folder / name) for name in (RESULTS, CURVES, POINTS))
-    return Held(mine, run.get("identity", {}), whole)
+    known = inventory.facts.get("identity")
+    if not isinstance(known, dict):
+        known = {}
+    listed = inventory.files.keys() & MADE_BY_RUN
+    whole = PROVENANCE in listed and not inventory.wrong(listed, quick=True)
+    return Held(inventory.fingerprint, known, whole, strangers[0] if strangers else None)
 
 
 def output_folder(base: Path, study: Study) -> tuple[Path, str | None]:
@@ -59,25 +61,22 @@ def output_folder(base: Path, study: Study) -> tuple[Path, str | None]:
         held = held_by(folder)
         if held is None or held.is_of(study):
             return folder, None if note is None else f"{note}; this one is in {folder}"
-        note = f"{folder} holds another study of this name ({_changed(held.identity, identity(study))})"
+        if held.fingerprint or held.identity:
+            note = f"{folder} holds another study of this name ({_changed(held.identity, identity(study))})"
+        else:
+            note = f"{folder / held.stranger if held.stranger else folder} is not of a run of this study"
     raise AssertionError
 
 
-def discard(folder: Path) -> None:
-    """Leave nothing of a run that has no result, unless the folder holds other files."""
-    for name in (RUN, LOCK):
-        (folder / name).unlink(missing_ok=True)
-    with contextlib.suppress(OSError):
-        folder.rmdir()
-
-
-def begin(folder: Path, study: Study, facts: Mapping[str, Any]) -> None:
-    """Say in the folder which run it holds; raises OutputError when it holds another one."""
+def begin(folder: Path, study: Study, facts: Mapping[str, Any]) -> Inventory:
+    """Say in the folder which run it holds; raises OutputError when it holds another one, or files of others."""
     held = held_by(folder)
-    if held is not None and not held.is_of(study):
+    if held is not None and held.fingerprint and not held.is_of(study):
         problem = f"holds another study ({_changed(held.identity, identity(study))})"
         raise OutputError(Fault(problem, str(folder), allowed="another folder"))
-    write_json({"fingerprint": fingerprint(study), "identity": identity(study)} | dict(facts), folder / RUN)
+    inventory = Inventory(folder)
+    inventory.begin(fingerprint(study), {"identity": identity(study), **facts})
+    return inventory
 
 
 def _changed(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
@@ -102,12 +101,3 @@ def _flat(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 def _short(value: object) -> str:
     text = str(value).removeprefix("study.")
     return text if len(text) <= 40 else text[:37] + "..."
-
-
-def read_facts(path: Path) -> dict[str, Any]:
-    """A JSON mapping; an empty one where there is none that can be read."""
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return found if isinstance(found, dict) else {}

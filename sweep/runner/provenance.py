@@ -7,7 +7,7 @@ import json
 import os
 import platform
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from importlib.metadata import version
 from io import StringIO
@@ -17,7 +17,6 @@ from ruamel.yaml import YAML
 
 from ..study import Study
 from .jobs import CHUNK
-from .workers import Workers
 
 MODEL_VERSION = "7"
 """Raised whenever the same study would give other rows; part of every shard's key."""
@@ -73,11 +72,14 @@ def plan_facts(study: Study) -> dict[str, Any]:
     }
 
 
-def provenance(study: Study, workers: Workers, command: Sequence[str], duration_s: float) -> dict[str, Any]:
-    """Everything needed to run the study again, and what the machine was."""
+def provenance(study: Study, how: Mapping[str, Any]) -> dict[str, Any]:
+    """Everything needed to run the study again, and what the machine was.
+
+    `how`: `command`, `duration_s`, `backend`, `scheduler` and `workers` of the run.
+    """
     return {
-        "command": list(command),
-        "duration_s": round(duration_s, 3),
+        "command": how["command"],
+        "duration_s": how["duration_s"],
         "seed": study.section.seed,
         "fingerprint": fingerprint(study),
         "model_version": MODEL_VERSION,
@@ -88,8 +90,8 @@ def provenance(study: Study, workers: Workers, command: Sequence[str], duration_
         "platform": platform.platform(),
         "byte_order": sys.byteorder,
         "cores": os.cpu_count(),
-        "backend": workers.backend,
-        "scheduler": workers.scheduler,
-        "workers": workers.count,
+        "backend": how["backend"],
+        "scheduler": how["scheduler"],
+        "workers": how["workers"],
         "threads_per_worker": 1,
     }

@@ -1,52 +1,34 @@
-"""The whole run: search, sweep, front, files. What is finished survives a kill."""
+"""The whole run: what is finished stays, what is missing or damaged is made."""
 
 from __future__ import annotations
 
-import hashlib
 import time
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
-from itertools import chain
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pandas as pd
-import pyarrow as pa
-
-from ..constraints import FEASIBLE
+from ..disk import read_facts
 from ..errors import InfeasibleError, StudyError
-from ..journal import Journal, locked
-from ..pareto import hypervolume
+from ..inventory import Inventory
+from ..journal import Journal
+from ..lock import LOCK, locked
 from ..progress import Progress
-from ..store import (
-    CURVES,
-    FRONT,
-    POINTS,
-    PROVENANCE,
-    RECOGNITION,
-    RESOLVED,
-    RESULTS,
-    SEARCH_LOG,
-    has_footer,
-    write_json,
-    write_table,
-    write_tables,
-    write_text,
-)
+from ..store import PROVENANCE, PROVENANCE_KEYS, RESOLVED, RESULTS
 from ..study import Study
-from .compaction import Front, Gathered
-from .drawn import curves_table, points_table
-from .folders import begin, discard, held_by, read_facts
-from .jobs import Rules, detours_of, rules_of
-from .patches import recognition_table
+from .folders import begin
+from .jobs import rules_of
+from .making import Making, files_of, fits
 from .planning import with_plans
-from .provenance import plan_facts, provenance, resolved_yaml
-from .routes import detours_in_words
-from .searching import SearchAnswer, answer_row, front_table, run_search, search_facts, search_log
+from .provenance import resolved_yaml
 from .stopping import Stop, stop_on_signals
-from .sweeping import Sweep
-from .workers import Call, Workers, workers
+from .workers import Workers, workers
+
+_HOW = ("command", "backend", "scheduler", "workers", "duration_s")
+"""What provenance and `run.json` both say of how a run went, so that either makes the other again."""
+_DETOURS = "detours"
+"""Of both as well: which designs took another route than their block's own."""
 
 
 @dataclass(frozen=True)
@@ -71,154 +53,68 @@ def run_study(
     scheduler: str | None = None,
     wishes: Wishes = Wishes(),
     stop: Stop | None = None,
-) -> bool:
-    """Run a study into `output`; what an earlier, interrupted run of the same study finished is kept.
+) -> tuple[str, ...]:
+    """Run a study into `output`; what an earlier run of the same study finished is kept, if it is not damaged.
 
-    Writes `results.parquet`, `search.parquet` (when the study searches), `curves.parquet`, `points.parquet`,
-    `recognition.parquet` (when the study asks for it), `study.resolved.yaml` and `provenance.json`, each atomically.
-    Returns False when there was nothing left to do. Raises OutputError when the folder is in use, holds another study
-    or cannot be written; InfeasibleError, before anything is left behind, when the search finds no feasible design;
-    FailedDesignError for the first failing design, if it is wished; InterruptedRunError after SIGINT or SIGTERM, which
-    are taken here unless the caller takes them into `stop`.
+    Writes `results.parquet`, `search.parquet` and `front.parquet` (when the study searches), `curves.parquet`,
+    `points.parquet`, `recognition.parquet` (when the study asks for it), `study.resolved.yaml` and `provenance.json`,
+    each atomically, and lists them with their digests in `run.json` and `SHA256SUMS`. Files that the lists do not name
+    are not touched. Returns the names of the files that were made, none when nothing was left to do.
+
+    Raises OutputError when the folder is in use, holds another study, holds something else under the name of a file of
+    the run, or cannot be written; InfeasibleError, before anything is left behind, when the search finds no feasible
+    design; FailedDesignError for the first failing design, if it is wished; InterruptedRunError after SIGINT or
+    SIGTERM, which are taken here unless the caller takes them into `stop`.
     """
     started = time.monotonic()
     with stop_on_signals(stop) as own, workers(Workers(n_jobs, own, backend, scheduler)) as crew, locked(output):
-        held = held_by(output)
-        failed = wishes.retry_failed and read_facts(output / PROVENANCE).get("failed", 0)
-        if held is not None and held.finished and held.is_of(study) and not failed:
-            return False
-        facts = {"command": list(command), "designs": study.n_designs, "workers": crew.count, "backend": crew.backend}
-        begin(output, study, facts)
-        try:
-            study = with_plans(study, crew.count, progress, stop=own)
-        except StudyError:
-            discard(output)
-            raise
-        run = _Run(study, output, rules_of(study), crew, progress, wishes)
-        run.whole(started, command, again=held is not None)
-    return True
+        inventory = Inventory(output)
+        mended, wrong, how = inventory.wrong_lists(), _wrong(inventory, study), _how(inventory)
+        retry = wishes.retry_failed and bool(read_facts(output / PROVENANCE).get("failed", 0))
+        if retry or how is None:
+            how = {"command": list(command), "workers": crew.count, "backend": crew.backend, "scheduler": scheduler}
+            how[_DETOURS] = inventory.facts.get(_DETOURS, [])
+        inventory = begin(output, study, how | {"designs": study.n_designs})
+        if wrong == {RESOLVED}:
+            inventory.write({RESOLVED: resolved_yaml(study).encode("utf-8")})
+        elif wrong or retry:
+            try:
+                study = with_plans(study, crew.count, progress, stop=own)
+                rules = rules_of(study)
+                if retry or not fits(inventory, study, rules):
+                    wrong.add(RESULTS)
+                making = Making(study, rules, inventory, crew, progress, wishes.fail_fast, wishes.retry_failed, started)
+                making.make(wrong)
+                wrong |= making.made
+            except (StudyError, InfeasibleError):
+                _discard(inventory)
+                raise
+    return (*mended, *sorted(wrong))
 
 
-@dataclass
-class _Kept:
-    """Runs calls as the crew does, and keeps each answer: what a killed search has finished is not searched again."""
-
-    crew: Workers
-    journal: Journal
-    fingerprint: str
-    _round: int = 0
-
-    def __call__(self, calls: Iterable[Call]) -> Iterator[Any]:
-        self._round += 1
-        waiting = list(calls)
-        keys = [
-            hashlib.sha256(f"{self.fingerprint} answer {self._round} {at}".encode()).hexdigest()
-            for at in range(len(waiting))
-        ]
-        known = {at: answer for at, key in enumerate(keys) if (answer := self.journal.answer(key)) is not None}
-        fresh = self.crew(call for at, call in enumerate(waiting) if at not in known)
-        for at, key in enumerate(keys):
-            if at in known:
-                yield known[at]
-                continue
-            started = time.monotonic()
-            answer = next(fresh)
-            self.journal.keep(key, answer, time.monotonic() - started)
-            yield answer
+def _wrong(inventory: Inventory, study: Study) -> set[str]:
+    """Files of the study's run that are not what a run wrote."""
+    wrong = set(inventory.wrong(sorted(files_of(study))))
+    if not read_facts(inventory.path(PROVENANCE)).keys() >= set(PROVENANCE_KEYS):
+        wrong.add(PROVENANCE)
+    return wrong
 
 
-@dataclass
-class _Run:
-    """One run of a study whose scenes are planned, in a folder that it holds."""
-
-    study: Study
-    output: Path
-    rules: Rules
-    crew: Workers
-    progress: Progress
-    wishes: Wishes
-    facts: dict[str, Any] = field(default_factory=dict)
-
-    def whole(self, started: float, command: Sequence[str], *, again: bool) -> None:
-        """Search, sweep, and write everything; `again`: the folder may have this study's results already."""
-        study, output = self.study, self.output
-        journal = Journal(output)
-        journal.check()
-        sweep = Sweep(study, self.rules, journal, self.crew)
-        if again and has_footer(output / RESULTS):
-            sweep.refill(output / RESULTS)
-        answer = self._searched(journal, sweep.fingerprint)
-        gathered = Gathered(self.rules, next(iter(study.scenarios)))
-        sweep.run(gathered, self.progress, fail_fast=self.wishes.fail_fast, retry_failed=self.wishes.retry_failed)
-        answered = [] if answer is None else [answer_row(study, answer, self.rules, study.n_designs)]
-        for row in answered:
-            gathered.add(row)
-        gathered.finish()
-        tables = map(gathered.front.marked, chain(sweep.tables(), answered))
-        write_tables(tables, self.rules.schema, output / RESULTS)
-        detours = sum(map(detours_of, answered), sweep.detours)
-        rows, on_front = gathered.frame(), gathered.front_frame()
-        self.facts |= {
-            "designs": study.n_designs + len(answered),
-            "failed": sweep.failed,
-            "plans": plan_facts(study),
-            "trade_off": study.trade_off,
-            "warnings": [*study.warnings, *sweep.warnings, *detours_in_words(detours)],
-            "detours": [{"how": how, "why": why, "designs": n} for (how, why), n in detours.items()],
-        }
-        self._write_search(answer, gathered.swept)
-        self._write_drawn(rows, on_front, answer)
-        write_text(resolved_yaml(study), output / RESOLVED)
-        duration = time.monotonic() - started
-        write_json(provenance(study, self.crew, command, duration) | self.facts, output / PROVENANCE)
-        journal.remove()
-
-    def _searched(self, journal: Journal, mine: str) -> SearchAnswer | None:
-        """The search comes first: a study that no design meets ends here, and leaves nothing."""
-        if self.study.search is None:
-            return None
-        try:
-            return run_search(self.study, self.study.search, _Kept(self.crew, journal, mine), self.progress)
-        except InfeasibleError:
-            journal.remove()
-            discard(self.output)
-            raise
-
-    def _write_search(self, answer: SearchAnswer | None, swept: Front) -> None:
-        log, trade_off = None, None
-        if answer is not None:
-            log = search_log(answer)
-            self.facts["search"] = search_facts(self.study, answer)
-            if self.study.plans[answer.search.scenario].methods.saturation == "clip":
-                self.facts["warnings"].append(
-                    "signals can saturate; the search sees the response before that, its row after"
-                )
-            if answer.front:
-                trade_off = front_table(answer)
-                self.facts["hypervolume"] = _hypervolumes(answer, swept)
-                self.facts["hypervolume_least_sensitivity"] = answer.search.levels[0]
-        self._write(SEARCH_LOG, log)
-        self._write(FRONT, trade_off)
-
-    def _write_drawn(self, rows: pd.DataFrame, on_front: pd.DataFrame, answer: SearchAnswer | None) -> None:
-        self._write(CURVES, curves_table(self.study, rows, on_front, None if answer is None else answer.limit))
-        self._write(POINTS, points_table(self.study, rows, on_front))
-        self._write(RECOGNITION, recognition_table(self.study, rows, self.crew, self.progress))
-
-    def _write(self, name: str, table: pa.Table | None) -> None:
-        """A table, or its absence."""
-        if table is None:
-            (self.output / name).unlink(missing_ok=True)
-        else:
-            write_table(table, self.output / name)
+def _how(inventory: Inventory) -> dict[str, Any] | None:
+    """How the run went that finished in the folder, out of `run.json` or else of provenance; None where none did."""
+    if PROVENANCE not in inventory.files:
+        return None
+    intact = inventory.guarded or not inventory.wrong([PROVENANCE])
+    facts = inventory.facts if inventory.guarded else read_facts(inventory.path(PROVENANCE))
+    return (
+        {key: facts[key] for key in (*_HOW, *_IF_ANY) if key in facts} if intact and facts.keys() >= {*_HOW} else None
+    )
 
 
-def _hypervolumes(answer: SearchAnswer, swept: Front) -> dict[str, float]:
-    """Area that the designs of sweep and search dominate above no separation and the lowest level of sensitivity."""
-    reference = np.array([0.0, answer.search.levels[0] - 1e-6])
-    runs = (*answer.runs, *(run for point in answer.front for run in point.runs))
-    found = [[e.objective, e.sensitivity] for run in runs for e in run.log if e.violation <= FEASIBLE]
-    return {
-        "sweep": hypervolume(swept.points(answer.search.space.cfa, answer.search.scenario), reference),
-        "search": hypervolume(np.array(found).reshape(-1, 2), reference),
-    }
+def _discard(inventory: Inventory) -> None:
+    """Leave nothing of a run that has no result; what others have in the folder stays."""
+    Journal(inventory.folder).remove()
+    if inventory.discard():
+        with suppress(OSError):
+            (inventory.folder / LOCK).unlink()
+            inventory.folder.rmdir()

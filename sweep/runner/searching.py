@@ -107,6 +107,12 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     return SearchAnswer(search, tuple(runs), best, limit, no_limit, front)
 
 
+def limit_alone(study: Study, search: Search) -> Limit | None:
+    """The limit that `run_search` finds, without a search."""
+    problem = study.problem(search)
+    return limit_of(problem) if why_not(problem) is None else None
+
+
 def _infeasible(study: Study, problem: Problem, starts: FloatArray, each: int) -> InfeasibleError:
     faults = [Fault(f"{study.name}: no feasible design was found")]
     for name, bound in problem.constraints.items():

@@ -16,10 +16,9 @@ from ..errors import FailedDesignError, Fault, OutputError
 from ..journal import Journal, Shard
 from ..progress import Progress
 from ..setup import Setup
-from ..store import PROVENANCE, sliced
+from ..store import sliced
 from ..study import Study
 from .compaction import Gathered, few_of
-from .folders import read_facts
 from .jobs import Job, Rules, detours_of, failed_rows, job_key, jobs_of, joined, run_job, with_local_front
 from .provenance import fingerprint
 from .routes import Detours
@@ -73,11 +72,11 @@ class Sweep:
     def refill(self, results: Path) -> None:
         """Take what the journal lacks out of a result table of this study, but for chunks with failed designs.
 
-        Up to the first row that cannot be read; nothing out of a table in which designs took detours, which only its
-        provenance knows. The whole table marks the front over all kinds of rows, a chunk its
-        own, from which that of the swept rows alone follows, too.
+        Up to the first row that cannot be read. Not for a table in which designs took detours, which its rows do not
+        tell. The whole table marks the front over all kinds of rows, a chunk its own, from which that of the swept rows
+        alone follows, too.
         """
-        if self.journal.entries.keys() >= set(self.keys) or read_facts(results.parent / PROVENANCE).get("detours"):
+        if self.journal.entries.keys() >= set(self.keys):
             return
         chunks = sliced(results, [job.stop - job.start for job in self.jobs])
         for index, (job, key) in enumerate(zip(self.jobs, self.keys, strict=True)):
@@ -134,7 +133,8 @@ class Sweep:
 
     def _kept(self, index: int) -> pa.Table | None:
         """A finished chunk; None, and it counts as not finished, if its file is damaged."""
-        table = self.journal.table(self.keys[index], self.rules.schema)
+        job = self.jobs[index]
+        table = self.journal.table(self.keys[index], self.rules.schema, job.stop - job.start)
         if table is None:
             self.warnings.append(f"chunk {index} was damaged on the disk and is computed again")
         return table
