@@ -106,9 +106,8 @@ def _how(inventory: Inventory) -> dict[str, Any] | None:
         return None
     intact = inventory.guarded or not inventory.wrong([PROVENANCE])
     facts = inventory.facts if inventory.guarded else read_facts(inventory.path(PROVENANCE))
-    return (
-        {key: facts[key] for key in (*_HOW, *_IF_ANY) if key in facts} if intact and facts.keys() >= {*_HOW} else None
-    )
+    known = intact and facts.keys() >= {*_HOW}
+    return {key: facts[key] for key in (*_HOW, _DETOURS) if key in facts} if known else None
 
 
 def _discard(inventory: Inventory) -> None:
