@@ -25,7 +25,16 @@ class Mischief(Stopband):
     file: Path
     separable = None  # its curves are asked for
 
+    def hull(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """A plan asks for it; the mischief is done for a single design."""
+        self._misbehave(low[None] if (low == high).all() else np.empty((0, low.size)))
+        return super().hull(low, high)
+
     def curves(self, x: np.ndarray) -> np.ndarray:
+        self._misbehave(x)
+        return super().curves(x)
+
+    def _misbehave(self, x: np.ndarray) -> None:
         if (x[:, 0] == 590).any() and self.file.exists():
             wish = self.file.read_text().split()
             with self.file.open("a") as handle:
@@ -34,7 +43,6 @@ class Mischief(Stopband):
                 os.kill(os.getpid(), signal.SIGKILL)
             if wish[0] == "fail":
                 raise ValueError("no such filter")
-        return super().curves(x)
 
 
 def mischievous(study: Study, file: Path) -> Study:

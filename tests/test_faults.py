@@ -70,7 +70,7 @@ def test_a_worker_that_is_killed_while_scenes_are_planned_costs_nothing(plain: S
     wish = tmp_path / "wish"
     wish.write_text("kill 1 ")
     study = mischievous(plain, wish)
-    single = replace(study.spaces[-1], axes=((590.0,), (5.0,), (660.0,), (5.0,), (1.0,)))  # a plan looks at its curves
+    single = replace(study.spaces[-1], axes=((590.0,), (5.0,), (660.0,), (5.0,), (1.0,)))
     study = replace(study, spaces=(*study.spaces[:-1], single))
     plans = with_plans(study, 2, lambda *_: None).plans
     assert wish.read_text().count("done") >= 2
