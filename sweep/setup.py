@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,29 +10,75 @@ import numpy as np
 from .arrays import FloatArray, IndexArray
 from .chromaticity import luminance_per_photon_radiance
 from .datasets.lights import Lights
+from .errors import Fault, SweepError, nearest
 from .mosaics import Mosaic
 from .scenes import Scenario, WhitePatchExposure
 from .sensor import Pixel, irradiance_factor
 from .spectra import WavelengthGrid
 
+METHODS: Mapping[str, tuple[str, ...]] = {
+    "noise": ("skip", "expected"),
+    "quantization": ("skip", "round"),
+    "saturation": ("skip", "clip"),
+    "pedestal": ("skip", "add"),
+    "quadrature": ("every 10th", "every 5th", "every 2nd", "grid"),
+    "sampling": ("skip", "pixels"),
+    "phase": (
+        "one",
+        "pixel",
+        "half pixel",
+        "quarter pixel",
+        "within 10 DN",
+        "within 1 DN",
+        "within 0.1 DN",
+        "within 0.01 DN",
+        "within 0.0001 DN",
+    ),
+    "demosaic": ("skip", "tent"),
+    "blur": ("skip", "every 10 nm", "every 5 nm", "every 2 nm", "every wavelength"),
+    "crosstalk": ("skip", "neighbors"),
+    "illumination": ("skip", "cos4"),
+    "extinction": ("skip", "gray", "spectral"),
+    "flicker": ("skip", "ends", "fine"),
+}
+"""Every effect of the image chain with its methods, from the cheapest to the reference."""
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, init=False)
 class Methods:
-    """How each effect of the image chain is computed; the defaults are the reference, with everything on."""
+    """How each effect of the image chain is computed; what is not named, as in the reference, with everything on.
 
-    noise: str = "expected"
-    quantization: str = "round"
-    saturation: str = "clip"
-    pedestal: str = "add"
-    quadrature: str = "grid"
-    sampling: str = "pixels"
-    phase: str = "within 0.0001 DN"
-    demosaic: str = "tent"
-    blur: str = "every wavelength"
-    crosstalk: str = "neighbors"
-    illumination: str = "cos4"
-    extinction: str = "spectral"
-    flicker: str = "fine"
+    Raises SweepError for an effect or a method that does not exist.
+    """
+
+    noise: str
+    quantization: str
+    saturation: str
+    pedestal: str
+    quadrature: str
+    sampling: str
+    phase: str
+    demosaic: str
+    blur: str
+    crosstalk: str
+    illumination: str
+    extinction: str
+    flicker: str
+
+    def __init__(self, **methods: str) -> None:
+        _refuse_unknown("effect", methods, METHODS)
+        for effect, known in METHODS.items():
+            method = methods.get(effect, known[-1])
+            _refuse_unknown(f"method of {effect}", (method,), known)
+            object.__setattr__(self, effect, method)
+
+
+def _refuse_unknown(what: str, names: Iterable[str], known: Collection[str]) -> None:
+    for name in names:
+        if name not in known:
+            raise SweepError(
+                Fault(f"unknown {what}", value=name, allowed=", ".join(known), nearest=nearest(name, known))
+            )
 
 
 REFERENCE = Methods()

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sweep.errors import SweepError
-from sweep.families import CHANNELS, Dual, Family, FamilyOptions, FreeForm, Stopband, build_family
+from sweep.families import MAKERS, Dual, Family, FamilyOptions, FreeForm, Maker, Stopband, build_family
 
 WAVE = np.arange(400.0, 701.0)
 BASE = 0.3 + 0.4 / (1 + np.exp(-(WAVE - 500) / 20))
@@ -30,7 +30,7 @@ FAMILIES: dict[str, tuple[Family, np.ndarray]] = {
 
 
 def test_every_family_is_tested() -> None:
-    assert set(FAMILIES) == set(CHANNELS)
+    assert set(FAMILIES) == set(MAKERS)
 
 
 @pytest.mark.parametrize("name", list(FAMILIES))
@@ -40,7 +40,7 @@ def test_shapes_and_names(name: str) -> None:
     assert family.kind == name
     assert x.shape == (n,)
     assert len({p.name for p in family.parameters}) == n
-    assert family.n_modified == CHANNELS[name]
+    assert family.n_modified == MAKERS[name].n_modified
     block = np.stack([x, x, x])
     assert family.curves(block).shape == (3, family.n_modified, 301)
     assert family.gradient(x).shape == (n, family.n_modified, 301)
@@ -181,6 +181,44 @@ def test_a_family_refuses_what_does_not_fit() -> None:
     ):
         with pytest.raises(SweepError):
             build_family(name, WAVE, BASE, target, given_options)
+
+
+@pytest.mark.parametrize("name", list(FAMILIES))
+def test_a_family_is_built_by_its_name(name: str) -> None:
+    family, x = FAMILIES[name]
+    given = {
+        "multi_stopband": FamilyOptions(bands=2),
+        "free_form": FamilyOptions(nodes={"start_nm": 540, "stop_nm": 700, "step_nm": 20}),
+    }
+    target = {"dual": CEILING, "free_form": None}.get(name, TARGET)
+    made = build_family(name, WAVE, BASE, target, given.get(name, FamilyOptions()))
+    assert (made.kind, type(made), made.n_modified) == (name, type(family), MAKERS[name].n_modified)
+    if name != "free_form":
+        np.testing.assert_array_equal(made.curves(x[None]), family.curves(x[None]))
+
+
+def test_a_name_in_no_registry_is_refused_and_one_that_is_added_gets_its_own_class(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with pytest.raises(
+        SweepError, match=r"unknown family \(got 'stopbnd'\); allowed: stopband, .*did you mean 'stopband'"
+    ):
+        build_family("stopbnd", WAVE, BASE, TARGET, FamilyOptions())
+
+    class Flat(FreeForm):
+        kind = "flat"
+
+    flat = Maker(
+        1, needs_target=False, option=None, make=lambda wave, base, *_: Flat(wave, base, np.array([500.0, 600.0]))
+    )
+    monkeypatch.setitem(MAKERS, "flat", flat)
+    assert type(build_family("flat", WAVE, BASE, None, FamilyOptions())) is Flat
+    with pytest.raises(SweepError, match="flat has no `to`"):
+        build_family("flat", WAVE, BASE, TARGET, FamilyOptions())
+    with pytest.raises(SweepError, match="`bands` goes with multi_stopband"):
+        build_family("flat", WAVE, BASE, None, FamilyOptions(bands=2))
+    with pytest.raises(AssertionError):  # and the suite above asks for its tests
+        test_every_family_is_tested()
 
 
 @pytest.mark.parametrize("name", list(FAMILIES))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cache
 
 import joblib
@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from sweep.effects import blur
+from sweep.errors import SweepError
 from sweep.evaluate import evaluate
 from sweep.imaging import Imager
 from sweep.metrics import CSD
 from sweep.plan import Plan, Planner
 from sweep.promises import EFFECTS, READOUT
-from sweep.setup import REFERENCE, Methods
+from sweep.setup import METHODS, REFERENCE, Methods
 from sweep.study import load_study
 
 from .conftest import STUDIES
@@ -60,6 +61,24 @@ def contract(made: Scene) -> list[tuple[str, str, float, float]]:
 def all_contracts() -> list[tuple[str, str, str, float, float]]:
     each = joblib.Parallel(n_jobs=2)(joblib.delayed(contract)(made) for made in HARD)
     return [(made.name, *row) for made, rows in zip(HARD, each, strict=True) for row in rows]
+
+
+def test_the_table_of_methods_is_that_of_the_effects() -> None:
+    assert [(effect, module.METHODS) for effect, module in EFFECTS.items()] == list(METHODS.items())
+    assert asdict(REFERENCE) == {effect: methods[-1] for effect, methods in METHODS.items()}
+    for effect, methods in METHODS.items():
+        for method in methods:
+            assert asdict(replace(REFERENCE, **{effect: method})) == asdict(REFERENCE) | {effect: method}
+
+
+def test_unknown_effects_and_methods_are_refused() -> None:
+    allowed = "; allowed: skip, every 10 nm, every 5 nm, every 2 nm, every wavelength; did you mean 'skip'"
+    with pytest.raises(SweepError, match=r"unknown method of blur \(got 'skp'\)" + allowed):
+        Methods(blur="skp")
+    with pytest.raises(SweepError, match=r"unknown method of noise \(got 'grid'\)"):
+        replace(REFERENCE, noise="grid")
+    with pytest.raises(SweepError, match=r"unknown effect \(got 'flickr'\); allowed: noise, .*did you mean 'flicker'"):
+        Methods(flickr="skip")
 
 
 def test_there_are_enough_hard_scenes() -> None:

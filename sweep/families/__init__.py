@@ -1,17 +1,18 @@
 """Families of filters: parameters in, QE curves of the modified channels out."""
 
 from .base import Family, Parameter, SeparableFamily
-from .build import CHANNELS, FamilyOptions, build_family
+from .build import MAKERS, FamilyOptions, Maker, build_family
 from .dual import Dual
 from .free_form import FreeForm
 from .stopband import Stopband
 
 __all__ = [
-    "CHANNELS",
+    "MAKERS",
     "Dual",
     "Family",
     "FamilyOptions",
     "FreeForm",
+    "Maker",
     "Parameter",
     "SeparableFamily",
     "Stopband",

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from ..arrays import FloatArray
-from ..errors import Fault, SweepError
+from ..errors import Fault, SweepError, nearest
 from ..schema import Positive, Section
 from .base import Family
 from .dual import Dual
 from .free_form import FreeForm
 from .stopband import Stopband
-
-CHANNELS: Mapping[str, int] = {"stopband": 1, "multi_stopband": 1, "dual": 2, "free_form": 1}
-"""Every family that a study can name, with the number of channels that it replaces."""
-
 
 _MOST_NODES = 500
 
@@ -46,30 +43,67 @@ class FamilyOptions(Section):
     nodes: Nodes | None = None
 
 
+@dataclass(frozen=True)
+class Maker:
+    """How a family is made: the channels that it replaces, whether it takes `to`, its own option, and the maker.
+
+    `make` takes the wavelengths, the base, the target (None without `to`) and the options.
+    """
+
+    n_modified: int
+    needs_target: bool
+    option: str | None
+    make: Callable[[FloatArray, FloatArray, FloatArray | None, FamilyOptions], Family]
+
+
+def _stopband(wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: FamilyOptions) -> Family:
+    assert target is not None
+    return Stopband(wavelength_nm, base, target, options.bands or 1)
+
+
+def _dual(wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, _: FamilyOptions) -> Family:
+    assert target is not None
+    if not (target > base).any():
+        raise SweepError(Fault("dual needs a ceiling `to` above its base: there is no room to swing"))
+    return Dual(wavelength_nm, base, target)
+
+
+def _free_form(wavelength_nm: FloatArray, base: FloatArray, _: FloatArray | None, options: FamilyOptions) -> Family:
+    nodes = options.nodes
+    assert nodes is not None
+    if nodes.start_nm < wavelength_nm[0] or nodes.stop_nm > wavelength_nm[-1]:
+        place = f"{nodes.start_nm:g} to {nodes.stop_nm:g} nm"
+        allowed = f"{wavelength_nm[0]:g} to {wavelength_nm[-1]:g} nm"
+        raise SweepError(Fault("nodes outside the wavelength grid", value=place, allowed=allowed))
+    count = round((nodes.stop_nm - nodes.start_nm) / nodes.step_nm) + 1
+    return FreeForm(wavelength_nm, base, nodes.start_nm + nodes.step_nm * np.arange(count, dtype=float))
+
+
+MAKERS: Mapping[str, Maker] = {
+    "stopband": Maker(1, needs_target=True, option=None, make=_stopband),
+    "multi_stopband": Maker(1, needs_target=True, option="bands", make=_stopband),
+    "dual": Maker(2, needs_target=True, option=None, make=_dual),
+    "free_form": Maker(1, needs_target=False, option="nodes", make=_free_form),
+}
+"""Every family that a study can name."""
+
+
 def build_family(
     name: str, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: FamilyOptions
 ) -> Family:
-    """The family `name` over `base`; raises SweepError when it lacks a target or an option, or has one too many."""
-    needs_target = name != "free_form"
-    if (target is None) == needs_target:
-        raise SweepError(Fault(f"{name} {'needs' if needs_target else 'has no'} `to`"))
-    if (options.bands is None) == (name == "multi_stopband"):
-        raise SweepError(
-            Fault("`bands` goes with multi_stopband, and multi_stopband with `bands`", value=options.bands)
-        )
-    if (options.nodes is None) == (name == "free_form"):
-        raise SweepError(Fault("`nodes` goes with free_form, and free_form with `nodes`"))
-    if name == "dual" and target is not None:
-        if not (target > base).any():
-            raise SweepError(Fault("dual needs a ceiling `to` above its base: there is no room to swing"))
-        return Dual(wavelength_nm, base, target)
-    if options.nodes is not None:
-        nodes = options.nodes
-        if nodes.start_nm < wavelength_nm[0] or nodes.stop_nm > wavelength_nm[-1]:
-            place = f"{nodes.start_nm:g} to {nodes.stop_nm:g} nm"
-            allowed = f"{wavelength_nm[0]:g} to {wavelength_nm[-1]:g} nm"
-            raise SweepError(Fault("nodes outside the wavelength grid", value=place, allowed=allowed))
-        count = round((nodes.stop_nm - nodes.start_nm) / nodes.step_nm) + 1
-        return FreeForm(wavelength_nm, base, nodes.start_nm + nodes.step_nm * np.arange(count, dtype=float))
-    assert target is not None
-    return Stopband(wavelength_nm, base, target, options.bands or 1)
+    """The family `name` over `base`.
+
+    Raises SweepError when there is no such family, and when it lacks a target or an option, or has one too many.
+    """
+    maker = MAKERS.get(name)
+    if maker is None:
+        allowed = ", ".join(MAKERS)
+        raise SweepError(Fault("unknown family", value=name, allowed=allowed, nearest=nearest(name, MAKERS)))
+    if (target is not None) != maker.needs_target:
+        raise SweepError(Fault(f"{name} {'needs' if maker.needs_target else 'has no'} `to`"))
+    for option in FamilyOptions.model_fields:
+        given = getattr(options, option)
+        if (given is not None) != (option == maker.option):
+            owners = " or ".join(owner for owner, made in MAKERS.items() if made.option == option)
+            raise SweepError(Fault(f"`{option}` goes with {owners}, and {owners} with `{option}`", value=given))
+    return maker.make(wavelength_nm, base, target, options)

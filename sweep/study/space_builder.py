@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from ..errors import SweepError, nearest
-from ..families import CHANNELS, Parameter, build_family
+from ..families import MAKERS, Parameter, build_family
 from ..filters import SensorCurves
 from ..mosaics import Mosaic
 from ..spaces import Filter, Kind, Space
@@ -72,11 +72,13 @@ class SpaceBuilder:
         for channel in entry.channel:
             if mosaic is not None and channel not in mosaic.channels:
                 self.sources.unknown((*path, "channel"), f"channel of {entry.cfa}", channel, list(mosaic.channels))
-        if entry.family not in CHANNELS:
-            self.sources.unknown((*path, "family"), "family", entry.family, list(CHANNELS))
-        elif len(entry.channel) != CHANNELS[entry.family]:
+        if entry.family not in MAKERS:
+            self.sources.unknown((*path, "family"), "family", entry.family, list(MAKERS))
+        elif len(entry.channel) != MAKERS[entry.family].n_modified:
             self.sources.add(
-                (*path, "channel"), f"{entry.family} replaces {CHANNELS[entry.family]} channel(s)", entry.channel
+                (*path, "channel"),
+                f"{entry.family} replaces {MAKERS[entry.family].n_modified} channel(s)",
+                entry.channel,
             )
         elif len(set(entry.channel)) < len(entry.channel):
             self.sources.add((*path, "channel"), "a channel is named twice", entry.channel)
