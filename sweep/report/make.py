@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import pandas as pd
@@ -41,24 +41,29 @@ def make_report(output: Output, *, mend: bool = False) -> None:
         wrong = inventory.wrong({REPORT, *listed})
         if mend and not wrong:
             return
-        contents = _contents(output)
-        inventory.write({name: made for name, made in contents.items() if not mend or inventory.wrong([name])})
-        inventory.remove(name for name in listed if name not in contents)
+        some = wrong if mend and REPORT not in wrong else None
+        contents = _contents(output, some)
+        inventory.write({n: made for n, made in contents.items() if not mend or n in wrong or n not in listed})
+        inventory.remove(n for n in listed if n not in contents and (some is None or n in some))
 
 
-def _contents(output: Output) -> dict[str, bytes]:
-    """Every file of the report -> what it holds."""
+def _contents(output: Output, some: Iterable[str] | None) -> dict[str, bytes]:
+    """The files of the report -> what they hold; `some` of them, or all, since the page has every picture in it."""
     images, contents = [], dict[str, bytes]()
     for name, caption, figure in _drawings(output):
-        files = {kind: rendered(figure, kind) for kind in ("png", "svg")}
         where = name if name.startswith("pareto") else f"{FIGURES}/{name}"
-        contents |= {f"{where}.{kind}": made for kind, made in files.items()}
-        images.append((caption, inlined(files["png"])))
+        for kind in ("png", "svg"):
+            if some is None or {f"{where}.png", f"{where}.svg"} & {*some}:
+                contents[f"{where}.{kind}"] = rendered(figure, kind)
+        if some is None:
+            images.append((caption, inlined(contents[f"{where}.png"])))
     published = comparison_with_published(output)
     if len(published):
         contents[PUBLISHED_CSV] = csv_of(published).encode("utf-8")
         contents[PUBLISHED_PARQUET] = encoded(pa.Table.from_pandas(published, preserve_index=False))
-    return contents | {REPORT: _html(output, images, published).encode("utf-8")}
+    if some is None:
+        contents[REPORT] = _html(output, images, published).encode("utf-8")
+    return contents
 
 
 def _html(output: Output, images: Sequence[tuple[str, str]], published: pd.DataFrame) -> str:

@@ -1,0 +1,201 @@
+"""Every file of a finished run is guarded: damage is named, is not read, and the same command mends it alone."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from sweep.inventory import Inventory
+
+from .commands import commanded
+
+STUDY = """\
+study: small
+sensor: ar0820
+lights: tl16
+scenarios:
+  chart: {exposure: {kind: white_patch}, noise: true}
+pixel: {read_noise_e: 2}
+cfas: [RGGB, RYNCy]
+sweeps:
+  edges:
+    cfa: RYNCy
+    channel: N
+    base: Y
+    to: G
+    grid: {left_nm: [590, 600, 610], left_width_nm: 5, right_nm: {min: 640, max: 690, count: 51}, right_width_nm: 5}
+constraints:
+  sensitivity: {min: 0.9}
+search: {starts: 1, max_evaluations: 20, front: {min: 0.8, max: 0.9, count: 2}}
+recognition: {states: [green, yellow, red], patches: 20}
+published:
+  Table 2:
+    RGGB: {csd_yellow_red: 138}
+"""
+LISTS = ("run.json", "SHA256SUMS")
+READ = (
+    *("results.parquet", "search.parquet", "front.parquet", "curves.parquet", "points.parquet", "recognition.parquet"),
+    *("audit.parquet", "study.resolved.yaml", "provenance.json"),
+)
+DRAWN = ("report.html", "pareto.png", "figures/sensor.svg", "paper_comparison.csv", "paper_comparison.parquet")
+
+
+def deleted(path: Path) -> None:
+    path.unlink()
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def flipped(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[len(content) // 3] ^= 1
+    path.write_bytes(content)
+
+
+def garbled(path: Path) -> None:
+    path.write_bytes(hashlib.shake_128(path.name.encode()).digest(path.stat().st_size))
+
+
+def a_folder(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
+def a_link(path: Path) -> None:
+    """To a copy that is whole, which is not the run's."""
+    elsewhere = path.parents[2] / f"elsewhere-{path.name}"
+    path.rename(elsewhere)
+    path.symlink_to(elsewhere)
+
+
+DAMAGES = (deleted, cut, flipped, garbled, a_folder, a_link)
+FEW = {
+    ("results.parquet", flipped),
+    ("curves.parquet", garbled),
+    ("provenance.json", deleted),
+    ("search.parquet", cut),
+    ("audit.parquet", flipped),
+    ("run.json", flipped),
+    ("SHA256SUMS", a_link),
+    ("figures/sensor.svg", deleted),
+}
+
+
+def cases() -> list[object]:
+    every = itertools.product((*LISTS, *READ, *DRAWN), DAMAGES)
+    return [
+        pytest.param(
+            file, damage, marks=() if (file, damage) in FEW else pytest.mark.slow, id=f"{file}-{damage.__name__}"
+        )
+        for file, damage in every
+    ]
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("study") / "small.yaml"
+    path.write_text(STUDY)
+    return path
+
+
+@pytest.fixture(scope="module")
+def finished(study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    outputs = tmp_path_factory.mktemp("finished")
+    assert commanded("run", study, "--output", outputs, "--jobs", 1)[0] == 0
+    folder = outputs / "small"
+    assert commanded("audit", folder)[0] == 0
+    assert commanded("report", folder)[0] == 0
+    made = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    assert made >= {*LISTS, *READ, *DRAWN}
+    assert made - {".lock", *LISTS} == Inventory(folder).files.keys()
+    return folder
+
+
+@pytest.fixture
+def folder(finished: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(finished, tmp_path / "outputs" / "small"))
+
+
+def state(folder: Path) -> dict[str, tuple[int, str]]:
+    """Time and digest of every file but the lock."""
+    return {
+        path.relative_to(folder).as_posix(): (path.stat().st_mtime_ns, hashlib.sha256(path.read_bytes()).hexdigest())
+        for path in folder.rglob("*")
+        if path.is_file() and path.name != ".lock"
+    }
+
+
+def named_in(said: str, folder: Path) -> list[str]:
+    """Files that a command refuses, one a line."""
+    return [line.removeprefix(f"sweep: {folder}/").split(": ")[0] for line in said.splitlines()]
+
+
+@pytest.mark.parametrize(("file", "damage"), cases())
+def test_a_damage_is_named_and_mended_alone(
+    study: Path, folder: Path, file: str, damage: Callable[[Path], None]
+) -> None:
+    before = state(folder)
+    damage(folder / file)
+    code, _, said = commanded("status", folder, "--verify")
+    assert (code, named_in(said, folder)) == (2, [file])
+    if file in READ:
+        for command in (
+            ("report", folder),
+            ("export", folder, "--design", "best"),
+            ("compare", folder, folder, "--output", folder.parent / "to"),
+            *([("audit", folder)] if file != "audit.parquet" else []),
+        ):
+            code, out, said = commanded(*command)
+            assert (code, out, named_in(said, folder)) == (2, "", [file]), command
+    code, _, said = commanded("run", study, "--output", folder.parent, "--jobs", 1)
+    assert code == 0, said
+    after = state(folder)
+    assert {name: digest for name, (_, digest) in after.items()} == {n: digest for n, (_, digest) in before.items()}
+    assert {name for name in after if after[name] != before[name]} == {file}
+    code, out, _ = commanded("status", folder, "--verify")
+    assert code == 0
+    assert out.splitlines()[-1].startswith(f"ok: its {len(after)} files")
+    elsewhere = folder.parents[1] / f"elsewhere-{Path(file).name}"
+    assert not elsewhere.exists() or hashlib.sha256(elsewhere.read_bytes()).hexdigest() == before[file][1]
+
+
+def test_the_lists_are_in_the_form_of_sha256sum(folder: Path) -> None:
+    done = subprocess.run(["sha256sum", "--strict", "-c", "SHA256SUMS"], cwd=folder, capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert len(done.stdout.splitlines()) == len(state(folder)) - 1
+
+
+def test_an_intact_run_is_not_touched_again(study: Path, folder: Path) -> None:
+    before = state(folder)
+    code, _, said = commanded("run", study, "--output", folder.parent, "--jobs", 1)
+    assert code == 0
+    assert "nothing was computed" in said
+    assert state(folder) == before
+
+
+def test_what_stands_in_a_file_s_place_is_not_removed(study: Path, folder: Path) -> None:
+    (folder / "curves.parquet").unlink()
+    (folder / "curves.parquet").mkdir()
+    (folder / "curves.parquet" / "mine.txt").write_text("mine")
+    code, _, said = commanded("run", study, "--output", folder.parent, "--jobs", 1)
+    assert (code, named_in(said, folder)) == (2, ["curves.parquet"])
+    assert (folder / "curves.parquet" / "mine.txt").read_text() == "mine"
+
+
+def test_without_both_lists_nothing_is_replaced(study: Path, folder: Path) -> None:
+    for name in LISTS:
+        (folder / name).unlink()
+    before = state(folder)
+    code, _, said = commanded("run", study, "--output", folder.parent, "--jobs", 1)
+    assert code == 0
+    assert f"{folder}-2" in said
+    assert state(folder) == before
+    assert (folder.with_name("small-2") / "report.html").exists()
