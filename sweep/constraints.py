@@ -8,22 +8,27 @@ import numpy as np
 from pydantic import model_validator
 
 from .arrays import FloatArray
-from .schema import Section
+from .schema import Number, Section
 
 FEASIBLE = 1e-9
 """A design is feasible up to this violation (relative to the bound), so that rounding cannot lose one on a bound."""
+_LEAST = 1e-30
+"""Violations are relative to a bound."""
 
 
 class Bound(Section):
-    """An allowed range; at least one end."""
+    """An allowed range; at least one end: 0, or 1e-30 to 1e30 in magnitude."""
 
-    min: float | None = None
-    max: float | None = None
+    min: Number | None = None
+    max: Number | None = None
 
     @model_validator(mode="after")
     def _ordered(self) -> Bound:
         if self.min is None and self.max is None:
             raise ValueError("a constraint needs `min`, `max` or both")
+        for end in (self.min, self.max):
+            if end is not None and 0 < abs(end) < _LEAST:
+                raise ValueError(f"{end:g} is too near to 0; 0 itself is allowed")
         if self.min is not None and self.max is not None and not self.min <= self.max:
             raise ValueError(f"min {self.min:g} must not be above max {self.max:g}")
         return self

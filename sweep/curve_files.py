@@ -18,15 +18,16 @@ from .arrays import FloatArray
 from .errors import DataError, Fault, nearest
 from .inputs import read_input
 from .mat_files import DamagedError, read_variables
-from .spectra import Curves, check_samples
+from .spectra import LARGEST, Curves, check_samples
 
 WAVELENGTH = "wavelength_nm"
 NO_UTF_16 = "UTF-8; UTF-16? save as UTF-8"
 """What is allowed where the text of a file looks like that."""
 MOST_BYTES = 40_000_000
 MOST_CURVES = 2_000
+MOST_SAMPLES = 100_000
 MOST_VALUES = 2_000_000
-"""Limits of a file of curves: 2,000 curves of 1,000 samples are read in a second."""
+"""Limits of a file of curves: 2,000 curves of 1,000 samples are read in a second or two."""
 _MOST_CELL_FAULTS = 10_000
 _MAT_VARIABLES = ("wavelength", "data", "filterNames")
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
@@ -95,9 +96,10 @@ def _decoded(path: Path) -> tuple[str, list[Fault]]:
 def _scan_csv(path: Path) -> Scan:
     text, layout = _decoded(path)
     file = str(path)
-    first = next((line for line in io.StringIO(text) if line.strip() and not line.startswith("#")), "")
+    lines = (line for line in io.StringIO(text, newline=None) if line.strip() and not line.startswith("#"))
+    first = next(lines, "")
     delimiter = next((mark for mark in (",", ";", "\t") if mark in first), ",")
-    _check_size(file, None, text.count("\n") or text.count("\r"), first.count(delimiter))
+    _check_size(file, None, sum(1 for _ in lines), first.count(delimiter))  # before all is taken apart
     reader = csv.reader(io.StringIO(text, newline=None), delimiter=delimiter)
     try:
         rows = [(reader.line_num, row) for row in reader if any(c.strip() for c in row) and not row[0].startswith("#")]
@@ -108,7 +110,7 @@ def _scan_csv(path: Path) -> Scan:
             [*layout, Fault("the file is empty", file, allowed=f"a header `{WAVELENGTH},...` and rows of numbers")]
         )
     line, header = rows[0][0], [cell.strip() for cell in rows[0][1]]
-    _check_size(file, line, len(rows), len(header) - 1)
+    _check_size(file, line, len(rows) - 1, len(header) - 1)
     if delimiter != ",":
         problem, allowed = "columns are not separated by commas", "`,` between columns, `.` in numbers"
         layout.append(Fault(problem, file, line, value=delimiter, allowed=allowed))
@@ -124,6 +126,7 @@ def _check_size(file: str, line: int | None, n_samples: int, n_curves: int) -> N
     """Refuse what would take minutes to read, before it is read."""
     for what, count, most in (
         ("curves", n_curves, MOST_CURVES),
+        ("samples", n_samples, MOST_SAMPLES),
         ("values", n_samples * n_curves, MOST_VALUES),
     ):
         if count > most:
@@ -164,7 +167,7 @@ class _Cells:
         try:
             if not any(map(_ODD.search, row)):
                 numbers = list(map(float, row))
-                if min(numbers[1:], default=0.0) >= 0 and all(map(math.isfinite, numbers)):
+                if min(numbers[1:], default=0.0) >= 0 and max(numbers) <= LARGEST:
                     return [number + 0.0 for number in numbers]
         except ValueError:
             pass  # which cell it is, is found below
@@ -182,6 +185,8 @@ class _Cells:
             return math.nan
         if not first and number < 0:
             self.add("negative value", line, name, cell.strip(), "finite, >= 0")
+        if number > LARGEST:
+            self.add("value too large", line, name, cell.strip(), f"0 to {LARGEST:g}")
         return number
 
     def add(self, problem: str, line: int, key: str | None, value: object, allowed: str) -> None:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .disk import read_facts
-from .errors import Fault, StudyError
+from .errors import Fault, StudyError, SweepError
+from .inputs import is_folder
 from .lock import holder
 from .report.content import amount
 from .runner import output_folder
@@ -31,7 +32,7 @@ def list_lines(folder: Path, outputs: Path, data: Path | None = None) -> list[st
     A study that cannot be loaded is a line that says why. `data` as for `load_study`. Raises StudyError when there is
     no such folder.
     """
-    if not folder.is_dir():
+    if not is_folder(folder):
         raise StudyError(Fault("no such folder", str(folder), allowed="a folder of study files"))
     files = sorted(
         path for path in folder.iterdir() if path.suffix in (".yaml", ".yml") and not path.name.startswith(".")
@@ -49,7 +50,7 @@ def list_lines(folder: Path, outputs: Path, data: Path | None = None) -> list[st
 def _line(path: Path, outputs: Path, data: Path | None) -> _Line:
     try:
         study = load_study(path, data)
-    except StudyError as error:
+    except SweepError as error:
         more = f" (and {len(error.faults) - 1} more)" if error.faults[1:] else ""
         return _Line(path.stem, "", "cannot be loaded", f"{error.faults[0]}{more}")
     name = path.stem if study.name == path.stem else f"{path.stem} ({study.name})"

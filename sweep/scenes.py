@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from .schema import NonNegative, Positive, Section
-from .sensor import Optics, Pixel
+from .schema import Meters, Ratio, Seconds, Section, Share
+from .sensor import DarkCurrent, Optics, Pixel, ReadNoise
 
 DIAMETER_M = 0.2
 """Diameter of a usual traffic light, EN 12368."""
@@ -25,24 +25,24 @@ class WhitePatchExposure(Section):
     """
 
     kind: Literal["white_patch"] = "white_patch"
-    level: float = Field(default=0.95, gt=0, le=1)
-    photon_ratio: float | None = Field(default=None, gt=0)
+    level: Share = 0.95
+    photon_ratio: Ratio | None = None
 
 
 class FixedExposure(Section):
-    """The same exposure time for every CFA, seconds."""
+    """The same exposure time for every CFA, seconds: femtoseconds to 30 years."""
 
     kind: Literal["fixed"] = "fixed"
-    exposure_s: Positive
+    exposure_s: Seconds
 
 
 class Geometry(Section):
     """A traffic light of `diameter_m` at `distance_m`, seen by a sensor of `width_px` columns over `fov_deg`."""
 
-    distance_m: Positive
-    fov_deg: float = Field(gt=0, le=360)
-    width_px: int = Field(default=3840, ge=1)
-    diameter_m: Positive = DIAMETER_M
+    distance_m: Meters
+    fov_deg: float = Field(ge=1e-6, le=360)
+    width_px: int = Field(default=3840, ge=1, le=10_000_000)
+    diameter_m: Meters = DIAMETER_M
 
     @property
     def object_resolution_px(self) -> float:
@@ -55,7 +55,11 @@ class Geometry(Section):
         return pitch_um * self.width_px / math.radians(self.fov_deg)
 
 
-_PlacePx = Annotated[list[float], Field(min_length=2, max_length=2)]
+_FARTHEST_PX = 1e6
+"""The mosaic repeats after a few pixels; of larger numbers a float keeps less and less of a pixel."""
+_PlacePx = Annotated[
+    list[Annotated[float, Field(ge=-_FARTHEST_PX, le=_FARTHEST_PX)]], Field(min_length=2, max_length=2)
+]
 
 
 def _place(value: Any) -> Any:
@@ -63,8 +67,9 @@ def _place(value: Any) -> Any:
     if value == "any":
         return value
     numbers = list(value) if isinstance(value, list | tuple) else []
-    if len(numbers) != 2 or not all(isinstance(v, int | float) and math.isfinite(v) for v in numbers):
-        raise ValueError("a place is `any`, or [column, row] in pixels")
+    plain = all(isinstance(v, int | float) and not isinstance(v, bool) for v in numbers)
+    if len(numbers) != 2 or not plain or not all(abs(v) <= _FARTHEST_PX for v in numbers):
+        raise ValueError(f"a place is `any`, or [column, row] in pixels, each -{_FARTHEST_PX:g} to {_FARTHEST_PX:g}")
     return (float(numbers[0]), float(numbers[1]))
 
 
@@ -86,15 +91,15 @@ class Target(Geometry):
 class Drive(Section):
     """A pulsed LED: on for `duty` of each period; its mean intensity is the rated one."""
 
-    duty: float = Field(gt=0, le=1)
-    frequency_hz: Positive
+    duty: Share
+    frequency_hz: float = Field(ge=1e-6, le=1e12)
 
 
 class Noise(Section):
     """Photon, read and dark noise and PRNU of the study's pixel; what is given here replaces the pixel's figure."""
 
-    read_noise_e: NonNegative | None = None
-    dark_e_per_s: NonNegative | None = None
+    read_noise_e: ReadNoise | None = None
+    dark_e_per_s: DarkCurrent | None = None
     prnu: float | None = Field(default=None, ge=0, lt=1)
 
     def of(self, pixel: Pixel) -> Pixel:
@@ -118,16 +123,17 @@ class Scenario(Section):
     which the air leaves 2 % (Koschmieder's meteorological range); it dims a target. `background_cd_m2`: light that is
     added over the whole field, also in front of the target, flat in photons and not dimmed. `off_axis_deg`: field
     angle. `noise`: photon, read and dark noise and PRNU act before the mean is taken; true, or figures of its own.
+    Limits: 1 to 1e40 photons (the sun's disc: 1e25), 1e-12 to 1e15 cd, a background up to 1e15 cd/m^2 (the sun: 2e9).
     """
 
-    photon_radiance: Positive = 2e18
-    intensity_cd: Positive | None = None
+    photon_radiance: float = Field(default=2e18, ge=1, le=1e40)
+    intensity_cd: float | None = Field(default=None, ge=1e-12, le=1e15)
     exposure: Annotated[WhitePatchExposure | FixedExposure, Field(discriminator="kind")] = WhitePatchExposure()
     optics: Optics = Optics()
     target: Target | None = None
     off_axis_deg: float = Field(default=0.0, ge=0, lt=90)
-    visibility_m: Positive | None = None
-    background_cd_m2: NonNegative = 0.0
+    visibility_m: Meters | None = None
+    background_cd_m2: float = Field(default=0.0, ge=0, le=1e15)
     drive: Drive | None = None
     noise: Annotated[Noise | None, BeforeValidator(_noise, json_schema_input_type=bool | Noise | None)] = None
 

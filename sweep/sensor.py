@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 from pydantic import Field, model_validator
 
 from .arrays import FloatArray
-from .schema import NonNegative, Positive, Section
+from .schema import Meters, NonNegative, Section, Share
+
+ReadNoise = Annotated[float, Field(ge=0, le=1e9)]
+"""Electrons; a pixel's well is full long before."""
+DarkCurrent = Annotated[float, Field(ge=0, le=1e15)]
+"""Electrons per second; any well is full in less than a second."""
 
 
 class Optics(Section):
     """A lens without aberrations. `transmission` holds for all wavelengths.
 
-    `focus_m`: distance that is in focus; null focuses on the target.
+    `focus_m`: distance that is in focus; null focuses on the target. `f_number`: 0.01 (no lens is faster than 0.5) to
+    a million (a pinhole far away).
     """
 
-    f_number: float = Field(default=4.0, gt=0)
-    focus_m: Positive | None = None
-    transmission: float = Field(default=1.0, gt=0, le=1)
+    f_number: float = Field(default=4.0, ge=0.01, le=1e6)
+    focus_m: Meters | None = None
+    transmission: Share = 1.0
 
 
 class Pixel(Section):
@@ -26,18 +33,19 @@ class Pixel(Section):
 
     Defaults: 2.1 um pitch (AR0820), a full well of 10,000 e that maps to full scale. `gain_dn_per_e` null means
     full scale / full well. `offset_dn` is the pedestal. `crosstalk`: share of a pixel's light that comes through the
-    filters of its four neighbors. `prnu`: relative standard deviation of the pixels' gains.
+    filters of its four neighbors. `prnu`: relative standard deviation of the pixels' gains. Limits: a pitch of 1 nm to
+    10 cm, wells of 0.01 to 1e15 e, gains of 1e-15 to 1e15 DN/e, read noise up to 1e9 e, dark current up to 1e15 e/s.
     """
 
-    pitch_um: Positive = 2.1
-    fill_factor: float = Field(default=1.0, gt=0, le=1)
-    well_e: Positive = 10_000.0
+    pitch_um: float = Field(default=2.1, ge=1e-3, le=1e5)
+    fill_factor: Share = 1.0
+    well_e: float = Field(default=10_000.0, ge=1e-2, le=1e15)
     bits: int = Field(default=12, ge=1, le=24)
-    gain_dn_per_e: float | None = Field(default=None, gt=0)
+    gain_dn_per_e: float | None = Field(default=None, ge=1e-15, le=1e15)
     offset_dn: NonNegative = 0.0
     crosstalk: float = Field(default=0.0, ge=0, lt=1)
-    read_noise_e: NonNegative = 0.0
-    dark_e_per_s: NonNegative = 0.0
+    read_noise_e: ReadNoise = 0.0
+    dark_e_per_s: DarkCurrent = 0.0
     prnu: float = Field(default=0.0, ge=0, lt=1)
 
     @model_validator(mode="after")

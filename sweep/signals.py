@@ -8,10 +8,10 @@ from functools import cache
 import numpy as np
 
 from .arrays import FloatArray
-from .chromaticity import REGIONS, chromaticity
+from .chromaticity import REGIONS, VISIBLE_NM, chromaticity
 from .spectra import WavelengthGrid
 
-VISIBLE = WavelengthGrid(start_nm=360.0, stop_nm=830.0, step_nm=1.0)
+VISIBLE = WavelengthGrid(start_nm=VISIBLE_NM[0], stop_nm=VISIBLE_NM[1], step_nm=1.0)
 """What the CIE 1931 color-matching functions cover."""
 EQUAL_ENERGY = (1 / 3, 1 / 3)
 """White that dominant wavelength and purity are counted from: CIE illuminant E."""

@@ -24,6 +24,10 @@ PLANCK_J_S = 6.62607015e-34
 """Planck constant, exact in the SI of 2019."""
 LIGHT_M_S = 299792458.0
 """Speed of light in vacuum, exact in the SI."""
+LARGEST = 1e100
+"""Of a curve's values, in any unit. Products of what is larger leave the range of floats."""
+LEAST_PEAK = 1e-100
+"""Of a curve that is not 0; its other values may be as small as they like."""
 _GRID_SLACK = 1e-9
 _MOST_STEPS = 20_000
 
@@ -43,14 +47,14 @@ class WavelengthGrid(Section):
         steps = (self.stop_nm - self.start_nm) / self.step_nm
         if not self.start_nm < self.stop_nm:
             raise ValueError(f"start_nm {self.start_nm:g} must be below stop_nm {self.stop_nm:g}")
+        if not 200 <= self.start_nm < self.stop_nm <= 2000:
+            raise ValueError("wavelengths must be in nm, between 200 and 2000")
+        if steps > _MOST_STEPS:
+            raise ValueError(f"step_nm {self.step_nm:g} is too fine: at most {_MOST_STEPS} steps")
         if not abs(steps - round(steps)) < 1e-6:
             raise ValueError(
                 f"step_nm {self.step_nm:g} must divide stop_nm - start_nm = {self.stop_nm - self.start_nm:g}"
             )
-        if steps > _MOST_STEPS:
-            raise ValueError(f"step_nm {self.step_nm:g} is too fine: at most {_MOST_STEPS} steps")
-        if not 200 <= self.start_nm < self.stop_nm <= 2000:
-            raise ValueError("wavelengths must be in nm, between 200 and 2000")
         return self
 
     @property
@@ -149,6 +153,12 @@ def check_samples(wavelength_nm: ArrayLike, values: ArrayLike) -> tuple[FloatArr
     elif (data < 0).any():
         at = int(np.argmax(data < 0))
         faults.append(Fault(f"negative value at {wave[at]:g} nm", value=float(data[at]), allowed=">= 0"))
+    elif data.max() > LARGEST:
+        at, allowed = int(np.argmax(data)), f"0 to {LARGEST:g}"
+        faults.append(Fault(f"value at {wave[at]:g} nm is too large", value=float(data[at]), allowed=allowed))
+    elif 0 < data.max() < LEAST_PEAK:
+        allowed = f"0 everywhere, or {LEAST_PEAK:g} or more somewhere"
+        faults.append(Fault("the largest value is too small", value=float(data.max()), allowed=allowed))
     if faults:
         raise DataError(faults)
     return wave, data
@@ -217,7 +227,7 @@ def equal_photons(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
     Raises DataError when a spectrum has no photons on the grid.
     """
     total = grid.integrate(photons)
-    if not (total > 0).all():
+    if not (total >= LEAST_PEAK).all():
         raise DataError(
             Fault(
                 "a light has no photons on the wavelength grid",

@@ -15,7 +15,7 @@ from sweep.evaluate import evaluate, smooth_csd, smooth_response
 from sweep.families import Stopband
 from sweep.imaging import Imager
 from sweep.mosaics import Mosaic
-from sweep.scenes import Scenario
+from sweep.scenes import FixedExposure, Scenario
 from sweep.sensor import Pixel
 from sweep.setup import Methods, Setup
 from sweep.spectra import WavelengthGrid
@@ -56,6 +56,11 @@ def made(
     modified = (mosaic.channels.index("N"),) if "N" in mosaic.channels else ()
     given = Scenario.model_validate(scenario or {})
     return Setup(GRID, mosaic, qe, modified, np.full(N, 0.9), lights, Pixel(**(pixel or {})), given, Methods(**methods))
+
+
+def beyond(setup: Setup, **scenario: object) -> Setup:
+    """The setup with figures of the scene that no study may have: the model itself has no limits."""
+    return replace(setup, scenario=setup.scenario.model_copy(update=scenario))
 
 
 def plain(setup: Setup) -> np.ndarray:
@@ -164,7 +169,7 @@ def exposures() -> Result:
     qe, results = random_qe(6, 3), []
     lights = lights_of(PAIR, lines(YELLOW, RED))
     for exposure_s in (5e-324, 1e-310, 1e-300, 1e-160, 1e-30, 1.0, 1e150, 1e300):
-        setup = made(qe, lights, {"exposure": {"kind": "fixed", "exposure_s": exposure_s}})
+        setup = beyond(made(qe, lights), exposure=FixedExposure.model_construct(exposure_s=exposure_s))
         found = smooth_csd(setup, plain(setup), PAIR)[0]
         gain = electrons_per_s(1.0) * mp.mpf(exposure_s) * 4095 / 10_000
         exact = gain * mp.sqrt(sum((mp.mpf(float(a)) - mp.mpf(float(b))) ** 2 for a, b in qe[:, [YELLOW, RED]]))
@@ -187,7 +192,7 @@ def radiances() -> Result:
     points = [[scale * mp.mpf(float(row[node])) for row in qe] for node in (YELLOW, RED)]
     exact = mp.sqrt(sum((a - b) ** 2 for a, b in zip(*points, strict=True)))
     for radiance in (1e-290, 1e-100, 2e18, 1e100, 1e270):
-        setup = made(qe, lights_of(PAIR, lines(YELLOW, RED)), {"photon_radiance": radiance})
+        setup = beyond(made(qe, lights_of(PAIR, lines(YELLOW, RED))), photon_radiance=radiance)
         found = smooth_csd(setup, plain(setup), PAIR)[0]
         results.append((abs(float(found - exact)), 64 * EPS * float(max(map(max, points))) * math.sqrt(3)))
     return worst(results)
@@ -202,7 +207,7 @@ def no_light() -> Result:
     lights = lights_of(PAIR, lines(YELLOW, RED))
     good = True
     for qe, radiance in ((np.zeros((3, N)), 2e18), (random_qe(8, 3), 5e-324)):
-        setup = made(qe, lights, FIXED | {"photon_radiance": radiance})
+        setup = beyond(made(qe, lights, FIXED), photon_radiance=radiance)
         good &= evaluate(Imager(setup), plain(setup))["csd_yellow_red"][0] == 0 == smooth_csd(setup, plain(setup), PAIR)
     with np.errstate(invalid="ignore"):
         setup = made(np.zeros((3, N)), lights)

@@ -21,6 +21,7 @@ _BROAD_NM = 70.0
 _COARSE_NM = 10.0
 _FEWEST_IN_PEAK = 4
 _PERCENT = 100.0
+_MOST_LETTERS = 100
 
 
 @dataclass(frozen=True)
@@ -96,8 +97,9 @@ def facts_of(scan: Scan) -> Facts:
     factor, read_as = _unit(scan.wavelength_nm)
     usable = np.isfinite(scan.wavelength_nm)
     curves = []
-    # Nothing that steers a terminal; two names that then look the same stay two.
-    shown = distinct([name if name.isprintable() else repr(name)[1:-1] for name in scan.names])
+    # Nothing that steers a terminal or fills it; two names that then look the same stay two.
+    cut = [name if len(name) <= _MOST_LETTERS else f"{name[: _MOST_LETTERS - 3]}..." for name in scan.names]
+    shown = distinct([name if name.isprintable() else repr(name)[1:-1] for name in cut])
     for name, column in zip(shown, scan.values.T, strict=True):
         kept = usable & np.isfinite(column)
         wave, at = np.unique(scan.wavelength_nm[kept] * factor, return_index=True)

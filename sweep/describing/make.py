@@ -16,12 +16,14 @@ import numpy as np
 from ..curve_files import scan_curves
 from ..errors import Fault, OutputError
 from ..figures import rendered
+from ..inputs import read_input
 from ..signals import LightColor
 from ..store import write_bytes
 from .facts import Facts, Quantity, condensed, facts_of, notes
 from .picture import draw
 
 _MOST_NAMES = 12
+_MOST_PICTURE = 100_000_000
 _HEADER_BYTES = 33
 """Of a PNG: its signature and its first chunk."""
 
@@ -79,12 +81,8 @@ def describe(path: Path, folder: Path, quantity: Quantity | None = None) -> Desc
 def _refuse_other(picture: Path) -> None:
     if not os.path.lexists(picture):
         return
-    try:
-        with picture.open("rb") as handle:
-            ours = handle.read(_HEADER_BYTES + len(_MARK)).endswith(_MARK)
-    except OSError as error:
-        raise OutputError(Fault(f"cannot be read: {error.strerror or error}", str(picture))) from None
-    if not ours:
+    held = read_input(picture, _MOST_PICTURE, OutputError)
+    if not held[: _HEADER_BYTES + len(_MARK)].endswith(_MARK):
         raise OutputError(Fault("holds something else already", str(picture), allowed="another --output"))
 
 

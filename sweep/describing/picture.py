@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..arrays import FloatArray
 from ..chromaticity import REGIONS, display_colors
 from ..figures import CURVE_COLORS, CURVE_CYCLE, TYPE_COLORS, canvas_grid
 from ..signals import VISIBLE, LightColor, outline, spectral_locus
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
 
 _MOST_NAMED = 16
 _MOST_LETTERS = 32
+_MOST_DRAWN = 200
+_MOST_POINTS = 4000
 _TICKS_NM = (460, 480, 490, 500, 510, 520, 540, 560, 580, 600, 620, 700)
 _CORNER_X, _CORNER_Y = (0.53, 0.74), (0.25, 0.46)
 _INSET = (0.49, 0.55, 0.35, 0.35)
@@ -25,8 +29,13 @@ Paint = tuple[float, ...] | str
 
 
 def draw(title: str, facts: Facts, colors: Mapping[str, LightColor | None]) -> Figure:
-    """Draw the curves; `colors` are those of lights, empty for QE."""
+    """Draw the curves, an even share of very many; `colors` are those of lights, empty for QE."""
     lights = bool(colors)
+    every = -(-len(facts.curves) // _MOST_DRAWN)
+    if every > 1:
+        title = f"{title}: {len(facts.curves[::every])} of {len(facts.curves):,} curves"
+        facts = replace(facts, curves=facts.curves[::every])
+        colors = {curve.name: colors[curve.name] for curve in facts.curves} if lights else {}
     figure, panels = canvas_grid(1, 2 if lights else 1, 13.0 if lights else 8.0, 5.0 if lights else 4.2)
     paints = {curve.name: _paint(curve, at, lights=lights) for at, curve in enumerate(facts.curves)}
     _draw_curves(panels[0], facts, paints)
@@ -52,8 +61,7 @@ def _draw_curves(axes: Axes, facts: Facts, paints: Mapping[str, Paint]) -> None:
     width = 1.6 if len(facts.curves) <= _MOST_NAMED else 0.7
     drawn = [
         axes.plot(
-            curve.wavelength_nm,
-            curve.values,
+            *_thinned(curve),
             color=paints[curve.name],
             linewidth=width,
             marker="." if curve.values.size < 20 else None,
@@ -75,6 +83,19 @@ def _draw_curves(axes: Axes, facts: Facts, paints: Mapping[str, Paint]) -> None:
         )
         for text in legend.get_texts():
             text.set_parse_math(False)
+
+
+def _thinned(curve: Curve) -> tuple[FloatArray, FloatArray]:
+    """Samples to draw: of very many the smallest and the largest of each group, so that no peak is lost."""
+    group = -(-2 * curve.values.size // _MOST_POINTS)
+    if group <= 2:
+        return curve.wavelength_nm, curve.values
+    whole = curve.values.size // group * group
+    groups = curve.values[:whole].reshape(-1, group)
+    ends = np.stack([groups.argmin(axis=1), groups.argmax(axis=1)], axis=1)
+    at = np.sort(ends, axis=1) + group * np.arange(len(groups))[:, None]
+    kept = np.unique([*at.ravel(), *range(whole, curve.values.size)])
+    return curve.wavelength_nm[kept], curve.values[kept]
 
 
 def _draw_diagram(axes: Axes, colors: Mapping[str, LightColor | None], paints: Mapping[str, Paint]) -> None:

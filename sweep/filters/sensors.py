@@ -14,6 +14,9 @@ from ..spectra import WavelengthGrid
 from ..surrogate import SurrogateParameters, surrogate_parameters
 from .ar0820 import ar0820
 
+_LEAST_QE = 1e-9
+"""A pixel that sees less would be exposed for hours on the sun."""
+
 
 @dataclass(frozen=True)
 class SensorCurves:
@@ -60,7 +63,7 @@ class SensorCurves:
 def make_sensor(name: str, qe: Mapping[str, FloatArray], source: str, clear: str | None = None) -> SensorCurves:
     """A sensor from curves on the grid; `clear` defaults to the curve with the largest total.
 
-    Raises DataError when a QE is above 1 or 0 everywhere, or `clear` is not a curve.
+    Raises DataError when a QE is above 1 or below 1e-9 everywhere, or `clear` is not a curve.
     """
     faults = []
     for curve, values in qe.items():
@@ -68,8 +71,9 @@ def make_sensor(name: str, qe: Mapping[str, FloatArray], source: str, clear: str
         if not top <= 1 + 1e-9:
             hint = "looks like percent: set `scale: 0.01`" if top <= 100 else "set `scale`"
             faults.append(Fault(f"QE above 1 ({hint})", source, None, curve, round(top, 6), "0 to 1"))
-        if not top > 0:
-            faults.append(Fault("QE is 0 on the whole grid", source, None, curve))
+        if not top >= _LEAST_QE:
+            what = "0" if top == 0 else f"below {_LEAST_QE:g}"
+            faults.append(Fault(f"QE is {what} on the whole grid", source, None, curve))
     if faults:
         raise DataError(faults)
     chosen = clear or max(qe, key=lambda curve: float(qe[curve].sum()))

@@ -7,10 +7,12 @@ from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field, WithJsonSchema, model_validator
 
-from ..schema import Positive, Section
+from ..curve_files import MOST_CURVES
+from ..schema import Ratio, Section
 from ..spectra import Outside, Resampling
 
 Name = Annotated[str, Field(min_length=1, max_length=100)]
+Columns = Annotated[list[Name], Field(min_length=1, max_length=MOST_CURVES)]
 FilePath = Annotated[str, Field(min_length=1, max_length=4096)]
 
 
@@ -27,7 +29,7 @@ class CurveFile(Documented):
     """Path of a .csv or .mat file, relative to the study or to the folder of --data."""
     columns: Annotated[dict[Name, Name], Field(min_length=1)]
     """Channel of the sensor -> column of the file."""
-    scale: Positive = 1.0
+    scale: Ratio = 1.0
     """Factor on the file's values: 0.01 for percent."""
     resampling: Resampling = "linear"
     """`mean` over each bin keeps the integral of lines that are finer than the grid."""
@@ -58,7 +60,7 @@ class LightFile(Documented):
     """Path of a .csv or .mat file, relative to the study or to the folder of --data."""
     quantity: Annotated[str, Field(pattern="^(energy|photons)$"), WithJsonSchema({"enum": ["energy", "photons"]})]
     """What the file's numbers are."""
-    signals: Annotated[dict[Name, Annotated[list[Name], Field(min_length=1)]], Field(min_length=1)]
+    signals: Annotated[dict[Name, Columns], Field(min_length=1)]
     resampling: Resampling = "linear"
     """`mean` over each bin keeps the integral of lines that are finer than the grid."""
     outside: Outside = "refuse"
@@ -71,7 +73,7 @@ class LightsSection(Documented):
     builtin: str | None = None
     name: Name | None = None
     files: list[LightFile] = []
-    photon_ratio: float | None = Field(default=None, gt=0)
+    photon_ratio: Ratio | None = None
     """K: photons of a signal patch over those of the white patch; from the spectra where it is left out."""
 
     @model_validator(mode="after")

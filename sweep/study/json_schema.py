@@ -12,12 +12,14 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from ..errors import Fault, OutputError
+from ..inputs import read_input
 from ..store import write_text
 from .schema import StudySection
 
 SCHEMA_FILE = "study.schema.json"
 """Its name beside the studies, which their first line gives."""
 _TITLE = "A study of sweep"
+_MOST_BYTES = 10_000_000
 _REF = "#/$defs/"
 _TEMPLATE = "ScenarioTemplate"
 Json = dict[str, Any]
@@ -61,9 +63,7 @@ def write_schema(path: Path) -> None:
     """Write the schema; raises OutputError, also where the file holds anything but such a schema."""
     if os.path.lexists(path):
         try:
-            held = json.loads(path.read_bytes())
-        except OSError as error:
-            raise OutputError(Fault(f"cannot be read: {error.strerror or error}", str(path))) from None
+            held = json.loads(read_input(path, _MOST_BYTES, OutputError))
         except (ValueError, RecursionError):
             held = None
         if not (isinstance(held, dict) and held.get("title") == _TITLE):

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ..arrays import FloatArray
+from ..chromaticity import VISIBLE_NM
 from ..datasets.lights import Lights
 from ..discrimination import CNR, D_PRIME, noise_names
 from ..effects import blur
@@ -16,14 +17,17 @@ from ..mosaics import Mosaic
 from ..scenes import OBJECT_RESOLUTION, WhitePatchExposure
 from ..search import ALGORITHMS
 from ..spaces import DIMENSIONS, Space
+from .axes import Axis
 from .lines import Document
 from .model import Search, Study
-from .schema import Axis, CfaSection, StudySection
+from .schema import CfaSection, StudySection
 from .sources import Sources
 from .space_builder import SpaceBuilder
 from .yaml_tree import Key
 
 MOST_DESIGNS = 10**9
+_LEAST_VISIBLE = 1e-6
+"""Share of a light's photons that the eye must see where its luminous intensity is given."""
 
 
 class _Resolver:
@@ -48,6 +52,7 @@ class _Resolver:
             raise StudyError(self.faults)
         spaces = SpaceBuilder(section, self.sources, sensor, mosaics).spaces()
         self.check_columns(lights)
+        self.check_luminances(lights)
         self.check_images()
         self.check_recognition(lights)
         self.check_objective(lights)
@@ -93,6 +98,21 @@ class _Resolver:
                 self.add(("lights",), problem, None, "other names of signal types")
             seen[name] = pair
 
+    def check_luminances(self, lights: Lights) -> None:
+        """Candelas are given of lights, and of a background, that the eye sees."""
+        nodes = self.section.wavelengths.nodes_nm
+        visible = (nodes >= VISIBLE_NM[0]) & (nodes <= VISIBLE_NM[1])
+        share = self.section.wavelengths.integrate(lights.photons * visible)
+        dark = [name for name, part in zip(lights.names, share, strict=True) if not part >= _LEAST_VISIBLE]
+        allowed = f"photons between {VISIBLE_NM[0]:g} and {VISIBLE_NM[1]:g} nm"
+        for name, scenario in self.section.scenarios.items():
+            if scenario.intensity_cd is not None and dark:
+                problem = f"a light that the eye does not see has no luminous intensity: {dark[0]}"
+                self.add(("scenarios", name, "intensity_cd"), problem, scenario.intensity_cd, allowed)
+            if scenario.background_cd_m2 and not visible.any():
+                problem = "a background on wavelengths that the eye does not see has no luminance"
+                self.add(("scenarios", name, "background_cd_m2"), problem, scenario.background_cd_m2, allowed)
+
     def check_images(self) -> None:
         """Every target makes an image that can be computed."""
         for name, scenario in self.section.scenarios.items():
@@ -135,12 +155,12 @@ class _Resolver:
     def check_published(self, lights: Lights, mosaics: Mapping[str, Mosaic]) -> None:
         section = self.section
         columns = [*DESIGNED, *(csd_name(pair) for pair in class_pairs(lights.classes))]
+        known = dict.fromkeys([*mosaics, *section.designs, *section.geometry])
         for table, rows in section.published.items():
             for row, values in rows.items():
                 path = ("published", table, row)
-                known = [*mosaics, *section.designs, *section.geometry]
                 if row not in known:
-                    self.unknown(path, "CFA, design or geometry", row, known)
+                    self.unknown(path, "CFA, design or geometry", row, list(known))
                 for quantity in values:
                     names = [OBJECT_RESOLUTION] if row in section.geometry else columns
                     if row in known and quantity not in names:
@@ -174,10 +194,11 @@ class _Resolver:
             self.check_quantity(inner, "objective", name, known)
 
     def check_constraints(self, lights: Lights) -> None:
+        quantities, noisy = self.named_quantities(lights), self.noise_quantities(lights)
         for name, bound in self.section.constraints.items():
             path = ("constraints", name)
-            known = self.check_quantity(path, "quantity", name, self.named_quantities(lights))
-            of_noise = name in self.noise_quantities(lights)
+            known = self.check_quantity(path, "quantity", name, quantities)
+            of_noise = name in noisy
             if of_noise and self.section.search is not None:
                 self.add(path, f"the search does not know {name}", None, "a study without `search`")
             if known and name not in ("sensitivity", "cfa_sensitivity"):

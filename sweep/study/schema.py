@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import math
-from copy import deepcopy
-from itertools import product
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from ..constraints import Bound
 from ..datasets import BUILT_IN_LIGHTS
@@ -15,18 +12,24 @@ from ..families import FamilyOptions
 from ..filters import BUILT_IN_SENSORS
 from ..objectives import Objective
 from ..scenes import Geometry, Scenario
-from ..schema import NonNegative, Positive, Section
+from ..schema import Number, Section
 from ..sensor import Pixel
 from ..spectra import WavelengthGrid
+from .axes import ScenarioTemplate, Span, Values, expanded
 from .curve_sections import Documented, LightsSection, Name, SensorSection, builtin, named
 
 _FEWEST_PATCHES = 10
+_MOST_ROWS = 64
+MOST_TYPES = 40
+"""Signal types of a study; 780 pairs of them have columns of their own."""
 
 
 class CfaSection(Section):
-    """A tile, row by row. `curves` maps channels to curves of the sensor that have another name."""
+    """A tile of at most 64 x 64 pixels, row by row. `curves`: channels to curves of the sensor with another name."""
 
-    tile: list[list[Name]] | None = None
+    tile: Annotated[list[Annotated[list[Name], Field(max_length=_MOST_ROWS)]], Field(max_length=_MOST_ROWS)] | None = (
+        None
+    )
     curves: dict[Name, Name] = {}
 
 
@@ -59,55 +62,7 @@ class Modification(Documented):
 class DesignSection(Modification):
     """One filter by its parameters, or by the name of a built-in one."""
 
-    at: dict[Name, float] | Name
-
-
-class Axis(Section):
-    """Values of one parameter: a list, or `count` equidistant ones from `min` to `max`."""
-
-    values: list[float] | None = Field(default=None, min_length=1)
-    min: float | None = None
-    max: float | None = None
-    count: int | None = Field(default=None, ge=1, le=1_000_000)
-
-    @model_validator(mode="after")
-    def _one_form(self) -> Axis:
-        spanned = (self.min, self.max, self.count)
-        if (self.values is None) == (None in spanned) or (self.values is not None and spanned != (None, None, None)):
-            raise ValueError("an axis is a number, a list of numbers, or `min`, `max` and `count`")
-        if self.min is not None and self.max is not None and not self.min <= self.max:
-            raise ValueError(f"min {self.min:g} must not be above max {self.max:g}")
-        if self.count == 1 and self.min != self.max:
-            raise ValueError("count 1 needs min = max")
-        return self
-
-    def points(self) -> tuple[float, ...]:
-        """The values, in order."""
-        if self.values is not None:
-            return tuple(self.values)
-        assert self.min is not None
-        assert self.max is not None
-        assert self.count is not None
-        step = (self.max - self.min) / max(1, self.count - 1)
-        return tuple(self.max if i == self.count - 1 else self.min + i * step for i in range(self.count))
-
-
-def _span(value: Any) -> Any:
-    """An axis of a box: `min` and `max` are enough."""
-    if isinstance(value, dict) and set(value) == {"min", "max"}:
-        return {**value, "count": 1 if value["min"] == value["max"] else 2}
-    return _axis(value)
-
-
-def _axis(value: Any) -> Any:
-    """A number or a list of numbers as an axis."""
-    if isinstance(value, list):
-        return {"values": value}
-    return {"values": [value]} if isinstance(value, int | float) and not isinstance(value, bool) else value
-
-
-Values = Annotated[Axis, BeforeValidator(_axis, json_schema_input_type=float | list[float] | Axis)]
-Span = Annotated[Axis, BeforeValidator(_span, json_schema_input_type=float | list[float] | Axis)]
+    at: dict[Name, Number] | Name
 
 
 class SweepSection(Modification):
@@ -125,7 +80,7 @@ class BoxSection(Modification):
 class Production(Section):
     """What production does to a filter: every edge may come out up to `edge_shift_nm` too far to either side."""
 
-    edge_shift_nm: NonNegative = 0.0
+    edge_shift_nm: float = Field(default=0.0, ge=0, le=1000)
 
 
 class Recognition(Section):
@@ -136,9 +91,9 @@ class Recognition(Section):
     0 draws none. `error_max`: a CFA is usable while no two states are confused more often.
     """
 
-    states: Annotated[list[Name], Field(min_length=2)] | None = None
+    states: Annotated[list[Name], Field(min_length=2, max_length=MOST_TYPES)] | None = None
     patches: int = Field(default=200, ge=0, le=5000)
-    error_max: float = Field(default=1e-3, gt=0, lt=0.5)
+    error_max: float = Field(default=1e-3, ge=1e-300, lt=0.5)
 
     @model_validator(mode="after")
     def _enough(self) -> Recognition:
@@ -150,8 +105,8 @@ class Recognition(Section):
 class Levels(Section):
     """Equidistant levels of sensitivity."""
 
-    min: float = Field(gt=0, lt=2)
-    max: float = Field(gt=0, lt=2)
+    min: float = Field(ge=1e-6, lt=2)
+    max: float = Field(ge=1e-6, lt=2)
     count: int = Field(ge=1, le=1000)
 
     @model_validator(mode="after")
@@ -190,65 +145,6 @@ def _cfas(value: Any) -> Any:
     return {name: {} if tile is None else tile for name, tile in value.items()} if isinstance(value, dict) else value
 
 
-_MOST_SCENARIOS = 2000
-
-
-class ScenarioTemplate(Scenario):
-    """What the file says of a scenario; with `each`, of one for every combination of its values.
-
-    `each`: dotted keys of the scenario (target.distance_m) -> values.
-    """
-
-    each: Annotated[dict[Name, Values], Field(min_length=1)] | None = None
-
-
-def _expanded(value: Any) -> Any:
-    """Scenarios with `each: {key: values}` become one per combination, named after their values."""
-    if not isinstance(value, dict):
-        return value
-    found: dict[str, Any] = {}
-    for name, entry in value.items():
-        if not isinstance(entry, dict) or "each" not in entry:
-            found[name] = entry
-            continue
-        each = entry["each"]
-        if not isinstance(each, dict) or not each:
-            raise ValueError(f"{name}: `each` maps keys such as target.distance_m to values")
-        axes = [_numbers(f"{name}: each.{key}", axis) for key, axis in each.items()]
-        if math.prod(map(len, axes)) + len(found) > _MOST_SCENARIOS:
-            raise ValueError(f"{name}: more than {_MOST_SCENARIOS} scenarios")
-        for point in product(*axes):
-            made = deepcopy({key: inner for key, inner in entry.items() if key != "each"})
-            for key, number in zip(each, point, strict=True):
-                _set(made, str(key).split("."), number)
-            labels = [f"{str(key).rsplit('.', 1)[-1]}={number:.12g}" for key, number in zip(each, point, strict=True)]
-            full = " ".join([str(name), *labels])
-            if full in found:
-                raise ValueError(f"{name}: two scenarios are named {full!r}")
-            found[full] = made
-    return found
-
-
-def _numbers(where: str, axis: Any) -> tuple[float, ...]:
-    """Values of one key of `each`; whole numbers of a list stay whole."""
-    try:
-        points = Axis.model_validate(_axis(axis)).points()
-    except ValidationError:
-        raise ValueError(f"{where}: a number, a list of numbers, or `min`, `max` and `count`") from None
-    return tuple(axis) if isinstance(axis, list) else points
-
-
-def _set(mapping: dict[str, Any], path: list[str], number: float) -> None:
-    """Put a number at a dotted path."""
-    for key in path[:-1]:
-        if mapping.get(key) is True:  # switched on, with its defaults
-            mapping[key] = {}
-        mapping = mapping.setdefault(key, {})
-        if not isinstance(mapping, dict):
-            raise ValueError(f"each: {key} is no mapping")
-    mapping[path[-1]] = number
-
-
 class StudySection(Documented):
     """A whole study file."""
 
@@ -272,25 +168,25 @@ class StudySection(Documented):
     """Traffic lights: `tl16`, a built-in surrogate, or a mapping with `files`."""
     scenarios: Annotated[
         dict[Name, Scenario],
-        BeforeValidator(_expanded, json_schema_input_type=dict[Name, ScenarioTemplate]),
+        BeforeValidator(expanded, json_schema_input_type=dict[Name, ScenarioTemplate]),
         Field(min_length=1),
     ] = {"chart": Scenario()}
     """Scenes, by name: exposure, target, optics, weather, noise."""
-    tolerance_dn: Positive = 0.1
+    tolerance_dn: Annotated[float, Field(ge=1e-12, le=1e12)] = 0.1
     """By how much the simulation may change any CSD, DN."""
-    geometry: dict[Name, Geometry] = {}
+    geometry: Annotated[dict[Name, Geometry], Field(max_length=1000)] = {}
     """Distances at which the size of a light on the sensor is told, by name."""
     cfas: Annotated[
         dict[Name, CfaSection],
         BeforeValidator(_cfas, json_schema_input_type=list[Name] | dict[Name, CfaSection | None]),
-        Field(min_length=1),
+        Field(min_length=1, max_length=1000),
     ]
     """CFAs to compare: a list of names of 2x2 pixels (RGGB, RYYCy), or NAME: {tile: [[R, G], [B, W]]}."""
-    designs: dict[Name, DesignSection] = {}
+    designs: Annotated[dict[Name, DesignSection], Field(max_length=10_000)] = {}
     """Single filters to compare with, by name."""
-    sweeps: dict[Name, SweepSection] = {}
+    sweeps: Annotated[dict[Name, SweepSection], Field(max_length=1000)] = {}
     """Full-factorial grids of filters, by name."""
-    boxes: dict[Name, BoxSection] = {}
+    boxes: Annotated[dict[Name, BoxSection], Field(max_length=1000)] = {}
     """Ranges of filters that are searched but not swept, by name."""
     production: Production = Production()
     """What production does to a filter; then worst_... quantities exist."""
@@ -302,5 +198,5 @@ class StudySection(Documented):
     """Quantity -> {min: ...}, {max: ...} or both."""
     search: SearchSection | None = None
     """A constrained search beside the sweep."""
-    published: dict[Name, dict[Name, dict[Name, float]]] = {}
+    published: dict[Name, dict[Name, dict[Name, Number]]] = {}
     """Printed figures to compare with: table -> CFA, design or geometry -> quantity -> value."""

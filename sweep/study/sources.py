@@ -19,9 +19,12 @@ from ..spectra import Curves, WavelengthGrid, photons_from_energy
 from ..surrogate import BUILT_IN_RANGE_NM
 from .curve_sections import CurveFile, LightFile, LightsSection, SensorSection
 from .lines import Document
+from .schema import MOST_TYPES
 from .yaml_tree import Key
 
 _Made = TypeVar("_Made", SensorCurves, Lights)
+_MOST_VALUES = 10_000_000
+"""Of the curves of a sensor, or of lights, on the grid: 80 MB."""
 _CUT_OFF = 0.01
 """Share of a light's photons outside the grid from which on the user is told."""
 
@@ -44,7 +47,8 @@ class Sources:
 
     def unknown(self, path: tuple[Key, ...], what: str, value: str, known: list[str]) -> None:
         """Add the fault of a name that is not among the known ones, with the nearest of them."""
-        self.add(path, f"unknown {what}", value, ", ".join(known), self._near(value, known))
+        told = len(self.faults) < MOST_FAULTS
+        self.add(path, f"unknown {what}", value, ", ".join(known) if told else None, self._near(value, known))
 
     def _near(self, value: str, known: Iterable[str]) -> str | None:
         """The nearest known name, as long as somebody is told of it."""
@@ -55,6 +59,8 @@ class Sources:
         if section.builtin is not None:
             return self._built_in("sensor", section.builtin, BUILT_IN_SENSORS)
         before = len(self.faults)
+        if not self._fits(("sensor", "files"), "curves", sum(len(entry.columns) for entry in section.files)):
+            return None
         qe: dict[str, FloatArray] = {}
         for index, entry in enumerate(section.files):
             path: tuple[Key, ...] = ("sensor", "files", index)
@@ -90,6 +96,9 @@ class Sources:
         if section.builtin is not None:
             return self._built_in("lights", section.builtin, BUILT_IN_LIGHTS)
         before = len(self.faults)
+        used = [len(columns) for entry in section.files for columns in entry.signals.values()]
+        if not self._fits(("lights", "files"), "lights", sum(used)):
+            return None
         by_type: dict[str, list[tuple[str, str, FloatArray]]] = {}
         for index, entry in enumerate(section.files):
             path = ("lights", "files", index)
@@ -109,9 +118,19 @@ class Sources:
         if len(by_type) < 2:
             self.add(("lights", "files"), "only one signal type", list(by_type), "two or more, to tell them apart")
             return None
+        if len(by_type) > MOST_TYPES:
+            self.add(("lights", "files"), "too many signal types", len(by_type), f"at most {MOST_TYPES}")
+            return None
         signals = [signal for group in by_type.values() for signal in group]
         source = ", ".join(entry.file for entry in section.files)
         return make_lights(self.grid, section.name or "lights", signals, source, photon_ratio=section.photon_ratio)
+
+    def _fits(self, path: tuple[Key, ...], what: str, count: int) -> bool:
+        """Whether so many curves on the grid fit into memory; else adds a fault."""
+        most = _MOST_VALUES // self.grid.size
+        if count > most:
+            self.add(path, f"too many {what} for a grid of {self.grid.size:,} wavelengths", count, f"at most {most:,}")
+        return count <= most
 
     def _built_in(self, key: str, name: str, known: Mapping[str, Callable[[WavelengthGrid], _Made]]) -> _Made | None:
         if name not in known:

@@ -15,6 +15,8 @@ from .schema import DesignSection, Modification, StudySection
 from .sources import Sources
 from .yaml_tree import Key
 
+_MOST_POINTS = 2_000_000
+
 
 @dataclass(frozen=True)
 class SpaceBuilder:
@@ -28,6 +30,8 @@ class SpaceBuilder:
     def spaces(self) -> list[Space]:
         """Plain CFAs (those whose every channel has a curve), then named designs, then sweeps."""
         section = self.section
+        if not self._fits():
+            return []
         entries = (*section.designs.values(), *section.sweeps.values(), *section.boxes.values())
         changed = {(entry.cfa, channel) for entry in entries for channel in entry.channel}
         spaces = []
@@ -56,6 +60,17 @@ class SpaceBuilder:
             axes = {key: axis.points() for key, axis in box.box.items()}
             spaces += self._filtered("search", name, box, axes, ("boxes", name, "box"))
         return spaces
+
+    def _fits(self) -> bool:
+        """Whether the axes of all grids and boxes can be written out; else adds a fault."""
+        grids = [sweep.grid for sweep in self.section.sweeps.values()]
+        total = sum(
+            axis.size for axes in (*grids, *(b.box for b in self.section.boxes.values())) for axis in axes.values()
+        )
+        if total > _MOST_POINTS:
+            allowed = f"at most {_MOST_POINTS:,} in all axes together"
+            self.sources.add(("sweeps",), "too many values of parameters", f"{total:,}", allowed)
+        return total <= _MOST_POINTS
 
     def _built_in(self, name: str, design: DesignSection) -> Mapping[str, float]:
         """A design's parameters, looked up when it names a built-in filter."""

@@ -1,0 +1,141 @@
+"""Values of parameters and of scenes: lists and spans, and the scenarios that `each` makes of them."""
+
+from __future__ import annotations
+
+import math
+from copy import deepcopy
+from itertools import product
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
+
+from ..scenes import Scenario
+from ..schema import Number, Section
+from .curve_sections import Name
+
+
+class Axis(Section):
+    """Values of one parameter: a list, or `count` equidistant ones from `min` to `max`."""
+
+    values: list[Number] | None = Field(default=None, min_length=1)
+    min: Number | None = None
+    max: Number | None = None
+    count: int | None = Field(default=None, ge=1, le=1_000_000)
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Axis:
+        spanned = (self.min, self.max, self.count)
+        if (self.values is None) == (None in spanned) or (self.values is not None and spanned != (None, None, None)):
+            raise ValueError("an axis is a number, a list of numbers, or `min`, `max` and `count`")
+        if self.min is not None and self.max is not None and not self.min <= self.max:
+            raise ValueError(f"min {self.min:g} must not be above max {self.max:g}")
+        if self.count == 1 and self.min != self.max:
+            raise ValueError("count 1 needs min = max")
+        return self
+
+    @property
+    def size(self) -> int:
+        """Number of values."""
+        return self.count or len(self.values or ())
+
+    def points(self) -> tuple[float, ...]:
+        """The values, in order."""
+        if self.values is not None:
+            return tuple(self.values)
+        assert self.min is not None
+        assert self.max is not None
+        assert self.count is not None
+        step = (self.max - self.min) / max(1, self.count - 1)
+        return tuple(self.max if i == self.count - 1 else self.min + i * step for i in range(self.count))
+
+
+def _span(value: Any) -> Any:
+    """An axis of a box: `min` and `max` are enough."""
+    if isinstance(value, dict) and set(value) == {"min", "max"}:
+        return {**value, "count": 1 if value["min"] == value["max"] else 2}
+    return _axis(value)
+
+
+def _axis(value: Any) -> Any:
+    """A number or a list of numbers as an axis."""
+    if isinstance(value, list):
+        return {"values": value}
+    return {"values": [value]} if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
+Values = Annotated[Axis, BeforeValidator(_axis, json_schema_input_type=float | list[float] | Axis)]
+Span = Annotated[Axis, BeforeValidator(_span, json_schema_input_type=float | list[float] | Axis)]
+
+
+_MOST_SCENARIOS = 2000
+_MOST_KEYS = 500_000
+"""Of all scenarios that `each` makes."""
+
+
+class ScenarioTemplate(Scenario):
+    """What the file says of a scenario; with `each`, of one for every combination of its values.
+
+    `each`: dotted keys of the scenario (target.distance_m) -> values.
+    """
+
+    each: Annotated[dict[Name, Values], Field(min_length=1)] | None = None
+
+
+def expanded(value: Any) -> Any:
+    """Scenarios with `each: {key: values}` become one per combination, named after their values."""
+    if not isinstance(value, dict):
+        return value
+    found: dict[str, Any] = {}
+    for name, entry in value.items():
+        if not isinstance(entry, dict) or "each" not in entry:
+            found[name] = entry
+            continue
+        each = entry["each"]
+        if not isinstance(each, dict) or not each:
+            raise ValueError(f"{name}: `each` maps keys such as target.distance_m to values")
+        axes = [_numbers(f"{name}: each.{key}", axis) for key, axis in each.items()]
+        made_of = math.prod(map(len, axes))
+        if made_of + len(found) > _MOST_SCENARIOS:
+            raise ValueError(f"{name}: more than {_MOST_SCENARIOS} scenarios")
+        if made_of * _size(entry) > _MOST_KEYS:
+            raise ValueError(f"{name}: more than {_MOST_KEYS:,} keys in all that `each` makes of it")
+        for point in product(*axes):
+            made = deepcopy({key: inner for key, inner in entry.items() if key != "each"})
+            for key, number in zip(each, point, strict=True):
+                _set(made, str(key).split("."), number)
+            labels = [f"{str(key).rsplit('.', 1)[-1]}={number:.12g}" for key, number in zip(each, point, strict=True)]
+            full = " ".join([str(name), *labels])
+            if full in found:
+                raise ValueError(f"{name}: two scenarios are named {full!r}")
+            found[full] = made
+    if len(found) > _MOST_SCENARIOS:
+        raise ValueError(f"more than {_MOST_SCENARIOS} scenarios")
+    return found
+
+
+def _size(value: Any) -> int:
+    """Keys and values of a part of a study."""
+    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return 1 + sum(map(_size, inner))
+
+
+def _numbers(where: str, axis: Any) -> tuple[float, ...]:
+    """Values of one key of `each`; whole numbers of a list stay whole."""
+    try:
+        checked = Axis.model_validate(_axis(axis))
+    except ValidationError:
+        raise ValueError(f"{where}: a number, a list of numbers, or `min`, `max` and `count`") from None
+    if checked.size > _MOST_SCENARIOS:
+        raise ValueError(f"{where}: more than {_MOST_SCENARIOS} scenarios")
+    return tuple(axis) if isinstance(axis, list) else checked.points()
+
+
+def _set(mapping: dict[str, Any], path: list[str], number: float) -> None:
+    """Put a number at a dotted path."""
+    for key in path[:-1]:
+        if mapping.get(key) is True:  # switched on, with its defaults
+            mapping[key] = {}
+        mapping = mapping.setdefault(key, {})
+        if not isinstance(mapping, dict):
+            raise ValueError(f"each: {key} is no mapping")
+    mapping[path[-1]] = number
