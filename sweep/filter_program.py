@@ -28,6 +28,8 @@ _SUM_ROUNDING = 1e-12
 _INSIDE_DN = 2e-7
 """Constrained distances are kept this far inside, beyond the solver's own tolerance."""
 _SOLVER_TOLERANCE = 1e-10
+_LEAST_WEIGHT = 1e-9
+"""Weights smaller than this share of the largest one are rounding, and left out."""
 _HALVINGS = 60
 _SOLVED, _INFEASIBLE = 0, 2
 
@@ -48,13 +50,14 @@ class Sides:
 class Solved:
     """What a linear program for a t and some sides found, in the objective's unit.
 
-    `beyond`: no filter with these sides reaches more (-inf: there is none). `curve`: the filter with the largest
-    `margin` above t, QE; None where no filter was found.
+    `beyond`: no filter with these sides reaches more (-inf: there is none), and already those of `needs` say so.
+    `curve`: the filter with the largest `margin` above t, QE; None where no filter was found.
     """
 
     beyond: float
     margin: float = -np.inf
     curve: FloatArray | None = None
+    needs: Sides = Sides()
 
 
 @dataclass(frozen=True)
@@ -193,8 +196,13 @@ class FilterProgram:
             found = None if found is None or found[-1] < -ROUNDING else found
         if weights is None:
             return Solved(np.inf)
+        weights[weights < _LEAST_WEIGHT * weights.max(initial=0.0)] = 0.0
+        used = weights[-pairs.size :] > 0 if pairs.size else some[:0]
+        needs = Sides().joined(pairs[used], signs[used])
         beyond = self._beyond(weights, rows, pairs)
-        return Solved(beyond) if found is None else Solved(beyond, float(found[-1]), found[:-1])
+        if found is None:
+            return Solved(beyond, needs=needs)
+        return Solved(beyond, float(found[-1]), found[:-1], needs)
 
     def _best_margin(
         self, rows: csr_matrix, floor: FloatArray, rate: FloatArray

@@ -1,15 +1,20 @@
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from sweep.cli import main
 from sweep.constraints import FEASIBLE, Bound, total_violation
+from sweep.errors import BrokenProofError
 from sweep.evaluate import designed_quantities, smooth_response
+from sweep.limit import Limit, limit_of
 from sweep.metrics import separation
-from sweep.problem import Evaluation, best_feasible, starting_points
+from sweep.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
+from sweep.runner import searching
 from sweep.search import search_from
 from sweep.study import Study, load_study
 
@@ -166,3 +171,66 @@ def test_a_filter_without_light_does_not_end_the_search(study: Study) -> None:
     run = search_from(replace(problem, setup=dark), 0, np.full(problem.free.size, 0.5), "SLSQP", 20)
     assert best_feasible(run.log) is None
     assert run.log
+
+
+TINY = """\
+study: tiny
+sensor: ar0820
+lights: tl16
+cfas: [RYNCy]
+sweeps:
+  edges:
+    cfa: RYNCy
+    channel: N
+    base: Y
+    to: G
+    grid:
+      left_nm: {min: 590, max: 690, count: 5}
+      left_width_nm: [5]
+      right_nm: {min: 640, max: 690, count: 5}
+      right_width_nm: [5]
+constraints:
+  sensitivity: {min: 0.9}
+search: {starts: 2, max_evaluations: 60, front: {min: 0.85, max: 0.95, count: 3}}
+"""
+
+
+@pytest.mark.parametrize(("tolerance_dn", "where"), [(1e-3, "broken proof: "), (0.02, "broken proof at a sensitivity")])
+def test_a_limit_below_what_the_search_found_stops_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tolerance_dn: float, where: str
+) -> None:
+    """One line, an exit code of its own, no results; and what was searched is not searched again."""
+    (tmp_path / "tiny.yaml").write_text(TINY)
+    searched: list[int] = []
+
+    def counted(problem: Problem, start: int, *rest: object) -> SearchRun:
+        searched.append(start)
+        return search_from(problem, start, *rest)
+
+    def planted(problem: Problem, tolerance: float = 1e-3, *rest: int) -> Limit:
+        found = limit_of(problem, tolerance, *rest)
+        return replace(found, proven=0.5 * found.proven) if tolerance == tolerance_dn else found
+
+    def ended() -> object:
+        command = ["sweep", "run", str(tmp_path / "tiny.yaml"), "--output", str(tmp_path), "--jobs", "1"]
+        monkeypatch.setattr(sys, "argv", command)
+        with pytest.raises(SystemExit) as stopped:
+            main()
+        return stopped.value.code
+
+    monkeypatch.setattr(searching, "search_from", counted)
+    with monkeypatch.context() as wrong:
+        wrong.setattr(searching, "limit_of", planted)
+        assert ended() == BrokenProofError.exit_code == 5
+        said = capsys.readouterr().err.splitlines()
+        assert len(said) == 1
+        assert where in said[0]
+        first = len(searched)
+        assert first >= 2
+        assert ended() == 5
+        assert len(searched) == first
+    assert not (tmp_path / "tiny" / "results.parquet").exists()
+    if tolerance_dn == 1e-3:  # the limit of the search itself is not kept
+        assert ended() == 0
+        assert (tmp_path / "tiny" / "results.parquet").exists()
+        assert searched[first:].count(0) == 3  # the levels of the front alone
