@@ -143,6 +143,7 @@ class Inventory:
         content = json_of({**whole, "sha256_of_the_rest": hashlib.sha256(blank).hexdigest()}).encode("utf-8")
         for name, wanted in ((RUN, content), (SUMS, self._sums(content).encode("utf-8"))):
             if _content(self.path(name)) != wanted:
+                _without_empty_folder(self.path(name))
                 write_bytes(wanted, self.path(name))
         self.guarded = self.agreed = True
 
@@ -229,11 +230,9 @@ class Inventory:
             raise _in_the_way(self.folder, FIGURES)
         if os.path.lexists(path) and name not in self.files:
             raise _in_the_way(self.folder, name)
+        _without_empty_folder(path)
         if is_folder(path):
-            with suppress(OSError):
-                path.rmdir()  # an empty one
-            if is_folder(path):
-                raise _in_the_way(self.folder, name)
+            raise _in_the_way(self.folder, name)
 
     def _with_size(self, name: str, held: Digest) -> Digest:
         """The digest with its size, which `SHA256SUMS` does not say."""
@@ -257,6 +256,13 @@ def faults_of(folder: Path, wrong: Mapping[str, str]) -> list[Fault]:
 
 def _in_the_way(folder: Path, name: str) -> OutputError:
     return OutputError(Fault("is not of this run; move it away", str(folder / name), allowed="another --output"))
+
+
+def _without_empty_folder(path: Path) -> None:
+    """A folder in the place of a file goes, if nothing is in it."""
+    if is_folder(path):
+        with suppress(OSError):
+            path.rmdir()
 
 
 def _names(folder: Path) -> list[str]:

@@ -31,7 +31,7 @@ _SHARD, _ANSWER = "{index:08d}-{key}.parquet", "_answer-{key}.json"
 _NAMES = re.compile(r"(?:\d{8,}-([0-9a-f]{16})\.parquet|_answer-([0-9a-f]{16})\.json)")
 """Names that a journal gives, by which its files are known; 16 digits of the key are part of them."""
 _MOST_BYTES, _MOST_LINE = 2**30, 4096
-"""Of a file and of a line of the journal, more than any has."""
+"""Of a file and of a line of the journal, more than any has; what is larger is not read."""
 _MOST_ROWS, _MOST_SECONDS = 2**40, 1e12
 
 
@@ -118,6 +118,8 @@ class Journal:
             return
         try:
             with opened(path) as file:
+                if os.fstat(file.fileno()).st_size > _MOST_BYTES:
+                    return
                 while line := file.readline(_MOST_LINE):
                     self._torn = not line.endswith(b"\n")
                     entry = Entry.of(line)

@@ -6,7 +6,8 @@ import hashlib
 import itertools
 import shutil
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import chdir
 from pathlib import Path
 
 import pytest
@@ -71,7 +72,7 @@ def a_folder(path: Path) -> None:
 
 def a_link(path: Path) -> None:
     """To a copy that is whole, which is not the run's."""
-    elsewhere = path.parents[2] / f"elsewhere-{path.name}"
+    elsewhere = Path(f"elsewhere-{path.name}").absolute()
     path.rename(elsewhere)
     path.symlink_to(elsewhere)
 
@@ -108,11 +109,11 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def finished(study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    outputs = tmp_path_factory.mktemp("finished")
-    assert commanded("run", study, "--output", outputs, "--jobs", 1)[0] == 0
-    folder = outputs / "small"
-    assert commanded("audit", folder)[0] == 0
-    assert commanded("report", folder)[0] == 0
+    with chdir(tmp_path_factory.mktemp("finished")):  # the report names the folder as the command does
+        assert commanded("run", study, "--output", "outputs", "--jobs", 1)[0] == 0
+        assert commanded("audit", "outputs/small")[0] == 0
+        assert commanded("report", "outputs/small")[0] == 0
+        folder = Path("outputs/small").absolute()
     made = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     assert made >= {*LISTS, *READ, *DRAWN}
     assert made - {".lock", *LISTS} == Inventory(folder).files.keys()
@@ -120,8 +121,10 @@ def finished(study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def folder(finished: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(finished, tmp_path / "outputs" / "small"))
+def folder(finished: Path, tmp_path: Path) -> Iterator[Path]:
+    shutil.copytree(finished, tmp_path / "outputs" / "small")
+    with chdir(tmp_path):
+        yield Path("outputs/small")
 
 
 def state(folder: Path) -> dict[str, tuple[int, str]]:
@@ -163,7 +166,7 @@ def test_a_damage_is_named_and_mended_alone(
     code, out, _ = commanded("status", folder, "--verify")
     assert code == 0
     assert out.splitlines()[-1].startswith(f"ok: its {len(after)} files")
-    elsewhere = folder.parents[1] / f"elsewhere-{Path(file).name}"
+    elsewhere = Path(f"elsewhere-{Path(file).name}")
     assert not elsewhere.exists() or hashlib.sha256(elsewhere.read_bytes()).hexdigest() == before[file][1]
 
 
