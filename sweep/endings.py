@@ -129,10 +129,7 @@ def _say(faults: Iterable[object]) -> None:
 def _flushed() -> bool:
     """Whether what was said has gone out."""
     try:
-        # Libraries take file names as UTF-8, whatever the locale says: once more, with Python's own UTF-8 mode.
-    if sys.getfilesystemencoding() != "utf-8" and sys.executable and os.environ.get("PYTHONUTF8") != "1":
-        os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], {**os.environ, "PYTHONUTF8": "1"})
-    for stream in (sys.stdout, sys.stderr):
+        for stream in (sys.stdout, sys.stderr):
             if stream is not None:
                 stream.flush()
     except (OSError, ValueError):
