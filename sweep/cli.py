@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from .completion import run_folders, study_files
-from .errors import DataError, Fault, StudyError, SweepError
+from .endings import end_now, ends_in_lines
+from .errors import DataError, Fault, InterruptedRunError, StudyError, SweepError
 
 if TYPE_CHECKING:
     from .report import Output
@@ -48,34 +49,40 @@ def run(
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Compute failed designs again.")] = False,
 ) -> None:
     """Run a study: results, figures and report go to OUTPUT/<study>. The same command continues an interrupted run."""
+    from . import runner
     from .audit import mend_audit
     from .progress import ProgressDisplay
-    from .runner import BACKENDS, Wishes, estimate, estimate_lines, output_folder, run_study
     from .study import folder_name, load_study
 
-    if backend not in BACKENDS:
-        allowed = ", ".join(BACKENDS)
+    if backend not in runner.BACKENDS:
+        allowed = ", ".join(runner.BACKENDS)
         raise SweepError(Fault("unknown backend", key="--backend", value=backend, allowed=allowed))
     loaded, workers = load_study(study, data), jobs or os.cpu_count() or 1
-    folder, note = output_folder(output / folder_name(loaded.name), loaded)
+    folder, note = runner.output_folder(output / folder_name(loaded.name), loaded)
     if note is not None:
         typer.echo(f"Note: {note}.", err=True)
-    with ProgressDisplay() as display:
-        if dry_run:
-            found = estimate(loaded, folder, workers, display.update)
-        else:
-            wishes = Wishes(fail_fast, retry_failed)
-            made = run_study(
-                loaded, folder, workers, display.update, sys.argv, backend=backend, scheduler=scheduler, wishes=wishes
-            )
     if dry_run:
-        for line in estimate_lines(found, folder):
+        with ProgressDisplay() as display:
+            found = runner.estimate(loaded, folder, workers, display.update)
+        for line in runner.estimate_lines(found, folder):
             typer.echo(line)
         return
-    if not made:
-        typer.echo(f"Note: {folder} holds this very study, finished; nothing was computed.", err=True)
-    mend_audit(folder, data)
-    _finish(folder, mend=True)
+    kind, wishes = runner.usable_backend(backend), runner.Wishes(fail_fast, retry_failed)
+    if kind != backend:
+        typer.echo(f"Note: no shared memory (/dev/shm) for worker processes; backend {kind}.", err=True)
+    try:
+        with runner.stop_on_signals(ends_process=True) as stop:
+            with ProgressDisplay() as display:
+                given = (loaded, folder, workers, display.update, sys.argv)
+                made = runner.run_study(*given, backend=kind, scheduler=scheduler, wishes=wishes, stop=stop)
+            if not made:
+                typer.echo(f"Note: {folder} holds this very study, finished; nothing was computed.", err=True)
+            mend_audit(folder, data)
+            _finish(folder, mend=True)
+    except InterruptedRunError as error:
+        if kind == "threading":  # what its threads are at cannot be broken off
+            end_now(error)
+        raise
 
 
 @app.command()
@@ -294,10 +301,5 @@ def _finish(folder: Path, *, mend: bool = False) -> None:
 
 
 def main() -> None:
-    """Run the command; a fault of the input is one line each on stderr and exit code 2."""
-    try:
-        app(prog_name="sweep", standalone_mode=True)
-    except SweepError as error:
-        for fault in error.faults:
-            typer.echo(f"sweep: {fault}", err=True)
-        sys.exit(error.exit_code)
+    """Run the command; what goes wrong is one line each on stderr and an exit code, 2 for a fault of the input."""
+    ends_in_lines(lambda: app(prog_name="sweep", standalone_mode=False))

@@ -12,7 +12,7 @@ PACKAGE = Path(__file__).parent.parent / "sweep"
 # From the bottom. A unit is a module or a folder of the package.
 LEVELS = [
     {"errors", "arrays", "cache", "completion", "records"},
-    {"schema", "inputs", "disk"},
+    {"schema", "inputs", "disk", "endings"},
     {"kernels", "spectra", "mosaics", "pareto", "constraints", "objectives", "edges", "progress", "mat_files"},
     {"metrics", "curve_files", "surrogate", "sensor", "chromaticity"},
     {"datasets", "filters", "filter_files", "scenes", "families", "discrimination", "signals"},
@@ -43,7 +43,7 @@ ONLY_USER = {
     "moocore": "pareto",
     "plotly": "report",
     "jinja2": "report",
-    "typer": "cli",
+    "typer": "cli endings",
     "sklearn": "recognition",
     "numba": "kernels",
 }

@@ -5,7 +5,8 @@ from .folders import output_folder
 from .planning import with_plans
 from .run import Wishes, run_study
 from .status import status_lines
-from .workers import BACKENDS
+from .stopping import stop_on_signals
+from .workers import BACKENDS, usable_backend
 
 __all__ = [
     "BACKENDS",
@@ -15,5 +16,7 @@ __all__ = [
     "output_folder",
     "run_study",
     "status_lines",
+    "stop_on_signals",
+    "usable_backend",
     "with_plans",
 ]

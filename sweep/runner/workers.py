@@ -8,8 +8,9 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
+from multiprocessing import get_context
 from typing import Any
 
 import joblib
@@ -130,12 +131,24 @@ class Workers:
             return killed(call)
 
 
+def usable_backend(backend: str) -> str:
+    """The backend; threads, where this machine has no semaphores for worker processes (no or a read-only /dev/shm)."""
+    if backend != "loky":
+        return backend
+    try:
+        get_context("fork").Semaphore()
+    except (ImportError, OSError):
+        return "threading"
+    return backend
+
+
 @contextmanager
 def workers(how: Workers) -> Iterator[Workers]:
     """Start the backend and give the workers for as long as the block stands.
 
     Raises SweepError when Dask is not installed or its scheduler does not answer.
     """
+    how = replace(how, backend=usable_backend(how.backend))
     settings: dict[str, Any] = {}
     keep_freed_memory()  # with one worker, and with threads, the work is done in this process
     with ExitStack() as stack:

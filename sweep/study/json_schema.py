@@ -12,14 +12,14 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from ..errors import Fault, OutputError
-from ..inputs import read_input
 from ..store import write_text
 from .schema import StudySection
 
 SCHEMA_FILE = "study.schema.json"
 """Its name beside the studies, which their first line gives."""
 _TITLE = "A study of sweep"
-_MOST_BYTES = 10_000_000
+_HEAD_BYTES = 4096
+"""The title is the second key of a schema; in earlier versions it was the section's name."""
 _REF = "#/$defs/"
 _TEMPLATE = "ScenarioTemplate"
 Json = dict[str, Any]
@@ -51,7 +51,7 @@ def study_schema() -> Json:
             section["required"] = ["kind", *section.get("required", [])]
     _loosen_each(sections)
     # Editors know this dialect; nothing in the schema needs a later one.
-    return {"$schema": "http://json-schema.org/draft-07/schema#", "title": _TITLE} | schema
+    return {"$schema": "http://json-schema.org/draft-07/schema#", "title": _TITLE} | schema | {"title": _TITLE}
 
 
 def schema_text() -> str:
@@ -63,12 +63,21 @@ def write_schema(path: Path) -> None:
     """Write the schema; raises OutputError, also where the file holds anything but such a schema."""
     if os.path.lexists(path):
         try:
-            held = json.loads(read_input(path, _MOST_BYTES, OutputError))
-        except (ValueError, RecursionError):
-            held = None
-        if not (isinstance(held, dict) and held.get("title") == _TITLE):
+            own = _is_ours(path)
+        except OSError as error:
+            raise OutputError(Fault(f"cannot be read: {error.strerror or error}", str(path))) from None
+        if not own:
             raise OutputError(Fault("holds something else already", str(path), allowed="another --output"))
     write_text(schema_text(), path)
+
+
+def _is_ours(path: Path) -> bool:
+    """Whether a file begins as every schema that this writes; what is no plain file is not read."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        head = file.read(_HEAD_BYTES)
+    return any(f'"title": {json.dumps(title)}'.encode() in head for title in (_TITLE, StudySection.__name__))
 
 
 def _describe_keys(section: Json) -> None:
