@@ -77,6 +77,12 @@ class FailedDesignError(SweepError):
     exit_code = 4
 
 
+class BrokenPromiseError(SweepError):
+    """An audit that found larger errors than were promised."""
+
+    exit_code = 5
+
+
 class InterruptedRunError(SweepError):
     """A run that a signal stopped."""
 
