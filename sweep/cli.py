@@ -11,7 +11,7 @@ import typer
 
 from .completion import run_folders, study_files
 from .endings import end_now, ends_in_lines
-from .errors import DataError, Fault, InterruptedRunError, StudyError, SweepError
+from .errors import BrokenPromiseError, DataError, Fault, InterruptedRunError, StudyError, SweepError
 
 if TYPE_CHECKING:
     from .report import Output
@@ -140,13 +140,21 @@ def audit(
     folder: RunFolder,
     data: DataFolder = None,
 ) -> None:
-    """Recompute the front and 1 % of a run's rows with every effect on: promised beside realized error."""
+    """Recompute the front and 1 % of a run's rows with every effect on: promised beside realized error.
+
+    Exit code 5 says that an error is larger than promised.
+    """
     from .audit import audit_output
+    from .progress import ProgressDisplay
     from .store import AUDIT
 
-    for line in audit_output(folder, data):
+    with ProgressDisplay() as display:
+        found = audit_output(folder, data, display.update)
+    for line in found.lines:
         typer.echo(line)
     typer.echo(f"Files: {folder}/: {AUDIT}.")
+    if found.faults:
+        raise BrokenPromiseError(found.faults)
 
 
 @app.command()

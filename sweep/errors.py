@@ -99,6 +99,12 @@ class BrokenProofError(SweepError):
     exit_code = 5
 
 
+class BrokenPromiseError(SweepError):
+    """An audit that found larger errors than were promised: the program has a fault."""
+
+    exit_code = 5
+
+
 class InterruptedRunError(SweepError):
     """A run that a signal stopped."""
 

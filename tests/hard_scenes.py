@@ -19,7 +19,7 @@ from sweep.sensor import Pixel
 from sweep.setup import Setup
 from sweep.spectra import WavelengthGrid
 
-GRID = WavelengthGrid(step_nm=5)
+GRID, FINE = WavelengthGrid(step_nm=5), WavelengthGrid(step_nm=1)
 SENSOR = BUILT_IN_SENSORS["ar0820"](GRID)
 FAMILY = Stopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"])
 LOW = np.array([595.0, 20.0, 640.0, 6.0, 0.9])
@@ -37,9 +37,9 @@ TILES = {
 
 
 @cache
-def lights() -> Lights:
+def lights(grid: WavelengthGrid = GRID) -> Lights:
     """Three signals of each type: enough for pairs of every kind, few enough for thousands of scenes."""
-    whole = BUILT_IN_LIGHTS["tl16"](GRID)
+    whole = BUILT_IN_LIGHTS["tl16"](grid)
     kept = [int(i) for members in whole.members.values() for i in members[:: max(1, len(members) // 3)][:3]]
     names, types = tuple(whole.names[i] for i in kept), tuple(whole.types[i] for i in kept)
     return Lights("few", names, types, whole.photons[kept], whole.photon_ratio, "", True)
@@ -62,25 +62,28 @@ def scene(
     pixel: dict[str, Any] | None = None,
     wide: bool = False,
     seed: int = 1,
+    grid: WavelengthGrid = GRID,
 ) -> Scene:
     """`wide`: plan for a box of filters; else for the one design."""
     mosaic = TILES[cfa]
+    sensor = SENSOR if grid is GRID else BUILT_IN_SENSORS["ar0820"](grid)
+    family = FAMILY if grid is GRID else Stopband(grid.nodes_nm, sensor.qe["Y"], sensor.qe["G"])
     modified = (mosaic.channels.index("N"),) if "N" in mosaic.channels else ()
     setup = Setup(
-        GRID,
+        grid,
         mosaic,
-        SENSOR.mosaic_qe(mosaic, {"N": "Y"} if modified else None),
+        sensor.mosaic_qe(mosaic, {"N": "Y"} if modified else None),
         modified,
-        SENSOR.qe["C"],
-        lights(),
+        sensor.qe["C"],
+        lights(grid),
         Pixel(**(pixel or {})),
         Scenario.model_validate(scenario),
     )
     x = LOW + (HIGH - LOW) * np.random.default_rng(seed).uniform(size=5)
-    curves = FAMILY.curves(x[None]) if modified else np.empty((1, 0, GRID.size))
+    curves = family.curves(x[None]) if modified else np.empty((1, 0, grid.size))
     low, high = setup.qe.copy(), setup.qe.copy()
     if modified:
-        hull = FAMILY.hull(LOW, HIGH) if wide else (curves[0], curves[0])
+        hull = family.hull(LOW, HIGH) if wide else (curves[0], curves[0])
         low[list(modified)], high[list(modified)] = hull
     return Scene(name, setup, curves, Box(setup, low, high, 1000))
 
@@ -90,6 +93,7 @@ def target(distance_m: float, fov_deg: float, **more: Any) -> dict[str, Any]:
 
 
 NEAR, MIDDLE, FAR = target(20, 120), target(100, 60), target(250, 30)
+TINY = target(600, 60, phase_px="any")
 F2, F4 = {"f_number": 2.0}, {"f_number": 4.0}
 FIXED = {"kind": "fixed", "exposure_s": 2e-3}
 DARK = {"read_noise_e": 2.0, "offset_dn": 64.0}
@@ -161,6 +165,8 @@ HARD: tuple[Scene, ...] = (
         {"well_e": 8000, "gain_dn_per_e": 0.3},
     ),
     scene("pedestal", "RYNCy", {}, {"offset_dn": 168}),
+    scene("a fraction of a pedestal", "RYNCy", {}, {"offset_dn": 168.5}),
+    scene("a fraction of a pedestal, far", "RCCC", {"target": FAR, "optics": F2}, {"offset_dn": 30.25}),
     scene("noise", "RYNCy", {"noise": True}, DARK),
     scene("noise, far", "RYNCy", {"noise": True, "target": FAR, "optics": F2}, DARK | {"prnu": 0.01}),
     scene("noise, no pedestal", "RYNCy", {"noise": True}, {"read_noise_e": 3.0}),
@@ -188,5 +194,140 @@ HARD: tuple[Scene, ...] = (
             "optics": F2,
         },
         DARK | {"crosstalk": 0.02},
+    ),
+    # Under noise the reference is smooth, so that every effect can be promised and seen with everything else on.
+    scene(
+        "noise, dark",
+        "RYNCy",
+        {"noise": True, "photon_radiance": 3e15, "exposure": FIXED},
+        {"read_noise_e": 6.0, "offset_dn": 1.5},
+    ),
+    scene("noise, a fraction of a pedestal", "RGGB", {"noise": True}, {"read_noise_e": 0.5, "offset_dn": 168.5}),
+    scene(
+        "noise, hazy and far",
+        "RGGB",
+        {
+            "noise": True,
+            "target": FAR | {"readout": "center", "phase_px": [0.4, 0.3]},
+            "visibility_m": 3000,
+            "off_axis_deg": 10,
+            "intensity_cd": 200,
+            "exposure": {"kind": "fixed", "exposure_s": 0.02},
+            "drive": {"duty": 0.6, "frequency_hz": 90},
+            "optics": {"f_number": 16.0},
+        },
+        DARK | {"crosstalk": 0.03},
+        grid=FINE,
+    ),
+    scene(
+        "noise, out of focus",
+        "RYNCy",
+        {
+            "noise": True,
+            "target": MIDDLE | {"readout": "center", "phase_px": [1.2, 0.7]},
+            "visibility_m": 600,
+            "off_axis_deg": 25,
+            "intensity_cd": 200,
+            "exposure": {"kind": "fixed", "exposure_s": 0.02},
+            "drive": {"duty": 0.3, "frequency_hz": 190},
+            "optics": {"f_number": 4.0, "focus_m": 2.0},
+        },
+        DARK | {"crosstalk": 0.1, "offset_dn": 10.3},
+        grid=FINE,
+    ),
+    scene(
+        "noise, blurred quad Bayer",
+        "quad",
+        {
+            "noise": True,
+            "target": MIDDLE | {"readout": "center", "phase_px": [0.9, 2.4]},
+            "visibility_m": 1000,
+            "off_axis_deg": 5,
+            "background_cd_m2": 30,
+            "intensity_cd": 800,
+            "exposure": {"kind": "fixed", "exposure_s": 0.05},
+            "drive": {"duty": 0.5, "frequency_hz": 45},
+            "optics": {"f_number": 40.0},
+        },
+        DARK | {"crosstalk": 0.05, "prnu": 0.01},
+        grid=FINE,
+    ),
+    scene("noise, any place", "RYNCy", {"noise": True, "target": TINY, "optics": F2}, DARK),
+    scene(
+        "noise, any place, center", "RGGB", {"noise": True, "target": TINY | {"readout": "center"}, "optics": F2}, DARK
+    ),
+    scene("noise, any place, RCCC", "RCCC", {"noise": True, "target": TINY, "optics": F4}, DARK),
+    scene("noise, any place, 1x3 tile", "1x3", {"noise": True, "target": TINY, "optics": F4}, DARK),
+    scene(
+        "noise, flicker, saturated",
+        "RYNCy",
+        {
+            "noise": True,
+            "intensity_cd": 127,
+            "exposure": {"kind": "fixed", "exposure_s": 0.0051},
+            "drive": {"duty": 0.25, "frequency_hz": 165},
+        },
+        DARK,
+    ),
+    scene(
+        "noise, flicker, saturated, RGGB",
+        "RGGB",
+        {
+            "noise": True,
+            "intensity_cd": 114,
+            "exposure": {"kind": "fixed", "exposure_s": 0.0092},
+            "drive": {"duty": 0.07, "frequency_hz": 154},
+        },
+        DARK,
+    ),
+    scene(
+        "noise, flicker, saturated, 1x3 tile",
+        "1x3",
+        {
+            "noise": True,
+            "intensity_cd": 422,
+            "exposure": {"kind": "fixed", "exposure_s": 0.0048},
+            "drive": {"duty": 0.32, "frequency_hz": 148},
+        },
+        DARK,
+    ),
+    scene(
+        "noise, f/40, center",
+        "RCCC",
+        {
+            "noise": True,
+            "target": FAR | {"phase_px": [0.5, 0.5], "readout": "center"},
+            "intensity_cd": 800,
+            "exposure": {"kind": "fixed", "exposure_s": 0.05},
+            "optics": {"f_number": 40.0},
+        },
+        DARK,
+        grid=FINE,
+    ),
+    scene(
+        "noise, f/64",
+        "RYNCy",
+        {
+            "noise": True,
+            "target": FAR | {"phase_px": [0.5, 0.5]},
+            "intensity_cd": 800,
+            "exposure": {"kind": "fixed", "exposure_s": 0.1},
+            "optics": {"f_number": 64.0},
+        },
+        DARK,
+        grid=FINE,
+    ),
+    # Where the full well ends below the ADC's range, rounding does not end it again.
+    scene(
+        "well below the ADC, RGGB, a fraction of a pedestal",
+        "RGGB",
+        {"intensity_cd": 400, "exposure": {"kind": "fixed", "exposure_s": 1e-2}},
+        {"well_e": 3000, "gain_dn_per_e": 0.4, "offset_dn": 100.5},
+    ),
+    scene(
+        "well below the ADC, far",
+        "RCCC",
+        {"intensity_cd": 200, "target": FAR, "exposure": {"kind": "fixed", "exposure_s": 2e-3}, "optics": F2},
+        {"well_e": 4000, "gain_dn_per_e": 0.5, "offset_dn": 20.25},
     ),
 )

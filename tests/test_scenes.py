@@ -55,14 +55,17 @@ def test_scenes_are_planned_drawn_and_audited(tmp_path: Path) -> None:
     plans = output.provenance["plans"]
     assert frame["plan"].iloc[0] == plans["road distance_m=50"]["key"]
     assert "quarter pixel" in (folder / "report.html").read_text()
-    lines = audit_output(folder, None)
+    lines = audit_output(folder, None).lines
     audited = pd.read_parquet(folder / "audit.parquet")
     assert lines[0].startswith(f"{len(audited)} of {len(frame)} designs recomputed with every effect on: no error")
     assert (audited["realized_dn"] <= audited["promised_dn"]).all()
     assert audited["realized_dn"].max() > 1e-9
-    # The audit notices a row that is wrong by more than was promised.
-    wrong = frame.assign(csd_yellow_red=frame["csd_yellow_red"] + 6)
-    assert len(audit(study, [wrong]).broken) == len(audited)
+    # The audit notices a row that is wrong by more than was promised, in any column that is promised.
+    for column in ("csd_yellow_red", "best_place_csd_yellow_red"):
+        wrong = frame.assign(**{column: frame[column] + 6})
+        found = audit(study, [wrong])
+        assert len(found.broken) == len(audited)
+        assert set(found.broken["quantity"]) == {column}
 
 
 def test_sampled_rows_are_the_front_and_a_hundredth() -> None:
