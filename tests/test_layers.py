@@ -13,7 +13,7 @@ PACKAGE = Path(__file__).parent.parent / "sweep"
 LEVELS = [
     {"errors", "arrays", "completion"},
     {"schema"},
-    {"kernels", "spectra", "mosaics", "pareto", "constraints", "objectives", "edges", "progress"},
+    {"kernels", "noise_kernels", "spectra", "mosaics", "pareto", "constraints", "objectives", "edges", "progress"},
     {"metrics", "curve_files", "surrogate", "sensor", "chromaticity"},
     {"datasets", "filters", "filter_files", "scenes", "families", "discrimination", "signals"},
     {"spaces", "setup"},
@@ -42,7 +42,7 @@ ONLY_USER = {
     "jinja2": "report",
     "typer": "cli",
     "sklearn": "recognition",
-    "numba": "kernels",
+    "numba": "kernels noise_kernels",
 }
 
 
