@@ -318,23 +318,28 @@ class Imager:
     def transfer(self, electrons: FloatArray) -> FloatArray:
         """Digital numbers of the units from their expected electrons, as far as the methods go."""
         methods, noisy, pixel = self.setup.methods, self.setup.scenario.noise is not None, self.pixel
+        soft, rounds = noisy and methods.noise == "expected", methods.quantization != "skip"
         if methods.saturation == "skip":
             dn = unquantized(electrons, pixel)
-        elif noisy and methods.noise == "expected":
+        elif soft:
             self.work["noise"] += electrons.size
-            dn = noise_table.moments(electrons, pixel)[0]
+            dn = (noise_table.rounded if rounds else noise_table.unrounded)(electrons, pixel)
         else:
             self.work["saturation"] += electrons.size
             dn = unquantized(saturation.clipped(electrons, pixel), pixel)
-        if methods.quantization == "skip":
+        if not rounds:
             return dn
         self.work["quantization"] += electrons.size
-        return quantization.dithered(dn, electrons, pixel) if noisy else quantization.rounded(dn, pixel)
+        if soft and methods.saturation != "skip":
+            return dn
+        if noisy:
+            return dn + noise_table.rounded(electrons, pixel) - noise_table.unrounded(electrons, pixel)
+        return quantization.rounded(dn, pixel)
 
     def variance_dn(self, electrons: FloatArray) -> FloatArray:
         """Variance of the units' digital numbers, DN^2, with their rounding."""
         self.work["variance"] += electrons.size
-        return quantization.variance_of_rounded(*noise_table.moments(electrons, self.pixel))
+        return noise_table.variance(electrons, self.pixel)
 
 
 _CERTAIN_DN2 = 1e-9

@@ -92,7 +92,7 @@ class Promises:
         if effect == "noise":
             each = [noise.promise(self.setup, top / pixel.dn_per_e) for top in tops]
         elif effect == "quantization":
-            each = [quantization.promise(self.setup)] * tops.size
+            each = [quantization.promise(self.setup, top / pixel.dn_per_e) for top in tops]
         elif effect == "saturation":
             each = [saturation.promise(self.setup, top / pixel.dn_per_e, after) for top in tops]
         else:

@@ -13,7 +13,7 @@ PACKAGE = Path(__file__).parent.parent / "sweep"
 LEVELS = [
     {"errors", "arrays", "cache", "completion", "records"},
     {"schema", "inputs", "disk", "endings"},
-    {"kernels", "spectra", "mosaics", "pareto", "constraints", "objectives", "edges", "progress", "mat_files"},
+    {"kernels", "spectra", "mosaics", "pareto", "constraints", "objectives", "edges", "progress", "mat_files", "noise_kernels"},
     {"metrics", "curve_files", "surrogate", "sensor", "chromaticity"},
     {"datasets", "filters", "filter_files", "scenes", "families", "discrimination", "signals"},
     {"spaces", "setup"},
@@ -45,7 +45,7 @@ ONLY_USER = {
     "jinja2": "report",
     "typer": "cli endings",
     "sklearn": "recognition",
-    "numba": "kernels",
+    "numba": "kernels noise_kernels",
 }
 
 

@@ -1,52 +1,52 @@
-"""Mean and variance of the readout from a table: every pixel of every design is looked up, not integrated."""
+"""Mean and variance of the readout from a table: every pixel of every design is looked up, not summed."""
 
 from __future__ import annotations
 
 from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PPoly
 
 from ..arrays import FloatArray
 from ..sensor import Pixel
-from . import noise
+from . import readout
 
-_MOST_E = 1e30
-"""More electrons than this are as many as this."""
-_TABLE_NODES = 2048
-"""Nodes of each piece of the table of readouts."""
-_BEND_SIGMAS = 16.0
+_DENSE = 1 / 64
+"""Distance of the nodes where gains differ, in standard deviations of the electrons times two."""
 
 
-def moments(electrons: FloatArray, pixel: Pixel) -> tuple[FloatArray, FloatArray]:
-    """`noise.moments_dn` from a table over the square root of the signal, in which both are smooth."""
-    electrons = np.minimum(electrons, _MOST_E)
-    most = np.nanmax(electrons, initial=1.0)
-    brightest = float(2 ** np.ceil(np.log2(most)))
-    mean, variance = np.moveaxis(_table(pixel, brightest)(np.sqrt(electrons + pixel.read_noise_e**2)), -1, 0)
-    return mean, np.maximum(variance, 0.0)
+def unrounded(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+    """Mean before rounding, DN, of expected electrons of any shape."""
+    return _looked_up(electrons, pixel, readout.UNROUNDED)
+
+
+def rounded(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+    """Mean of the digital number, DN."""
+    return _looked_up(electrons, pixel, readout.ROUNDED)
+
+
+def variance(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+    """Variance of the digital number, DN^2."""
+    return np.maximum(_looked_up(electrons, pixel, readout.VARIANCE), 0.0)
+
+
+def _looked_up(electrons: FloatArray, pixel: Pixel, row: int) -> FloatArray:
+    table = _tables(pixel)[row]
+    root = np.sqrt(np.minimum(electrons, readout.Ends.of(pixel).last_e))
+    at = np.arcsinh(pixel.prnu * root) / pixel.prnu if pixel.prnu else root
+    return np.asarray(table(at), dtype=float)
 
 
 @lru_cache(maxsize=8)
-def _table(pixel: Pixel, brightest_e: float) -> CubicSpline:
-    read = pixel.read_noise_e
-    roots = _table_roots(pixel, np.sqrt(brightest_e + read**2))
-    return CubicSpline(roots, np.stack(noise.moments_dn(np.maximum(roots**2 - read**2, 0.0), pixel), axis=1))
+def _tables(pixel: Pixel) -> tuple[PPoly, ...]:
+    """A cubic for each of `readout.moments` over twice the standard deviations of the electrons from 0 up.
 
-
-def _table_roots(pixel: Pixel, last: float) -> FloatArray:
-    """Nodes from the dark to `last`: dense where the readout bends (in the dark, at full well, at the ADC's end).
-
-    Between these it is straight, and beyond them it hardly changes, however bright the brightest signal is.
+    That is the root of the electrons, or with PRNU the inverse hyperbolic sine of PRNU times the root, over PRNU.
     """
-    read, ends = pixel.read_noise_e, {pixel.read_noise_e, last}
-    for bend_e in (0.0, pixel.well_e, (pixel.full_scale_dn - pixel.offset_dn) / pixel.dn_per_e):
-        root = np.sqrt(bend_e + read**2)
-        sigma = np.sqrt(noise.variance_e(np.array(bend_e), pixel) + read**2) / (2 * root) if root else 0.5
-        ends |= {float(np.clip(root + side * _BEND_SIGMAS * sigma, read, last)) for side in (-1, 0, 1)}
-    pieces = [
-        np.geomspace(left, right, _TABLE_NODES) if left else np.linspace(left, right, _TABLE_NODES)
-        for left, right in pairwise(sorted(ends))
-    ]
-    return np.unique(np.concatenate(pieces))
+    if pixel.prnu:
+        last = np.arcsinh(pixel.prnu * np.sqrt(readout.Ends.of(pixel).last_e)) / pixel.prnu
+        nodes = np.arange(0, last + 2 * _DENSE, _DENSE)
+        whole = CubicSpline(nodes, readout.moments((np.sinh(pixel.prnu * nodes) / pixel.prnu) ** 2, pixel), axis=1)
+    else:
+        whole = readout.table_without_prnu(pixel)
+    return tuple(PPoly(np.ascontiguousarray(whole.c[..., row]), whole.x) for row in range(3))

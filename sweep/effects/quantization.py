@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
-from scipy.special import ndtr
 
 from ..arrays import FloatArray
+from ..noise_kernels import poisson_means
 from ..sensor import Pixel
 from ..setup import Setup
-from .noise import least_sigma_dn, variance_e
+from . import gaussian, readout
 
 METHODS = ("skip", "round")
-_TERMS = 6
-_STEPS = 6
-_LITTLE_DN = 0.5
-_MUCH_DN = 1.5
-"""From here on the first term of the series, exp(-2 (pi 1.5)^2), is below the rounding of a float."""
-_LEAST_SIGMA_DN = 1e-12
+_CURVATURE = 4 * math.e
+"""Second derivative of a Poisson mean in the root of the electrons, at most, for values between -1 and 1.
+
+The mean at s + iy is at most exp(2 y^2), since a Poisson probability there grows by |exp(|z| - z)|, z = (s + iy)^2; on
+a circle of radius 1 / sqrt(2) Cauchy's estimate of the derivative is 2 e / (1 / 2).
+"""
 
 
 def skip_is_exact(_: Setup) -> str | None:
@@ -31,64 +32,41 @@ def rounded(dn: FloatArray, pixel: Pixel) -> FloatArray:
     return np.clip(np.floor(dn + 0.5), 0, pixel.full_scale_dn)
 
 
-def _by_series(rest: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean of e = round(x) - x, and variance of round(x), by the Fourier series of e in the mean of x.
+def promise(setup: Setup, brightest_e: float) -> float:
+    """Range of what leaving it out changes in one coordinate, DN: up to a pixel that expects `brightest_e`.
 
-    E[e] = sum over k of (-1)^k sin(2 pi k m) exp(-2 (pi k sigma)^2) / (pi k). Variance: sigma^2 + E[e^2] - E[e]^2 +
-    2 cov(x, e); Stein's lemma gives the covariance.
+    1 at most; under noise the range of the mean's shift.
     """
-    shift, square, slope = np.zeros_like(rest), np.full_like(rest, 1 / 12), np.zeros_like(rest)
-    for k in range(1, _TERMS + 1):
-        decay = (-1) ** k * np.exp(-2 * (math.pi * k * sigma) ** 2)
-        cosine = np.cos(2 * math.pi * k * rest) * decay
-        shift += np.sin(2 * math.pi * k * rest) * decay / (math.pi * k)
-        square += cosine / (math.pi * k) ** 2
-        slope += 2 * cosine
-    return shift, sigma**2 * (1 + 2 * slope) + square - shift**2
-
-
-def _by_steps(rest: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The same from the probabilities to pass each step, where little noise lets the series converge slowly."""
-    mean, square = np.zeros_like(rest), np.zeros_like(rest)
-    least = np.maximum(sigma, _LEAST_SIGMA_DN)
-    for step in range(_STEPS):
-        up, down = ndtr((rest - step - 0.5) / least), ndtr((-rest - step - 0.5) / least)
-        mean += up - down
-        square += (2 * step + 1) * (up + down)
-    return mean - rest, np.maximum(square - mean**2, 0.0)
-
-
-def rounding(mean_dn: FloatArray, sigma_dn: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean of round(x) - x (DN) and variance of round(x) (DN^2) for Gaussian x."""
-    rest = mean_dn - np.floor(mean_dn + 0.5)
-    shift, variance = np.zeros_like(rest), sigma_dn**2 + 1 / 12
-    little = sigma_dn < _LITTLE_DN
-    for where, moments in ((little, _by_steps), (~little & (sigma_dn < _MUCH_DN), _by_series)):
-        if where.any():
-            shift[where], variance[where] = moments(rest[where], sigma_dn[where])
-    return shift, variance
-
-
-def dithered(dn: FloatArray, electrons: FloatArray, pixel: Pixel) -> FloatArray:
-    """Mean of the rounded value where noise of the pixel dithers it."""
-    sigma = pixel.dn_per_e * np.sqrt(variance_e(electrons, pixel) + pixel.read_noise_e**2)
-    return np.asarray(dn + rounding(dn, sigma)[0], dtype=float)
-
-
-def variance_of_rounded(mean_dn: FloatArray, variance_dn: FloatArray) -> FloatArray:
-    """Variance of round(x), DN^2, for Gaussian x of this mean and variance."""
-    return rounding(mean_dn, np.sqrt(variance_dn))[1]
-
-
-def promise(setup: Setup) -> float:
-    """Range of what leaving it out changes in one coordinate, DN: 1, or under noise twice the series' largest sum."""
-    if setup.scenario.noise is None:
-        return 1.0
-    sigma = least_sigma_dn(setup.pixel)
-    return min(1.0, 2 * sum(math.exp(-2 * (math.pi * k * sigma) ** 2) / (math.pi * k) for k in range(1, 50)))
+    return 1.0 if setup.scenario.noise is None else min(1.0, _under_noise(setup.pixel, brightest_e)[0])
 
 
 def steepness(setup: Setup) -> float:
-    """Largest slope of the mean rounded value under noise."""
-    sigma = least_sigma_dn(setup.pixel)
-    return 1 + 2 * sum(math.exp(-2 * (math.pi * k * sigma) ** 2) for k in range(1, _TERMS + 1))
+    """Largest slope of the mean rounded value under noise, relative to that of the readout before it."""
+    return 1 + _under_noise(setup.pixel, math.inf)[1]
+
+
+@lru_cache(maxsize=64)
+def _under_noise(pixel: Pixel, brightest_e: float) -> tuple[float, float]:
+    """Range of the shift by rounding, DN, over the numbers of electrons; its largest slope, DN per DN.
+
+    Shifts at a table's nodes, with what they may miss in between; from the last counted electron on those of a
+    Gaussian. The slope of a Poisson mean is the mean of the steps from count to count. PRNU averages over both.
+    """
+    even, most_e = readout.without_prnu(pixel), brightest_e * (1 + readout.DRAWN * pixel.prnu)
+    electrons = readout.nodes(even) ** 2
+    electrons = electrons[: 1 + int(np.searchsorted(electrons, most_e))]
+    gain, low, high, steepest = even.dn_per_e, 0.0, 0.0, 0.0
+    for run, first, each in readout.runs(electrons, even):
+        shift = each[readout.ROUNDED] - each[readout.UNROUNDED]
+        slope = np.append(np.diff(shift), 0.0) / gain
+        found = poisson_means(electrons[run], first, np.stack([shift, slope]))
+        missed = _CURVATURE * np.diff(np.sqrt(electrons[run])).max(initial=readout.STEP) ** 2 / 8
+        low = min(low, found[0].min() - missed * np.abs(shift).max())
+        high = max(high, found[0].max() + missed * np.abs(shift).max())
+        steepest = max(steepest, np.abs(found[1]).max() + missed * np.abs(slope).max())
+    sigma = gain * math.hypot(math.sqrt(readout.COUNTED_E), even.read_noise_e)
+    if electrons[-1] > readout.COUNTED_E and sigma < gaussian.SMOOTH_DN:
+        terms = [math.exp(-2 * (math.pi * k * sigma) ** 2) for k in range(1, 2 + math.ceil(3 / sigma))]
+        most = min(0.5, sum(term / (math.pi * k) for k, term in enumerate(terms, 1)))
+        low, high, steepest = min(low, -most), max(high, most), max(steepest, 2 * sum(terms))
+    return float(high - low), float(steepest)

@@ -1,0 +1,50 @@
+"""A pixel's digital number by brute force: every number of electrons, every step of the ADC, gains by quadrature."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.stats import norm, poisson
+
+from sweep.sensor import Pixel
+
+
+def digital_numbers(electrons: float, pixel: Pixel) -> tuple[np.ndarray, np.ndarray]:
+    """The numbers that occur and how often, for a pixel without PRNU: ndarray[n], ndarray[n]."""
+    root = math.sqrt(electrons)
+    counts = np.arange(max(0, int(electrons - 14 * root - 9)), int(electrons + 14 * root + 120))
+    weights = poisson.pmf(counts, electrons)
+    dn = np.minimum(counts, pixel.well_e) * pixel.dn_per_e + pixel.offset_dn
+    sigma, top = pixel.read_noise_e * pixel.dn_per_e, pixel.full_scale_dn
+    ends = dn.min() - 15 * sigma - 2, dn.max() + 15 * sigma + 2
+    first, last = np.clip([math.floor(ends[0]), math.ceil(ends[1])], 0, top).astype(int)
+    numbers = np.arange(first, last + 1)
+    found = np.zeros(numbers.size)
+    if sigma == 0:
+        np.add.at(found, np.clip(np.floor(dn + 0.5), 0, top).astype(int) - first, weights)
+        return numbers, found
+    kept = weights > 1e-60
+    weights, dn = weights[kept, None], dn[kept, None]
+    near = np.round(dn).astype(int) + np.arange(-math.ceil(14 * sigma) - 1, math.ceil(14 * sigma) + 2)
+    low, high = (near - 0.5 - dn) / sigma, (near + 0.5 - dn) / sigma
+    shares = np.where(low > 0, norm.sf(low) - norm.sf(high), norm.cdf(high) - norm.cdf(low))
+    np.add.at(found, np.clip(near, 0, top) - first, weights * shares)
+    return numbers, found
+
+
+def moments(electrons: float, pixel: Pixel) -> tuple[float, float]:
+    """Mean, DN, and variance, DN^2; with PRNU over gains that are half a Poisson deviation apart or less."""
+    fine = max(40, math.ceil(36 * pixel.prnu * math.sqrt(electrons)))
+    gains = np.linspace(-9, 9, fine + 1) if pixel.prnu else np.zeros(1)
+    shares = np.exp(-(gains**2) / 2)
+    shares /= shares.sum()
+    means, squares = [], []
+    center = round(digital_numbers(electrons, pixel)[0].mean())
+    for gain in gains:
+        numbers, often = digital_numbers(electrons * (1 + pixel.prnu * gain), pixel)
+        often = often / often.sum()
+        means.append(often @ (numbers - center))
+        squares.append(often @ (numbers - center) ** 2)
+    mean = shares @ means
+    return float(center + mean), float(shares @ squares - mean**2)
