@@ -11,7 +11,9 @@ from .arrays import FloatArray
 from .schema import Section
 
 FEASIBLE = 1e-9
-"""A design is feasible up to this violation (relative to the bound), so that rounding cannot lose one on a bound."""
+"""A design is feasible up to this violation (see `Bound.scale`), so that rounding cannot lose one on a bound."""
+_LEAST_SCALE = 1e-6
+"""A violation is relative to this at least: relative to a smaller bound, rounding alone would be one."""
 
 
 class Bound(Section):
@@ -30,8 +32,9 @@ class Bound(Section):
 
     @property
     def scale(self) -> float:
-        """What a violation is relative to: the larger end, 1 when that is 0."""
-        return max(abs(self.min or 0.0), abs(self.max or 0.0)) or 1.0
+        """What a violation is relative to: the larger end; where that is 0, one unit of the quantity."""
+        end = max(abs(self.min or 0.0), abs(self.max or 0.0))
+        return max(end, _LEAST_SCALE) if end > 0 else 1.0
 
     def violation(self, values: FloatArray) -> FloatArray:
         """How far `values` are outside, relative to `scale`, >= 0; 0 where the quantity does not exist (NaN)."""
