@@ -11,9 +11,11 @@ from .arrays import FloatArray
 from .schema import Number, Section
 
 FEASIBLE = 1e-9
-"""A design is feasible up to this violation (relative to the bound), so that rounding cannot lose one on a bound."""
+"""A design is feasible up to this violation (see `Bound.scale`), so that rounding cannot lose one on a bound."""
 _LEAST = 1e-30
-"""Violations are relative to a bound."""
+"""A bound is 0, or at least so large."""
+_LEAST_SCALE = 1e-6
+"""A violation is relative to this at least: relative to a smaller bound, rounding alone would be one."""
 
 
 class Bound(Section):
@@ -35,8 +37,9 @@ class Bound(Section):
 
     @property
     def scale(self) -> float:
-        """What a violation is relative to: the larger end, 1 when that is 0."""
-        return max(abs(self.min or 0.0), abs(self.max or 0.0)) or 1.0
+        """What a violation is relative to: the larger end; where that is 0, one unit of the quantity."""
+        end = max(abs(self.min or 0.0), abs(self.max or 0.0))
+        return max(end, _LEAST_SCALE) if end > 0 else 1.0
 
     def violation(self, values: FloatArray) -> FloatArray:
         """How far `values` are outside, relative to `scale`, >= 0; 0 where the quantity does not exist (NaN)."""

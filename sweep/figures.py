@@ -36,8 +36,8 @@ CURVE_COLORS = {
     "Cy": "#17a2a2",
     "C": "#555555",
 }
-LINE_COLORS = {"front of the search": "#d55e00", "limit of any filter": "#009e73"}
-LINE_STEPS = {"front of the search": "steps-pre", "limit of any filter": "steps-post"}
+LINE_COLORS = {"front of the search": "#d55e00", "limit of any filter, unquantized": "#009e73"}
+LINE_STEPS = {"front of the search": "steps-pre", "limit of any filter, unquantized": "steps-post"}
 """Between two levels of sensitivity holds what was found at the next one, and what was proven at the last one."""
 TYPE_COLORS = {"green": "#009e73", "yellow": "#c9a800", "orange": "#e66100", "red": "#b2182b"}
 CURVE_CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from .arrays import FloatArray, IndexArray
-from .constraints import Bound
+from .constraints import FEASIBLE, Bound
 from .evaluate import WORST, designed_quantities, sensitivities_gradient
 from .imaging import Imager, smooth_imager
 from .metrics import Pair
@@ -21,6 +21,10 @@ from .problem import Evaluation, Problem, SearchRun
 
 BACK_OFF = 1e-8
 """The search keeps this far (relative) inside each bound, so that rounding does not leave its answer outside."""
+_ON_BOUND = -0.5 * FEASIBLE
+"""The same where nothing lies inside, such as a slope of 0: half of what still counts as feasible."""
+_MOST = {"min_transmission": 1.0, "sensitivity": 1.0}
+"""What a quantity reaches at most when a filter replaces a curve that it does not exceed."""
 _CONDITION_NM = 100.0
 """Scale of the families' own conditions, so that they weigh like the others."""
 
@@ -145,6 +149,7 @@ class Model:
         wanted = (*problem.objective.weights, *problem.constraints)
         shifts = dict.fromkeys(s for name in ("nominal", *wanted) for s in problem.shifts_nm(name))
         self._families = {s: problem.family.shifted(s) if s else problem.family for s in shifts}
+        self._back_off = {name: _back_off(problem, name, bound) for name, bound in problem.constraints.items()}
         self._seen: dict[bytes, Point] = {}
 
     def at(self, u: FloatArray) -> Point:
@@ -179,7 +184,7 @@ class Model:
         quantities = {}
         for name, bound in problem.constraints.items():
             rows = quantities[name] = self._rows(name, made, x)
-            conditions += _conditions(name, bound, rows)
+            conditions += _conditions(name, bound, rows, self._back_off[name])
             worst = max(worst, float(bound.violation(np.array([_value(name, rows)]))[0]))
         amounts = made[0.0].amounts
         evaluation = Evaluation(x, objective, amounts["sensitivity"], amounts["cfa_sensitivity"], worst)
@@ -226,13 +231,23 @@ def _value(name: str, rows: Rows) -> float:
     return float(np.sqrt(rows.values.min()) if is_distance(name) else rows.values.min())
 
 
-def _conditions(name: str, bound: Bound, rows: Rows) -> list[Rows]:
-    """Rows that are <= 0 where the bound is kept, relative to its scale, a hair inside."""
+def _back_off(problem: Problem, name: str, bound: Bound) -> float:
+    """How far inside a bound to keep, relative: not at all where it is the end of what the quantity can be."""
+    most = _MOST.get(name.removeprefix(WORST), np.inf)
+    if name in problem.family.dimensions:
+        rows = problem.family.dimensions[name]
+        most = float((np.maximum(rows, 0) @ problem.high + np.minimum(rows, 0) @ problem.low).min())
+    at_end = bound.max == 0 or (bound.min is not None and bound.min + BACK_OFF * bound.scale > most)
+    return _ON_BOUND if at_end else BACK_OFF
+
+
+def _conditions(name: str, bound: Bound, rows: Rows, back_off: float) -> list[Rows]:
+    """Rows that are <= 0 where the bound is kept, `back_off` inside, relative to its scale."""
     found, scale = [], bound.scale
     if bound.min is not None and is_distance(name):
-        found.append(rows.scaled(-1 / scale**2, (bound.min * (1 + BACK_OFF) / scale) ** 2))
+        found.append(rows.scaled(-1 / scale**2, (bound.min * (1 + back_off) / scale) ** 2))
     elif bound.min is not None:
-        found.append(rows.scaled(-1 / scale, bound.min / scale + BACK_OFF))
+        found.append(rows.scaled(-1 / scale, bound.min / scale + back_off))
     if bound.max is not None:
-        found.append(rows.scaled(1 / scale, -bound.max / scale + BACK_OFF))
+        found.append(rows.scaled(1 / scale, -bound.max / scale + back_off))
     return found

@@ -11,8 +11,10 @@ from sweep.cli import main
 from sweep.constraints import FEASIBLE, Bound, total_violation
 from sweep.errors import BrokenProofError
 from sweep.evaluate import designed_quantities, smooth_response
+from sweep.families import FreeForm
 from sweep.limit import Limit, limit_of
 from sweep.metrics import separation
+from sweep.objectives import Objective
 from sweep.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
 from sweep.runner import searching
 from sweep.search import search_from
@@ -171,6 +173,57 @@ def test_a_filter_without_light_does_not_end_the_search(study: Study) -> None:
     run = search_from(replace(problem, setup=dark), 0, np.full(problem.free.size, 0.5), "SLSQP", 20)
     assert best_feasible(run.log) is None
     assert run.log
+
+
+@pytest.mark.parametrize(
+    "constraints",
+    [{"slope_per_nm": Bound(max=0.0)}, {"min_transmission": Bound(min=1.0)}, {"sensitivity": Bound(min=1.0)}],
+    ids=lambda constraints: next(iter(constraints)),
+)
+def test_a_bound_at_the_end_of_what_can_be_is_met(study: Study, constraints: dict[str, Bound]) -> None:
+    """Flat filters under a flat curve, or the flat curve alone: nothing lies inside such a bound."""
+    assert study.search is not None
+    found = study.problem(study.search)
+    wave, base = study.grid.nodes_nm, np.full(study.grid.size, 0.3)
+    qe = found.setup.qe.copy()
+    qe[found.setup.modified[0]] = base
+    family = FreeForm(wave, base, np.arange(400.0, 701.0, 20.0))
+    ends = np.zeros(family.nodes_nm.size), np.ones(family.nodes_nm.size)
+    problem = Problem(
+        replace(found.setup, qe=qe), family, *ends, Objective(minimum={"csd_yellow_red": 1.0}), constraints
+    )
+    log = [
+        e for i, u in enumerate(starting_points(problem, 4, 1)) for e in search_from(problem, i, u, "SLSQP", 100).log
+    ]
+    best = best_feasible(log)
+    assert best is not None
+    name, bound = next(iter(constraints.items()))
+    curves = family.curves(best.x[None])
+    assert bound.violation(designed_quantities(problem.setup, curves)[name])[0] <= FEASIBLE
+    assert np.ptp(curves) <= 1e-6  # 300 steps of what counts as no slope
+    assert best.objective <= limit_of(problem).proven
+
+
+def test_an_edge_as_wide_as_the_box_allows_is_met(study: Study) -> None:
+    assert study.search is not None
+    found = study.problem(study.search)
+    widest = {"edge_width_nm": Bound(min=float(found.high[1])), "sensitivity": Bound(min=0.9)}
+    problem = replace(found, constraints=widest)
+    log = [
+        e for i, u in enumerate(starting_points(problem, 4, 1)) for e in search_from(problem, i, u, "SLSQP", 100).log
+    ]
+    best = best_feasible(log)
+    assert best is not None
+    assert best.x[[1, 3]] == pytest.approx(found.high[[1, 3]], rel=1e-8)
+
+
+@pytest.mark.parametrize("bound", [0.0, 1e-12, 1e-6, 0.06, 300.0])
+def test_rounding_is_no_violation_of_any_bound(bound: float) -> None:
+    """A slope of 1e-16 is one of a flat filter; what misses a bound by a thousandth, or by 1e-6, does violate it."""
+    for kind in (Bound(max=bound), Bound(min=bound)):
+        sign = 1.0 if kind.max is not None else -1.0
+        assert kind.violation(np.array([bound + sign * (1e-16 + 1e-15 * bound)]))[0] <= FEASIBLE
+        assert kind.violation(np.array([bound + sign * max(1e-6, 1e-3 * bound)]))[0] > FEASIBLE
 
 
 TINY = """\

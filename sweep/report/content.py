@@ -15,7 +15,7 @@ from ..series import Line, SeriesFigure
 from ..spectra import WavelengthGrid
 from .outputs import Output
 
-LIMIT_NAME = "limit of any filter"
+LIMIT_NAME = "limit of any filter, unquantized"
 QUANTITIES = ("sensitivity", "cfa_sensitivity")
 _SENSITIVITY_LABELS = {
     "sensitivity": "sensitivity of the modified channel (1 = the channel it replaces)",

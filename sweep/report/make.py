@@ -96,6 +96,7 @@ def _html(output: Output, images: Sequence[tuple[str, str]], published: pd.DataF
         constraints={name: str(bound) for name, bound in output.constraints.items()},
         summary=summary_lines(output),
         provenance=output.provenance,
+        limited=(output.provenance.get("search") or {}).get("limit_proven") is not None,
     )
 
 

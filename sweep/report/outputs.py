@@ -77,7 +77,10 @@ class Output:
 
     @property
     def trade_off(self) -> tuple[str, str]:
-        """Columns of the Pareto front: separation, sensitivity."""
+        """Axes of the Pareto front: separation, sensitivity.
+
+        `pareto` marks it among the designs that meet every constraint but those on these two.
+        """
         separation, sensitivity = self.provenance["trade_off"]
         return separation, sensitivity
 

@@ -125,7 +125,7 @@ def _plan_line(output: Output) -> str:
 def counts_line(output: Output) -> str:
     """How many designs there are, and what the report leaves out."""
     counts = output.counts
-    text = f"{counts.rows:,} designs, {counts.feasible:,} feasible, {counts.front:,} on the Pareto front"
+    text = f"{counts.rows:,} designs, {counts.feasible:,} feasible, {counts.front:,} of these on the Pareto front"
     if counts.failed:
         text += f", {counts.failed:,} failed"
     if counts.left_out:

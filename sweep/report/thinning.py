@@ -20,7 +20,7 @@ _BEST = 100
 
 @dataclass(frozen=True)
 class Counts:
-    """Rows of the whole table: all, feasible, on the Pareto front, failed; and how many of them were left out."""
+    """Rows of the whole table: all, feasible, feasible and on the Pareto front, failed; and how many were left out."""
 
     rows: int
     feasible: int

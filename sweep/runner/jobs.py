@@ -46,7 +46,7 @@ class Job:
 class Rules:
     """What turns designs into rows: the table's schema, its quantities and the verdicts on them.
 
-    `front`: the two quantities of the Pareto front.
+    `front`: the two quantities of the Pareto front, whose constraints the designs on it need not meet.
     """
 
     schema: pa.Schema
@@ -93,8 +93,9 @@ def _job_size(study: Study, space: Space) -> int:
 def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
     """Evaluate a job; a design that fails is a row with its status, and the others are kept.
 
-    `pareto` marks the non-dominated designs of this job alone; `compaction.Front` finds those of the whole table.
-    `detours_of` the table says which designs took another route than their block's own.
+    `pareto` marks the non-dominated designs of this job alone, among those that meet every constraint but those on the
+    front's axes; `compaction.Front` finds those of the whole table. `detours_of` the table says which designs took
+    another route than their block's own.
     """
     points = job.space.points(job.start, job.stop)
     found = _quantities(job, setup, rules)

@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 
 from ..arrays import FloatArray
-from ..constraints import Bound
+from ..constraints import FEASIBLE, Bound
 from ..errors import BrokenProofError, Fault, InfeasibleError
 from ..limit import Limit, limit_of, why_not
 from ..problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
@@ -117,7 +117,7 @@ def _infeasible(study: Study, problem: Problem, starts: FloatArray, each: int) -
     faults = [Fault(f"{study.name}: no feasible design was found")]
     for name, bound in problem.constraints.items():
         value = best_reachable(problem, name, starts, each)
-        met = "reachable alone" if bound.violation(np.array([value]))[0] <= 0 else "out of reach"
+        met = "reachable alone" if bound.violation(np.array([value]))[0] <= FEASIBLE else "out of reach"
         best = f"the best value found is {value:.6g}" if np.isfinite(value) else "no well-formed filter was found"
         faults.append(Fault(f"{met}: {name} {bound}; {best}", key=f"constraints.{name}"))
     return InfeasibleError(faults)

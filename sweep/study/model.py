@@ -95,6 +95,8 @@ class Study:
     def trade_off(self) -> tuple[str, str]:
         """The two quantities of the Pareto front: separation and sensitivity.
 
+        The front is that of the designs that meet every constraint but those on these two.
+
         The separation is the objective, or, where that is a sensitivity, the first CSD that is constrained.
         """
         column = self.objective.column

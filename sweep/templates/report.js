@@ -31,7 +31,7 @@ const scenario = unpack(data.scenario.codes), cfa = unpack(data.cfa.codes);
 const wavelength = Array.from(unpack(data.curves.wavelength_nm));
 const G = Object.fromEntries(data.groups.map((name, i) => [name, i]));
 const x = columns[data.axes.x], y = columns[data.axes.y];
-const lineShapes = {"front of the search": "vh", "limit of any filter": "hv"};  // what holds between two levels
+const lineShapes = {"front of the search": "vh", "limit of any filter, unquantized": "hv"};  // what holds between two levels
 let view = data.views[0] || null;
 
 const shown = (name, value) => Number.isFinite(value) ? value.toFixed(data.columns[name].digits) : "-";
@@ -163,7 +163,7 @@ function drawCurves(row) {
   });
   for (const name of data.curves.ends[view.cfa] || [])
     line(name, data.curves.sensor[name], data.colors.curves[name] || "#777777", "dot", 1.5);
-  if (data.curves.limits[view.cfa]) line("limit of any filter", data.curves.limits[view.cfa], "#000000", "dash", 1.2);
+  if (data.curves.limits[view.cfa]) line("limit of any filter, unquantized", data.curves.limits[view.cfa], "#000000", "dash", 1.2);
   own.forEach((packed, i) => line(own.length > 1 ? `${title(row)}, ${"ab"[i]}` : title(row), packed, cycle[i], "solid", 2.5));
   Plotly.react("curves", found, {
     title: {text: `QE of ${plain(title(row))}`, font: {size: 14}}, height: 340, margin: {l: 50, r: 10, t: 36, b: 45},
