@@ -48,7 +48,9 @@ def run(
     fail_fast: Annotated[bool, typer.Option("--fail-fast", help="Stop at the first design that fails.")] = False,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Compute failed designs again.")] = False,
 ) -> None:
-    """Run a study: results, figures and report go to OUTPUT/<study>. The same command continues an interrupted run."""
+    """Run a study: results, figures and report go to OUTPUT/<study>. The same command continues an interrupted run,
+    and makes again what is missing or damaged. Files that are not its own stay (run.json lists those that are).
+    """
     from . import runner
     from .audit import mend_audit
     from .progress import ProgressDisplay
@@ -136,10 +138,7 @@ def plan(
 
 
 @app.command()
-def audit(
-    folder: RunFolder,
-    data: DataFolder = None,
-) -> None:
+def audit(folder: RunFolder, data: DataFolder = None) -> None:
     """Recompute the front and 1 % of a run's rows with every effect on: promised beside realized error.
 
     Exit code 5 says that an error is larger than promised.

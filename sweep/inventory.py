@@ -20,47 +20,15 @@ import pyarrow as pa
 
 from .disk import MOST_FACTS, Digest, digest_of, is_folder, is_link, parsed_facts, read_plain
 from .errors import Fault, OutputError
-from .store import (
-    AUDIT,
-    CURVES,
-    FRONT,
-    POINTS,
-    PROVENANCE,
-    RECOGNITION,
-    RESOLVED,
-    RESULTS,
-    SEARCH_LOG,
-    Seal,
-    json_of,
-    write_bytes,
-    write_table,
-)
+from .run_files import FIGURES, RUN, SUMS, is_drawn, is_own
+from .store import AUDIT, Seal, json_of, write_bytes, write_table
 
-RUN, SUMS = "run.json", "SHA256SUMS"
-REPORT, FIGURES = "report.html", "figures"
-TABLES = (RESULTS, SEARCH_LOG, FRONT, CURVES, POINTS, RECOGNITION)
-MADE_BY_RUN = frozenset((*TABLES, RESOLVED, PROVENANCE))
-"""What a run itself writes beside its list; the report draws from it, `sweep audit` adds a table."""
-_DRAWN = re.compile(
-    r"report\.html|pareto(-\d+)?\.(png|svg)|paper_comparison\.(csv|parquet)"
-    r"|figures/((filters|series)-\d+|sensor|signals|chart|clouds-(cfas|designs))\.(png|svg)"
-)
 _SUM = re.compile(r"([0-9a-f]{64})  (\S+)")
 _FINGERPRINT = re.compile(r"# run ([0-9a-f]{64})\b")
 _OWN_DIGEST = re.compile(rb'"sha256_of_the_rest": "([0-9a-f]{64})"')
 _ZEROS = "0" * 64
 """Stands for the digest of a file that is out of date, and for that of the list itself while it is found."""
 MISSING, DAMAGED, OUTDATED = "is missing", "is damaged", "is out of date"
-
-
-def is_drawn(name: str) -> bool:
-    """Whether it is a file of the report."""
-    return _DRAWN.fullmatch(name) is not None
-
-
-def is_own(name: str) -> bool:
-    """Whether it is a name that commands give to files of a run, beside its two lists."""
-    return name in MADE_BY_RUN or name == AUDIT or is_drawn(name)
 
 
 class Inventory:
@@ -187,11 +155,14 @@ class Inventory:
         if gone:
             self.save()
 
-    def outdate_report(self) -> None:
-        """The report is of other rows than the folder holds now; raises OutputError when the disk refuses."""
-        drawn = [name for name in self.files if is_drawn(name)]
-        if drawn:
-            self.files |= dict.fromkeys(drawn, Digest(_ZEROS, 0))
+    def outdate(self, *, rows: bool) -> None:
+        """The report, and where the `rows` are others the audit, are not of what the folder holds now.
+
+        Raises OutputError when the disk refuses.
+        """
+        old = [name for name in self.files if is_drawn(name) or (rows and name == AUDIT)]
+        if old:
+            self.files |= dict.fromkeys(old, Digest(_ZEROS, 0))
             self.save()
 
     def discard(self) -> bool:
@@ -247,6 +218,14 @@ class Inventory:
         digests = {name: held.sha256 for name, held in self.files.items()} | {RUN: hashlib.sha256(run).hexdigest()}
         lines = [f"{digests[name]}  {name}" for name in sorted(digests)]
         return "\n".join([f"# run {self.fingerprint}; check its files: sha256sum -c {SUMS}", *lines, ""])
+
+
+def no_run(folder: Path) -> OutputError:
+    """What there is to say of a folder whose run is not known."""
+    if Inventory(folder).strangers():
+        problem = f"not a run of this version, or its {RUN} and {SUMS} are both missing or damaged"
+        return OutputError(Fault(problem, str(folder), allowed="a folder that `sweep run` made"))
+    return OutputError(Fault("no run here", str(folder), allowed="a folder that `sweep run` made"))
 
 
 def faults_of(folder: Path, wrong: Mapping[str, str]) -> list[Fault]:

@@ -14,8 +14,8 @@ from typing import IO
 
 from .disk import is_folder, opened, read_plain
 from .errors import Fault, OutputError
-from .inventory import FIGURES
 from .journal import SHARDS
+from .run_files import FIGURES
 
 LOCK = ".lock"
 _ATTEMPTS, _PAUSE_S = 5, 0.02

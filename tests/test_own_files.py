@@ -13,10 +13,11 @@ import pytest
 
 from sweep.audit import audit_output
 from sweep.errors import OutputError
-from sweep.inventory import Inventory, is_drawn, is_own
+from sweep.inventory import Inventory
 from sweep.journal import SHARDS, Journal
 from sweep.lock import LOCK, locked
 from sweep.report import make_report, read_output
+from sweep.run_files import is_drawn, is_own
 from sweep.runner import output_folder, run_study, status_lines
 from sweep.study import Study, load_study
 

@@ -10,9 +10,10 @@ import pandas as pd
 import pyarrow as pa
 
 from ..figures import draw_chart, draw_clouds, draw_curves, draw_pareto, rendered
-from ..inventory import FIGURES, REPORT, Inventory, is_drawn
+from ..inventory import Inventory
 from ..lock import locked
 from ..objectives import Objective
+from ..run_files import FIGURES, REPORT, is_drawn
 from ..series import draw_series
 from ..store import csv_of, encoded
 from . import content

@@ -19,7 +19,7 @@ from ruamel.yaml.error import YAMLError
 from ..arrays import FloatArray
 from ..constraints import Bound
 from ..errors import Fault, OutputError
-from ..inventory import Inventory
+from ..inventory import Inventory, no_run
 from ..metrics import CSD
 from ..objectives import Objective
 from ..scenes import Geometry
@@ -128,6 +128,8 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
     `audited`: with the rows of `sweep audit`, where there are some.
     """
     inventory = Inventory(folder)
+    if not inventory.fingerprint:
+        raise no_run(folder)
     if PROVENANCE not in inventory.files:
         raise OutputError(Fault("no finished run here", str(folder), allowed="a folder that `sweep run` finished"))
     optional = [name for name in (FRONT, RECOGNITION, SEARCH_LOG, AUDIT) if name in inventory.files]

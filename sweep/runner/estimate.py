@@ -12,9 +12,10 @@ from pathlib import Path
 import pyarrow as pa
 from threadpoolctl import threadpool_limits
 
+from ..inventory import Inventory
 from ..journal import Journal
 from ..progress import Progress
-from ..store import encoded
+from ..store import RESULTS, encoded
 from ..study import Study
 from .folders import held_by
 from .jobs import Job, rules_of
@@ -44,7 +45,7 @@ class Estimate:
 def estimate(study: Study, output: Path, n_jobs: int, progress: Progress) -> Estimate:
     """Plan, look at what is kept, and compute a few designs of every kind of chunk in this process."""
     held = held_by(output)
-    whole = held is not None and held.finished and held.is_of(study)
+    whole = held is not None and held.is_of(study) and not Inventory(output).wrong([RESULTS], quick=True)
     crew = Workers(n_jobs, Stop())
     study = with_plans(study, crew.count, progress)
     journal = Journal(output)

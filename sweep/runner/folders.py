@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import Fault, OutputError
-from ..inventory import MADE_BY_RUN, Inventory
+from ..inventory import Inventory
+from ..run_files import MADE_BY_RUN
 from ..store import PROVENANCE
 from ..study import Study
 from .provenance import fingerprint, identity

@@ -14,11 +14,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ..constraints import FEASIBLE
-from ..inventory import TABLES, Inventory
+from ..inventory import Inventory
 from ..journal import Journal
 from ..limit import Limit
 from ..pareto import hypervolume
 from ..progress import Progress
+from ..run_files import TABLES
 from ..store import (
     CURVES,
     FRONT,
@@ -96,7 +97,7 @@ class Making:
             changed = {n for n in self.made if before.get(n) != self.inventory.files[n]}
             todo = files_of(self.study) - self.made if changed & {*TABLES} else set()
         if changed:
-            self.inventory.outdate_report()
+            self.inventory.outdate(rows=bool(changed & {*TABLES}))
         self.journal.remove()
 
     @cached_property

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ..disk import read_facts
-from ..errors import Fault, OutputError
-from ..inventory import Inventory, faults_of
+from ..errors import OutputError
+from ..inventory import Inventory, faults_of, no_run
 from ..journal import SHARDS, Entry, Journal
 from ..lock import holder
 from ..store import PROVENANCE, RESULTS
@@ -26,7 +26,7 @@ def status_lines(folder: Path, *, verify: bool = False) -> list[str]:
     """
     held, inventory = held_by(folder), Inventory(folder)
     if held is None or not held.fingerprint:
-        raise OutputError(Fault("no run here", str(folder), allowed="a folder that `sweep run` made"))
+        raise no_run(folder)
     running = holder(folder)
     finished = PROVENANCE in inventory.files and running is None
     if finished or (verify and running is None):
