@@ -122,7 +122,7 @@ def test_changed_studies(studies: list[dict[str, Any]], tmp_path: Path, seed: in
     rng, path, found = np.random.default_rng([1, seed]), tmp_path / "changed.yaml", Counter()
     for index in range(15):
         tree = one_of(rng, studies)
-        path.write_bytes(written(changed(rng, tree)) if index % 3 else torn(rng, written(tree)))
+        path.write_bytes(written(changed(rng, tree)) if index % 3 else torn(rng, written(tree), 2))
         found[tried(path, compute=False)] += 1
     assert found["refused"] > 3, found
 
@@ -132,9 +132,9 @@ def test_five_hundred_changed_studies(studies: list[dict[str, Any]], tmp_path: P
     rng, path, found = np.random.default_rng(2), tmp_path / "changed.yaml", Counter()
     for index in range(500):
         tree = one_of(rng, studies)
-        path.write_bytes(written(changed(rng, tree)) if index % 3 else torn(rng, written(tree)))
+        path.write_bytes(written(changed(rng, tree)) if index % 3 else torn(rng, written(tree), 2))
         found[tried(path, compute=True)] += 1
-    assert found["refused"] > 250, found
+    assert found["refused"] > 200, found
     assert found["computed"] > 25, found
 
 
