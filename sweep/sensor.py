@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from .arrays import FloatArray
 from .schema import Meters, NonNegative, Section, Share
 
-ReadNoise = Annotated[float, Field(ge=0, le=1e9)]
+ReadNoise = Annotated[float, Field(ge=0, le=1e6)]
 """Electrons; a pixel's well is full long before."""
 DarkCurrent = Annotated[float, Field(ge=0, le=1e15)]
 """Electrons per second; any well is full in less than a second."""
@@ -34,7 +34,7 @@ class Pixel(Section):
     Defaults: 2.1 um pitch (AR0820), a full well of 10,000 e that maps to full scale. `gain_dn_per_e` null means
     full scale / full well. `offset_dn` is the pedestal. `crosstalk`: share of a pixel's light that comes through the
     filters of its four neighbors. `prnu`: relative standard deviation of the pixels' gains. Limits: a pitch of 1 nm to
-    10 cm, wells of 0.01 to 1e15 e, gains of 1e-15 to 1e15 DN/e, read noise up to 1e9 e, dark current up to 1e15 e/s.
+    10 cm, wells of 0.01 to 1e15 e, gains of 1e-15 to 1e15 DN/e, read noise up to 1e6 e, dark current up to 1e15 e/s.
     """
 
     pitch_um: float = Field(default=2.1, ge=1e-3, le=1e5)

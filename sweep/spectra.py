@@ -51,7 +51,7 @@ class WavelengthGrid(Section):
             raise ValueError("wavelengths must be in nm, between 200 and 2000")
         if steps > _MOST_STEPS:
             raise ValueError(f"step_nm {self.step_nm:g} is too fine: at most {_MOST_STEPS} steps")
-        if not abs(steps - round(steps)) < 1e-6:
+        if round(steps) < 1 or not abs(steps - round(steps)) < 1e-6:
             raise ValueError(
                 f"step_nm {self.step_nm:g} must divide stop_nm - start_nm = {self.stop_nm - self.start_nm:g}"
             )

@@ -30,6 +30,8 @@ def test_default_grid_is_301_bins() -> None:
     ("keys", "word"),
     [
         ({"step_nm": 7.0}, "divide"),
+        ({"step_nm": 1e300}, "divide"),
+        ({"step_nm": 5e-324}, "too fine"),
         ({"start_nm": 700.0, "stop_nm": 400.0}, "below"),
         ({"start_nm": 0.4, "stop_nm": 0.7, "step_nm": 0.1}, "nm"),
         ({"step_nm": float("nan")}, "finite"),
