@@ -291,7 +291,10 @@ class Imager:
         if methods.quantization == "skip":
             return dn
         self.work["quantization"] += electrons.size
-        return quantization.dithered(dn, electrons, pixel) if noisy else quantization.rounded(dn, pixel)
+        if noisy:
+            return quantization.dithered(dn, electrons, pixel)
+        held = electrons if methods.saturation == "skip" else saturation.clipped(electrons, pixel)
+        return quantization.rounded(held * pixel.dn_per_e, pixel)
 
     def variance_dn(self, electrons: FloatArray) -> FloatArray:
         """Variance of the units' digital numbers, DN^2, with their rounding."""

@@ -24,7 +24,7 @@ from .hard_scenes import FAMILY, GRID, SENSOR, TILES, lights, target
 _DUAL = Dual(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["C"])
 _TWO_BANDS = Stopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"], 2)
 _TWO = Mosaic.from_rows("two", [["R", "N"], ["M", "Cy"]])
-_DESIGNS = 6
+_DESIGNS = 4
 _SHIFT_NM = 3.0
 _ANY_PLACE_PX = 6.0
 """Larger lights at any place take too long."""
