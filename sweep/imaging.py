@@ -334,7 +334,8 @@ class Imager:
             return dn
         if noisy:
             return dn + noise_table.rounded(electrons, pixel) - noise_table.unrounded(electrons, pixel)
-        return quantization.rounded(dn, pixel)
+        held = electrons if methods.saturation == "skip" else saturation.clipped(electrons, pixel)
+        return quantization.rounded(held * pixel.dn_per_e, pixel)
 
     def variance_dn(self, electrons: FloatArray) -> FloatArray:
         """Variance of the units' digital numbers, DN^2, with their rounding."""

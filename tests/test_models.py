@@ -21,7 +21,7 @@ from sweep.metrics import cfa_sensitivity, separation
 from sweep.mosaics import Mosaic
 from sweep.pareto import non_dominated
 from sweep.scenes import FixedExposure, Geometry, Scenario
-from sweep.sensor import Optics, Pixel, irradiance_factor, unquantized
+from sweep.sensor import Optics, Pixel, irradiance_factor
 from sweep.setup import Setup
 from sweep.spectra import WavelengthGrid
 
@@ -115,7 +115,7 @@ def test_electrons_of_a_flat_light() -> None:
 
 
 def read_out(electrons: np.ndarray, pixel: Pixel) -> np.ndarray:
-    return quantization.rounded(unquantized(saturation.clipped(electrons, pixel), pixel), pixel)
+    return quantization.rounded(saturation.clipped(electrons, pixel) * pixel.dn_per_e, pixel)
 
 
 def test_digital_numbers_clip_the_well_before_the_adc() -> None:

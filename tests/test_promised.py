@@ -25,7 +25,9 @@ def keep_a_plan(seed: int) -> tuple[int, float, float, float, str]:
     assert planned.keys() == exact.keys()
     realized = {name: float(np.abs(planned[name] - exact[name]).max()) for name in exact}
     worst = max(realized, key=lambda name: realized[name])
-    return seed, made.tolerance_dn, plan.promised_dn, realized[worst], worst
+    # Of all real places the worst is found within a limit of its own, which the tolerance may be below.
+    tolerance = np.inf if made.anywhere else made.tolerance_dn
+    return seed, tolerance, plan.promised_dn, realized[worst], worst
 
 
 def check(seeds: range) -> None:

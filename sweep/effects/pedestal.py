@@ -25,8 +25,11 @@ import numpy as np
 
 from ..sensor import Pixel
 from ..setup import Methods, Setup
+from .saturation import JUST_ABOVE
 
 METHODS = ("skip", "add")
+_MOST_E = 1e30
+"""More electrons than this are as many as this."""
 _TERMS = 50
 _LEAST_SIGMA_DN = 0.05
 """With less noise the series is not summed: its terms fall too slowly."""
@@ -47,7 +50,7 @@ def promise(setup: Setup, brightest_dn: float, methods: Methods) -> float:
     rounds, clips = methods.quantization == "round", methods.saturation == "clip"
     held_dn = min(brightest_dn, pixel.well_e * pixel.dn_per_e) if clips else brightest_dn
     if rounds and not noisy:
-        shortest = full - min(math.floor(held_dn + 0.5), full)
+        shortest = full - math.floor(min(held_dn * JUST_ABOVE, full) + 0.5)
         return float(math.ceil(offset) - min(math.floor(offset), shortest))
     found = _dithered_steps(pixel) if rounds else 0.0
     bottom, top = _tails(pixel, brightest_dn, rounds=rounds)
@@ -72,7 +75,9 @@ def _dithered_steps(pixel: Pixel) -> float:
 
 def _most_cut(mean: float, sigma: float, end: float) -> float:
     """The mean of max(0, x - end) is at most this, for x of any distribution with this mean and sigma (Scarf, 1958)."""
-    return (math.hypot(sigma, end - mean) - (end - mean)) / 2
+    far = end - mean
+    whole = math.hypot(sigma, far)
+    return sigma**2 / (2 * (whole + far)) if far > 0 else (whole - far) / 2
 
 
 def _tails(pixel: Pixel, brightest_dn: float, *, rounds: bool) -> tuple[float, float]:
@@ -82,7 +87,7 @@ def _tails(pixel: Pixel, brightest_dn: float, *, rounds: bool) -> tuple[float, f
     n + (prnu n)^2 + read^2 of n electrons its derivative changes sign at most once, from falling to rising.
     """
     gain, read_e = pixel.dn_per_e, pixel.read_noise_e
-    brightest_e = brightest_dn / gain
+    brightest_e = min(brightest_dn / gain, _MOST_E)
     spread_e = math.hypot(math.sqrt(brightest_e), pixel.prnu * brightest_e, read_e)
     bottom = max(_most_cut(0.0, read_e, 0.0), _most_cut(-brightest_e, spread_e, 0.0))
     end_e = (pixel.full_scale_dn - pixel.offset_dn - 0.5 * rounds) / gain

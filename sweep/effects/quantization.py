@@ -28,8 +28,14 @@ def skip_is_exact(_: Setup) -> str | None:
 
 
 def rounded(dn: FloatArray, pixel: Pixel) -> FloatArray:
-    """Rounded half up, inside the ADC's range."""
-    return np.clip(np.floor(dn + 0.5), 0, pixel.full_scale_dn)
+    """The pedestal added to `dn`, rounded half up, inside the ADC's range.
+
+    The whole part of the pedestal is added after rounding, so that no digit of a float is lost to it: values with and
+    without a whole pedestal differ by exactly that.
+    """
+    whole = math.floor(pixel.offset_dn)
+    steps = np.floor(dn + (pixel.offset_dn - whole) + 0.5) + whole
+    return np.asarray(np.clip(steps, 0, pixel.full_scale_dn), dtype=float)
 
 
 def promise(setup: Setup, brightest_e: float) -> float:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ..arrays import FloatArray
 from ..sensor import Pixel
 from ..setup import Methods, Setup
+from .quantization import rounded
 
 METHODS = ("skip", "clip")
+JUST_ABOVE = 1 + 1e-12
+"""Bounds of a value that is rounded leave this room for the arithmetic of both."""
 
 
 def skip_is_exact(_: Setup) -> str | None:
@@ -40,6 +41,5 @@ def promise(setup: Setup, brightest_e: float, methods: Methods) -> float:
         return excess
     if setup.scenario.noise is not None:
         return excess + 1.0
-    ends = (top_e(pixel), brightest_e)
-    held, whole = (math.floor(end * pixel.dn_per_e + pixel.offset_dn + 0.5) for end in ends)
-    return float(min(whole, pixel.full_scale_dn) - min(held, pixel.full_scale_dn))
+    held, whole = rounded(np.array([top_e(pixel), brightest_e * JUST_ABOVE]) * pixel.dn_per_e, pixel)
+    return float(whole - held)
