@@ -14,8 +14,8 @@ LEVELS = [
     {"errors", "arrays", "completion"},
     {"schema"},
     {"kernels", "noise_kernels", "spectra", "mosaics", "pareto", "constraints", "objectives", "edges", "progress"},
-    {"metrics", "curve_files", "surrogate", "sensor", "chromaticity"},
-    {"datasets", "filters", "filter_files", "scenes", "families", "discrimination", "signals"},
+    {"metrics", "confusion_kernels", "curve_files", "surrogate", "sensor", "chromaticity"},
+    {"datasets", "filters", "filter_files", "scenes", "families", "discrimination", "confusion", "signals"},
     {"spaces", "setup"},
     {"blocks"},
     {"effects"},
@@ -42,7 +42,7 @@ ONLY_USER = {
     "jinja2": "report",
     "typer": "cli",
     "sklearn": "recognition",
-    "numba": "kernels noise_kernels",
+    "numba": "kernels noise_kernels confusion_kernels",
 }
 
 
