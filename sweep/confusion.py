@@ -89,6 +89,8 @@ def errors(
     Bhattacharyya coefficients, for the signal that errs most often.
     """
     n_designs, n_signals = electrons.shape[:2]
+    unknown = np.isnan(electrons).any(axis=(1, 2))
+    electrons = np.where(unknown[:, None, None], 0.0, np.minimum(electrons, 100 * pixel.well_e + 1e5))
     pairs = class_pairs(list(members))
     found = {pair: np.empty(n_designs) for pair in pairs}
     bounds = {pair: np.empty(n_designs) for pair in pairs}
@@ -112,4 +114,6 @@ def errors(
                 error = kernels.largest_error(overlap, one, other, *parts, rows, step)
                 found[pair][start + d] = min(error + FLOOR, 0.5)
             state[start + d] = min(sums.max() + FLOOR, 1.0)
+    for values in (*found.values(), *bounds.values(), state):
+        values[unknown] = np.nan
     return Errors(found, bounds, state)

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from .schema import NonNegative, Positive, Section
-from .sensor import Optics, Pixel
+from .sensor import Optics, Pixel, Prnu, ReadNoiseE
 
 DIAMETER_M = 0.2
 """Diameter of a usual traffic light, EN 12368."""
@@ -93,9 +93,9 @@ class Drive(Section):
 class Noise(Section):
     """Photon, read and dark noise and PRNU of the study's pixel; what is given here replaces the pixel's figure."""
 
-    read_noise_e: NonNegative | None = None
+    read_noise_e: ReadNoiseE | None = None
     dark_e_per_s: NonNegative | None = None
-    prnu: float | None = Field(default=None, ge=0, lt=1)
+    prnu: Prnu | None = None
 
     def of(self, pixel: Pixel) -> Pixel:
         """The pixel with this noise."""

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 from pydantic import Field, model_validator
 
 from .arrays import FloatArray
 from .schema import NonNegative, Positive, Section
+
+MOST_PRNU = 0.1
+"""Largest relative deviation of gains: a Gaussian gain is then positive within ten of them. Sensors have 0.01."""
+Prnu = Annotated[float, Field(ge=0, le=MOST_PRNU)]
+WellE = Annotated[float, Field(gt=0, le=1e8)]
+"""A hundred million electrons are more than any pixel holds."""
+ReadNoiseE = Annotated[float, Field(ge=0, le=1e6)]
 
 
 class Optics(Section):
@@ -26,19 +34,19 @@ class Pixel(Section):
 
     Defaults: 2.1 um pitch (AR0820), a full well of 10,000 e that maps to full scale. `gain_dn_per_e` null means
     full scale / full well. `offset_dn` is the pedestal. `crosstalk`: share of a pixel's light that comes through the
-    filters of its four neighbors. `prnu`: relative standard deviation of the pixels' gains.
+    filters of its four neighbors. `prnu`: relative standard deviation of the pixels' gains, at most 0.1.
     """
 
     pitch_um: Positive = 2.1
     fill_factor: float = Field(default=1.0, gt=0, le=1)
-    well_e: Positive = 10_000.0
+    well_e: WellE = 10_000.0
     bits: int = Field(default=12, ge=1, le=24)
     gain_dn_per_e: float | None = Field(default=None, gt=0)
     offset_dn: NonNegative = 0.0
     crosstalk: float = Field(default=0.0, ge=0, lt=1)
-    read_noise_e: NonNegative = 0.0
+    read_noise_e: ReadNoiseE = 0.0
     dark_e_per_s: NonNegative = 0.0
-    prnu: float = Field(default=0.0, ge=0, lt=1)
+    prnu: Prnu = 0.0
 
     @model_validator(mode="after")
     def _pedestal_in_range(self) -> Pixel:
