@@ -4,22 +4,32 @@ The channels of a mosaic are read from different pixels, so their noise is indep
 All functions take `mean` and `variance`, ndarray[n_designs, n_signals, n_channels] (DN, DN^2), and the signal indices
 `first`, `second` of the two types; they return ndarray[n_designs]. A channel without variance tells two signals
 apart for certain, unless their means there are the same; then it tells nothing.
+
+With a `NoiseShape`, errors are those of Gaussians in the channels whose noise is one, or Bennett's bound from all of
+them, whichever is less: to leave channels out is a rule, too; 1e-12 is the least. Without one, all noise is Gaussian.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from .arrays import FloatArray, IndexArray
+from .arrays import BoolArray, FloatArray, IndexArray
 from .metrics import Pair, pair_blocks
 
 CNR, D_PRIME, ERROR, ERROR_BOUND = "cnr_", "dprime_", "error_", "error_bound_"
 """How the names of a pair's noise metrics begin."""
 STATE_ERROR_BOUND = "state_error_bound"
 """Name of `state_error_bound`."""
+_LEAST_VARIANCE = 2e-9
+"""Variance, DN^2, that a channel may have although it counts as certain."""
+_LEFT_OUT = 1e-12
+"""A pixel of up to a thousand goes beyond its reach at most this often; Gaussian tails are trusted down to here."""
 
 
 def noise_names(pair: Pair) -> tuple[str, ...]:
@@ -59,8 +69,10 @@ def detectability(mean: FloatArray, variance: FloatArray, first: IndexArray, sec
     return found
 
 
-def pairwise_error(mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
-    """Probability that Gaussian noise moves one point over to the other, the largest over the pairs of the two types.
+def pairwise_error(
+    mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray, shape: NoiseShape | None = None
+) -> FloatArray:
+    """Probability that noise moves one point over to the other, the largest over the pairs of the two types.
 
     The pair is divided by a plane with normal S^-1 D, S the mean covariance, placed so that both points err equally
     often: Q(D' S^-1 D / (s_a + s_b)), with the standard deviation s of each along the normal (Fukunaga,
@@ -68,27 +80,76 @@ def pairwise_error(mean: FloatArray, variance: FloatArray, first: IndexArray, se
     """
     found = np.empty(len(mean))
     for block, difference, ours, theirs in _pairs(mean, variance, first, second):
+        seen = difference if shape is None else shape.seen(block, difference, first, second)
         total = ours + theirs
-        z = _ratio(difference, np.sqrt(total))
+        z = _ratio(seen, np.sqrt(total))
         shares = [np.divide(v, total, out=np.full_like(total, 0.5), where=total > 0) for v in (ours, theirs)]
         whole = _length(z)
         some = ~np.isinf(whole)
         z = np.where(some[..., None], z, 0.0)
         spread = _length(z * np.sqrt(shares[0])) + _length(z * np.sqrt(shares[1]))
-        apart = np.where(some, whole * _ratio(whole, spread), np.inf)
-        found[block] = ndtr(-apart.min(axis=1))
+        error = ndtr(-np.where(some, whole * _ratio(whole, spread), np.inf))
+        if shape is not None:
+            error = np.maximum(error, _LEFT_OUT)
+            error = np.minimum(error, shape.bound(block, difference, ours, theirs, first, second))
+        found[block] = error.max(axis=1)
     return found
 
 
-def error_bound(mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
-    """Bound on how often the most likely signal of two types is of the wrong one, for the signal that errs most often.
+@dataclass(frozen=True)
+class NoiseShape:
+    """Where noise is Gaussian, and how far any pixel moves a channel, DN; arrays of the shape of `mean`."""
+
+    gaussian: BoolArray
+    reach_dn: FloatArray
+
+    def seen(self, block: slice, difference: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
+        """Differences in the channels in which both points have Gaussian noise, 0 in the others."""
+        ours, theirs = _both(self.gaussian[block], first, second)
+        return np.where(ours & theirs, difference, 0.0)
+
+    def bound(
+        self,
+        block: slice,
+        difference: FloatArray,
+        ours: FloatArray,
+        theirs: FloatArray,
+        first: IndexArray,
+        second: IndexArray,
+    ) -> FloatArray:
+        """Bound of the error on either side of a plane, for independent pixels of any distribution.
+
+        Chernoff's bound exp((L_a(s) + L_b(-s)) / 2) for some s > 0, with the normal S^-1 D, and Bennett's inequality
+        (1962) for the logarithms L of the moment generating functions: v / m^2 (exp(s m) - 1 - s m) for a sum of
+        variance v whose terms are within m of their means.
+        """
+        if self.gaussian[block].all():
+            return np.array(np.inf)
+        reach = np.maximum(*_both(self.reach_dn[block], first, second))
+        total = np.maximum(ours + theirs, _LEAST_VARIANCE)
+        normal = difference / np.maximum(total, reach**2 / 50)  # a plane that suits terms as rare as Bennett allows
+        apart = (normal * difference).sum(axis=-1)
+        least = np.zeros(apart.shape)
+        for s in np.geomspace(1e-3, 10, 25):
+            x = s * normal * reach
+            with np.errstate(over="ignore"):
+                least = np.minimum(least, (total / reach**2 * (np.expm1(x) - x)).sum(axis=-1) - s * apart)
+        return np.asarray(np.minimum(np.exp(least / 2) + _LEFT_OUT, 0.5), dtype=float)
+
+
+def error_bound(
+    mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray, shape: NoiseShape | None = None
+) -> FloatArray:
+    """Bound on how often the best rule takes a signal of two types for one of the wrong type, for the worst signal.
 
     The sum over the signals of the other type of each pair's Bhattacharyya coefficient (Kailath, 1967), at most 1.
     """
-    return state_error_bound(mean, variance, {"first": first, "second": second})
+    return state_error_bound(mean, variance, {"first": first, "second": second}, shape)
 
 
-def state_error_bound(mean: FloatArray, variance: FloatArray, members: Mapping[str, IndexArray]) -> FloatArray:
+def state_error_bound(
+    mean: FloatArray, variance: FloatArray, members: Mapping[str, IndexArray], noise: NoiseShape | None = None
+) -> FloatArray:
     """`error_bound` over all types of `members` (type -> signal indices): how often the state is told wrong at most."""
     sums = np.zeros(mean.shape[:2])
     types = list(members.values())
@@ -96,7 +157,15 @@ def state_error_bound(mean: FloatArray, variance: FloatArray, members: Mapping[s
         for second in types[at + 1 :]:
             for block, difference, ours, theirs in _pairs(mean, variance, first, second):
                 shape = (len(difference), len(first), len(second))
-                overlap = np.exp(-_distance(difference, ours, theirs)).reshape(shape)
+                if noise is None:
+                    overlap = np.exp(-_distance(difference, ours, theirs))
+                else:
+                    seen = noise.seen(block, difference, first, second)
+                    alike = np.broadcast_to(ours, seen.shape)
+                    gaussian = np.exp(-_distance(seen, alike, np.where(seen > 0, theirs, alike))) + _LEFT_OUT
+                    sides = noise.bound(block, difference, ours, theirs, first, second)
+                    overlap = np.minimum(gaussian, np.where(sides < 0.5, sides, 1.0))
+                overlap = overlap.reshape(shape)
                 sums[block, first] += overlap.sum(axis=2)
                 sums[block, second] += overlap.sum(axis=1)
     used = np.concatenate(types)
@@ -136,3 +205,8 @@ def _pairs(
     for block, one, other in pair_blocks(mean.shape, first, second):
         ours, theirs = variance[block][:, one], variance[block][:, other]
         yield block, np.abs(mean[block][:, one] - mean[block][:, other]), ours, theirs
+
+
+def _both(values: NDArray[Any], first: IndexArray, second: IndexArray) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Of both points of every pair; `values`: ndarray[n_designs, n_signals, n_channels]."""
+    return np.repeat(values[:, first], len(second), axis=1), np.tile(values[:, second], (1, len(first), 1))

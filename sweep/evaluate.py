@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from . import confusion
 from .arrays import FloatArray, IndexArray
 from .blocks import Block, Curves
 from .datasets.lights import Lights
 from .discrimination import (
     STATE_ERROR_BOUND,
+    NoiseShape,
     contrast_to_noise,
     detectability,
     error_bound,
@@ -21,7 +23,7 @@ from .discrimination import (
     state_error_bound,
 )
 from .effects.phase import Cases
-from .imaging import Changing, Imager, smooth_imager
+from .imaging import Changing, Imager, NoisyReadout, smooth_imager
 from .metrics import CSD, Pair, cfa_sensitivity, class_pairs, csd_name, separation, separations, separations_along
 from .places import Extremes
 from .setup import Setup
@@ -120,27 +122,44 @@ def sensitivities_gradient(setup: Setup, curves_gradient: FloatArray) -> dict[st
     }
 
 
-def _told_apart(mean: FloatArray, variance: FloatArray, members: Mapping[str, IndexArray]) -> dict[str, FloatArray]:
-    """The columns of `noise_quantities`, the worst over the cases; `mean`, `variance` as of `read_with_noise`."""
-    cases = [(mean[:, case], variance[:, case]) for case in range(mean.shape[1])]
+def _told_apart(
+    imager: Imager, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
+) -> dict[str, FloatArray]:
+    """The columns of `noise_quantities`, the worst over the cases; `read`: of these curves.
+
+    Errors of a few pixels are exact sums over their digital numbers, those of many are Gaussian or bounds.
+    """
+    cases = [(read.mean[:, case], read.variance[:, case]) for case in range(read.mean.shape[1])]
+    shapes = [NoiseShape(read.gaussian[:, case], read.reach_dn[:, case]) for case in range(len(cases))]
 
     def over(quantity: Callable[..., FloatArray], worst: Callable[..., FloatArray], *of: Any) -> FloatArray:
         return worst([quantity(*case, *of) for case in cases], axis=0)
 
+    def errors_over(quantity: Callable[..., FloatArray], *of: Any) -> FloatArray:
+        shaped = zip(cases, shapes, strict=True)
+        return np.asarray(np.max([quantity(*case, *of, shape) for case, shape in shaped], axis=0), dtype=float)
+
+    few = imager.few_pixels
     found: dict[str, FloatArray] = {}
-    errors = []
+    if few is None:
+        error = {}
+        bound = {}
+        for pair in class_pairs(list(members)):
+            both = members[pair[0]], members[pair[1]]
+            error[pair], bound[pair] = errors_over(pairwise_error, *both), errors_over(error_bound, *both)
+        state_bound = errors_over(state_error_bound, members)
+    else:
+        electrons = imager.pixel_electrons(curves)
+        exact = [confusion.errors(electrons[:, case], few, imager.pixel, members) for case in range(len(cases))]
+        error = {pair: np.max([each.error[pair] for each in exact], axis=0) for pair in exact[0].error}
+        bound = {pair: np.max([each.bound[pair] for each in exact], axis=0) for pair in exact[0].bound}
+        state_bound = np.max([each.state_bound for each in exact], axis=0)
     for pair in class_pairs(list(members)):
         both = members[pair[0]], members[pair[1]]
-        errors.append(over(pairwise_error, np.max, *both))
-        values = (
-            over(contrast_to_noise, np.min, *both),
-            over(detectability, np.min, *both),
-            errors[-1],
-            over(error_bound, np.max, *both),
-        )
-        found |= dict(zip(noise_names(pair), values, strict=True))
-    found[STATE_ERROR] = np.max(errors, axis=0)
-    found[STATE_ERROR_BOUND] = over(state_error_bound, np.max, members)
+        floor = over(contrast_to_noise, np.min, *both), over(detectability, np.min, *both)
+        found |= dict(zip(noise_names(pair), (*floor, error[pair], bound[pair]), strict=True))
+    found[STATE_ERROR] = np.max(list(error.values()), axis=0)
+    found[STATE_ERROR_BOUND] = state_bound
     return found
 
 
@@ -230,8 +249,10 @@ def _distances(imager: Imager, block: Block, states: Sequence[str] = ()) -> Colu
     """CSDs and exposure of any designs; with `states`, `noise_quantities`, too."""
     apart: Columns = {}
     if states:
-        response, variance, exposure_s = imager.read_with_noise(block.curves())
-        apart = _told_apart(response, variance, {name: imager.setup.members[name] for name in states})
+        curves = block.curves()
+        read = imager.read_with_noise(curves)
+        response, exposure_s = read.mean, read.exposure_s
+        apart = _told_apart(imager, curves, read, {name: imager.setup.members[name] for name in states})
     else:
         response, exposure_s = imager.read(block.curves())
     cases = [separations(response[:, case], imager.setup.members) for case in range(response.shape[1])]

@@ -140,8 +140,7 @@ def _draws(study: Study, scenario: str) -> Iterator[Setting]:
     setup, curves = _one(study, scenario)
     imager = Imager(replace(setup, methods=REFERENCE))
     started = time.perf_counter()
-    mean, _, _ = imager.read_with_noise(curves)
-    exact = _distances(mean[:, :1], setup.members)
+    exact = _distances(imager.read_with_noise(curves).mean[:, :1], setup.members)
     closed_s = time.perf_counter() - started
     electrons = imager.pixel_electrons(curves)[0, 0]
     for draws in _DRAWS:

@@ -91,9 +91,10 @@ class _MostLikely:
     """The most likely of `signals` for drawn patches of one design."""
 
     def __init__(self, imager: Imager, curves: FloatArray, signals: IndexArray) -> None:
-        mean, variance, _ = imager.read_with_noise(curves)
+        read = imager.read_with_noise(curves)
         self._imager = imager
-        self._mean, self._variance = mean[0][:, signals], np.maximum(variance[0][:, signals], _LEAST_VARIANCE)
+        self._mean = read.mean[0][:, signals]
+        self._variance = np.maximum(read.variance[0][:, signals], _LEAST_VARIANCE)
 
     def of(self, drawn: FloatArray, place: IndexArray) -> IndexArray:
         """Its index for each patch, ndarray[n_patches, n_signals]; `drawn` has an axis more, of the pixels."""

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from .schema import Meters, Ratio, Seconds, Section, Share
-from .sensor import DarkCurrent, Optics, Pixel, ReadNoise
+from .sensor import DarkCurrent, Optics, Pixel, Prnu, ReadNoise
 
 DIAMETER_M = 0.2
 """Diameter of a usual traffic light, EN 12368."""
@@ -100,7 +100,7 @@ class Noise(Section):
 
     read_noise_e: ReadNoise | None = None
     dark_e_per_s: DarkCurrent | None = None
-    prnu: float | None = Field(default=None, ge=0, lt=1)
+    prnu: Prnu | None = None
 
     def of(self, pixel: Pixel) -> Pixel:
         """The pixel with this noise."""

@@ -25,13 +25,13 @@ LEVELS = [
         "mat_files",
         "noise_kernels",
     },
-    {"metrics", "curve_files", "surrogate", "sensor", "chromaticity"},
+    {"metrics", "confusion_kernels", "curve_files", "surrogate", "sensor", "chromaticity"},
     {"datasets", "filters", "filter_files", "scenes", "families", "discrimination", "signals"},
     {"spaces", "setup"},
     {"blocks"},
     {"effects"},
     {"promises", "places"},
-    {"plan", "imaging"},
+    {"plan", "imaging", "confusion"},
     {"evaluate", "recognition"},
     {"store", "problem", "figures"},
     {"series", "journal", "describing", "run_files"},
@@ -56,7 +56,7 @@ ONLY_USER = {
     "jinja2": "report",
     "typer": "cli endings",
     "sklearn": "recognition",
-    "numba": "kernels noise_kernels",
+    "numba": "kernels noise_kernels confusion_kernels",
 }
 
 

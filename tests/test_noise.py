@@ -41,7 +41,8 @@ NOISY = (
 @pytest.mark.parametrize("made", NOISY, ids=lambda made: made.name)
 def test_mean_and_variance_of_the_readout_agree_with_draws_of_every_pixel(made: Scene) -> None:
     imager = Imager(made.setup)
-    mean, variance, _ = imager.read_with_noise(made.curves)
+    read = imager.read_with_noise(made.curves)
+    mean, variance = read.mean, read.variance
     np.testing.assert_array_equal(mean, Imager(made.setup).read(made.curves)[0])
     electrons = imager.pixel_electrons(made.curves)[0]
     per_place = len(electrons) // imager.n_cases
@@ -104,7 +105,8 @@ def test_more_noise_is_never_better() -> None:
 def test_readouts_that_are_certain_and_the_same_tell_nothing(pixel: dict[str, float]) -> None:
     made = scene("patch", "RGGB", {"noise": {"read_noise_e": 3}}, pixel)
     imager = Imager(replace(made.setup, pixel=made.setup.pixel.model_copy(update={"read_noise_e": 3.0})))
-    mean, variance, _ = imager.read_with_noise(made.curves)
+    read = imager.read_with_noise(made.curves)
+    mean, variance = read.mean, read.variance
     certain = variance == 0
     assert certain.any()
     assert (mean[certain] == np.rint(mean[certain])).all()

@@ -13,7 +13,7 @@ from ..noise_kernels import rounded_gaussian
 TAILS = 9.0
 """Beyond so many standard deviations everything is taken to be at the end."""
 SMOOTH_DN = 1.5
-"""From here on noise hides the steps of rounding: the first term of their series, exp(-2 (pi 1.5)^2), is below 1e-19."""
+"""From here on noise hides the steps of rounding: their series begins with exp(-2 (pi 1.5)^2) < 1e-19."""
 _SERIES_DN = 0.5
 _TERMS = 6
 _EULER_DN = 4.0

@@ -11,6 +11,7 @@ from ..arrays import FloatArray
 from ..sensor import Pixel
 from . import readout
 
+_CUT = 1e-5
 _DENSE = 1 / 64
 """Distance of the nodes where gains differ, in standard deviations of the electrons times two."""
 
@@ -28,6 +29,17 @@ def rounded(electrons: FloatArray, pixel: Pixel) -> FloatArray:
 def variance(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     """Variance of the digital number, DN^2."""
     return np.maximum(_looked_up(electrons, pixel, readout.VARIANCE), 0.0)
+
+
+@lru_cache(maxsize=64)
+def unclipped_e(pixel: Pixel) -> tuple[float, float]:
+    """From and up to how many electrons neither end takes more from the mean than 1e-5 of the noise."""
+    table = _tables(pixel)[readout.UNROUNDED]
+    electrons = (np.sinh(pixel.prnu * table.x) / pixel.prnu if pixel.prnu else table.x) ** 2
+    sigma = pixel.dn_per_e * np.sqrt(electrons + (pixel.prnu * electrons) ** 2 + pixel.read_noise_e**2)
+    inside = np.abs(table(table.x) - pixel.dn_per_e * electrons - pixel.offset_dn) <= _CUT * sigma + 1e-9
+    kept = electrons[inside]
+    return (float(kept[0]), float(kept[-1])) if kept.size else (1.0, 0.0)
 
 
 def _looked_up(electrons: FloatArray, pixel: Pixel, row: int) -> FloatArray:

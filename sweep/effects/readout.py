@@ -1,4 +1,4 @@
-"""Mean and variance of a pixel's digital number: Poisson electrons, full well, read noise, pedestal, ADC range, rounding.
+"""Mean and variance of a pixel's digital number: Poisson electrons, full well, read noise, pedestal, ADC, rounding.
 
 Exact sums over the numbers of electrons wherever something bends or steps: near the dark, the full well and the ends of
 the ADC, and below 2^20 electrons wherever read noise does not hide the steps of rounding. Elsewhere the readout is
