@@ -212,7 +212,7 @@ def evaluate(imager: Imager, designs: FloatArray | Block, states: Sequence[str] 
     best: dict[str, FloatArray] = {}
     for pair in class_pairs(list(imager.setup.members)):
         # A case is a place and a moment of the pulses.
-        over = np.stack([case[pair] for case in cases]).reshape(imager.n_cases, -1, len(block)).min(axis=1)
+        over = np.stack([case[pair] for case in cases]).reshape(imager.n_places, -1, len(block)).min(axis=1)
         columns[csd_name(pair)] = over.min(axis=0)
         best[BEST_PLACE + csd_name(pair)] = over.max(axis=0)
     if imager.anywhere is not None:
