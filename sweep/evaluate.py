@@ -267,6 +267,6 @@ def _distance_names(imager: Imager) -> list[str]:
 def _over(imager: Imager, cases: Sequence[Mapping[Pair, FloatArray]]) -> Columns:
     """Each pair's smallest CSD over all cases, and the largest over the places of the smallest over the moments."""
     over = {csd_name(pair): np.stack([case[pair] for case in cases]) for pair in cases[0]}
-    moments = {name: values.reshape(imager.n_cases, -1, values.shape[-1]).min(axis=1) for name, values in over.items()}
+    moments = {name: values.reshape(imager.n_places, -1, values.shape[-1]).min(axis=1) for name, values in over.items()}
     least = {name: values.min(axis=0) for name, values in moments.items()}
     return least | {BEST_PLACE + name: values.max(axis=0) for name, values in moments.items()}

@@ -20,7 +20,8 @@ from .arrays import BoolArray, FloatArray, IndexArray, row_products
 from .blocks import Block
 from .cache import Cache
 from .effects import flicker, noise_table, phase, quadrature, quantization, saturation
-from .effects.kernel import make_kernel
+from .effects.kernel import blocks, make_kernel
+from .errors import Fault, SweepError
 from .places import AnyPlace
 from .scenes import WhitePatchExposure
 from .sensor import Pixel, unquantized
@@ -90,9 +91,14 @@ class Imager:
         self.work: Counter[str] = Counter() if work is None else work
         methods, grid = setup.methods, setup.grid
         self.straight = methods.saturation == "skip" and methods.quantization == "skip"
-        by_pixel = not self.straight
+        by_pixel, targeted = not self.straight, setup.scenario.target is not None
+        every = blocks(setup, phase.cases(setup, methods.phase) if cases is None else cases) if targeted else []
+        # Where the kernels of all places would be too large to hold, those of the others are made as they are read.
+        self._others = every[1:] if by_pixel and methods.sampling != "skip" else []
+        cases = every[0] if self._others else cases
         kernel = make_kernel(setup, methods, grid.nodes_nm, by_pixel=by_pixel, work=self.work, cases=cases)
         self.n_cases, self.n_units = kernel.light.shape[:2]
+        self.n_places = self.n_cases + sum(len(block.places_px) for block in self._others)
         self._readout, self._light, self._uniform = kernel.readout, kernel.light, kernel.uniform
         self._spread = kernel.spread
         self._nodes = quadrature.nodes(grid.size, methods.quadrature)
@@ -304,7 +310,12 @@ class Imager:
     def read(self, curves: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The readout, DN, ndarray[n_designs, n_cases, n_signals, n_channels], and exposure, s, ndarray[n_designs]."""
         exposure_s = self.exposure_s(curves)
-        return np.concatenate([self._folded(self.transfer(e)) for e in self._blocks(curves, exposure_s)]), exposure_s
+        own = np.concatenate([self._folded(self.transfer(e)) for e in self._blocks(curves, exposure_s)])
+        return np.concatenate([own, *(other.read(curves)[0] for other in self._rest())], axis=1), exposure_s
+
+    def _rest(self) -> Iterator[Imager]:
+        """The places whose kernels are not held, block by block."""
+        return (Imager(self.setup, self.work, cases=block) for block in self._others)
 
     def read_with_noise(self, curves: FloatArray) -> NoisyReadout:
         """The readout as from `read`, with its variance and what errors need to know of it.
@@ -321,7 +332,11 @@ class Imager:
             dn, variance_dn = np.where(certain, np.rint(dn), dn), np.where(certain, 0.0, variance_dn)
             mean, variance = self._folded(dn), self._weighed(variance_dn, self._spread)
             parts.append((mean, variance, *self._shape_of_noise(electrons, variance)))
-        mean, variance, gaussian, reach = (np.concatenate(values) for values in zip(*parts, strict=True))
+        found = [tuple(np.concatenate(values) for values in zip(*parts, strict=True))]
+        for other in self._rest():
+            more = other.read_with_noise(curves)
+            found.append((more.mean, more.variance, more.gaussian, more.reach_dn))
+        mean, variance, gaussian, reach = (np.concatenate(values, axis=1) for values in zip(*found, strict=True))
         return NoisyReadout(mean, variance, gaussian, reach, exposure_s)
 
     def _shape_of_noise(self, electrons: FloatArray, variance: FloatArray) -> tuple[BoolArray, FloatArray]:
@@ -349,8 +364,12 @@ class Imager:
     def pixel_electrons(self, curves: FloatArray) -> FloatArray:
         """Expected electrons of the pixels that are read, ndarray[n_designs, n_cases, n_signals, n_pixels].
 
-        Of a light that fills the field, the pixels of one tile, row by row.
+        Of a light that fills the field, the pixels of one tile, row by row. Raises SweepError where the pixels of all
+        places do not fit into memory.
         """
+        if self._others:
+            most = f"at most those of {self.n_cases} places: a smaller light, or a named place"
+            raise SweepError(Fault("too many pixels to draw", value=f"{self.n_places} places", allowed=most))
         exposure_s = self.exposure_s(curves)
         found = self.electrons(curves, self.scales(exposure_s), exposure_s)
         if self.setup.scenario.target is None and self.n_units == len(self.setup.mosaic.channels):

@@ -19,7 +19,6 @@ from .effects.kernel import make_kernel
 from .metrics import Pair, class_pairs
 from .setup import Setup
 
-_BANDS = 12
 _UNIT_PX = 2.0**-40
 """Places are told apart in this unit."""
 _MOST_CELLS = 400_000
@@ -58,7 +57,7 @@ class AnyPlace:
         self._work = work
         self._knots_nm = wave if setup.methods.blur == "skip" else blur.knots(wave, setup.methods.blur)
         self._hats = np.stack([np.interp(wave, self._knots_nm, unit) for unit in np.eye(self._knots_nm.size)])
-        self._between = Between(self._setup, self._setup.methods, self._knots_nm, _BANDS)
+        self._between = Between(self._setup, self._setup.methods, self._knots_nm)
         falls = illumination.factor(setup, setup.methods.illumination)
         self._dimmed = falls * extinction.transmittance(setup, setup.methods.extinction, wave)
         self._kernels: dict[tuple[int, ...], FloatArray] = {}
@@ -77,6 +76,11 @@ class AnyPlace:
     def whole(self) -> phase.Cells:
         """The cells to begin with."""
         return phase.whole(self._setup.mosaic)
+
+    @property
+    def values_per_cell(self) -> int:
+        """Values of the kernels at a cell's corners."""
+        return len(phase.CORNERS) * len(self._setup.mosaic.channels) ** 2 * self._knots_nm.size
 
     def at_knots(self, light: FloatArray) -> FloatArray:
         """Light on the wavelengths of the kernel, ndarray[..., n_wavelengths] -> ndarray[..., n_knots or 1]."""
@@ -142,7 +146,7 @@ class _Search:
         least, most = (np.inf, nowhere), (-np.inf, nowhere)
         while counted < _MOST_CELLS:
             counted += len(cells.centers)
-            step = max(1, _AT_ONCE // (len(pairs) * 16))
+            step = max(1, _AT_ONCE // max(16 * len(pairs), self._scene.values_per_cell))
             blocks = [cells.some(slice(at, at + step)) for at in range(0, len(cells.centers), step)]
             parts = [self._bounds(block, pairs) for block in blocks]
             low, high, corners = (np.concatenate(part) for part in zip(*parts, strict=True))

@@ -35,7 +35,12 @@ class Choice:
 
 @dataclass(frozen=True)
 class Plan:
-    """How one scene is simulated; `work` estimates the operations for all designs, `reference_work` everything on."""
+    """How one scene is simulated; `work` estimates the operations for all designs, `reference_work` everything on.
+
+    Everything on is a mathematical limit. What no method reaches (the last of all places of a light, and how a readout
+    in whole numbers moves the worst of them) is part of every promise, so that `promised_dn` may be above
+    `tolerance_dn`: then it is the smallest that can be promised.
+    """
 
     scenario: str
     tolerance_dn: float
@@ -53,6 +58,11 @@ class Plan:
     def promised_dn(self) -> float:
         """No CSD differs by more from the reference."""
         return sum(choice.promised_dn for choice in self.choices)
+
+    @property
+    def kept(self) -> bool:
+        """Whether the tolerance is kept."""
+        return self.promised_dn <= self.tolerance_dn
 
     @cached_property
     def key(self) -> str:
@@ -93,9 +103,16 @@ class Planner:
         return max((scene.promise(effect, before, after) for scene in self._scenes), default=0.0)
 
     def plan(self, scenario: str, tolerance_dn: float) -> Plan:
-        """The cheapest plan whose promises sum to at most `tolerance_dn`; of equally cheap ones, what skips more."""
+        """The cheapest plan whose promises sum to at most `tolerance_dn`; of equally cheap ones, what skips more.
+
+        Where no plan does, the one that promises least.
+        """
         tried: dict[tuple[str, str], float] = {}
-        methods, promises = self._cheapest(tolerance_dn, tried)
+        found = self._cheapest(tolerance_dn, tried)
+        if found is None:
+            found = self._cheapest(self._least(tolerance_dn), tried)
+        assert found is not None
+        methods, promises = found
         choices = tuple(
             Choice(e, method, promises.get(e, 0.0), self._reason(e, method, promises.get(e, 0.0), tried))
             for e, method in asdict(methods).items()
@@ -106,9 +123,29 @@ class Planner:
     def _work(self, methods: Methods) -> float:
         return sum(scene.work_of(methods) for scene in self._scenes)
 
-    def _cheapest(self, tolerance_dn: float, tried: dict[tuple[str, str], float]) -> tuple[Methods, dict[str, float]]:
+    @property
+    def _start(self) -> Methods:
+        """Everything on but what changes nothing."""
+        return replace(REFERENCE, **{e: EFFECTS[e].METHODS[0] for e in EFFECTS if self._exact[e] is not None})
+
+    def _least(self, tolerance_dn: float) -> float:
+        """A promise that some plan keeps: with the readout as it is, or with the first effects of it left out."""
+        methods, promised, found = self._start, 0.0, []
+        for effect in ("", *READOUT):
+            if effect:
+                after = replace(methods, **{effect: "skip"})
+                if not self._allowed(effect, after):
+                    break
+                promised += self.promise(effect, methods, after)
+                methods = after
+            found.append(promised + self.promise("phase", methods, methods))
+        return max(tolerance_dn, min(found) * (1 + 1e-12))
+
+    def _cheapest(
+        self, tolerance_dn: float, tried: dict[tuple[str, str], float]
+    ) -> tuple[Methods, dict[str, float]] | None:
         """Branch and bound over the effects, cheapest methods first; `tried` takes each method's smallest promise."""
-        start = replace(REFERENCE, **{e: EFFECTS[e].METHODS[0] for e in EFFECTS if self._exact[e] is not None})
+        start = self._start
         active = [e for e in EFFECTS if self._exact[e] is None]
         best: list[tuple[float, Methods, dict[str, float]]] = []
 
@@ -129,12 +166,13 @@ class Planner:
                 tried[effect, method] = min(promised, tried.get((effect, method), promised))
                 # Behind a rounded readout, an error however small may move a value by a whole step.
                 rounded = after.quantization == "round" and not self._noisy
-                if sum(promises.values()) + promised <= (0.0 if rounded and effect not in READOUT else tolerance_dn):
+                exactly = rounded and effect not in (*READOUT, "phase")
+                allowed = promises.get("phase", 0.0) if exactly else tolerance_dn
+                if sum(promises.values()) + promised <= allowed:
                     deeper(at + 1, after, promises | {effect: promised})
 
         deeper(0, start, {})
-        _, methods, promises = best[0]  # there is one: the reference promises 0
-        return methods, promises
+        return best[0][1:] if best else None
 
     @property
     def _noisy(self) -> bool:

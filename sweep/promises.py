@@ -11,6 +11,7 @@ import hashlib
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cached_property
 from types import ModuleType
 
 import numpy as np
@@ -31,7 +32,8 @@ from .effects import (
     sampling,
     saturation,
 )
-from .effects.bounds import Amounts, Box, Reach
+from .effects.between import Between, Deviation
+from .effects.bounds import CORNERS, Amounts, Box, Reach, Spread
 from .effects.kernel import make_kernel
 from .setup import REFERENCE, Methods
 
@@ -66,11 +68,16 @@ class Promises:
         self.spectrum = extinction.transmittance(self.setup, "spectral", self.setup.grid.nodes_nm)
         self._kernels: dict[Methods, FloatArray] = {}
         self._amounts: dict[bytes, Amounts] = {}
+        self._deviations: dict[Methods, Deviation] = {}
         self._gaps: dict[tuple[str, float], float] = {}
         self._promises: dict[tuple[str, Methods, Methods], float] = {}
 
     def promise(self, effect: str, before: Methods, after: Methods) -> float:
         """What switching `effect` from its reference changes in any CSD, DN."""
+        if effect == "phase" and self._anywhere(after):
+            return float(phase.within_dn(after.phase) or 0.0) + 2 * self._as_read(after)
+        if effect == "phase" and not self._anywhere(before):
+            return 0.0
         if getattr(before, effect) == getattr(after, effect):
             return 0.0
         if effect in READOUT:
@@ -99,20 +106,90 @@ class Promises:
             each = [pedestal.promise(self.setup, top, after) for top in tops]
         return float(np.linalg.norm(each))
 
-    def _kernel(self, methods: Methods) -> FloatArray:
-        """The kernel at the knots at the reference's places, without extinction: [cases, channels, channels, knots]."""
+    def _anywhere(self, methods: Methods) -> bool:
+        """Whether the light may fall anywhere, and more than a lattice of places is looked at."""
+        return phase.all_count(replace(self.setup, methods=methods))
+
+    def _as_read(self, methods: Methods) -> float:
+        """By how much a distance of the readout may differ from that of a straight one at the same place, DN.
+
+        The extremes over all places are looked for in the straight response, and read out where they are. Its smallest
+        distance is off by this much, and so is the readout there.
+        """
+        promised = 0.0
+        for effect in READOUT:
+            after = replace(methods, **{effect: "skip"})
+            if after != methods:
+                promised += self._readout_promise(effect, after)
+                methods = after
+        return promised
+
+    @cached_property
+    def _cells(self) -> phase.Cells:
+        """Cells of places; their corners stand for all places, with what may lie between them."""
+        return phase.whole(self.setup.mosaic)
+
+    def _wanted(self, methods: Methods) -> Methods:
+        """What the kernel depends on, with no extinction."""
         on = "skip" if methods.blur == "skip" else REFERENCE.blur
         wanted = replace(methods, extinction="skip", illumination="skip", blur=on)
         wanted = replace(wanted, **{e: getattr(REFERENCE, e) for e in (*READOUT, "quadrature", "flicker")})
+        return replace(wanted, phase=REFERENCE.phase) if self._anywhere(wanted) else wanted
+
+    def _kernel(self, methods: Methods) -> FloatArray:
+        """The kernel at the knots, without extinction: [cases, channels, channels, knots].
+
+        The cases are the places of the lattice, or the corners of all cells where the light may fall anywhere.
+        """
+        wanted, nodes = self._wanted(methods), self.reach.knots_nm
         if wanted not in self._kernels:
-            light = make_kernel(self.setup, wanted, self.reach.knots_nm, by_pixel=False, work=Counter()).light
-            places = phase.places_px(self.setup, REFERENCE.phase)
-            at = np.zeros(len(places), dtype=np.intp)
-            if len(light) > 1:
-                at = phase.nearest(self.setup, places, phase.places_px(self.setup, wanted.phase))
-            full = np.broadcast_to(light, (*light.shape[:3], self.reach.knots_nm.size))
-            self._kernels[wanted] = np.ascontiguousarray(full[at])
+            cases = self._cells.corners if self._anywhere(wanted) else None
+            light = make_kernel(self.setup, wanted, nodes, by_pixel=False, work=Counter(), cases=cases).light
+            self._kernels[wanted] = np.ascontiguousarray(np.broadcast_to(light, (*light.shape[:3], nodes.size)))
         return self._kernels[wanted]
+
+    def _nearest(self, methods: Methods) -> FloatArray:
+        """The kernel at the place of a lattice that is nearest to the center of each cell, for each of its corners."""
+        lattice = phase.places_px(self.setup, methods.phase)
+        at = phase.nearest(self.setup, self._cells.centers, lattice)
+        return self._kernel(methods)[np.repeat(at, CORNERS)]
+
+    def _deviation(self, methods: Methods) -> Deviation:
+        """How far the kernel in cells may be from a mean of that at the corners: [cells, channels, channels, 1]."""
+        wanted = self._wanted(methods)
+        if wanted not in self._deviations:
+            kernel, cells = self._kernel(wanted), self._cells
+            corners = kernel.reshape(-1, CORNERS, *kernel.shape[1:])
+            between = Between(self.setup, wanted, self.reach.knots_nm)
+            found = between.of_cells(cells.centers, cells.half, cells.homes, corners)
+            # At any wavelength: that of the middle one, and what differs from it.
+            largest = found.kernel[..., :1] + found.kernel[..., 1:].max(axis=3, initial=0.0, keepdims=True)
+            self._deviations[wanted] = Deviation(largest, found.tilt)
+        return self._deviations[wanted]
+
+    def _spread(
+        self, effect: str, before: Methods, after: Methods, change: FloatArray, left: FloatArray, scale: float
+    ) -> Spread | None:
+        """What lies between the corners of the cells, of a change of the kernel and what is left; None for a lattice.
+
+        `scale`: of a change that is this share of the kernel.
+        """
+        if not self._anywhere(before):
+            return None
+        here = self._deviation(before)
+        nothing = Deviation(np.zeros_like(here.kernel), here.tilt)
+        there = self._deviation(after) if self._anywhere(after) else nothing
+        sizes = here.kernel * scale
+        if effect in ("demosaic", "crosstalk", "blur"):
+            sizes = (here.kernel + there.kernel) * bool(change.any())
+        by_cell = (-1, CORNERS, *change.shape[1:])
+        changes, lefts = change.reshape(by_cell), left.reshape(by_cell)
+        tilt, found = here.tilt[:, :, None], []
+        for values, size in ((changes, sizes), (lefts, there.kernel)):
+            tilted = tilt * (values.max(axis=1) - values.min(axis=1)).max(axis=3) / 2
+            found.append(np.repeat(size[..., 0] + tilted, CORNERS, axis=0))
+        wide = np.broadcast_to(np.ptp(lefts, axis=1)[:, None], lefts.shape).reshape(change.shape)
+        return Spread(found[0], found[1], wide)
 
     def _gap(self, methods: Methods, method: str) -> float:
         """How far a kernel may be from its interpolation between the wavelengths of a method of blur."""
@@ -146,9 +223,11 @@ class Promises:
     def _linear_promise(self, effect: str, before: Methods, after: Methods) -> float:
         box, setup, reach = self.box, self.setup, self.reach
         straight = after.saturation == "skip" and after.quantization == "skip"
+        scale = 1.0
         falls = illumination.factor(setup, after.illumination if effect != "illumination" else before.illumination)
         base = changed = self._sums(self.spectrum * falls, box.low, box.high)
-        now, then = self._kernel(before), self._kernel(after)
+        now = self._kernel(before)
+        then = self._nearest(after) if effect == "phase" else self._kernel(after)
         left, remainder = then, self._between_knots(before)
         if effect == "quadrature":
             kept = quadrature.nodes(setup.grid.size, after.quadrature)
@@ -156,14 +235,15 @@ class Promises:
             changed, change = self._sums(self.spectrum * falls, middle - half, middle + half), now
         elif effect == "illumination":
             lost = 1 - illumination.factor(setup, after.illumination) / falls
-            change, remainder = now * lost, remainder * abs(lost)
+            scale = abs(lost)
+            change, remainder = now * lost, remainder * scale
         elif effect == "extinction":
             other = extinction.transmittance(setup, after.extinction, setup.grid.nodes_nm)
             changed = self._sums((self.spectrum - other) * falls, box.low, box.high)
             base, change = self._sums(other * falls, box.low, box.high), now
         elif effect == "flicker":
-            share = self._flicker_share(after.flicker, straight=straight)
-            change, remainder = now * share, remainder * share
+            scale = self._flicker_share(after.flicker, straight=straight)
+            change, remainder = now * scale, remainder * scale
         else:
             change = now - then
             if effect != "blur":  # what is interpolated in both kernels; nothing where they are the same
@@ -172,7 +252,13 @@ class Promises:
                 remainder = self._gap(after, after.blur)
         if remainder == 0 and not change.any():
             return 0.0
-        found = reach.largest_change(changed, change, remainder, base, left, straight=straight)
+        left = np.broadcast_to(left, change.shape)
+        between = self._spread(effect, before, after, change, left, scale)
+        # What places change is bounded for a straight readout, and for what it differs from that.
+        straight = straight or effect == "phase"
+        found = reach.largest_change(changed, change, remainder, base, left, straight=straight, between=between)
+        if effect == "phase":
+            return found + 2 * self._as_read(after)
         steep = (
             quantization.steepness(setup) if after.quantization == "round" and setup.scenario.noise is not None else 1.0
         )
@@ -194,7 +280,7 @@ class Promises:
         straight = methods.saturation == "skip" and methods.quantization == "skip"
         cases, pixels, kernel = 1.0, float(channels), 0.0
         if target is not None and methods.sampling != "skip":
-            cases = float(len(phase.places_px(setup, methods.phase)))
+            cases = float(phase.n_places(setup, methods.phase))
             across = 2 * sampling.radii_px(setup, target)[1] + 1
             places = max(across, 2.0 * max(setup.mosaic.indices.shape)) ** 2
             pixels = channels if straight else places

@@ -159,7 +159,7 @@ def test_readouts_weigh_each_channel_to_one(name: str, method: str) -> None:
     places = np.random.default_rng(1).uniform(0, 4, (5, 2))
     seen = sampling.window(mosaic, places, 5.0)
     for weights in (
-        demosaic.center_weights(seen, method, mosaic.indices.shape, n),
+        demosaic.center_weights(seen, np.rint(places) - places, method, mosaic),
         sampling.mean_weights(seen, 0.5, 3.0, n),
     ):
         assert (weights >= 0).all()
@@ -169,7 +169,7 @@ def test_readouts_weigh_each_channel_to_one(name: str, method: str) -> None:
 
 def test_demosaicking_a_bayer_tile_is_bilinear() -> None:
     seen = sampling.window(TILES["RGGB"], np.array([[0.0, 0.0]]), 3.0)
-    weights = demosaic.center_weights(seen, "tent", (2, 2), 3)[0]
+    weights = demosaic.center_weights(seen, np.zeros((1, 2)), "tent", TILES["RGGB"])[0]
     row, column = (int(np.abs(a).argmin()) for a in (seen.dy[0, :, 0], seen.dx[0, 0]))
     around = weights[row - 1 : row + 2, column - 1 : column + 2]
     np.testing.assert_allclose(around, [[0.25, 0.25, 0.25], [0.25, 1.0, 0.25], [0.25, 0.25, 0.25]])

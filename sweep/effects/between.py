@@ -28,6 +28,8 @@ _SEGMENTS = 8
 _BETWEEN_NODES = (math.pi / 12) ** 2 / 8
 """A function of one highest frequency, at 24 nodes per period of it, exceeds its nodes by at most this much of its
 largest value (Bernstein: its second derivative is at most the square of that frequency times this value)."""
+_BANDS = 12
+"""Bands of wavelengths in which the light is bounded apart."""
 _AT_ONCE = 400_000
 """Values of pixels and edges that are held at once."""
 
@@ -134,7 +136,7 @@ class Deviation(NamedTuple):
 class Between:
     """Bounds between places, for one way to compute the kernel of a scene."""
 
-    def __init__(self, setup: Setup, methods: Methods, knots_nm: FloatArray, n_bands: int) -> None:
+    def __init__(self, setup: Setup, methods: Methods, knots_nm: FloatArray) -> None:
         """The kernel is linear between the wavelengths `knots_nm`; a band is some of their intervals."""
         target, n = setup.scenario.target, len(setup.mosaic.channels)
         assert target is not None
@@ -145,7 +147,7 @@ class Between:
         self._share = 0.0 if methods.crosstalk == "skip" else setup.pixel.crosstalk
         profile = kernel.profile_of(setup, methods, knots_nm)
         self._knots_nm, self._pitch_um = knots_nm, setup.pixel.pitch_um
-        n_bands = min(n_bands, knots_nm.size - 1) if profile is not None else 0
+        n_bands = min(_BANDS, knots_nm.size - 1) if profile is not None else 0
         self._ends = np.linspace(0, knots_nm.size - 1, n_bands + 1).astype(int) if n_bands else np.zeros(1, dtype=int)
         total = setup.lights.photons.sum(axis=0)
         self._middle = int(np.abs(knots_nm - setup.grid.nodes_nm @ total / total.sum()).argmin())
@@ -175,7 +177,7 @@ class Between:
     def amounts(self, light: FloatArray) -> FloatArray:
         """Size of each part of a light, ndarray[..., n_wavelengths] (of the scene's grid) -> ndarray[..., n_parts]."""
         whole = np.abs(light.sum(axis=-1, keepdims=True))
-        if self._images is None:
+        if self.n_parts == 1:
             return np.asarray(whole, dtype=float)
         band = np.searchsorted(self._knots_nm[self._ends[1:-1]], self._setup.grid.nodes_nm)
         return np.concatenate([whole, np.abs(light) @ np.eye(self.n_parts - 1)[band]], axis=-1)
@@ -249,9 +251,8 @@ class Between:
         through = own[row, column].argmax(axis=1)
         taken = self._taken.T[through]
         sums = np.einsum("nrc,rcu->nu", sudden, own) * h / 2
-        shares = [
-            sampling.covered(seen.dx - h * x, seen.dy - h * y, self._half, self._radii[1]) for x, y in phase.CORNERS
-        ]
+        readout = self._radii[1]
+        shares = [sampling.covered(seen.dx - h * x, seen.dy - h * y, self._half, readout) for x, y in phase.CORNERS]
         at_corners = np.stack([np.einsum("nrc,rcu->nu", share, own) for share in shares], axis=1)
         least = np.maximum(at_corners.min(axis=1) - sums, 1e-300)
         found = np.zeros((len(centers), *self._taken.shape, self.n_parts))

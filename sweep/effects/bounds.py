@@ -48,6 +48,30 @@ class Amounts:
     most_each: FloatArray
 
 
+_AT_ONCE = 4_000_000
+"""Distances of pairs that are bounded at once."""
+CORNERS = 4
+"""Corners of a cell of places: so many cases of a kernel, one after the other."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """What the places in a cell may see besides what its corners see, for each corner.
+
+    `change`, `left`: ndarray[n_cases, n_values, n_channels], by how much the change of the kernel, and the kernel after
+    it, may differ from a mean of those at the corners. `after`: ndarray[n_cases, n_values, n_channels, n_knots], how
+    far the corners' kernels after the change are from this one's.
+    """
+
+    change: FloatArray
+    left: FloatArray
+    after: FloatArray
+
+    def some(self, cases: slice) -> Spread:
+        """Of some cases: whole cells."""
+        return Spread(self.change[cases], self.left[cases], self.after[cases])
+
+
 class Reach:
     """The responses that the designs of a box can have, on the knots at which kernels are compared."""
 
@@ -107,13 +131,34 @@ class Reach:
         after: FloatArray,
         *,
         straight: bool,
+        between: Spread | None = None,
+    ) -> float:
+        """Bound on the change of any CSD, DN, as `_largest` has it, a block of cases after the other."""
+        step = max(1, _AT_ONCE // max(1, len(self.first) * change.shape[1] * CORNERS)) * CORNERS
+        worst = 0.0
+        for start in range(0, len(change), step):
+            some = slice(start, start + step)
+            part = None if between is None else between.some(some)
+            found = self._largest(changed, change[some], remainder, base, after[some], straight, part)
+            worst = max(worst, found)
+        return worst
+
+    def _largest(
+        self,
+        changed: Amounts,
+        change: FloatArray,
+        remainder: float,
+        base: Amounts,
+        after: FloatArray,
+        straight: bool,
+        between: Spread | None,
     ) -> float:
         """Bound on the change of any CSD, DN.
 
         `change`: ndarray[n_cases, n_values, n_channels, n_knots], of the kernel that multiplies `changed`, exact up to
         `remainder` between the knots. `base`, `after`: the responses and the kernel after the change, which say which
         pairs can be the smallest. `straight`: the readout is linear; if not, a distance may change by what each of its
-        two points moves.
+        two points moves. `between`: the cases are corners of cells of places, all of which count.
         """
         n_cases, n_values = change.shape[:2]
         shape = (-1, n_cases, n_values)
@@ -123,14 +168,23 @@ class Reach:
             apart = _flat(changed.middle)[self.first] - _flat(changed.middle)[self.second]
             moved = np.abs(apart @ by) + _flat(changed.half) @ size
             moved += remainder * changed.most.sum(axis=1, keepdims=True)
+            moved += 0.0 if between is None else changed.most @ _flat(between.change, 2).T
         else:
             each = np.abs(_flat(changed.middle) @ by) + _flat(changed.half_each) @ size
             each += remainder * changed.most_each.sum(axis=1, keepdims=True)
+            each += 0.0 if between is None else changed.most_each @ _flat(between.change, 2).T
             moved = each[self.first] + each[self.second]
         far = _norms(moved.reshape(shape))
+        if between is not None:  # in a cell, no change is larger than the largest at a corner and what is left
+            by_cell = far.reshape(len(far), -1, CORNERS).max(axis=2)
+            far = np.repeat(by_cell, CORNERS, axis=1)
         middle = np.abs(pairs @ _flat(after, 2).T).reshape(shape)
         width = (_flat(base.half) @ np.abs(_flat(after, 2)).T).reshape(shape)
         width += (remainder * base.most.sum(axis=1))[:, None, None]
+        if between is not None:
+            apart = _flat(between.after, 2).T
+            width += (np.abs(pairs) @ apart + _flat(base.half) @ apart).reshape(shape)
+            width += (base.most @ _flat(between.left, 2).T).reshape(shape)
         shortened = self.shortest_s / self.longest_s * self.least_light / self.most_light if straight else 0.0
         least = _norms(np.maximum(middle - width, 0.0)) * shortened
         most = _norms(middle + width)

@@ -12,11 +12,15 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from ..arrays import FloatArray
-from ..setup import Methods, Setup
+from ..setup import REFERENCE, Methods, Setup
 from . import blur, crosstalk, demosaic, extinction, illumination, phase, sampling
 
-_HELD = 4_000_000
-"""Weights of pixels that are held at once."""
+_HELD = 8_000_000
+"""Values of pixels that are held at once."""
+MOST_BYTES = 2 * 2**30
+"""What the images of a scene may take of a worker's memory."""
+_COPIES = 4
+"""So many arrays of the size of a kernel are held while it is made."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +65,7 @@ def make_kernel(
         if by_pixel:
             made = _pixels(setup, methods, knots, cases, by_pixel=True, work=work)
         else:
-            step = _places_at_once(setup)
+            step = max(1, _HELD // (pixels_per_place(setup) * max(len(setup.mosaic.channels) ** 2, knots.size)))
             blocks = [cases.some(slice(at, at + step)) for at in range(0, len(cases.places_px), step)]
             made = _joined([_pixels(setup, methods, knots, block, by_pixel=False, work=work) for block in blocks])
         light = made.light if knots is wavelength_nm else _interpolated(made.light, knots, wavelength_nm)
@@ -113,11 +117,6 @@ def _ideal(setup: Setup, methods: Methods, wavelength_nm: FloatArray) -> Kernel:
     return Kernel(uniform[..., None] * lost, uniform, own, own)
 
 
-def _places_at_once(setup: Setup) -> int:
-    """Places whose pixels are held at once: as many as `_HELD` values allow."""
-    return max(1, _HELD // (pixels_per_place(setup) * len(setup.mosaic.channels) ** 2))
-
-
 def pixels_per_place(setup: Setup) -> int:
     """About how many pixels are looked at around each place of a light."""
     target, rows_columns = setup.scenario.target, setup.mosaic.indices.shape
@@ -125,6 +124,37 @@ def pixels_per_place(setup: Setup) -> int:
         return int(np.prod(rows_columns))
     reach = sampling.reach_px(setup, target)
     return int(np.prod([2 * reach + n + 3 for n in rows_columns]))
+
+
+def bytes_per_place(setup: Setup, *, by_pixel: bool) -> int:
+    """About how much memory the kernel of one place of a light takes while it is made."""
+    n = len(setup.mosaic.channels)
+    units = pixels_per_place(setup) if by_pixel else n
+    return 8 * _COPIES * units * n * setup.grid.size
+
+
+def blocks(setup: Setup, cases: phase.Cases) -> list[phase.Cases]:
+    """Places whose kernels, pixel by pixel, fit into half of `MOST_BYTES` together."""
+    step = max(1, MOST_BYTES // 2 // bytes_per_place(setup, by_pixel=True))
+    return [cases.some(slice(at, at + step)) for at in range(0, len(cases.places_px), step)]
+
+
+def too_large(setup: Setup) -> tuple[str, str, str] | None:
+    """Why a target's kernel is not computed: problem, value, what is allowed; None when it is."""
+    if setup.scenario.target is None:
+        return None
+    channels = f"{len(setup.mosaic.channels)} channels and {setup.grid.size} wavelengths"
+    if (one := bytes_per_place(setup, by_pixel=True)) > MOST_BYTES:
+        problem = f"{pixels_per_place(setup):,} pixels around the light, of {channels}, take too much memory"
+        return problem, f"{one / 2**30:.1f} GiB", f"at most {MOST_BYTES / 2**30:g} GiB"
+    places = len(phase.places_px(setup, REFERENCE.phase))
+    if places > phase.MOST:
+        problem = f"a light at any place of a tile of {setup.mosaic.indices.size:,} pixels has too many places"
+        return problem, f"{places:,}", f"at most {phase.MOST:,} (a tile of {phase.MOST // 16} pixels), or a named place"
+    if (every := places * bytes_per_place(setup, by_pixel=False)) > MOST_BYTES:
+        problem = f"{places:,} places of the light, of {channels}, take too much memory"
+        return problem, f"{every / 2**30:.1f} GiB", f"at most {MOST_BYTES / 2**30:g} GiB"
+    return None
 
 
 def _joined(parts: list[Kernel]) -> Kernel:

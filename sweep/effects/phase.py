@@ -6,6 +6,7 @@ starts from the lattice of quarter pixels and divides its cells until no place b
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,8 @@ _WITHIN_DN = {
     "within 0.0001 DN": 1e-4,
 }
 METHODS = (*LATTICES, *_WITHIN_DN)
+MOST = 1024
+"""Places of a lattice on a tile, at most."""
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
 """A cell's corners from its center (column, row), in units of its half width."""
 PER_PIXEL = 4
@@ -111,6 +114,14 @@ def whole(mosaic: Mosaic) -> Cells:
 def all_count(setup: Setup) -> bool:
     """Whether every real place counts: where any is asked for, and the method is not a lattice's."""
     return skip_is_exact(setup) is None and setup.methods.sampling != "skip" and setup.methods.phase not in LATTICES
+
+
+def n_places(setup: Setup, method: str) -> float:
+    """About how many places a method looks at: a search divides most where its limit is tight (measured)."""
+    lattice, within = len(places_px(setup, method)), within_dn(method)
+    if within is None or skip_is_exact(setup) is not None:
+        return lattice
+    return lattice * (1 + 3 * (2 - math.log10(within)))
 
 
 def cases(setup: Setup, method: str) -> Cases:

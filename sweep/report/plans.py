@@ -33,6 +33,11 @@ def _lines(plans: list[Plan], *, explain: bool) -> Iterator[str]:
         f"{names}: promised {max(p.promised_dn for p in plans):.2g} of {plans[0].tolerance_dn:g} DN, "
         f"about {work:.2g} operations (everything on: {whole:.2g})"
     )
+    if not_kept := [p for p in plans if not p.kept]:
+        yield (
+            f"  The tolerance of {plans[0].tolerance_dn:g} DN cannot be promised here; "
+            f"the least that can is {max(p.promised_dn for p in not_kept):.2g} DN."
+        )
     width = max(map(len, EFFECTS))
     for choices in zip(*(plan.choices for plan in plans), strict=True):
         choice = max(choices, key=lambda c: c.promised_dn)

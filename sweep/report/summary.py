@@ -119,7 +119,9 @@ def _plan_line(output: Output) -> str:
     computed = dict.fromkeys(e["effect"] for p in plans for e in p["effects"] if e["method"] not in ("skip", "one"))
     promised = max(plan["promised_dn"] for plan in plans)
     tolerance = max(plan["tolerance_dn"] for plan in plans)
-    return f"Simulated: {', '.join(computed)}; all else changes a CSD by at most {promised:.2g} of {tolerance:g} DN."
+    line = f"Simulated: {', '.join(computed)}; all else changes a CSD by at most {promised:.2g} of {tolerance:g} DN."
+    short = [name for name, plan in output.provenance["plans"].items() if plan["promised_dn"] > plan["tolerance_dn"]]
+    return f"{line} The tolerance cannot be promised in {', '.join(short)}." if short else line
 
 
 def counts_line(output: Output) -> str:

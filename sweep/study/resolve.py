@@ -10,6 +10,7 @@ from ..chromaticity import VISIBLE_NM
 from ..datasets.lights import Lights
 from ..discrimination import CNR, D_PRIME, noise_names
 from ..effects import blur
+from ..effects.kernel import too_large
 from ..errors import StudyError, SweepError
 from ..evaluate import DESIGNED, WORST, noise_quantities, shiftable
 from ..metrics import Pair, class_pairs, csd_name
@@ -78,6 +79,7 @@ class _Resolver:
             digests=dict(self.sources.digests),
             warnings=tuple(self.sources.warnings),
         )
+        self.check_memory(study)
         if not study.n_designs and search is None:
             self.add(
                 ("cfas",), "no designs", None, "a CFA with a curve for each channel, a design, a sweep or a search"
@@ -120,6 +122,15 @@ class _Resolver:
             if refused is not None:
                 key, problem, value, allowed = refused
                 self.add(("scenarios", name, *key), problem, value, allowed)
+
+    def check_memory(self, study: Study) -> None:
+        """The kernels of every scene and CFA fit into memory. Raises StudyError."""
+        for name in study.scenarios:
+            for space in study.spaces:
+                if (refused := too_large(study.setup(space, name))) is not None:
+                    problem, value, allowed = refused
+                    self.add(("scenarios", name, "target"), f"{problem} (CFA {space.cfa})", value, allowed)
+                    raise StudyError(self.faults)
 
     def check_recognition(self, lights: Lights) -> None:
         """Its states are signal types, each once, and every scenario has noise."""
