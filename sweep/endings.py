@@ -18,8 +18,8 @@ from .errors import Fault, SweepError
 
 _INTERRUPTED, _BROKEN_PIPE = 130, 141
 """Exit codes of a shell for a command that SIGINT or SIGPIPE ended."""
-_LEAST_ADDRESS_SPACE = 600 * 2**20
-"""Below it NumPy does not start; it then waits for ever for memory of its BLAS."""
+_LEAST_ADDRESS_SPACE = 2**30
+"""Below it libraries wait for ever for memory, or end the process, while they are loaded."""
 _UsageError = typer.BadParameter.__bases__[0]
 """Click's, wherever this version of typer has it."""
 

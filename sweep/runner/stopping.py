@@ -36,6 +36,9 @@ class Stop:
     ends_process: bool = False
     _since: float = 0.0
     _broken_off: float | None = None
+    _knocked: bool = False
+    _handled: bool = False
+    _impatient: bool = False
     _held: int = 0
     _grace_s: float = 0.0
     _over: threading.Event = field(default_factory=threading.Event)
@@ -65,32 +68,44 @@ class Stop:
             self._broken_off = time.monotonic()
             raise InterruptedRunError(_SAID)
 
-    def _asked(self, number: int, _frame: FrameType | None) -> None:
-        """A signal: the first one asks; a second one ends the grace; `_knock` sends it again when it is time."""
-        now = time.monotonic()
-        if not self.requested:
-            self.requested, self._since = True, now
-            threading.Thread(target=self._knock, args=(number, threading.get_ident()), daemon=True).start()
-        if self._may_break(now):
+    def _asked(self, _number: int, _frame: FrameType | None) -> None:
+        """A signal: the first one asks; `watch` sends it again when it is time; another one ends the grace."""
+        self._impatient = self._impatient or (self.requested and not self._knocked and self._handled)
+        self._knocked, self._handled = False, True
+        self._request()
+        if self._may_break(now := time.monotonic()):
             self._broken_off = now
             raise BrokenOffError
 
+    def _request(self) -> None:
+        if not self.requested:
+            self.requested, self._since = True, time.monotonic()
+
     def _may_break(self, now: float) -> bool:
         """Once; and once more where someone swallowed the exception."""
-        if self._held or self._over.is_set() or now < self._since + self._grace_s:
+        grace_s = 0.0 if self._impatient else self._grace_s
+        if self._held or self._over.is_set() or now < self._since + grace_s:
             return False
         return self._broken_off is None or now > self._broken_off + _AGAIN_S
 
-    def _knock(self, number: int, main_thread: int) -> None:
-        """In a thread of its own: interrupt the main thread as soon as it may be broken off."""
+    def watch(self, signals: int, main_thread: int) -> None:
+        """In a thread of its own: interrupt the main thread as soon as it may be broken off.
+
+        `signals`: a pipe from the C library's handler, since Python's runs only between two byte codes of the main
+        thread, and that may be far away in a library.
+        """
+        while not self._over.is_set() and os.read(signals, 1)[0] not in SIGNALS:
+            pass  # another signal of the process, or the end
         while not self._over.wait(_KNOCK_S):
+            self._request()
             now = time.monotonic()
             if self.ends_process and now > self._since + _LAST_S and not self._held:
                 os.write(2, f"sweep: {_SAID}\n".encode())
                 os._exit(InterruptedRunError.exit_code)
             with self._sending:
                 if self._may_break(now):
-                    signal.pthread_kill(main_thread, number)
+                    self._knocked = True
+                    signal.pthread_kill(main_thread, SIGNALS[0])
 
 
 @contextmanager
@@ -107,6 +122,11 @@ def stop_on_signals(outer: Stop | None = None, *, ends_process: bool = False) ->
     if threading.current_thread() is not threading.main_thread():
         yield stop
         return
+    signals, at_once = os.pipe()
+    os.set_blocking(at_once, False)
+    watcher = threading.Thread(target=stop.watch, args=(signals, threading.get_ident()), daemon=True)
+    watcher.start()
+    earlier = signal.set_wakeup_fd(at_once, warn_on_full_buffer=False)
     before = [(number, signal.signal(number, stop._asked)) for number in SIGNALS]
     try:
         yield stop
@@ -117,11 +137,16 @@ def stop_on_signals(outer: Stop | None = None, *, ends_process: bool = False) ->
         with stop._sending:
             for number, handler in before:
                 signal.signal(number, handler)
+        signal.set_wakeup_fd(earlier)
+        os.write(at_once, b"\0")
+        watcher.join()
+        os.close(signals)
+        os.close(at_once)
 
 
 @contextmanager
 def without_interrupts() -> Iterator[None]:
-    """A Ctrl-C waits for the end of the block; processes that are started in it never see one."""
+    """Processes that are started in the block never see a Ctrl-C, from their first moment on."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

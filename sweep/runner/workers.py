@@ -91,7 +91,7 @@ class Workers:
         while waiting and not self.stop.requested:
             try:
                 parallel = joblib.Parallel(self._n_jobs, return_as="generator_unordered", pre_dispatch="3*n_jobs")
-                with without_interrupts():
+                with self.stop.held(), without_interrupts():
                     results = iter(parallel(taken()))
                 for at, result in self._gracefully(results):
                     del flying[at]
