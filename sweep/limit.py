@@ -80,6 +80,8 @@ def why_not(problem: Problem) -> str | None:
             return reason
     if (_top(problem) > problem.setup.base_qe[0] * (1 + ROUNDING)).any():
         return "filters of the box may exceed the curve that they replace"
+    if (problem.family.lower(problem.low, problem.high)[0] < -ROUNDING * problem.setup.base_qe[0]).any():
+        return "filters of the box may be below 0"
     if _clips(problem):
         return "signals exceed the full well or the range of the ADC"
     if isinstance(problem.setup.scenario.exposure, WhitePatchExposure) and not _exposure_is_fixed(problem):

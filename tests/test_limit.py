@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from sweep.metrics import separation
 from sweep.objectives import Objective
 from sweep.pareto import hypervolume
 from sweep.problem import Problem, best_feasible, starting_points
+from sweep.report.summary import _limit_line
 from sweep.scenes import FixedExposure, Scenario
 from sweep.search import search_from
 from sweep.setup import Setup
@@ -201,6 +204,8 @@ def test_no_limit_is_claimed_where_it_would_not_hold() -> None:
     wave, cyan, green = STUDY.grid.nodes_nm, STUDY.sensor.qe["Cy"], STUDY.sensor.qe["G"]
     above = replace(PROBLEM, family=Stopband(wave, cyan, green), setup=_with_base(cyan))
     assert why_not(above) == "filters of the box may exceed the curve that they replace"
+    below = replace(PROBLEM, family=Stopband(wave, PROBLEM.setup.base_qe[0], -0.1 * green))
+    assert why_not(below) == "filters of the box may be below 0"
     scenario = replace(PROBLEM.setup, scenario=Scenario(exposure=FixedExposure(exposure_s=1000.0)))
     assert why_not(replace(PROBLEM, setup=scenario)) == "signals exceed the full well or the range of the ADC"
 
@@ -209,6 +214,29 @@ def _with_base(curve: np.ndarray) -> Setup:
     qe = PROBLEM.setup.qe.copy()
     qe[PROBLEM.setup.modified[0]] = curve
     return replace(PROBLEM.setup, qe=qe)
+
+
+def test_words_say_what_is_proven() -> None:
+    """A finished proof, one that was cut short, levels that were, and the limit of an earlier version."""
+    output: Any = SimpleNamespace(objective="csd_yellow_red")
+    search = {
+        "no_limit": None,
+        "gap": 0.1,
+        "limit_attained": 90.0,
+        "limit_proven": 100.0,
+        "limit_left_out": ["edge_width_nm"],
+    }
+    done = search | {"limit_programs": 9, "limit_open_parts": 0, "front_limits_open": 0}
+    words = _limit_line(output, done)
+    assert (
+        "no filter exceeds 100.000 DN (proven) and one attains 90.000 DN; the search's answer is 10.0% below" in words
+    )
+    assert "under the same constraints but edge_width_nm, before clipping and quantization" in words
+    assert "open" not in words
+    cut = _limit_line(output, done | {"limit_open_parts": 3})
+    assert "the limit itself is not proven: 3 parts are open after 9 linear programs" in cut
+    assert "At 2 levels of the front the line is an upper bound" in _limit_line(output, done | {"front_limits_open": 2})
+    assert "not proven for every filter" in _limit_line(output, search)
 
 
 @pytest.mark.parametrize("level", [0.8, 0.9, 0.97, 1.0])
