@@ -235,6 +235,8 @@ def test_words_say_what_is_proven() -> None:
     assert "open" not in words
     cut = _limit_line(output, done | {"limit_open_parts": 3})
     assert "the limit itself is not proven: 3 parts are open after 9 linear programs" in cut
+    unknown = _limit_line(output, done | {"limit_attained": None})
+    assert "no filter exceeds 100.000 DN (proven); the search's answer is 10.0% below" in unknown
     assert "At 2 levels of the front the line is an upper bound" in _limit_line(output, done | {"front_limits_open": 2})
     assert "not proven for every filter" in _limit_line(output, search)
 

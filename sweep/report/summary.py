@@ -139,12 +139,14 @@ def _limit_line(output: Output, search: Mapping[str, Any]) -> str:
     """The bracket of the limit: what is proven, for which filters and which response."""
     if search["no_limit"] is not None:
         return f"Limit: none computed ({search['no_limit']})."
-    attained, proven = (amount(output.objective, search[f"limit_{end}"], 3) for end in ("attained", "proven"))
+    proven = amount(output.objective, search["limit_proven"], 3)
     gap = "nothing is left to gain" if search["gap"] is None else f"the search's answer is {search['gap']:.1%} below"
     if "limit_open_parts" not in search:
         return f"Limit: {proven}, by an earlier version, not proven for every filter (run the study again); {gap}."
     without = f" but {', '.join(search['limit_left_out'])}" if search["limit_left_out"] else ""
-    proof = f"no filter exceeds {proven} (proven) and one attains {attained}"
+    proof = f"no filter exceeds {proven} (proven)"
+    if search["limit_attained"] is not None:
+        proof += f" and one attains {amount(output.objective, search['limit_attained'], 3)}"
     if search["limit_open_parts"]:
         programs, parts = search["limit_programs"], search["limit_open_parts"]
         proof += f", but the limit itself is not proven: {parts} parts are open after {programs} linear programs"

@@ -192,7 +192,7 @@ def search_facts(study: Study, answer: SearchAnswer) -> dict[str, Any]:
         "objective": str(study.objective),
         "best_smooth_objective": answer.best.objective,
         "best_sensitivity": answer.best.sensitivity,
-        "limit_attained": None if answer.limit is None else answer.limit.attained,
+        "limit_attained": None if answer.limit is None or answer.limit.curve is None else answer.limit.attained,
         "limit_proven": None if answer.limit is None else answer.limit.proven,
         "limit_left_out": [] if answer.limit is None else list(answer.limit.left_out),
         "limit_programs": None if answer.limit is None else answer.limit.programs,
