@@ -37,8 +37,11 @@ seen: list[tuple[str, tuple[Any, ...]]] | None = None
 
 
 def watch(event: str, details: tuple[Any, ...]) -> None:
-    if seen is not None and event in ("open", "os.remove", "os.rename", "os.rmdir", "pickle.find_class", "os.system"):
-        seen.append((event, details))
+    if seen is None or event not in ("open", "os.remove", "os.rename", "os.rmdir", "pickle.find_class", "os.system"):
+        return
+    if event == "open" and isinstance(details[0], str | bytes) and not (details[2] or 0) & os.O_NOFOLLOW:
+        details = (os.path.realpath(details[0]), *details[1:])  # where a link leads to
+    seen.append((event, details))
 
 
 sys.addaudithook(watch)
@@ -386,6 +389,12 @@ def test_a_hostile_folder_gives_the_right_rows(
     if (folder / "mine.txt").exists():
         assert (folder / "mine.txt").read_text() == "mine"
     assert status_lines(folder, verify=True)[-1].startswith("ok")
+
+
+@pytest.mark.parametrize("attack", [other_places, no_lines])
+def test_lines_that_no_journal_writes_are_no_entries(interrupted: Path, tmp_path: Path, attack: Attack) -> None:
+    folder, _ = attacked(interrupted, tmp_path, attack)
+    assert Journal(folder).entries == Journal(interrupted).entries
 
 
 @pytest.mark.parametrize("attack", REFUSED)
