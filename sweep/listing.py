@@ -34,9 +34,12 @@ def list_lines(folder: Path, outputs: Path, data: Path | None = None) -> list[st
     """
     if not is_folder(folder):
         raise StudyError(Fault("no such folder", str(folder), allowed="a folder of study files"))
-    files = sorted(
-        path for path in folder.iterdir() if path.suffix in (".yaml", ".yml") and not path.name.startswith(".")
-    )
+    try:
+        files = sorted(
+            path for path in folder.iterdir() if path.suffix in (".yaml", ".yml") and not path.name.startswith(".")
+        )
+    except OSError as error:
+        raise StudyError(Fault(f"cannot be read: {error.strerror or error}", str(folder))) from None
     if not files:
         return [f"No studies in {folder}. `sweep new NAME --folder {folder}` writes one."]
     lines = [_line(path, outputs, data) for path in files]
@@ -50,11 +53,12 @@ def list_lines(folder: Path, outputs: Path, data: Path | None = None) -> list[st
 def _line(path: Path, outputs: Path, data: Path | None) -> _Line:
     try:
         study = load_study(path, data)
+        state = _state(study, outputs)
     except SweepError as error:
         more = f" (and {len(error.faults) - 1} more)" if error.faults[1:] else ""
         return _Line(path.stem, "", "cannot be loaded", f"{error.faults[0]}{more}")
     name = path.stem if study.name == path.stem else f"{path.stem} ({study.name})"
-    return _Line(" ".join(name.split()), f"{study.n_designs:,} designs", _state(study, outputs), _short(study))
+    return _Line(" ".join(name.split()), f"{study.n_designs:,} designs", state, _short(study))
 
 
 def _state(study: Study, outputs: Path) -> str:

@@ -92,7 +92,10 @@ def changed(rng: np.random.Generator, tree: dict[str, Any]) -> dict[str, Any]:
         path = one_of(rng, known)
         parent, key = at(tree, path[:-1]), path[-1]
         value = parent[key]
-        match int(rng.integers(8)):
+        match int(rng.integers(14)):
+            case number if number > 7:
+                if isinstance(value, int | float) and not isinstance(value, bool):
+                    parent[key] = type(value)(value * one_of(rng, [0.5, 0.9, 1.1, 2]))
             case 0:
                 del parent[key]
             case 1 if isinstance(parent, list):

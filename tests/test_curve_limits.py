@@ -19,7 +19,7 @@ from sweep.spectra import LARGEST, LEAST_PEAK, check_samples
 
 from .watchdog import within
 
-HANG_S = 30.0
+HANG_S = 120.0
 WAVE = np.arange(400, 701, 10.0)
 
 

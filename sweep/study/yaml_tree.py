@@ -37,7 +37,7 @@ _BOOLEANS = {"true": True, "True": True, "TRUE": True, "false": False, "False": 
 _INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 _BASES = {"0o": 8, "0x": 16}
-_LOOKS_LIKE_A_NUMBER = re.compile(r"[-+.0-9eExXoO_a-fA-F]+")
+_LOOKS_LIKE_A_NUMBER = re.compile(r"[-+.]*[0-9][-+.0-9xo_a-fA-F]*")
 _HALF = re.compile("[\ud800-\udfff]")
 """Half of a character: `\\ud800`. No file takes it."""
 
