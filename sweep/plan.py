@@ -39,7 +39,7 @@ class Plan:
 
     Everything on is a mathematical limit. What no method reaches (the last of all places of a light, and how a readout
     in whole numbers moves the worst of them) is part of every promise, so that `promised_dn` may be above
-    `tolerance_dn`: then it is the smallest that can be promised.
+    `tolerance_dn`: all else keeps the tolerance then.
     """
 
     scenario: str
@@ -105,14 +105,12 @@ class Planner:
     def plan(self, scenario: str, tolerance_dn: float) -> Plan:
         """The cheapest plan whose promises sum to at most `tolerance_dn`; of equally cheap ones, what skips more.
 
-        Where no plan does, the one that promises least.
+        Where no plan does, one that keeps it but for what the places of a light leave open.
         """
         tried: dict[tuple[str, str], float] = {}
-        found = self._cheapest(tolerance_dn, tried)
-        if found is None:
-            found = self._cheapest(self._least(tolerance_dn), tried)
-        assert found is not None
-        methods, promises = found
+        kept = self._cheapest(tolerance_dn, tried) or self._cheapest(tolerance_dn, tried, besides=True)
+        assert kept is not None  # everything on changes nothing but what is left open
+        methods, promises = kept
         choices = tuple(
             Choice(e, method, promises.get(e, 0.0), self._reason(e, method, promises.get(e, 0.0), tried))
             for e, method in asdict(methods).items()
@@ -128,23 +126,17 @@ class Planner:
         """Everything on but what changes nothing."""
         return replace(REFERENCE, **{e: EFFECTS[e].METHODS[0] for e in EFFECTS if self._exact[e] is not None})
 
-    def _least(self, tolerance_dn: float) -> float:
-        """A promise that some plan keeps: with the readout as it is, or with the first effects of it left out."""
-        methods, promised, found = self._start, 0.0, []
-        for effect in ("", *READOUT):
-            if effect:
-                after = replace(methods, **{effect: "skip"})
-                if not self._allowed(effect, after):
-                    break
-                promised += self.promise(effect, methods, after)
-                methods = after
-            found.append(promised + self.promise("phase", methods, methods))
-        return max(tolerance_dn, min(found) * (1 + 1e-12))
+    def _left_over(self, methods: Methods) -> float:
+        """What no method of `phase` takes away: over all places everything on is a limit."""
+        return self.promise("phase", methods, replace(methods, phase=REFERENCE.phase))
 
     def _cheapest(
-        self, tolerance_dn: float, tried: dict[tuple[str, str], float]
+        self, tolerance_dn: float, tried: dict[tuple[str, str], float], *, besides: bool = False
     ) -> tuple[Methods, dict[str, float]] | None:
-        """Branch and bound over the effects, cheapest methods first; `tried` takes each method's smallest promise."""
+        """Branch and bound over the effects, cheapest methods first; `tried` takes each method's smallest promise.
+
+        None where no plan keeps the tolerance; `besides`: what no method takes away does not count.
+        """
         start = self._start
         active = [e for e in EFFECTS if self._exact[e] is None]
         best: list[tuple[float, Methods, dict[str, float]]] = []
@@ -168,6 +160,8 @@ class Planner:
                 rounded = after.quantization == "round" and not self._noisy
                 exactly = rounded and effect not in (*READOUT, "phase")
                 allowed = promises.get("phase", 0.0) if exactly else tolerance_dn
+                if besides and not exactly and ("phase" in promises or effect == "phase"):
+                    allowed += self._left_over(after)
                 if sum(promises.values()) + promised <= allowed:
                     deeper(at + 1, after, promises | {effect: promised})
 

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -22,6 +22,7 @@ from sweep.evaluate import BEST_PLACE, evaluate
 from sweep.imaging import Imager
 from sweep.metrics import CSD
 from sweep.plan import Plan, Planner
+from sweep.report.plans import plan_lines
 from sweep.setup import REFERENCE, Methods, Setup
 
 from .hard_scenes import DARK, F2, FAR, NEAR, TILES, Scene, random_scene, scene, target
@@ -36,6 +37,13 @@ def at_place(made: Scene, x: float, y: float, methods: Methods = REFERENCE) -> d
     there = given.model_copy(update={"target": given.target.model_copy(update={"phase_px": (x, y)})})
     columns = evaluate(Imager(replace(made.setup, scenario=there, methods=methods)), made.curves)
     return {name: float(values[0]) for name, values in columns.items() if name.startswith(CSD)}
+
+
+@dataclass(frozen=True)
+class Planned:
+    """What the lines of plans ask of a study."""
+
+    plans: dict[str, Plan]
 
 
 def searched(
@@ -141,8 +149,9 @@ def test_a_plan_that_cannot_keep_the_tolerance_says_so() -> None:
     made = scene("rounded", "RYNCy", {"target": FAR | {"phase_px": "any"}, "optics": F2})
     plan, _ = planned(made, 0.1)
     assert not plan.kept
-    assert 2 <= plan.promised_dn < 2.1  # the square root of four channels
-    assert not broken(made, 0.1, 4, CSDS[:1])
+    # The worst place of the response before rounding, and its readout: the square root of four channels each.
+    assert plan.promised_dn == pytest.approx(4, abs=0.1)
+    assert "cannot be promised" in "".join(plan_lines(Planned({"rounded": plan}), explain=False))  # type: ignore[arg-type]
     # A named place is computed exactly.
     named = scene("named", "RYNCy", {"target": FAR, "optics": F2})
     assert planned(named, 0.1)[0].promised_dn == 0
@@ -213,9 +222,11 @@ def test_the_best_place_of_a_pulsed_light_is_the_best_of_the_worst_moments() -> 
         "noise": True,
         "drive": {"duty": 0.5, "frequency_hz": 100},
         "exposure": {"kind": "fixed", "exposure_s": 0.012},
+        "photon_radiance": 1e17,
     }
     made = scene("pulsed", "RYNCy", pulsed, DARK)
-    assert not broken(made, 5.0, 4)
+    assert planned(made, 5.0)[0].kept
+    assert not broken(made, 5.0, 3, CSDS[:1])
     # In a moment that is not the worst, more light separates more.
     straight = replace(REFERENCE, phase="quarter pixel", noise="skip", quantization="skip", saturation="skip")
     row = evaluate(Imager(replace(made.setup, methods=straight)), made.curves)
