@@ -89,7 +89,7 @@ def errors(
     Bhattacharyya coefficients, for the signal that errs most often.
     """
     n_designs, n_signals = electrons.shape[:2]
-    unknown = np.isnan(electrons).any(axis=(1, 2))
+    unknown = np.asarray(np.isnan(electrons).any(axis=(1, 2)))
     electrons = np.where(unknown[:, None, None], 0.0, np.minimum(electrons, 100 * pixel.well_e + 1e5))
     pairs = class_pairs(list(members))
     found = {pair: np.empty(n_designs) for pair in pairs}

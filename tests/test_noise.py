@@ -177,6 +177,10 @@ def test_a_noisy_study_from_file_to_report(tmp_path: Path) -> None:
         ("patches: 20", "patches: 3", "too few"),
         ("error_yellow_red: {max: 0.5}", "error_yellow_red: {min: 0.5}", "has no `min`"),
         ("dprime_yellow_red: {min", "dprime_yellow_green: {min", "unknown quantity"),
+        ("offset_dn: 168}", "offset_dn: 168, prnu: 0.999}", "less than or equal to 0.1"),
+        ("noise: true", "noise: {prnu: 0.999}", "less than or equal to 0.1"),
+        ("offset_dn: 168}", "offset_dn: 168, well_e: 1.0e+300}", "less than or equal to 100000000"),
+        ("noise: true", "noise: {read_noise_e: 1.0e+300}", "less than or equal to 1000000"),
         ("constraints:", "search: {starts: 2}\nconstraints:", "the search does not know"),
     ],
 )
