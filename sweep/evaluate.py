@@ -21,8 +21,9 @@ from .discrimination import (
     pairwise_error,
     state_error_bound,
 )
-from .imaging import Imager, NoisyReadout, smooth_imager
+from .imaging import Imager, smooth_imager
 from .metrics import Pair, cfa_sensitivity, class_pairs, csd_name, separation, separations, separations_along
+from .noisy_readout import NoisyReadout
 from .setup import Setup
 
 DESIGNED = ("sensitivity", "cfa_sensitivity", "slope_per_nm", "min_transmission")

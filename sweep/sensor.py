@@ -13,8 +13,9 @@ from .schema import NonNegative, Positive, Section
 MOST_PRNU = 0.1
 """Largest relative deviation of gains: a Gaussian gain is then positive within ten of them. Sensors have 0.01."""
 Prnu = Annotated[float, Field(ge=0, le=MOST_PRNU)]
-WellE = Annotated[float, Field(gt=0, le=1e8)]
+WellE = Annotated[float, Field(ge=1e-3, le=1e8)]
 """A hundred million electrons are more than any pixel holds."""
+GainDnPerE = Annotated[float, Field(gt=0, le=1e9)]
 ReadNoiseE = Annotated[float, Field(ge=0, le=1e6)]
 
 
@@ -41,7 +42,7 @@ class Pixel(Section):
     fill_factor: float = Field(default=1.0, gt=0, le=1)
     well_e: WellE = 10_000.0
     bits: int = Field(default=12, ge=1, le=24)
-    gain_dn_per_e: float | None = Field(default=None, gt=0)
+    gain_dn_per_e: GainDnPerE | None = None
     offset_dn: NonNegative = 0.0
     crosstalk: float = Field(default=0.0, ge=0, lt=1)
     read_noise_e: ReadNoiseE = 0.0

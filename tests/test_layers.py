@@ -19,7 +19,7 @@ LEVELS = [
     {"spaces", "setup"},
     {"blocks"},
     {"effects"},
-    {"promises"},
+    {"promises", "noisy_readout"},
     {"plan", "imaging", "confusion"},
     {"evaluate", "recognition"},
     {"store", "problem", "figures"},
