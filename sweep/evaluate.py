@@ -23,8 +23,9 @@ from .discrimination import (
     state_error_bound,
 )
 from .effects.phase import Cases
-from .imaging import Changing, Imager, NoisyReadout, smooth_imager
+from .imaging import Changing, Imager, smooth_imager
 from .metrics import CSD, Pair, cfa_sensitivity, class_pairs, csd_name, separation, separations, separations_along
+from .noisy_readout import NoisyReadout
 from .places import Extremes
 from .setup import Setup
 

@@ -22,6 +22,7 @@ from .cache import Cache
 from .effects import flicker, noise_table, phase, quadrature, quantization, saturation
 from .effects.kernel import blocks, make_kernel
 from .errors import Fault, SweepError
+from .noisy_readout import NoisyReadout, is_cut, is_gaussian, reach_dn
 from .places import AnyPlace
 from .scenes import WhitePatchExposure
 from .sensor import Pixel, unquantized
@@ -54,24 +55,6 @@ class Changing:
     values: FloatArray
     exposure_s: float
     which: BoolArray
-
-
-@dataclass(frozen=True)
-class NoisyReadout:
-    """Mean (DN) and variance (DN^2) of each channel, ndarray[n_designs, n_cases, n_signals, n_channels].
-
-    `gaussian`: where its noise may be taken as Gaussian. No pixel is cut by full well or an end of the ADC, and read
-    noise dithers each pixel (0.7 DN), or the deviation is at least 4 steps of the pixel that weighs most. In random
-    pixels and pairs the error of Gaussians was then never less than 1 / 1.2 of the exact one, down to 1e-12
-    (`tests/test_confusion.py`): evidence, not a proof. `reach_dn`: no pixel moves the channel further from its mean,
-    but for 1e-15. `exposure_s`: ndarray[n_designs].
-    """
-
-    mean: FloatArray
-    variance: FloatArray
-    gaussian: BoolArray
-    reach_dn: FloatArray
-    exposure_s: FloatArray
 
 
 class Imager:
@@ -341,17 +324,11 @@ class Imager:
 
     def _shape_of_noise(self, electrons: FloatArray, variance: FloatArray) -> tuple[BoolArray, FloatArray]:
         """`NoisyReadout.gaussian` and `reach_dn` of a block."""
-        pixel, repeats = self.pixel, electrons.shape[1] // self.n_cases
+        repeats = electrons.shape[1] // self.n_cases
         heaviest = self._readout.max(axis=1) if self.setup.scenario.target else 1 / self.setup.mosaic.counts[None]
         heaviest = np.repeat(np.broadcast_to(heaviest, (self.n_cases, variance.shape[-1])), repeats, axis=0)[:, None]
-        low, high = noise_table.unclipped_e(pixel)
-        outside = ((electrons < low) | (electrons > high)).astype(float)
-        cut = self._weighed(outside, (self._readout > 0).astype(float)) > 0
-        own = pixel.dn_per_e * pixel.read_noise_e >= _DITHERED_DN
-        gaussian = ~cut & (own | (variance >= _MANY_STEPS * heaviest**2))
-        reach_e = 9 * (np.sqrt(electrons) + pixel.prnu * electrons + pixel.read_noise_e) + 27
-        reach = np.minimum(pixel.dn_per_e * reach_e + 1, float(pixel.full_scale_dn)).max(axis=-1, keepdims=True)
-        return gaussian, np.asarray(reach * heaviest, dtype=float)
+        cut = self._weighed(is_cut(electrons, self.pixel), (self._readout > 0).astype(float)) > 0
+        return is_gaussian(variance, heaviest, cut, self.pixel), reach_dn(electrons, self.pixel) * heaviest
 
     def _blocks(self, curves: FloatArray, exposure_s: FloatArray) -> Iterator[FloatArray]:
         """`electrons` of blocks of designs."""
@@ -405,8 +382,6 @@ class Imager:
 
 
 _CERTAIN_DN2 = 1e-9
-_DITHERED_DN = 0.7
-_MANY_STEPS = 16.0
 _FEW = 16
 _imagers: Cache[bytes, Imager] = Cache(16)
 

@@ -18,8 +18,9 @@ DarkCurrent = Annotated[float, Field(ge=0, le=1e15)]
 MOST_PRNU = 0.1
 """Largest relative deviation of gains: a Gaussian gain is then positive within ten of them. Sensors have 0.01."""
 Prnu = Annotated[float, Field(ge=0, le=MOST_PRNU)]
-WellE = Annotated[float, Field(ge=1e-2, le=1e8)]
+WellE = Annotated[float, Field(ge=1e-3, le=1e8)]
 """A hundred million electrons are more than any pixel holds."""
+GainDnPerE = Annotated[float, Field(ge=1e-15, le=1e9)]
 
 
 class Optics(Section):
@@ -40,7 +41,7 @@ class Pixel(Section):
     Defaults: 2.1 um pitch (AR0820), a full well of 10,000 e that maps to full scale. `gain_dn_per_e` null means
     full scale / full well. `offset_dn` is the pedestal. `crosstalk`: share of a pixel's light that comes through the
     filters of its four neighbors. `prnu`: relative standard deviation of the pixels' gains. Limits: a pitch of 1 nm to
-    10 cm, wells of 0.01 to 1e8 e, gains of 1e-15 to 1e15 DN/e, read noise up to 1e6 e, dark current up to 1e15 e/s,
+    10 cm, wells of 0.001 to 1e8 e, gains of 1e-15 to 1e9 DN/e, read noise up to 1e6 e, dark current up to 1e15 e/s,
     PRNU up to 0.1.
     """
 
@@ -48,7 +49,7 @@ class Pixel(Section):
     fill_factor: Share = 1.0
     well_e: WellE = 10_000.0
     bits: int = Field(default=12, ge=1, le=24)
-    gain_dn_per_e: float | None = Field(default=None, ge=1e-15, le=1e15)
+    gain_dn_per_e: GainDnPerE | None = None
     offset_dn: NonNegative = 0.0
     crosstalk: float = Field(default=0.0, ge=0, lt=1)
     read_noise_e: ReadNoise = 0.0

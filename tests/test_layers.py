@@ -30,7 +30,7 @@ LEVELS = [
     {"spaces", "setup"},
     {"blocks"},
     {"effects"},
-    {"promises", "places"},
+    {"promises", "places", "noisy_readout"},
     {"plan", "imaging", "confusion"},
     {"evaluate", "recognition"},
     {"store", "problem", "figures"},

@@ -45,4 +45,4 @@ def promise(setup: Setup, brightest_e: float) -> float:
     mean = readout.moments(np.array([at_e]), pixel)[readout.UNROUNDED, 0]
     added = read_dn * float(gaussian.ramp(np.array(-pixel.offset_dn / read_dn))) if read_dn else 0.0
     lost = gain * at_e + pixel.offset_dn - mean
-    return float(added + max(lost + added, 0.0))
+    return min(float(added + max(lost + added, 0.0)), float(pixel.full_scale_dn))
