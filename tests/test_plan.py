@@ -25,6 +25,7 @@ from sweep.study import load_study
 
 from .conftest import STUDIES
 from .hard_scenes import F2, FAR, HARD, Scene, scene
+from .hard_scenes_alone import ALONE as SCENES_ALONE
 
 _ARITHMETIC_DN = 1e-9
 """Rounding of double precision itself."""
@@ -51,6 +52,7 @@ def columns(made: Scene, methods: Methods) -> np.ndarray:
     return np.array([v[0] for n, v in found.items() if is_promised(n) and (anywhere or not n.startswith(BEST_PLACE))])
 
 
+SCENES = (*HARD, *SCENES_ALONE)
 ALONE = "reference"
 """Everything on but the one effect."""
 STRAIGHT = "straight"
@@ -92,7 +94,7 @@ def contract(made: Scene) -> list[Row]:
 
 @cache
 def all_contracts() -> tuple[Row, ...]:
-    each = joblib.Parallel(n_jobs=2)(joblib.delayed(contract)(made) for made in HARD)
+    each = joblib.Parallel(n_jobs=2)(joblib.delayed(contract)(made) for made in SCENES)
     return tuple(row for rows in each for row in rows)
 
 
@@ -126,8 +128,8 @@ def test_unknown_effects_and_methods_are_refused() -> None:
 
 
 def test_there_are_enough_hard_scenes() -> None:
-    assert len(HARD) >= 40
-    assert len({made.name for made in HARD}) == len(HARD)
+    assert len(SCENES) >= 40
+    assert len({made.name for made in SCENES}) == len(SCENES)
 
 
 def test_no_method_changes_more_than_it_promises() -> None:
@@ -157,7 +159,7 @@ def test_an_effect_that_no_scene_sees_is_found() -> None:
 
 
 def test_no_plan_switches_alone_what_is_not_seen_alone() -> None:
-    for made in HARD:
+    for made in SCENES:
         planner = Planner([made.box])
         for effect in NOT_ALONE:
             if planner._exact[effect] is None:
