@@ -42,6 +42,9 @@ class Family(Protocol):
     def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
         """No well-formed filter of the box `low`..`high` exceeds this, ndarray[n_modified, n_wavelengths]."""
 
+    def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """No well-formed filter of the box is below this, ndarray[n_modified, n_wavelengths]; see `upper`."""
+
     def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
         """No filter of the box, well formed or not, is below the first or above the second: see `upper`."""
 

@@ -33,6 +33,10 @@ class Dual(Banded):
         """The base, and the base with the whole swing where the band can reach; see `Family.upper`."""
         return np.stack([self._base, self._base + self._room * self._bands.reach(low, high)])
 
+    def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """The base without the whole swing where the band can reach, and the base; see `Family.lower`."""
+        return np.stack([self._base - self._room * self._bands.reach(low, high), self._base])
+
     def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The base with the least and the most swing; see `Family.hull`."""
         least, most = (self._room * shape for shape in self._bands.range(low, high))

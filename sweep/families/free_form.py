@@ -49,6 +49,11 @@ class FreeForm:
         assert low.shape == high.shape
         return np.asarray(self.curves(high[None])[0], dtype=float)
 
+    def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """Every transmission at its smallest; see `Family.lower`."""
+        assert low.shape == high.shape
+        return np.asarray(self.curves(low[None])[0], dtype=float)
+
     def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Every transmission at its smallest and at its largest; see `Family.hull`."""
         lower, upper = self.curves(np.stack([low, high]))

@@ -218,6 +218,10 @@ class Stopband(Banded):
         """The base, or the target where it is higher and a band can reach; see `Family.upper`."""
         return (self._base + np.maximum(self._change, 0.0) * self._bands.reach(low, high))[None, :]
 
+    def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """The base, or the target where it is lower and a band can reach; see `Family.lower`."""
+        return (self._base + np.minimum(self._change, 0.0) * self._bands.reach(low, high))[None, :]
+
     def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Base and change where the bands are least and most open; see `Family.hull`."""
         ends = np.stack([self._base + self._change * shape for shape in self._bands.range(low, high)])
