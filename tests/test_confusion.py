@@ -20,6 +20,8 @@ from .hard_scenes import DARK, F2, FAR, scene
 
 ONE, OTHER = np.array([0]), np.array([1])
 _FACTOR = 1.2
+_MOST_READOUTS = 1_000_000
+"""A pair with more is compared in fewer channels."""
 Numbers = tuple[int, np.ndarray]
 
 
@@ -88,6 +90,9 @@ def claimed(pixel: Pixel, ours: list[np.ndarray], theirs: list[np.ndarray]) -> t
 
 def check(seed: int) -> None:
     pixel, ours, theirs = random_pair(seed)
+    sizes = [max(summed(side[c], pixel)[1].size for side in (ours, theirs)) for c in range(len(ours))]
+    while len(sizes) > 1 and np.prod(sizes) > _MOST_READOUTS:
+        sizes, ours, theirs = sizes[:-1], ours[:-1], theirs[:-1]
     error, bound = claimed(pixel, ours, theirs)
     least = exact(ours, theirs, pixel)
     assert least / _FACTOR <= error <= _FACTOR * least + 1e-15, (seed, error, least)
