@@ -63,6 +63,9 @@ def _prepare() -> None:
         if hasattr(stream, "reconfigure"):  # a letter that the terminal does not know is no fault
             stream.reconfigure(errors="backslashreplace")
     signal.signal(signal.SIGTERM, _interrupt)
+    # loky's tracker cleans up after a run that had to end at once; that it says so is of no use to anyone.
+    told = [os.environ.get("PYTHONWARNINGS", ""), "ignore:resource_tracker"]
+    os.environ["PYTHONWARNINGS"] = ",".join(filter(None, told))
     warnings.filterwarnings("ignore", message=".*joblib will operate in serial mode")
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit != resource.RLIM_INFINITY and limit < _LEAST_ADDRESS_SPACE:
