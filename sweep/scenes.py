@@ -55,7 +55,7 @@ class Geometry(Section):
         return pitch_um * self.width_px / math.radians(self.fov_deg)
 
 
-_FARTHEST_PX = 1e6
+_FARTHEST_PX = 1e9
 """The mosaic repeats after a few pixels; of larger numbers a float keeps less and less of a pixel."""
 _PlacePx = Annotated[
     list[Annotated[float, Field(ge=-_FARTHEST_PX, le=_FARTHEST_PX)]], Field(min_length=2, max_length=2)
