@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from .evaluate import evaluate
+from .evaluate import BEST_PLACE, evaluate
 from .imaging import imager_of
 from .metrics import CSD
 from .report import read_output, study_of
@@ -26,7 +26,8 @@ _COLUMNS = ("design_id", "scenario", "plan", "promised_dn", "realized_dn")
 
 @dataclass(frozen=True)
 class Audit:
-    """A row per audited design: its id, scenario, promised and realized error, DN (the largest of its CSDs)."""
+    """A row per audited design: its id, scenario, promised and realized error, DN (the largest of its CSDs, at
+    the worst and at the best place)."""
 
     rows: pd.DataFrame
     n_designs: int
@@ -76,7 +77,7 @@ def audit_output(folder: Path, data: Path | None) -> list[str]:
 
 
 def _rows(study: Study, sample: pd.DataFrame) -> Iterator[dict[str, object]]:
-    distances = [name for name in sample.columns if name.startswith(CSD)]
+    distances = [name for name in sample.columns if name.startswith((CSD, BEST_PLACE + CSD))]
     for row in sample.to_dict("records"):
         space = row_space(study, row)
         setup = replace(study.setup(space, row["scenario"]), methods=REFERENCE)

@@ -19,7 +19,7 @@ from ..study import Study
 from .jobs import CHUNK
 from .workers import Workers
 
-MODEL_VERSION = "6"
+MODEL_VERSION = "7"
 """Raised whenever the same study would give other rows; part of every shard's key."""
 _PACKAGES = ("cfa-sweep", "numpy", "scipy", "numba", "scikit-learn", "pandas", "pyarrow", "joblib", "nlopt", "moocore")
 
