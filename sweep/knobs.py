@@ -125,7 +125,7 @@ def _places(study: Study, scenario: str) -> Iterator[Setting]:
             at = target.model_copy(update={"phase_px": (x / _PLACES_PER_PIXEL, y / _PLACES_PER_PIXEL)})
             there = replace(setup, scenario=setup.scenario.model_copy(update={"target": at}))
             exact = np.minimum(exact, _distances(Imager(there).smooth(curves), members))
-    for method in phase.METHODS:
+    for method in phase.LATTICES:
         blur.profile.cache_clear()
         started = time.perf_counter()
         imager = Imager(replace(setup, methods=replace(_SMOOTH, phase=method)))

@@ -108,6 +108,7 @@ def test_the_worst_place_between_the_quarters_of_a_pixel() -> None:
     assert row["csd_green_yellow"] < lattice["csd_green_yellow"][0] - 1  # what a lattice misses
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["RYNCy", "1x3", "center", "out of focus", "large pixels apart"])
 def test_any_place_is_the_continuum(name: str) -> None:
     made = {
@@ -133,6 +134,7 @@ def any_place(seed: int) -> Scene:
         tried += 1000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_random_scenes_keep_their_promise_over_the_continuum(seed: int) -> None:
     assert not broken(any_place(seed), float(10 ** np.random.default_rng(seed).uniform(-1, 1.5)), 4, CSDS[:1])

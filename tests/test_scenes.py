@@ -54,7 +54,9 @@ def test_scenes_are_planned_drawn_and_audited(tmp_path: Path) -> None:
     assert (folder / "figures" / "series-1.svg").is_file()
     plans = output.provenance["plans"]
     assert frame["plan"].iloc[0] == plans["road distance_m=50"]["key"]
-    assert "quarter pixel" in (folder / "report.html").read_text()
+    effects = plans["road distance_m=50"]["effects"]
+    method = next(effect["method"] for effect in effects if effect["effect"] == "phase")
+    assert method in (folder / "report.html").read_text()
     lines = audit_output(folder, None).lines
     audited = pd.read_parquet(folder / "audit.parquet")
     assert lines[0].startswith(f"{len(audited)} of {len(frame)} designs recomputed with every effect on: no error")
