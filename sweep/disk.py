@@ -29,7 +29,7 @@ def is_link(path: Path) -> bool:
     return stat.S_ISLNK(_mode(path))
 
 
-def is_folder(path: Path) -> bool:
+def is_real_folder(path: Path) -> bool:
     """Whether a folder stands there, and no link to one."""
     return stat.S_ISDIR(_mode(path))
 

@@ -18,7 +18,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from .disk import MOST_FACTS, Digest, digest_of, is_folder, is_link, parsed_facts, read_plain
+from .disk import MOST_FACTS, Digest, digest_of, is_real_folder, is_link, parsed_facts, read_plain
 from .errors import Fault, OutputError
 from .run_files import FIGURES, RUN, SUMS, is_drawn, is_own
 from .store import AUDIT, Seal, json_of, write_bytes, write_table
@@ -144,7 +144,7 @@ class Inventory:
         """Remove files of the run and list them no longer; raises OutputError when the disk refuses."""
         gone = [name for name in names if name in self.files]
         for name in gone:
-            if self._within(name) and not is_folder(self.path(name)):
+            if self._within(name) and not is_real_folder(self.path(name)):
                 try:
                     self.path(name).unlink(missing_ok=True)
                 except OSError as error:
@@ -202,7 +202,7 @@ class Inventory:
         if os.path.lexists(path) and name not in self.files:
             raise _in_the_way(self.folder, name)
         _without_empty_folder(path)
-        if is_folder(path):
+        if is_real_folder(path):
             raise _in_the_way(self.folder, name)
 
     def _with_size(self, name: str, held: Digest) -> Digest:
@@ -239,7 +239,7 @@ def _in_the_way(folder: Path, name: str) -> OutputError:
 
 def _without_empty_folder(path: Path) -> None:
     """A folder in the place of a file goes, if nothing is in it."""
-    if is_folder(path):
+    if is_real_folder(path):
         with suppress(OSError):
             path.rmdir()
 

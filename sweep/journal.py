@@ -20,7 +20,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from .disk import is_folder, is_link, opened, read_plain
+from .disk import is_real_folder, is_link, opened, read_plain
 from .errors import Fault, OutputError
 from .store import decoded, encoded, holds, write_bytes
 
@@ -104,7 +104,7 @@ class Journal:
         self.folder = output / SHARDS
         self.entries: dict[str, Entry] = {}
         self._torn = False
-        if os.path.lexists(self.folder) and not is_folder(self.folder):
+        if os.path.lexists(self.folder) and not is_real_folder(self.folder):
             raise OutputError(Fault("is no folder of this run; move it away", str(self.folder)))
         self._read()
 
@@ -130,7 +130,7 @@ class Journal:
 
     def check(self) -> None:
         """Forget what is missing or has another size; a file of the right size is checked when it is used."""
-        here = list(os.scandir(self.folder)) if is_folder(self.folder) else []
+        here = list(os.scandir(self.folder)) if is_real_folder(self.folder) else []
         sizes = {item.name: item.stat().st_size for item in here if item.is_file(follow_symlinks=False)}
         self.entries = {key: entry for key, entry in self.entries.items() if sizes.get(entry.file) == entry.size}
 
@@ -161,7 +161,7 @@ class Journal:
 
     def remove(self) -> None:
         """Drop all of it, after the rows stand in the result table; the journal goes last. Files of others stay."""
-        if is_folder(self.folder):
+        if is_real_folder(self.folder):
             own = [path.name for path in self.folder.iterdir() if _NAMES.fullmatch(path.name)]
             for name in (*own, _JOURNAL):
                 with suppress(IsADirectoryError, FileNotFoundError):

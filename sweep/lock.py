@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
-from .disk import is_folder, opened, read_plain
+from .disk import is_real_folder, opened, read_plain
 from .errors import Fault, OutputError
 from .journal import SHARDS
 from .run_files import FIGURES
@@ -96,7 +96,7 @@ def _said(handle: IO[bytes]) -> str:
 def _clear(output: Path) -> None:
     """Remove what killed commands left half written, but not through links."""
     own = (output / SHARDS, output / FIGURES)
-    for folder in (output, *(inner for inner in own if is_folder(inner))):
+    for folder in (output, *(inner for inner in own if is_real_folder(inner))):
         for path in folder.iterdir():
-            if _LEFT_OVER.fullmatch(path.name) and not is_folder(path):
+            if _LEFT_OVER.fullmatch(path.name) and not is_real_folder(path):
                 path.unlink(missing_ok=True)
