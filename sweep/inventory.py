@@ -18,7 +18,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from .disk import MOST_FACTS, Digest, digest_of, is_real_folder, is_link, parsed_facts, read_plain
+from .disk import MOST_FACTS, Digest, digest_of, is_link, is_real_folder, parsed_facts, read_plain
 from .errors import Fault, OutputError
 from .run_files import FIGURES, RUN, SUMS, is_drawn, is_own
 from .store import AUDIT, Seal, json_of, write_bytes, write_table

@@ -20,7 +20,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from .disk import is_real_folder, is_link, opened, read_plain
+from .disk import is_link, is_real_folder, opened, read_plain
 from .errors import Fault, OutputError
 from .store import decoded, encoded, holds, write_bytes
 
