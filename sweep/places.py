@@ -83,9 +83,7 @@ class AnyPlace:
         return len(phase.CORNERS) * len(self._setup.mosaic.channels) ** 2 * self._knots_nm.size
 
     def at_knots(self, light: FloatArray) -> FloatArray:
-        """Light on the wavelengths of the kernel, ndarray[..., n_wavelengths] -> ndarray[..., n_knots or 1]."""
-        if self._setup.methods.blur == "skip":
-            return np.asarray(light.sum(axis=-1, keepdims=True), dtype=float)
+        """Light on the wavelengths of the kernel, ndarray[..., n_wavelengths] -> ndarray[..., n_knots]."""
         return np.asarray(light @ self._hats.T, dtype=float)
 
     def amounts(self, light: FloatArray) -> FloatArray:
@@ -102,7 +100,7 @@ class AnyPlace:
         return [tuple(name) for name in names.tolist()]
 
     def kernels(self, cells: phase.Cells) -> FloatArray:
-        """Kernel at the corners of cells, ndarray[n_cells, 4, n_channels, n_channels, n_knots or 1]."""
+        """Kernel at the corners of cells, ndarray[n_cells, 4, n_channels, n_channels, n_knots]."""
         corners = cells.corners
         names = self._named(corners.places_px, corners.home_px)
         if sum(kernel.nbytes for kernel in self._kernels.values()) > _KEPT_BYTES:
@@ -112,7 +110,8 @@ class AnyPlace:
             cases, methods = corners.some(np.array(list(new.values()))), self._setup.methods
             made = make_kernel(self._setup, methods, self._knots_nm, by_pixel=False, work=self._work, cases=cases)
             self._work["places"] += len(new)
-            self._kernels |= dict(zip(new, made.light, strict=True))
+            whole = np.broadcast_to(made.light, (*made.light.shape[:3], self._knots_nm.size))
+            self._kernels |= dict(zip(new, whole, strict=True))
         found = np.stack([self._kernels[name] for name in names])
         return found.reshape(len(cells.centers), len(phase.CORNERS), *found.shape[1:])
 

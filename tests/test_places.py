@@ -146,6 +146,15 @@ def test_thirty_random_scenes_keep_their_promise_over_the_continuum(seed: int) -
     assert not broken(any_place(seed), float(10 ** np.random.default_rng(seed).uniform(-1, 1.5)), 6)
 
 
+def test_a_sharp_image_at_any_place() -> None:
+    made = scene("sharp", "RGGB", SMALL | {"noise": False})
+    methods = replace(REFERENCE, blur="skip", quantization="skip", saturation="skip", phase="within 1 DN")
+    row = evaluate(Imager(replace(made.setup, methods=methods)), made.curves)
+    smallest, largest = searched(made, CSDS[:1], 5, methods)[CSDS[0]]
+    assert row[CSDS[0]][0] == pytest.approx(smallest, abs=1 + 1e-3)
+    assert row[BEST_PLACE + CSDS[0]][0] == pytest.approx(largest, abs=1 + 1e-3)
+
+
 def test_a_plan_that_cannot_keep_the_tolerance_says_so() -> None:
     """Whole numbers without noise jump from place to place: no more is promised than what rounding moves."""
     made = scene("rounded", "RYNCy", {"target": FAR | {"phase_px": "any"}, "optics": F2})
