@@ -12,7 +12,7 @@ PACKAGE = Path(__file__).parent.parent / "sweep"
 # From the bottom. A unit is a module or a folder of the package.
 LEVELS = [
     {"errors", "arrays", "cache", "completion", "records"},
-    {"schema", "inputs", "disk", "endings"},
+    {"schema", "inputs", "disk", "endings", "options"},
     {
         "kernels",
         "spectra",
@@ -55,7 +55,7 @@ ONLY_USER = {
     "moocore": "pareto",
     "plotly": "report",
     "jinja2": "report",
-    "typer": "cli endings",
+    "typer": "cli endings options",
     "sklearn": "recognition",
     "numba": "kernels noise_kernels confusion_kernels",
 }
