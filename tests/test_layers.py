@@ -11,8 +11,8 @@ PACKAGE = Path(__file__).parent.parent / "sweep"
 
 # From the bottom. A unit is a module or a folder of the package.
 LEVELS = [
-    {"errors", "arrays", "cache", "completion", "records"},
-    {"schema", "inputs", "disk", "endings", "options"},
+    {"errors", "arrays", "cache", "completion", "records", "disk"},
+    {"schema", "inputs", "endings", "options"},
     {
         "kernels",
         "spectra",
