@@ -5,12 +5,16 @@ What stands in the tool's own folders, where a link is not to be followed, is re
 
 from __future__ import annotations
 
+import codecs
 import os
 import stat
 from pathlib import Path
 
 from .disk import opened
 from .errors import Fault, SweepError
+
+NO_UTF_16 = "UTF-8; UTF-16? save as UTF-8"
+"""What to allow where a text seems to be UTF-16."""
 
 
 def read_input(path: Path, most_bytes: int, refused: type[SweepError]) -> bytes:
@@ -32,6 +36,12 @@ def read_input(path: Path, most_bytes: int, refused: type[SweepError]) -> bytes:
     if size > most_bytes:
         raise refused(Fault("the file is too large", str(path), None, None, f"{size:,} bytes", f"up to {most_bytes:,}"))
     return content
+
+
+def not_utf8(content: bytes, error: UnicodeDecodeError) -> tuple[str, bool]:
+    """What is wrong with a text that is not UTF-8, and whether it begins as UTF-16 does."""
+    wide = content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+    return f"not UTF-8 text ({error.reason} at byte {error.start})", wide
 
 
 def is_file(path: Path) -> bool:
