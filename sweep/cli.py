@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .completion import run_folders, study_files
+from .completion import run_folders
 from .endings import end_now, ends_in_lines
 from .errors import BrokenPromiseError, DataError, Fault, InterruptedRunError, StudyError, SweepError
+from .options import DataFolder, Outputs, Quantity, RunFolder, StudyPath
 
 if TYPE_CHECKING:
     from .report import Output
@@ -22,18 +23,6 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
-
-StudyPath = Annotated[
-    Path, typer.Argument(help="The study file, YAML.", show_default=False, autocompletion=study_files)
-]
-RunFolder = Annotated[
-    Path, typer.Argument(help="Output folder of a study.", show_default=False, autocompletion=run_folders)
-]
-Outputs = Annotated[Path, typer.Option(help="Folder for the results of all studies.")]
-Quantity = Literal["energy", "photons"]
-DataFolder = Annotated[
-    Path | None, typer.Option("--data", help="Folder that the study's files are looked for in first.")
-]
 
 
 @app.command()
@@ -218,9 +207,8 @@ def calibrate(
 ) -> None:
     """Fit the built-in surrogate curves to the figures that STUDY publishes."""
     from .calibration import calibrate as fit
-    from .calibration.output import lines, parameter_file, record
+    from .calibration.output import write
     from .progress import ProgressDisplay
-    from .store import write_json, write_text
     from .study import load_study
 
     loaded = load_study(study)
@@ -230,11 +218,8 @@ def calibrate(
         raise StudyError(f"{study}: the study has no `published` figures to fit to")
     with ProgressDisplay() as display:
         found = fit(printed, seed, starts, jobs or os.cpu_count() or 1, display.update)
-    write_text(parameter_file(found), output / "surrogate.yaml")
-    write_json(record(found), output / "calibration.json")
-    for line in lines(found):
+    for line in write(found, output):
         typer.echo(line)
-    typer.echo(f"Files: {output}/: surrogate.yaml (ships as sweep/data/surrogate.yaml), calibration.json.")
 
 
 @app.command()

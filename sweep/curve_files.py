@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import codecs
 import csv
 import hashlib
 import io
@@ -16,13 +15,11 @@ import numpy as np
 
 from .arrays import FloatArray
 from .errors import DataError, Fault, nearest
-from .inputs import read_input
+from .inputs import NO_UTF_16, not_utf8, read_input
 from .mat_files import DamagedError, read_variables
 from .spectra import LARGEST, Curves, check_samples
 
 WAVELENGTH = "wavelength_nm"
-NO_UTF_16 = "UTF-8; UTF-16? save as UTF-8"
-"""What is allowed where the text of a file looks like that."""
 MOST_BYTES = 40_000_000
 MOST_CURVES = 2_000
 MOST_SAMPLES = 100_000
@@ -84,8 +81,7 @@ def _decoded(path: Path) -> tuple[str, list[Fault]]:
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        wide = content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
-        problem = f"not UTF-8 text ({error.reason} at byte {error.start})"
+        problem, wide = not_utf8(content, error)
         fault = Fault(problem, str(path), allowed=NO_UTF_16 if wide else None)
         return content.decode("utf-16" if wide else "latin-1", errors="replace"), [fault]
     if "\0" in text:

@@ -1,4 +1,6 @@
-"""Reading files that others may have put there: plain files alone, no links, no more bytes than expected."""
+"""Reading files in the tool's own folders, where others may have put something: plain files alone, no links, no more
+bytes than expected. What a user names, links included, is read by `inputs`.
+"""
 
 from __future__ import annotations
 
@@ -41,10 +43,10 @@ def _mode(path: Path) -> int:
         return 0
 
 
-def opened(path: Path, flags: int = os.O_RDONLY, mode: str = "rb") -> IO[bytes]:
-    """Open a plain file; raises OSError for links, folders, pipes and devices, none of which is touched."""
+def opened(path: Path, flags: int = os.O_RDONLY, mode: str = "rb", *, links: bool = False) -> IO[bytes]:
+    """Open a plain file; raises OSError for folders, pipes, devices and, but for `links`, links: none is read."""
     # Without O_NONBLOCK, opening a pipe would wait for who writes into it.
-    number = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
+    number = os.open(path, flags | (0 if links else os.O_NOFOLLOW) | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
     if not stat.S_ISREG(os.fstat(number).st_mode):
         os.close(number)
         raise OSError(errno.EINVAL, "not a plain file", str(path))

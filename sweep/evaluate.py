@@ -23,7 +23,8 @@ from .discrimination import (
     state_error_bound,
 )
 from .effects.phase import Cases
-from .imaging import Changing, Imager, smooth_imager
+from .electrons import Changing
+from .imaging import Imager, smooth_imager
 from .metrics import CSD, Pair, cfa_sensitivity, class_pairs, csd_name, separation, separations, separations_along
 from .noisy_readout import NoisyReadout
 from .places import Extremes
@@ -140,7 +141,7 @@ def _told_apart(
         shaped = zip(cases, shapes, strict=True)
         return np.asarray(np.max([quantity(*case, *of, shape) for case, shape in shaped], axis=0), dtype=float)
 
-    few = imager.few_pixels
+    few = imager.readout.few_pixels
     found: dict[str, FloatArray] = {}
     if few is None:
         error = {}
@@ -151,7 +152,7 @@ def _told_apart(
         state_bound = errors_over(state_error_bound, members)
     else:
         electrons = imager.pixel_electrons(curves)
-        exact = [confusion.errors(electrons[:, case], few, imager.pixel, members) for case in range(len(cases))]
+        exact = [confusion.errors(electrons[:, case], few, imager.readout.pixel, members) for case in range(len(cases))]
         error = {pair: np.max([each.error[pair] for each in exact], axis=0) for pair in exact[0].error}
         bound = {pair: np.max([each.bound[pair] for each in exact], axis=0) for pair in exact[0].bound}
         state_bound = np.max([each.state_bound for each in exact], axis=0)
@@ -173,11 +174,11 @@ def _over_all_places(
     """Put the extremes over all places into the columns, which hold those over the lattice."""
     assert imager.anywhere is not None
     for design in np.flatnonzero(np.isfinite(exposure_s)):
-        light = imager.light_dn(curves[design], exposure_s[design])
+        light = imager.electrons.light_dn(curves[design], exposure_s[design])
         if not np.isfinite(light).all():
             continue
         found = imager.anywhere.extremes(light)
-        if not imager.straight:
+        if not imager.setup.methods.straight:
             found = _as_read(imager, curves[design : design + 1], found)
         for pair, extremes in found.items():
             name = csd_name(pair)
@@ -194,7 +195,8 @@ def _as_read(imager: Imager, curves: FloatArray, found: Mapping[Pair, Extremes |
     if not at:
         return dict(found)
     there = Imager(imager.setup, imager.work, cases=Cases(*np.moveaxis(np.array(at), 1, 0)))
-    response = there.read(curves)[0].reshape(len(at), -1, *imager.signals.shape[:1], len(imager.setup.mosaic.channels))
+    response = there.read(curves)[0]
+    response = response.reshape(len(at), -1, *response.shape[2:])
     read = [separations(moments, imager.setup.members) for moments in response]
     return {
         pair: None

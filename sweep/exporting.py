@@ -16,7 +16,7 @@ from .errors import Fault, OutputError, SweepError, nearest
 from .filter_files import color_hints, csv_text, filter_names, isetcam_mat, unique_names
 from .mosaics import Mosaic
 from .report import Output, check_kept, read_output, study_of
-from .report.content import amount, readable
+from .report.names import amount, readable
 from .runner.drawn import row_curves
 from .store import RESULTS, batches, write_bytes
 from .study import Study, folder_name

@@ -143,7 +143,7 @@ class FilterProgram:
         problem, setup = self.problem, self.problem.setup
         imager, channel = smooth_imager(setup), setup.modified[0]
         # Exposure does not depend on N, so the response to a filter is linear, plus what does not depend on it.
-        gain = imager.per_qe(0, self.base[None])[:, :, channel]
+        gain = imager.electrons.per_qe(0, self.base[None])[:, :, channel]
         fixed = np.delete(imager.smooth(self.base[None, None])[0], channel, axis=2)
         apart, columns = [np.empty((0, self.base.size))], [np.empty((0, 4))]
         for name, (a, b) in problem.pairs.items():

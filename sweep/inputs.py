@@ -1,12 +1,20 @@
-"""Read a user's file: a regular one, no larger than its kind can be."""
+"""Reading files that a user names: plain ones, also by a link, no larger than their kind can be. Faults name the file.
+
+What stands in the tool's own folders, where a link is not to be followed, is read by `disk`.
+"""
 
 from __future__ import annotations
 
+import codecs
 import os
 import stat
 from pathlib import Path
 
+from .disk import opened
 from .errors import Fault, SweepError
+
+NO_UTF_16 = "UTF-8; UTF-16? save as UTF-8"
+"""What to allow where a text seems to be UTF-16."""
 
 
 def read_input(path: Path, most_bytes: int, refused: type[SweepError]) -> bytes:
@@ -18,7 +26,7 @@ def read_input(path: Path, most_bytes: int, refused: type[SweepError]) -> bytes:
     try:
         if not stat.S_ISREG(path.stat().st_mode):
             raise refused(Fault("not a file", str(path), allowed="a file on a disk; no folder, pipe or device"))
-        with open(path, "rb", opener=_opened) as handle:
+        with opened(path, links=True) as handle:  # a pipe may have come to its place
             size = os.fstat(handle.fileno()).st_size
             content = handle.read(most_bytes + 1) if size <= most_bytes else b""
     except (OSError, ValueError) as error:  # a ValueError: NUL in a path
@@ -28,6 +36,12 @@ def read_input(path: Path, most_bytes: int, refused: type[SweepError]) -> bytes:
     if size > most_bytes:
         raise refused(Fault("the file is too large", str(path), None, None, f"{size:,} bytes", f"up to {most_bytes:,}"))
     return content
+
+
+def not_utf8(content: bytes, error: UnicodeDecodeError) -> tuple[str, bool]:
+    """What is wrong with a text that is not UTF-8, and whether it begins as UTF-16 does."""
+    wide = content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+    return f"not UTF-8 text ({error.reason} at byte {error.start})", wide
 
 
 def is_file(path: Path) -> bool:
@@ -44,8 +58,3 @@ def is_folder(path: Path) -> bool:
         return path.is_dir()
     except (OSError, ValueError):
         return False
-
-
-def _opened(path: str, flags: int) -> int:
-    """Without waiting, should a pipe have come to the place of the file."""
-    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))

@@ -148,8 +148,8 @@ def _draws(study: Study, scenario: str) -> Iterator[Setting]:
         errors = []
         started = time.perf_counter()
         for _ in range(_REPEATS):
-            drawn = noise.draws_dn(np.broadcast_to(electrons, (draws, *electrons.shape)), imager.pixel, rng)
-            channels = imager.channels_of(drawn.mean(axis=0), 0)
+            drawn = noise.draws_dn(np.broadcast_to(electrons, (draws, *electrons.shape)), imager.readout.pixel, rng)
+            channels = imager.readout.channels_of(drawn.mean(axis=0), 0)
             errors.append(np.abs(_distances(channels[None, None], setup.members) - exact).max())
         seconds = (time.perf_counter() - started) / _REPEATS
         error = float(np.sqrt(np.mean(np.square(errors))))

@@ -9,7 +9,7 @@ from .disk import read_facts
 from .errors import Fault, StudyError, SweepError
 from .inputs import is_folder
 from .lock import holder
-from .report.content import amount
+from .report.names import amount
 from .runner import output_folder
 from .runner.folders import held_by
 from .store import PROVENANCE

@@ -178,8 +178,7 @@ class Planner:
             return bool(getattr(methods, effect) == getattr(REFERENCE, effect))
         if effect == "saturation" and methods.saturation == "skip":
             return self._exact["noise"] is not None or methods.noise == "skip"
-        straight = methods.saturation == "skip" and methods.quantization == "skip"
-        return effect != "sampling" or methods.sampling != "skip" or straight
+        return effect != "sampling" or methods.sampling != "skip" or methods.straight
 
     def _reason(self, effect: str, method: str, promised: float, tried: Mapping[tuple[str, str], float]) -> str:
         exact = self._exact[effect]

@@ -70,7 +70,7 @@ def recognize(
     rule = _MostLikely(imager, curves, signals)
     step = max(1, _AT_ONCE // (len(signals) * n_pixels))
     for block in (slice(start, start + step) for start in range(0, patches, step)):
-        whole = noise.draws_dn(electrons[place[block], signals], imager.pixel, rng)
+        whole = noise.draws_dn(electrons[place[block], signals], imager.readout.pixel, rng)
         drawn[block] = whole[..., seen]
         said[block] = state[rule.of(whole, place[block])]
     found = dict(_accuracy(MOST_LIKELY, truth, said))
@@ -92,7 +92,7 @@ class _MostLikely:
 
     def __init__(self, imager: Imager, curves: FloatArray, signals: IndexArray) -> None:
         read = imager.read_with_noise(curves)
-        self._imager = imager
+        self._readout = imager.readout
         self._mean = read.mean[0][:, signals]
         self._variance = np.maximum(read.variance[0][:, signals], _LEAST_VARIANCE)
 
@@ -101,8 +101,8 @@ class _MostLikely:
         best = np.empty(place.shape, dtype=np.intp)
         for at in np.unique(place):
             here = place == at
-            kernel = int(at) * self._imager.n_cases // len(self._mean)
-            values = self._imager.channels_of(drawn[here], kernel)  # [n, n_channels]
+            kernel = int(at) * self._readout.n_cases // len(self._mean)
+            values = self._readout.channels_of(drawn[here], kernel)  # [n, n_channels]
             m, v = self._mean[at], self._variance[at]
             likelihood = -0.5 * ((values[:, None] - m) ** 2 / v + np.log(v)).sum(axis=2)
             best[here] = likelihood.argmax(axis=1)

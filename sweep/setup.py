@@ -72,6 +72,11 @@ class Methods:
             _refuse_unknown(f"method of {effect}", (method,), known)
             object.__setattr__(self, effect, method)
 
+    @property
+    def straight(self) -> bool:
+        """Whether digital numbers are linear in electrons: neither clipped nor rounded."""
+        return self.saturation == "skip" and self.quantization == "skip"
+
 
 def _refuse_unknown(what: str, names: Iterable[str], known: Collection[str]) -> None:
     for name in names:

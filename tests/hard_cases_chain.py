@@ -304,5 +304,5 @@ def nan_in_one_design() -> Result:
             return Result(np.inf, 0.0)
         for name in one:
             off = np.abs(np.delete(one[name], 17) - np.delete(other[name], 17)).max()
-            error = max(error, float(off) / (imager.pixel.full_scale_dn if "csd" in name else 1.0))
+            error = max(error, float(off) / (imager.readout.pixel.full_scale_dn if "csd" in name else 1.0))
     return Result(error, 64 * EPS)

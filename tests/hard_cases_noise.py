@@ -154,7 +154,7 @@ def a_blinding_signal() -> Result:
         allowed.append((12.8 * wide + 177 * 0.5) * 5 / 384 / 32**4)
     imager = chain(pixel)
     for brightest in (2e4, 1e8, 1e12, 1e100, 1e300, np.inf):
-        found = imager.transfer(np.append(electrons, brightest))[:-1]
+        found = imager.readout.transfer(np.append(electrons, brightest))[:-1]
         results += [(abs(float(f - e)), a) for f, e, a in zip(found, exact, allowed, strict=True)]
     return worst(results)
 
@@ -228,8 +228,8 @@ def poisson_draws() -> Result:
 def all_clipped() -> Result:
     imager = chain(Pixel())
     electrons = np.array([1e8, 2e8, 1e14, 1e100, 1e300, np.inf])
-    found = imager.transfer(electrons)
-    spread = float(np.ptp(found) + imager.variance_dn(electrons).max())
+    found = imager.readout.transfer(electrons)
+    spread = float(np.ptp(found) + imager.readout.variance_dn(electrons).max())
     return worst([(spread, 1e-20 * 4095), (float(np.abs(found - 4095).max()), EPS * 4095)])
 
 

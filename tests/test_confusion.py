@@ -136,12 +136,12 @@ def test_coarse_digital_numbers_are_not_told_apart_better_than_they_can_be(
     curves = np.empty((1, 0, study.grid.size))
     found = {name: values[0] for name, values in evaluate(imager, curves, ["green", "yellow", "red"]).items()}
     electrons = imager.pixel_electrons(curves)[0, 0]
-    own = imager.few_pixels
+    own = imager.readout.few_pixels
     assert own is not None
     # The distances of means do not say which pair is worst: all of them.
     members = imager.setup.members
     worst = max(
-        exact([electrons[i, c] for c in own], [electrons[j, c] for c in own], imager.pixel)
+        exact([electrons[i, c] for c in own], [electrons[j, c] for c in own], imager.readout.pixel)
         for i, j in product(members["yellow"], members["red"])
     )
     assert worst / _FACTOR <= found["error_yellow_red"] <= _FACTOR * worst + 1e-15

@@ -89,7 +89,7 @@ def electrons(cfa: str, mode: str) -> tuple[np.ndarray, dict[str, Any]]:
     run = next(r for r in ref["runs"] if r["cfa"] == cfa and r["mode"] == mode)
     every = Mosaic.from_rows("all", [ref["qe_names"]])
     setup = isetcam_setup(every, ref["skip_magnification"], run["skip_exposure_s"])
-    return smooth_imager(setup).rates(NOTHING)[0, 0] * run["skip_exposure_s"], run
+    return smooth_imager(setup).electrons.rates(NOTHING)[0, 0] * run["skip_exposure_s"], run
 
 
 @pytest.mark.parametrize("mode", ["fixed", "auto"])
@@ -110,7 +110,9 @@ def test_digital_numbers_are_the_same(cfa: str, channels: list[int], mode: str) 
     if mode == "fixed":
         assert expected.max() < 4095
     # The only difference that is allowed: where ISETCam's ADC saturates at 4096, ours does at 4095.
-    np.testing.assert_array_equal(Imager(every_channel()).transfer(found)[:, channels], np.minimum(expected, 4095))
+    np.testing.assert_array_equal(
+        Imager(every_channel()).readout.transfer(found)[:, channels], np.minimum(expected, 4095)
+    )
 
 
 def test_irradiance_agrees_to_single_precision() -> None:

@@ -11,8 +11,8 @@ PACKAGE = Path(__file__).parent.parent / "sweep"
 
 # From the bottom. A unit is a module or a folder of the package.
 LEVELS = [
-    {"errors", "arrays", "cache", "completion", "records"},
-    {"schema", "inputs", "disk", "endings"},
+    {"errors", "arrays", "cache", "completion", "records", "disk"},
+    {"schema", "inputs", "endings", "options"},
     {
         "kernels",
         "spectra",
@@ -30,7 +30,8 @@ LEVELS = [
     {"spaces", "setup"},
     {"blocks"},
     {"effects"},
-    {"promises", "places", "noisy_readout"},
+    {"promises", "places", "noisy_readout", "electrons"},
+    {"readout"},
     {"plan", "imaging", "confusion"},
     {"evaluate", "recognition"},
     {"store", "problem", "figures"},
@@ -54,7 +55,7 @@ ONLY_USER = {
     "moocore": "pareto",
     "plotly": "report",
     "jinja2": "report",
-    "typer": "cli endings",
+    "typer": "cli endings options",
     "sklearn": "recognition",
     "numba": "kernels noise_kernels confusion_kernels",
 }

@@ -50,9 +50,9 @@ def test_mean_and_variance_of_the_readout_agree_with_draws_of_every_pixel(made: 
     for case in {0, len(electrons) - 1}:
         for signal in (0, len(made.setup.lights.names) - 1):
             pixels = noise.draws_dn(
-                np.broadcast_to(electrons[case, signal], (draws, electrons.shape[2])), imager.pixel, rng
+                np.broadcast_to(electrons[case, signal], (draws, electrons.shape[2])), imager.readout.pixel, rng
             )
-            values = imager.channels_of(pixels, case // per_place)
+            values = imager.readout.channels_of(pixels, case // per_place)
             # 4 sigma of the mean and, by the fourth moment, of the variance.
             off = 4 * values.std(axis=0) / draws**0.5
             np.testing.assert_array_less(np.abs(values.mean(axis=0) - mean[0, case, signal]), off + 1e-9)

@@ -97,10 +97,10 @@ def test_a_whole_pedestal_cancels_to_the_last_digit() -> None:
     made = scene("one", "RGGB", {}, {"offset_dn": 4_000_000.0, "bits": 24, "well_e": 2.0**24, "gain_dn_per_e": 1.0})
     steps = np.arange(1, 41) + 0.5
     electrons = np.concatenate([np.nextafter(steps, 0), steps, np.nextafter(steps, 99)])
-    with_it = Imager(made.setup).transfer(electrons)
-    without = Imager(scene("one", "RGGB", {}, {"bits": 24, "well_e": 2.0**24, "gain_dn_per_e": 1.0}).setup).transfer(
-        electrons
-    )
+    with_it = Imager(made.setup).readout.transfer(electrons)
+    without = Imager(
+        scene("one", "RGGB", {}, {"bits": 24, "well_e": 2.0**24, "gain_dn_per_e": 1.0}).setup
+    ).readout.transfer(electrons)
     np.testing.assert_array_equal(with_it - without, 4_000_000.0)
     np.testing.assert_array_equal(
         without, np.repeat([[0], [1], [1]], 40, axis=1).ravel() + np.tile(np.arange(1, 41), 3)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
+from ..store import write_json, write_text
 from .fit import Fit, ranking
 from .model import Figures
 from .run import Calibration
@@ -23,6 +25,14 @@ filters: transmission = leak + (peak - leak) * product of logistic edges; leak a
 lights: peak in photons, decay lengths toward blue and red; the lamps of a region spread evenly over peak +- spread.
 stopbands: our counterparts of the paper's N_1 to N_4."""
 _SURE, _GUESS = 0.5, 0.9
+
+
+def write(calibration: Calibration, folder: Path) -> list[str]:
+    """Write parameter file and record; returns lines for a person. Raises OutputError when the disk refuses."""
+    write_text(parameter_file(calibration), folder / "surrogate.yaml")
+    write_json(record(calibration), folder / "calibration.json")
+    files = f"Files: {folder}/: surrogate.yaml (ships as sweep/data/surrogate.yaml), calibration.json."
+    return [*lines(calibration), files]
 
 
 def parameter_file(calibration: Calibration) -> str:

@@ -11,7 +11,8 @@ import pandas as pd
 from ..metrics import CSD
 from ..objectives import COMBINED, Objective
 from ..report import Output
-from ..report.content import QUANTITIES, amount, label, readable
+from ..report.names import amount, label, readable
+from ..report.tables import QUANTITIES
 from .fronts import dn_of
 
 _SAME = 1e-9

@@ -15,7 +15,7 @@ from ..metrics import CSD
 from ..objectives import COMBINED, Objective
 from ..pareto import hypervolume
 from ..report import Output
-from ..report.content import readable
+from ..report.names import readable
 from ..sensor import Pixel
 
 _STEP = 0.01

@@ -13,7 +13,7 @@ import pandas as pd
 
 from ..errors import Fault, OutputError, SweepError
 from ..report import Output, read_output
-from ..report.content import axis_label, readable
+from ..report.names import axis_label, readable
 from ..report.pages import inlined, page, rows
 from ..store import write_bytes, write_csv, write_text
 from ..study import folder_name

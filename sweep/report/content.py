@@ -1,4 +1,4 @@
-"""What the report says and shows, as plain values."""
+"""What the figures of the report show, as plain values."""
 
 from __future__ import annotations
 
@@ -10,40 +10,16 @@ import pandas as pd
 from ..chromaticity import display_colors
 from ..evaluate import BEST_PLACE, WORST
 from ..figures import TYPE_COLORS, ChartFigure, Cloud, CurvesFigure, ParetoFigure, Points
-from ..metrics import CSD
 from ..series import Line, SeriesFigure
 from ..spectra import WavelengthGrid
+from .names import amount, axis_label, label, worst_case
 from .outputs import Output
 
 LIMIT_NAME = "limit of any filter, unquantized"
-QUANTITIES = ("sensitivity", "cfa_sensitivity")
 _SENSITIVITY_LABELS = {
     "sensitivity": "sensitivity of the modified channel (1 = the channel it replaces)",
     "cfa_sensitivity": "sensitivity of the CFA (1 = a sensor without color filters)",
 }
-
-
-def readable(column: str) -> str:
-    """A column's name as people write it."""
-    worst = _worst(column)
-    plain = column.removeprefix(WORST)
-    if plain.startswith(CSD):
-        return worst + plain.removeprefix(CSD).replace("_", "/") + " CSD"
-    return worst + {"cfa_sensitivity": "CFA sensitivity"}.get(plain, plain)
-
-
-def _worst(column: str) -> str:
-    return "worst-case " if column.startswith(WORST) else ""
-
-
-def axis_label(column: str) -> str:
-    """A quantity's name with its unit, if it has one."""
-    return readable(column) + (" / DN" if CSD in column else "")
-
-
-def amount(column: str, value: float, digits: int = 0) -> str:
-    """A quantity's value with its unit; ratios, and combined objectives, have none and four digits."""
-    return f"{value:.{digits}f} DN" if CSD in column else f"{value:.4f}"
 
 
 def pareto_figure(output: Output, scenario: str, cfa: str | None) -> ParetoFigure:
@@ -67,13 +43,13 @@ def pareto_figure(output: Output, scenario: str, cfa: str | None) -> ParetoFigur
     where = "" if cfa is None else f", {cfa}"
     return ParetoFigure(
         title=f"{output.study['study']}{where}: what separation costs in sensitivity",
-        x_label=_worst(output.trade_off[1]) + _SENSITIVITY_LABELS[output.trade_off[1].removeprefix(WORST)],
+        x_label=worst_case(output.trade_off[1]) + _SENSITIVITY_LABELS[output.trade_off[1].removeprefix(WORST)],
         y_label=axis_label(output.trade_off[0]),
         groups=groups,
         lines=_trade_offs(output, scenario, cfa),
         levels=dict(zip(references["cfa"], references[output.trade_off[0]], strict=True)),
         bound=limit,
-        bound_text="" if limit is None else f"{_worst(output.trade_off[1])}sensitivity >= {limit:g}",
+        bound_text="" if limit is None else f"{worst_case(output.trade_off[1])}sensitivity >= {limit:g}",
     )
 
 
@@ -235,59 +211,6 @@ def drawn(output: Output) -> pd.DataFrame:
     """Rows whose filter's curve was kept: named designs, the search's answer, the best of each sweep."""
     ids = [int(c.split(":")[1]) for c in output.curves.columns if c.startswith("design:")]
     return output.table[output.table["design_id"].isin(ids)]
-
-
-def label(row: dict[object, object]) -> str:
-    """A design's name, or its number."""
-    return str(row["name"]) if isinstance(row["name"], str) else f"design {row['design_id']}"
-
-
-def comparison_table(output: Output) -> pd.DataFrame:
-    """Plain CFAs, named designs and the search's answer with all CSDs and sensitivities."""
-    rows = output.kind("reference", "design", "search")
-    return _shown(rows, ["name", "scenario", *output.distances, *QUANTITIES, *output.further, "feasible"])
-
-
-def best_table(output: Output, most: int = 12) -> pd.DataFrame:
-    """The best feasible designs with their parameters."""
-    ranked = output.best.head(most)
-    columns = [
-        "design_id",
-        "kind",
-        "cfa",
-        "scenario",
-        *output.parameters,
-        *output.distances,
-        *QUANTITIES,
-        *output.further,
-        "pareto",
-    ]
-    return _shown(ranked, columns)
-
-
-def geometry_table(output: Output) -> pd.DataFrame:
-    """Object resolution of each distance scenario (the paper's Table 1)."""
-    rows = [
-        {
-            "scenario": name,
-            "distance_m": g.distance_m,
-            "fov_deg": g.fov_deg,
-            "object_resolution_px": round(g.object_resolution_px, 1),
-        }
-        for name, g in output.geometry.items()
-    ]
-    return pd.DataFrame(rows)
-
-
-def _shown(rows: pd.DataFrame, columns: list[str]) -> pd.DataFrame:
-    shown = rows[columns].copy()
-    for column in columns:
-        if column.removeprefix(WORST).startswith(CSD):
-            shown[column] = shown[column].round(1)
-        elif shown[column].dtype == np.float64:
-            shown[column] = shown[column].round(4)
-    several = rows["scenario"].nunique() > 1
-    return shown if several else shown.drop(columns="scenario")
 
 
 def _curves(output: Output, prefix: str) -> dict[str, np.ndarray]:

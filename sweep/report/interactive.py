@@ -15,8 +15,10 @@ from ..pareto import knee
 from ..series import SeriesFigure
 from . import content
 from .history import history_of
+from .names import readable
 from .noise import all_series
 from .outputs import Output
+from .tables import QUANTITIES
 
 _MOST_POINTS = 6_000
 """Swept designs of each group, feasible or not, that the page holds; the front and the named designs are all there."""
@@ -104,7 +106,7 @@ def _columns(output: Output, rows: pd.DataFrame) -> dict[str, dict[str, Any]]:
         *output.trade_off,
         *output.parameters,
         *output.distances,
-        *content.QUANTITIES,
+        *QUANTITIES,
         *output.further,
         "violation",
     )
@@ -113,7 +115,7 @@ def _columns(output: Output, rows: pd.DataFrame) -> dict[str, dict[str, Any]]:
         values = rows[name].to_numpy(dtype=float)
         if np.isfinite(values).any() or name in output.trade_off:
             digits = 1 if "csd_" in name else 2 if name in output.parameters else 4
-            label = name if name in output.parameters else content.readable(name)
+            label = name if name in output.parameters else readable(name)
             found[name] = {"label": label, "digits": digits, "values": _packed(values, "f4")}
     return found
 
@@ -210,7 +212,7 @@ def _history(output: Output) -> dict[str, Any] | None:
         "best": _finite(history.best),
         "volume": None if history.volume is None else history.volume.tolist(),
         "least_sensitivity": history.least_sensitivity,
-        "label": content.readable(output.objective),
+        "label": readable(output.objective),
     }
 
 
@@ -240,7 +242,7 @@ def _front(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
     """The feasible front, every digit of it, for its file."""
     own = rows[rows["feasible"] & rows["pareto"] & (rows["kind"] == "sweep")]
     names = ["design_id", "scenario", "cfa", *_used(own, output.parameters), *output.distances]
-    names += [name for name in dict.fromkeys((*content.QUANTITIES, *output.further)) if name not in names]
+    names += [name for name in dict.fromkeys((*QUANTITIES, *output.further)) if name not in names]
     return {"columns": names, "rows": [[_plain(value) for value in row] for row in own[names].itertuples(index=False)]}
 
 

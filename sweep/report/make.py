@@ -16,9 +16,10 @@ from ..objectives import Objective
 from ..run_files import FIGURES, REPORT, is_drawn
 from ..series import draw_series
 from ..store import csv_of, encoded
-from . import content
+from . import content, tables
 from .comparison import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
 from .interactive import payload
+from .names import readable
 from .noise import all_series, recognition_table
 from .outputs import Output
 from .pages import inlined, library, page, rows, script
@@ -76,7 +77,7 @@ def _html(output: Output, images: Sequence[tuple[str, str]], published: pd.DataF
         folder=output.folder.as_posix(),
         quoted=shlex.quote(output.folder.as_posix()),
         objective=str(Objective.model_validate(output.study["objective"])),
-        objective_words=content.readable(output.objective),
+        objective_words=readable(output.objective),
         answer=answer_sentences(output),
         counts=counts_line(output),
         interactive=drawn if drawn["views"] or drawn["series"] else None,
@@ -89,10 +90,10 @@ def _html(output: Output, images: Sequence[tuple[str, str]], published: pd.DataF
         group_rows=[rows(effect_table(group)) for group in groups],
         audited=output.audited is not None,
         images=images,
-        comparison=rows(content.comparison_table(output)),
-        best=rows(content.best_table(output)),
+        comparison=rows(tables.comparison_table(output)),
+        best=rows(tables.best_table(output)),
         recognition=rows(recognition_table(output)),
-        geometry=rows(content.geometry_table(output)),
+        geometry=rows(tables.geometry_table(output)),
         published=rows(published),
         constraints={name: str(bound) for name, bound in output.constraints.items()},
         summary=summary_lines(output),

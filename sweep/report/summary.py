@@ -10,9 +10,11 @@ import numpy as np
 
 from ..series import SeriesFigure
 from .comparison import comparison_lines, comparison_with_published
-from .content import amount, geometry_table, readable, series_figures
+from .content import series_figures
+from .names import amount, readable
 from .noise import usable_lines
 from .outputs import Output
+from .tables import geometry_table
 
 _MOST_PARAMETERS = 10
 _MOST_SCENARIOS = 8

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import codecs
 from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
@@ -11,9 +10,8 @@ from typing import Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from ..curve_files import NO_UTF_16
 from ..errors import MOST_FAULTS, Fault, StudyError, nearest
-from ..inputs import read_input
+from ..inputs import NO_UTF_16, not_utf8, read_input
 from .yaml_tree import Key, Tree
 
 _MOST = (500_000, 50_000)
@@ -197,8 +195,7 @@ def _text(path: Path, most_bytes: int) -> str:
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        wide = content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
-        problem = f"not UTF-8 text ({error.reason} at byte {error.start})"
+        problem, wide = not_utf8(content, error)
         line = None if wide else content.count(b"\n", 0, error.start) + 1
         raise StudyError(Fault(problem, str(path), line, allowed=NO_UTF_16 if wide else "UTF-8")) from None
     if "\0" in text:
