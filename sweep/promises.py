@@ -2,7 +2,10 @@
 
 Effects are switched from the reference to their method one after the other; each promise bounds what that step changes
 in any CSD, for every design of the scene. So the sum bounds the whole. The readout's effects come first: once it is
-straight, what the optics change passes through it unchanged.
+straight, what the optics change passes through it unchanged. Where it still bends, a promise of the optics is the
+smaller one of two bounds: what they move pixel by pixel (`effects.pixelwise`), and what they change in a straight
+readout, with as much as both distances may differ from that. Where the light may fall anywhere, the promise of `phase`
+already holds the latter: its extremes are those of the straight response, so that is all that the optics change.
 """
 
 from __future__ import annotations
@@ -33,8 +36,10 @@ from .effects import (
     saturation,
 )
 from .effects.between import Between, Deviation
-from .effects.bounds import CORNERS, Amounts, Box, Reach, Spread
+from .effects.bounds import CORNERS, Amounts, Box, Reach, Spread, Step
 from .effects.kernel import make_kernel
+from .effects.pixelwise import Moves
+from .effects.work import estimated_work
 from .setup import REFERENCE, Methods
 
 EFFECTS: Mapping[str, ModuleType] = {
@@ -54,8 +59,6 @@ EFFECTS: Mapping[str, ModuleType] = {
 }
 """Every effect in the order in which it is switched to its method; methods go from the cheapest to the reference."""
 READOUT = ("noise", "quantization", "saturation", "pedestal")
-_NOISE_COST = 8
-"""A pixel through the table of the mean readout costs about as much as this many multiplications."""
 
 
 class Promises:
@@ -71,6 +74,7 @@ class Promises:
         self._deviations: dict[Methods, Deviation] = {}
         self._gaps: dict[tuple[str, float], float] = {}
         self._promises: dict[tuple[str, Methods, Methods], float] = {}
+        self._moves = Moves(self.setup, self.reach)
 
     def promise(self, effect: str, before: Methods, after: Methods) -> float:
         """What switching `effect` from its reference changes in any CSD, DN."""
@@ -83,11 +87,16 @@ class Promises:
         if effect in READOUT:
             return self._readout_promise(effect, after)
         # What optics change does not depend on these.
-        others = {e: getattr(REFERENCE, e) for e in ("noise", "pedestal", "quadrature") if e != effect}
+        same = ("noise", "pedestal", "quadrature") if self._is_straight(after) else ("quadrature",)
+        others = {e: getattr(REFERENCE, e) for e in same if e != effect}
         key = (effect, replace(before, **others), replace(after, **others))
         if key not in self._promises:
             self._promises[key] = self._linear_promise(*key)
         return self._promises[key]
+
+    @staticmethod
+    def _is_straight(methods: Methods) -> bool:
+        return methods.saturation == "skip" and methods.quantization == "skip"
 
     def _readout_promise(self, effect: str, after: Methods) -> float:
         """Ranges of the change in each channel, put together over the channels."""
@@ -119,7 +128,7 @@ class Promises:
         promised = 0.0
         for effect in READOUT:
             after = replace(methods, **{effect: "skip"})
-            if after != methods:
+            if after != methods and EFFECTS[effect].skip_is_exact(self.setup) is None:
                 promised += self._readout_promise(effect, after)
                 methods = after
         return promised
@@ -220,9 +229,9 @@ class Promises:
             self._amounts[digest] = self.reach.amounts(factor, low, high)
         return self._amounts[digest]
 
-    def _linear_promise(self, effect: str, before: Methods, after: Methods) -> float:
-        box, setup, reach = self.box, self.setup, self.reach
-        straight = after.saturation == "skip" and after.quantization == "skip"
+    def _step(self, effect: str, before: Methods, after: Methods, *, straight: bool) -> Step:
+        """What switching an effect of the optics changes; `straight`: as seen by a straight readout."""
+        box, setup = self.box, self.setup
         scale = 1.0
         falls = illumination.factor(setup, after.illumination if effect != "illumination" else before.illumination)
         base = changed = self._sums(self.spectrum * falls, box.low, box.high)
@@ -242,7 +251,7 @@ class Promises:
             changed = self._sums((self.spectrum - other) * falls, box.low, box.high)
             base, change = self._sums(other * falls, box.low, box.high), now
         elif effect == "flicker":
-            scale = self._flicker_share(after.flicker, straight=straight)
+            scale = flicker.missed(after.flicker, self.reach.least_light, self.reach.most_light, straight=straight)
             change, remainder = now * scale, remainder * scale
         else:
             change = now - then
@@ -250,52 +259,39 @@ class Promises:
                 remainder = (remainder + self._between_knots(after)) * bool(change.any())
             elif after.blur != "skip":
                 remainder = self._gap(after, after.blur)
-        if remainder == 0 and not change.any():
-            return 0.0
-        left = np.broadcast_to(left, change.shape)
-        between = self._spread(effect, before, after, change, left, scale)
-        # What places change is bounded for a straight readout, and for what it differs from that.
-        straight = straight or effect == "phase"
-        found = reach.largest_change(changed, change, remainder, base, left, straight=straight, between=between)
+        return Step(changed, change, remainder, base, np.broadcast_to(left, change.shape), scale, falls)
+
+    def _linear_promise(self, effect: str, before: Methods, after: Methods) -> float:
+        """Of an effect of the optics: in a straight readout, and what a readout that is not adds to that."""
+        step, found = self._step(effect, before, after, straight=True), 0.0
+        if step.remainder != 0 or step.change.any():
+            between = self._spread(effect, before, after, step.change, step.left, step.scale)
+            found = self.reach.largest_change(*step[:5], between=between)
         if effect == "phase":
             return found + 2 * self._as_read(after)
-        steep = (
-            quantization.steepness(setup) if after.quantization == "round" and setup.scenario.noise is not None else 1.0
-        )
-        return found * steep
+        if self._is_straight(after) or self._anywhere(after):
+            return found
+        return self._bent_promise(effect, before, after, found)
 
-    def _flicker_share(self, method: str, *, straight: bool) -> float:
-        """What a method misses of the light, relative to the most light of a pulsed exposure."""
-        reach = self.reach
-        below, above = 1 - reach.least_light, reach.most_light - 1
-        if method == "ends":
-            return 0.0 if straight else (below + above) / 2 / reach.most_light
-        return (below if straight else max(below, above)) / reach.most_light
+    def _bent_promise(self, effect: str, before: Methods, after: Methods, found: float) -> float:
+        """See the head of this file; `found`: of a straight readout."""
+        clips, rounds = after.saturation == "clip", after.quantization == "round"
+        hard = rounds and self.setup.scenario.noise is None
+        # A step of rounding is as high as it is, however little a pixel moves; without pixels none can be compared.
+        if effect == "sampling" or (hard and found > 0):
+            return found + 2 * self._as_read(after)
+        step = self._step(effect, before, after, straight=False)
+        wanted = self._wanted(before), self._wanted(after)
+        moved = self._moves.of(effect, *wanted, step.changed, step.falls) * step.scale
+        moved += step.remainder * step.changed.most_each.sum(axis=1)[:, None]
+        if not moved.any():
+            return 0.0
+        as_read = found + 2 * self._as_read(after)
+        if hard:
+            return as_read
+        every = 0.0 if clips else self.reach.largest_change(*step[:5], every=True)
+        return min(as_read, self._moves.promise(every, moved, clips=clips, rounds=rounds))
 
     def work_of(self, methods: Methods) -> float:
         """Estimated operations of a run of all designs."""
-        setup, target = self.setup, self.setup.scenario.target
-        grid, signals = setup.grid.size, len(setup.lights.photons)
-        channels = len(setup.mosaic.channels)
-        straight = methods.saturation == "skip" and methods.quantization == "skip"
-        cases, pixels, kernel = 1.0, float(channels), 0.0
-        if target is not None and methods.sampling != "skip":
-            cases = float(phase.n_places(setup, methods.phase))
-            across = 2 * sampling.radii_px(setup, target)[1] + 1
-            places = max(across, 2.0 * max(setup.mosaic.indices.shape)) ** 2
-            pixels = channels if straight else places
-            waves = 1 if methods.blur == "skip" else blur.knots(setup.grid.nodes_nm, methods.blur).size
-            kernel = cases * places * channels * waves + (200 * places * waves if methods.blur != "skip" else 0)
-        elif target is not None and methods.blur != "skip":
-            kernel = 500.0 * blur.knots(setup.grid.nodes_nm, methods.blur).size
-        nodes = quadrature.nodes(grid, methods.quadrature).size
-        touched = pixels * max(len(setup.modified), 1) / channels
-        scales = len(flicker.scales(setup, methods.flicker, np.ones(1))[0])
-        values = cases * scales * signals
-        each = values / scales * touched * nodes + values * channels * signals / 2
-        if methods.saturation != "skip":
-            each += (
-                values * pixels * (_NOISE_COST if setup.scenario.noise is not None and methods.noise != "skip" else 1)
-            )
-        each += values * pixels if methods.quantization != "skip" else 0.0
-        return kernel + self.box.n_designs * each
+        return estimated_work(self.setup, self.box.n_designs, methods)

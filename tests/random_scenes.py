@@ -151,7 +151,7 @@ def _pixel(rng: np.random.Generator, *, noisy: bool) -> dict[str, Any]:
         pixel["dark_e_per_s"] = float(10 ** rng.uniform(0, 5))
     if noisy:
         pixel["read_noise_e"] = float(rng.choice([0.0, rng.uniform(0.05, 1), rng.uniform(0.2, 5), rng.uniform(5, 60)]))
-        pixel["prnu"] = float(rng.choice([0.0, 0.0, 0.01, rng.uniform(0, 0.2)]))
+        pixel["prnu"] = float(rng.choice([0.0, 0.0, 0.01, rng.uniform(0, 0.1)]))
     return pixel
 
 

@@ -2,12 +2,14 @@
 
 A CSD is the smallest of the distances of all pairs, so it changes by no more than the distance of a pair that can be
 the smallest, before or after; and a distance changes by no more than the norm of the change of its difference vector.
-That is linear in QE and kernel, and both are known up to an interval.
+That is linear in QE and kernel, and both are known up to an interval. Behind a readout that is not straight it is not:
+there, a distance changes by at most what both of its points move (`pixelwise`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -46,6 +48,18 @@ class Amounts:
     half_each: FloatArray
     most: FloatArray
     most_each: FloatArray
+
+
+class Step(NamedTuple):
+    """What a step changes, as `Reach.largest_change` takes it; the share of the kernel, and of the light off axis."""
+
+    changed: Amounts
+    change: FloatArray
+    remainder: float
+    base: Amounts
+    left: FloatArray
+    scale: float
+    falls: float
 
 
 _AT_ONCE = 4_000_000
@@ -108,6 +122,14 @@ class Reach:
         dn = per_photon(setup) * self.longest_s * setup.pixel.dn_per_e
         return np.asarray(self.box.high @ background_irradiance(setup) * dn, dtype=float)
 
+    @property
+    def background(self) -> tuple[FloatArray, FloatArray]:
+        """Response of each channel to the background, DN: middle value and half width, ndarray[n_channels] each."""
+        irradiance = background_irradiance(self.box.setup)
+        dn = per_photon(self.box.setup) * self.longest_s * self.box.setup.pixel.dn_per_e
+        ends = [qe @ irradiance * dn for qe in (self.box.low, self.box.high)]
+        return np.asarray((ends[0] + ends[1]) / 2), np.asarray((ends[1] - ends[0]) / 2)
+
     def amounts(self, factor: FloatArray, low: FloatArray, high: FloatArray) -> Amounts:
         """Sums for QE between `low` and `high` (ndarray[n_channels, n_wavelengths]) and a factor per wavelength."""
         middle, half = (low + high) / 2, (high - low) / 2
@@ -130,18 +152,32 @@ class Reach:
         base: Amounts,
         after: FloatArray,
         *,
-        straight: bool,
+        every: bool = False,
         between: Spread | None = None,
     ) -> float:
-        """Bound on the change of any CSD, DN, as `_largest` has it, a block of cases after the other."""
+        """Bound on the change of any CSD of a straight readout, DN, as `_largest` has it, block by block of cases."""
         step = max(1, _AT_ONCE // max(1, len(self.first) * change.shape[1] * CORNERS)) * CORNERS
         worst = 0.0
         for start in range(0, len(change), step):
             some = slice(start, start + step)
             part = None if between is None else between.some(some)
-            found = self._largest(changed, change[some], remainder, base, after[some], straight, part)
+            found = self._largest(changed, change[some], remainder, base, after[some], every, part)
             worst = max(worst, found)
         return worst
+
+    def largest_move(self, moved: FloatArray) -> float:
+        """Largest change of a distance whose two points move by up to `moved`, ndarray[n_cases, n_signals, n_channels].
+
+        DN. A point's channels move by at most this much, so the difference of two points by at most the sum of both.
+        """
+        each = np.swapaxes(moved, 0, 1)
+        return max((float(_norms(each[some] + each[to]).max()) for some, to in self._by_block(moved)), default=0.0)
+
+    def _by_block(self, moved: FloatArray) -> list[tuple[IndexArray, IndexArray]]:
+        """Pairs, so many at once that their values fit into memory."""
+        step = max(1, _AT_ONCE // max(1, moved[:, 0].size))
+        starts = range(0, len(self.first), step)
+        return [(self.first[at : at + step], self.second[at : at + step]) for at in starts]
 
     def _largest(
         self,
@@ -150,34 +186,30 @@ class Reach:
         remainder: float,
         base: Amounts,
         after: FloatArray,
-        straight: bool,
+        every: bool,
         between: Spread | None,
     ) -> float:
         """Bound on the change of any CSD, DN.
 
         `change`: ndarray[n_cases, n_values, n_channels, n_knots], of the kernel that multiplies `changed`, exact up to
         `remainder` between the knots. `base`, `after`: the responses and the kernel after the change, which say which
-        pairs can be the smallest. `straight`: the readout is linear; if not, a distance may change by what each of its
-        two points moves. `between`: the cases are corners of cells of places, all of which count.
+        pairs can be the smallest; `every`: all pairs count. `between`: the cases are corners of cells of places, all
+        of which count.
         """
         n_cases, n_values = change.shape[:2]
         shape = (-1, n_cases, n_values)
         pairs = _flat(base.middle)[self.first] - _flat(base.middle)[self.second]
         by, size = _flat(change, 2).T, np.abs(_flat(change, 2)).T
-        if straight:
-            apart = _flat(changed.middle)[self.first] - _flat(changed.middle)[self.second]
-            moved = np.abs(apart @ by) + _flat(changed.half) @ size
-            moved += remainder * changed.most.sum(axis=1, keepdims=True)
-            moved += 0.0 if between is None else changed.most @ _flat(between.change, 2).T
-        else:
-            each = np.abs(_flat(changed.middle) @ by) + _flat(changed.half_each) @ size
-            each += remainder * changed.most_each.sum(axis=1, keepdims=True)
-            each += 0.0 if between is None else changed.most_each @ _flat(between.change, 2).T
-            moved = each[self.first] + each[self.second]
+        apart = _flat(changed.middle)[self.first] - _flat(changed.middle)[self.second]
+        moved = np.abs(apart @ by) + _flat(changed.half) @ size
+        moved += remainder * changed.most.sum(axis=1, keepdims=True)
+        moved += 0.0 if between is None else changed.most @ _flat(between.change, 2).T
         far = _norms(moved.reshape(shape))
         if between is not None:  # in a cell, no change is larger than the largest at a corner and what is left
             by_cell = far.reshape(len(far), -1, CORNERS).max(axis=2)
             far = np.repeat(by_cell, CORNERS, axis=1)
+        if every:
+            return float(far.max(initial=0.0))
         middle = np.abs(pairs @ _flat(after, 2).T).reshape(shape)
         width = (_flat(base.half) @ np.abs(_flat(after, 2)).T).reshape(shape)
         width += (remainder * base.most.sum(axis=1))[:, None, None]
@@ -185,7 +217,7 @@ class Reach:
             apart = _flat(between.after, 2).T
             width += (np.abs(pairs) @ apart + _flat(base.half) @ apart).reshape(shape)
             width += (base.most @ _flat(between.left, 2).T).reshape(shape)
-        shortened = self.shortest_s / self.longest_s * self.least_light / self.most_light if straight else 0.0
+        shortened = self.shortest_s / self.longest_s * self.least_light / self.most_light
         least = _norms(np.maximum(middle - width, 0.0)) * shortened
         most = _norms(middle + width)
         worst = 0.0

@@ -59,3 +59,11 @@ def scales(setup: Setup, method: str, exposure_s: FloatArray) -> FloatArray:
     least, most = extremes(drive, exposure_s)
     share = np.linspace(0.0, 1.0, 2 if method == "ends" else _FINE)
     return np.asarray(least[:, None] + share * (most - least)[:, None], dtype=float)
+
+
+def missed(method: str, least: float, most: float, *, straight: bool) -> float:
+    """What a method misses of the light, relative to the `most` light of a pulsed exposure; `least` as `smallest`."""
+    below, above = 1 - least, most - 1
+    if method == "ends":
+        return 0.0 if straight else (below + above) / 2 / most
+    return (below if straight else max(below, above)) / most

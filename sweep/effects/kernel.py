@@ -186,20 +186,11 @@ def _pixels(
     work: Counter[str],
 ) -> Kernel:
     """Every pixel of the readout, for every place of the light."""
-    target, mosaic, pixel = setup.scenario.target, setup.mosaic, setup.pixel
+    target, pixel, n = setup.scenario.target, setup.pixel, len(setup.mosaic.channels)
     assert target is not None
-    n = len(mosaic.channels)
-    radius, readout = sampling.radii_px(setup, target)
-    half = pixel.fill_factor**0.5 / 2
-    reach = sampling.reach_px(setup, target)
-    seen = sampling.window(mosaic, cases.places_px, reach)
-    if target.readout == "mean":
-        weights = sampling.mean_weights(seen, half, readout, n)
-    else:
-        weights = demosaic.center_weights(seen, cases.home_px - cases.places_px, methods.demosaic, mosaic)
+    radius, half = sampling.radii_px(setup, target)[0], pixel.fill_factor**0.5 / 2
+    seen, own, apart = _weights(setup, methods, cases)
     share = _share(setup, methods)
-    own = (seen.channel[..., None] == np.arange(n)).astype(float)
-    apart = weights[..., None] * own  # [cases, rows, columns, channels]
     spread = crosstalk.mixed(apart, share) if share else apart
     wanted = np.asarray((spread > 0).any(axis=3))
     profile = profile_of(setup, methods, wavelength_nm)
@@ -210,10 +201,32 @@ def _pixels(
         return _apart(light, own, apart, share)
     # What each channel's readout takes of the pixels of each channel: [cases, rows, columns, channels x channels].
     taken = spread[..., :, None] * own[..., None, :]
-    shape = (len(weights), n, n)
+    shape = (len(apart), n, n)
     folded = light.folded(taken.reshape(*taken.shape[:3], n * n)).reshape(*shape, light.values.shape[1])
-    weights = np.repeat(np.eye(n)[None], len(weights), axis=0)
+    weights = np.repeat(np.eye(n)[None], len(apart), axis=0)
     return Kernel(folded, taken.sum(axis=(1, 2)), weights, weights)
+
+
+def _weights(setup: Setup, methods: Methods, cases: phase.Cases) -> tuple[sampling.Window, FloatArray, FloatArray]:
+    """The pixels around the light, whose channel each is, ndarray[rows, columns, n_channels], and its weight in the
+    value of each, ndarray[n_cases, rows, columns, n_channels].
+    """
+    target, mosaic, n = setup.scenario.target, setup.mosaic, len(setup.mosaic.channels)
+    assert target is not None
+    seen = sampling.window(mosaic, cases.places_px, sampling.reach_px(setup, target))
+    if target.readout == "mean":
+        half, readout = setup.pixel.fill_factor**0.5 / 2, sampling.radii_px(setup, target)[1]
+        weights = sampling.mean_weights(seen, half, readout, n)
+    else:
+        weights = demosaic.center_weights(seen, cases.home_px - cases.places_px, methods.demosaic, mosaic)
+    own = (seen.channel[..., None] == np.arange(n)).astype(float)
+    return seen, own, weights[..., None] * own
+
+
+def readout_of(setup: Setup, methods: Methods, cases: phase.Cases, like: Methods) -> FloatArray:
+    """`Kernel.readout` of some methods on the pixels that `like` reads, ndarray[n_cases, n_pixels, n_channels]."""
+    used = (_weights(setup, like, cases)[2] > 0).any(axis=(0, 3))
+    return _weights(setup, methods, cases)[2][:, used]
 
 
 def _apart(light: sampling.PixelLight, own: FloatArray, apart: FloatArray, share: float) -> Kernel:
