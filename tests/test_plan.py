@@ -87,6 +87,9 @@ def contract(made: Scene) -> list[Row]:
                 if effect != "sampling" and not planner._allowed("sampling", after):
                     continue
                 promised = 0.0 if exact else planner.promise(effect, before, after)
+                if not exact and effect not in (*READOUT, "phase") and before.saturation == "clip":
+                    # Over all places, what a readout that is not straight adds is part of the promise of `phase`.
+                    promised += planner._left_over(after) if planner.promise("phase", after, after) else 0.0
                 realized = float(np.abs(columns(made, after) - reference).max())
                 found.append(Row(made.name, name, effect, method, promised, realized))
     return found
