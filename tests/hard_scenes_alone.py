@@ -114,6 +114,19 @@ ALONE: tuple[Scene, ...] = (
         grid=FINE,
     ),
     scene(
+        "noise, f/40, center of a 3x3 tile",
+        "3x3",
+        {
+            "noise": True,
+            "target": FAR | {"phase_px": [1.4, 0.6], "readout": "center"},
+            "intensity_cd": 800,
+            "exposure": {"kind": "fixed", "exposure_s": 0.05},
+            "optics": {"f_number": 40.0},
+        },
+        DARK,
+        grid=FINE,
+    ),
+    scene(
         "noise, f/64",
         "RYNCy",
         {

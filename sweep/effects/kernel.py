@@ -194,7 +194,8 @@ def _pixels(
     spread = crosstalk.mixed(apart, share) if share else apart
     wanted = np.asarray((spread > 0).any(axis=3))
     profile = profile_of(setup, methods, wavelength_nm)
-    work["blur"] += 0 if profile is None else profile.work
+    if profile is not None:
+        work["blur"] += profile.work
     light = sampling.light_on_pixels(seen, wanted, half, radius, profile, pixel.pitch_um)
     work["sampling"] += light.values.size
     if by_pixel:
