@@ -25,7 +25,8 @@ from sweep.plan import Plan, Planner
 from sweep.report.plans import plan_lines
 from sweep.setup import REFERENCE, Methods, Setup
 
-from .hard_scenes import DARK, F2, FAR, NEAR, TILES, Scene, random_scene, scene, target
+from .hard_scenes import DARK, F2, FAR, NEAR, TILES, Scene, scene, target
+from .random_scenes import random_scene
 
 CSDS = ("csd_yellow_red", "csd_green_yellow")
 
@@ -130,7 +131,7 @@ def any_place(seed: int) -> Scene:
         if given.target is not None and made.setup.mosaic.indices.size <= 4:
             anywhere = given.target.model_copy(update={"phase_px": "any"})
             setup = replace(made.setup, scenario=given.model_copy(update={"target": anywhere}))
-            return Scene(f"any {tried}", setup, made.curves, replace(made.box, setup=setup))
+            return Scene(f"any {tried}", setup, made.curves[0][:1], replace(made.box, setup=setup))
         tried += 1000
 
 

@@ -11,10 +11,10 @@ import pandas as pd
 import pytest
 
 from sweep.blocks import Edges
+from sweep.disk import read_facts
 from sweep.families import Stopband
 from sweep.report import read_output, summary_lines
 from sweep.runner import Wishes, run_study
-from sweep.runner.folders import read_facts
 from sweep.runner.jobs import CHUNK, Job, detours_of, rules_of, run_job
 from sweep.runner.routes import ALONE, BY_CURVES
 from sweep.spaces import Filter
