@@ -6,7 +6,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -173,15 +172,9 @@ def test_completion_scripts_are_made_without_a_terminal(kind: str, word: str) ->
     assert "_SWEEP_COMPLETE=complete" in script
 
 
-def test_help_is_quick_and_imports_nothing_heavy() -> None:
+def test_help_imports_nothing_heavy() -> None:
     code = "import sys, sweep.cli\ntry: sweep.cli.app(['--help'])\nexcept SystemExit: pass\nprint(*sys.modules, file=sys.stderr)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     for command in ("run", "describe", "new", "list", "schema"):
         assert f" {command} " in done.stdout
     assert not set(HEAVY) & set(done.stderr.split())
-    times = []
-    for _ in range(5):  # the best of five: other work on the machine is not the command's
-        started = time.perf_counter()
-        subprocess.run([sys.executable, "-m", "sweep", "--help"], capture_output=True, check=True)
-        times.append(time.perf_counter() - started)
-    assert min(times) < 0.3
