@@ -178,7 +178,9 @@ def decoded(content: bytes, schema: pa.Schema, rows: int) -> pa.Table | None:
         file = pq.ParquetFile(pa.BufferReader(content), page_checksum_verification=True)
         if file.metadata.num_rows != rows or not file.schema_arrow.equals(schema):
             return None
-        return file.read().replace_schema_metadata(schema.metadata)
+        table = file.read()
+        # What the file says of its rows besides, such as their detours, stays.
+        return table.replace_schema_metadata({**(table.schema.metadata or {}), **(schema.metadata or {})})
     except (OSError, pa.ArrowException):
         return None
 
