@@ -83,7 +83,7 @@ def test_detours_before_a_kill_are_told_after_it_and_mended_when_asked(
     ran(plain, tmp_path, 1)
     (detour,) = read_facts(tmp_path / "provenance.json")["detours"]
     assert detour == {"how": BY_CURVES, "why": FAULT, "designs": 1 + CHUNK}  # with the named one
-    (tmp_path / "points.parquet").unlink()  # what makes the run go on; rows without a detour are taken from the table
+    (tmp_path / "results.parquet").unlink()  # what makes the rows be computed again
     ran(plain, tmp_path, 1)
     assert read_facts(tmp_path / "provenance.json")["detours"] == []
     pd.testing.assert_frame_equal(rows(tmp_path), whole)
