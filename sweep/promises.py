@@ -19,7 +19,7 @@ from types import ModuleType
 
 import numpy as np
 
-from .arrays import FloatArray
+from .arrays import FloatArray, IndexArray
 from .effects import (
     blur,
     crosstalk,
@@ -36,7 +36,7 @@ from .effects import (
     saturation,
 )
 from .effects.between import Between, Deviation
-from .effects.bounds import CORNERS, Amounts, Box, Reach, Spread, Step
+from .effects.bounds import Amounts, Box, Reach, Spread, Step
 from .effects.kernel import make_kernel
 from .effects.pixelwise import Moves
 from .effects.work import estimated_work
@@ -138,6 +138,11 @@ class Promises:
         """Cells of places; their corners stand for all places, with what may lie between them."""
         return phase.whole(self.setup.mosaic)
 
+    @cached_property
+    def _corners(self) -> tuple[phase.Cases, IndexArray]:
+        """The corners of the cells, each once, and those of each cell."""
+        return self._cells.shared_corners(self.setup)
+
     def _wanted(self, methods: Methods) -> Methods:
         """What the kernel depends on, with no extinction."""
         on = "skip" if methods.blur == "skip" else REFERENCE.blur
@@ -148,29 +153,27 @@ class Promises:
     def _kernel(self, methods: Methods) -> FloatArray:
         """The kernel at the knots, without extinction: [cases, channels, channels, knots].
 
-        The cases are the places of the lattice, or the corners of all cells where the light may fall anywhere.
+        The cases are the places of the lattice, or the corners of cells where the light may fall anywhere.
         """
         wanted, nodes = self._wanted(methods), self.reach.knots_nm
         if wanted not in self._kernels:
-            cases = self._cells.corners if self._anywhere(wanted) else None
+            cases = self._corners[0] if self._anywhere(wanted) else None
             light = make_kernel(self.setup, wanted, nodes, by_pixel=False, work=Counter(), cases=cases).light
             self._kernels[wanted] = np.ascontiguousarray(np.broadcast_to(light, (*light.shape[:3], nodes.size)))
         return self._kernels[wanted]
 
     def _nearest(self, methods: Methods) -> FloatArray:
-        """The kernel at the place of a lattice that is nearest to the center of each cell, for each of its corners."""
+        """The kernel at the place of a lattice that is nearest to the center of each cell."""
         lattice = phase.places_px(self.setup, methods.phase)
-        at = phase.nearest(self.setup, self._cells.centers, lattice)
-        return self._kernel(methods)[np.repeat(at, CORNERS)]
+        return self._kernel(methods)[phase.nearest(self.setup, self._cells.centers, lattice)]
 
     def _deviation(self, methods: Methods) -> Deviation:
         """How far the kernel in cells may be from a mean of that at the corners: [cells, channels, channels, 1]."""
         wanted = self._wanted(methods)
         if wanted not in self._deviations:
             kernel, cells = self._kernel(wanted), self._cells
-            corners = kernel.reshape(-1, CORNERS, *kernel.shape[1:])
             between = Between(self.setup, wanted, self.reach.knots_nm)
-            found = between.of_cells(cells.centers, cells.half, cells.homes, corners)
+            found = between.of_cells(cells.centers, cells.half, cells.homes, kernel[self._corners[1]])
             # At any wavelength: that of the middle one, and what differs from it.
             largest = found.kernel[..., :1] + found.kernel[..., 1:].max(axis=3, initial=0.0, keepdims=True)
             self._deviations[wanted] = Deviation(largest, found.tilt)
@@ -191,14 +194,15 @@ class Promises:
         sizes = here.kernel * scale
         if effect in ("demosaic", "crosstalk", "blur"):
             sizes = (here.kernel + there.kernel) * bool(change.any())
-        by_cell = (-1, CORNERS, *change.shape[1:])
-        changes, lefts = change.reshape(by_cell), left.reshape(by_cell)
+        corners = self._corners[1]
+        if effect == "phase":  # what is left is that of another place in each cell
+            corners = np.arange(len(change)).reshape(corners.shape)
+        changes, lefts = change[corners], left[corners]
         tilt, found = here.tilt[:, :, None], []
         for values, size in ((changes, sizes), (lefts, there.kernel)):
             tilted = tilt * (values.max(axis=1) - values.min(axis=1)).max(axis=3) / 2
-            found.append(np.repeat(size[..., 0] + tilted, CORNERS, axis=0))
-        wide = np.broadcast_to(np.ptp(lefts, axis=1)[:, None], lefts.shape).reshape(change.shape)
-        return Spread(found[0], found[1], wide)
+            found.append(size[..., 0] + tilted)
+        return Spread(corners, *found, np.ptp(lefts, axis=1))
 
     def _gap(self, methods: Methods, method: str) -> float:
         """How far a kernel may be from its interpolation between the wavelengths of a method of blur."""
@@ -236,7 +240,10 @@ class Promises:
         falls = illumination.factor(setup, after.illumination if effect != "illumination" else before.illumination)
         base = changed = self._sums(self.spectrum * falls, box.low, box.high)
         now = self._kernel(before)
-        then = self._nearest(after) if effect == "phase" else self._kernel(after)
+        if effect == "phase":  # the places that are nearest to those in a cell are compared at all of its corners
+            now, then = now[self._corners[1].ravel()], np.repeat(self._nearest(after), len(phase.CORNERS), axis=0)
+        else:
+            then = self._kernel(after)
         left, remainder = then, self._between_knots(before)
         if effect == "quadrature":
             kept = quadrature.nodes(setup.grid.size, after.quadrature)

@@ -24,6 +24,7 @@ LEVELS = [
         "progress",
         "mat_files",
         "noise_kernels",
+        "bound_kernels",
     },
     {"metrics", "confusion_kernels", "curve_files", "surrogate", "sensor", "chromaticity"},
     {"datasets", "filters", "filter_files", "scenes", "families", "discrimination", "signals"},
@@ -57,7 +58,7 @@ ONLY_USER = {
     "jinja2": "report",
     "typer": "cli endings options",
     "sklearn": "recognition",
-    "numba": "kernels noise_kernels confusion_kernels",
+    "numba": "kernels noise_kernels confusion_kernels bound_kernels",
 }
 
 

@@ -14,6 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import FloatArray, IndexArray
+from ..bound_kernels import largest_change
+from ..metrics import class_pairs
 from ..setup import (
     Setup,
     background_irradiance,
@@ -40,12 +42,14 @@ class Amounts:
     """Sums of signals times QE on hats between the knots, DN: middle value, half width, and the largest possible.
 
     `middle`: ndarray[n_signals, n_channels, n_knots], `half`: ndarray[n_pairs, n_channels, n_knots] (of a pair's
-    difference), `half_each`: the same of each signal, `most`, `most_each`: ndarray[n_pairs or n_signals, n_channels].
+    difference), `half_each`: the same of each signal, `largest`: the most that a pair's difference can be on each hat,
+    shaped like `half`; `most`, `most_each`: the same on all hats, ndarray[n_pairs or n_signals, n_channels].
     """
 
     middle: FloatArray
     half: FloatArray
     half_each: FloatArray
+    largest: FloatArray
     most: FloatArray
     most_each: FloatArray
 
@@ -63,27 +67,29 @@ class Step(NamedTuple):
 
 
 _AT_ONCE = 4_000_000
-"""Distances of pairs that are bounded at once."""
-CORNERS = 4
-"""Corners of a cell of places: so many cases of a kernel, one after the other."""
+"""Values of pairs' differences that are bounded at once."""
 
 
 @dataclass(frozen=True)
 class Spread:
-    """What the places in a cell may see besides what its corners see, for each corner.
+    """What the places in cells may see besides what their corners see.
 
-    `change`, `left`: ndarray[n_cases, n_values, n_channels], by how much the change of the kernel, and the kernel after
-    it, may differ from a mean of those at the corners. `after`: ndarray[n_cases, n_values, n_channels, n_knots], how
-    far the corners' kernels after the change are from this one's.
+    `corners`: the cases at the corners of each cell, ndarray[n_cells, n_corners]. `change`, `left`: ndarray[n_cells,
+    n_values, n_channels], by how much the change of the kernel, and the kernel after it, may differ from a mean of
+    those at the corners. `after`: ndarray[n_cells, n_values, n_channels, n_knots], how far the corners' kernels after
+    the change are from each other.
     """
 
+    corners: IndexArray
     change: FloatArray
     left: FloatArray
     after: FloatArray
 
-    def some(self, cases: slice) -> Spread:
-        """Of some cases: whole cells."""
-        return Spread(self.change[cases], self.left[cases], self.after[cases])
+    def some(self, cells: slice) -> tuple[Spread, IndexArray]:
+        """Some cells, and the cases at their corners, which are numbered anew."""
+        cases, corners = np.unique(self.corners[cells], return_inverse=True)
+        numbered = corners.reshape(self.corners[cells].shape)
+        return Spread(numbered, self.change[cells], self.left[cells], self.after[cells]), cases
 
 
 class Reach:
@@ -101,7 +107,7 @@ class Reach:
         self.most_light = 1.0 if drive is None else flicker.largest(drive, self.shortest_s, self.longest_s)
         dn = per_photon(setup) * self.longest_s * self.most_light * setup.pixel.dn_per_e
         self._signals = signal_irradiance(setup) * dn
-        self.first, self.second, self.group = _pairs(setup.members)
+        self.first, self.second, self._ends = _pairs(setup.members)
 
     def _exposures(self) -> tuple[float, float]:
         setup = self.box.setup
@@ -136,10 +142,13 @@ class Reach:
         most = np.maximum(np.abs(low), np.abs(high))
         light = self._signals * factor
         apart = np.abs(light[self.first] - light[self.second])
+        centers = np.einsum("sl,cl,kl->sck", light, middle, self._hats, optimize=True)
+        halves = np.einsum("pl,cl,kl->pck", apart, half, self._hats, optimize=True)
         return Amounts(
-            middle=np.einsum("sl,cl,kl->sck", light, middle, self._hats, optimize=True),
-            half=np.einsum("pl,cl,kl->pck", apart, half, self._hats, optimize=True),
+            middle=centers,
+            half=halves,
             half_each=np.einsum("sl,cl,kl->sck", np.abs(light), half, self._hats, optimize=True),
+            largest=np.abs(centers[self.first] - centers[self.second]) + halves,
             most=apart @ most.T,
             most_each=np.abs(light) @ most.T,
         )
@@ -155,13 +164,20 @@ class Reach:
         every: bool = False,
         between: Spread | None = None,
     ) -> float:
-        """Bound on the change of any CSD of a straight readout, DN, as `_largest` has it, block by block of cases."""
-        step = max(1, _AT_ONCE // max(1, len(self.first) * change.shape[1] * CORNERS)) * CORNERS
+        """Bound on the change of any CSD of a straight readout, DN.
+
+        `change`: ndarray[n_cases, n_values, n_channels, n_knots], of the kernel that multiplies `changed`, exact up to
+        `remainder` between the knots. `base`, `after`: the responses and the kernel after the change, which say which
+        pairs can be the smallest; `every`: all pairs count. `between`: the cases are corners of cells of places, all
+        of which count.
+        """
+        alone = np.arange(len(change))[:, None] if between is None else between.corners
+        step = max(1, _AT_ONCE // max(1, len(self.first) * change.shape[1] * alone.shape[1]))
         worst = 0.0
-        for start in range(0, len(change), step):
-            some = slice(start, start + step)
-            part = None if between is None else between.some(some)
-            found = self._largest(changed, change[some], remainder, base, after[some], every, part)
+        for start in range(0, len(alone), step):
+            cells = slice(start, start + step)
+            part, cases = (None, alone[cells, 0]) if between is None else between.some(cells)
+            found = self._largest(changed, change[cases], remainder, base, after[cases], every, part)
             worst = max(worst, found)
         return worst
 
@@ -189,64 +205,35 @@ class Reach:
         every: bool,
         between: Spread | None,
     ) -> float:
-        """Bound on the change of any CSD, DN.
-
-        `change`: ndarray[n_cases, n_values, n_channels, n_knots], of the kernel that multiplies `changed`, exact up to
-        `remainder` between the knots. `base`, `after`: the responses and the kernel after the change, which say which
-        pairs can be the smallest; `every`: all pairs count. `between`: the cases are corners of cells of places, all
-        of which count.
-        """
-        n_cases, n_values = change.shape[:2]
-        shape = (-1, n_cases, n_values)
-        pairs = _flat(base.middle)[self.first] - _flat(base.middle)[self.second]
-        by, size = _flat(change, 2).T, np.abs(_flat(change, 2)).T
-        apart = _flat(changed.middle)[self.first] - _flat(changed.middle)[self.second]
-        moved = np.abs(apart @ by) + _flat(changed.half) @ size
-        moved += remainder * changed.most.sum(axis=1, keepdims=True)
-        moved += 0.0 if between is None else changed.most @ _flat(between.change, 2).T
-        far = _norms(moved.reshape(shape))
-        if between is not None:  # in a cell, no change is larger than the largest at a corner and what is left
-            by_cell = far.reshape(len(far), -1, CORNERS).max(axis=2)
-            far = np.repeat(by_cell, CORNERS, axis=1)
-        if every:
-            return float(far.max(initial=0.0))
-        middle = np.abs(pairs @ _flat(after, 2).T).reshape(shape)
-        width = (_flat(base.half) @ np.abs(_flat(after, 2)).T).reshape(shape)
-        width += (remainder * base.most.sum(axis=1))[:, None, None]
+        """`largest_change` of some cases."""
+        nothing = np.zeros((len(change), change.shape[1], len(self.first)))
+        corners, more = np.arange(len(change))[:, None], nothing
         if between is not None:
-            apart = _flat(between.after, 2).T
-            width += (np.abs(pairs) @ apart + _flat(base.half) @ apart).reshape(shape)
-            width += (base.most @ _flat(between.left, 2).T).reshape(shape)
+            corners, more = between.corners, between.change @ changed.most.T
+        off = self._in(np.abs(change), changed.half) + remainder * changed.most.sum(axis=1)
+        moved = left = (self._in(change, changed.middle), off, more)
+        if not every:
+            off, more = self._in(np.abs(after), base.half) + remainder * base.most.sum(axis=1), nothing
+            if between is not None:
+                more = self._in(between.after, base.largest) + between.left @ base.most.T
+            left = (self._in(after, base.middle), off, more)
         shortened = self.shortest_s / self.longest_s * self.least_light / self.most_light
-        least = _norms(np.maximum(middle - width, 0.0)) * shortened
-        most = _norms(middle + width)
-        worst = 0.0
-        for group in range(int(self.group.max(initial=-1)) + 1):
-            own = self.group == group
-            can_be = least[own] - far[own] <= (most[own] + far[own]).min(axis=0)
-            worst = max(worst, float(far[own][can_be].max(initial=0.0)))
-        return worst
+        return float(largest_change(moved, left, corners, self.first, self.second, self._ends, shortened, every))
+
+    @staticmethod
+    def _in(kernel: FloatArray, amounts: FloatArray) -> FloatArray:
+        """Amounts (ndarray[n, n_channels, n_knots]) behind a kernel (ndarray[n_cases, n_values, ...]); [..., n]."""
+        flat = amounts.reshape(len(amounts), -1)
+        used = flat.any(axis=0)
+        return np.asarray(kernel.reshape(*kernel.shape[:2], -1)[..., used] @ flat[:, used].T, dtype=float)
 
 
 def _norms(vectors: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(np.einsum("pcv,pcv->pc", vectors, vectors)), dtype=float)
 
 
-def _flat(values: FloatArray, kept: int = 1) -> FloatArray:
-    """The last two axes as one; the first `kept` axes as one."""
-    return values.reshape(int(np.prod(values.shape[:kept])), -1)
-
-
 def _pairs(members: dict[str, IndexArray]) -> tuple[IndexArray, IndexArray, IndexArray]:
-    """Signals of all pairs of two types: first, second, number of the pair of types."""
-    names = list(members)
-    first, second, group = [], [], []
-    number = 0
-    for i, one in enumerate(names):
-        for other in names[i + 1 :]:
-            a, b = np.meshgrid(members[one], members[other], indexing="ij")
-            first.append(a.ravel())
-            second.append(b.ravel())
-            group.append(np.full(a.size, number))
-            number += 1
-    return tuple(np.concatenate(part) if part else np.empty(0, dtype=np.intp) for part in (first, second, group))  # type: ignore[return-value]
+    """Signals of all pairs of two types: first, second; where the pairs of each two types begin, and the end."""
+    grids = [np.meshgrid(members[a], members[b], indexing="ij") for a, b in class_pairs(list(members))]
+    first, second = (np.concatenate([np.empty(0, dtype=np.intp), *(g[i].ravel() for g in grids)]) for i in (0, 1))
+    return first, second, np.cumsum([0, *(g[0].size for g in grids)])

@@ -100,6 +100,18 @@ class Cells:
         places = (self.centers[:, None] + self.half * CORNERS).reshape(-1, 2)
         return Cases(places, np.repeat(self.homes, len(CORNERS), axis=0))
 
+    def shared_corners(self, setup: Setup) -> tuple[Cases, IndexArray]:
+        """The corners, each once, and those of each cell, ndarray[n_cells, n_corners].
+
+        Of a mean over the disc it does not matter which pixel is the nearest.
+        """
+        target, every = setup.scenario.target, self.corners
+        keys = every.places_px
+        if target is not None and target.readout == "center":
+            keys = np.concatenate([every.places_px, every.home_px], axis=1)
+        _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+        return every.some(first), which.reshape(-1, len(CORNERS))
+
 
 def whole(mosaic: Mosaic) -> Cells:
     """Cells between the places of the finest lattice, over a part of the tile that stands for all of it."""
