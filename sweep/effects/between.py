@@ -45,6 +45,17 @@ class _Slopes:
     jump: tuple[FloatArray, FloatArray]
     bend: tuple[FloatArray, FloatArray]
 
+    def part(self, number: int) -> _Slopes:
+        """One part of the light."""
+        each = ((a[number], b[number]) for a, b in (self.slope, self.jump, self.bend))
+        return _Slopes(self.low[number], self.high[number], *each)
+
+    def at(self, which: IndexArray, turned: BoolArray) -> _Slopes:
+        """Of some pixels, by number, those that are `turned` with the axes exchanged."""
+        values = [(a[which], b[which]) for a, b in (self.slope, self.jump, self.bend)]
+        each = ((np.where(turned, b, a), np.where(turned, a, b)) for a, b in values)
+        return _Slopes(self.low[which], self.high[which], *each)
+
 
 def _overlap(y: FloatArray, half: float, reach: FloatArray) -> FloatArray:
     """Length of y - half..y + half that lies in -reach..reach."""
@@ -205,15 +216,13 @@ class Between:
 
     def _light(self, seen: sampling.Window, wanted: BoolArray, h: float) -> Iterator[_Slopes]:
         """Of the light of the pixels that are `wanted`, ndarray[n_pixels], part by part."""
-        shape = np.broadcast_shapes(seen.dx.shape, seen.dy.shape)
-        dx, dy = (np.broadcast_to(a, shape)[wanted] for a in (seen.dx, seen.dy))
+        places, which, turned = sampling.different(seen, wanted)
         if self._images is None:
-            yield _of_disc(dx, dy, self._half, self._radii[0], h)
+            yield _of_disc(places[:, 0], places[:, 1], self._half, self._radii[0], h).at(which, turned)
             return
-        found = self._images.of_pixels(dx, dy, self._half, h)
+        found = self._images.of_pixels(places[:, 0], places[:, 1], self._half, h)
         for part in range(self.n_parts):
-            each = ((a[part], b[part]) for a, b in (found.slope, found.jump, found.bend))
-            yield _Slopes(found.low[part], found.high[part], *each)
+            yield found.part(part).at(which, turned)
 
     def _own(self, seen: sampling.Window) -> FloatArray:
         """Which channel is whose, ndarray[rows, columns, n_channels]."""

@@ -140,7 +140,8 @@ class Profile:
         The weights go to the spline's coefficients first, so that no more is done at each wavelength than one product.
         """
         n, size = len(r_um), len(self._spline.c)
-        basis = BSpline.design_matrix(r_um.ravel(), self._spline.t, 3)  # four values for each radius
+        # Four values for each radius. SciPy looks for radii outside number by number, if it is not told to extrapolate.
+        basis = BSpline.design_matrix(r_um.ravel(), self._spline.t, 3, extrapolate=True)
         at = np.arange(n)[:, None] * size + basis.indices.reshape(n, -1)
         each = (basis.data.reshape(*r_um.shape, 4) * weights[:, None]).reshape(n, -1)
         folded = np.bincount(at.ravel(), each.ravel(), minlength=n * size).reshape(n, size)

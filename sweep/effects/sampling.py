@@ -112,6 +112,21 @@ class PixelLight:
         return found
 
 
+def different(seen: Window, wanted: BoolArray) -> tuple[FloatArray, IndexArray, BoolArray]:
+    """Where the pixels that are `wanted` lie from the light's center: the image is round, so mirrored places are one.
+
+    The different places, ndarray[n_places, 2], the shorter distance first; that of each pixel; and whether its shorter
+    distance is `dy`, ndarray[n_wanted] each.
+    """
+    x, y = seen.dx[:, 0, :], seen.dy[:, :, 0]
+    along = np.round(np.abs(np.concatenate([x.ravel(), y.ravel()])), 12)
+    distances, which = np.unique(along, return_inverse=True)
+    case, row, column = np.nonzero(wanted)
+    of_x, of_y = which[: x.size].reshape(x.shape)[case, column], which[x.size :].reshape(y.shape)[case, row]
+    named, place = np.unique(np.minimum(of_x, of_y) * distances.size + np.maximum(of_x, of_y), return_inverse=True)
+    return distances[np.stack(np.divmod(named, distances.size), axis=1)], place, of_y < of_x
+
+
 def light_on_pixels(
     seen: Window, wanted: BoolArray, half: float, radius_px: float, profile: Profile | None, pitch_um: float
 ) -> PixelLight:
@@ -120,12 +135,9 @@ def light_on_pixels(
     Without a profile the image is sharp. The mean of the profile over the pixel is a Gauss-Legendre rule, whose order
     follows the size of the pixel in periods of the highest frequency.
     """
-    shape = np.broadcast_shapes(seen.dx.shape, seen.dy.shape)
-    # The image is round, so pixels at mirrored places see the same.
-    apart = np.abs(np.stack([np.broadcast_to(a, shape)[wanted] for a in (seen.dx, seen.dy)], axis=1))
-    apart, inverse = np.unique(np.round(np.sort(apart, axis=1), 12), axis=0, return_inverse=True)
-    place = np.full(shape, len(apart))
-    place[wanted] = inverse.ravel()
+    apart, inverse, _ = different(seen, wanted)
+    place = np.full(wanted.shape, len(apart))
+    place[wanted] = inverse
     if profile is None:
         values = covered(apart[:, 0], apart[:, 1], half, radius_px)[:, None]
     else:
