@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 
 from .effects.bounds import Box
+from .effects.phase import LATTICES
 from .promises import EFFECTS, READOUT, Promises
 from .setup import REFERENCE, Methods
 
@@ -135,7 +136,8 @@ class Planner:
     ) -> tuple[Methods, dict[str, float]] | None:
         """Branch and bound over the effects, cheapest methods first; `tried` takes each method's smallest promise.
 
-        None where no plan keeps the tolerance; `besides`: what no method takes away does not count.
+        None where no plan keeps the tolerance; `besides`: what no method takes away does not count, so that all places
+        are looked at, however little can be promised of them.
         """
         start = self._start
         active = [e for e in EFFECTS if self._exact[e] is None]
@@ -152,7 +154,7 @@ class Planner:
             effect = active[at]
             for method in EFFECTS[effect].METHODS:
                 after = replace(methods, **{effect: method})
-                if not self._allowed(effect, after):
+                if not self._allowed(effect, after) or (besides and effect == "phase" and method in LATTICES):
                     continue
                 promised = self.promise(effect, methods, after)
                 tried[effect, method] = min(promised, tried.get((effect, method), promised))
@@ -173,11 +175,14 @@ class Planner:
         return any(scene.setup.scenario.noise is not None for scene in self._scenes)
 
     def _allowed(self, effect: str, methods: Methods) -> bool:
-        """Without pixels nothing saturates or is rounded one by one; noise moves a mean only where something clips."""
+        """Without pixels nothing saturates or is rounded one by one; noise moves a mean only where something clips, and
+        rounding clips, too.
+        """
         if self._for_noise and effect in _OF_NOISE:
             return bool(getattr(methods, effect) == getattr(REFERENCE, effect))
         if effect == "saturation" and methods.saturation == "skip":
-            return self._exact["noise"] is not None or methods.noise == "skip"
+            quiet = self._exact["noise"] is not None or methods.noise == "skip"
+            return quiet and methods.quantization == "skip"
         return effect != "sampling" or methods.sampling != "skip" or methods.straight
 
     def _reason(self, effect: str, method: str, promised: float, tried: Mapping[tuple[str, str], float]) -> str:

@@ -11,15 +11,14 @@ already holds the latter: its extremes are those of the straight response, so th
 from __future__ import annotations
 
 import hashlib
-from collections import Counter
+import math
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cached_property
 from types import ModuleType
 
 import numpy as np
 
-from .arrays import FloatArray, IndexArray
+from .arrays import FloatArray
 from .effects import (
     blur,
     crosstalk,
@@ -35,10 +34,9 @@ from .effects import (
     sampling,
     saturation,
 )
-from .effects.between import Between, Deviation
-from .effects.bounds import Amounts, Box, Reach, Spread, Step
-from .effects.kernel import make_kernel
+from .effects.bounds import Amounts, Box, Reach, Step
 from .effects.pixelwise import Moves
+from .effects.scene_kernels import SceneKernels
 from .effects.work import estimated_work
 from .setup import REFERENCE, Methods
 
@@ -69,18 +67,18 @@ class Promises:
         self.setup = box.setup
         self.reach = Reach(box)
         self.spectrum = extinction.transmittance(self.setup, "spectral", self.setup.grid.nodes_nm)
-        self._kernels: dict[Methods, FloatArray] = {}
+        self._kernels = SceneKernels(self.setup, self.reach.knots_nm)
         self._amounts: dict[bytes, Amounts] = {}
-        self._deviations: dict[Methods, Deviation] = {}
         self._gaps: dict[tuple[str, float], float] = {}
         self._promises: dict[tuple[str, Methods, Methods], float] = {}
         self._moves = Moves(self.setup, self.reach)
 
     def promise(self, effect: str, before: Methods, after: Methods) -> float:
         """What switching `effect` from its reference changes in any CSD, DN."""
-        if effect == "phase" and self._anywhere(after):
-            return float(phase.within_dn(after.phase) or 0.0) + 2 * self._as_read(after)
-        if effect == "phase" and not self._anywhere(before):
+        if effect == "phase" and self._kernels.anywhere(after):
+            within_dn = float(phase.within_dn(after.phase) or 0.0)
+            return min(within_dn + 2 * self._as_read(after), self._longest(after))
+        if effect == "phase" and not self._kernels.anywhere(before):
             return 0.0
         if getattr(before, effect) == getattr(after, effect):
             return 0.0
@@ -115,10 +113,6 @@ class Promises:
             each = [pedestal.promise(self.setup, top, after) for top in tops]
         return float(np.linalg.norm(each))
 
-    def _anywhere(self, methods: Methods) -> bool:
-        """Whether the light may fall anywhere, and more than a lattice of places is looked at."""
-        return phase.all_count(replace(self.setup, methods=methods))
-
     def _as_read(self, methods: Methods) -> float:
         """By how much a distance of the readout may differ from that of a straight one at the same place, DN.
 
@@ -133,76 +127,11 @@ class Promises:
                 methods = after
         return promised
 
-    @cached_property
-    def _cells(self) -> phase.Cells:
-        """Cells of places; their corners stand for all places, with what may lie between them."""
-        return phase.whole(self.setup.mosaic)
-
-    @cached_property
-    def _corners(self) -> tuple[phase.Cases, IndexArray]:
-        """The corners of the cells, each once, and those of each cell."""
-        return self._cells.shared_corners(self.setup)
-
-    def _wanted(self, methods: Methods) -> Methods:
-        """What the kernel depends on, with no extinction."""
-        on = "skip" if methods.blur == "skip" else REFERENCE.blur
-        wanted = replace(methods, extinction="skip", illumination="skip", blur=on)
-        wanted = replace(wanted, **{e: getattr(REFERENCE, e) for e in (*READOUT, "quadrature", "flicker")})
-        return replace(wanted, phase=REFERENCE.phase) if self._anywhere(wanted) else wanted
-
-    def _kernel(self, methods: Methods) -> FloatArray:
-        """The kernel at the knots, without extinction: [cases, channels, channels, knots].
-
-        The cases are the places of the lattice, or the corners of cells where the light may fall anywhere.
-        """
-        wanted, nodes = self._wanted(methods), self.reach.knots_nm
-        if wanted not in self._kernels:
-            cases = self._corners[0] if self._anywhere(wanted) else None
-            light = make_kernel(self.setup, wanted, nodes, by_pixel=False, work=Counter(), cases=cases).light
-            self._kernels[wanted] = np.ascontiguousarray(np.broadcast_to(light, (*light.shape[:3], nodes.size)))
-        return self._kernels[wanted]
-
-    def _nearest(self, methods: Methods) -> FloatArray:
-        """The kernel at the place of a lattice that is nearest to the center of each cell."""
-        lattice = phase.places_px(self.setup, methods.phase)
-        return self._kernel(methods)[phase.nearest(self.setup, self._cells.centers, lattice)]
-
-    def _deviation(self, methods: Methods) -> Deviation:
-        """How far the kernel in cells may be from a mean of that at the corners: [cells, channels, channels, 1]."""
-        wanted = self._wanted(methods)
-        if wanted not in self._deviations:
-            kernel, cells = self._kernel(wanted), self._cells
-            between = Between(self.setup, wanted, self.reach.knots_nm)
-            found = between.of_cells(cells.centers, cells.half, cells.homes, kernel[self._corners[1]])
-            # At any wavelength: that of the middle one, and what differs from it.
-            largest = found.kernel[..., :1] + found.kernel[..., 1:].max(axis=3, initial=0.0, keepdims=True)
-            self._deviations[wanted] = Deviation(largest, found.tilt)
-        return self._deviations[wanted]
-
-    def _spread(
-        self, effect: str, before: Methods, after: Methods, change: FloatArray, left: FloatArray, scale: float
-    ) -> Spread | None:
-        """What lies between the corners of the cells, of a change of the kernel and what is left; None for a lattice.
-
-        `scale`: of a change that is this share of the kernel.
-        """
-        if not self._anywhere(before):
-            return None
-        here = self._deviation(before)
-        nothing = Deviation(np.zeros_like(here.kernel), here.tilt)
-        there = self._deviation(after) if self._anywhere(after) else nothing
-        sizes = here.kernel * scale
-        if effect in ("demosaic", "crosstalk", "blur"):
-            sizes = (here.kernel + there.kernel) * bool(change.any())
-        corners = self._corners[1]
-        if effect == "phase":  # what is left is that of another place in each cell
-            corners = np.arange(len(change)).reshape(corners.shape)
-        changes, lefts = change[corners], left[corners]
-        tilt, found = here.tilt[:, :, None], []
-        for values, size in ((changes, sizes), (lefts, there.kernel)):
-            tilted = tilt * (values.max(axis=1) - values.min(axis=1)).max(axis=3) / 2
-            found.append(size[..., 0] + tilted)
-        return Spread(corners, *found, np.ptp(lefts, axis=1))
+    def _longest(self, methods: Methods) -> float:
+        """The longest distance that a readout which clips can have, DN; two of them differ by no more."""
+        if self._is_straight(methods):
+            return np.inf
+        return math.sqrt(len(self.setup.mosaic.channels)) * self.reach.span_dn(rounds=methods.quantization == "round")
 
     def _gap(self, methods: Methods, method: str) -> float:
         """How far a kernel may be from its interpolation between the wavelengths of a method of blur."""
@@ -239,11 +168,14 @@ class Promises:
         scale = 1.0
         falls = illumination.factor(setup, after.illumination if effect != "illumination" else before.illumination)
         base = changed = self._sums(self.spectrum * falls, box.low, box.high)
-        now = self._kernel(before)
+        now = self._kernels.of(before)
         if effect == "phase":  # the places that are nearest to those in a cell are compared at all of its corners
-            now, then = now[self._corners[1].ravel()], np.repeat(self._nearest(after), len(phase.CORNERS), axis=0)
+            now, then = (
+                now[self._kernels.corners[1].ravel()],
+                np.repeat(self._kernels.nearest(after), len(phase.CORNERS), axis=0),
+            )
         else:
-            then = self._kernel(after)
+            then = self._kernels.of(after)
         left, remainder = then, self._between_knots(before)
         if effect == "quadrature":
             kept = quadrature.nodes(setup.grid.size, after.quadrature)
@@ -272,11 +204,11 @@ class Promises:
         """Of an effect of the optics: in a straight readout, and what a readout that is not adds to that."""
         step, found = self._step(effect, before, after, straight=True), 0.0
         if step.remainder != 0 or step.change.any():
-            between = self._spread(effect, before, after, step.change, step.left, step.scale)
+            between = self._kernels.spread(effect, before, after, step.change, step.left, step.scale)
             found = self.reach.largest_change(*step[:5], between=between)
         if effect == "phase":
-            return found + 2 * self._as_read(after)
-        if self._is_straight(after) or self._anywhere(after):
+            return min(found + 2 * self._as_read(after), self._longest(after))
+        if self._is_straight(after) or self._kernels.anywhere(after):
             return found
         return self._bent_promise(effect, before, after, found)
 
@@ -288,7 +220,7 @@ class Promises:
         if effect == "sampling" or (hard and found > 0):
             return found + 2 * self._as_read(after)
         step = self._step(effect, before, after, straight=False)
-        wanted = self._wanted(before), self._wanted(after)
+        wanted = self._kernels.wanted(before), self._kernels.wanted(after)
         moved = self._moves.of(effect, *wanted, step.changed, step.falls) * step.scale
         moved += step.remainder * step.changed.most_each.sum(axis=1)[:, None]
         if not moved.any():

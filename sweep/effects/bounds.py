@@ -136,6 +136,12 @@ class Reach:
         ends = [qe @ irradiance * dn for qe in (self.box.low, self.box.high)]
         return np.asarray((ends[0] + ends[1]) / 2), np.asarray((ends[1] - ends[0]) / 2)
 
+    def span_dn(self, *, rounds: bool) -> float:
+        """Between which two values, so far apart, DN, every channel's value is where the readout clips, or `rounds`."""
+        pixel = self.box.setup.pixel
+        full = float(pixel.full_scale_dn)
+        return full if rounds else min(full, pixel.well_e * pixel.dn_per_e)
+
     def amounts(self, factor: FloatArray, low: FloatArray, high: FloatArray) -> Amounts:
         """Sums for QE between `low` and `high` (ndarray[n_channels, n_wavelengths]) and a factor per wavelength."""
         middle, half = (low + high) / 2, (high - low) / 2

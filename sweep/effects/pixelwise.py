@@ -69,10 +69,7 @@ class Moves:
         steep = quantization.steepness(self._setup) if rounds else 1.0
         if not clips:
             return every + (steep - 1) * self._reach.largest_move(moved)
-        pixel = self._setup.pixel
-        full = float(pixel.full_scale_dn)
-        span = full if rounds else min(full, pixel.well_e * pixel.dn_per_e)
-        return self._reach.largest_move(np.minimum(moved * steep, span))
+        return self._reach.largest_move(np.minimum(moved * steep, self._reach.span_dn(rounds=rounds)))
 
     def _kernel(self, methods: Methods, cases: phase.Cases) -> Kernel:
         """Pixel by pixel, at all knots."""
