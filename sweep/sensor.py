@@ -10,17 +10,17 @@ from pydantic import Field, model_validator
 from .arrays import FloatArray
 from .schema import Meters, NonNegative, Section, Share
 
-ReadNoise = Annotated[float, Field(ge=0, le=1e6)]
-"""Electrons; a pixel's well is full long before."""
+ReadNoise = Annotated[float, Field(ge=0, le=1e4)]
+"""Electrons; sensors have 1 to 100."""
 DarkCurrent = Annotated[float, Field(ge=0, le=1e15)]
 """Electrons per second; any well is full in less than a second."""
 
 MOST_PRNU = 0.1
 """Largest relative deviation of gains: a Gaussian gain is then positive within ten of them. Sensors have 0.01."""
 Prnu = Annotated[float, Field(ge=0, le=MOST_PRNU)]
-WellE = Annotated[float, Field(ge=1e-3, le=1e8)]
-"""A hundred million electrons are more than any pixel holds."""
-GainDnPerE = Annotated[float, Field(ge=1e-15, le=1e9)]
+WellE = Annotated[float, Field(ge=1e-3, le=1e7)]
+"""Ten million electrons are more than pixels for visible light hold."""
+GainDnPerE = Annotated[float, Field(ge=1e-6, le=1e9)]
 
 
 class Optics(Section):
@@ -36,12 +36,12 @@ class Optics(Section):
 
 
 class Pixel(Section):
-    """A pixel and its 12-bit readout.
+    """A pixel and its readout.
 
-    Defaults: 2.1 um pitch (AR0820), a full well of 10,000 e that maps to full scale. `gain_dn_per_e` null means
+    Defaults: 2.1 um pitch (AR0820), 12 bits, a full well of 10,000 e that maps to full scale. `gain_dn_per_e` null means
     full scale / full well. `offset_dn` is the pedestal. `crosstalk`: share of a pixel's light that comes through the
     filters of its four neighbors. `prnu`: relative standard deviation of the pixels' gains. Limits: a pitch of 1 nm to
-    10 cm, wells of 0.001 to 1e8 e, gains of 1e-15 to 1e9 DN/e, read noise up to 1e6 e, dark current up to 1e15 e/s,
+    10 cm, wells of 0.001 to 1e7 e, gains of 1e-6 to 1e9 DN/e, read noise up to 10,000 e, dark current up to 1e15 e/s,
     PRNU up to 0.1.
     """
 

@@ -64,7 +64,7 @@ class Ends:
     @classmethod
     def of(cls, pixel: Pixel) -> Ends:
         """The ends of a pixel."""
-        reach_e = _REACH * pixel.read_noise_e + 1 / pixel.dn_per_e
+        reach_e = _REACH * pixel.read_noise_e
         adc_e = (pixel.full_scale_dn - pixel.offset_dn) / pixel.dn_per_e
         full_e = min(pixel.well_e, adc_e + reach_e)
         last_e = _least_exceeding(full_e) / (1 - DRAWN * pixel.prnu)
