@@ -38,7 +38,7 @@ class Optics(Section):
 class Pixel(Section):
     """A pixel and its readout.
 
-    Defaults: 2.1 um pitch (AR0820), 12 bits, a full well of 10,000 e that maps to full scale. `gain_dn_per_e` null means
+    Defaults: 2.1 um pitch (AR0820), 12 bits, a full well of 10,000 e that maps to full scale. No `gain_dn_per_e` means
     full scale / full well. `offset_dn` is the pedestal. `crosstalk`: share of a pixel's light that comes through the
     filters of its four neighbors. `prnu`: relative standard deviation of the pixels' gains. Limits: a pitch of 1 nm to
     10 cm, wells of 0.001 to 1e7 e, gains of 1e-6 to 1e9 DN/e, read noise up to 10,000 e, dark current up to 1e15 e/s,

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import errno
 import os
-import signal
 import time
 from dataclasses import replace
 from pathlib import Path
 
 import joblib
-import numpy as np
 import pandas as pd
 import psutil
 import pyarrow.parquet as pq
@@ -29,7 +27,7 @@ from sweep.runner.workers import Workers, workers
 from sweep.study import Study, load_study
 
 from .mischief import StoppedError, half_done, mischievous, rows
-from .test_runner import ran, started, study_file
+from .test_runner import ran, study_file
 
 
 @pytest.fixture(scope="module")
@@ -274,38 +272,3 @@ def test_a_search_that_was_killed_is_not_repeated(tmp_path: Path) -> None:
     for name in ("results", "search"):
         tables = [pq.read_table(tmp_path / folder / f"{name}.parquet") for folder in ("out", "whole")]
         assert tables[0].equals(tables[1])
-
-
-def children(pid: int) -> list[psutil.Process]:
-    """Worker processes of a run; not the tracker of its semaphores."""
-    found = psutil.Process(pid).children(recursive=True)
-    return [process for process in found if "resource_tracker" not in " ".join(process.cmdline())]
-
-
-@pytest.mark.slow
-def test_thirty_kills_of_a_run_and_ten_of_its_workers(tmp_path: Path) -> None:
-    study, rng = load_study(study_file(tmp_path, 401)), np.random.default_rng(11)
-    folder = tmp_path / "out" / "tiny"
-    kills = {"run": 0, "worker": 0}
-    while kills["run"] < 30:
-        run = started(tmp_path, tmp_path / "out", "--jobs", "2")
-        if kills["worker"] < 10:
-            time.sleep(float(rng.uniform(4, 7)))
-            for process in children(run.pid)[:1] if run.poll() is None else []:
-                process.kill()
-                kills["worker"] += 1
-        time.sleep(float(rng.uniform(0, 8)))
-        if run.poll() is None:
-            os.kill(run.pid, signal.SIGKILL)
-            kills["run"] += 1
-        run.wait()
-        if (folder / "provenance.json").exists():  # finished between two kills: once more from the start
-            ran(study, tmp_path / "again", 2)
-            assert pq.read_table(folder / "results.parquet").equals(
-                pq.read_table(tmp_path / "again" / "results.parquet")
-            )
-            for made in sorted(folder.rglob("*"), reverse=True):
-                made.rmdir() if made.is_dir() else made.unlink()
-    ran(study, folder, 2)
-    ran(study, tmp_path / "whole", 2)
-    assert pq.read_table(folder / "results.parquet").equals(pq.read_table(tmp_path / "whole" / "results.parquet"))

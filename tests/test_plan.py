@@ -62,8 +62,9 @@ BASES = {
     STRAIGHT: replace(REFERENCE, noise="skip", quantization="skip", saturation="skip"),
 }
 """From where methods are switched."""
-NOT_ALONE = {"sampling": "without pixels nothing is read one by one: no plan leaves it out but of a straight readout"}
-"""Effects that no plan switches alone, and why; they are seen from a straight readout."""
+NOT_ALONE = {"sampling": STRAIGHT, "saturation": "unrounded"}
+"""Effects that no plan switches alone (without pixels nothing is read one by one; rounding clips, too), and from where
+they are seen."""
 
 
 def contract(made: Scene) -> list[Row]:
@@ -113,7 +114,7 @@ def unseen(rows: Iterable[Row], effects: Mapping[str, Any]) -> dict[tuple[str, s
         (effect, method): [] for effect, module in effects.items() for method in module.METHODS[:-1]
     }
     for row in rows:
-        if row.base == (STRAIGHT if row.effect in NOT_ALONE else ALONE) and row.realized > _SEEN_DN:
+        if row.base == NOT_ALONE.get(row.effect, ALONE) and row.realized > _SEEN_DN:
             seen[row.effect, row.method].append(row.scene)
     return {method: scenes for method, scenes in seen.items() if len(scenes) < 3}
 

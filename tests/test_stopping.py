@@ -207,6 +207,25 @@ def test_results_are_handed_on_as_they_finish_and_given_in_order(backend: str) -
     assert finished[0] != 0  # the slow one did not hold up what was finished beside it
 
 
+def test_a_worker_whose_parent_was_killed_before_it_began_ends() -> None:
+    program = "import os, sys; from sweep.runner.processes import prepare_worker; prepare_worker({}); print('lives')"
+    for parent, said in (("os.getppid()", "lives\n"), ("os.getppid() + 1", "")):
+        ended = subprocess.run(
+            [sys.executable, "-c", program.format(parent)], capture_output=True, text=True, check=False
+        )
+        assert (ended.stdout, ended.stderr, ended.returncode) == (said, "", int(not said))
+
+
+def workers_of(mark: str) -> list[psutil.Process]:
+    """Processes that were started with a mark in their environment."""
+    found = []
+    for process in psutil.process_iter():
+        with suppress(psutil.Error):
+            if process.environ().get("SWEEP_MARK") == mark:
+                found.append(process)
+    return found
+
+
 @pytest.mark.slow
 def test_fifty_kills_in_every_phase(tmp_path: Path, undisturbed: Path) -> None:
     """Parents and workers, by three signals, at random moments; the rows are those of an undisturbed run each time."""
@@ -216,7 +235,11 @@ def test_fifty_kills_in_every_phase(tmp_path: Path, undisturbed: Path) -> None:
     while sum(kills.values()) < 50:
         with (tmp_path / "said").open("w") as said:
             run = subprocess.Popen(
-                command(tmp_path, "--jobs", "2"), stdout=subprocess.DEVNULL, stderr=said, start_new_session=True
+                command(tmp_path, "--jobs", "2"),
+                stdout=subprocess.DEVNULL,
+                stderr=said,
+                start_new_session=True,
+                env=os.environ | {"SWEEP_MARK": str(tmp_path)},
             )
         wait_for(tmp_path / "out" / "tiny" / "run.json", run, tmp_path)
         time.sleep(float(rng.uniform(0, 12)))
@@ -230,6 +253,8 @@ def test_fifty_kills_in_every_phase(tmp_path: Path, undisturbed: Path) -> None:
             os.kill(run.pid, number)
             kills["run"] += 1
         run.wait(timeout=120)
+        _, alive = psutil.wait_procs(workers_of(str(tmp_path)), timeout=WITHIN_S)
+        assert not alive
         said_text = (tmp_path / "said").read_text()
         assert "Traceback" not in said_text, said_text
         if (out / "report.html").exists():

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import signal
+from collections.abc import Callable
 from contextlib import suppress
+from functools import cache, partial
 
 _PR_SET_PDEATHSIG = 1
 """Number of prctl's option in Linux's sys/prctl.h."""
@@ -13,10 +16,16 @@ _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 """Numbers of mallopt's options in glibc's malloc.h."""
 
 
-def prepare_worker() -> None:
+@cache
+def preparing(parent_pid: int) -> Callable[[], None]:
+    """What each worker of a process calls first; the same object each time, by which a pool knows its workers."""
+    return partial(prepare_worker, parent_pid)
+
+
+def prepare_worker(parent_pid: int) -> None:
     """Leave signals to the parent, end with it, and keep freed memory."""
     leave_signals_to_the_parent()
-    end_with_the_parent()
+    end_with(parent_pid)
     keep_freed_memory()
 
 
@@ -25,10 +34,12 @@ def leave_signals_to_the_parent() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def end_with_the_parent() -> None:
-    """In a worker: when the parent is killed, end at once, where the system can do that (Linux)."""
+def end_with(parent_pid: int) -> None:
+    """In a worker: when its parent is killed, end at once, where the system can do that (Linux)."""
     with suppress(OSError, AttributeError):
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() != parent_pid:  # it was killed before
+            os._exit(1)
 
 
 def keep_freed_memory() -> None:

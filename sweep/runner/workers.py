@@ -18,7 +18,7 @@ from joblib.externals.loky import ProcessPoolExecutor
 from threadpoolctl import threadpool_limits
 
 from ..errors import SweepError
-from .processes import keep_freed_memory, prepare_worker
+from .processes import keep_freed_memory, preparing
 from .stopping import Stop, without_interrupts
 
 _LEAST_WINDOW, _WINDOW_PER_WORKER = 64, 16
@@ -160,7 +160,7 @@ def workers(how: Workers) -> Iterator[Workers]:
         if how.backend == "dask":
             stack.enter_context(_dask_client(how.scheduler))
         elif how.backend == "loky":
-            settings = {"inner_max_num_threads": 1, "initializer": prepare_worker}
+            settings = {"inner_max_num_threads": 1, "initializer": preparing(os.getpid())}
         # This process computes, too; and a thread that ends gives back what it found, also to those beside it.
         stack.enter_context(threadpool_limits(1))
         stack.enter_context(joblib.parallel_config(how.backend, **settings))
@@ -169,7 +169,7 @@ def workers(how: Workers) -> Iterator[Workers]:
 
 def alone(call: Call) -> Any:
     """Result of a call in a process of its own; raises WorkerKilledError when that dies."""
-    process = ProcessPoolExecutor(max_workers=1, initializer=prepare_worker)
+    process = ProcessPoolExecutor(max_workers=1, initializer=preparing(os.getpid()))
     ended = False
     try:
         with without_interrupts():
