@@ -7,17 +7,21 @@ than the method of `phase` leaves open, are divided. The readout is taken as str
 
 from __future__ import annotations
 
+import hashlib
+import pickle
+import threading
 from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .arrays import FloatArray, IndexArray
+from .cache import Cache
 from .effects import blur, extinction, illumination, phase
 from .effects.between import Between, Deviation
 from .effects.kernel import make_kernel
 from .metrics import Pair, class_pairs
-from .setup import Setup
+from .setup import REFERENCE, Setup
 
 _UNIT_PX = 2.0**-40
 """Places are told apart in this unit."""
@@ -41,10 +45,78 @@ class Extremes:
     at_largest: FloatArray
 
 
-class AnyPlace:
-    """A scene in which the light may fall anywhere, ready for designs; kernels and bounds are kept.
+class _Geometry:
+    """Kernels at places and in cells of places, kept: what designs, spaces and tolerances of one scene share."""
 
-    `work` counts the places and cells that are computed.
+    def __init__(self, setup: Setup) -> None:
+        self._setup, wave = setup, setup.grid.nodes_nm
+        self.knots_nm = wave if setup.methods.blur == "skip" else blur.knots(wave, setup.methods.blur)
+        self.between = Between(setup, setup.methods, self.knots_nm)
+        self._kernels: dict[tuple[int, ...], FloatArray] = {}
+        self._deviations: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
+        self._one_at_a_time = threading.Lock()
+
+    def of_cells(self, cells: phase.Cells, work: Counter[str]) -> tuple[FloatArray, Deviation]:
+        """The kernel at the corners of cells, and how far it may be from that in them."""
+        with self._one_at_a_time:
+            kernels = self._kernels_at(cells, work)
+            return kernels, self._deviations_in(cells, kernels, work)
+
+    def _named(self, places: FloatArray, homes: FloatArray) -> list[tuple[int, ...]]:
+        """A name for each place (ndarray[n, 2]), with the pixel that is read out there, where one is."""
+        target = self._setup.scenario.target
+        assert target is not None
+        names = np.rint(places / _UNIT_PX).astype(np.int64)
+        if target.readout == "center":
+            names = np.concatenate([names, homes.astype(np.int64)], axis=1)
+        return [tuple(name) for name in names.tolist()]
+
+    def _kernels_at(self, cells: phase.Cells, work: Counter[str]) -> FloatArray:
+        """Kernel at the corners of cells, ndarray[n_cells, 4, n_channels, n_channels, n_knots]."""
+        corners = cells.corners
+        names = self._named(corners.places_px, corners.home_px)
+        if sum(kernel.nbytes for kernel in self._kernels.values()) > _KEPT_BYTES:
+            self._kernels.clear()
+        new = {name: at for at, name in enumerate(names) if name not in self._kernels}
+        if new:
+            cases, methods = corners.some(np.array(list(new.values()))), self._setup.methods
+            made = make_kernel(self._setup, methods, self.knots_nm, by_pixel=False, work=work, cases=cases)
+            work["places"] += len(new)
+            whole = np.broadcast_to(made.light, (*made.light.shape[:3], self.knots_nm.size))
+            self._kernels |= dict(zip(new, whole, strict=True))
+        found = np.stack([self._kernels[name] for name in names])
+        return found.reshape(len(cells.centers), len(phase.CORNERS), *found.shape[1:])
+
+    def _deviations_in(self, cells: phase.Cells, kernels: FloatArray, work: Counter[str]) -> Deviation:
+        """How far the kernel may be from that at the corners."""
+        names = [(*name, int(cells.half / _UNIT_PX)) for name in self._named(cells.centers, cells.homes)]
+        if len(self._deviations) * kernels[0, 0, :, :, 0].size * self.between.n_parts * 8 > _KEPT_BYTES:
+            self._deviations.clear()
+        new = [at for at, name in enumerate(names) if name not in self._deviations]
+        if new:
+            made = self.between.of_cells(cells.centers[new], cells.half, cells.homes[new], kernels[new])
+            work["cells"] += len(new)
+            self._deviations |= {names[at]: both for at, both in zip(new, zip(*made, strict=True), strict=True)}
+        return Deviation(*(np.stack(parts) for parts in zip(*(self._deviations[n] for n in names), strict=True)))
+
+
+_geometries: Cache[bytes, _Geometry] = Cache(4)
+
+
+def _geometry_of(setup: Setup) -> _Geometry:
+    """The geometry of a scene: filters, noise and the light's way to the lens have no part in it."""
+    kept = {effect: getattr(setup.methods, effect) for effect in ("sampling", "demosaic", "blur", "crosstalk")}
+    methods = replace(REFERENCE, **kept, extinction="skip", illumination="skip")
+    bare = replace(
+        setup, methods=methods, modified=(), qe=np.zeros_like(setup.qe), clear_qe=np.zeros_like(setup.clear_qe)
+    )
+    return _geometries.get(hashlib.sha256(pickle.dumps(bare)).digest(), lambda: _Geometry(bare))
+
+
+class AnyPlace:
+    """A scene in which the light may fall anywhere, ready for designs.
+
+    `work` counts the places and cells that are computed; those of other designs of the scene are kept.
     """
 
     def __init__(self, setup: Setup, work: Counter[str]) -> None:
@@ -52,16 +124,15 @@ class AnyPlace:
         if within_dn is None:
             raise ValueError(f"{setup.methods.phase!r} looks at a lattice of places")
         self.within_dn, self.members = within_dn, setup.members
-        skipped = ("noise", "quantization", "saturation", "pedestal", "extinction", "illumination")
-        self._setup = replace(setup, methods=replace(setup.methods, **dict.fromkeys(skipped, "skip")))
-        self._work = work
-        self._knots_nm = wave if setup.methods.blur == "skip" else blur.knots(wave, setup.methods.blur)
-        self._hats = np.stack([np.interp(wave, self._knots_nm, unit) for unit in np.eye(self._knots_nm.size)])
-        self._between = Between(self._setup, self._setup.methods, self._knots_nm)
+        self._mosaic, self._work, self._geometry = setup.mosaic, work, _geometry_of(setup)
+        self._hats = np.stack([np.interp(wave, self._geometry.knots_nm, unit) for unit in np.eye(self.n_knots)])
         falls = illumination.factor(setup, setup.methods.illumination)
         self._dimmed = falls * extinction.transmittance(setup, setup.methods.extinction, wave)
-        self._kernels: dict[tuple[int, ...], FloatArray] = {}
-        self._deviations: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
+
+    @property
+    def n_knots(self) -> int:
+        """Wavelengths of the kernels."""
+        return self._geometry.knots_nm.size
 
     def extremes(self, light_dn: FloatArray) -> dict[Pair, Extremes | None]:
         """Extremes of every pair of types; None where too many cells would be needed.
@@ -75,12 +146,12 @@ class AnyPlace:
 
     def whole(self) -> phase.Cells:
         """The cells to begin with."""
-        return phase.whole(self._setup.mosaic)
+        return phase.whole(self._mosaic)
 
     @property
     def values_per_cell(self) -> int:
         """Values of the kernels at a cell's corners."""
-        return len(phase.CORNERS) * len(self._setup.mosaic.channels) ** 2 * self._knots_nm.size
+        return len(phase.CORNERS) * len(self._mosaic.channels) ** 2 * self.n_knots
 
     def at_knots(self, light: FloatArray) -> FloatArray:
         """Light on the wavelengths of the kernel, ndarray[..., n_wavelengths] -> ndarray[..., n_knots]."""
@@ -88,44 +159,11 @@ class AnyPlace:
 
     def amounts(self, light: FloatArray) -> FloatArray:
         """`Between.amounts` of a light."""
-        return self._between.amounts(light)
+        return self._geometry.between.amounts(light)
 
-    def _named(self, places: FloatArray, homes: FloatArray) -> list[tuple[int, ...]]:
-        """A name for each place (ndarray[n, 2]), with the pixel that is read out there, where one is."""
-        target = self._setup.scenario.target
-        assert target is not None
-        names = np.rint(places / _UNIT_PX).astype(np.int64)
-        if target.readout == "center":
-            names = np.concatenate([names, homes.astype(np.int64)], axis=1)
-        return [tuple(name) for name in names.tolist()]
-
-    def kernels(self, cells: phase.Cells) -> FloatArray:
-        """Kernel at the corners of cells, ndarray[n_cells, 4, n_channels, n_channels, n_knots]."""
-        corners = cells.corners
-        names = self._named(corners.places_px, corners.home_px)
-        if sum(kernel.nbytes for kernel in self._kernels.values()) > _KEPT_BYTES:
-            self._kernels.clear()
-        new = {name: at for at, name in enumerate(names) if name not in self._kernels}
-        if new:
-            cases, methods = corners.some(np.array(list(new.values()))), self._setup.methods
-            made = make_kernel(self._setup, methods, self._knots_nm, by_pixel=False, work=self._work, cases=cases)
-            self._work["places"] += len(new)
-            whole = np.broadcast_to(made.light, (*made.light.shape[:3], self._knots_nm.size))
-            self._kernels |= dict(zip(new, whole, strict=True))
-        found = np.stack([self._kernels[name] for name in names])
-        return found.reshape(len(cells.centers), len(phase.CORNERS), *found.shape[1:])
-
-    def deviations(self, cells: phase.Cells, kernels: FloatArray) -> Deviation:
-        """How far the kernel may be from that at the corners."""
-        names = [(*name, int(cells.half / _UNIT_PX)) for name in self._named(cells.centers, cells.homes)]
-        if len(self._deviations) * kernels[0, 0, :, :, 0].size * self._between.n_parts * 8 > _KEPT_BYTES:
-            self._deviations.clear()
-        new = [at for at, name in enumerate(names) if name not in self._deviations]
-        if new:
-            made = self._between.of_cells(cells.centers[new], cells.half, cells.homes[new], kernels[new])
-            self._work["cells"] += len(new)
-            self._deviations |= {names[at]: both for at, both in zip(new, zip(*made, strict=True), strict=True)}
-        return Deviation(*(np.stack(parts) for parts in zip(*(self._deviations[n] for n in names), strict=True)))
+    def of_cells(self, cells: phase.Cells) -> tuple[FloatArray, Deviation]:
+        """The kernel at the corners of cells, and how far it may be from that in them."""
+        return self._geometry.of_cells(cells, self._work)
 
 
 class _Search:
@@ -173,8 +211,7 @@ class _Search:
         So the distance is at most the largest at a corner and what is left, and at least how far all corners lie to one
         side of a plane, less what is left.
         """
-        kernels = self._scene.kernels(cells)
-        deviation = self._scene.deviations(cells, kernels)
+        kernels, deviation = self._scene.of_cells(cells)
         flat = kernels.reshape(*kernels.shape[:3], -1)
         first, second = (
             flat @ light.reshape(len(light), -1).T for light in self._light
