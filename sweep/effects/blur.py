@@ -142,11 +142,17 @@ class Profile:
         n, size = len(r_um), len(self._spline.c)
         # Four values for each radius. SciPy looks for radii outside number by number, if it is not told to extrapolate.
         basis = BSpline.design_matrix(r_um.ravel(), self._spline.t, 3, extrapolate=True)
-        at = np.arange(n)[:, None] * size + basis.indices.reshape(n, -1)
+        indices = basis.indices.reshape(n, -1)
+        first, last = indices.min(axis=1), indices.max(axis=1)
+        width = int((last - first).max(initial=0)) + 1
+        first = np.minimum(first, size - width)
         each = (basis.data.reshape(*r_um.shape, 4) * weights[:, None]).reshape(n, -1)
-        folded = np.bincount(at.ravel(), each.ravel(), minlength=n * size).reshape(n, size)
+        at = indices + (np.arange(n) * width - first)[:, None]
+        folded = np.bincount(at.ravel(), each.ravel(), minlength=n * width)
+        columns = first[:, None] + np.arange(width)
         # A sparse product sums each row by itself: the same values in whatever company a radius is asked for.
-        return np.asarray(csr_matrix(folded) @ self._spline.c, dtype=float)
+        rows = csr_matrix((folded, columns.ravel(), np.arange(n + 1) * width), shape=(n, size))
+        return np.asarray(rows @ self._spline.c, dtype=float)
 
     @property
     def slopes(self) -> FloatArray:
