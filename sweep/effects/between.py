@@ -11,7 +11,6 @@ means of the image.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
@@ -214,15 +213,12 @@ class Between:
         ]
         return Deviation(np.concatenate([p.kernel for p in parts]), np.concatenate([p.tilt for p in parts]))
 
-    def _light(self, seen: sampling.Window, wanted: BoolArray, h: float) -> Iterator[_Slopes]:
-        """Of the light of the pixels that are `wanted`, ndarray[n_pixels], part by part."""
-        places, which, turned = sampling.different(seen, wanted)
+    def _light(self, places: FloatArray, h: float) -> list[_Slopes]:
+        """Of the light of pixels at `places` (ndarray[n_places, 2]) from its center, part by part."""
         if self._images is None:
-            yield _of_disc(places[:, 0], places[:, 1], self._half, self._radii[0], h).at(which, turned)
-            return
+            return [_of_disc(places[:, 0], places[:, 1], self._half, self._radii[0], h)]
         found = self._images.of_pixels(places[:, 0], places[:, 1], self._half, h)
-        for part in range(self.n_parts):
-            yield found.part(part).at(which, turned)
+        return [found.part(part) for part in range(self.n_parts)]
 
     def _own(self, seen: sampling.Window) -> FloatArray:
         """Which channel is whose, ndarray[rows, columns, n_channels]."""
@@ -236,12 +232,10 @@ class Between:
         spread = crosstalk.mixed(weights[..., None] * own, self._share)
         wanted = np.asarray((spread > 0).any(axis=3))
         cell, row, column = np.nonzero(wanted)
-        n = own.shape[2]
-        found = np.zeros((len(centers), n, n, self.n_parts))
+        places, which, _ = sampling.different(seen, wanted)
         through = own[row, column].argmax(axis=1)
-        for part, light in enumerate(self._light(seen, wanted, h)):
-            bends = (light.bend[0] + light.bend[1]) * h**2 / 2 + (light.jump[0] + light.jump[1]) * h / 2
-            np.add.at(found[..., part].swapaxes(1, 2), (cell, through), spread[wanted] * bends[:, None])
+        light = self._light(places, h)
+        found = _summed(spread[wanted], cell, through, which, _bends(light, h), len(centers))
         return Deviation(found, np.zeros(found.shape[:2]))
 
     def _of_mean(self, centers: FloatArray, h: float, _: FloatArray, corners: FloatArray) -> Deviation:
@@ -258,25 +252,46 @@ class Between:
         weight, slope_x, slope_y, jump = (values[wanted] for values in mixed)  # [n_pixels, n_channels]
         cell, row, column = np.nonzero(wanted)
         through = own[row, column].argmax(axis=1)
-        taken = self._taken.T[through]
         sums = np.einsum("nrc,rcu->nu", sudden, own) * h / 2
         readout = self._radii[1]
         shares = [sampling.covered(seen.dx - h * x, seen.dy - h * y, self._half, readout) for x, y in phase.CORNERS]
         at_corners = np.stack([np.einsum("nrc,rcu->nu", share, own) for share in shares], axis=1)
         least = np.maximum(at_corners.min(axis=1) - sums, 1e-300)
-        found = np.zeros((len(centers), *self._taken.shape, self.n_parts))
-        ranges = self._kernel_ranges(corners)
-        for part, (light, (low, high)) in enumerate(zip(self._light(seen, wanted, h), ranges, strict=True)):
+        places, which, turned = sampling.different(seen, wanted)
+        lights = self._light(places, h)
+        found = _summed(weight, cell, through, which, _bends(lights, h), len(centers))
+        # Elsewhere than at the rim of the readout the weights are the same in the whole cell.
+        rim = np.flatnonzero((slope_x > 0).any(axis=1) | (slope_y > 0).any(axis=1) | (jump > 0).any(axis=1))
+        at, to, taken = cell[rim], through[rim], self._taken.T[through[rim]]
+        for part, (all_light, (low, high)) in enumerate(zip(lights, self._kernel_ranges(corners), strict=True)):
+            light = all_light.at(which[rim], turned[rim])
             # The ratio, for a weight that goes through one channel's filter alone.
             k_low, k_high = (
-                np.divide(k[cell, :, through], taken, out=np.zeros_like(taken), where=taken > 0) for k in (low, high)
+                np.divide(k[at, :, to], taken, out=np.zeros_like(taken), where=taken > 0) for k in (low, high)
             )
-            every = jump * np.maximum(light.high[:, None] - k_low, k_high - light.low[:, None]) * (h / 2)
-            every += (slope_x * light.slope[0][:, None] + slope_y * light.slope[1][:, None]) * h**2
-            bends = (light.bend[0] + light.bend[1]) * h**2 / 2 + (light.jump[0] + light.jump[1]) * h / 2
-            every += weight * bends[:, None]
-            np.add.at(found[..., part].swapaxes(1, 2), (cell, through), every)
+            every = jump[rim] * np.maximum(light.high[:, None] - k_low, k_high - light.low[:, None]) * (h / 2)
+            every += (slope_x[rim] * light.slope[0][:, None] + slope_y[rim] * light.slope[1][:, None]) * h**2
+            np.add.at(found[..., part].swapaxes(1, 2), (at, to), every)
             size = np.maximum(np.abs(low), np.abs(high)) / np.where(self._taken > 0, self._taken, np.inf)
             found[..., part] += size * self._uneven * sums[:, :, None]
         spread = at_corners.max(axis=1) - at_corners.min(axis=1)
         return Deviation(found / least[:, :, None, None], spread / np.maximum(at_corners.min(axis=1), 1e-300))
+
+
+def _bends(lights: list[_Slopes], h: float) -> FloatArray:
+    """How far each part of the light may be from the line between two ends of a cell, ndarray[n_places, n_parts]."""
+    each = [(a.bend[0] + a.bend[1]) * h**2 / 2 + (a.jump[0] + a.jump[1]) * h / 2 for a in lights]
+    return np.stack(each, axis=1)
+
+
+def _summed(
+    weights: FloatArray, cell: IndexArray, through: IndexArray, place: IndexArray, values: FloatArray, n_cells: int
+) -> FloatArray:
+    """Sums of values at places, ndarray[n_places, n_parts], over the pixels of each cell that look through a channel.
+
+    `weights`: ndarray[n_pixels, n_channels]. Returns ndarray[n_cells, n_channels, n_channels, n_parts].
+    """
+    n, n_places = weights.shape[1], len(values)
+    at = (cell * n + through) * n_places + place
+    sums = [np.bincount(at, own, minlength=n_cells * n * n_places).reshape(-1, n_places) @ values for own in weights.T]
+    return np.stack([each.reshape(n_cells, n, -1) for each in sums], axis=1)

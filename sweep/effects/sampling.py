@@ -24,8 +24,13 @@ def skip_is_exact(setup: Setup) -> str | None:
 
 def covered(x: FloatArray, y: FloatArray, half: float, radius: float) -> FloatArray:
     """Share of a square of half side `half` around (x, y) that lies in the disc of `radius` around 0, exact."""
-    ends = [_area(x + sx * half, y + sy * half, radius) * sx * sy for sx in (1, -1) for sy in (1, -1)]
-    return np.asarray(np.clip(sum(ends) / (4 * half**2), 0.0, 1.0), dtype=float)
+    ax, ay = np.abs(x), np.abs(y)
+    inside = np.hypot(ax + half, ay + half) <= radius
+    found = inside.astype(float)
+    rim = ~inside & (np.hypot(np.maximum(ax - half, 0.0), np.maximum(ay - half, 0.0)) < radius)
+    ends = [_area(ax[rim] + sx * half, ay[rim] + sy * half, radius) * sx * sy for sx in (1, -1) for sy in (1, -1)]
+    found[rim] = np.clip(sum(ends) / (4 * half**2), 0.0, 1.0)
+    return found
 
 
 def _area(x: FloatArray, y: FloatArray, radius: float) -> FloatArray:
