@@ -232,7 +232,7 @@ class Between:
         spread = crosstalk.mixed(weights[..., None] * own, self._share)
         wanted = np.asarray((spread > 0).any(axis=3))
         cell, row, column = np.nonzero(wanted)
-        places, which, _ = sampling.different(seen, wanted)
+        places, which = sampling.different(seen, wanted)[:2]
         through = own[row, column].argmax(axis=1)
         light = self._light(places, h)
         found = _summed(spread[wanted], cell, through, which, _bends(light, h), len(centers))
