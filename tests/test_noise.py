@@ -180,9 +180,9 @@ def test_a_noisy_study_from_file_to_report(tmp_path: Path) -> None:
         ("dprime_yellow_red: {min", "dprime_yellow_green: {min", "unknown quantity"),
         ("offset_dn: 168}", "offset_dn: 168, prnu: 0.999}", "less than or equal to 0.1"),
         ("noise: true", "noise: {prnu: 0.999}", "less than or equal to 0.1"),
-        ("offset_dn: 168}", "offset_dn: 168, well_e: 1.0e+300}", "less than or equal to 100000000"),
+        ("offset_dn: 168}", "offset_dn: 168, well_e: 1.0e+300}", "less than or equal to 10000000"),
         ("offset_dn: 168}", "offset_dn: 168, gain_dn_per_e: 1.0e+300}", "less than or equal to 1000000000"),
-        ("noise: true", "noise: {read_noise_e: 1.0e+300}", "less than or equal to 1000000"),
+        ("noise: true", "noise: {read_noise_e: 1.0e+300}", "less than or equal to 10000"),
         ("constraints:", "search: {starts: 2}\nconstraints:", "the search does not know"),
     ],
 )
