@@ -21,6 +21,7 @@ from .imaging import Imager
 from .knobs import Regridded, Setting, knob_measurements
 from .metrics import CSD
 from .plan import Plan
+from .places import forget_geometries
 from .progress import Progress
 from .report import AccuracyReport, make_accuracy_report, read_hard_cases
 from .series import draw_knobs, draw_work_precision
@@ -108,6 +109,7 @@ def _timed(study: Study, scenario: str, most_designs: int) -> tuple[FloatArray, 
     times = []
     while True:
         blur.profile.cache_clear()
+        forget_geometries()
         started = time.perf_counter()
         found, work = [], Counter[str]()
         for space, setup in setups:

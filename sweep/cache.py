@@ -34,3 +34,8 @@ class Cache(Generic[Key, Value]):
                     self._values.popitem(last=False)
             self._values.move_to_end(key)
             return self._values[key]
+
+    def clear(self) -> None:
+        """Forget all values."""
+        with self._one_at_a_time:
+            self._values.clear()

@@ -103,6 +103,11 @@ class _Geometry:
 _geometries: Cache[bytes, _Geometry] = Cache(4)
 
 
+def forget_geometries() -> None:
+    """Let the next scene compute its kernels anew, as one that is the first."""
+    _geometries.clear()
+
+
 def _geometry_of(setup: Setup) -> _Geometry:
     """The geometry of a scene: filters, noise and the light's way to the lens have no part in it."""
     kept = {effect: getattr(setup.methods, effect) for effect in ("sampling", "demosaic", "blur", "crosstalk")}

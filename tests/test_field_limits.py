@@ -237,9 +237,10 @@ def test_each_limit_is_where_the_schema_has_it() -> None:
             assert part.get("maximum", ends[1]) == ends[1], (key, part)
 
 
-def check_limits(tmp_path: Path, seed: int, count: int) -> int:
-    rng, computed = np.random.default_rng(seed), 0
-    for _ in range(count):
+@pytest.mark.slow
+def test_many_figures_at_their_limits_together(tmp_path: Path) -> None:
+    rng, computed = np.random.default_rng(2), 0
+    for _ in range(40):
         tree = beyond_hardware(rng)
         try:
             study = loaded(tmp_path, tree)
@@ -250,17 +251,7 @@ def check_limits(tmp_path: Path, seed: int, count: int) -> int:
             for name in study.scenarios:
                 assert statuses(study, name) == {"ok"}, tree
         computed += 1
-    return computed
-
-
-@pytest.mark.slow
-def test_all_figures_at_their_limits_together(tmp_path: Path) -> None:
-    assert check_limits(tmp_path, 1, 5) > 1
-
-
-@pytest.mark.slow
-def test_many_figures_at_their_limits_together(tmp_path: Path) -> None:
-    assert check_limits(tmp_path, 2, 100) > 20
+    assert computed > 8
 
 
 def test_negative_zero_is_zero(tmp_path: Path) -> None:

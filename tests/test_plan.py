@@ -61,7 +61,7 @@ BASES = {
     "no noise": replace(REFERENCE, noise="skip"),
     STRAIGHT: replace(REFERENCE, noise="skip", quantization="skip", saturation="skip"),
 }
-"""From where methods are switched."""
+"""From where methods are switched; over all places, which takes long, from the first and the last."""
 NOT_ALONE = {"sampling": STRAIGHT, "saturation": "unrounded"}
 """Effects that no plan switches alone (without pixels nothing is read one by one; rounding clips, too), and from where
 they are seen."""
@@ -71,7 +71,8 @@ def contract(made: Scene) -> list[Row]:
     """Every method of every effect, switched alone from every base from which a plan may switch it."""
     planner, noisy = Planner([made.box]), made.setup.scenario.noise is not None
     found = []
-    for name, before in BASES.items():
+    bases = {name: BASES[name] for name in (ALONE, STRAIGHT)} if asks_for_any_place(made) else BASES
+    for name, before in bases.items():
         if (name == "unrounded" and noisy) or (name == "no noise" and not noisy):
             continue
         reference = columns(made, before)
