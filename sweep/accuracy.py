@@ -20,8 +20,8 @@ from .figures import rendered
 from .imaging import Imager
 from .knobs import Regridded, Setting, knob_measurements
 from .metrics import CSD
-from .plan import Plan
 from .places import forget_geometries
+from .plan import Plan
 from .progress import Progress
 from .report import AccuracyReport, make_accuracy_report, read_hard_cases
 from .series import draw_knobs, draw_work_precision
