@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from pathlib import Path
@@ -118,8 +119,8 @@ def plan(
     from .runner import with_plans
     from .study import load_study
 
-    if tolerance is not None and not tolerance > 0:
-        raise StudyError(f"--tolerance {tolerance:g}: must be above 0 DN")
+    if tolerance is not None and not 0 < tolerance < math.inf:
+        raise StudyError(f"--tolerance {tolerance:g}: must be above 0 DN, and finite")
     with ProgressDisplay() as display:
         planned = with_plans(load_study(study, data), os.cpu_count() or 1, display.update, tolerance)
     for line in plan_lines(planned, explain=explain):

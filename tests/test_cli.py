@@ -89,6 +89,8 @@ def test_wrong_input_is_one_line_and_exit_2(tmp_path: Path) -> None:
         (("check", str(wrong)), 1),
         (("run", str(tmp_path / "absent.yaml")), 1),
         (("report", str(tmp_path)), 1),
+        (("plan", str(STUDIES / "stopband.yaml"), "--tolerance", "inf"), 1),
+        (("plan", str(STUDIES / "stopband.yaml"), "--tolerance", "nan"), 1),
         (("check", str(tmp_path / "tiny.yaml"), "--data", str(tmp_path / "nowhere")), 1),
     ):
         done = sweep(*arguments)

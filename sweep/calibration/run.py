@@ -11,6 +11,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..progress import Progress
+from ..runner.stopping import Stop
+from ..runner.workers import Workers, workers
 from ..surrogate import parameter_tree
 from .fit import Fit, Task, best_of, fit_from
 from .model import Figures, figures
@@ -64,10 +66,8 @@ def calibrate(printed: Figures, seed: int, starts: int, n_jobs: int, progress: P
         rows = [row for row in printed if row not in group]
         tasks["without " + group[-1]] = _task(prior, printed, rows, filters)
     jobs = [(name, start) for name in tasks for start in range(starts if name in ("validation", "final") else 1)]
-    with joblib.parallel_config("loky", inner_max_num_threads=1):
-        found = joblib.Parallel(n_jobs=n_jobs, return_as="generator")(
-            joblib.delayed(fit_from)(tasks[name], seed, start) for name, start in jobs
-        )
+    with workers(Workers(n_jobs, Stop())) as crew:
+        found = crew(joblib.delayed(fit_from)(tasks[name], seed, start) for name, start in jobs)
         fits: dict[str, list[Fit]] = {name: [] for name in tasks}
         for index, ((name, _), fit) in enumerate(zip(jobs, found, strict=True)):
             fits[name].append(fit)
