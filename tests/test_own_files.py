@@ -195,7 +195,7 @@ def test_a_journal_that_is_a_link_is_not_written_through(plain: Study, whole: pd
 
 def test_names_that_reports_give_are_known(finished: Finished) -> None:
     """A picture of a new name is to be added to the names of a run's files."""
-    for study in ("stopband", "distance"):
+    for study in ("stopband", "fog"):
         folder = finished(study)
         drawn = [path for path in folder.rglob("*") if path.suffix in (".png", ".svg", ".html")]
         assert len(drawn) > 10

@@ -116,7 +116,7 @@ def test_the_history_ends_at_the_answer(finished: Finished) -> None:
 
 
 def test_every_scene_is_told_once_with_its_largest_promise(finished: Finished) -> None:
-    output = read_output(finished("distance"))
+    output = read_output(finished("fog"))
     groups = scene_groups(output)
     assert sorted(name for group in groups for name in group.scenarios) == sorted(output.study["scenarios"])
     for group in groups:
