@@ -11,7 +11,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 NAME ?= stopband
 ARGS ?=
-PARALLEL := -n logical --dist loadfile
+PARALLEL := -n logical --dist
 
 .PHONY: study report test slow accuracy check bench clean
 .DELETE_ON_ERROR:
@@ -23,10 +23,10 @@ report: $(VENV)/.ready
 	$(BIN)/sweep report outputs/$(NAME)
 
 test: $(VENV)/.ready-dev
-	$(BIN)/python -m pytest $(PARALLEL) $(ARGS)
+	$(BIN)/python -m pytest $(PARALLEL) loadfile $(ARGS)
 
 slow: $(VENV)/.ready-dev
-	$(BIN)/python -m pytest -m slow $(PARALLEL) $(ARGS)
+	$(BIN)/python -m pytest -m slow $(PARALLEL) worksteal $(ARGS)
 
 accuracy: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest tests/test_hard_cases.py --hard-cases outputs/accuracy/hard_cases.json
