@@ -27,20 +27,20 @@ import pyarrow.parquet as pq
 from scipy.signal import fftconvolve
 from scipy.spatial.distance import cdist
 from scipy.special import j1
+from sweep.metrics.separation.evaluate import evaluate
+from sweep.metrics.separation.separation import class_pairs, separation, separations_along
 from test_scale import large
 
-from sweep.blocks import Curves, edges_of
-from sweep.datasets.lights import Lights
-from sweep.evaluate import evaluate
-from sweep.imaging import Imager
-from sweep.metrics import class_pairs, separation, separations_along
-from sweep.mosaics import Mosaic
-from sweep.runner import run_study
-from sweep.runner.processes import keep_freed_memory
-from sweep.scenes import Scenario
-from sweep.setup import Setup
-from sweep.spaces import Space
-from sweep.spectra import WavelengthGrid
+from sweep.camera.imager import Imager
+from sweep.camera.mosaic import Mosaic
+from sweep.camera.scene import Scenario
+from sweep.camera.view import Setup
+from sweep.curves.lights import Lights
+from sweep.curves.spectrum import WavelengthGrid
+from sweep.designs.block import Curves, edges_of
+from sweep.designs.space import Space
+from sweep.run import run_study
+from sweep.run.worker_process import keep_freed_memory
 from sweep.study import Study, load_study
 
 ROOT = Path(__file__).parent.parent

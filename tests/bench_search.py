@@ -13,13 +13,13 @@ from pathlib import Path
 
 import numpy as np
 from scipy.optimize import NonlinearConstraint, differential_evolution
+from sweep.metrics.separation.bound import FEASIBLE, total_violation
+from sweep.metrics.separation.evaluate import designed_quantities, smooth_response
+from sweep.metrics.separation.separation import separation
+from sweep.search.solver.limit import limit_of
+from sweep.search.solver.problem import starting_points
+from sweep.search.solver.solver import search_from
 
-from sweep.constraints import FEASIBLE, total_violation
-from sweep.evaluate import designed_quantities, smooth_response
-from sweep.limit import limit_of
-from sweep.metrics import separation
-from sweep.problem import starting_points
-from sweep.search import search_from
 from sweep.study import load_study
 
 ROOT = Path(__file__).parent.parent

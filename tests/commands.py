@@ -7,7 +7,7 @@ import sys
 from contextlib import redirect_stderr, redirect_stdout
 from unittest import mock
 
-from sweep.cli import main
+from sweep.commands.app import main
 
 
 def commanded(*arguments: object) -> tuple[int, str, str]:

@@ -9,16 +9,16 @@ from typing import Any
 
 import mpmath as mp
 import numpy as np
+from sweep.metrics.separation.evaluate import evaluate, smooth_csd, smooth_response
 
-from sweep.datasets.lights import Lights
-from sweep.evaluate import evaluate, smooth_csd, smooth_response
-from sweep.families import Stopband
-from sweep.imaging import Imager
-from sweep.mosaics import Mosaic
-from sweep.scenes import FixedExposure, Scenario
-from sweep.sensor import Pixel
-from sweep.setup import Methods, Setup
-from sweep.spectra import WavelengthGrid
+from sweep.camera.imager import Imager
+from sweep.camera.mosaic import Mosaic
+from sweep.camera.pixel import Pixel
+from sweep.camera.scene import FixedExposure, Scenario
+from sweep.camera.view import Methods, Setup
+from sweep.curves.lights import Lights
+from sweep.curves.spectrum import WavelengthGrid
+from sweep.designs.stopband import Stopband
 
 from .hard_cases import EPS, Result, hard_case, outcome, relative, worst
 

@@ -10,15 +10,16 @@ from tempfile import TemporaryDirectory
 import mpmath as mp
 import numpy as np
 from scipy.io import savemat
+from sweep.metrics.separation.bound import FEASIBLE
 
-from sweep.constraints import FEASIBLE
-from sweep.curve_files import read_curves
-from sweep.datasets.lights import make_lights
-from sweep.edges import edge, edge_gradient
+from sweep.camera.sensor import make_sensor
+from sweep.curves.files import read_curves
+from sweep.curves.lights import make_lights
+from sweep.curves.spectrum import WavelengthGrid, check_samples, resample
+from sweep.designs.dual import Dual
+from sweep.designs.edge import edge, edge_gradient
+from sweep.designs.stopband import Stopband
 from sweep.errors import DataError, StudyError, SweepError
-from sweep.families import Dual, Stopband
-from sweep.filters import make_sensor
-from sweep.spectra import WavelengthGrid, check_samples, resample
 from sweep.study import load_study
 
 from .hard_cases import EPS, Result, hard_case, outcome, refused, worst

@@ -7,9 +7,8 @@ from fractions import Fraction
 import mpmath as mp
 import numpy as np
 from scipy.spatial import cKDTree
-
-from sweep.metrics import separation, separations
-from sweep.pareto import non_dominated
+from sweep.metrics.separation.pareto import non_dominated
+from sweep.metrics.separation.separation import separation, separations
 
 from .hard_cases import EPS, Result, hard_case, outcome, relative, worst
 

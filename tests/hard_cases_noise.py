@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import mpmath as mp
 import numpy as np
+from sweep.metrics.separation.evaluate import evaluate
 
-from sweep.datasets.lights import Lights
-from sweep.effects.gaussian import rounding
-from sweep.effects.noise import draws_dn
-from sweep.effects.readout import moments
-from sweep.evaluate import evaluate
-from sweep.imaging import Imager
-from sweep.mosaics import Mosaic
-from sweep.scenes import Scenario
-from sweep.sensor import Pixel
-from sweep.setup import Setup
-from sweep.spectra import WavelengthGrid
+from sweep.camera.effects.gaussian import rounding
+from sweep.camera.effects.noise import draws_dn
+from sweep.camera.effects.readout import moments
+from sweep.camera.imager import Imager
+from sweep.camera.mosaic import Mosaic
+from sweep.camera.pixel import Pixel
+from sweep.camera.scene import Scenario
+from sweep.camera.view import Setup
+from sweep.curves.lights import Lights
+from sweep.curves.spectrum import WavelengthGrid
 
 from .hard_cases import EPS, Result, hard_case, outcome, worst
 

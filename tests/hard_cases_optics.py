@@ -7,14 +7,14 @@ from functools import cache
 
 import mpmath as mp
 import numpy as np
+from sweep.metrics.separation.evaluate import smooth_response
 
-from sweep.effects import blur, sampling
-from sweep.effects.blur import Profile, mean_over_disc, too_much, transfer
-from sweep.effects.sampling import covered
-from sweep.evaluate import smooth_response
-from sweep.mosaics import Mosaic
-from sweep.scenes import Scenario
-from sweep.sensor import Pixel
+from sweep.camera.effects import blur, sampling
+from sweep.camera.effects.blur import Profile, mean_over_disc, too_much, transfer
+from sweep.camera.effects.sampling import covered
+from sweep.camera.mosaic import Mosaic
+from sweep.camera.pixel import Pixel
+from sweep.camera.scene import Scenario
 
 from .hard_cases import EPS, Result, hard_case, outcome, relative, worst
 from .hard_cases_chain import FIXED, PAIR, RED, YELLOW, lights_of, lines, made, plain, random_qe

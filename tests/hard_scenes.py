@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from sweep.datasets import BUILT_IN_LIGHTS
-from sweep.datasets.lights import Lights
-from sweep.effects.bounds import Box
-from sweep.families import Stopband
-from sweep.filters import BUILT_IN_SENSORS
-from sweep.mosaics import Mosaic
-from sweep.scenes import Scenario
-from sweep.sensor import Pixel
-from sweep.setup import Setup
-from sweep.spectra import WavelengthGrid
+from sweep.camera.mosaic import Mosaic
+from sweep.camera.pixel import Pixel
+from sweep.camera.plan.bounds import Box
+from sweep.camera.scene import Scenario
+from sweep.camera.sensor import BUILT_IN_SENSORS
+from sweep.camera.view import Setup
+from sweep.curves.builtin import BUILT_IN_LIGHTS
+from sweep.curves.lights import Lights
+from sweep.curves.spectrum import WavelengthGrid
+from sweep.designs.stopband import Stopband
 
 GRID, FINE = WavelengthGrid(step_nm=5), WavelengthGrid(step_nm=1)
 SENSOR = BUILT_IN_SENSORS["ar0820"](GRID)

@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sweep.families import Stopband
-from sweep.journal import Journal
-from sweep.runner import run_study
-from sweep.runner.jobs import CHUNK
-from sweep.spaces import Filter
+from sweep.designs.space import Filter
+from sweep.designs.stopband import Stopband
+from sweep.results.identity import CHUNK
+from sweep.results.journal import Journal
+from sweep.run import run_study
 from sweep.study import Study
 
 

@@ -7,17 +7,19 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from sweep.metrics.separation.evaluate import BEST_PLACE, WORST, evaluate, is_promised
+from sweep.metrics.separation.separation import CSD
+from sweep.search.solver.problem import SHIFTS
 
-from sweep.effects.bounds import Box
-from sweep.evaluate import BEST_PLACE, WORST, evaluate, is_promised
-from sweep.families import Dual, Family, Stopband
-from sweep.imaging import Imager
-from sweep.metrics import CSD
-from sweep.mosaics import Mosaic
-from sweep.problem import SHIFTS
-from sweep.scenes import Scenario
-from sweep.sensor import Pixel
-from sweep.setup import Methods, Setup
+from sweep.camera.imager import Imager
+from sweep.camera.mosaic import Mosaic
+from sweep.camera.pixel import Pixel
+from sweep.camera.plan.bounds import Box
+from sweep.camera.scene import Scenario
+from sweep.camera.view import Methods, Setup
+from sweep.designs.dual import Dual
+from sweep.designs.family import Family
+from sweep.designs.stopband import Stopband
 
 from .hard_scenes import FAMILY, GRID, SENSOR, TILES, lights, target
 

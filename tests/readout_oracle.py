@@ -7,7 +7,7 @@ import math
 import numpy as np
 from scipy.stats import norm, poisson
 
-from sweep.sensor import Pixel
+from sweep.camera.pixel import Pixel
 
 
 def digital_numbers(electrons: float, pixel: Pixel) -> tuple[np.ndarray, np.ndarray]:

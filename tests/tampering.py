@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from sweep.disk import digest_of
-from sweep.inventory import Inventory
+from sweep.results.inventory import Inventory
 
 
 def listed_anew(folder: Path) -> None:

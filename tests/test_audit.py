@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from sweep.metrics.separation.evaluate import is_promised
 
-from sweep import cli
-from sweep.audit import Audit, audit, sampled
+from sweep.commands import app as cli
+from sweep.commands.audit import Audit, audit, sampled
 from sweep.errors import BrokenPromiseError
-from sweep.evaluate import is_promised
-from sweep.runner import run_study
+from sweep.run import run_study
 from sweep.study import Study, load_study
 
 STUDY = """\
@@ -82,7 +82,7 @@ def broken_audit() -> Audit:
 def test_a_broken_promise_has_an_exit_code_of_its_own(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("sweep.audit.audit_output", lambda *_: broken_audit())
+    monkeypatch.setattr("sweep.commands.audit.audit_output", lambda *_: broken_audit())
     monkeypatch.setattr(sys, "argv", ["sweep", "audit", str(tmp_path)])
     with pytest.raises(SystemExit) as left:
         cli.main()
@@ -94,7 +94,7 @@ def test_a_broken_promise_has_an_exit_code_of_its_own(
         "allowed: at most 0.1 DN\n"
     )
     kept = broken_audit().rows.iloc[:1]
-    monkeypatch.setattr("sweep.audit.audit_output", lambda *_: Audit(kept, 1000))
+    monkeypatch.setattr("sweep.commands.audit.audit_output", lambda *_: Audit(kept, 1000))
     with pytest.raises(SystemExit) as left:
         cli.main()
     assert not left.value.code

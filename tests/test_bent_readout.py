@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sweep.effects.bounds import Box
-from sweep.mosaics import Mosaic
-from sweep.plan import Planner
-from sweep.setup import REFERENCE
+from sweep.camera.mosaic import Mosaic
+from sweep.camera.plan.bounds import Box
+from sweep.camera.plan.plan import Planner
+from sweep.camera.view import REFERENCE
 
 from .hard_scenes import SENSOR, Scene, scene, target
 from .test_plan import columns

@@ -11,15 +11,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
+from sweep.metrics.separation.evaluate import evaluate
+from sweep.metrics.separation.separation import class_pairs, separations, separations_along
 
-from sweep import blocks
-from sweep.blocks import Curves, edges_of
-from sweep.evaluate import evaluate
-from sweep.families import FreeForm, Stopband
-from sweep.imaging import Imager
-from sweep.metrics import class_pairs, separations, separations_along
-from sweep.setup import Setup
-from sweep.spaces import Filter, Space
+from sweep.camera.imager import Imager
+from sweep.camera.view import Setup
+from sweep.designs import block as blocks
+from sweep.designs.block import Curves, edges_of
+from sweep.designs.free_form import FreeForm
+from sweep.designs.space import Filter, Space
+from sweep.designs.stopband import Stopband
 
 from .hard_scenes import DARK, F2, FAMILY, FAR, FIXED, GRID, SENSOR, scene
 

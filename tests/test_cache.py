@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sweep.blocks import Tables, edges_of
 from sweep.cache import Cache
-from sweep.imaging import imager_of
+from sweep.camera.imager import imager_of
+from sweep.designs.block import Tables, edges_of
 
 from .test_blocks import SETUPS, SPACE
 

@@ -9,13 +9,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sweep.calibration.fit import Task, fit_from, ranking
-from sweep.calibration.model import color_violations, crossed_edges, figures
-from sweep.calibration.output import allowed_dn
-from sweep.calibration.parameters import checked, free_parameters, with_values
-from sweep.runner import run_study
+from sweep.commands.calibrate.fit import Task, fit_from, ranking
+from sweep.commands.calibrate.model import color_violations, crossed_edges, figures
+from sweep.commands.calibrate.output import allowed_dn
+from sweep.commands.calibrate.parameters import checked, free_parameters, with_values
+from sweep.curves.builtin.surrogate import parameter_tree, surrogate_parameters
+from sweep.run import run_study
 from sweep.study import Study, load_study
-from sweep.surrogate import parameter_tree, surrogate_parameters
 
 from .conftest import STUDIES
 

@@ -6,10 +6,10 @@ import colour
 import numpy as np
 import pytest
 
-from sweep.chromaticity import REGIONS, chromaticity, display_colors
-from sweep.datasets import BUILT_IN_LIGHTS
-from sweep.datasets.led import led_photons
-from sweep.spectra import WavelengthGrid
+from sweep.curves.builtin import BUILT_IN_LIGHTS
+from sweep.curves.builtin.led import led_photons
+from sweep.curves.color import REGIONS, chromaticity, display_colors
+from sweep.curves.spectrum import WavelengthGrid
 
 GRID = WavelengthGrid()
 LIGHTS = BUILT_IN_LIGHTS["tl16"](GRID)

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from plotly.offline import get_plotlyjs
 
-from sweep.curve_files import read_curves
+from sweep.curves.files import read_curves
 
 from .conftest import SHARED, STUDIES, Finished, needs_measured
 from .test_runner import study_file

@@ -7,17 +7,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweep.metrics.separation.evaluate import evaluate
 
-from sweep.arrays import row_products
-from sweep.blocks import Curves, edges_of
-from sweep.evaluate import evaluate
-from sweep.families import Dual, FreeForm, Stopband
-from sweep.imaging import Imager
-from sweep.mosaics import Mosaic
-from sweep.scenes import Scenario
-from sweep.sensor import Pixel
-from sweep.setup import Setup
-from sweep.spaces import Filter, Space
+from sweep.camera.imager import Imager
+from sweep.camera.mosaic import Mosaic
+from sweep.camera.pixel import Pixel
+from sweep.camera.scene import Scenario
+from sweep.camera.view import Setup
+from sweep.designs.block import Curves, edges_of
+from sweep.designs.dual import Dual
+from sweep.designs.free_form import FreeForm
+from sweep.designs.products import row_products
+from sweep.designs.space import Filter, Space
+from sweep.designs.stopband import Stopband
 
 from .hard_scenes import DARK, F2, FAMILY, FAR, FIXED, GRID, SENSOR, lights
 from .test_blocks import SETUPS, SPACE, setup_of

@@ -13,12 +13,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from sweep.comparing import compare_runs
-from sweep.comparing.differences import study_differences
-from sweep.comparing.drawing import FrontsFigure, Line, Mark, draw_fronts, pictures
-from sweep.comparing.fronts import Front, box_of, hypervolumes
 from sweep.errors import OutputError, SweepError
 from sweep.report import read_output
+from sweep.report.compare import compare_runs
+from sweep.report.compare.differences import study_differences
+from sweep.report.compare.drawing import FrontsFigure, Line, Mark, draw_fronts, pictures
+from sweep.report.compare.fronts import Front, box_of, hypervolumes
 from sweep.study import load_study
 
 from .tampering import listed_anew

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from sweep.curve_files import digest, read_curves
+from sweep.curves.files import digest, read_curves
 from sweep.errors import DataError
 
 

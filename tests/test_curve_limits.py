@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from sweep.curve_files import MOST_CURVES, MOST_SAMPLES, read_curves, scan_curves
-from sweep.describing import describe
+from sweep.commands.describe import describe
+from sweep.curves.files import MOST_CURVES, MOST_SAMPLES, read_curves, scan_curves
+from sweep.curves.spectrum import LARGEST, LEAST_PEAK, check_samples
 from sweep.errors import DataError, SweepError
-from sweep.spectra import LARGEST, LEAST_PEAK, check_samples
 
 from .watchdog import within
 
@@ -236,8 +236,8 @@ def test_values_that_nothing_can_be_computed_with() -> None:
 
 
 def test_a_picture_of_very_many_curves_is_of_an_even_share(monkeypatch: pytest.MonkeyPatch) -> None:
-    from sweep.describing import picture
-    from sweep.describing.facts import Curve, Facts
+    from sweep.commands import describe_picture as picture
+    from sweep.curves.facts import Curve, Facts
 
     monkeypatch.setattr(picture, "_MOST_DRAWN", 3)
     curves = tuple(Curve(f"c{i}", WAVE, np.full(WAVE.size, i / 10)) for i in range(8))
@@ -248,8 +248,8 @@ def test_a_picture_of_very_many_curves_is_of_an_even_share(monkeypatch: pytest.M
 
 
 def test_a_thinned_curve_keeps_every_group_s_extremes() -> None:
-    from sweep.describing.facts import Curve
-    from sweep.describing.picture import _MOST_POINTS, _thinned
+    from sweep.commands.describe_picture import _MOST_POINTS, _thinned
+    from sweep.curves.facts import Curve
 
     rng = np.random.default_rng(3)
     wave, values = np.linspace(400, 700, 100_003), rng.random(100_003)

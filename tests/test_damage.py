@@ -11,14 +11,15 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
+from sweep.commands.status import status_lines
 from sweep.errors import OutputError
-from sweep.journal import SHARDS, Journal
 from sweep.report import read_output
-from sweep.runner import output_folder, status_lines, with_plans
-from sweep.runner.jobs import rules_of
-from sweep.runner.stopping import Stop
-from sweep.runner.sweeping import Sweep
-from sweep.runner.workers import Workers
+from sweep.results.journal import SHARDS, Journal
+from sweep.run import output_folder, with_plans
+from sweep.run.rows import rules_of
+from sweep.run.stop import Stop
+from sweep.run.sweep import Sweep
+from sweep.run.workers import Workers
 from sweep.study import Study
 
 from .mischief import half_done, rows

@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from sweep.curve_files import scan_curves
-from sweep.describing import describe
-from sweep.describing.facts import condensed, facts_of
+from sweep.commands.describe import describe
+from sweep.commands.schema import write_schema
+from sweep.curves.facts import condensed, facts_of
+from sweep.curves.files import scan_curves
+from sweep.curves.signal_color import VISIBLE, dominant_ranges_nm, light_color, outline
 from sweep.errors import DataError, OutputError
-from sweep.signals import VISIBLE, dominant_ranges_nm, light_color, outline
-from sweep.study.json_schema import schema_text, write_schema
+from sweep.study.editors import schema_text
 
 from .conftest import SHARED, needs_measured
 from .test_cli import sweep

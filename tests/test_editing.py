@@ -12,10 +12,10 @@ from typing import Any
 import jsonschema
 import pytest
 
-from sweep.completion import run_folders, study_files
-from sweep.listing import list_lines
-from sweep.study.json_schema import SCHEMA_FILE, schema_text, study_schema
-from sweep.study.lines import Document
+from sweep.commands.completion import run_folders, study_files
+from sweep.commands.list_studies import list_lines
+from sweep.study.document import Document
+from sweep.study.editors import SCHEMA_FILE, schema_text, study_schema
 
 from .conftest import STUDIES
 from .test_cli import sweep
@@ -123,7 +123,7 @@ def test_a_missing_or_empty_folder_is_told(tmp_path: Path) -> None:
 
 
 def test_an_interrupted_and_a_changed_run_are_told(tmp_path: Path) -> None:
-    from sweep.runner.folders import begin
+    from sweep.results.folder import begin
     from sweep.study import load_study
 
     path = study_file(tmp_path)
@@ -173,7 +173,7 @@ def test_completion_scripts_are_made_without_a_terminal(kind: str, word: str) ->
 
 
 def test_help_imports_nothing_heavy() -> None:
-    code = "import sys, sweep.cli\ntry: sweep.cli.app(['--help'])\nexcept SystemExit: pass\nprint(*sys.modules, file=sys.stderr)"
+    code = "import sys, sweep.commands.app\ntry: sweep.commands.app.app(['--help'])\nexcept SystemExit: pass\nprint(*sys.modules, file=sys.stderr)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     for command in ("run", "describe", "new", "list", "schema"):
         assert f" {command} " in done.stdout

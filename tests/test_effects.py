@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from scipy.integrate import dblquad, quad
 from scipy.special import j0, j1
 
-from sweep.chromaticity import luminance_per_photon_radiance
-from sweep.effects import (
+from sweep.camera.effects import (
     blur,
     crosstalk,
     demosaic,
@@ -28,9 +27,10 @@ from sweep.effects import (
     sampling,
     saturation,
 )
-from sweep.scenes import Drive, FixedExposure, Scenario, Target
-from sweep.sensor import Pixel
-from sweep.spectra import LIGHT_M_S, PLANCK_J_S, WavelengthGrid
+from sweep.camera.pixel import Pixel
+from sweep.camera.scene import Drive, FixedExposure, Scenario, Target
+from sweep.curves.color import luminance_per_photon_radiance
+from sweep.curves.spectrum import LIGHT_M_S, PLANCK_J_S, WavelengthGrid
 
 from .hard_scenes import F2, FAR, NEAR, TILES, scene, target
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import typer
 
-from sweep.endings import ends_in_lines
+from sweep.commands.endings import ends_in_lines
 from sweep.errors import InfeasibleError
 
 from .conftest import STUDIES

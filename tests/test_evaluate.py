@@ -6,17 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sweep.metrics.separation.evaluate import designed_quantities, evaluate, sensitivities_gradient, smooth_response
 
-from sweep.datasets import BUILT_IN_LIGHTS
-from sweep.evaluate import designed_quantities, evaluate, sensitivities_gradient, smooth_response
-from sweep.families import Stopband
-from sweep.filters import BUILT_IN_SENSORS
-from sweep.imaging import imager_of, smooth_imager
-from sweep.mosaics import Mosaic
-from sweep.scenes import FixedExposure, Scenario, WhitePatchExposure
-from sweep.sensor import Optics, Pixel
-from sweep.setup import Setup
-from sweep.spectra import WavelengthGrid
+from sweep.camera.imager import imager_of, smooth_imager
+from sweep.camera.mosaic import Mosaic
+from sweep.camera.pixel import Optics, Pixel
+from sweep.camera.scene import FixedExposure, Scenario, WhitePatchExposure
+from sweep.camera.sensor import BUILT_IN_SENSORS
+from sweep.camera.view import Setup
+from sweep.curves.builtin import BUILT_IN_LIGHTS
+from sweep.curves.spectrum import WavelengthGrid
+from sweep.designs.stopband import Stopband
 
 GRID = WavelengthGrid()
 SENSOR = BUILT_IN_SENSORS["ar0820"](GRID)

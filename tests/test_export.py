@@ -10,14 +10,14 @@ import pytest
 from scipy.io import loadmat
 from scipy.spatial.distance import cdist
 
-from sweep.audit import audit_output
-from sweep.curve_files import read_curves
+from sweep.camera.mosaic import Mosaic
+from sweep.commands.audit import audit_output
+from sweep.commands.export import Filters, export_design
+from sweep.curves.builtin.surrogate import surrogate_parameters
+from sweep.curves.files import read_curves
+from sweep.curves.isetcam import HINTS, color_hints, csv_text, isetcam_mat, unique_names
 from sweep.errors import OutputError, SweepError
-from sweep.exporting import Filters, export_design
-from sweep.filter_files import HINTS, color_hints, csv_text, isetcam_mat, unique_names
-from sweep.mosaics import Mosaic
 from sweep.study import load_study
-from sweep.surrogate import surrogate_parameters
 
 from .tampering import listed_anew
 from .test_cli import sweep
@@ -256,7 +256,7 @@ def test_names_that_a_file_cannot_hold_are_made_so(tmp_path: Path) -> None:
 def test_the_shell_completes_run_folders(tiny: Path, command: str) -> None:
     from typer.main import get_command
 
-    from sweep.cli import app
+    from sweep.commands.app import app
 
     own = get_command(app).commands[command]  # type: ignore[attr-defined]
     context = own.make_context(command, [], resilient_parsing=True)

@@ -10,8 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sweep.designs.dual import Dual
+from sweep.designs.family import Family
+from sweep.designs.free_form import FreeForm
+from sweep.designs.registry import MAKERS, FamilyOptions, Maker, build_family
+from sweep.designs.stopband import Stopband
 from sweep.errors import SweepError
-from sweep.families import MAKERS, Dual, Family, FamilyOptions, FreeForm, Maker, Stopband, build_family
 
 WAVE = np.arange(400.0, 701.0)
 BASE = 0.3 + 0.4 / (1 + np.exp(-(WAVE - 500) / 20))

@@ -15,15 +15,16 @@ import pyarrow.parquet as pq
 import pytest
 from threadpoolctl import threadpool_info
 
+from sweep.commands.status import status_lines
 from sweep.errors import FailedDesignError, OutputError, SweepError
-from sweep.journal import SHARDS, Journal
-from sweep.lock import locked
 from sweep.report import make_report, read_output
-from sweep.runner import Wishes, estimate, estimate_lines, output_folder, run_study, status_lines, with_plans
-from sweep.runner.jobs import CHUNK
-from sweep.runner.stopping import Stop
-from sweep.runner.sweeping import KILLED
-from sweep.runner.workers import Workers, workers
+from sweep.results.identity import CHUNK
+from sweep.results.journal import SHARDS, Journal
+from sweep.results.lock import locked
+from sweep.run import Wishes, estimate, estimate_lines, output_folder, run_study, with_plans
+from sweep.run.stop import Stop
+from sweep.run.sweep import KILLED
+from sweep.run.workers import Workers, workers
 from sweep.study import Study, load_study
 
 from .mischief import StoppedError, half_done, mischievous, rows

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from sweep.chromaticity import chromaticity, color_matching, display_colors
+from sweep.curves.color import chromaticity, color_matching, display_colors
+from sweep.curves.spectrum import WavelengthGrid
 from sweep.errors import StudyError, SweepError
-from sweep.runner.jobs import Job, rules_of, run_job
-from sweep.spectra import WavelengthGrid
+from sweep.run.rows import Job, rules_of, run_job
 from sweep.study import Study, load_study
-from sweep.study.json_schema import study_schema
+from sweep.study.editors import study_schema
 
 from .mutations import at, written
 from .watchdog import within

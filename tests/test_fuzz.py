@@ -17,11 +17,11 @@ import pytest
 from ruamel.yaml import YAML
 from scipy.io import loadmat, savemat
 
-from sweep.curve_files import read_curves
-from sweep.describing import describe
+from sweep.commands.describe import describe
+from sweep.curves.files import read_curves
 from sweep.errors import MOST_FAULTS, SweepError
-from sweep.runner.jobs import rules_of, run_job
-from sweep.runner.sweeping import Sweep
+from sweep.run.rows import rules_of, run_job
+from sweep.run.sweep import Sweep
 from sweep.study import Study, load_study
 
 from .conftest import STUDIES
@@ -78,9 +78,9 @@ def first_rows(study: Study, scenario: str) -> set[str]:
 
 
 def jobs(study: Study) -> list[Any]:
-    from sweep.journal import Journal
-    from sweep.runner.stopping import Stop
-    from sweep.runner.workers import Workers
+    from sweep.results.journal import Journal
+    from sweep.run.stop import Stop
+    from sweep.run.workers import Workers
 
     every = Sweep(study, rules_of(study), Journal(Path("absent")), Workers(1, Stop())).jobs
     return list({(job.space.kind, job.space.name): job for job in reversed(every)}.values())

@@ -16,14 +16,15 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pytest
+from sweep.search.solver.problem import Evaluation, SearchRun
 
+from sweep.commands.status import status_lines
 from sweep.errors import OutputError
-from sweep.inventory import Inventory
-from sweep.journal import SHARDS, Entry, Journal
-from sweep.problem import Evaluation, SearchRun
-from sweep.records import to_json
-from sweep.runner import output_folder, run_study, status_lines
-from sweep.store import encoded
+from sweep.results.inventory import Inventory
+from sweep.results.journal import SHARDS, Entry, Journal
+from sweep.results.records import to_json
+from sweep.results.tables import encoded
+from sweep.run import output_folder, run_study
 from sweep.study import Study, load_study
 
 from .mischief import StoppedError, rows

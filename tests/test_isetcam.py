@@ -14,16 +14,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sweep.datasets.lights import Lights
-from sweep.effects.blur import transfer
-from sweep.effects.bounds import Box
-from sweep.imaging import Imager, smooth_imager
-from sweep.mosaics import Mosaic
-from sweep.plan import Planner
-from sweep.scenes import FixedExposure, Scenario
-from sweep.sensor import Optics, Pixel, irradiance_factor
-from sweep.setup import Setup
-from sweep.spectra import WavelengthGrid
+from sweep.camera.effects.blur import transfer
+from sweep.camera.imager import Imager, smooth_imager
+from sweep.camera.mosaic import Mosaic
+from sweep.camera.pixel import Optics, Pixel, irradiance_factor
+from sweep.camera.plan.bounds import Box
+from sweep.camera.plan.plan import Planner
+from sweep.camera.scene import FixedExposure, Scenario
+from sweep.camera.view import Setup
+from sweep.curves.lights import Lights
+from sweep.curves.spectrum import WavelengthGrid
 
 from .conftest import SHARED, needs_reference
 

@@ -8,21 +8,22 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweep.metrics.separation.bound import FEASIBLE, Bound, total_violation
+from sweep.metrics.separation.evaluate import designed_quantities, smooth_response
+from sweep.metrics.separation.objective import Objective
+from sweep.metrics.separation.pareto import hypervolume
+from sweep.metrics.separation.separation import separation
+from sweep.search.solver.limit import limit_of, why_not
+from sweep.search.solver.problem import Problem, best_feasible, starting_points
+from sweep.search.solver.solver import search_from
 
-from sweep.constraints import FEASIBLE, Bound, total_violation
-from sweep.datasets.lights import Lights
+from sweep.camera.scene import FixedExposure, Scenario
+from sweep.camera.view import Setup
+from sweep.curves.lights import Lights
+from sweep.designs.free_form import FreeForm
+from sweep.designs.stopband import Stopband
 from sweep.errors import SweepError
-from sweep.evaluate import designed_quantities, smooth_response
-from sweep.families import FreeForm, Stopband
-from sweep.limit import limit_of, why_not
-from sweep.metrics import separation
-from sweep.objectives import Objective
-from sweep.pareto import hypervolume
-from sweep.problem import Problem, best_feasible, starting_points
 from sweep.report.summary import _limit_line
-from sweep.scenes import FixedExposure, Scenario
-from sweep.search import search_from
-from sweep.setup import Setup
 from sweep.study import load_study
 
 from .conftest import STUDIES

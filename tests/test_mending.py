@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from sweep.errors import OutputError
-from sweep.inventory import Inventory
-from sweep.runner import output_folder, run_study
+from sweep.results.inventory import Inventory
+from sweep.run import output_folder, run_study
 from sweep.study import load_study
 
 from .commands import commanded

@@ -10,20 +10,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
+from sweep.metrics.separation.pareto import non_dominated
+from sweep.metrics.separation.separation import cfa_sensitivity, separation
 
-from sweep.datasets.lights import Lights
-from sweep.edges import SPAN_PER_WIDTH, edge, edge_gradient
-from sweep.effects import quantization, saturation
+from sweep.camera.effects import quantization, saturation
+from sweep.camera.imager import Imager
+from sweep.camera.mosaic import Mosaic
+from sweep.camera.pixel import Optics, Pixel, irradiance_factor
+from sweep.camera.scene import FixedExposure, Geometry, Scenario
+from sweep.camera.view import Setup
+from sweep.curves.lights import Lights
+from sweep.curves.spectrum import WavelengthGrid
+from sweep.designs.edge import SPAN_PER_WIDTH, edge, edge_gradient
+from sweep.designs.stopband import Stopband
 from sweep.errors import SweepError
-from sweep.families import Stopband
-from sweep.imaging import Imager
-from sweep.metrics import cfa_sensitivity, separation
-from sweep.mosaics import Mosaic
-from sweep.pareto import non_dominated
-from sweep.scenes import FixedExposure, Geometry, Scenario
-from sweep.sensor import Optics, Pixel, irradiance_factor
-from sweep.setup import Setup
-from sweep.spectra import WavelengthGrid
 
 
 @pytest.mark.parametrize(

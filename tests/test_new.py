@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sweep.commands.list_studies import list_lines
+from sweep.commands.new import new_study
+from sweep.commands.new.channels import channel_of, layout_of
+from sweep.commands.new.template import scalar
 from sweep.errors import DataError, OutputError, StudyError
-from sweep.listing import list_lines
-from sweep.newstudy import new_study
-from sweep.newstudy.channels import channel_of, layout_of
-from sweep.newstudy.template import scalar
 from sweep.study import load_study
-from sweep.study.lines import Document
+from sweep.study.document import Document
 
 from .conftest import SHARED, needs_measured
 from .test_cli import sweep
@@ -155,7 +155,7 @@ def test_a_study_that_cannot_be_made_leaves_nothing(tmp_path: Path, monkeypatch:
     def full(*_: object) -> None:
         raise OutputError("full")
 
-    monkeypatch.setattr("sweep.newstudy.make.write_text", full)
+    monkeypatch.setattr("sweep.commands.new.make.write_text", full)
     with pytest.raises(OutputError, match="full"):
         new_study("mine", tmp_path / "a" / "b", None, None, "energy")
     assert list(tmp_path.iterdir()) == []

@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from sweep.metrics.separation.discrimination import D_PRIME, ERROR
+from sweep.metrics.separation.evaluate import STATE_ERROR, evaluate
+from sweep.metrics.separation.recognition import MOST_LIKELY, RULES, recognize
 
-from sweep.datasets.lights import Lights
-from sweep.discrimination import D_PRIME, ERROR
-from sweep.effects import noise
+from sweep.camera.effects import noise
+from sweep.camera.imager import Imager
+from sweep.curves.lights import Lights
 from sweep.errors import StudyError
-from sweep.evaluate import STATE_ERROR, evaluate
-from sweep.imaging import Imager
-from sweep.recognition import MOST_LIKELY, RULES, recognize
 from sweep.report import make_report, read_output, summary_lines
-from sweep.runner import run_study
+from sweep.run import run_study
 from sweep.study import load_study
 
 from .hard_scenes import DARK, F2, FAR, FIXED, Scene, scene

@@ -11,14 +11,15 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from sweep.audit import audit_output
+from sweep.commands.audit import audit_output
+from sweep.commands.status import status_lines
 from sweep.errors import OutputError
-from sweep.inventory import Inventory
-from sweep.journal import SHARDS, Journal
-from sweep.lock import LOCK, locked
 from sweep.report import make_report, read_output
-from sweep.run_files import is_drawn, is_own
-from sweep.runner import output_folder, run_study, status_lines
+from sweep.results.inventory import Inventory
+from sweep.results.journal import SHARDS, Journal
+from sweep.results.lock import LOCK, locked
+from sweep.results.names import is_drawn, is_own
+from sweep.run import output_folder, run_study
 from sweep.study import Study, load_study
 
 from .conftest import Finished
@@ -50,8 +51,8 @@ def expected(few: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFra
 def plain_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports whose pictures take no time."""
     names = ("pareto", "sensor", "signals", "chart")
-    monkeypatch.setattr("sweep.report.make._drawings", lambda _: ((name, name, None) for name in names))
-    monkeypatch.setattr("sweep.report.make.rendered", lambda _, kind: kind.encode())
+    monkeypatch.setattr("sweep.report.page._drawings", lambda _: ((name, name, None) for name in names))
+    monkeypatch.setattr("sweep.report.page.rendered", lambda _, kind: kind.encode())
 
 
 @pytest.mark.parametrize("name", NAMES)

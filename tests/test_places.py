@@ -14,16 +14,16 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.optimize import minimize
+from sweep.metrics.separation.evaluate import BEST_PLACE, evaluate
+from sweep.metrics.separation.separation import CSD
 
-from sweep.effects import phase
-from sweep.effects.between import Between
-from sweep.effects.kernel import make_kernel
-from sweep.evaluate import BEST_PLACE, evaluate
-from sweep.imaging import Imager
-from sweep.metrics import CSD
-from sweep.plan import Plan, Planner
+from sweep.camera.between import Between
+from sweep.camera.effects import phase
+from sweep.camera.imager import Imager
+from sweep.camera.kernel import make_kernel
+from sweep.camera.plan.plan import Plan, Planner
+from sweep.camera.view import REFERENCE, Methods, Setup
 from sweep.report.plans import plan_lines
-from sweep.setup import REFERENCE, Methods, Setup
 
 from .hard_scenes import DARK, F2, FAR, NEAR, TILES, Scene, scene, target
 from .random_scenes import random_scene
@@ -281,8 +281,8 @@ from pathlib import Path
 resource.setrlimit(resource.RLIMIT_AS, ({most}, {most}))
 from sweep.errors import SweepError
 from sweep.study import load_study
-from sweep.imaging import Imager
-from sweep.evaluate import evaluate
+from sweep.camera.imager import Imager
+from sweep.metrics.evaluate import evaluate
 try:
     study = load_study(Path(sys.argv[1]))
 except SweepError as error:

@@ -12,15 +12,15 @@ from typing import Any
 import joblib
 import numpy as np
 import pytest
+from sweep.metrics.separation.evaluate import BEST_PLACE, evaluate, is_promised
+from sweep.metrics.separation.separation import CSD
 
-from sweep.effects import blur, phase
+from sweep.camera.effects import blur, phase
+from sweep.camera.imager import Imager
+from sweep.camera.plan.plan import Plan, Planner
+from sweep.camera.plan.promises import EFFECTS, READOUT
+from sweep.camera.view import METHODS, REFERENCE, Methods
 from sweep.errors import SweepError
-from sweep.evaluate import BEST_PLACE, evaluate, is_promised
-from sweep.imaging import Imager
-from sweep.metrics import CSD
-from sweep.plan import Plan, Planner
-from sweep.promises import EFFECTS, READOUT
-from sweep.setup import METHODS, REFERENCE, Methods
 from sweep.study import load_study
 
 from .conftest import STUDIES

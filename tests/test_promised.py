@@ -6,8 +6,8 @@ import joblib
 import numpy as np
 import pytest
 
-from sweep.plan import Planner
-from sweep.setup import REFERENCE
+from sweep.camera.plan.plan import Planner
+from sweep.camera.view import REFERENCE
 
 from .random_scenes import columns, random_scene
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sweep.effects import noise_table, quantization, readout
-from sweep.sensor import Pixel
+from sweep.camera.effects import noise_table, quantization, readout
+from sweep.camera.pixel import Pixel
 
 from . import readout_oracle
 

@@ -10,10 +10,10 @@ import pytest
 from scipy.special import ndtr
 from scipy.stats import norm, poisson
 
-from sweep.effects import pedestal, saturation
-from sweep.imaging import Imager
-from sweep.sensor import Pixel
-from sweep.setup import Methods
+from sweep.camera.effects import pedestal, saturation
+from sweep.camera.imager import Imager
+from sweep.camera.pixel import Pixel
+from sweep.camera.view import Methods
 
 from .hard_scenes import scene
 

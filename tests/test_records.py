@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from sweep.search.solver.limit import Limit
+from sweep.search.solver.problem import Evaluation, SearchRun
 
-from sweep.arrays import FloatArray, IndexArray
-from sweep.limit import Limit
-from sweep.problem import Evaluation, SearchRun
-from sweep.records import from_json, to_json
+from sweep.results.records import from_json, to_json
+from sweep.types import FloatArray, IndexArray
 
 numbers = st.floats(allow_nan=True, allow_infinity=True, allow_subnormal=True)
 

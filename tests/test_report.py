@@ -11,16 +11,17 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from sweep.metrics.separation.pareto import knee
 
 from sweep.errors import OutputError
-from sweep.pareto import knee
 from sweep.report import read_output
 from sweep.report.history import history_of
-from sweep.report.interactive import payload
-from sweep.report.outputs import Output
-from sweep.report.profiles import Profile, Profiles
+from sweep.report.page_data import payload
 from sweep.report.scenes import scene_groups
-from sweep.runner.jobs import CHUNK, Job, jobs_of, rules_of, run_job
+from sweep.results.identity import CHUNK
+from sweep.results.output import Output
+from sweep.results.profiles import Profile, Profiles
+from sweep.run.rows import Job, jobs_of, rules_of, run_job
 from sweep.study import Study, load_study
 
 from .conftest import Finished
@@ -160,7 +161,7 @@ def test_a_small_study_has_one_chunk_per_job(tmp_path: Path) -> None:
 
 
 def test_a_dollar_in_a_name_is_no_formula() -> None:
-    from sweep.figures import CurvesFigure, draw_curves, rendered
+    from sweep.report.figures import CurvesFigure, draw_curves, rendered
 
     wave = np.linspace(400, 700, 4)
     for name in (r"$\nonsense{", "a$b$c"):
@@ -182,7 +183,7 @@ def test_a_camera_of_one_channel_has_a_report(tmp_path: Path) -> None:
 
 
 def test_a_csv_has_every_digit_whatever_numpy_prints(tmp_path: Path) -> None:
-    from sweep.store import write_csv
+    from sweep.results.tables import write_csv
 
     value = 37.322915213043046
     with np.printoptions(legacy="1.13"):

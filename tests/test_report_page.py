@@ -121,9 +121,7 @@ def test_a_report_opens_without_an_error_or_a_request(finished: Finished, opened
     assert seen.page.locator("#pareto .plotly").count() == 1
 
 
-@pytest.mark.parametrize(
-    ("name", "trace"), [("stopband", "Pareto front"), ("fog", "RYN_4Cy"), ("paper", "RYN_2Cy")]
-)
+@pytest.mark.parametrize(("name", "trace"), [("stopband", "Pareto front"), ("fog", "RYN_4Cy"), ("paper", "RYN_2Cy")])
 def test_pointing_and_clicking_tell_of_a_design(finished: Finished, opened: Any, name: str, trace: str) -> None:
     seen = opened(finished(name))
     table = pd.read_parquet(finished(name) / "results.parquet").set_index("design_id")

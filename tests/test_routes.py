@@ -10,14 +10,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sweep.blocks import Edges
+from sweep.designs.block import Edges
+from sweep.designs.space import Filter
+from sweep.designs.stopband import Stopband
 from sweep.disk import read_facts
-from sweep.families import Stopband
 from sweep.report import read_output, summary_lines
-from sweep.runner import Wishes, run_study
-from sweep.runner.jobs import CHUNK, Job, detours_of, rules_of, run_job
-from sweep.runner.routes import ALONE, BY_CURVES
-from sweep.spaces import Filter
+from sweep.results.identity import CHUNK
+from sweep.run import Wishes, run_study
+from sweep.run.routes import ALONE, BY_CURVES
+from sweep.run.rows import Job, detours_of, rules_of, run_job
 from sweep.study import Study
 
 from .mischief import StoppedError, mischievous, rows

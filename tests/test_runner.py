@@ -16,18 +16,19 @@ import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
+from sweep.metrics.separation.evaluate import evaluate, quantities
 
+from sweep.camera.imager import imager_of
+from sweep.designs.space import Filter, Space
+from sweep.designs.stopband import Stopband
 from sweep.errors import OutputError, StudyError
-from sweep.evaluate import evaluate, quantities
-from sweep.families import Stopband
-from sweep.imaging import imager_of
-from sweep.journal import Journal
-from sweep.lock import locked
 from sweep.report import make_report, read_output
-from sweep.report.content import scenario_series
-from sweep.runner import run_study
-from sweep.runner.jobs import CHUNK, Job, jobs_of, rules_of, run_job
-from sweep.spaces import Filter, Space
+from sweep.report.values import scenario_series
+from sweep.results.identity import CHUNK
+from sweep.results.journal import Journal
+from sweep.results.lock import locked
+from sweep.run import run_study
+from sweep.run.rows import Job, jobs_of, rules_of, run_job
 from sweep.study import Study, load_study
 
 STUDY = """\

@@ -13,8 +13,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from sweep.report import read_output
-from sweep.report.thinning import MOST_ROWS
-from sweep.runner.jobs import job_key, jobs_of
+from sweep.results.thinning import MOST_ROWS
+from sweep.run.rows import job_key, jobs_of
 from sweep.study import Study, load_study
 
 STUDY = """

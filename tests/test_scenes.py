@@ -7,10 +7,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from sweep.accuracy import TOLERANCES_DN, accuracy
-from sweep.audit import audit, audit_output, sampled
+from sweep.commands.accuracy.ladder import TOLERANCES_DN, accuracy
+from sweep.commands.audit import audit, audit_output, sampled
 from sweep.report import make_report, read_output
-from sweep.runner import run_study
+from sweep.run import run_study
 from sweep.study import load_study
 
 from .conftest import STUDIES

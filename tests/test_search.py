@@ -6,18 +6,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sweep.metrics.separation.bound import FEASIBLE, Bound, total_violation
+from sweep.metrics.separation.evaluate import designed_quantities, smooth_response
+from sweep.metrics.separation.objective import Objective
+from sweep.metrics.separation.separation import separation
+from sweep.search.solver.limit import Limit, limit_of
+from sweep.search.solver.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
+from sweep.search.solver.solver import search_from
 
-from sweep.cli import main
-from sweep.constraints import FEASIBLE, Bound, total_violation
+from sweep.commands.app import main
+from sweep.designs.free_form import FreeForm
 from sweep.errors import BrokenProofError
-from sweep.evaluate import designed_quantities, smooth_response
-from sweep.families import FreeForm
-from sweep.limit import Limit, limit_of
-from sweep.metrics import separation
-from sweep.objectives import Objective
-from sweep.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
-from sweep.runner import searching
-from sweep.search import search_from
+from sweep.run import search as searching
 from sweep.study import Study, load_study
 
 from .conftest import STUDIES

@@ -6,18 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sweep.metrics.separation.bound import Bound
+from sweep.metrics.separation.evaluate import designed_quantities, smooth_csd, smooth_response
+from sweep.metrics.separation.objective import Objective
+from sweep.metrics.separation.separation import separation
+from sweep.search.solver.gradients import Model
+from sweep.search.solver.limit import limit_of, why_not
+from sweep.search.solver.problem import Problem, SearchRun, best_feasible, starting_points
+from sweep.search.solver.solver import best_reachable, search_from
 
-from sweep.constraints import Bound
-from sweep.evaluate import designed_quantities, smooth_csd, smooth_response
-from sweep.limit import limit_of, why_not
-from sweep.metrics import separation
-from sweep.objectives import Objective
-from sweep.problem import Problem, SearchRun, best_feasible, starting_points
-from sweep.scenes import Scenario
-from sweep.search import best_reachable, search_from
-from sweep.sensor import Pixel
-from sweep.setup import REFERENCE
-from sweep.smooth import Model
+from sweep.camera.pixel import Pixel
+from sweep.camera.scene import Scenario
+from sweep.camera.view import REFERENCE
 from sweep.study import load_study
 
 from .conftest import STUDIES

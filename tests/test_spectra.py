@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from sweep.errors import DataError
-from sweep.spectra import (
+from sweep.curves.spectrum import (
     WavelengthGrid,
     check_samples,
     energy_from_photons,
@@ -15,6 +14,7 @@ from sweep.spectra import (
     photons_from_energy,
     resample,
 )
+from sweep.errors import DataError
 
 GRID = WavelengthGrid()
 

@@ -19,21 +19,21 @@ import pyarrow.parquet as pq
 import pytest
 
 from sweep.errors import InterruptedRunError
-from sweep.runner.stopping import GRACE_S, BrokenOffError, Stop, stop_on_signals
-from sweep.runner.workers import Workers, workers
+from sweep.run.stop import GRACE_S, BrokenOffError, Stop, stop_on_signals
+from sweep.run.workers import Workers, workers
 
 from .test_runner import STUDY
 
 SLOWED = Path(__file__).parent / "slowed"
 SAID = "sweep: interrupted; finished chunks are kept, the same command continues\n"
 PHASES = {
-    "planning": ("sweep.plan:Planner.plan", 2),
-    "search": ("sweep.search:search_from", 3),
-    "sweep": ("sweep.evaluate:evaluate", 6),
-    "recognition": ("sweep.recognition:recognize", 2),
-    "tables": ("sweep.store:write_tables", 1),
-    "points": ("sweep.store:write_table", 2),
-    "report": ("sweep.report.make:make_report", 1),
+    "planning": ("sweep.camera.plan.plan:Planner.plan", 2),
+    "search": ("sweep.search.solver:search_from", 3),
+    "sweep": ("sweep.metrics.evaluate:evaluate", 6),
+    "recognition": ("sweep.metrics.recognition:recognize", 2),
+    "tables": ("sweep.results.tables:write_tables", 1),
+    "points": ("sweep.results.tables:write_table", 2),
+    "report": ("sweep.report.page:make_report", 1),
 }
 WITHIN_S = 15.0
 """The promise is five seconds on a machine that does nothing else."""
@@ -208,7 +208,7 @@ def test_results_are_handed_on_as_they_finish_and_given_in_order(backend: str) -
 
 
 def test_a_worker_whose_parent_was_killed_before_it_began_ends() -> None:
-    program = "import os, sys; from sweep.runner.processes import prepare_worker; prepare_worker({}); print('lives')"
+    program = "import os, sys; from sweep.run.worker_process import prepare_worker; prepare_worker({}); print('lives')"
     for parent, said in (("os.getppid()", "lives\n"), ("os.getppid() + 1", "")):
         ended = subprocess.run(
             [sys.executable, "-c", program.format(parent)], capture_output=True, text=True, check=False

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from sweep.errors import StudyError
-from sweep.runner.provenance import fingerprint, resolved_yaml
+from sweep.results.identity import fingerprint
+from sweep.run.provenance import resolved_yaml
 from sweep.study import Study, folder_name, load_study
 
 from .conftest import SHARED, STUDIES, needs_measured

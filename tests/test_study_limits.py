@@ -15,13 +15,13 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from sweep.curve_files import MOST_BYTES, MOST_CURVES, MOST_SAMPLES, MOST_VALUES
+from sweep.commands.list_studies import list_lines
+from sweep.curves.files import MOST_BYTES, MOST_CURVES, MOST_SAMPLES, MOST_VALUES
 from sweep.errors import MOST_FAULTS, Fault, StudyError, SweepError, nearest
-from sweep.listing import list_lines
-from sweep.store import RESOLVED
+from sweep.results.tables import RESOLVED
 from sweep.study import load_study
-from sweep.study.json_schema import study_schema
-from sweep.study.lines import Document
+from sweep.study.document import Document
+from sweep.study.editors import study_schema
 from sweep.study.yaml_tree import MOST_DEPTH, Tree
 
 from .watchdog import within

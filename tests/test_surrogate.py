@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sweep.datasets import BUILT_IN_LIGHTS
-from sweep.datasets.led import led_photons
-from sweep.datasets.lights import peak_normalized_ratio
-from sweep.filters import BUILT_IN_SENSORS
-from sweep.spectra import WavelengthGrid
+from sweep.camera.sensor import BUILT_IN_SENSORS
+from sweep.curves.builtin import BUILT_IN_LIGHTS
+from sweep.curves.builtin.led import led_photons
+from sweep.curves.lights import peak_normalized_ratio
+from sweep.curves.spectrum import WavelengthGrid
 
 GRID = WavelengthGrid()
 SENSOR = BUILT_IN_SENSORS["ar0820"](GRID)

@@ -12,7 +12,8 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from sweep.runner.jobs import CHUNK, Job, joined, rules_of, run_job
+from sweep.results.identity import CHUNK
+from sweep.run.rows import Job, joined, rules_of, run_job
 from sweep.study import Study
 
 from .test_routes import plant

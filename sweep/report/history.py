@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from ..arrays import FloatArray, IndexArray
-from ..constraints import FEASIBLE, Bound
-from ..metrics import CSD
-from ..pareto import hypervolume
-from .outputs import Output
+from ..metrics.bound import FEASIBLE, Bound
+from ..metrics.pareto import hypervolume
+from ..metrics.separation import CSD
+from ..results.output import Output
+from ..types import FloatArray, IndexArray
 
 _PLACES = 80
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..evaluate import WORST
-from ..metrics import CSD
+from ..metrics.evaluate import WORST
+from ..metrics.separation import CSD
 
 
 def readable(column: str) -> str:

@@ -7,13 +7,13 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from ..arrays import FloatArray
-from ..discrimination import STATE_ERROR_BOUND
-from ..evaluate import STATE_ERROR
-from ..recognition import CLASSIFIERS, MOST_LIKELY
-from ..series import Line, SeriesFigure
-from .content import over_series, scenario_series, series_figures
-from .outputs import Output
+from ..metrics.discrimination import STATE_ERROR_BOUND
+from ..metrics.evaluate import STATE_ERROR
+from ..metrics.recognition import CLASSIFIERS, MOST_LIKELY
+from ..results.output import Output
+from ..types import FloatArray
+from .series import Line, SeriesFigure
+from .values import over_series, scenario_series, series_figures
 
 _LEAST = 1e-12
 _RULE_NAMES = {MOST_LIKELY: "most likely signal", "nearest_centroid": "nearest centroid", "lda": "LDA"}

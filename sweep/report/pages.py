@@ -14,7 +14,7 @@ from markupsafe import Markup
 
 def page(template: str, **values: Any) -> str:
     """A template filled in; every value is escaped."""
-    loader = PackageLoader("sweep", "templates")
+    loader = PackageLoader("sweep.report", "templates")
     templates = Environment(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
@@ -31,7 +31,7 @@ def library() -> Markup:
 
 def script(name: str) -> Markup:
     """A script of ours, as the page itself carries it."""
-    return Markup(resources.files("sweep").joinpath("templates", name).read_text(encoding="utf-8"))
+    return Markup(resources.files("sweep.report").joinpath("templates", name).read_text(encoding="utf-8"))
 
 
 def inlined(png: bytes) -> str:

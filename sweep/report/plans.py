@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..plan import Plan
-from ..promises import EFFECTS
+from ..camera.plan.plan import Plan
+from ..camera.plan.promises import EFFECTS
 from ..study import Study
 
 

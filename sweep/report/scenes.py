@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from .outputs import Output
+from ..results.output import Output
 
 
 @dataclass(frozen=True)

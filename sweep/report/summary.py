@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ..series import SeriesFigure
-from .comparison import comparison_lines, comparison_with_published
-from .content import series_figures
+from ..results.output import Output
 from .names import amount, readable
 from .noise import usable_lines
-from .outputs import Output
+from .published import comparison_lines, comparison_with_published
+from .series import SeriesFigure
 from .tables import geometry_table
+from .values import series_figures
 
 _MOST_PARAMETERS = 10
 _MOST_SCENARIOS = 8

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from ..evaluate import WORST
-from ..metrics import CSD
-from .outputs import Output
+from ..metrics.evaluate import WORST
+from ..metrics.separation import CSD
+from ..results.output import Output
 
 QUANTITIES = ("sensitivity", "cfa_sensitivity")
 

@@ -9,9 +9,9 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
-from ..scenes import Scenario
-from ..schema import Number, Section
-from .curve_sections import Name
+from ..camera.scene import Scenario
+from ..types import Number, Section
+from .schema_curves import Name
 
 
 class Axis(Section):

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from ..arrays import FloatArray
+from ..curves.spectrum import WavelengthGrid
+from ..disk import is_folder
 from ..errors import Fault, StudyError
-from ..inputs import is_folder
-from ..spectra import WavelengthGrid
-from .lines import Document
+from ..types import FloatArray
+from .document import Document
 from .model import Study
 from .resolve import resolve
 from .schema import StudySection

@@ -7,22 +7,22 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..constraints import Bound
-from ..datasets.lights import Lights
-from ..effects.bounds import Box
+from ..camera.mosaic import Mosaic
+from ..camera.pixel import Pixel
+from ..camera.plan.bounds import Box
+from ..camera.plan.plan import Plan, Planner
+from ..camera.scene import Geometry, Scenario
+from ..camera.sensor import SensorCurves
+from ..camera.view import REFERENCE, Setup
+from ..curves.lights import Lights, Pair, class_pairs
+from ..curves.spectrum import WavelengthGrid
+from ..designs.space import DIMENSIONS, Space
 from ..errors import Fault, StudyError
-from ..evaluate import BEST_PLACE, WORST, noise_quantities, quantities, shiftable
-from ..filters import SensorCurves
-from ..metrics import CSD, Pair, class_pairs, csd_name
-from ..mosaics import Mosaic
-from ..objectives import COMBINED, Objective
-from ..plan import Plan, Planner
-from ..problem import SHIFTS, Problem
-from ..scenes import Geometry, Scenario
-from ..sensor import Pixel
-from ..setup import REFERENCE, Setup
-from ..spaces import DIMENSIONS, Space
-from ..spectra import WavelengthGrid
+from ..metrics.bound import Bound
+from ..metrics.evaluate import BEST_PLACE, WORST, noise_quantities, quantities, shiftable
+from ..metrics.objective import COMBINED, Objective
+from ..metrics.separation import CSD, csd_name
+from ..search.problem import SHIFTS, Problem
 from .schema import StudySection
 
 

@@ -5,25 +5,25 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from ..arrays import FloatArray
-from ..chromaticity import VISIBLE_NM
-from ..datasets.lights import Lights
-from ..discrimination import CNR, D_PRIME, noise_names
-from ..effects import blur
-from ..effects.kernel import too_large
+from ..camera.effects import blur
+from ..camera.kernel import too_large
+from ..camera.mosaic import Mosaic
+from ..camera.scene import OBJECT_RESOLUTION, WhitePatchExposure
+from ..curves.color import VISIBLE_NM
+from ..curves.lights import Lights, Pair, class_pairs
+from ..designs.space import DIMENSIONS, Space
 from ..errors import StudyError, SweepError
-from ..evaluate import DESIGNED, WORST, noise_quantities, shiftable
-from ..metrics import Pair, class_pairs, csd_name
-from ..mosaics import Mosaic
-from ..scenes import OBJECT_RESOLUTION, WhitePatchExposure
-from ..search import ALGORITHMS
-from ..spaces import DIMENSIONS, Space
+from ..metrics.discrimination import CNR, D_PRIME, noise_names
+from ..metrics.evaluate import DESIGNED, WORST, noise_quantities, shiftable
+from ..metrics.separation import csd_name
+from ..search.solver import ALGORITHMS
+from ..types import FloatArray
 from .axes import Axis
-from .lines import Document
+from .document import Document
 from .model import Search, Study
 from .schema import CfaSection, StudySection
 from .sources import Sources
-from .space_builder import SpaceBuilder
+from .spaces import SpaceBuilder
 from .yaml_tree import Key
 
 MOST_DESIGNS = 10**9

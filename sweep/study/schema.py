@@ -6,17 +6,17 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..constraints import Bound
-from ..datasets import BUILT_IN_LIGHTS
-from ..families import FamilyOptions
-from ..filters import BUILT_IN_SENSORS
-from ..objectives import Objective
-from ..scenes import Geometry, Scenario
-from ..schema import Number, Section
-from ..sensor import Pixel
-from ..spectra import WavelengthGrid
+from ..camera.pixel import Pixel
+from ..camera.scene import Geometry, Scenario
+from ..camera.sensor import BUILT_IN_SENSORS
+from ..curves.builtin import BUILT_IN_LIGHTS
+from ..curves.spectrum import WavelengthGrid
+from ..designs.registry import FamilyOptions
+from ..metrics.bound import Bound
+from ..metrics.objective import Objective
+from ..types import Number, Section
 from .axes import ScenarioTemplate, Span, Values, expanded
-from .curve_sections import Documented, LightsSection, Name, SensorSection, builtin, named
+from .schema_curves import Documented, LightsSection, Name, SensorSection, builtin, named
 
 _FEWEST_PATCHES = 10
 _MOST_ROWS = 64

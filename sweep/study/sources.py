@@ -8,18 +8,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
-from ..arrays import FloatArray
-from ..curve_files import digest, read_curves
-from ..datasets import BUILT_IN_LIGHTS
-from ..datasets.lights import Lights, make_lights
+from ..camera.sensor import BUILT_IN_SENSORS, SensorCurves, make_sensor
+from ..curves.builtin import BUILT_IN_LIGHTS
+from ..curves.builtin.surrogate import BUILT_IN_RANGE_NM
+from ..curves.files import digest, read_curves
+from ..curves.lights import Lights, make_lights
+from ..curves.spectrum import Curves, WavelengthGrid, photons_from_energy
+from ..disk import is_file
 from ..errors import MOST_FAULTS, DataError, Fault, nearest
-from ..filters import BUILT_IN_SENSORS, SensorCurves, make_sensor
-from ..inputs import is_file
-from ..spectra import Curves, WavelengthGrid, photons_from_energy
-from ..surrogate import BUILT_IN_RANGE_NM
-from .curve_sections import CurveFile, LightFile, LightsSection, SensorSection
-from .lines import Document
+from ..types import FloatArray
+from .document import Document
 from .schema import MOST_TYPES
+from .schema_curves import CurveFile, LightFile, LightsSection, SensorSection
 from .yaml_tree import Key
 
 _Made = TypeVar("_Made", SensorCurves, Lights)

@@ -1,0 +1,1 @@
+"""Light in, digital numbers out, with no more effects than needed."""

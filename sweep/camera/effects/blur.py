@@ -1,0 +1,229 @@
+"""Diffraction and defocus: a disc seen through a lens without aberrations, exact.
+
+The image of a disc of radius R is a function of the distance r from its center,
+  h(r) = 2 pi R integral_0^(1 / lambda N) J1(2 pi R nu) J0(2 pi r nu) OTF(nu) dnu,
+since the transfer function ends at nu = 1 / (lambda N), the cutoff of a cone with sin = 1 / 2N (the irradiance, as
+ISETCam's, is that of tan = 1 / 2N; they differ by 0.8 % at f/4). OTF with defocus W20 (Hopkins), s = lambda N nu:
+  OTF = (4 / pi) integral_0^acos(s) sin^2 p cos(8 pi W20 N nu (cos p - s)) dp.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+from scipy.interpolate import BSpline, make_interp_spline
+from scipy.sparse import csr_matrix
+from scipy.special import j0, j1
+
+from ...types import FloatArray
+from ..pixel import Pixel
+from ..scene import Scenario
+from ..view import Setup
+
+METHODS = ("skip", "every 10 nm", "every 5 nm", "every 2 nm", "every wavelength")
+COARSE = "every 10 nm"
+"""The interpolated method on whose wavelengths kernels are compared when a plan is made."""
+_SPACING_NM = {"every 10 nm": 10.0, "every 5 nm": 5.0, "every 2 nm": 2.0}
+_SHORTEST_UM = 0.4
+_PANEL_NODES = 32
+_CYCLES_PER_PANEL = 4.0
+_SPLINE_PER_CYCLE = 24
+"""Nodes of the table of h(r) per period of the highest frequency."""
+
+
+def skip_is_exact(setup: Setup) -> str | None:
+    """Why leaving blur out changes nothing; None when it does."""
+    return "a patch that fills the field" if setup.scenario.target is None else None
+
+
+def defocus_um(scenario: Scenario, pitch_um: float) -> float:
+    """W20, the wavefront's defocus at the edge of the pupil, micrometers: image shift / (8 N^2)."""
+    target, focus_m = scenario.target, scenario.optics.focus_m
+    if target is None or focus_m is None:
+        return 0.0
+    f = target.focal_length_um(pitch_um)
+    image = [f * d / (d - f) for d in (target.distance_m * 1e6, focus_m * 1e6)]
+    return abs(image[0] - image[1]) / (8 * scenario.optics.f_number**2)
+
+
+_MOST_PX = 128.0
+_MOST_PERIODS = 400.0
+
+
+def too_much(scenario: Scenario, pixel: Pixel) -> tuple[tuple[str, ...], str, str, str] | None:
+    """Why a target's image is not computed: where it is set, problem, value, what is allowed; None when it is."""
+    target, optics = scenario.target, scenario.optics
+    if target is None:
+        return None
+    across = target.object_resolution_px
+    if across > _MOST_PX:
+        uniform = f"at most {_MOST_PX:g} px (a larger light fills the field: leave out `target`)"
+        return ("target",), "the light is too large", f"{across:.6g} px", uniform
+    f_m = target.focal_length_um(pixel.pitch_um) * 1e-6
+    for key, distance_m in ((("target", "distance_m"), target.distance_m), (("optics", "focus_m"), optics.focus_m)):
+        if distance_m is not None and distance_m <= 2 * f_m:
+            return (
+                key,
+                "too near for this lens",
+                f"{distance_m:g} m",
+                f"more than {2 * f_m:.4g} m, twice its focal length",
+            )
+    # The image shift over the f-number is the diameter of the blur circle.
+    circle_px = defocus_um(scenario, pixel.pitch_um) * 8 * optics.f_number / pixel.pitch_um
+    if circle_px > _MOST_PX:
+        return ("optics", "focus_m"), "too far out of focus", f"{circle_px:.4g} px of blur", f"at most {_MOST_PX:g} px"
+    periods = (across + 4) * pixel.pitch_um / (_SHORTEST_UM * optics.f_number)
+    if periods > _MOST_PERIODS:
+        allowed = f"at most {_MOST_PERIODS:g} periods of the finest detail across the light"
+        return ("optics", "f_number"), "the image is too fine", f"{periods:.4g} periods", allowed
+    return None
+
+
+def transfer(nu_per_um: FloatArray, wavelength_um: FloatArray, f_number: float, w20_um: float) -> FloatArray:
+    """OTF, ndarray[n_nu, n_wavelengths]."""
+    s = np.minimum(nu_per_um[:, None] * wavelength_um * f_number, 1.0)
+    angle = np.arccos(s)
+    if w20_um == 0:
+        return np.asarray((2 / math.pi) * (angle - s * np.sqrt((1 - s) * (1 + s))), dtype=float)
+    phase = 8 * math.pi * w20_um * f_number * nu_per_um
+    panels = 1 + int(phase.max(initial=0.0) / _PANEL_NODES)
+    nodes, weights = np.polynomial.legendre.leggauss(_PANEL_NODES)
+    shares = ((np.arange(panels)[:, None] + (nodes + 1) / 2) / panels).ravel()
+    found = np.zeros_like(s)
+    for node, weight in zip(shares, np.tile(weights / 2 / panels, panels), strict=True):
+        p = node * angle
+        found += weight * np.sin(p) ** 2 * np.cos(phase[:, None] * (np.cos(p) - s))
+    return np.asarray((4 / math.pi) * angle * found, dtype=float)
+
+
+def _frequencies(reach_um: float, wavelength_um: FloatArray, f_number: float) -> tuple[FloatArray, FloatArray]:
+    """Nodes and weights up to the highest frequency, for phases up to 2 pi nu reach: Gauss-Legendre on panels."""
+    highest = 1 / (wavelength_um.min() * f_number)
+    panels = 8 + int(highest * reach_um / _CYCLES_PER_PANEL)
+    nodes, weights = np.polynomial.legendre.leggauss(_PANEL_NODES)
+    starts = np.arange(panels)[:, None]
+    nu = (starts + (nodes + 1) / 2) * (highest / panels)
+    return nu.ravel(), np.tile(weights / 2 * (highest / panels), panels)
+
+
+class Profile:
+    """h(r) of one disc for some wavelengths, as a table to look up."""
+
+    def __init__(
+        self, radius_um: float, reach_um: float, wavelength_um: FloatArray, f_number: float, w20_um: float
+    ) -> None:
+        nu, weight = _frequencies(radius_um + reach_um, wavelength_um, f_number)
+        step = 1 / (_SPLINE_PER_CYCLE * nu[-1])
+        r = np.linspace(0.0, reach_um + step, max(8, 2 + int(reach_um / step)))
+        spectrum = (2 * math.pi * radius_um * j1(2 * math.pi * radius_um * nu) * weight)[:, None]
+        table = j0(2 * math.pi * np.outer(r, nu)) @ (spectrum * transfer(nu, wavelength_um, f_number, w20_um))
+        self._spline = make_interp_spline(r, table, k=3, axis=0)
+        self.r_um, self.values = r, table
+        self._highest = float(nu[-1])
+        self.n_wavelengths = wavelength_um.size
+        self.work = r.size * nu.size * wavelength_um.size
+
+    def order(self, width_um: float) -> int:
+        """Order of a Gauss-Legendre rule that integrates h over `width_um`."""
+        return 5 + math.ceil(2.5 * self._highest * width_um)
+
+    def at(self, r_um: FloatArray) -> FloatArray:
+        """h, ndarray[..., n_wavelengths]."""
+        return np.asarray(self._spline(r_um), dtype=float)
+
+    def sums(self, r_um: FloatArray, weights: FloatArray) -> FloatArray:
+        """Sums of h over the last axis of `r_um`, by their weights: ndarray[n, m], ndarray[m] -> [n, n_wavelengths].
+
+        The weights go to the spline's coefficients first, so that no more is done at each wavelength than one product.
+        """
+        n, size = len(r_um), len(self._spline.c)
+        # Four values for each radius. SciPy looks for radii outside number by number, if it is not told to extrapolate.
+        basis = BSpline.design_matrix(r_um.ravel(), self._spline.t, 3, extrapolate=True)
+        indices = basis.indices.reshape(n, -1)
+        first, last = indices.min(axis=1), indices.max(axis=1)
+        width = int((last - first).max(initial=0)) + 1
+        first = np.minimum(first, size - width)
+        each = (basis.data.reshape(*r_um.shape, 4) * weights[:, None]).reshape(n, -1)
+        at = indices + (np.arange(n) * width - first)[:, None]
+        folded = np.bincount(at.ravel(), each.ravel(), minlength=n * width)
+        columns = first[:, None] + np.arange(width)
+        # A sparse product sums each row by itself: the same values in whatever company a radius is asked for.
+        rows = csr_matrix((folded, columns.ravel(), np.arange(n + 1) * width), shape=(n, size))
+        return np.asarray(rows @ self._spline.c, dtype=float)
+
+    @property
+    def slopes(self) -> FloatArray:
+        """Derivative of h at the radii `r_um`, 1/um, ndarray[n_radii, n_wavelengths]."""
+        return np.asarray(self._spline.derivative()(self.r_um), dtype=float)
+
+
+@lru_cache(maxsize=8)
+def profile(
+    radius_um: float, reach_um: float, wavelengths_um: tuple[float, ...], f_number: float, w20_um: float
+) -> Profile:
+    """A profile; the latest ones are kept, since CFAs with tiles of one size share theirs."""
+    return Profile(radius_um, reach_um, np.array(wavelengths_um), f_number, w20_um)
+
+
+def mean_over_disc(
+    radius_um: float, readout_um: float, wavelength_um: FloatArray, f_number: float, w20_um: float
+) -> FloatArray:
+    """Mean of h over a concentric disc of radius `readout_um`, ndarray[n_wavelengths]; 1 is no light lost.
+
+    (2 R / R') integral J1(2 pi R nu) J1(2 pi R' nu) OTF(nu) / nu dnu; at the very center the encircled energy.
+    """
+    nu, weight = _frequencies(radius_um + readout_um, wavelength_um, f_number)
+    inner = j1(2 * math.pi * radius_um * nu) * weight
+    inner *= (2 * radius_um / readout_um) * j1(2 * math.pi * readout_um * nu) / nu
+    return np.asarray(inner @ transfer(nu, wavelength_um, f_number, w20_um), dtype=float)
+
+
+def _envelope(x: FloatArray) -> FloatArray:
+    """|J1(x)| is at most this: x / 2, its maximum 0.5819, and 0.8251 / sqrt(x) (its supremum of sqrt(x) |J1|)."""
+    return np.asarray(np.minimum(np.minimum(x / 2, 0.58187), 0.8251 / np.sqrt(np.maximum(x, 1e-300))), dtype=float)
+
+
+def interpolation_bound(
+    radius_um: float, aperture_um: float, knots_um: FloatArray, f_number: float, w20_um: float
+) -> float:
+    """No kernel of this disc differs by more than this from its linear interpolation between the knots.
+
+    In focus |d2h/dlambda2| step^2 / 8, else |dh/dlambda| step / 2 (a derivative of the OTF by lambda at given nu is
+    never larger with defocus than without). Both derivatives are bounded by the integral of the absolute integrand,
+    with an envelope of |J1|; for s = lambda N nu fixed that falls with lambda, so each interval's shorter end counts,
+    but
+    for the pixel aperture, whose transfer falls with nu, where the longer end does.
+    """
+    u, weight = np.polynomial.legendre.leggauss(200)
+    u, weight = (u + 1) * math.pi / 4, weight * math.pi / 4
+    s = np.sin(u)
+    theta = (np.arange(64) + 0.5) / 64 * (math.pi / 2)
+    worst = 0.0
+    for short, long in pairwise(knots_um):
+        nu = s / (short * f_number)
+        aperture = 1.0
+        if aperture_um > 0:
+            across = math.pi * aperture_um * s[:, None] / (long * f_number)
+            falls = [1 / np.maximum(1.0, across * np.abs(axis(theta))) for axis in (np.cos, np.sin)]
+            aperture = (falls[0] * falls[1]).mean(axis=1)
+        common = 2 * math.pi * radius_um * _envelope(2 * math.pi * radius_um * nu) * aperture / (short * f_number)
+        step = long - short
+        if w20_um == 0:
+            second = float(weight @ (common * (s / short) ** 2 * (4 / math.pi) * s))
+            worst = max(worst, second * step**2 / 8)
+        else:
+            first = float(weight @ (common * (s / short) * (4 / math.pi) * np.cos(u) ** 2))
+            worst = max(worst, first * step / 2)
+    return worst
+
+
+def knots(wavelength_nm: FloatArray, method: str) -> FloatArray:
+    """Wavelengths at which a method makes its kernels: equidistant ones and the end; all, where the grid is coarser."""
+    spacing = _SPACING_NM.get(method, 0.0)
+    if wavelength_nm.size < 3 or wavelength_nm[1] - wavelength_nm[0] >= spacing:
+        return wavelength_nm
+    inner = np.arange(wavelength_nm[0], wavelength_nm[-1], spacing)
+    return np.append(inner, wavelength_nm[-1])

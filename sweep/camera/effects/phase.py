@@ -1,0 +1,165 @@
+"""Where the light's center falls on the mosaic.
+
+Of `any` place, the worst of all real places in the tile is asked for. A lattice looks at some of them; `within X DN`
+starts from the lattice of quarter pixels and divides its cells until no place between can change a distance by more.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...types import BoolArray, FloatArray, IndexArray
+from ..mosaic import Mosaic
+from ..view import Setup
+
+LATTICES = ("one", "pixel", "half pixel", "quarter pixel")
+_WITHIN_DN = {
+    "within 10 DN": 10.0,
+    "within 1 DN": 1.0,
+    "within 0.1 DN": 0.1,
+    "within 0.01 DN": 0.01,
+    "within 0.0001 DN": 1e-4,
+}
+METHODS = (*LATTICES, *_WITHIN_DN)
+MOST = 1024
+"""Places of a lattice on a tile, at most."""
+CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
+"""A cell's corners from its center (column, row), in units of its half width."""
+PER_PIXEL = 4
+"""Places per pixel, along a row and a column, of the finest lattice."""
+_PER_PIXEL = {"one": 0, "pixel": 1, "half pixel": 2, "quarter pixel": PER_PIXEL} | dict.fromkeys(_WITHIN_DN, PER_PIXEL)
+
+
+@dataclass(frozen=True)
+class Cases:
+    """Places of the light's center, ndarray[n_cases, 2] as (column, row), and the pixel at which each is read out.
+
+    `home_px`: ndarray[n_cases, 2], the pixel nearest to the light's center; halfway between two it is either.
+    """
+
+    places_px: FloatArray
+    home_px: FloatArray
+
+    def some(self, which: slice | IndexArray) -> Cases:
+        """Some of them."""
+        return Cases(self.places_px[which], self.home_px[which])
+
+
+def within_dn(method: str) -> float | None:
+    """How far a distance may be from that over all real places; None for a lattice, which knows no such limit."""
+    return _WITHIN_DN.get(method)
+
+
+def skip_is_exact(setup: Setup) -> str | None:
+    """Why one place is enough; None when the scene asks for all."""
+    target = setup.scenario.target
+    if target is None:
+        return "a patch that fills the field"
+    return None if target.phase_px == "any" else "the scene names the place"
+
+
+def places_px(setup: Setup, method: str) -> FloatArray:
+    """Centers of the light, ndarray[n_cases, 2] as (column, row): all of a grid over the tile, or the scene's one."""
+    target = setup.scenario.target
+    rows, columns = setup.mosaic.indices.shape
+    if target is None:
+        return np.zeros((1, 2))
+    if target.phase_px != "any":
+        return np.asarray(np.mod([target.phase_px], (columns, rows)), dtype=float)
+    per_pixel = _PER_PIXEL[method]
+    if not per_pixel:
+        return np.zeros((1, 2))
+    x, y = np.meshgrid(np.arange(columns * per_pixel) / per_pixel, np.arange(rows * per_pixel) / per_pixel)
+    return np.stack([x.ravel(), y.ravel()], axis=1)
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Squares of places: centers and the pixel read out (ndarray[n, 2] each, (column, row)), half width, pixels."""
+
+    centers: FloatArray
+    homes: FloatArray
+    half: float
+
+    def divided(self, which: BoolArray) -> Cells:
+        """The quarters of some of them."""
+        quarter = self.half / 2
+        centers = (self.centers[which][:, None] + quarter * CORNERS).reshape(-1, 2)
+        return Cells(centers, np.repeat(self.homes[which], len(CORNERS), axis=0), quarter)
+
+    def some(self, which: slice) -> Cells:
+        """Part of them."""
+        return Cells(self.centers[which], self.homes[which], self.half)
+
+    @property
+    def corners(self) -> Cases:
+        """All corners, those of a cell one after the other."""
+        places = (self.centers[:, None] + self.half * CORNERS).reshape(-1, 2)
+        return Cases(places, np.repeat(self.homes, len(CORNERS), axis=0))
+
+    def shared_corners(self, setup: Setup) -> tuple[Cases, IndexArray]:
+        """The corners, each once, and those of each cell, ndarray[n_cells, n_corners].
+
+        Of a mean over the disc it does not matter which pixel is the nearest.
+        """
+        target, every = setup.scenario.target, self.corners
+        keys = every.places_px
+        if target is not None and target.readout == "center":
+            keys = np.concatenate([every.places_px, every.home_px], axis=1)
+        _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+        return every.some(first), which.reshape(-1, len(CORNERS))
+
+
+def whole(mosaic: Mosaic) -> Cells:
+    """Cells between the places of the finest lattice, over a part of the tile that stands for all of it."""
+    half = 0.5 / PER_PIXEL
+    x, y = (np.arange(a + half, b, 2 * half) for a, b in domain_px(mosaic).T)
+    centers = np.stack([v.ravel() for v in np.meshgrid(x, y)], axis=1)
+    if np.array_equal(mosaic.indices, mosaic.indices.T):  # places on both sides of the diagonal see the same
+        centers = centers[centers[:, 1] <= centers[:, 0]]
+    return Cells(centers, np.floor(centers + 0.5), half)
+
+
+def all_count(setup: Setup) -> bool:
+    """Whether every real place counts: where any is asked for, and the method is not a lattice's."""
+    return skip_is_exact(setup) is None and setup.methods.sampling != "skip" and setup.methods.phase not in LATTICES
+
+
+def n_places(setup: Setup, method: str) -> float:
+    """About how many places a method looks at: a search divides most where its limit is tight (measured)."""
+    lattice, within = len(places_px(setup, method)), within_dn(method)
+    if within is None or skip_is_exact(setup) is not None:
+        return lattice
+    return lattice * (1 + 3 * (2 - math.log10(within)))
+
+
+def cases(setup: Setup, method: str) -> Cases:
+    """The places of a method; halfway between two pixels the one before is read out."""
+    places = places_px(setup, method)
+    return Cases(places, np.ceil(places - 0.5))
+
+
+def domain_px(mosaic: Mosaic) -> FloatArray:
+    """A part of the tile that stands for all of it: ndarray[2, 2], (column, row) of its two ends.
+
+    Where the tile is its own mirror image, places on both sides of the mirror see the same.
+    """
+    tile = mosaic.indices
+    ends = []
+    for rows in (tile.T, tile):
+        n = len(rows)
+        mirrors = [m for m in range(n) if np.array_equal(rows[(m - np.arange(n)) % n], rows)]
+        ends.append((mirrors[0] / 2, (mirrors[0] + n) / 2) if mirrors else (0.0, float(n)))
+    return np.array(ends).T
+
+
+def nearest(setup: Setup, of: FloatArray, among: FloatArray) -> IndexArray:
+    """For each place of `of` the index of the nearest one of `among`, on the torus of the tile."""
+    rows, columns = setup.mosaic.indices.shape
+    size = np.array([columns, rows])
+    apart = np.abs(of[:, None] - among[None]) % size
+    apart = np.minimum(apart, size - apart)
+    return np.asarray((apart**2).sum(axis=2).argmin(axis=1))

@@ -1,0 +1,163 @@
+"""Mosaic sampling: which pixels a light covers, how much of each, and how they are read out."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...types import BoolArray, FloatArray, IndexArray
+from ..mosaic import Mosaic
+from ..scene import Target
+from ..view import Setup
+from .blur import Profile
+
+METHODS = ("skip", "pixels")
+_AT_ONCE = 200
+
+
+def skip_is_exact(setup: Setup) -> str | None:
+    """Why leaving sampling out changes nothing; None when it does."""
+    return "every pixel of a channel sees the same" if setup.scenario.target is None else None
+
+
+def covered(x: FloatArray, y: FloatArray, half: float, radius: float) -> FloatArray:
+    """Share of a square of half side `half` around (x, y) that lies in the disc of `radius` around 0, exact."""
+    ax, ay = np.abs(x), np.abs(y)
+    inside = np.hypot(ax + half, ay + half) <= radius
+    found = inside.astype(float)
+    rim = ~inside & (np.hypot(np.maximum(ax - half, 0.0), np.maximum(ay - half, 0.0)) < radius)
+    ends = [_area(ax[rim] + sx * half, ay[rim] + sy * half, radius) * sx * sy for sx in (1, -1) for sy in (1, -1)]
+    found[rim] = np.clip(sum(ends) / (4 * half**2), 0.0, 1.0)
+    return found
+
+
+def _area(x: FloatArray, y: FloatArray, radius: float) -> FloatArray:
+    """Signed area of the disc over the rectangle from 0 to (x, y), odd in both."""
+    sign = np.sign(x) * np.sign(y)
+    x, y = np.minimum(np.abs(x), radius), np.minimum(np.abs(y), radius)
+    corner = np.sqrt((radius - y) * (radius + y))  # from here on the circle is lower than y
+
+    def under(t: FloatArray) -> FloatArray:
+        height = np.sqrt((radius - t) * (radius + t))
+        return np.asarray(0.5 * (t * height + radius**2 * np.arctan2(t, height)), dtype=float)
+
+    return np.asarray(sign * np.where(x <= corner, x * y, corner * y + under(x) - under(corner)), dtype=float)
+
+
+@dataclass(frozen=True)
+class Window:
+    """Pixels around a light for some places of its center.
+
+    `channel`: ndarray[rows, columns] of channel indices; `dx`, `dy`: ndarray[n_cases, rows, columns], pixels from the
+    light's center. One pixel of margin on every side has no weight in any readout.
+    """
+
+    channel: IndexArray
+    dx: FloatArray
+    dy: FloatArray
+
+
+def radii_px(setup: Setup, target: Target) -> tuple[float, float]:
+    """Radius of the light and of the readout, in pixels; a readout reaches a pixel of every channel."""
+    radius = target.object_resolution_px / 2
+    rows, columns = setup.mosaic.indices.shape
+    return radius, max(radius, math.hypot(rows, columns) / 2)
+
+
+def reach_px(setup: Setup, target: Target) -> float:
+    """How far from the light's center a pixel may have a weight in the readout, along a row or column."""
+    if target.readout == "mean":
+        return radii_px(setup, target)[1] + 0.5
+    return float(max(setup.mosaic.indices.shape))
+
+
+def window(mosaic: Mosaic, phases_px: FloatArray, reach_px: float) -> Window:
+    """All pixels within `reach_px` (and the margin) of the light's centers, ndarray[n_cases, 2] as (column, row)."""
+    low = np.floor(phases_px.min(axis=0) - reach_px).astype(int) - 1
+    high = np.ceil(phases_px.max(axis=0) + reach_px).astype(int) + 1
+    columns, rows = (np.arange(a, b + 1) for a, b in zip(low, high, strict=True))
+    tile = mosaic.indices
+    channel = tile[np.ix_(rows % tile.shape[0], columns % tile.shape[1])]
+    dx = columns[None, None, :] - phases_px[:, :1, None] + np.zeros((1, rows.size, 1))
+    dy = rows[None, :, None] - phases_px[:, 1:, None] + np.zeros((1, 1, columns.size))
+    return Window(channel, dx, dy)
+
+
+def mean_weights(seen: Window, half: float, readout_px: float, n_channels: int) -> FloatArray:
+    """Weight of each pixel in the mean of its channel, ndarray[n_cases, rows, columns]; each channel's sum to 1."""
+    weights = covered(seen.dx, seen.dy, half, readout_px)
+    for channel in range(n_channels):
+        own = seen.channel == channel
+        weights[:, own] /= weights[:, own].sum(axis=1, keepdims=True)
+    return weights
+
+
+@dataclass(frozen=True)
+class PixelLight:
+    """Light of pixels relative to a uniform field, each different place once.
+
+    `values`: ndarray[n_places, n_wavelengths or 1], the last place is dark; `place`: ndarray[n_cases, rows, columns].
+    """
+
+    values: FloatArray
+    place: IndexArray
+
+    def by_pixel(self) -> FloatArray:
+        """ndarray[n_cases, rows, columns, n_wavelengths or 1]."""
+        return self.values[self.place]
+
+    def folded(self, weights: FloatArray) -> FloatArray:
+        """Weighted sums over the pixels: ndarray[n_cases, rows, columns, n] -> ndarray[n_cases, n, n_wavelengths]."""
+        found = np.empty((len(weights), weights.shape[-1], self.values.shape[1]))
+        for case, own in enumerate(weights):
+            some = np.flatnonzero(own.any(axis=2))
+            found[case] = own.reshape(-1, own.shape[2])[some].T @ self.values[self.place[case].ravel()[some]]
+        return found
+
+
+def different(seen: Window, wanted: BoolArray) -> tuple[FloatArray, IndexArray, BoolArray]:
+    """Where the pixels that are `wanted` lie from the light's center: the image is round, so mirrored places are one.
+
+    The different places, ndarray[n_places, 2], the shorter distance first; that of each pixel; and whether its shorter
+    distance is `dy`, ndarray[n_wanted] each.
+    """
+    x, y = seen.dx[:, 0, :], seen.dy[:, :, 0]
+    along = np.round(np.abs(np.concatenate([x.ravel(), y.ravel()])), 12)
+    distances, which = np.unique(along, return_inverse=True)
+    case, row, column = np.nonzero(wanted)
+    of_x, of_y = which[: x.size].reshape(x.shape)[case, column], which[x.size :].reshape(y.shape)[case, row]
+    named, place = np.unique(np.minimum(of_x, of_y) * distances.size + np.maximum(of_x, of_y), return_inverse=True)
+    return distances[np.stack(np.divmod(named, distances.size), axis=1)], place, of_y < of_x
+
+
+def light_on_pixels(
+    seen: Window, wanted: BoolArray, half: float, radius_px: float, profile: Profile | None, pitch_um: float
+) -> PixelLight:
+    """The light of the pixels that are `wanted` (ndarray[n_cases, rows, columns]); the others are dark.
+
+    Without a profile the image is sharp. The mean of the profile over the pixel is a Gauss-Legendre rule, whose order
+    follows the size of the pixel in periods of the highest frequency.
+    """
+    apart, inverse, _ = different(seen, wanted)
+    place = np.full(wanted.shape, len(apart))
+    place[wanted] = inverse
+    if profile is None:
+        values = covered(apart[:, 0], apart[:, 1], half, radius_px)[:, None]
+    else:
+        values = _means(apart, half, profile, pitch_um)
+    return PixelLight(np.vstack([values, np.zeros((1, values.shape[1]))]), place)
+
+
+def _means(apart: FloatArray, half: float, profile: Profile, pitch_um: float) -> FloatArray:
+    """Mean of the profile over pixels at `apart` (ndarray[n, 2]) from its center, ndarray[n, n_wavelengths]."""
+    nodes, weights = np.polynomial.legendre.leggauss(profile.order(2 * half * pitch_um))
+    u, v = (a.ravel() * half for a in np.meshgrid(nodes, nodes))
+    both = np.outer(weights, weights).ravel() / 4
+    values = np.empty((len(apart), profile.n_wavelengths))
+    for start in range(0, len(apart), _AT_ONCE):
+        x, y = apart[start : start + _AT_ONCE].T
+        r = np.hypot(x[:, None] + u, y[:, None] + v) * pitch_um
+        values[start : start + _AT_ONCE] = profile.sums(r, both)
+    return values

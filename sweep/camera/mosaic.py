@@ -1,0 +1,63 @@
+"""A color filter array is an integer tile over named channels."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import Fault, SweepError
+from ..types import IndexArray
+
+_TOKEN = re.compile(r"[A-Z][a-z0-9]*")
+
+
+@dataclass(frozen=True)
+class Mosaic:
+    """`tile[row][column]` indexes `channels`; the tile repeats over the sensor.
+
+    Channels are kept once each, in the order of their first pixel, so `len(channels)` is the paper's m_p
+    (RGGB 3, RCCC 2, RCCB 3, RYYCy 3, RYNCy 4): a channel that occurs more than once counts once.
+    """
+
+    name: str
+    channels: tuple[str, ...]
+    tile: tuple[tuple[int, ...], ...]
+
+    @classmethod
+    def from_rows(cls, name: str, rows: Sequence[Sequence[str]]) -> Mosaic:
+        """Make a mosaic from rows of channel names; raises SweepError on an empty or ragged tile."""
+        if not rows or not rows[0] or any(len(row) != len(rows[0]) for row in rows):
+            raise SweepError(Fault("a tile needs rows of equal length", key=name, value=[list(row) for row in rows]))
+        channels = tuple(dict.fromkeys(channel for row in rows for channel in row))
+        return cls(name, channels, tuple(tuple(channels.index(channel) for channel in row) for row in rows))
+
+    @classmethod
+    def from_name(cls, name: str) -> Mosaic:
+        """Read a 2x2 CFA from its name, row by row: `RYYCy` is R Y / Y Cy.
+
+        A channel is a capital letter and the small letters and digits that follow it. Raises SweepError unless the
+        name has exactly four channels.
+        """
+        tokens = _TOKEN.findall(name)
+        if "".join(tokens) != name or len(tokens) != 4:
+            raise SweepError(
+                Fault(
+                    "not the name of a 2x2 CFA",
+                    value=name,
+                    allowed="four channels, each a capital and small letters (RGGB, RYYCy), or a mapping with `tile`",
+                )
+            )
+        return cls.from_rows(name, [tokens[:2], tokens[2:]])
+
+    @property
+    def indices(self) -> IndexArray:
+        """The tile as ndarray[rows, columns] of channel indices."""
+        return np.asarray(self.tile, dtype=np.intp)
+
+    @property
+    def counts(self) -> IndexArray:
+        """Pixels per tile of each channel, ndarray[n_channels]."""
+        return np.bincount(self.indices.ravel(), minlength=len(self.channels))

@@ -1,0 +1,238 @@
+"""How much a change of a linear effect can change a CSD, for every design of a box: a proven upper bound.
+
+A CSD is the smallest of the distances of all pairs, so it changes by no more than the distance of a pair that can be
+the smallest, before or after; and a distance changes by no more than the norm of the change of its difference vector.
+That is linear in QE and kernel, and both are known up to an interval. Behind a readout that is not straight it is not:
+there, a distance changes by at most what both of its points move (`pixelwise`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ...curves.lights import class_pairs
+from ...types import FloatArray, IndexArray
+from ..effects import blur, flicker
+from ..view import Setup, background_irradiance, exposure_times, per_photon, signal_irradiance, white_irradiance
+from .compiled import largest_change
+
+
+@dataclass(frozen=True)
+class Box:
+    """Designs of a scene: every channel's QE lies between `low` and `high`, ndarray[n_channels, n_wavelengths]."""
+
+    setup: Setup
+    low: FloatArray
+    high: FloatArray
+    n_designs: int
+
+
+@dataclass(frozen=True)
+class Amounts:
+    """Sums of signals times QE on hats between the knots, DN: middle value, half width, and the largest possible.
+
+    `middle`: ndarray[n_signals, n_channels, n_knots], `half`: ndarray[n_pairs, n_channels, n_knots] (of a pair's
+    difference), `half_each`: the same of each signal, `largest`: the most that a pair's difference can be on each hat,
+    shaped like `half`; `most`, `most_each`: the same on all hats, ndarray[n_pairs or n_signals, n_channels].
+    """
+
+    middle: FloatArray
+    half: FloatArray
+    half_each: FloatArray
+    largest: FloatArray
+    most: FloatArray
+    most_each: FloatArray
+
+
+class Step(NamedTuple):
+    """What a step changes, as `Reach.largest_change` takes it; the share of the kernel, and of the light off axis."""
+
+    changed: Amounts
+    change: FloatArray
+    remainder: float
+    base: Amounts
+    left: FloatArray
+    scale: float
+    falls: float
+
+
+_AT_ONCE = 4_000_000
+"""Values of pairs' differences that are bounded at once."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """What the places in cells may see besides what their corners see.
+
+    `corners`: the cases at the corners of each cell, ndarray[n_cells, n_corners]. `change`, `left`: ndarray[n_cells,
+    n_values, n_channels], by how much the change of the kernel, and the kernel after it, may differ from a mean of
+    those at the corners. `after`: ndarray[n_cells, n_values, n_channels, n_knots], how far the corners' kernels after
+    the change are from each other.
+    """
+
+    corners: IndexArray
+    change: FloatArray
+    left: FloatArray
+    after: FloatArray
+
+    def some(self, cells: slice) -> tuple[Spread, IndexArray]:
+        """Some cells, and the cases at their corners, which are numbered anew."""
+        cases, corners = np.unique(self.corners[cells], return_inverse=True)
+        numbered = corners.reshape(self.corners[cells].shape)
+        return Spread(numbered, self.change[cells], self.left[cells], self.after[cells]), cases
+
+
+class Reach:
+    """The responses that the designs of a box can have, on the knots at which kernels are compared."""
+
+    def __init__(self, box: Box) -> None:
+        setup = box.setup
+        self.box = box
+        wave = setup.grid.nodes_nm
+        self.knots_nm = blur.knots(wave, blur.COARSE)
+        self._hats = np.stack([np.interp(wave, self.knots_nm, unit) for unit in np.eye(self.knots_nm.size)])
+        self.shortest_s, self.longest_s = self._exposures()
+        drive = setup.scenario.drive
+        self.least_light = 1.0 if drive is None else flicker.smallest(drive, self.shortest_s, self.longest_s)
+        self.most_light = 1.0 if drive is None else flicker.largest(drive, self.shortest_s, self.longest_s)
+        dn = per_photon(setup) * self.longest_s * self.most_light * setup.pixel.dn_per_e
+        self._signals = signal_irradiance(setup) * dn
+        self.first, self.second, self._ends = _pairs(setup.members)
+
+    def _exposures(self) -> tuple[float, float]:
+        setup = self.box.setup
+        modified = list(setup.modified)
+        white = white_irradiance(setup) * per_photon(setup)
+        ends = [exposure_times(setup, (qe[modified] @ white)[None])[0] for qe in (self.box.high, self.box.low)]
+        return float(ends[0]), float(ends[1])
+
+    @property
+    def brightest_dn(self) -> FloatArray:
+        """Largest response of each channel to any signal whose image is whole, DN, ndarray[n_channels]."""
+        return np.asarray((self._signals @ self.box.high.T).max(axis=0), dtype=float)
+
+    @property
+    def background_dn(self) -> FloatArray:
+        """Largest response of each channel to the background, DN, ndarray[n_channels]."""
+        setup = self.box.setup
+        dn = per_photon(setup) * self.longest_s * setup.pixel.dn_per_e
+        return np.asarray(self.box.high @ background_irradiance(setup) * dn, dtype=float)
+
+    @property
+    def background(self) -> tuple[FloatArray, FloatArray]:
+        """Response of each channel to the background, DN: middle value and half width, ndarray[n_channels] each."""
+        irradiance = background_irradiance(self.box.setup)
+        dn = per_photon(self.box.setup) * self.longest_s * self.box.setup.pixel.dn_per_e
+        ends = [qe @ irradiance * dn for qe in (self.box.low, self.box.high)]
+        return np.asarray((ends[0] + ends[1]) / 2), np.asarray((ends[1] - ends[0]) / 2)
+
+    def span_dn(self, *, rounds: bool) -> float:
+        """Between which two values, so far apart, DN, every channel's value is where the readout clips, or `rounds`."""
+        pixel = self.box.setup.pixel
+        full = float(pixel.full_scale_dn)
+        return full if rounds else min(full, pixel.well_e * pixel.dn_per_e)
+
+    def amounts(self, factor: FloatArray, low: FloatArray, high: FloatArray) -> Amounts:
+        """Sums for QE between `low` and `high` (ndarray[n_channels, n_wavelengths]) and a factor per wavelength."""
+        middle, half = (low + high) / 2, (high - low) / 2
+        most = np.maximum(np.abs(low), np.abs(high))
+        light = self._signals * factor
+        apart = np.abs(light[self.first] - light[self.second])
+        centers = np.einsum("sl,cl,kl->sck", light, middle, self._hats, optimize=True)
+        halves = np.einsum("pl,cl,kl->pck", apart, half, self._hats, optimize=True)
+        return Amounts(
+            middle=centers,
+            half=halves,
+            half_each=np.einsum("sl,cl,kl->sck", np.abs(light), half, self._hats, optimize=True),
+            largest=np.abs(centers[self.first] - centers[self.second]) + halves,
+            most=apart @ most.T,
+            most_each=np.abs(light) @ most.T,
+        )
+
+    def largest_change(
+        self,
+        changed: Amounts,
+        change: FloatArray,
+        remainder: float,
+        base: Amounts,
+        after: FloatArray,
+        *,
+        every: bool = False,
+        between: Spread | None = None,
+    ) -> float:
+        """Bound on the change of any CSD of a straight readout, DN.
+
+        `change`: ndarray[n_cases, n_values, n_channels, n_knots], of the kernel that multiplies `changed`, exact up to
+        `remainder` between the knots. `base`, `after`: the responses and the kernel after the change, which say which
+        pairs can be the smallest; `every`: all pairs count. `between`: the cases are corners of cells of places, all
+        of which count.
+        """
+        alone = np.arange(len(change))[:, None] if between is None else between.corners
+        step = max(1, _AT_ONCE // max(1, len(self.first) * change.shape[1] * alone.shape[1]))
+        worst = 0.0
+        for start in range(0, len(alone), step):
+            cells = slice(start, start + step)
+            part, cases = (None, alone[cells, 0]) if between is None else between.some(cells)
+            found = self._largest(changed, change[cases], remainder, base, after[cases], every, part)
+            worst = max(worst, found)
+        return worst
+
+    def largest_move(self, moved: FloatArray) -> float:
+        """Largest change of a distance whose two points move by up to `moved`, ndarray[n_cases, n_signals, n_channels].
+
+        DN. A point's channels move by at most this much, so the difference of two points by at most the sum of both.
+        """
+        each = np.swapaxes(moved, 0, 1)
+        return max((float(_norms(each[some] + each[to]).max()) for some, to in self._by_block(moved)), default=0.0)
+
+    def _by_block(self, moved: FloatArray) -> list[tuple[IndexArray, IndexArray]]:
+        """Pairs, so many at once that their values fit into memory."""
+        step = max(1, _AT_ONCE // max(1, moved[:, 0].size))
+        starts = range(0, len(self.first), step)
+        return [(self.first[at : at + step], self.second[at : at + step]) for at in starts]
+
+    def _largest(
+        self,
+        changed: Amounts,
+        change: FloatArray,
+        remainder: float,
+        base: Amounts,
+        after: FloatArray,
+        every: bool,
+        between: Spread | None,
+    ) -> float:
+        """`largest_change` of some cases."""
+        nothing = np.zeros((len(change), change.shape[1], len(self.first)))
+        corners, more = np.arange(len(change))[:, None], nothing
+        if between is not None:
+            corners, more = between.corners, between.change @ changed.most.T
+        off = self._in(np.abs(change), changed.half) + remainder * changed.most.sum(axis=1)
+        moved = left = (self._in(change, changed.middle), off, more)
+        if not every:
+            off, more = self._in(np.abs(after), base.half) + remainder * base.most.sum(axis=1), nothing
+            if between is not None:
+                more = self._in(between.after, base.largest) + between.left @ base.most.T
+            left = (self._in(after, base.middle), off, more)
+        shortened = self.shortest_s / self.longest_s * self.least_light / self.most_light
+        return float(largest_change(moved, left, corners, self.first, self.second, self._ends, shortened, every))
+
+    @staticmethod
+    def _in(kernel: FloatArray, amounts: FloatArray) -> FloatArray:
+        """Amounts (ndarray[n, n_channels, n_knots]) behind a kernel (ndarray[n_cases, n_values, ...]); [..., n]."""
+        flat = amounts.reshape(len(amounts), -1)
+        used = flat.any(axis=0)
+        return np.asarray(kernel.reshape(*kernel.shape[:2], -1)[..., used] @ flat[:, used].T, dtype=float)
+
+
+def _norms(vectors: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt(np.einsum("pcv,pcv->pc", vectors, vectors)), dtype=float)
+
+
+def _pairs(members: dict[str, IndexArray]) -> tuple[IndexArray, IndexArray, IndexArray]:
+    """Signals of all pairs of two types: first, second; where the pairs of each two types begin, and the end."""
+    grids = [np.meshgrid(members[a], members[b], indexing="ij") for a, b in class_pairs(list(members))]
+    first, second = (np.concatenate([np.empty(0, dtype=np.intp), *(g[i].ravel() for g in grids)]) for i in (0, 1))
+    return first, second, np.cumsum([0, *(g[0].size for g in grids)])

@@ -1,0 +1,80 @@
+"""Compiled inner loops of the bounds on how much an effect can change a CSD. They release the GIL."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from ...types import FloatArray, IndexArray
+
+
+@njit(cache=True, nogil=True)
+def _lengths(
+    seen: FloatArray,
+    first: IndexArray,
+    second: IndexArray,
+    wide: FloatArray,
+    between: FloatArray,
+    sign: float,
+    scale: float,
+    out: FloatArray,
+) -> None:
+    """Largest (`sign` 1) or smallest (-1) length of each pair's difference, times `scale`.
+
+    `seen`: ndarray[n_values, n_signals]. A pair's values differ by as much as its two signals, give or take `wide` and
+    `between`, ndarray[n_values, n_pairs] each. `out`: ndarray[n_pairs].
+    """
+    out[:] = 0.0
+    for v in range(seen.shape[0]):
+        for p in range(first.size):
+            one = max(abs(seen[v, first[p]] - seen[v, second[p]]) + sign * (wide[v, p] + between[v, p]), 0.0)
+            out[p] += one * one
+    for p in range(first.size):
+        out[p] = scale * np.sqrt(out[p])
+
+
+Values = tuple[FloatArray, FloatArray, FloatArray]
+"""What each signal is, ndarray[n_cases, n_values, n_signals]; by how much the difference of each pair may be off,
+ndarray[n_cases, n_values, n_pairs]; and by how much more in a cell of places, ndarray[n_cells, n_values, n_pairs]."""
+
+
+@njit(cache=True, nogil=True)
+def largest_change(
+    change: Values,
+    after: Values,
+    corners: IndexArray,
+    first: IndexArray,
+    second: IndexArray,
+    ends: IndexArray,
+    shortened: float,
+    every: bool,
+) -> float:
+    """Largest change of the smallest distance of any group of pairs, in any cell of places.
+
+    `change`: what changes, `after`: what is left. `corners`: the cases at the corners of each cell, ndarray[n_cells,
+    n_corners]. `first`, `second`: the signals of each pair; `ends`: where each group of pairs begins, and the end.
+    `shortened`: how much shorter the smallest possible distance is. `every`: all pairs count, not those alone that can
+    be the nearest of their group.
+    """
+    far, one, low, high = np.zeros((4, first.size))
+    worst = 0.0
+    for cell in range(corners.shape[0]):
+        far[:] = 0.0
+        for case in corners[cell]:
+            _lengths(change[0][case], first, second, change[1][case], change[2][cell], 1.0, 1.0, one)
+            for p in range(first.size):
+                far[p] = max(far[p], one[p])
+        if every:
+            worst = max(worst, far.max())
+            continue
+        for case in corners[cell]:
+            _lengths(after[0][case], first, second, after[1][case], after[2][cell], -1.0, shortened, low)
+            _lengths(after[0][case], first, second, after[1][case], after[2][cell], 1.0, 1.0, high)
+            for group in range(ends.size - 1):
+                nearest = np.inf
+                for p in range(ends[group], ends[group + 1]):
+                    nearest = min(nearest, high[p] + far[p])
+                for p in range(ends[group], ends[group + 1]):
+                    if far[p] > worst and low[p] - far[p] <= nearest:
+                        worst = far[p]
+    return worst

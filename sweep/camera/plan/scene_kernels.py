@@ -1,0 +1,101 @@
+"""The kernels of a scene that promises compare: at a few wavelengths, and at all places of the light or a lattice."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from ...types import FloatArray, IndexArray
+from ..between import Between, Deviation
+from ..effects import phase
+from ..kernel import make_kernel
+from ..view import REFERENCE, Methods, Setup
+from .bounds import Spread
+
+_KEPT = ("sampling", "phase", "demosaic", "crosstalk")
+"""Effects whose methods change the kernel; blur is either on or off."""
+
+
+class SceneKernels:
+    """Kernels of a scene's methods at some wavelengths, remembered."""
+
+    def __init__(self, setup: Setup, knots_nm: FloatArray) -> None:
+        self._setup, self._knots_nm = setup, knots_nm
+        self._kernels: dict[Methods, FloatArray] = {}
+        self._deviations: dict[Methods, Deviation] = {}
+
+    def anywhere(self, methods: Methods) -> bool:
+        """Whether the light may fall anywhere, and more than a lattice of places is looked at."""
+        return phase.all_count(replace(self._setup, methods=methods))
+
+    @cached_property
+    def _cells(self) -> phase.Cells:
+        """Cells of places; their corners stand for all places, with what may lie between them."""
+        return phase.whole(self._setup.mosaic)
+
+    @cached_property
+    def corners(self) -> tuple[phase.Cases, IndexArray]:
+        """The corners of the cells, each once, and those of each cell."""
+        return self._cells.shared_corners(self._setup)
+
+    def wanted(self, methods: Methods) -> Methods:
+        """What the kernel depends on, with no extinction."""
+        on = "skip" if methods.blur == "skip" else REFERENCE.blur
+        kept = {effect: getattr(methods, effect) for effect in _KEPT}
+        wanted = replace(REFERENCE, **kept, extinction="skip", illumination="skip", blur=on)
+        return replace(wanted, phase=REFERENCE.phase) if self.anywhere(wanted) else wanted
+
+    def of(self, methods: Methods) -> FloatArray:
+        """The kernel at the knots, without extinction: [cases, channels, channels, knots].
+
+        The cases are the places of the lattice, or the corners of cells where the light may fall anywhere.
+        """
+        wanted, nodes = self.wanted(methods), self._knots_nm
+        if wanted not in self._kernels:
+            cases = self.corners[0] if self.anywhere(wanted) else None
+            light = make_kernel(self._setup, wanted, nodes, by_pixel=False, work=Counter(), cases=cases).light
+            self._kernels[wanted] = np.ascontiguousarray(np.broadcast_to(light, (*light.shape[:3], nodes.size)))
+        return self._kernels[wanted]
+
+    def nearest(self, methods: Methods) -> FloatArray:
+        """The kernel at the place of a lattice that is nearest to the center of each cell."""
+        lattice = phase.places_px(self._setup, methods.phase)
+        return self.of(methods)[phase.nearest(self._setup, self._cells.centers, lattice)]
+
+    def _deviation(self, methods: Methods) -> Deviation:
+        """How far the kernel in cells may be from a mean of that at the corners: [cells, channels, channels, 1]."""
+        wanted = self.wanted(methods)
+        if wanted not in self._deviations:
+            kernel, cells = self.of(wanted), self._cells
+            between = Between(self._setup, wanted, self._knots_nm)
+            found = between.of_cells(cells.centers, cells.half, cells.homes, kernel[self.corners[1]])
+            # At any wavelength: that of the middle one, and what differs from it.
+            largest = found.kernel[..., :1] + found.kernel[..., 1:].max(axis=3, initial=0.0, keepdims=True)
+            self._deviations[wanted] = Deviation(largest, found.tilt)
+        return self._deviations[wanted]
+
+    def spread(
+        self, effect: str, before: Methods, after: Methods, change: FloatArray, left: FloatArray, scale: float
+    ) -> Spread | None:
+        """What lies between the corners of the cells, of a change of the kernel and what is left; None for a lattice.
+
+        `scale`: of a change that is this share of the kernel.
+        """
+        if not self.anywhere(before):
+            return None
+        here = self._deviation(before)
+        nothing = Deviation(np.zeros_like(here.kernel), here.tilt)
+        there = self._deviation(after) if self.anywhere(after) else nothing
+        sizes = here.kernel * scale
+        if effect in ("demosaic", "crosstalk", "blur"):
+            sizes = (here.kernel + there.kernel) * bool(change.any())
+        corners = self.corners[1]
+        if effect == "phase":  # what is left is that of another place in each cell
+            corners = np.arange(len(change)).reshape(corners.shape)
+        changes, lefts = change[corners], left[corners]  # [cells, corners, ...]
+        tilt, wide = here.tilt[:, :, None] / 2, np.ptp(lefts, axis=1)
+        changed = sizes[..., 0] + tilt * np.ptp(changes, axis=1).max(axis=3)
+        return Spread(corners, changed, there.kernel[..., 0] + tilt * wide.max(axis=3), wide)

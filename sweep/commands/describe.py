@@ -1,0 +1,154 @@
+"""Describe a file of curves: lines for a person, and a picture."""
+
+from __future__ import annotations
+
+import os
+import struct
+import warnings
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+
+from ..curves.facts import Facts, Quantity, condensed, facts_of, notes
+from ..curves.files import scan_curves
+from ..curves.signal_color import LightColor
+from ..disk import read_input
+from ..errors import Fault, OutputError
+from ..report.figures import rendered
+from ..results.tables import write_bytes
+from .describe_picture import draw
+
+_MOST_NAMES = 12
+_MOST_PICTURE = 100_000_000
+_HEADER_BYTES = 33
+"""Of a PNG: its signature and its first chunk."""
+
+
+def _text_chunk(key: str, text: str) -> bytes:
+    """A PNG chunk of text: length, type and data, CRC-32 of these two (PNG specification, 11.3.3.2)."""
+    body = b"tEXt" + key.encode("latin-1") + b"\0" + text.encode("latin-1")
+    return struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
+
+
+_MARK = _text_chunk("Software", "sweep describe")
+"""By it a picture is known to be a description's."""
+
+
+@dataclass(frozen=True)
+class Description:
+    """What was found: lines to print, and why studies refuse the file (empty: they take it)."""
+
+    lines: tuple[str, ...]
+    faults: tuple[Fault, ...]
+
+
+def describe(path: Path, folder: Path, quantity: Quantity | None = None) -> Description:
+    """Describe a CSV or `.mat` file of curves and draw it to `folder`/<stem>.png.
+
+    `quantity`: the curves are lights, in energy or photons; None guesses whether they are lights (then in energy) or
+    QE. Raises DataError where nothing can be read, OutputError where the picture cannot be written or would replace
+    a file that no description wrote.
+    """
+    scan = scan_curves(path)
+    faults = tuple(condensed(list(chain.from_iterable(scan.faults))))
+    facts = facts_of(scan)
+    names = [curve.name for curve in facts.curves]
+    lines = [f"{path}: {len(names)} curve{'' if len(names) == 1 else 's'}{': ' if names else ''}{_some(names)}."]
+    if not any(curve.values.size for curve in facts.curves):
+        return Description((*lines, "Nothing in it can be drawn."), faults)
+    as_qe = facts.looks_like_qe and quantity is None
+    lines += [_range(facts), _guess(facts, quantity)]
+    colors = {} if as_qe else facts.colors(quantity or "energy")
+    lines += _table(facts, colors)
+    if quantity == "photons":
+        lines += _as_energy(facts)
+    lines += [f"Note: {note}." for note in notes(facts, as_qe=as_qe)]
+    if not faults:
+        lines.append("Its samples are clean: a study can read it.")
+    picture = folder / f"{path.stem}.png"
+    _refuse_other(picture)
+    with warnings.catch_warnings(), np.errstate(over="ignore"):
+        warnings.filterwarnings("ignore", "Glyph")  # names in scripts that the font lacks
+        content = rendered(draw(path.name, facts, colors), "png")
+    write_bytes(content[:_HEADER_BYTES] + _MARK + content[_HEADER_BYTES:], picture)
+    return Description((*lines, f"Picture: {picture}"), faults)
+
+
+def _refuse_other(picture: Path) -> None:
+    if not os.path.lexists(picture):
+        return
+    held = read_input(picture, _MOST_PICTURE, OutputError)
+    if not held[: _HEADER_BYTES + len(_MARK)].endswith(_MARK):
+        raise OutputError(Fault("holds something else already", str(picture), allowed="another --output"))
+
+
+def _some(names: Sequence[str]) -> str:
+    if len(names) <= _MOST_NAMES:
+        return ", ".join(names)
+    return f"{', '.join(names[: _MOST_NAMES - 1])}, ... {names[-1]}"
+
+
+def _range(facts: Facts) -> str:
+    wave = facts.samples_nm
+    steps = np.round(np.diff(wave), 6)
+    if not steps.size:
+        return f"Wavelengths: one sample, at {wave[0]:g} nm."
+    step = f"step {steps.min():g} nm"
+    if steps.max() > steps.min():
+        step = f"steps of {steps.min():g} to {steps.max():g} nm"
+    read_as = f" ({facts.read_as})" if facts.read_as else ""
+    return f"Wavelengths: {wave[0]:g} to {wave[-1]:g} nm{read_as}, {step}, {wave.size:,} samples."
+
+
+def _guess(facts: Facts, quantity: Quantity | None) -> str:
+    if quantity is not None:
+        return f"Read as light spectra in {quantity}, as --quantity says."
+    broad, top = np.median([c.width_nm for c in facts.curves]), max(c.peak for c in facts.curves)
+    reason = (
+        f"a typical curve is {broad:.0f} nm wide (integral over peak, 400 to 700 nm), the largest value is {top:.6g}"
+    )
+    if facts.looks_like_qe:
+        return f"A guess: QE of a sensor, for {reason}. `--quantity energy` reads it as lights."
+    return f"A guess: light spectra, for {reason}. Read as energy; `--quantity photons` reads photons."
+
+
+def _table(facts: Facts, colors: Mapping[str, LightColor | None]) -> list[str]:
+    """A line for each curve: its largest value, and its color where it is a light."""
+    wide = min(max(len(curve.name) for curve in facts.curves), 40)
+    lines = []
+    for curve in facts.curves:
+        name = f"  {curve.name:<{wide}}"
+        if not curve.values.size:
+            lines.append(f"{name}  no sample can be used")
+            continue
+        text = f"{name}  largest {curve.values.max():<9.6g} at {curve.peak_nm:g} nm"
+        lines.append(f"{text}  {color_words(colors[curve.name])}" if colors else text)
+    return lines
+
+
+def _as_energy(facts: Facts) -> list[str]:
+    """Chromaticities of the same numbers taken as energy, to see what the quantity matters."""
+    found = facts.colors("energy").items()
+    words = [f"{name} {color.xy[0]:.4f} {color.xy[1]:.4f}" for name, color in found if color is not None]
+    return [f"  the same numbers as energy would be at xy: {'; '.join(words)}"] if words else []
+
+
+def color_words(color: LightColor | None) -> str:
+    """Chromaticity, dominant wavelength and region of a light, in words."""
+    if color is None:
+        return "no visible light"
+    hue = "white" if color.purity < 1e-3 else "purple" if color.dominant_nm is None else f"{color.dominant_nm:g} nm"
+    return f"xy {color.xy[0]:.4f} {color.xy[1]:.4f}, dominant {hue}, {region_words(color)}"
+
+
+def region_words(color: LightColor) -> str:
+    """The region of EN 12368 that a light lies in, or how far it is outside the nearest."""
+    if color.region == "orange":
+        return "orange, between EN 12368's red and yellow"
+    if color.region is not None:
+        return f"{color.region} of EN 12368"
+    return f"in no region of EN 12368, {color.distance:.3f} from {color.nearest}"

@@ -1,0 +1,148 @@
+"""How a command ends: whatever goes wrong with input, machine or user is a line on stderr and an exit code."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import sys
+import warnings
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from types import FrameType
+from typing import Any, NoReturn
+
+import typer
+
+from ..errors import Fault, SweepError
+
+_INTERRUPTED, _BROKEN_PIPE = 130, 141
+"""Exit codes of a shell for a command that SIGINT or SIGPIPE ended."""
+_LEAST_ADDRESS_SPACE = 2**30
+"""Below it libraries wait for ever for memory, or end the process, while they are loaded."""
+_UsageError = typer.BadParameter.__bases__[0]
+"""Click's, wherever this version of typer has it."""
+
+
+def ends_in_lines(command: Callable[[], object]) -> NoReturn:
+    """Run a command and leave with its exit code: 0, what it returns or its error has, or 2.
+
+    A fault of the program itself is raised on, with its traceback. SIGTERM ends a command as SIGINT does.
+    """
+    try:
+        _prepare()
+        found = command()
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        code = found if isinstance(found, int) else 0
+        if code == _INTERRUPTED:
+            _say(["interrupted"])
+    except Exception as error:
+        code = _said(error)
+    except KeyboardInterrupt:
+        _say(["interrupted"])
+        code = _INTERRUPTED
+    if code == _BROKEN_PIPE or not _flushed():
+        _drop_output()
+    sys.exit(code)
+
+
+def end_now(error: SweepError) -> NoReturn:
+    """Say what went wrong and leave at once, whatever other threads are at."""
+    _say(error.faults)
+    _flushed()
+    os._exit(error.exit_code)
+
+
+def _prepare() -> None:
+    """What holds for every command. Raises SweepError where nothing could be computed."""
+    # Libraries take file names as UTF-8, whatever the locale says: once more, with Python's own UTF-8 mode.
+    if sys.getfilesystemencoding() != "utf-8" and sys.executable and os.environ.get("PYTHONUTF8") != "1":
+        os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], {**os.environ, "PYTHONUTF8": "1"})
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):  # a letter that the terminal does not know is no fault
+            stream.reconfigure(errors="backslashreplace")
+    signal.signal(signal.SIGTERM, _interrupt)
+    # loky's tracker cleans up after a run that had to end at once; that it says so is of no use to anyone.
+    told = [os.environ.get("PYTHONWARNINGS", ""), "ignore:resource_tracker"]
+    os.environ["PYTHONWARNINGS"] = ",".join(filter(None, told))
+    warnings.filterwarnings("ignore", message=".*joblib will operate in serial mode")
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit != resource.RLIM_INFINITY and limit < _LEAST_ADDRESS_SPACE:
+        had, needed = (f"{n / 2**20:.0f} MiB" for n in (limit, _LEAST_ADDRESS_SPACE))
+        raise SweepError(Fault(f"the address space is limited to {had}", allowed=f"{needed} and more (ulimit -v)"))
+
+
+def _interrupt(_number: int, _frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+def _said(error: Exception) -> int:
+    """Say what went wrong; the exit code. A fault of the program is raised again."""
+    if isinstance(error, SweepError):
+        _say(error.faults)
+        return error.exit_code
+    if isinstance(error, BrokenPipeError):
+        return _BROKEN_PIPE
+    if isinstance(error, typer.Abort):
+        _say(["interrupted"])
+        return _INTERRUPTED
+    text = _text(error)
+    if text is None:
+        raise error
+    if text:
+        _say([text])
+    return 2
+
+
+def _text(error: Exception) -> str | None:
+    """What a user or an administrator can mend, on one line; None for a fault of the program."""
+    text = None
+    if isinstance(error, _UsageError):
+        text = _usage(error)
+    elif isinstance(error, MemoryError):
+        text = "out of memory; fewer workers (--jobs) need less"
+    elif isinstance(error, OSError):
+        names = [os.fsdecode(name) for name in (error.filename, error.filename2) if isinstance(name, (str, bytes))]
+        text = ": ".join([*names, error.strerror or str(error) or type(error).__name__])
+    elif isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed":
+        text = f"a name that is no UTF-8 (got {error.object!r})"
+    elif isinstance(error, ImportError):
+        text = f"a library cannot be loaded: {error}"
+    elif isinstance(error, RuntimeError) and "thread" in str(error):  # of Python and of Arrow, where no more may start
+        text = f"out of memory or threads: {error}"
+    return text
+
+
+def _usage(error: Any) -> str:
+    """What is wrong with the command; nothing after the help that `sweep` alone asks for."""
+    if type(error).__name__ == "NoArgsIsHelpError":
+        error.show()
+        return ""
+    where = "" if error.ctx is None else f"; see {error.ctx.command_path} --help"
+    return f"{error.format_message().rstrip('.')}{where}"
+
+
+def _say(faults: Iterable[object]) -> None:
+    with suppress(OSError, ValueError):
+        for fault in faults:
+            typer.echo(f"sweep: {' '.join(str(fault).split())}", err=True)
+
+
+def _flushed() -> bool:
+    """Whether what was said has gone out."""
+    try:
+        for stream in (sys.stdout, sys.stderr):
+            if stream is not None:
+                stream.flush()
+    except (OSError, ValueError):
+        return False
+    return True
+
+
+def _drop_output() -> None:
+    """Nobody takes what is still to be said; the interpreter would complain of it at its end."""
+    with suppress(OSError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        for number in (1, 2):
+            os.dup2(nowhere, number)

@@ -1,0 +1,58 @@
+"""Progress with rate and ETA: a live bar on a terminal, a line now and then elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from types import TracebackType
+
+_EVERY_S = 10.0
+
+
+class ProgressDisplay:
+    """Shows `update(phase, done, total)` calls on stderr."""
+
+    def __init__(self) -> None:
+        self._live = sys.stderr.isatty()
+        self._phase = ""
+        self._started = 0.0
+        self._first = 0
+        self._last_line = 0.0
+
+    def __enter__(self) -> ProgressDisplay:
+        if self._live:
+            from rich.console import Console  # noqa: PLC0415  (only on a terminal)
+            from rich.progress import (  # noqa: PLC0415
+                BarColumn,
+                MofNCompleteColumn,
+                TextColumn,
+                TimeRemainingColumn,
+            )
+            from rich.progress import Progress as Bars  # noqa: PLC0415
+
+            columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+            self._bars = Bars(*columns, console=Console(stderr=True))
+            self._bars.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._live:
+            self._bars.stop()
+
+    def update(self, phase: str, done: int, total: int) -> None:
+        """Show that `done` of `total` are done in a phase."""
+        now = time.monotonic()
+        new = phase != self._phase
+        if new:
+            self._phase, self._started, self._first, self._last_line = phase, now, done, now
+        if self._live:
+            if new:
+                self._task = self._bars.add_task(phase, total=total)
+            self._bars.update(self._task, completed=done)
+        elif now - self._last_line >= _EVERY_S:
+            self._last_line = now
+            rate = (done - self._first) / max(now - self._started, 1e-9)
+            eta = f"{(total - done) / rate:.0f} s left" if rate > 0 else "unknown time left"
+            print(f"{phase}: {done:,} of {total:,}, {rate:,.3g}/s, {eta}", file=sys.stderr, flush=True)

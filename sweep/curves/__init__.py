@@ -1,0 +1,1 @@
+"""Curves over wavelength: sampled, read from any file, written, colored, built in."""

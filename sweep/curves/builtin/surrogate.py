@@ -1,0 +1,92 @@
+"""Parameters of the built-in surrogate sensor and lights: one readable file, checked when it is read."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+from ruamel.yaml import YAML
+
+from ...types import Fraction, NonNegative, Positive, Section
+
+BUILT_IN_RANGE_NM = (400.0, 700.0)
+"""Wavelengths that the surrogate curves are stated for; an IR cut filter closes the rest."""
+LEAK_NODES_NM = (400.0, 600.0, 700.0)
+
+
+class ClearPixel(Section):
+    """Nodes of the unfiltered pixel's QE."""
+
+    wavelength_nm: list[Positive]
+    qe: list[Fraction]
+
+
+class IrCut(Section):
+    """The infrared cut filter before all pixels: a falling logistic edge; `width_nm` is its 10-90 % width."""
+
+    center_nm: Positive
+    width_nm: Positive
+
+
+class FilterEdge(Section):
+    """A logistic edge; `width_nm` is its 10-90 % width."""
+
+    passes: Annotated[Literal["above", "below"], Field(alias="pass")]
+    center_nm: Positive
+    width_nm: Positive
+
+
+class FilterParameters(Section):
+    """A color filter's transmission: `peak` where all edges are open, `leak` where it is closed.
+
+    `leak` holds the values at LEAK_NODES_NM: dyes close best somewhere and open again toward the ends.
+    """
+
+    peak: Fraction
+    leak: Annotated[list[Fraction], Field(min_length=3, max_length=3)]
+    edges: list[FilterEdge]
+
+
+class LedParameters(Section):
+    """LEDs of one color: peak (in photons) of the middle lamp, half range over the lamps, decay toward blue and red."""
+
+    peak_nm: Positive
+    spread_nm: NonNegative
+    blue_nm: Positive
+    red_nm: Positive
+
+
+class StopbandParameters(Section):
+    """A stopband filter of the paper, as `families.Stopband` takes it."""
+
+    left_nm: Positive
+    left_width_nm: Positive
+    right_nm: Positive
+    right_width_nm: Positive
+
+
+class SurrogateParameters(Section):
+    """The whole file: `data/surrogate.yaml` as shipped, `data/prior.yaml` as the calibration's start."""
+
+    provenance: dict[str, str | int | float]
+    photon_ratio: Positive
+    clear_pixel: ClearPixel
+    ir_cut: IrCut
+    filters: dict[str, FilterParameters]
+    lights: dict[str, dict[str, LedParameters]]
+    stopbands: dict[str, StopbandParameters]
+
+
+@cache
+def surrogate_parameters(name: str = "surrogate") -> SurrogateParameters:
+    """Read a parameter file that ships with the package."""
+    return SurrogateParameters.model_validate(parameter_tree(name))
+
+
+def parameter_tree(name: str) -> dict[str, Any]:
+    """The file as plain mappings and lists."""
+    text = files(__package__).joinpath(f"{name}.yaml").read_text(encoding="utf-8")
+    tree: dict[str, Any] = YAML(typ="safe").load(text)
+    return tree

@@ -1,0 +1,172 @@
+"""Facts of a file of curves, also of one that is not clean: curves on sorted wavelengths, a guess of what they are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from ..errors import Fault
+from ..types import FloatArray
+from .files import Scan, distinct
+from .signal_color import VISIBLE, LightColor, light_color
+from .spectrum import WavelengthGrid, photons_from_energy, resample
+
+Quantity = Literal["energy", "photons"]
+_NEEDED = WavelengthGrid()
+_BROAD_NM = 70.0
+"""Equivalent width (integral over peak) from which on a curve is rather a pixel's than an LED's."""
+_COARSE_NM = 10.0
+_FEWEST_IN_PEAK = 4
+_PERCENT = 100.0
+_MOST_LETTERS = 100
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One curve with its finite samples: wavelengths and values, ndarray[n] each, n >= 0, wavelengths increasing."""
+
+    name: str
+    wavelength_nm: FloatArray
+    values: FloatArray
+
+    @property
+    def peak(self) -> float:
+        """The largest value; 0 without samples."""
+        return float(self.values.max(initial=0.0))
+
+    @property
+    def peak_nm(self) -> float:
+        """Where the largest value lies."""
+        return float(self.wavelength_nm[np.argmax(self.values)])
+
+    def on(self, grid: WavelengthGrid) -> FloatArray:
+        """The curve over its largest value, ndarray[grid.size]; 0 where it is negative or has no samples."""
+        if self.values.size < 2 or not self.peak > 0:
+            return np.zeros(grid.size)
+        return resample(self.wavelength_nm, np.clip(self.values / self.peak, 0, None), grid, "mean", "zero")
+
+    @property
+    def width_nm(self) -> float:
+        """Equivalent width inside 400 to 700 nm: integral over peak; 0 for a curve that is 0 there."""
+        inside = self.on(_NEEDED)
+        return float(_NEEDED.integrate(inside) / inside.max()) if inside.max() > 0 else 0.0
+
+    @property
+    def samples_in_peak(self) -> int:
+        """Samples in a row around the largest value that are at least half of it."""
+        low = np.flatnonzero(self.values < self.peak / 2)
+        at = int(np.argmax(self.values))
+        left, right = low[low < at], low[low > at]
+        return int((right.min() if right.size else self.values.size) - (left.max() + 1 if left.size else 0))
+
+
+@dataclass(frozen=True)
+class Facts:
+    """A file's curves; `read_as` says how its wavelengths were taken, where they are not in nm."""
+
+    curves: tuple[Curve, ...]
+    read_as: str
+
+    @property
+    def samples_nm(self) -> FloatArray:
+        """Wavelengths at which any curve has a sample."""
+        return np.unique(np.concatenate([curve.wavelength_nm for curve in self.curves]))
+
+    @property
+    def looks_like_qe(self) -> bool:
+        """The guess: half of the curves or more are as broad as a pixel's, and none is beyond percent."""
+        lit = [curve for curve in self.curves if curve.peak > 0]
+        broad = sum(curve.width_nm >= _BROAD_NM for curve in lit)
+        return bool(lit) and 2 * broad >= len(lit) and max(curve.peak for curve in lit) <= _PERCENT
+
+    def colors(self, quantity: Quantity) -> Mapping[str, LightColor | None]:
+        """The color of each curve read as a light."""
+        found = {}
+        for curve in self.curves:
+            values = curve.on(VISIBLE)
+            energy = quantity == "energy"
+            found[curve.name] = light_color(photons_from_energy(VISIBLE.nodes_nm, values) if energy else values)
+        return found
+
+
+def facts_of(scan: Scan) -> Facts:
+    """The curves of a file with what can be used of them: finite samples, sorted, each wavelength once."""
+    factor, read_as = _unit(scan.wavelength_nm)
+    usable = np.isfinite(scan.wavelength_nm)
+    curves = []
+    # Nothing that steers a terminal or fills it; two names that then look the same stay two.
+    cut = [name if len(name) <= _MOST_LETTERS else f"{name[: _MOST_LETTERS - 3]}..." for name in scan.names]
+    shown = distinct([name if name.isprintable() else repr(name)[1:-1] for name in cut])
+    for name, column in zip(shown, scan.values.T, strict=True):
+        kept = usable & np.isfinite(column)
+        wave, at = np.unique(scan.wavelength_nm[kept] * factor, return_index=True)
+        curves.append(Curve(name, wave, column[kept][at]))
+    return Facts(tuple(curves), read_as)
+
+
+def _unit(wave: FloatArray) -> tuple[float, str]:
+    """What brings the wavelengths to nm: they look like um or m where they are that small."""
+    largest = float(np.nanmax(wave)) if np.isfinite(wave).any() else 0.0
+    if 0 < largest < 1e-4:
+        return 1e9, "read as m"
+    if 0 < largest < 20:
+        return 1e3, "read as um"
+    return 1.0, ""
+
+
+def notes(facts: Facts, *, as_qe: bool) -> list[str]:
+    """What a user should know of curves that can be read."""
+    found = []
+    wave = facts.samples_nm
+    if wave.size and (wave[0] > _NEEDED.start_nm or wave[-1] < _NEEDED.stop_nm):
+        found.append(
+            f"the wavelengths do not cover {_NEEDED.start_nm:g} to {_NEEDED.stop_nm:g} nm, a study's usual range: "
+            + ("give the study `wavelengths:` of its own" if as_qe else "`outside: zero` takes 0 there")
+        )
+    gap = float(np.diff(wave).max(initial=0.0))
+    if gap > _COARSE_NM:
+        found.append(f"sparse samples: up to {gap:g} nm apart; between them the curves are taken as straight lines")
+    few = [c for c in facts.curves if c.peak > 0 and c.samples_in_peak < _FEWEST_IN_PEAK]
+    if few:
+        worst = min(few, key=lambda curve: curve.samples_in_peak)
+        samples = "1 sample" if worst.samples_in_peak == 1 else f"{worst.samples_in_peak} samples"
+        place = f"only {samples} of half its height or more around its peak at {worst.peak_nm:g} nm"
+        found.append(f"{worst.name} has {place}" + (f", and {len(few) - 1} more curves likewise" if few[1:] else ""))
+    dark = [curve.name for curve in facts.curves if not curve.peak > 0]
+    if dark:
+        found.append(f"no value is above 0: {', '.join(dark)}")
+    if as_qe:
+        top = max(curve.peak for curve in facts.curves)
+        if top > 1:
+            scale = qe_scale(top)
+            reason = "percent" if scale == 1 / _PERCENT else "a relative scale"
+            found.append(f"values up to {top:.6g} are above 1, so no QE: {reason}? Then set `scale: {scale:.4g}`")
+    return found
+
+
+def qe_scale(top: float) -> float:
+    """What brings QE curves whose largest value is `top` into 0..1: 0.01 for percent."""
+    if top <= 1:
+        return 1.0
+    return 1 / _PERCENT if 2 < top <= _PERCENT else float(f"{1 / top * (1 - 5e-4):.4g}")
+
+
+def condensed(faults: Sequence[Fault]) -> list[Fault]:
+    """One fault for many that say the same of one column, or of several; their number, and the first one's place."""
+    alike: dict[tuple[str, str | None], list[Fault]] = {}
+    for fault in faults:
+        alike.setdefault((fault.problem, fault.key), []).append(fault)
+    by_place: dict[tuple[str, int | None, str], list[Fault]] = {}
+    for (problem, _), group in alike.items():
+        more = f"{problem}, and {len(group) - 1:,} more like it" if len(group) > 1 else problem
+        by_place.setdefault((more, group[0].line, repr(group[0].value)), []).append(replace(group[0], problem=more))
+    return [_joined(group) for group in by_place.values()]
+
+
+def _joined(group: Sequence[Fault]) -> Fault:
+    names = [fault.key or "" for fault in group]
+    shown = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+    return replace(group[0], key=shown or None)

@@ -1,0 +1,98 @@
+"""Write the filters of a CFA: CSV, and `.mat` files that ISETCam reads as color filters."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from ..types import FloatArray, IndexArray
+from .files import WAVELENGTH
+
+HINTS = "rgbcymwiuxzok"
+"""First letters of filter names that ISETCam has a color for (its `sensorColorOrder`)."""
+_FREE = "oxuzim"
+"""Those that are spent first where a filter's own letter is taken: hints that mean no usual filter."""
+_CLEAR = ("c", "clear")
+_HEADER = b"MATLAB 5.0 MAT-file, written by sweep"
+_HEADER_BYTES = 116
+
+
+def unique_names(names: Iterable[str]) -> list[str]:
+    """The names on one line each, without blanks around them; one that occurs again gets a number."""
+    found: list[str] = []
+    for name in names:
+        plain = " ".join(name.split()) or "_"
+        candidate, number = plain, 1
+        while candidate in (*found, WAVELENGTH):
+            number += 1
+            candidate = f"{plain}_{number}"
+        found.append(candidate)
+    return found
+
+
+def csv_text(wavelength_nm: FloatArray, curves: Mapping[str, FloatArray]) -> str:
+    """Curves, ndarray[n_wavelengths] each, as `curve_files.read_curves` reads them: every float comes back as it is."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([WAVELENGTH, *unique_names(curves)])
+    writer.writerows([repr(float(value)) for value in row] for row in zip(wavelength_nm, *curves.values(), strict=True))
+    return text.getvalue()
+
+
+def color_hints(channels: Sequence[str], bases: Mapping[str, str]) -> list[str]:
+    """A letter of HINTS for each channel of a CFA, each used once, as ISETCam wants it (`k` when all are spent).
+
+    `bases`: modified channel -> curve that it replaces, whose color it takes where that is free. `C` is the clear
+    pixel here, ISETCam's `w`; its `c` is cyan, `Cy` here.
+    """
+    found: dict[str, str] = {}
+    for channel in sorted(channels, key=lambda channel: channel in bases):  # a plain channel keeps its own letter
+        own = _own_hint(bases.get(channel, channel))
+        free = [hint for hint in (*own, *_FREE, *HINTS) if hint not in found.values()]
+        found[channel] = free[0] if free else "k"
+    return [found[channel] for channel in channels]
+
+
+def _own_hint(name: str) -> str:
+    folded = name.casefold()
+    if folded in _CLEAR:
+        return "w"
+    return folded[:1] if folded[:1] in HINTS else ""
+
+
+def filter_names(hints: Sequence[str], channels: Iterable[str]) -> list[str]:
+    """Names of ISETCam's filters: the hint, then the channel's own name."""
+    return [hint + name for hint, name in zip(hints, unique_names(channels), strict=True)]
+
+
+def isetcam_mat(
+    wavelength_nm: FloatArray, curves: Mapping[str, FloatArray], hints: Sequence[str], tile: IndexArray, comment: str
+) -> bytes:
+    """Filters as ISETCam's `ieReadColorFilter` and `sensorCreate('custom', ...)` take them, MATLAB version 5.
+
+    `curves`: channel -> ndarray[n_wavelengths], 0..1 (above 1 ISETCam rescales all: what rounding put there is cut).
+    `tile`: ndarray[rows, columns] of channel indices. Variables: `wavelength` (a column, nm), `data`
+    (n_wavelengths x n_filters), `filterNames` (a cell array: hint and name), `filterOrder` (the tile, from 1 on),
+    `comment`. The same filters give the same bytes.
+    """
+    from scipy.io import savemat  # noqa: PLC0415  (slow to import, seldom needed)
+
+    names = filter_names(hints, curves)
+    cells = np.empty((1, len(names)), dtype=object)
+    cells[0] = names
+    content = io.BytesIO()
+    savemat(
+        content,
+        {
+            "wavelength": wavelength_nm[:, None],
+            "data": np.minimum(np.stack(list(curves.values()), axis=1), 1.0),
+            "filterNames": cells,
+            "filterOrder": (tile + 1).astype(float),
+            "comment": comment,
+        },
+    )
+    # SciPy's header holds the time.
+    return _HEADER.ljust(_HEADER_BYTES) + content.getvalue()[_HEADER_BYTES:]

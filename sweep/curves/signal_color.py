@@ -1,0 +1,123 @@
+"""What color a light has, and which traffic signal that is: chromaticity, dominant wavelength, EN 12368's regions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from ..types import FloatArray
+from .color import REGIONS, VISIBLE_NM, chromaticity
+from .spectrum import WavelengthGrid
+
+VISIBLE = WavelengthGrid(start_nm=VISIBLE_NM[0], stop_nm=VISIBLE_NM[1], step_nm=1.0)
+"""What the CIE 1931 color-matching functions cover."""
+EQUAL_ENERGY = (1 / 3, 1 / 3)
+"""White that dominant wavelength and purity are counted from: CIE illuminant E."""
+NEAR_NM = 30.0
+"""A light outside every region is taken for a signal color up to this difference of dominant wavelengths."""
+LEAST_PURITY = 0.5
+"""Below this excitation purity a light is whitish, and its dominant wavelength says little."""
+
+
+@dataclass(frozen=True)
+class LightColor:
+    """The color of one light.
+
+    `xy`: CIE 1931, 2 degree observer. `dominant_nm` is None for a white and for a purple (beyond the ends of the
+    spectrum); `purity` is the excitation purity, 1 on the spectral locus. `region` is the one that the light lies in,
+    None outside all; `nearest` the nearest of them, `distance` away in x, y (0 inside).
+    """
+
+    xy: tuple[float, float]
+    dominant_nm: float | None
+    purity: float
+    region: str | None
+    nearest: str
+    distance: float
+
+    @property
+    def signal(self) -> str | None:
+        """The signal type that the light is taken for: its region, else the nearest one by dominant wavelength.
+
+        None where that is more than NEAR_NM off, or the light is whitish or purple.
+        """
+        if self.region is not None or self.dominant_nm is None or self.purity < LEAST_PURITY:
+            return self.region
+        gap, kind = min((_gap(self.dominant_nm, *span), kind) for kind, span in dominant_ranges_nm().items())
+        return kind if gap <= NEAR_NM else None
+
+
+def light_color(photons: FloatArray) -> LightColor | None:
+    """The color of a photon spectrum on VISIBLE, ndarray[471]; None where it has no visible light."""
+    from colour.colorimetry import dominant_wavelength, excitation_purity  # noqa: PLC0415  (slow to import)
+
+    peak = float(photons.max())
+    if not peak > 0:
+        return None
+    with np.errstate(invalid="ignore", divide="ignore"):
+        xy = chromaticity(VISIBLE, photons[None] / peak)
+        if not np.isfinite(xy).all():
+            return None
+        purity = float(excitation_purity(xy[0], EQUAL_ENERGY))
+        dominant = float(dominant_wavelength(xy[0], EQUAL_ENERGY)[0])
+    inside = [kind for kind, region in REGIONS.items() if region.violation(xy)[0] <= 0]
+    distance, nearest = min((_distance(xy[0], outline(kind)), kind) for kind in REGIONS)
+    has_hue = dominant > 0 and purity > 1e-3
+    return LightColor(
+        xy=(float(xy[0, 0]), float(xy[0, 1])),
+        dominant_nm=dominant if has_hue else None,
+        purity=purity,
+        region=inside[0] if inside else None,
+        nearest=inside[0] if inside else nearest,
+        distance=0.0 if inside else distance,
+    )
+
+
+@cache
+def spectral_locus() -> FloatArray:
+    """Chromaticities of monochromatic light on VISIBLE, ndarray[471, 2]."""
+    return chromaticity(VISIBLE, np.eye(VISIBLE.size))
+
+
+@cache
+def outline(kind: str) -> FloatArray:
+    """The part of a color region that light can have, as a polygon, ndarray[n, 2].
+
+    The spectral locus is cut at each bound (Sutherland and Hodgman, "Reentrant polygon clipping").
+    """
+    polygon = spectral_locus()
+    for a, b, c in REGIONS[kind].bounds:
+        over = polygon @ np.array([a, b]) - c
+        kept: list[FloatArray] = []
+        for here, there, u, v in zip(polygon, np.roll(polygon, -1, axis=0), over, np.roll(over, -1), strict=True):
+            if u <= 0:
+                kept.append(here)
+            if (u <= 0) != (v <= 0):
+                kept.append(here + (there - here) * (u / (u - v)))
+        polygon = np.array(kept)
+    return polygon
+
+
+@cache
+def dominant_ranges_nm() -> dict[str, tuple[float, float]]:
+    """Dominant wavelengths of each region: those of monochromatic light inside it. Red is open toward the red."""
+    spans = {}
+    for kind, region in REGIONS.items():
+        inside = VISIBLE.nodes_nm[region.violation(spectral_locus()) <= 0]
+        spans[kind] = (float(inside.min()), float(VISIBLE.stop_nm if kind == "red" else inside.max()))
+    return spans
+
+
+def _gap(value: float, low: float, high: float) -> float:
+    return max(low - value, value - high, 0.0)
+
+
+def _distance(xy: FloatArray, polygon: FloatArray) -> float:
+    """From a point to a polygon's outline, ndarray[2] and ndarray[n, 2]."""
+    along = np.roll(polygon, -1, axis=0) - polygon
+    length = (along**2).sum(axis=1)
+    share = np.divide(((xy - polygon) * along).sum(axis=1), length, out=np.zeros_like(length), where=length > 0)
+    foot = polygon + along * np.clip(share, 0, 1)[:, None]
+    return float(np.sqrt(((xy - foot) ** 2).sum(axis=1)).min())

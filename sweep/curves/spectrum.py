@@ -1,0 +1,236 @@
+"""Spectra on one wavelength grid: checks, resampling rules, photons and energy.
+
+A curve that is not clean (NaN, negative, unsorted, duplicated or truncated data) is refused, never mended.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import model_validator
+
+from ..errors import DataError, Fault
+from ..types import FloatArray, Positive, Section
+
+Resampling = Literal["linear", "mean"]
+Outside = Literal["refuse", "zero"]
+
+PLANCK_J_S = 6.62607015e-34
+"""Planck constant, exact in the SI of 2019."""
+LIGHT_M_S = 299792458.0
+"""Speed of light in vacuum, exact in the SI."""
+LARGEST = 1e100
+"""Of a curve's values, in any unit. Products of what is larger leave the range of floats."""
+LEAST_PEAK = 1e-100
+"""Of a curve that is not 0; its other values may be as small as they like."""
+_GRID_SLACK = 1e-9
+_MOST_STEPS = 20_000
+
+
+class WavelengthGrid(Section):
+    """Equidistant wavelengths; each node stands for a bin of `step_nm` centered on it.
+
+    400 to 700 nm at 1 nm are 301 bins, so a flat spectrum of height 1 integrates to 301 nm, as in ISETCam.
+    """
+
+    start_nm: Positive = 400.0
+    stop_nm: Positive = 700.0
+    step_nm: Positive = 1.0
+
+    @model_validator(mode="after")
+    def _whole_steps(self) -> WavelengthGrid:
+        steps = (self.stop_nm - self.start_nm) / self.step_nm
+        if not self.start_nm < self.stop_nm:
+            raise ValueError(f"start_nm {self.start_nm:g} must be below stop_nm {self.stop_nm:g}")
+        if not 200 <= self.start_nm < self.stop_nm <= 2000:
+            raise ValueError("wavelengths must be in nm, between 200 and 2000")
+        if steps > _MOST_STEPS:
+            raise ValueError(f"step_nm {self.step_nm:g} is too fine: at most {_MOST_STEPS} steps")
+        if round(steps) < 1 or not abs(steps - round(steps)) < 1e-6:
+            raise ValueError(
+                f"step_nm {self.step_nm:g} must divide stop_nm - start_nm = {self.stop_nm - self.start_nm:g}"
+            )
+        return self
+
+    @property
+    def size(self) -> int:
+        """Number of nodes."""
+        return round((self.stop_nm - self.start_nm) / self.step_nm) + 1
+
+    @property
+    def nodes_nm(self) -> FloatArray:
+        """The wavelengths, ndarray[size], nm."""
+        return self.start_nm + self.step_nm * np.arange(self.size, dtype=float)
+
+    def integrate(self, values: FloatArray) -> FloatArray:
+        """Sum of value times bin width over the last axis: ndarray[..., size] -> ndarray[...]."""
+        return np.asarray(values.sum(axis=-1) * self.step_nm, dtype=float)
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Named curves on common wavelengths, as they came from their source.
+
+    `wavelength_nm`: ndarray[n], strictly increasing. `values`: name -> ndarray[n], finite and >= 0.
+    `source` names the file or the maker; `surrogate` says that the curves are modeled, not measured.
+    """
+
+    wavelength_nm: FloatArray
+    values: Mapping[str, FloatArray]
+    source: str
+    surrogate: bool = False
+
+    def on(
+        self, grid: WavelengthGrid, name: str, method: Resampling = "linear", outside: Outside = "refuse"
+    ) -> FloatArray:
+        """Return curve `name` on `grid`, ndarray[grid.size]; errors as for `resample`."""
+        try:
+            return resample(self.wavelength_nm, self.values[name], grid, method, outside)
+        except DataError as error:
+            raise DataError(
+                [Fault(f.problem, self.source, None, name, f.value, f.allowed) for f in error.faults]
+            ) from None
+
+
+def check_samples(wavelength_nm: ArrayLike, values: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return both as float arrays of equal length, or raise DataError with one fault per thing wrong."""
+    wave = np.asarray(wavelength_nm, dtype=float)
+    data = np.asarray(values, dtype=float)
+    faults: list[Fault] = []
+    if wave.ndim != 1 or data.shape != wave.shape or wave.size < 2:
+        raise DataError(
+            Fault("a curve needs two or more samples, one value per wavelength", value=(wave.shape, data.shape))
+        )
+    if not np.isfinite(wave).all():
+        faults.append(Fault("wavelength is not a finite number", allowed="finite nm"))
+    else:
+        step = np.diff(wave)
+        if (step == 0).any():
+            faults.append(
+                Fault(
+                    "wavelength occurs twice",
+                    value=float(wave[1:][step == 0][0]),
+                    allowed="strictly increasing",
+                )
+            )
+        elif not (step > 0).all():
+            faults.append(
+                Fault(
+                    "wavelengths are not sorted",
+                    value=float(wave[1:][step < 0][0]),
+                    allowed="strictly increasing",
+                )
+            )
+        if not (wave[0] >= 100 and wave[-1] <= 20000):
+            hint = (
+                "looks like um"
+                if wave[-1] < 20
+                else "looks like m"
+                if wave[-1] < 1e-4
+                else "not optical wavelengths in nm"
+            )
+            faults.append(
+                Fault(
+                    f"wavelength unit: {hint}",
+                    value=(float(wave[0]), float(wave[-1])),
+                    allowed="100 to 20000 nm",
+                )
+            )
+    bad = ~np.isfinite(data)
+    if bad.any():
+        faults.append(
+            Fault(
+                f"value at {wave[bad][0]:g} nm is not a finite number",
+                value=float(data[bad][0]),
+                allowed=">= 0",
+            )
+        )
+    elif (data < 0).any():
+        at = int(np.argmax(data < 0))
+        faults.append(Fault(f"negative value at {wave[at]:g} nm", value=float(data[at]), allowed=">= 0"))
+    elif data.max() > LARGEST:
+        at, allowed = int(np.argmax(data)), f"0 to {LARGEST:g}"
+        faults.append(Fault(f"value at {wave[at]:g} nm is too large", value=float(data[at]), allowed=allowed))
+    elif 0 < data.max() < LEAST_PEAK:
+        allowed = f"0 everywhere, or {LEAST_PEAK:g} or more somewhere"
+        faults.append(Fault("the largest value is too small", value=float(data.max()), allowed=allowed))
+    if faults:
+        raise DataError(faults)
+    return wave, data
+
+
+def resample(
+    wavelength_nm: ArrayLike,
+    values: ArrayLike,
+    grid: WavelengthGrid,
+    method: Resampling = "linear",
+    outside: Outside = "refuse",
+) -> FloatArray:
+    """Bring a sampled curve onto `grid`: ndarray[grid.size].
+
+    `linear`: the value of the piecewise linear interpolant at each node. `mean`: its exact mean over each bin, which
+    keeps the integral (of bins inside the samples) when the source is finer than the grid; bins are cut at the ends of
+    the samples. Splines are not offered: they ring below zero at LED peaks.
+    `outside`: `refuse` raises DataError when the samples end inside the grid, `zero` takes 0 there.
+    """
+    wave, data = check_samples(wavelength_nm, values)
+    nodes = grid.nodes_nm
+    slack = _GRID_SLACK * grid.stop_nm
+    if outside == "refuse" and (wave[0] > nodes[0] + slack or wave[-1] < nodes[-1] - slack):
+        raise DataError(
+            Fault(
+                "the curve is truncated: it does not cover the wavelength grid",
+                value=f"{wave[0]:g} to {wave[-1]:g} nm",
+                allowed=f"at least {nodes[0]:g} to {nodes[-1]:g} nm, or `outside: zero`",
+            )
+        )
+    if method == "linear":
+        found = np.interp(nodes, wave, data, left=0.0, right=0.0)
+        # A node that misses the first or last sample by rounding alone still takes that sample.
+        found[np.abs(nodes - wave[0]) <= slack] = data[0]
+        found[np.abs(nodes - wave[-1]) <= slack] = data[-1]
+        return found
+    low = np.clip(nodes - grid.step_nm / 2, wave[0], wave[-1])
+    high = np.clip(nodes + grid.step_nm / 2, wave[0], wave[-1])
+    width = high - low
+    area = _integral_to(wave, data, high) - _integral_to(wave, data, low)
+    return np.divide(area, width, out=np.zeros_like(area), where=width > 0)
+
+
+def _integral_to(wave: FloatArray, data: FloatArray, at: FloatArray) -> FloatArray:
+    """Integral of the piecewise linear interpolant from the first sample to `at`."""
+    whole = np.concatenate([[0.0], np.cumsum(np.diff(wave) * (data[1:] + data[:-1]) / 2)])
+    index = np.clip(np.searchsorted(wave, at, side="right") - 1, 0, wave.size - 2)
+    part = at - wave[index]
+    slope = (data[index + 1] - data[index]) / (wave[index + 1] - wave[index])
+    return np.asarray(whole[index] + part * (data[index] + slope * part / 2), dtype=float)
+
+
+def photons_from_energy(wavelength_nm: FloatArray, energy: FloatArray) -> FloatArray:
+    """Spectral photon quantity from spectral radiant energy: Q lambda / (h c), per the same nm (Planck)."""
+    return energy * (wavelength_nm * 1e-9) / (PLANCK_J_S * LIGHT_M_S)
+
+
+def energy_from_photons(wavelength_nm: FloatArray, photons: FloatArray) -> FloatArray:
+    """Spectral radiant energy from a spectral photon quantity: Q h c / lambda, per the same nm (Planck)."""
+    return photons * (PLANCK_J_S * LIGHT_M_S) / (wavelength_nm * 1e-9)
+
+
+def equal_photons(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
+    """Scale each spectrum of ndarray[..., grid.size] so that it integrates to 1 photon over the grid.
+
+    Raises DataError when a spectrum has no photons on the grid.
+    """
+    total = grid.integrate(photons)
+    if not (total >= LEAST_PEAK).all():
+        raise DataError(
+            Fault(
+                "a light has no photons on the wavelength grid",
+                allowed=f"{grid.start_nm:g} to {grid.stop_nm:g} nm",
+            )
+        )
+    return photons / total[..., None]

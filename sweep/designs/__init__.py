@@ -1,0 +1,1 @@
+"""What can be built: families of filters, and spaces of them."""

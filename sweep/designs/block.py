@@ -1,0 +1,200 @@
+"""Blocks of designs, as the image chain needs them: products of their filters with weights, and shapes of the curves.
+
+Two routes with one signature. `Curves` takes any filters, as one matrix product. `Edges` takes designs of a grid of
+stopbands: N = base + depth (target - base) (e_left - e_right), so a product is that of the base and two look-ups in
+tables over the grid's edges, exact up to rounding; no spectrum is touched per design.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from ..cache import Cache
+from ..types import FloatArray, IndexArray
+from .family import SeparableFamily
+from .products import row_products
+from .space import Space
+
+_LEFT, _LEFT_WIDTH, _RIGHT, _RIGHT_WIDTH, _DEPTH = range(5)
+_MOST_BYTES = 2**27
+_KEPT_TABLES = 8
+
+
+class Block(Protocol):
+    """Designs with one modified channel or several."""
+
+    def __len__(self) -> int:
+        """Number of designs."""
+
+    def curves(self) -> FloatArray:
+        """QE of the modified channels, ndarray[n_designs, n_modified, n_wavelengths]."""
+
+    def product(self, weights: FloatArray, nodes: IndexArray) -> FloatArray:
+        """Sum over modified channels and `nodes` of QE times `weights` ([n_modified x n_nodes, k]): [n_designs, k]."""
+
+    def shapes(self, base_qe: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Largest step between neighboring wavelengths, and smallest ratio to `base_qe`, ndarray[n_designs] each.
+
+        Over all modified channels; `base_qe`: ndarray[n_modified, n_wavelengths]. Where it is 0 the ratio is 1.
+        """
+
+    def some(self, which: IndexArray) -> Block:
+        """Those of its designs."""
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Any filters: `qe`, ndarray[n_designs, n_modified, n_wavelengths]."""
+
+    qe: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.qe)
+
+    def curves(self) -> FloatArray:
+        """See `Block.curves`."""
+        return self.qe
+
+    def product(self, weights: FloatArray, nodes: IndexArray) -> FloatArray:
+        """See `Block.product`; in the precision of the weights."""
+        seen = self.qe if nodes.size == self.qe.shape[2] else self.qe[:, :, nodes]
+        flat = seen.reshape(len(self.qe), -1)
+        return row_products(flat.astype(weights.dtype, copy=False), weights)
+
+    def some(self, which: IndexArray) -> Curves:
+        """See `Block.some`."""
+        return Curves(self.qe[which])
+
+    def shapes(self, base_qe: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See `Block.shapes`."""
+        from .compiled import shapes  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+        steepest, lowest = np.zeros(len(self.qe)), np.full(len(self.qe), np.inf)
+        for channel, base in enumerate(np.asarray(base_qe, dtype=float)):
+            step, low = np.empty(len(self.qe)), np.empty(len(self.qe))
+            curves = np.ascontiguousarray(self.qe[:, channel], dtype=float)
+            shapes(curves, *_inverse(base), step, low)
+            bad = np.isnan(curves).any(axis=1)
+            step[bad] = low[bad] = np.nan
+            steepest, lowest = np.maximum(steepest, step), np.minimum(lowest, low)
+        return steepest, lowest
+
+
+@dataclass
+class Tables:
+    """All edges of a grid, ndarray[n_edges, n_wavelengths] each, and what they give with weights."""
+
+    base: FloatArray
+    change: FloatArray
+    left: FloatArray
+    right: FloatArray
+    _products: Cache[bytes, tuple[FloatArray, FloatArray, FloatArray]] = field(
+        default_factory=lambda: Cache(_KEPT_TABLES)
+    )
+
+    def product(self, weights: FloatArray, nodes: IndexArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The weighted sums of the base, and of the change times each edge."""
+
+        def made() -> tuple[FloatArray, FloatArray, FloatArray]:
+            changed = self.change[nodes, None] * weights
+            edges = (self.left[:, nodes] @ changed, self.right[:, nodes] @ changed)
+            return (self.base[nodes] @ weights, *edges)
+
+        return self._products.get(hashlib.sha256(weights.tobytes() + nodes.tobytes()).digest(), made)
+
+
+@dataclass(frozen=True)
+class Edges:
+    """Designs `start`..`stop`-1 of a grid of stopbands, or the `chosen` ones of these, by their edges' numbers."""
+
+    space: Space
+    start: int
+    stop: int
+    tables: Tables
+    at_left: IndexArray
+    at_right: IndexArray
+    depth: FloatArray
+    chosen: IndexArray | None = None
+
+    def __len__(self) -> int:
+        return len(self.depth)
+
+    def curves(self) -> FloatArray:
+        """See `Block.curves`."""
+        points = self.space.points(self.start, self.stop)
+        return self.space.curves(points if self.chosen is None else points[self.chosen], self.tables.base.size)
+
+    def some(self, which: IndexArray) -> Edges:
+        """See `Block.some`."""
+        chosen = which if self.chosen is None else self.chosen[which]
+        ends = (self.at_left[which], self.at_right[which], self.depth[which])
+        return Edges(self.space, self.start, self.stop, self.tables, *ends, chosen)
+
+    def product(self, weights: FloatArray, nodes: IndexArray) -> FloatArray:
+        """See `Block.product`."""
+        from .compiled import through_edges  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+        found = np.empty((len(self), weights.shape[1]))
+        through_edges(*self.tables.product(weights, nodes), self.at_left, self.at_right, self.depth, found)
+        return found
+
+    def shapes(self, base_qe: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See `Block.shapes`; `base_qe` is the family's own."""
+        from .compiled import shapes_of_edges  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+        steepest, lowest = np.empty(len(self)), np.empty(len(self))
+        tables = self.tables
+        edges = (tables.left, tables.right, self.at_left, self.at_right, self.depth)
+        shapes_of_edges(tables.base, tables.change, *edges, *_inverse(base_qe[0]), steepest, lowest)
+        return steepest, lowest
+
+
+def _inverse(base: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """1 / base and 0; where the base is 0, 0 and 1, so that the ratio to it is 1."""
+    return np.divide(1.0, base, out=np.zeros_like(base), where=base > 0), np.where(base > 0, 0.0, 1.0)
+
+
+_tables: Cache[bytes, Tables] = Cache(_KEPT_TABLES)
+
+
+def by_edges(space: Space) -> bool:
+    """Whether `edges_of` takes the designs of a space."""
+    return _separable(space) is not None
+
+
+def _separable(space: Space) -> tuple[SeparableFamily, FloatArray, FloatArray] | None:
+    """Family, base and change of a grid; None where the family is not separable, or its tables were too large."""
+    family = None if space.filter is None else space.filter.family
+    if not space.gridded or not isinstance(family, SeparableFamily) or not family.separable:
+        return None
+    n_left, n_right = (len(space.axes[at]) * len(space.axes[at + 1]) for at in (_LEFT, _RIGHT))
+    base, change = family.separable
+    return (family, base, change) if (n_left + n_right) * base.size * base.itemsize <= _MOST_BYTES else None
+
+
+def edges_of(space: Space, start: int, stop: int) -> Edges | None:
+    """The designs of a grid by their edges; None where the family is not separable, or its tables were too large."""
+    found = _separable(space)
+    if found is None:
+        return None
+    family, base, change = found
+    key = hashlib.sha256(pickle.dumps((space.axes, base, change, family.edges(np.array([[600.0, 10.0]]))))).digest()
+
+    def made() -> Tables:
+        pairs = [
+            np.stack([a.ravel() for a in np.meshgrid(space.axes[at], space.axes[at + 1], indexing="ij")], axis=1)
+            for at in (_LEFT, _RIGHT)
+        ]
+        left_edges, right_edges = (family.edges(pair) for pair in pairs)
+        return Tables(base, change, left_edges, right_edges)
+
+    tables = _tables.get(key, made)
+    left, left_width, right, right_width, depth = space.digits(start, stop)
+    at_left = left * len(space.axes[_LEFT_WIDTH]) + left_width
+    at_right = right * len(space.axes[_RIGHT_WIDTH]) + right_width
+    return Edges(space, start, stop, tables, at_left, at_right, np.asarray(space.axes[_DEPTH], dtype=float)[depth])

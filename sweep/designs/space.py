@@ -1,0 +1,91 @@
+"""Design spaces: the designs that a study names, counted and addressable without making them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..types import FloatArray, IndexArray
+from .family import Family
+from .products import row_products
+
+DIMENSIONS = ("edge_width_nm", "band_width_nm")
+"""Lengths of a family's design that a producer asks for."""
+Kind = Literal["reference", "design", "sweep", "search"]
+
+
+@dataclass(frozen=True)
+class Filter:
+    """A family bound to its curves, and which channels of which CFA it replaces."""
+
+    family: Family
+    channels: tuple[str, ...]
+    base: str
+    target: str
+
+
+@dataclass(frozen=True)
+class Space:
+    """A full-factorial set of designs on one CFA.
+
+    `axes`: the values of each parameter of the family; the last one runs fastest. A plain CFA has no filter, no axes
+    and one design.
+    """
+
+    kind: Kind
+    name: str
+    cfa: str
+    filter: Filter | None = None
+    axes: tuple[tuple[float, ...], ...] = ()
+    gridded: bool = True
+
+    @property
+    def size(self) -> int:
+        """Number of designs; 0 for a box that is searched but not swept."""
+        return math.prod(len(axis) for axis in self.axes) if self.gridded else 0
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the family's parameters, with units."""
+        return () if self.filter is None else tuple(p.name for p in self.filter.family.parameters)
+
+    def digits(self, start: int, stop: int) -> list[IndexArray]:
+        """For each axis the index of its value in designs start..stop-1, ndarray[stop - start]."""
+        rest = np.arange(start, stop)
+        found = []
+        for axis in reversed(self.axes):  # mixed radix: NumPy's own unravel_index stops at 64 axes
+            rest, digit = np.divmod(rest, len(axis))
+            found.append(digit)
+        return found[::-1]
+
+    def points(self, start: int, stop: int) -> FloatArray:
+        """Parameters of designs start..stop-1: ndarray[stop - start, n_parameters]."""
+        digits = zip(self.axes, self.digits(start, stop), strict=True)
+        columns = [np.asarray(axis, dtype=float)[digit] for axis, digit in digits]
+        return np.stack(columns, axis=1) if columns else np.empty((stop - start, 0))
+
+    def curves(self, points: FloatArray, n_wavelengths: int, shift_nm: float = 0.0) -> FloatArray:
+        """QE of the modified channels: ndarray[n_designs, n_modified, n_wavelengths]; none for a plain CFA.
+
+        `shift_nm`: how far production moved every edge toward the red.
+        """
+        if self.filter is None:
+            return np.empty((len(points), 0, n_wavelengths))
+        family = self.filter.family
+        return (family.shifted(shift_nm) if shift_nm else family).curves(points)
+
+    def dimensions(self, points: FloatArray) -> dict[str, FloatArray]:
+        """The narrowest edge and band of each design, nm, ndarray[n_designs]; NaN for what the family does not have."""
+        rows = {} if self.filter is None else self.filter.family.dimensions
+        nothing = np.full((len(points), 1), np.nan)
+        lengths = {name: row_products(points, rows[name].T) if name in rows else nothing for name in DIMENSIONS}
+        return {name: values.min(axis=1) for name, values in lengths.items()}
+
+    def violation(self, points: FloatArray) -> FloatArray:
+        """Largest violation of the family's own conditions, ndarray[n_designs]; 0 where a design is well formed."""
+        if self.filter is None:
+            return np.zeros(len(points))
+        return np.asarray(np.maximum(self.filter.family.violation(points).max(axis=1), 0.0), dtype=float)

@@ -1,0 +1,233 @@
+"""Stopbands: a channel leaves its base curve for a target curve and comes back, once or several times."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import copy
+from typing import Self
+
+import numpy as np
+
+from ..types import FloatArray
+from .edge import SPAN_PER_WIDTH, edge, edge_gradient
+from .family import Parameter
+from .products import row_products
+
+_HALF = SPAN_PER_WIDTH / 2
+_PER_BAND = 5
+_FEW = 64
+"""Edges of fewer designs are computed one by one."""
+LEFT, LEFT_WIDTH, RIGHT, RIGHT_WIDTH, DEPTH = range(_PER_BAND)
+
+
+def band_parameters(number: int | None = None) -> tuple[Parameter, ...]:
+    """Edges and depth of one band; `number` goes into the names when there are several."""
+    n = "" if number is None else str(number)
+    return (
+        Parameter(f"left{n}_nm", 200, 2000),
+        Parameter(f"left{n}_width_nm", 0, 500),
+        Parameter(f"right{n}_nm", 200, 2000),
+        Parameter(f"right{n}_width_nm", 0, 500),
+        Parameter(f"depth{n}", 0, 1, default=1.0),
+    )
+
+
+class Bands:
+    """The sum of k bands, each e(l; left) - e(l; right) times its depth, and the conditions that keep it in 0..1."""
+
+    def __init__(self, wavelength_nm: FloatArray, count: int) -> None:
+        self._wave = wavelength_nm
+        self._count = count
+        self.parameters = (
+            band_parameters() if count == 1 else tuple(p for b in range(count) for p in band_parameters(b + 1))
+        )
+        self._conditions = self._condition_matrix()
+
+    def shape(self, x: FloatArray) -> FloatArray:
+        """Sum of the bands: ndarray[n_designs, 5 k] -> ndarray[n_designs, n_wavelengths]."""
+        return np.asarray(sum(self._depth(x, band) * self._open(x, band) for band in range(self._count)), dtype=float)
+
+    def gradient(self, x: FloatArray) -> FloatArray:
+        """Derivative of `shape` at one design: ndarray[5 k] -> ndarray[5 k, n_wavelengths]."""
+        rows = []
+        for band in range(self._count):
+            left, left_width, right, right_width, depth = x[band * _PER_BAND : (band + 1) * _PER_BAND]
+            rows += [depth * d for d in edge_gradient(self._wave, left, left_width)]
+            rows += [-depth * d for d in edge_gradient(self._wave, right, right_width)]
+            rows.append(self._open(x[None], band)[0])
+        return np.stack(rows)
+
+    def reach(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """1 where a band of the box `low`..`high` can be open, else 0: ndarray[n_wavelengths]."""
+        open_at = np.zeros(self._wave.size)
+        for at in range(0, self._count * _PER_BAND, _PER_BAND):
+            start = low[at + LEFT] - _HALF * high[at + LEFT_WIDTH]
+            end = high[at + RIGHT] + _HALF * high[at + RIGHT_WIDTH]
+            open_at[(self._wave >= start) & (self._wave <= end)] = 1.0
+        return open_at
+
+    def range(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """No `shape` of the box lies outside, whatever the order of its edges: ndarray[n_wavelengths] each.
+
+        An edge falls with its center, and with its width it falls behind the center and rises before it. So its
+        extremes are at the ends of both.
+        """
+        least, most = np.zeros(self._wave.size), np.zeros(self._wave.size)
+        for at in range(0, self._count * _PER_BAND, _PER_BAND):
+            ends = []
+            for edge_at in (at + LEFT, at + RIGHT):
+                early, late = (
+                    self.edges(np.array([[box[edge_at], width[edge_at + 1]] for width in (low, high)]))
+                    for box in (low, high)
+                )
+                ends.append((late.min(axis=0), early.max(axis=0)))
+            (left_low, left_high), (right_low, right_high) = ends
+            depths = np.array([low[at + DEPTH], high[at + DEPTH]])
+            least += np.outer(depths, left_low - right_high).min(axis=0)
+            most += np.outer(depths, left_high - right_low).max(axis=0)
+        return least, most
+
+    def shifted(self, shift_nm: float) -> Bands:
+        """The bands that come out with every edge `shift_nm` too far toward the red."""
+        return Bands(self._wave - shift_nm, self._count)
+
+    @property
+    def dimensions(self) -> dict[str, FloatArray]:
+        """Rows of the narrowest edge (10 to 90 %) and the narrowest band (between its 50 % points), nm."""
+        identity = np.eye(self._count * _PER_BAND)
+        first = np.arange(self._count) * _PER_BAND
+        return {
+            "edge_width_nm": identity[np.sort(np.concatenate([first + LEFT_WIDTH, first + RIGHT_WIDTH]))],
+            "band_width_nm": identity[first + RIGHT] - identity[first + LEFT],
+        }
+
+    def violation(self, x: FloatArray) -> FloatArray:
+        """Edges out of order, nm, ndarray[n_designs, 3 k - 1].
+
+        Start and end of a left edge must not lie behind those of its right edge, and a band must end before the next
+        begins.
+        """
+        return row_products(x, self._conditions.T)
+
+    def violation_gradient(self, x: FloatArray) -> FloatArray:
+        """Constant, ndarray[3 k - 1, 5 k]."""
+        assert x.shape == (self._count * _PER_BAND,)
+        return self._conditions
+
+    def edges(self, centers_and_widths: FloatArray) -> FloatArray:
+        """Rising edges: ndarray[n, 2] -> ndarray[n, n_wavelengths]."""
+        return edge(self._wave, centers_and_widths[:, :1], centers_and_widths[:, 1:])
+
+    def _open(self, x: FloatArray, band: int) -> FloatArray:
+        at = band * _PER_BAND
+        left, right = (self._each_once(x[:, at + i : at + i + 2]) for i in (LEFT, RIGHT))
+        return np.asarray(left - right, dtype=float)
+
+    def _each_once(self, centers_and_widths: FloatArray) -> FloatArray:
+        """`edges`, where the designs of a grid share many: each is computed once."""
+        if len(centers_and_widths) < _FEW:
+            return self.edges(centers_and_widths)
+        unique, which = np.unique(centers_and_widths, axis=0, return_inverse=True)
+        return self.edges(unique)[which.ravel()]
+
+    def _depth(self, x: FloatArray, band: int) -> FloatArray:
+        return x[:, band * _PER_BAND + DEPTH, None]
+
+    def _condition_matrix(self) -> FloatArray:
+        rows = []
+        for band in range(self._count):
+            at = band * _PER_BAND
+            for sign in (-_HALF, _HALF):
+                row = np.zeros(self._count * _PER_BAND)
+                row[at + LEFT], row[at + LEFT_WIDTH], row[at + RIGHT], row[at + RIGHT_WIDTH] = 1, sign, -1, -sign
+                rows.append(row)
+            if band + 1 < self._count:
+                row = np.zeros(self._count * _PER_BAND)
+                row[at + RIGHT], row[at + RIGHT_WIDTH] = 1, _HALF
+                row[at + _PER_BAND + LEFT], row[at + _PER_BAND + LEFT_WIDTH] = -1, _HALF
+                rows.append(row)
+        return np.stack(rows)
+
+
+class Banded:
+    """What families whose parameters are those of bands have in common."""
+
+    start_dimensions: int | None = None
+
+    def __init__(self, wavelength_nm: FloatArray, bands: int) -> None:
+        self._bands = Bands(wavelength_nm, bands)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Edges, widths and depth of each band."""
+        return self._bands.parameters
+
+    @property
+    def dimensions(self) -> Mapping[str, FloatArray]:
+        """See `Bands.dimensions`."""
+        return self._bands.dimensions
+
+    def shifted(self, shift_nm: float) -> Self:
+        """The same curves to go between, with the bands moved; see `Family.shifted`."""
+        made = copy(self)
+        made._bands = self._bands.shifted(shift_nm)
+        return made
+
+    def start(self, points: FloatArray) -> FloatArray:
+        """Not needed: a search starts anywhere in its box."""
+        return points
+
+    def violation(self, x: FloatArray) -> FloatArray:
+        """Edges out of order, nm; see `Bands.violation`."""
+        return self._bands.violation(x)
+
+    def violation_gradient(self, x: FloatArray) -> FloatArray:
+        """See `Bands.violation_gradient`."""
+        return self._bands.violation_gradient(x)
+
+
+class Stopband(Banded):
+    """N = base + sum over bands of depth (target - base) (e(l; left) - e(l; right)).
+
+    One band is the paper's N_x with base Y and target G. `base`, `target`: QE, ndarray[n_wavelengths]. With the edges
+    in order, the bands lie between 0 and 1 and do not overlap, so N lies between its base and its target at every
+    wavelength, and is exactly the base outside the bands.
+    """
+
+    n_modified = 1
+
+    def __init__(self, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray, bands: int = 1) -> None:
+        self.kind = "stopband" if bands == 1 else "multi_stopband"
+        super().__init__(wavelength_nm, bands)
+        self._base = base
+        self._change = target - base
+
+    def curves(self, x: FloatArray) -> FloatArray:
+        """QE of the modified channel, ndarray[n_designs, 1, n_wavelengths]; see `Family.curves`."""
+        return (self._base + self._change * self._bands.shape(x))[:, None, :]
+
+    @property
+    def separable(self) -> tuple[FloatArray, FloatArray] | None:
+        """Of one band; see `SeparableFamily.separable`."""
+        return (self._base, self._change) if self.kind == "stopband" else None
+
+    def edges(self, centers_and_widths: FloatArray) -> FloatArray:
+        """See `SeparableFamily.edges`."""
+        return self._bands.edges(centers_and_widths)
+
+    def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """The base, or the target where it is higher and a band can reach; see `Family.upper`."""
+        return (self._base + np.maximum(self._change, 0.0) * self._bands.reach(low, high))[None, :]
+
+    def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """The base, or the target where it is lower and a band can reach; see `Family.lower`."""
+        return (self._base + np.minimum(self._change, 0.0) * self._bands.reach(low, high))[None, :]
+
+    def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Base and change where the bands are least and most open; see `Family.hull`."""
+        ends = np.stack([self._base + self._change * shape for shape in self._bands.range(low, high)])
+        return ends.min(axis=0)[None, :], ends.max(axis=0)[None, :]
+
+    def gradient(self, x: FloatArray) -> FloatArray:
+        """Derivative by each parameter, ndarray[n_parameters, 1, n_wavelengths]; see `Family.gradient`."""
+        return (self._change * self._bands.gradient(x))[:, None, :]

@@ -1,0 +1,1 @@
+"""What a readout is worth, and when it is allowed."""

@@ -1,0 +1,264 @@
+"""Compiled inner loops of errors: how often digital numbers occur, and how far those of two signals overlap."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from ..camera.compiled import poisson_shares
+from ..types import FloatArray, IndexArray
+
+RARE = 1e-40
+"""What occurs less often than this, relative to the most frequent, is left out."""
+_TAIL = 13.0
+_PER_DEVIATION = 1.3
+_MOST_NATS = 100.0
+"""Logarithms of a likelihood ratio beyond this are taken to say nothing, which bounds the error from above."""
+
+
+@njit(cache=True, nogil=True)
+def _counts(electrons: float, prnu: float, most: int) -> tuple[int, FloatArray]:
+    """First count and how often each occurs; `most` takes all higher ones. The gain of the pixel is Gaussian."""
+    spread = 1.0 + _TAIL * prnu
+    high = electrons * spread
+    low = electrons * max(2.0 - spread, 0.0)
+    start = min(max(int(low - 14 * math.sqrt(low) - 2), 0), most)
+    last = min(int(high + 14 * math.sqrt(high) + 110), most)
+    shares = np.zeros(max(last, start) - start + 1)
+    if prnu == 0:
+        begin, end = poisson_shares(electrons, start, RARE, shares)
+        return start + begin, shares[begin:end] / shares[begin:end].sum()
+    half = int(_TAIL * _PER_DEVIATION * math.sqrt(1 + prnu * prnu * electrons)) + 1
+    own = np.empty(shares.size)
+    for i in range(-half, half + 1):
+        z = _TAIL * i / half
+        begin, end = poisson_shares(max(electrons * (1 + prnu * z), 0.0), start, RARE, own)
+        weight = math.exp(-z * z / 2) / own[begin:end].sum()
+        for k in range(begin, end):
+            shares[k] += weight * own[k]
+    return start, shares / shares.sum()
+
+
+@njit(cache=True, nogil=True)
+def bin_shares(sigma: float) -> FloatArray:
+    """Shares of a Gaussian in bins of width 1, for places of its mean in one: ndarray[n_places + 1, 2 reach + 1].
+
+    `sigma`: in bins. Places are at most 1/64 sigma apart.
+    """
+    reach = int(_TAIL * sigma) + 1
+    places = int(64 / sigma) + 1
+    found = np.empty((places + 1, 2 * reach + 1))
+    for p in range(places + 1):
+        for i in range(2 * reach + 1):
+            low, high = (i - reach - p / places) / sigma, (i - reach + 1 - p / places) / sigma
+            if low > 0:
+                found[p, i] = 0.5 * (math.erfc(low / math.sqrt(2)) - math.erfc(high / math.sqrt(2)))
+            else:
+                found[p, i] = 0.5 * (math.erfc(-high / math.sqrt(2)) - math.erfc(-low / math.sqrt(2)))
+    return found
+
+
+@njit(cache=True, nogil=True)
+def pixel_numbers(
+    electrons: float,
+    most: int,
+    well_e: float,
+    prnu: float,
+    read_e: float,
+    line: tuple[float, float],
+    n_bins: int,
+    table: FloatArray,
+) -> tuple[int, FloatArray]:
+    """First bin of digital numbers that occurs, and how often each does, for one pixel.
+
+    `most`: the count from which the well is full. `line`: bins per electron, and where no electron is, in bins from
+    the first one's lower edge. `table`: of `bin_shares`, of size 0 without read noise.
+    """
+    first, shares = _counts(electrons, prnu, most)
+    # Counts are taken together where that adds less than 1/700 to the variance of both and read noise hides it.
+    group = max(1, min(int(read_e), int(math.sqrt(electrons) / 8)))
+    reach = (table.shape[1] - 1) // 2 if table.size else 0
+    places = table.shape[0] - 1
+    slope, origin = line
+    beyond = n_bins + reach + 1.0
+    least = min(slope * min(float(first - group), well_e) + origin, beyond)
+    largest = min(slope * min(float(first + shares.size + group), well_e) + origin, beyond)
+    low = min(max(math.floor(least) - reach - 1, 0), n_bins - 1)
+    high = min(max(math.floor(largest) + reach + 1, 0), n_bins - 1)
+    found = np.zeros(high - low + 1)
+    k = 0
+    while k < shares.size:
+        count, weight = first + k, shares[k]
+        k += 1
+        held = min(float(count), well_e)
+        if group > 1 and count < most:
+            begin = count // group
+            while k < shares.size and (first + k) // group == begin and first + k < most:
+                weight += shares[k]
+                k += 1
+            held = min(begin * group + (group - 1) / 2, well_e)
+        if weight < RARE:
+            continue
+        y = min(slope * held + origin, beyond)
+        cell = math.floor(y)
+        if not table.size:
+            found[min(max(cell, low), high) - low] += weight
+            continue
+        place = (y - cell) * places
+        p = min(int(place), places - 1)
+        right = weight * (place - p)
+        left = weight - right
+        for i in range(2 * reach + 1):
+            b = min(max(cell + i - reach, low), high) - low
+            found[b] += left * table[p, i] + right * table[p + 1, i]
+    return low, found
+
+
+@njit(cache=True, nogil=True)
+def _sum_of(one: FloatArray, other: FloatArray) -> FloatArray:
+    found = np.zeros(one.size + other.size - 1)
+    for i in range(one.size):
+        if one[i] > RARE:
+            for j in range(other.size):
+                found[i + j] += one[i] * other[j]
+    return found
+
+
+@njit(cache=True, nogil=True)
+def channel_numbers(
+    electrons: FloatArray,
+    most: int,
+    well_e: float,
+    prnu: float,
+    read_e: float,
+    line: tuple[float, float],
+    n_bins: int,
+    table: FloatArray,
+) -> tuple[IndexArray, IndexArray, FloatArray]:
+    """How often each sum of pixels occurs: first bin, ndarray[n]; where its shares begin, ndarray[n + 1]; all shares.
+
+    `electrons`: ndarray[n, n_pixels]; the rest as in `pixel_numbers`.
+    """
+    firsts, starts = np.empty(len(electrons), np.intp), np.zeros(len(electrons) + 1, np.intp)
+    values = np.empty(4096)
+    for i in range(len(electrons)):
+        first, shares = pixel_numbers(electrons[i, 0], most, well_e, prnu, read_e, line, n_bins, table)
+        own_first, own = first, shares
+        for u in range(1, electrons.shape[1]):
+            if electrons[i, u] != electrons[i, u - 1]:
+                own_first, own = pixel_numbers(electrons[i, u], most, well_e, prnu, read_e, line, n_bins, table)
+            first, shares = first + own_first, _sum_of(shares, own)
+        low, high = 0, shares.size
+        while low + 1 < high and shares[low] < RARE:
+            low += 1
+        while high - 1 > low and shares[high - 1] < RARE:
+            high -= 1
+        firsts[i] = first + low
+        starts[i + 1] = starts[i] + high - low
+        if starts[i + 1] > values.size:
+            grown = np.empty(2 * starts[i + 1])
+            grown[: starts[i]] = values[: starts[i]]
+            values = grown
+        values[starts[i] : starts[i + 1]] = shares[low:high]
+    return firsts, starts, values[: starts[-1]]
+
+
+@njit(cache=True, nogil=True)
+def overlaps(firsts: IndexArray, starts: IndexArray, roots: FloatArray, rows: IndexArray) -> FloatArray:
+    """Bhattacharyya coefficient of each two signals of a design, ndarray[n_signals, n_signals].
+
+    `rows`: ndarray[n_channels, n_signals], the row of `firsts` and `starts` that each has; `roots`: of the shares.
+    """
+    found = np.ones((rows.shape[1], rows.shape[1]))
+    for a in range(rows.shape[1]):
+        for b in range(a):
+            for c in range(rows.shape[0]):
+                one, other = rows[c, a], rows[c, b]
+                if one == other:
+                    continue
+                i, j, n = _common(firsts, starts, one, other)
+                total = 0.0
+                for k in range(n):
+                    total += roots[i + k] * roots[j + k]
+                found[a, b] *= total
+                if total == 0:
+                    break
+            found[b, a] = found[a, b]
+    return found
+
+
+@njit(cache=True, nogil=True)
+def _common(firsts: IndexArray, starts: IndexArray, one: int, other: int) -> tuple[int, int, int]:
+    """Where the bins that two rows share begin in each, and how many there are."""
+    low = max(firsts[one], firsts[other])
+    high = min(firsts[one] + starts[one + 1] - starts[one], firsts[other] + starts[other + 1] - starts[other])
+    return starts[one] + low - firsts[one], starts[other] + low - firsts[other], max(high - low, 0)
+
+
+@njit(cache=True, nogil=True)
+def _ratios(
+    firsts: IndexArray, starts: IndexArray, roots: FloatArray, one: int, other: int, step: float
+) -> tuple[int, FloatArray]:
+    """Overlap of one channel by the logarithm of the likelihood ratio, in steps: the first step, shares from it on."""
+    i, j, n = _common(firsts, starts, one, other)
+    most = int(_MOST_NATS / step)
+    found = np.zeros(2 * most + 1)
+    begin, end = 2 * most, 0
+    for k in range(n):
+        p, q = roots[i + k], roots[j + k]
+        if p > 0 and q > 0:
+            at = round(min(max(2 * math.log(p / q) / step, -most), most)) + most
+            found[at] += p * q
+            begin, end = min(begin, at), max(end, at)
+    if end < begin:
+        return 0, np.zeros(1)
+    return begin - most, found[begin : end + 1]
+
+
+@njit(cache=True, nogil=True)
+def _least_error(
+    firsts: IndexArray, starts: IndexArray, roots: FloatArray, rows: IndexArray, a: int, b: int, step: float
+) -> float:
+    """Error of the most likely of two equally frequent signals.
+
+    Half the sum of min(p, q), that is of sqrt(p q) exp(-|ln(p / q)| / 2); the logarithms of independent channels add.
+    """
+    first, shares = 0, np.ones(1)
+    for c in range(rows.shape[0]):
+        if rows[c, a] != rows[c, b]:
+            own_first, own = _ratios(firsts, starts, roots, rows[c, a], rows[c, b], step)
+            first, shares = first + own_first, _sum_of(shares, own)
+    total = 0.0
+    for k in range(shares.size):
+        total += shares[k] * math.exp(-abs(first + k) * step / 2)
+    return 0.5 * total
+
+
+@njit(cache=True, nogil=True)
+def largest_error(
+    overlap: FloatArray,
+    first: IndexArray,
+    second: IndexArray,
+    firsts: IndexArray,
+    starts: IndexArray,
+    roots: FloatArray,
+    rows: IndexArray,
+    step: float,
+) -> float:
+    """Largest error of two signals over the pairs of two types: those whose overlap leaves room for it, largest first.
+
+    `overlap`, `firsts`, `starts`, `roots`, `rows`: as in `overlaps`; `first`, `second`: signals of each type.
+    """
+    bound = np.empty(first.size * second.size)
+    for a in range(first.size):
+        for b in range(second.size):
+            bound[a * second.size + b] = overlap[first[a], second[b]]
+    found = 0.0
+    for at in np.argsort(-bound):
+        if 0.5 * bound[at] <= found:
+            break
+        a, b = first[at // second.size], second[at % second.size]
+        found = max(found, _least_error(firsts, starts, roots, rows, a, b, step))
+    return found

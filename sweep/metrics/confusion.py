@@ -1,0 +1,119 @@
+"""How often digital numbers confuse two signal types: exact sums over the numbers that occur, for a few pixels.
+
+Each channel's value is the sum of a few independent pixels that read Poisson electrons, full well, read noise, pedestal
+and ADC range, rounded. `electrons`, ndarray[n_designs, n_signals, n_pixels], are what each pixel expects.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..camera.pixel import Pixel
+from ..curves.lights import class_pairs
+from ..types import FloatArray, IndexArray
+from . import compiled as kernels
+
+FLOOR = 1e-18
+"""What tails that are left out may add to an error or to its bound."""
+_NATS = 0.25
+"""A step of the log-likelihood ratio is this over the number of channels: errors are exact within exp(1/16)."""
+_AT_ONCE = 4096
+"""Signals of designs whose digital numbers are held at once."""
+
+
+@dataclass(frozen=True)
+class Errors:
+    """By pair of types the error of the worst two signals and the bound; that of all types; ndarray[n_designs]."""
+
+    error: dict[tuple[str, str], FloatArray]
+    bound: dict[tuple[str, str], FloatArray]
+    state_bound: FloatArray
+
+
+@dataclass(frozen=True)
+class _Numbers:
+    """A channel's digital numbers: of each distinct signal the first bin, where its roots begin, and roots of shares.
+
+    `rows`: the distinct one that a design's signal has, ndarray[n_designs, n_signals].
+    """
+
+    firsts: IndexArray
+    starts: IndexArray
+    roots: FloatArray
+    rows: IndexArray
+
+    @classmethod
+    def joined(cls, channels: Sequence[_Numbers]) -> _Numbers:
+        """Of all channels: `rows` gets an axis for them, in front."""
+        before = np.cumsum([0, *(len(each.firsts) for each in channels)])
+        sizes = np.cumsum([0, *(each.roots.size for each in channels)])
+        starts = [each.starts[:-1] + size for each, size in zip(channels, sizes, strict=False)]
+        return cls(
+            np.concatenate([each.firsts for each in channels]),
+            np.append(np.concatenate(starts), sizes[-1]),
+            np.concatenate([each.roots for each in channels]),
+            np.stack([each.rows + first for each, first in zip(channels, before, strict=False)]),
+        )
+
+
+def _numbers(electrons: FloatArray, pixel: Pixel) -> _Numbers:
+    """Of a channel whose pixels expect `electrons`, ndarray[n_designs, n_signals, n_pixels]."""
+    flat = np.ascontiguousarray(np.sort(electrons, axis=-1).reshape(-1, electrons.shape[-1]))
+    distinct, rows = np.unique(flat, axis=0, return_inverse=True)
+    # Numbers are taken together in bins of a quarter of the noise that every count has, or of an electron.
+    wide = max(1, int(max(pixel.read_noise_e, 1.0) * min(pixel.dn_per_e, pixel.full_scale_dn) / 4))
+    sigma = pixel.read_noise_e * pixel.dn_per_e / wide
+    table = kernels.bin_shares(sigma) if sigma > _LEAST_BINS else np.empty((0, 0))
+    line = pixel.dn_per_e / wide, (pixel.offset_dn + 0.5) / wide
+    most, n_bins = math.ceil(pixel.well_e), pixel.full_scale_dn // wide + 1
+    firsts, starts, shares = kernels.channel_numbers(
+        distinct, most, pixel.well_e, pixel.prnu, pixel.read_noise_e, line, n_bins, table
+    )
+    return _Numbers(firsts, starts, np.sqrt(shares), rows.reshape(electrons.shape[:2]).astype(np.intp))
+
+
+_LEAST_BINS = 1e-4
+
+
+def errors(
+    electrons: FloatArray, channels: Sequence[IndexArray], pixel: Pixel, members: Mapping[str, IndexArray]
+) -> Errors:
+    """Errors and bounds of a block of designs; `channels`: of each the pixels that it sums, `members`: type -> signals.
+
+    The error of two signals is that of the most likely one, the least that any rule reaches: half the sum of the lesser
+    of both probabilities over all readouts. The bound is the sum over the signals of other types of their
+    Bhattacharyya coefficients, for the signal that errs most often.
+    """
+    n_designs, n_signals = electrons.shape[:2]
+    unknown = np.asarray(np.isnan(electrons).any(axis=(1, 2)))
+    electrons = np.where(unknown[:, None, None], 0.0, np.minimum(electrons, 100 * pixel.well_e + 1e5))
+    pairs = class_pairs(list(members))
+    found = {pair: np.empty(n_designs) for pair in pairs}
+    bounds = {pair: np.empty(n_designs) for pair in pairs}
+    state = np.empty(n_designs)
+    step = _NATS / len(channels)
+    for start in range(0, n_designs, max(1, _AT_ONCE // n_signals)):
+        block = electrons[start : start + max(1, _AT_ONCE // n_signals)]
+        numbers = _Numbers.joined([_numbers(block[..., own], pixel) for own in channels])
+        parts = numbers.firsts, numbers.starts, numbers.roots
+        for d in range(len(block)):
+            rows = np.ascontiguousarray(numbers.rows[:, d])
+            overlap = kernels.overlaps(*parts, rows)
+            sums = np.zeros(n_signals)
+            for pair in pairs:
+                one, other = members[pair[0]], members[pair[1]]
+                both = overlap[np.ix_(one, other)]
+                for signals, axis in ((one, 1), (other, 0)):
+                    sums[signals] += both.sum(axis=axis)
+                worst = max(both.sum(axis=1).max(), both.sum(axis=0).max())
+                bounds[pair][start + d] = min(worst + FLOOR, 1.0)
+                error = kernels.largest_error(overlap, one, other, *parts, rows, step)
+                found[pair][start + d] = min(error + FLOOR, 0.5)
+            state[start + d] = min(sums.max() + FLOOR, 1.0)
+    for values in (*found.values(), *bounds.values(), state):
+        values[unknown] = np.nan
+    return Errors(found, bounds, state)

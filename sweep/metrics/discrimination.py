@@ -1,0 +1,213 @@
+"""How often noise confuses two signal types: from mean and variance of what the readout gives for each signal.
+
+The channels of a mosaic are read from different pixels, so their noise is independent and a covariance is diagonal.
+All functions take `mean` and `variance`, ndarray[n_designs, n_signals, n_channels] (DN, DN^2), and the signal indices
+`first`, `second` of the two types; they return ndarray[n_designs]. A channel without variance tells two signals
+apart for certain, unless their means there are the same; then it tells nothing.
+
+With a `NoiseShape`, errors are those of Gaussians in the channels whose noise is one, or Bennett's bound from all of
+them, whichever is less: to leave channels out is a rule, too; 1e-12 is the least. Without one, all noise is Gaussian.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from ..curves.lights import Pair
+from ..types import BoolArray, FloatArray, IndexArray
+from .separation import pair_blocks
+
+CNR, D_PRIME, ERROR, ERROR_BOUND = "cnr_", "dprime_", "error_", "error_bound_"
+"""How the names of a pair's noise metrics begin."""
+STATE_ERROR_BOUND = "state_error_bound"
+"""Name of `state_error_bound`."""
+_LEAST_VARIANCE = 2e-9
+"""Variance, DN^2, that a channel may have although it counts as certain."""
+_LEFT_OUT = 1e-12
+"""A pixel of up to a thousand goes beyond its reach at most this often; Gaussian tails are trusted down to here."""
+
+
+def noise_names(pair: Pair) -> tuple[str, ...]:
+    """Names of a pair's four metrics: contrast to noise, d', error, bound of the error."""
+    one, other = pair
+    prefixes = (CNR, D_PRIME, ERROR, ERROR_BOUND)
+    return tuple(f"{prefix}{one}_{other}" for prefix in prefixes)
+
+
+def contrast_to_noise(mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
+    """CSD over the noise floor: the standard deviation, along the line of the nearest pair, of its two points.
+
+    The floor is sqrt(u' (Sa + Sb) / 2 u) for the unit vector u from one point to the other; of several pairs at
+    exactly the same distance, the one with the most noise counts. 0 for coincident points.
+    """
+    found = np.empty(len(mean))
+    for block, difference, ours, theirs in _pairs(mean, variance, first, second):
+        distance = _length(difference)
+        nearest = distance == distance.min(axis=1, keepdims=True)
+        along = np.divide(difference, distance[..., None], out=np.zeros_like(difference), where=distance[..., None] > 0)
+        floor = _length(along * np.sqrt((ours + theirs) / 2))
+        floor = np.where(nearest, floor, -1.0).max(axis=1)
+        contrast = distance.min(axis=1)
+        found[block] = _ratio(contrast, floor)
+    return found
+
+
+def detectability(mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
+    """d', the smallest over the pairs of the two types: sqrt(D' S^-1 D), S the mean covariance of the two points.
+
+    This is d_a of signal detection theory for unequal variances (Simpson and Fitter, 1973), in several channels.
+    """
+    found = np.empty(len(mean))
+    for block, difference, ours, theirs in _pairs(mean, variance, first, second):
+        z = _ratio(difference, np.sqrt((ours + theirs) / 2))
+        found[block] = _length(z).min(axis=1)
+    return found
+
+
+def pairwise_error(
+    mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray, shape: NoiseShape | None = None
+) -> FloatArray:
+    """Probability that noise moves one point over to the other, the largest over the pairs of the two types.
+
+    The pair is divided by a plane with normal S^-1 D, S the mean covariance, placed so that both points err equally
+    often: Q(D' S^-1 D / (s_a + s_b)), with the standard deviation s of each along the normal (Fukunaga,
+    "Introduction to Statistical Pattern Recognition", linear classifiers). 0.5 for coincident points.
+    """
+    found = np.empty(len(mean))
+    for block, difference, ours, theirs in _pairs(mean, variance, first, second):
+        seen = difference if shape is None else shape.seen(block, difference, first, second)
+        total = ours + theirs
+        z = _ratio(seen, np.sqrt(total))
+        shares = [np.divide(v, total, out=np.full_like(total, 0.5), where=total > 0) for v in (ours, theirs)]
+        whole = _length(z)
+        some = ~np.isinf(whole)
+        z = np.where(some[..., None], z, 0.0)
+        spread = _length(z * np.sqrt(shares[0])) + _length(z * np.sqrt(shares[1]))
+        error = ndtr(-np.where(some, whole * _ratio(whole, spread), np.inf))
+        if shape is not None:
+            error = np.maximum(error, _LEFT_OUT)
+            error = np.minimum(error, shape.bound(block, difference, ours, theirs, first, second))
+        found[block] = error.max(axis=1)
+    return found
+
+
+@dataclass(frozen=True)
+class NoiseShape:
+    """Where noise is Gaussian, and how far any pixel moves a channel, DN; arrays of the shape of `mean`."""
+
+    gaussian: BoolArray
+    reach_dn: FloatArray
+
+    def seen(self, block: slice, difference: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
+        """Differences in the channels in which both points have Gaussian noise, 0 in the others."""
+        ours, theirs = _both(self.gaussian[block], first, second)
+        return np.where(ours & theirs, difference, 0.0)
+
+    def bound(
+        self,
+        block: slice,
+        difference: FloatArray,
+        ours: FloatArray,
+        theirs: FloatArray,
+        first: IndexArray,
+        second: IndexArray,
+    ) -> FloatArray:
+        """Bound of the error on either side of a plane, for independent pixels of any distribution.
+
+        Chernoff's bound exp((L_a(s) + L_b(-s)) / 2) for some s > 0, with the normal S^-1 D, and Bennett's inequality
+        (1962) for the logarithms L of the moment generating functions: v / m^2 (exp(s m) - 1 - s m) for a sum of
+        variance v whose terms are within m of their means.
+        """
+        if self.gaussian[block].all():
+            return np.array(np.inf)
+        reach = np.maximum(*_both(self.reach_dn[block], first, second))
+        total = np.maximum(ours + theirs, _LEAST_VARIANCE)
+        normal = difference / np.maximum(total, reach**2 / 50)  # a plane that suits terms as rare as Bennett allows
+        apart = (normal * difference).sum(axis=-1)
+        least = np.zeros(apart.shape)
+        for s in np.geomspace(1e-3, 10, 25):
+            x = s * normal * reach
+            with np.errstate(over="ignore"):
+                least = np.minimum(least, (total / reach**2 * (np.expm1(x) - x)).sum(axis=-1) - s * apart)
+        return np.asarray(np.minimum(np.exp(least / 2) + _LEFT_OUT, 0.5), dtype=float)
+
+
+def error_bound(
+    mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray, shape: NoiseShape | None = None
+) -> FloatArray:
+    """Bound on how often the best rule takes a signal of two types for one of the wrong type, for the worst signal.
+
+    The sum over the signals of the other type of each pair's Bhattacharyya coefficient (Kailath, 1967), at most 1.
+    """
+    return state_error_bound(mean, variance, {"first": first, "second": second}, shape)
+
+
+def state_error_bound(
+    mean: FloatArray, variance: FloatArray, members: Mapping[str, IndexArray], noise: NoiseShape | None = None
+) -> FloatArray:
+    """`error_bound` over all types of `members` (type -> signal indices): how often the state is told wrong at most."""
+    sums = np.zeros(mean.shape[:2])
+    types = list(members.values())
+    for at, first in enumerate(types):
+        for second in types[at + 1 :]:
+            for block, difference, ours, theirs in _pairs(mean, variance, first, second):
+                shape = (len(difference), len(first), len(second))
+                if noise is None:
+                    overlap = np.exp(-_distance(difference, ours, theirs))
+                else:
+                    seen = noise.seen(block, difference, first, second)
+                    alike = np.broadcast_to(ours, seen.shape)
+                    gaussian = np.exp(-_distance(seen, alike, np.where(seen > 0, theirs, alike))) + _LEFT_OUT
+                    sides = noise.bound(block, difference, ours, theirs, first, second)
+                    overlap = np.minimum(gaussian, np.where(sides < 0.5, sides, 1.0))
+                overlap = overlap.reshape(shape)
+                sums[block, first] += overlap.sum(axis=2)
+                sums[block, second] += overlap.sum(axis=1)
+    used = np.concatenate(types)
+    return np.asarray(np.minimum(sums[:, used].max(axis=1), 1.0), dtype=float)
+
+
+def _distance(difference: FloatArray, ours: FloatArray, theirs: FloatArray) -> FloatArray:
+    """Bhattacharyya distance of Gaussians: D'S^-1 D / 8 + ln(S / sqrt(Sa Sb)) / 2, ndarray[n_designs, n_pairs].
+
+    Where one of the two variances is 0 the logarithm is left out: digital numbers are steps, so that a point and a
+    Gaussian around it are not told apart for certain. Without it the coefficient is larger, so that it still bounds.
+    """
+    z = _ratio(difference, np.sqrt(ours + theirs))
+    both = (ours > 0) & (theirs > 0)
+    small, large = np.sqrt(np.minimum(ours, theirs)), np.sqrt(np.maximum(ours, theirs))
+    ratio = np.divide(small, large, out=np.ones_like(small), where=both)
+    # (Sa + Sb) / (2 sqrt(Sa Sb)) - 1 = (1 - r)^2 / (2 r) for r = sqrt(small / large): no digits are lost near 1.
+    with np.errstate(over="ignore"):
+        return np.asarray((z**2 / 4 + np.log1p((1 - ratio) ** 2 / (2 * ratio)) / 2).sum(axis=-1), dtype=float)
+
+
+def _ratio(over: FloatArray, under: FloatArray) -> FloatArray:
+    """Ratio of non-negative numbers; 0 / 0 is 0, anything else over 0 is infinite, and NaN stays NaN."""
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        return np.where((over == 0) & (under == 0), 0.0, over / under)
+
+
+def _length(vectors: FloatArray) -> FloatArray:
+    """L2 norm over the last axis without squares; NaN where any component is (to `hypot` an infinite one is enough)."""
+    return np.where(np.isnan(vectors).any(axis=-1), np.nan, np.hypot.reduce(vectors, axis=-1))
+
+
+def _pairs(
+    mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray
+) -> Iterator[tuple[slice, FloatArray, FloatArray, FloatArray]]:
+    """Blocks of designs: their slice, absolute differences and both variances, ndarray[n, n_pairs, n_channels] each."""
+    for block, one, other in pair_blocks(mean.shape, first, second):
+        ours, theirs = variance[block][:, one], variance[block][:, other]
+        yield block, np.abs(mean[block][:, one] - mean[block][:, other]), ours, theirs
+
+
+def _both(values: NDArray[Any], first: IndexArray, second: IndexArray) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Of both points of every pair; `values`: ndarray[n_designs, n_signals, n_channels]."""
+    return np.repeat(values[:, first], len(second), axis=1), np.tile(values[:, second], (1, len(first), 1))

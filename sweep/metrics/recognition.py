@@ -1,0 +1,117 @@
+"""Raw patches of a noisy scene, drawn pixel by pixel, and how often a state is recognized from them."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.stats import binomtest
+
+from ..camera.effects import noise
+from ..camera.imager import Imager
+from ..types import FloatArray, IndexArray
+
+MOST_LIKELY = "most_likely"
+"""Name of the rule that knows mean and variance of every signal's channels."""
+_CONFIDENCE = 0.95
+_LEAST_VARIANCE = 1e-6
+_MOST_PIXELS = 1024
+_AT_ONCE = 4_000_000
+"""Pixels that are drawn at once."""
+
+
+def _nearest_centroid(_: int) -> Any:
+    from sklearn.neighbors import NearestCentroid
+
+    return NearestCentroid()
+
+
+def _lda(n_states: int) -> Any:
+    """Fisher's discriminant; shrinkage (Ledoit and Wolf) keeps it stable with more pixels than patches."""
+    from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
+
+    return LinearDiscriminantAnalysis(solver="lsqr", shrinkage="auto", priors=np.full(n_states, 1 / n_states))
+
+
+CLASSIFIERS: Mapping[str, Callable[[int], Any]] = {"nearest_centroid": _nearest_centroid, "lda": _lda}
+"""Classifiers that are trained on raw patches."""
+RULES = (MOST_LIKELY, *CLASSIFIERS)
+
+
+def columns() -> tuple[str, ...]:
+    """Names of what `recognize` finds: accuracy of each rule with its 95 % interval, and its worst state's."""
+    ends = ("", "_low", "_high", "_worst_state")
+    return tuple(f"{rule}_accuracy{end}" for rule in RULES for end in ends)
+
+
+def recognize(
+    imager: Imager, curves: FloatArray, states: Sequence[str], patches: int, rng: np.random.Generator
+) -> dict[str, float]:
+    """Accuracy of every rule for one design, as `columns` names it; `curves`: ndarray[1, n_modified, n_wavelengths].
+
+    `patches` raw patches (the pixels that the scene's readout takes) of every signal are drawn, each at one of the
+    scene's places with its own Poisson electrons and gain errors. The classifiers see raw digital numbers (of a patch
+    with more than 1,024 pixels a random choice of so many, the same for all), train on one half and are tested on the
+    other. The most likely rule takes the channels' readout and the signal with the largest Gaussian likelihood at the
+    patch's place, and says its state. Intervals are Wilson's.
+    """
+    members = {name: imager.setup.members[name] for name in states}
+    signals = np.concatenate(list(members.values()))
+    state = np.concatenate([np.full(len(own), name) for name, own in members.items()])
+    electrons = imager.pixel_electrons(curves)[0]
+    place = rng.integers(len(electrons), size=(patches, len(signals)))
+    truth = np.broadcast_to(state, place.shape)
+    n_pixels = electrons.shape[2]
+    seen = np.sort(rng.permutation(n_pixels)[:_MOST_PIXELS])
+    drawn = np.empty((*place.shape, seen.size), dtype=np.float32)  # [patches, n_signals, pixels that are seen]
+    said = np.empty(place.shape, dtype=state.dtype)
+    rule = _MostLikely(imager, curves, signals)
+    step = max(1, _AT_ONCE // (len(signals) * n_pixels))
+    for block in (slice(start, start + step) for start in range(0, patches, step)):
+        whole = noise.draws_dn(electrons[place[block], signals], imager.readout.pixel, rng)
+        drawn[block] = whole[..., seen]
+        said[block] = state[rule.of(whole, place[block])]
+    found = dict(_accuracy(MOST_LIKELY, truth, said))
+    half = patches // 2
+    train, test = (part.reshape(-1, part.shape[-1]) for part in (drawn[:half], drawn[half:]))
+    for name, make in CLASSIFIERS.items():
+        if np.ptp(train, axis=0).any():
+            with warnings.catch_warnings():  # scikit-learn's, where a pixel reads the same in every patch of a state
+                warnings.simplefilter("ignore", UserWarning)
+                said = make(len(states)).fit(train, truth[:half].ravel()).predict(test)
+        else:  # every pixel of every patch reads the same
+            said = np.full(len(test), states[0])
+        found |= dict(_accuracy(name, truth[half:].ravel(), said))
+    return found
+
+
+class _MostLikely:
+    """The most likely of `signals` for drawn patches of one design."""
+
+    def __init__(self, imager: Imager, curves: FloatArray, signals: IndexArray) -> None:
+        read = imager.read_with_noise(curves)
+        self._readout = imager.readout
+        self._mean = read.mean[0][:, signals]
+        self._variance = np.maximum(read.variance[0][:, signals], _LEAST_VARIANCE)
+
+    def of(self, drawn: FloatArray, place: IndexArray) -> IndexArray:
+        """Its index for each patch, ndarray[n_patches, n_signals]; `drawn` has an axis more, of the pixels."""
+        best = np.empty(place.shape, dtype=np.intp)
+        for at in np.unique(place):
+            here = place == at
+            kernel = int(at) * self._readout.n_cases // len(self._mean)
+            values = self._readout.channels_of(drawn[here], kernel)  # [n, n_channels]
+            m, v = self._mean[at], self._variance[at]
+            likelihood = -0.5 * ((values[:, None] - m) ** 2 / v + np.log(v)).sum(axis=2)
+            best[here] = likelihood.argmax(axis=1)
+        return best
+
+
+def _accuracy(rule: str, truth: Any, said: Any) -> Iterator[tuple[str, float]]:
+    right = np.asarray(truth == said)
+    interval = binomtest(int(right.sum()), right.size).proportion_ci(_CONFIDENCE, method="wilson")
+    worst = min(float(right[truth == state].mean()) for state in np.unique(truth))
+    values = (float(right.mean()), float(interval.low), float(interval.high), worst)
+    yield from zip((name for name in columns() if name.startswith(f"{rule}_accuracy")), values, strict=True)

@@ -1,0 +1,172 @@
+"""Color separation distance and sensitivity."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+
+import numpy as np
+
+from ..curves.lights import Pair, class_pairs
+from ..types import FloatArray, IndexArray
+
+CSD = "csd_"
+"""How the name of a color separation distance begins."""
+_BLOCK_PAIRS = 262_144
+"""Pair distances held at once per channel: 2 MiB, so that a block stays in cache."""
+_SMALLEST = 1e-140
+"""Distances below this, and above its inverse, are computed without squares."""
+
+
+def csd_name(pair: Pair) -> str:
+    """Column name of a pair's color separation distance, in DN."""
+    return f"{CSD}{pair[0]}_{pair[1]}"
+
+
+def separation(response: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
+    """Color separation distance of two signal types for a block of designs.
+
+    `response`: ndarray[n_designs, n_signals, n_channels], DN. `first`, `second`: signal indices of the two types.
+    Returns ndarray[n_designs], DN: the smallest L2 distance between a point of one and a point of the other (the
+    paper's CSD). Differences are taken before squares, so nearly coincident points at large offsets lose no digits.
+    """
+    response = np.asarray(response, dtype=float)
+    found = np.sqrt(_nearest(response, first, second, _add_square))
+    doubtful = np.flatnonzero((found < _SMALLEST) | (found > 1 / _SMALLEST))
+    found[doubtful] = _nearest(response[doubtful], first, second, _add_leg)
+    return found
+
+
+def _add_square(total: FloatArray, difference: FloatArray) -> None:
+    np.multiply(difference, difference, out=difference)
+    np.add(total, difference, out=total)
+
+
+def _add_leg(total: FloatArray, difference: FloatArray) -> None:
+    """For lengths whose squares would be too small or too large for a float."""
+    np.hypot(total, difference, out=total)
+
+
+def _nearest(
+    response: FloatArray, first: IndexArray, second: IndexArray, add: Callable[[FloatArray, FloatArray], None]
+) -> FloatArray:
+    """Smallest over all pairs of what `add` collects over the channels' differences, in blocks of designs and pairs."""
+    n_designs, _, n_channels = response.shape
+    found = np.full(n_designs, np.inf)
+    most = max(1, _BLOCK_PAIRS // max(1, len(second)))
+    for at in range(0, len(first), most):
+        some = first[at : at + most]
+        step = max(1, _BLOCK_PAIRS // max(1, len(some) * len(second)))
+        for start in range(0, n_designs, step):
+            block = response[start : start + step]
+            total = np.zeros((len(block), len(some), len(second)))
+            with np.errstate(over="ignore"):
+                for channel in range(n_channels):
+                    values = block[:, :, channel]
+                    add(total, values[:, some, None] - values[:, None, second])
+            found[start : start + step] = np.minimum(found[start : start + step], total.min(axis=(1, 2)))
+    return found
+
+
+def pair_blocks(
+    shape: tuple[int, ...], first: IndexArray, second: IndexArray
+) -> Iterator[tuple[slice, IndexArray, IndexArray]]:
+    """Blocks of designs small enough for all pairs at once: their slice, and both signal indices of every pair.
+
+    `shape`: (n_designs, n_signals, n_channels).
+    """
+    one, other = _all_pairs(first, second)
+    step = max(1, _BLOCK_PAIRS // max(1, one.size * shape[2]))
+    for start in range(0, shape[0], step):
+        yield slice(start, min(start + step, shape[0])), one, other
+
+
+def _all_pairs(first: IndexArray, second: IndexArray) -> tuple[IndexArray, IndexArray]:
+    """Both signal indices of every pair."""
+    return np.repeat(first, len(second)), np.tile(second, len(first))
+
+
+def separations(response: FloatArray, members: Mapping[str, IndexArray]) -> dict[Pair, FloatArray]:
+    """CSD of every pair of signal types; `members` maps a type to its signal indices. Shapes as in `separation`."""
+    from ..designs.compiled import CHANNELS, nearest_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+    n_designs, _, n_channels = response.shape
+    pairs = class_pairs(list(members))
+    if n_channels > CHANNELS or not np.isfinite(response).all():
+        return {(a, b): separation(response, members[a], members[b]) for a, b in pairs}
+    order, bounds = _in_order(members)
+    filled = np.zeros((n_designs, CHANNELS, order.size))
+    filled[:, :n_channels] = np.moveaxis(response[:, order], 1, 2)
+    squared = np.empty((n_designs, len(pairs)))
+    nearest_squared(filled, bounds, squared)
+    return _distances(squared, members, lambda doubtful: response[doubtful])
+
+
+def separations_along(
+    fixed: FloatArray, channel: int, values: FloatArray, members: Mapping[str, IndexArray]
+) -> dict[Pair, FloatArray]:
+    """`separations` of designs that differ in one channel alone.
+
+    `fixed`: ndarray[n_signals, n_channels], DN, what they share in the others; `values`: ndarray[n_designs, n_signals],
+    that of `channel`.
+    """
+    from ..designs.compiled import nearest_along_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+    def whole(some: IndexArray | slice) -> FloatArray:
+        response = np.repeat(fixed[None], len(values[some]), axis=0)
+        response[..., channel] = values[some]
+        return response
+
+    others = np.delete(fixed, channel, axis=1)
+    if not np.isfinite(others).all():
+        return separations(whole(slice(None)), members)
+    bad = np.flatnonzero(~np.isfinite(values).all(axis=1))  # what is wrong with one design changes no other
+    order, bounds = _in_order(members)
+    nearest: list[tuple[FloatArray, IndexArray, IndexArray]] = []
+    for a, b in class_pairs(list(members)):
+        one, other = _all_pairs(members[a], members[b])
+        apart = ((others[one] - others[other]) ** 2).sum(axis=1)
+        rank = np.argsort(apart, kind="stable")
+        nearest.append((apart[rank], one[rank], other[rank]))
+    starts = np.cumsum([0, *(len(apart) for apart, _, _ in nearest)])
+    place = np.empty(order.max() + 1, dtype=np.intp)  # of each signal in the order of the classes
+    place[order] = np.arange(order.size)
+    apart, one, other = (np.concatenate(parts) for parts in zip(*nearest, strict=True))
+    squared = np.empty((len(values), len(nearest)))
+    ordered = np.take(values, order, axis=1)
+    ordered[bad] = 0.0
+    nearest_along_squared(ordered, bounds, apart, place[one], place[other], starts, squared)
+    found = _distances(squared, members, whole)
+    if bad.size:
+        for pair, distance in separations(whole(bad), members).items():
+            found[pair][bad] = distance
+    return found
+
+
+def _in_order(members: Mapping[str, IndexArray]) -> tuple[IndexArray, IndexArray]:
+    """All signals, one type after the other, and where each begins."""
+    own = list(members.values())
+    return np.concatenate(own), np.cumsum([0, *(len(signals) for signals in own)])
+
+
+def _distances(
+    squared: FloatArray, members: Mapping[str, IndexArray], response: Callable[[IndexArray], FloatArray]
+) -> dict[Pair, FloatArray]:
+    """Roots; distances whose squares a float does not hold well are computed again, without squares."""
+    found = {}
+    for (a, b), column in zip(class_pairs(list(members)), squared.T, strict=True):
+        distance = np.sqrt(column)
+        doubtful = np.flatnonzero((distance < _SMALLEST) | (distance > 1 / _SMALLEST))
+        if doubtful.size:
+            distance[doubtful] = _nearest(response(doubtful), members[a], members[b], _add_leg)
+        found[a, b] = distance
+    return found
+
+
+def cfa_sensitivity(total_qe: FloatArray, counts: IndexArray, clear_qe: FloatArray) -> FloatArray:
+    """Total QE, averaged over the pixels of the tile, divided by that of the clear pixel.
+
+    `total_qe`: ndarray[..., n_channels], QE summed over the wavelengths; `counts`: pixels per tile of each channel. 1
+    means a sensor without color filters. Returns ndarray[...].
+    """
+    mean = (total_qe * counts).sum(axis=-1) / counts.sum()
+    return np.asarray(mean / clear_qe.sum(dtype=float), dtype=float)

@@ -1,0 +1,143 @@
+"""Fronts of several runs on the same axes, and what each dominates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from ...camera.pixel import Pixel
+from ...metrics.evaluate import WORST
+from ...metrics.objective import COMBINED, Objective
+from ...metrics.pareto import hypervolume
+from ...metrics.separation import CSD
+from ...types import FloatArray
+from .. import Output
+from ..names import readable
+
+_STEP = 0.01
+_BELOW = 1e-9
+
+
+@dataclass(frozen=True)
+class Front:
+    """The trade-off of a CFA in a scenario of a run.
+
+    `traced`: by the search, before quantization; else designs of the result table. `points`: ndarray[n, 2],
+    separation and sensitivity, by rising sensitivity.
+    """
+
+    run: str
+    cfa: str
+    scenario: str
+    traced: bool
+    points: FloatArray
+
+    @property
+    def name(self) -> str:
+        """What a legend calls it."""
+        return f"{self.run}, {self.cfa}{', traced by the search' if self.traced else ''}"
+
+
+@dataclass(frozen=True)
+class Box:
+    """Where hypervolumes are taken: above `reference`, ndarray[2]; `top`: the largest that any front reaches."""
+
+    reference: FloatArray
+    top: FloatArray
+
+    @property
+    def area(self) -> float:
+        """Separation x sensitivity."""
+        return float(np.prod(self.top - self.reference))
+
+
+def on_the_same_axes(runs: Mapping[str, Output]) -> tuple[dict[str, Output], list[str]]:
+    """The largest group of runs whose fronts have the same meaning, and a sentence where that is not all of them."""
+    groups: dict[tuple[str, ...], dict[str, Output]] = {}
+    for label, output in runs.items():
+        groups.setdefault(_meaning(output), {})[label] = output
+    if len(groups) == 1:
+        return dict(runs), []
+    chosen = max(groups.values(), key=len)
+    each = "; ".join(f"{', '.join(group)}: {' / '.join(axes)}" for axes, group in groups.items())
+    if len(chosen) == 1:
+        return {}, [f"The fronts have different axes ({each}), so none are compared."]
+    return chosen, [f"The fronts have different axes ({each}); compared are those of {' and '.join(chosen)}."]
+
+
+def dn_of(output: Output) -> str:
+    """What a DN of a run is: only of the same full scale and pedestal do they compare."""
+    pixel = Pixel.model_validate(output.study.get("pixel", {}))
+    return f"DN of {pixel.bits} bits" + (f", pedestal {pixel.offset_dn:g} DN" if pixel.offset_dn else "")
+
+
+def _meaning(output: Output) -> tuple[str, ...]:
+    """What the two axes are; of a combined objective, of a worst case, of DN with all that it depends on."""
+    shift = output.study.get("production", {}).get("edge_shift_nm", 0.0)
+    words = []
+    for axis in output.trade_off:
+        text = str(Objective.model_validate(output.study["objective"])) if axis == COMBINED else readable(axis)
+        dependent = f" (edges {shift:g} nm off)" if WORST in axis or (axis == COMBINED and WORST in text) else ""
+        words.append(f"{text}{dependent}" + (f" in {dn_of(output)}" if CSD in axis or axis == COMBINED else ""))
+    return tuple(words)
+
+
+def common_scenarios(runs: Mapping[str, Output]) -> list[str]:
+    """Scenarios of this name in every run, in the order of the first."""
+    (first, *others) = runs.values()
+    return [str(name) for name in first.study["scenarios"] if all(name in other.study["scenarios"] for other in others)]
+
+
+def fronts(runs: Mapping[str, Output], scenario: str) -> list[Front]:
+    """All fronts of a scenario: of designs, which meet every constraint but those on the axes, and of the search."""
+    found = []
+    for label, output in runs.items():
+        table = output.table
+        rows = table[table["pareto"] & (table["scenario"] == scenario)]
+        for cfa, own in rows.groupby("cfa", observed=True, sort=False):
+            found.append(Front(label, str(cfa), scenario, False, _sorted(own[list(output.trade_off)])))
+        search = output.provenance.get("search")
+        if output.front is not None and search and search["scenario"] == scenario:
+            traced = _sorted(output.front[["objective", "sensitivity"]].dropna())
+            if len(traced):
+                found.append(Front(label, str(output.kind("search")["cfa"].iloc[0]), scenario, True, traced))
+    return found
+
+
+def _sorted(values: pd.DataFrame) -> FloatArray:
+    points = np.unique(values.to_numpy(dtype=float), axis=0)
+    return points[np.argsort(points[:, 1], kind="stable")]
+
+
+def box_of(found: list[Front]) -> Box:
+    """The box of all fronts: from no separation, and the hundredth below the lowest sensitivity of any."""
+    points = np.concatenate([front.points for front in found])
+    lowest = math.floor((points[:, 1].min() - _BELOW) / _STEP) * _STEP
+    return Box(np.array([min(0.0, points[:, 0].min()), round(lowest, 2)]), points.max(axis=0))
+
+
+def hypervolumes(found: list[Front], box: Box) -> pd.DataFrame:
+    """A row per front: its ends, the area that it dominates in the box, and that as a share of the box."""
+    rows = []
+    for front in found:
+        area, (low, high) = (
+            hypervolume(front.points, box.reference),
+            (front.points.min(axis=0), front.points.max(axis=0)),
+        )
+        rows.append(
+            {
+                "run": front.run,
+                "CFA": front.cfa,
+                "front": "traced by the search" if front.traced else "designs",
+                "points": len(front.points),
+                "separation / DN": f"{low[0]:.1f} to {high[0]:.1f}",
+                "sensitivity": f"{low[1]:.4f} to {high[1]:.4f}",
+                "hypervolume": area,
+                "of the box": f"{area / box.area:.1%}" if box.area > 0 else "-",
+            }
+        )
+    return pd.DataFrame(rows)

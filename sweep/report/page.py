@@ -1,0 +1,126 @@
+"""Draw the figures and write the HTML report of a finished run."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import pandas as pd
+import pyarrow as pa
+
+from ..metrics.objective import Objective
+from ..results.inventory import Inventory
+from ..results.lock import locked
+from ..results.names import FIGURES, REPORT, is_drawn
+from ..results.output import Output
+from ..results.profiles import profile_table
+from ..results.tables import csv_of, encoded
+from . import tables
+from . import values as content
+from .figures import draw_chart, draw_clouds, draw_curves, draw_pareto, rendered
+from .names import readable
+from .noise import all_series, recognition_table
+from .page_data import payload
+from .pages import inlined, library, page, rows, script
+from .published import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
+from .scenes import effect_table, scene_groups, scene_table
+from .series import draw_series
+from .summary import answer_sentences, counts_line, summary_lines
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def make_report(output: Output, *, mend: bool = False) -> None:
+    """Write `pareto.png`/`.svg`, `figures/*`, the comparison with published figures and `report.html`.
+
+    `mend`: those alone that are missing, damaged or out of date. Raises OutputError where a file of others has the name
+    of one of them or the disk refuses.
+    """
+    with locked(output.folder):
+        inventory = Inventory(output.folder)
+        listed = [name for name in inventory.files if is_drawn(name)]
+        wrong = inventory.wrong({REPORT, *listed})
+        if mend and not wrong:
+            return
+        some = wrong if mend and REPORT not in wrong else None
+        contents = _contents(output, some)
+        inventory.write({n: made for n, made in contents.items() if not mend or n in wrong or n not in listed})
+        inventory.remove(n for n in listed if n not in contents and (some is None or n in some))
+
+
+def _contents(output: Output, some: Iterable[str] | None) -> dict[str, bytes]:
+    """The files of the report -> what they hold; `some` of them, or all, since the page has every picture in it."""
+    images, contents = [], dict[str, bytes]()
+    for name, caption, figure in _drawings(output):
+        where = name if name.startswith("pareto") else f"{FIGURES}/{name}"
+        for kind in ("png", "svg"):
+            if some is None or {f"{where}.png", f"{where}.svg"} & {*some}:
+                contents[f"{where}.{kind}"] = rendered(figure, kind)
+        if some is None:
+            images.append((caption, inlined(contents[f"{where}.png"])))
+    published = comparison_with_published(output)
+    if len(published):
+        contents[PUBLISHED_CSV] = csv_of(published).encode("utf-8")
+        contents[PUBLISHED_PARQUET] = encoded(pa.Table.from_pandas(published, preserve_index=False))
+    if some is None:
+        contents[REPORT] = _html(output, images, published).encode("utf-8")
+    return contents
+
+
+def _html(output: Output, images: Sequence[tuple[str, str]], published: pd.DataFrame) -> str:
+    drawn = payload(output)
+    groups = scene_groups(output)
+    return page(
+        "report.html.j2",
+        study=output.study,
+        folder=output.folder.as_posix(),
+        quoted=shlex.quote(output.folder.as_posix()),
+        objective=str(Objective.model_validate(output.study["objective"])),
+        objective_words=readable(output.objective),
+        answer=answer_sentences(output),
+        counts=counts_line(output),
+        interactive=drawn if drawn["views"] or drawn["series"] else None,
+        profiles={cfa: rows(profile_table(found)) for cfa, found in output.profiles.items()},
+        history=drawn["history"],
+        plotly=library(),
+        script=script("report.js"),
+        groups=groups,
+        scenes=rows(scene_table(groups)),
+        group_rows=[rows(effect_table(group)) for group in groups],
+        audited=output.audited is not None,
+        images=images,
+        comparison=rows(tables.comparison_table(output)),
+        best=rows(tables.best_table(output)),
+        recognition=rows(recognition_table(output)),
+        geometry=rows(tables.geometry_table(output)),
+        published=rows(published),
+        constraints={name: str(bound) for name, bound in output.constraints.items()},
+        summary=summary_lines(output),
+        provenance=output.provenance,
+        limited=(output.provenance.get("search") or {}).get("limit_proven") is not None,
+    )
+
+
+def _drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
+    """(file name, caption, figure) of everything that is drawn."""
+    scenario = next(iter(output.study["scenarios"]))
+    cfas = list(dict.fromkeys(str(m["cfa"]) for m in content.modifications(output)))
+    for number, cfa in enumerate(cfas or [None]):
+        figure = draw_pareto(content.pareto_figure(output, scenario, cfa))
+        yield ("pareto" if number == 0 else f"pareto-{number + 1}"), f"Trade-off{f' of {cfa}' if cfa else ''}", figure
+    for number, cfa in enumerate(cfas):
+        yield f"filters-{number + 1}", f"Filters of {cfa}", draw_curves(content.filters_figure(output, cfa))
+    for number, series in enumerate(all_series(output)):
+        yield f"series-{number + 1}", series.title, draw_series(series)
+    yield "sensor", "Quantum efficiency of the sensor", draw_curves(content.sensor_figure(output))
+    yield "signals", "Spectra of the signals", draw_curves(content.lights_figure(output))
+    yield "chart", "The color checker chart", draw_chart(content.chart_figure(output))
+    for name, caption, kinds in (
+        ("clouds-cfas", "Signals in the channels of the plain CFAs", ("reference",)),
+        ("clouds-designs", "Signals in the channels of the named and the found designs", ("design", "search")),
+    ):
+        found = content.clouds(output, *kinds)
+        if found:
+            yield name, caption, draw_clouds(found, caption, max(1.0, 1.05 * float(output.points["dn"].max())))

@@ -1,0 +1,258 @@
+"""What the report's page draws by itself: the data of its script, as plain values and packed numbers."""
+
+from __future__ import annotations
+
+import base64
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ..metrics.pareto import knee
+from ..results.output import Output
+from . import values as content
+from .figures import COLORS, CURVE_COLORS, TYPE_COLORS, ParetoFigure, even
+from .history import history_of
+from .names import readable
+from .noise import all_series
+from .series import SeriesFigure
+from .tables import QUANTITIES
+
+_MOST_POINTS = 6_000
+"""Swept designs of each group, feasible or not, that the page holds; the front and the named designs are all there."""
+_BEST_ROWS = 9
+GROUPS = ("infeasible", "feasible", "front", "named", "best")
+_PUBLISHED = "RYN_4Cy"
+_PUBLISHED_LABEL = "our counterpart of the paper's N_4"
+
+
+def payload(output: Output) -> dict[str, Any]:
+    """Everything that the page's script needs, ready for JSON; no NaN but inside packed numbers."""
+    rows = _rows(output)
+    columns = _columns(output, rows)
+    return {
+        "study": str(output.study["study"]),
+        "axes": {"x": output.trade_off[1], "y": output.trade_off[0]},
+        "objective": output.objective,
+        "parameters": [name for name in output.parameters if name in columns],
+        "columns": columns,
+        "groups": list(GROUPS),
+        "group": _packed(_groups(rows), "u1"),
+        "design_id": _packed(rows["design_id"], "f8"),
+        "scenario": _words(rows["scenario"]),
+        "cfa": _words(rows["cfa"]),
+        "names": {str(at): _names(output, row) for at, row in enumerate(rows.to_dict("records")) if _is_named(row)},
+        "views": list(_views(output, rows)),
+        "curves": _curves(output),
+        "clouds": _clouds(output, rows),
+        "cloud_scenario": next(iter(output.study["scenarios"])),
+        "profiles": _profiles(output),
+        "history": _history(output),
+        "front": _front(output, rows),
+        "series": [_series(series) for series in all_series(output)],
+        "swept": bool((rows["kind"] == "sweep").any()),
+        "colors": {"groups": COLORS, "curves": CURVE_COLORS, "types": TYPE_COLORS},
+        "folder": shlex.quote(output.folder.as_posix()),
+    }
+
+
+def _packed(values: Any, kind: str) -> dict[str, str]:
+    """Numbers as base64 of little-endian bytes, which cost a third of their digits."""
+    return {"dtype": kind, "bdata": base64.b64encode(np.asarray(values).astype(f"<{kind}").tobytes()).decode("ascii")}
+
+
+def _words(values: pd.Series) -> dict[str, Any]:
+    """A column of words: the words, and the number of each row's word."""
+    codes, words = pd.factorize(values.astype(str))
+    return {"words": [str(word) for word in words], "codes": _packed(codes, "u2")}
+
+
+def _rows(output: Output) -> pd.DataFrame:
+    """Designs to show: all on the front, named or found, and an even share of the others."""
+    table = output.table[(output.table["status"] == "ok") & (output.table["kind"] != "reference")]
+    swept = table["kind"] == "sweep"
+    always = ~swept | (table["pareto"] & table["feasible"])
+    parts = [table[always], output.best.head(_BEST_ROWS)]
+    for feasible in (False, True):
+        others = table[~always & (table["feasible"] == feasible)]
+        parts.append(others.iloc[even(len(others), _MOST_POINTS)])
+    return pd.concat(parts).drop_duplicates("design_id").sort_values("design_id", ignore_index=True)
+
+
+def _groups(rows: pd.DataFrame) -> np.ndarray:
+    """Index into GROUPS of each row."""
+    front = rows["feasible"] & rows["pareto"]
+    return np.select(
+        [rows["kind"] == "search", rows["kind"] == "design", front, rows["feasible"]], [4, 3, 2, 1], default=0
+    )
+
+
+def _is_named(row: Mapping[Any, Any]) -> bool:
+    return isinstance(row["name"], str)
+
+
+def _names(output: Output, row: Mapping[Any, Any]) -> dict[str, str]:
+    """A design's name, to write beside its point and in full; the published one says so."""
+    entry = output.study.get("designs", {}).get(row["name"], {})
+    name = str(row["name"])
+    return {"short": name, "long": f"{name} ({_PUBLISHED_LABEL})" if entry.get("at") == _PUBLISHED else name}
+
+
+def _columns(output: Output, rows: pd.DataFrame) -> dict[str, dict[str, Any]]:
+    """Column -> label, digits and values of everything that says something about a design."""
+    wanted = (
+        *output.trade_off,
+        *output.parameters,
+        *output.distances,
+        *QUANTITIES,
+        *output.further,
+        "violation",
+    )
+    found = {}
+    for name in dict.fromkeys(wanted):
+        values = rows[name].to_numpy(dtype=float)
+        if np.isfinite(values).any() or name in output.trade_off:
+            digits = 1 if "csd_" in name else 2 if name in output.parameters else 4
+            label = name if name in output.parameters else readable(name)
+            found[name] = {"label": label, "digits": digits, "values": _packed(values, "f4")}
+    return found
+
+
+def _views(output: Output, rows: pd.DataFrame) -> Iterator[dict[str, Any]]:
+    """What is drawn around the points of each scenario and CFA: lines, levels of plain CFAs, bound, knee."""
+    for scenario in output.study["scenarios"]:
+        for cfa in dict.fromkeys(str(m["cfa"]) for m in content.modifications(output)):
+            figure = content.pareto_figure(output, scenario, cfa)
+            yield {
+                "scenario": scenario,
+                "cfa": cfa,
+                "title": figure.title,
+                "x_label": figure.x_label,
+                "y_label": figure.y_label,
+                "lines": {n: [p.x.tolist(), p.y.tolist()] for n, p in figure.lines.items()},
+                "levels": {name: float(level) for name, level in figure.levels.items() if np.isfinite(level)},
+                "bound": figure.bound,
+                "bound_text": figure.bound_text,
+                "knee": _knee(figure, output, rows[(rows["scenario"] == scenario) & (rows["cfa"] == cfa)]),
+            }
+
+
+def _knee(figure: ParetoFigure, output: Output, rows: pd.DataFrame) -> int | None:
+    """Row of the front's knee."""
+    front = figure.groups["front"]
+    order = np.argsort(front.x, kind="stable")
+    values = np.stack([front.x[order], front.y[order]], axis=1)
+    found = knee(values)
+    if found is None:
+        return None
+    x, y = values[found]
+    same = rows[(rows[output.trade_off[1]] == x) & (rows[output.trade_off[0]] == y)]
+    return int(same.index[0])
+
+
+def _curves(output: Output) -> dict[str, Any]:
+    """QE of the sensor's and the kept designs' channels over the wavelength, and the limits'."""
+    kept: dict[str, list[dict[str, str]]] = {}
+    for column in output.curves.columns:
+        kind, _, rest = column.partition(":")
+        if kind in ("design", "front"):
+            kept.setdefault(rest.split(":")[0], []).append(_packed(output.curves[column], "f4"))
+    return {
+        "wavelength_nm": _packed(output.curves["wavelength_nm"], "f4"),
+        "sensor": {c.removeprefix("qe:"): _packed(output.curves[c], "f4") for c in _starting(output, "qe:")},
+        "limits": {c.removeprefix("limit:"): _packed(output.curves[c], "f4") for c in _starting(output, "limit:")},
+        "designs": kept,
+        "ends": {cfa: content.end_curves(output, cfa) for cfa in dict.fromkeys(output.table["cfa"].astype(str))},
+    }
+
+
+def _starting(output: Output, prefix: str) -> list[str]:
+    return [column for column in output.curves.columns if column.startswith(prefix)]
+
+
+def _clouds(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
+    """Signals' digital numbers of the kept designs: [n_channels x n_signals] each, channel by channel."""
+    points = output.points[output.points["design_id"].isin(rows["design_id"])]
+    found: dict[str, Any] = {"designs": {}, "channels": {}, "types": []}
+    for design, own in points.groupby("design_id", sort=False):
+        channels = list(dict.fromkeys(own["channel"]))
+        dn = own["dn"].to_numpy(dtype=float).reshape(-1, len(channels))
+        found["types"] = found["types"] or list(own["signal_type"].to_numpy().reshape(-1, len(channels))[:, 0])
+        cfa = str(rows.loc[rows["design_id"] == design, "cfa"].iloc[0])
+        found["channels"][cfa] = channels
+        found["designs"][str(design)] = _packed(dn.T, "f4")
+    return found
+
+
+def _profiles(output: Output) -> dict[str, Any]:
+    return {
+        cfa: [
+            {
+                "parameter": p.parameter,
+                "values": p.values.tolist(),
+                "best": p.best.tolist(),
+                "drop": p.drop,
+                "keeps": list(p.keeps),
+            }
+            for p in found
+        ]
+        for cfa, found in output.profiles.items()
+    }
+
+
+def _history(output: Output) -> dict[str, Any] | None:
+    history = history_of(output)
+    if history is None:
+        return None
+    return {
+        "starts": [{"number": start.number, "best": _finite(start.best)} for start in history.starts],
+        "evaluations": history.evaluations.tolist(),
+        "best": _finite(history.best),
+        "volume": None if history.volume is None else history.volume.tolist(),
+        "least_sensitivity": history.least_sensitivity,
+        "label": readable(output.objective),
+    }
+
+
+def _finite(values: np.ndarray) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]
+
+
+def _series(series: SeriesFigure) -> dict[str, Any]:
+    return {
+        "title": series.title,
+        "x_label": series.x_label,
+        "y_label": series.y_label,
+        "x": series.x.tolist(),
+        "lines": {
+            name: {"y": _finite(line.y), "upper": None if line.upper is None else _finite(line.upper)}
+            for name, line in series.lines.items()
+        },
+        "band": series.band,
+        "log_x": series.log_x,
+        "log_y": series.log_y,
+        "from_zero": series.from_zero,
+        "level": series.level,
+    }
+
+
+def _front(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
+    """The feasible front, every digit of it, for its file."""
+    own = rows[rows["feasible"] & rows["pareto"] & (rows["kind"] == "sweep")]
+    names = ["design_id", "scenario", "cfa", *_used(own, output.parameters), *output.distances]
+    names += [name for name in dict.fromkeys((*QUANTITIES, *output.further)) if name not in names]
+    return {"columns": names, "rows": [[_plain(value) for value in row] for row in own[names].itertuples(index=False)]}
+
+
+def _used(rows: pd.DataFrame, names: Sequence[str]) -> list[str]:
+    return [name for name in names if rows[name].notna().any()]
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, (int, np.integer)):
+        return int(value)
+    if isinstance(value, (float, np.floating)):
+        return float(value) if np.isfinite(value) else None
+    return str(value)

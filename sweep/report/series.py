@@ -1,0 +1,133 @@
+"""A quantity over the scenarios that differ in one number: against distance, exposure or visibility."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import pandas as pd
+
+from ..types import FloatArray
+from .figures import CURVE_CYCLE, canvas, canvas_grid
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_WIDE = 15.0
+_LEAST_DN = 1e-6
+_LABELS = {
+    "distance_m": "distance / m",
+    "exposure_s": "exposure / s",
+    "visibility_m": "visibility / m",
+    "intensity_cd": "luminous intensity / cd",
+    "read_noise_e": "read noise / e",
+    "dark_e_per_s": "dark current / (e/s)",
+    "level": "exposure: brightest channel on white / full scale",
+}
+
+
+@dataclass(frozen=True)
+class Line:
+    """A design: values over the numbers, ndarray[n], and, where it has one, the upper end of its band."""
+
+    y: FloatArray
+    upper: FloatArray | None
+
+
+@dataclass(frozen=True)
+class SeriesFigure:
+    """A line per design over `x` (ndarray[n]), the number `key` of the scenarios; `level` is marked."""
+
+    title: str
+    key: str
+    y_label: str
+    x: FloatArray
+    lines: Mapping[str, Line]
+    band: str
+    log_y: bool = False
+    from_zero: bool = True
+    level: float | None = None
+
+    @property
+    def x_label(self) -> str:
+        """What the scenarios' number is, with its unit."""
+        return _LABELS.get(self.key, self.key)
+
+    @property
+    def log_x(self) -> bool:
+        """Whether the numbers span more than a decade."""
+        return bool(self.x.min() > 0 and self.x.max() / self.x.min() > _WIDE)
+
+
+def draw_series(series: SeriesFigure) -> Figure:
+    """Draw a line with its band per design; numbers over more than a decade are drawn on a logarithmic axis."""
+    figure, axes = canvas(8.0, 4.8)
+    for (name, line), color in zip(series.lines.items(), CURVE_CYCLE * 4, strict=False):
+        axes.plot(series.x, line.y, "o-", color=color, label=name, linewidth=1.5, markersize=3.5)
+        if line.upper is not None:
+            axes.fill_between(series.x, line.y, line.upper, color=color, alpha=0.2, linewidth=0)
+    if series.log_x:
+        axes.set_xscale("log")
+    axes.set_xlabel(series.x_label)
+    axes.set_ylabel(series.y_label)
+    if series.log_y:
+        axes.set_yscale("log")
+    elif series.from_zero:
+        axes.set_ylim(bottom=0)
+    if series.level is not None:
+        axes.axhline(series.level, color="#666666", linestyle="--", linewidth=1.0)
+    axes.set_title(series.title)
+    legend = f"band: {series.band}" if series.band else None
+    axes.legend(title=legend, fontsize=8, title_fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False)
+    return figure
+
+
+def draw_work_precision(table: pd.DataFrame, name: str) -> Figure:
+    """Error against time for each scenario's ladder of tolerances: realized (full line) and promised (dashed).
+
+    `table`: columns scenario, tolerance_dn, seconds, reference_s, promised_dn, realized_dn. Errors below 1e-6 DN are
+    drawn there.
+    """
+    figure, axes = canvas(8.5, 5.0)
+    for (scenario, rows), color in zip(table.groupby("scenario", sort=False), CURVE_CYCLE * 4, strict=False):
+        ladder = rows.sort_values("tolerance_dn")
+        for column, style in (("realized_dn", "o-"), ("promised_dn", "x--")):
+            label = str(scenario) if column == "realized_dn" else None
+            errors = ladder[column].clip(lower=_LEAST_DN)
+            axes.plot(ladder["seconds"], errors, style, color=color, label=label, linewidth=1.3, markersize=4)
+        axes.axvline(float(rows["reference_s"].iloc[0]), color=color, linestyle=":", linewidth=1.0)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlabel("time / s (dotted: everything on)")
+    axes.set_ylabel("error of a CSD / DN (full: realized, dashed: promised)")
+    axes.set_title(f"{name}: what accuracy costs")
+    axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0, frameon=False)
+    return figure
+
+
+def draw_knobs(table: pd.DataFrame, name: str) -> Figure:
+    """A panel per knob: the error of each of its settings against its time, named at the points.
+
+    `table`: columns knob, scenario, setting, error_dn, seconds, oracle. Errors below 1e-6 DN are drawn there.
+    """
+    knobs = list(table.groupby("knob", sort=False))
+    figure, panels = canvas_grid(2, 3, 12.0, 7.0)
+    for axes, (knob, rows) in zip(panels, knobs, strict=False):
+        axes.plot(rows["seconds"], rows["error_dn"].clip(lower=_LEAST_DN), "o", color=CURVE_CYCLE[0], markersize=4)
+        for row in rows.to_dict("records"):
+            at = (row["seconds"], max(row["error_dn"], _LEAST_DN))
+            axes.annotate(row["setting"], at, xytext=(4, 3), textcoords="offset points", fontsize=7)
+        if rows["seconds"].max() / rows["seconds"].min() > _WIDE:
+            axes.set_xscale("log")
+        else:
+            axes.set_xlim(0, 1.25 * rows["seconds"].max())
+        axes.set_yscale("log")
+        axes.margins(x=0.25, y=0.15)
+        axes.set_title(f"{knob} ({rows['scenario'].iloc[0]})", fontsize=9)
+        axes.set_xlabel("time / s", fontsize=8)
+        axes.set_ylabel(f"error / DN (against {rows['oracle'].iloc[0]})", fontsize=8)
+    for axes in panels[len(knobs) :]:
+        axes.set_visible(False)
+    figure.suptitle(f"{name}: what single settings cost")
+    return figure

@@ -1,0 +1,1 @@
+"""A folder on disk: written atomically, read back as one object."""

@@ -1,0 +1,27 @@
+"""Names that commands give to the files of a run."""
+
+from __future__ import annotations
+
+import re
+
+from .tables import AUDIT, CURVES, FRONT, POINTS, PROVENANCE, RECOGNITION, RESOLVED, RESULTS, SEARCH_LOG
+
+RUN, SUMS = "run.json", "SHA256SUMS"
+REPORT, FIGURES = "report.html", "figures"
+TABLES = (RESULTS, SEARCH_LOG, FRONT, CURVES, POINTS, RECOGNITION)
+MADE_BY_RUN = frozenset((*TABLES, RESOLVED, PROVENANCE))
+"""What a run itself writes beside its list; the report draws from it, `sweep audit` adds a table."""
+_DRAWN = re.compile(
+    r"report\.html|pareto(-\d+)?\.(png|svg)|paper_comparison\.(csv|parquet)"
+    r"|figures/((filters|series)-\d+|sensor|signals|chart|clouds-(cfas|designs))\.(png|svg)"
+)
+
+
+def is_drawn(name: str) -> bool:
+    """Whether it is a file of the report."""
+    return _DRAWN.fullmatch(name) is not None
+
+
+def is_own(name: str) -> bool:
+    """Whether it is a name that commands give to files of a run, beside its two lists."""
+    return name in MADE_BY_RUN or name == AUDIT or is_drawn(name)

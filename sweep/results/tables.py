@@ -1,0 +1,280 @@
+"""Parquet and JSON on disk: explicit schema, atomic writes, shards that a kill cannot harm."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
+from ..errors import Fault, OutputError
+from ..types import BoolArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SCHEMA_VERSION = "2"
+RESULTS = "results.parquet"
+SEARCH_LOG = "search.parquet"
+FRONT = "front.parquet"
+CURVES = "curves.parquet"
+POINTS = "points.parquet"
+RECOGNITION = "recognition.parquet"
+AUDIT = "audit.parquet"
+PROVENANCE = "provenance.json"
+PROVENANCE_KEYS = (
+    "designs",
+    "duration_s",
+    "fingerprint",
+    "lights",
+    "plans",
+    "sensor",
+    "trade_off",
+    "warnings",
+    "workers",
+)
+"""What is read there again; one of an earlier version may lack some."""
+RESOLVED = "study.resolved.yaml"
+_REPEATING = "cfa_sweep_parameters"
+ROW_GROUP = 131_072
+"""Rows that are read and written at once."""
+_TABLES_AHEAD = 3
+Seal = Callable[[Path], None]
+"""Sees a file that is written to its end, before it takes its name."""
+
+
+def result_schema(parameters: Sequence[str], quantities: Sequence[str]) -> pa.Schema:
+    """Columns of the result table: keys, a column per parameter (unit in its name), quantities, verdicts."""
+    text, number = pa.dictionary(pa.int32(), pa.string()), pa.float64()
+    fields = [pa.field("design_id", pa.int64(), nullable=False)]
+    fields += [pa.field(name, text) for name in ("kind", "name", "cfa", "family", "scenario")]
+    fields += [pa.field(name, number) for name in (*parameters, *quantities, "violation", "limit", "gap")]
+    fields += [pa.field("feasible", pa.bool_()), pa.field("pareto", pa.bool_())]
+    fields += [pa.field("plan", text), pa.field("promised_dn", number), pa.field("status", text)]
+    return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION, _REPEATING: json.dumps(list(parameters))})
+
+
+def search_schema(parameters: Sequence[str]) -> pa.Schema:
+    """Columns of the search's log: one row per evaluation of the smooth response.
+
+    `sensitivity_min` is the level of the front that the evaluation belongs to; null in the search itself.
+    """
+    text, number = pa.dictionary(pa.int32(), pa.string()), pa.float64()
+    fields = [pa.field("scenario", text), pa.field("sensitivity_min", number)]
+    fields += [pa.field("start", pa.int32()), pa.field("evaluation", pa.int32())]
+    names = (*parameters, "objective", "sensitivity", "cfa_sensitivity", "violation")
+    fields += [pa.field(name, number) for name in names]
+    return pa.schema([*fields, pa.field("status", text)], metadata={"cfa_sweep_schema": SCHEMA_VERSION})
+
+
+def front_schema(parameters: Sequence[str]) -> pa.Schema:
+    """Columns of the trade-off that the search traces: one row per level of sensitivity."""
+    number = pa.float64()
+    names = ("sensitivity_min", "objective", "sensitivity", "limit", "gap", *parameters)
+    fields = [pa.field(name, number) for name in names] + [pa.field("evaluations", pa.int64())]
+    return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION})
+
+
+def _unsealed(_: Path) -> None:
+    """Nothing is noted of a file before it takes its name."""
+
+
+@contextmanager
+def atomic(path: Path, seal: Seal = _unsealed) -> Iterator[Path]:
+    """Give a hidden name beside `path`; on success it is synced and takes the name of `path`, else it is removed.
+
+    `seal` sees the whole hidden file before it takes its name. A symbolic link at `path` is replaced, not followed.
+    Raises OutputError when the disk refuses (full, read-only, no permission). A reader sees the old file or the new
+    one, never a part.
+    """
+    hidden = path.with_name(f".tmp-{os.getpid()}-{path.name}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        hidden.unlink(missing_ok=True)
+        hidden.touch(exist_ok=False)  # a new file, not what a link of this name leads to
+        yield hidden
+        with hidden.open("rb") as handle:
+            os.fsync(handle.fileno())
+        seal(hidden)
+        hidden.replace(path)
+    except OSError as error:
+        raise OutputError(Fault(f"cannot be written: {error.strerror or error}", str(path))) from None
+    finally:
+        with suppress(OSError):  # where it could not be made, for example below a file
+            hidden.unlink()
+
+
+def write_table(table: pa.Table, path: Path, seal: Seal = _unsealed) -> None:
+    """Write one Parquet file atomically, with a checksum of each page; `seal` and errors as for `atomic`."""
+    with atomic(path, seal) as hidden:
+        _write_table(table, hidden, row_group_size=ROW_GROUP)
+
+
+def write_bytes(content: bytes, path: Path, seal: Seal = _unsealed) -> None:
+    """Write one file atomically; `seal` and errors as for `atomic`."""
+    with atomic(path, seal) as hidden:
+        hidden.write_bytes(content)
+
+
+def write_text(text: str, path: Path) -> None:
+    """Write one UTF-8 text file atomically; errors as for `atomic`."""
+    write_bytes(text.encode("utf-8"), path)
+
+
+def write_csv(table: pd.DataFrame, path: Path) -> None:
+    """Write one CSV file with every digit, atomically; errors as for `atomic`."""
+    write_text(csv_of(table), path)
+
+
+def csv_of(table: pd.DataFrame) -> str:
+    """A table as CSV with every digit.
+
+    Pandas alone would print numbers as NumPy's print options say, which other libraries change.
+    """
+    return table.to_csv(index=False, float_format=_every_digit)
+
+
+def _every_digit(value: Any) -> str:
+    return repr(float(value))
+
+
+def json_of(data: Mapping[str, Any]) -> str:
+    """A mapping as the text of a JSON file, its keys in order."""
+    return json.dumps(data, indent=2, sort_keys=True, allow_nan=False) + "\n"
+
+
+def write_json(data: Mapping[str, Any], path: Path) -> None:
+    """Write one JSON file atomically; errors as for `atomic`."""
+    write_text(json_of(data), path)
+
+
+def _write_table(table: pa.Table, where: Any, **options: Any) -> None:
+    """Write a Parquet file whose pages carry checksums (CRC-32), which readers can verify."""
+    pq.write_table(table, where, use_dictionary=_repeating(table.schema), write_page_checksum=True, **options)
+
+
+def encoded(table: pa.Table) -> bytes:
+    """A table as the bytes of a Parquet file."""
+    sink = pa.BufferOutputStream()
+    _write_table(table, sink)
+    return bytes(sink.getvalue().to_pybytes())
+
+
+def decoded(content: bytes, schema: pa.Schema, rows: int) -> pa.Table | None:
+    """The table of a Parquet file's bytes; None where they hold no such table of so many rows.
+
+    Nothing but its size and its schema is looked at before these fit, so that no more memory is taken than they need.
+    """
+    try:
+        file = pq.ParquetFile(pa.BufferReader(content), page_checksum_verification=True)
+        if file.metadata.num_rows != rows or not file.schema_arrow.equals(schema):
+            return None
+        table = file.read()
+        # What the file says of its rows besides, such as their detours, stays.
+        return table.replace_schema_metadata({**(table.schema.metadata or {}), **(schema.metadata or {})})
+    except (OSError, pa.ArrowException):
+        return None
+
+
+def write_tables(tables: Iterable[pa.Table], schema: pa.Schema, path: Path, seal: Seal = _unsealed) -> None:
+    """Write tables as one Parquet file, in full row groups, one of which is in memory; else as `write_table`.
+
+    The next table is made while one is written.
+    """
+    words = _repeating(schema)
+    with (
+        atomic(path, seal) as hidden,
+        pq.ParquetWriter(hidden, schema, use_dictionary=words, write_page_checksum=True) as writer,
+    ):
+        waiting: list[pa.Table] = []
+
+        def write() -> None:
+            writer.write_table(pa.concat_tables(waiting).unify_dictionaries(), row_group_size=ROW_GROUP)
+            waiting.clear()
+            release_memory()
+
+        for table in _ahead(iter(tables)):
+            waiting.append(table)
+            if sum(part.num_rows for part in waiting) >= ROW_GROUP:
+                write()
+        if waiting:
+            write()
+
+
+def _ahead(tables: Iterator[pa.Table]) -> Iterator[pa.Table]:
+    """The same tables; a thread makes the next few while one is used."""
+    with ThreadPoolExecutor(1) as thread:
+        coming = deque(thread.submit(next, tables, None) for _ in range(_TABLES_AHEAD))
+        while (table := coming.popleft().result()) is not None:
+            coming.append(thread.submit(next, tables, None))
+            yield table
+
+
+def _repeating(schema: pa.Schema) -> list[str] | bool:
+    """Columns to store as a dictionary of their values: words and parameters; measured values hardly repeat."""
+    parameters = (schema.metadata or {}).get(_REPEATING.encode())
+    if parameters is None:
+        return True
+    return [field.name for field in schema if pa.types.is_dictionary(field.type)] + list(json.loads(parameters))
+
+
+def batches(path: Path) -> Iterator[pa.Table]:
+    """A Parquet file in tables of a row group each; raises OutputError when it is missing or damaged."""
+    try:
+        # Buffered ahead, a whole file would be in memory.
+        file = pq.ParquetFile(path, pre_buffer=False, page_checksum_verification=True)
+        for batch in file.iter_batches(ROW_GROUP):
+            yield pa.Table.from_batches([batch])
+    except (OSError, pa.ArrowException) as error:
+        raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
+
+
+def best_rows(table: pa.Table, order: Sequence[str], most: int) -> pa.Table:
+    """The best rows by columns that are maximized, in their order; of equal ones the smallest `design_id`."""
+    keys = [*((name, "descending") for name in dict.fromkeys(order)), ("design_id", "ascending")]
+    return table.take(pc.sort_indices(table, sort_keys=keys)[:most]).combine_chunks()
+
+
+def sliced(path: Path, sizes: Iterable[int]) -> Iterator[pa.Table]:
+    """The rows of a Parquet file in tables of these sizes, a row group in memory; raises OutputError when damaged."""
+    groups = batches(path)
+    rest = None
+    for size in sizes:
+        while rest is None or rest.num_rows < size:
+            more = next(groups, None)
+            if more is None:
+                raise OutputError(Fault("has too few rows", str(path)))
+            rest = more if rest is None else pa.concat_tables([rest, more])
+        yield rest.slice(0, size)
+        rest = rest.slice(size)
+
+
+def holds(table: pa.Table, column: str, *words: str) -> BoolArray:
+    """Where a column of words (dictionary-encoded) holds one of `words`, ndarray[n_rows]."""
+    found = [np.zeros(0, dtype=bool)]
+    for chunk in table[column].chunks:
+        at = [index for index, word in enumerate(chunk.dictionary.to_pylist()) if word in words]
+        found.append(np.isin(chunk.indices.fill_null(-1).to_numpy(), at))
+    return np.concatenate(found)
+
+
+def release_memory() -> None:
+    """Give memory that Arrow keeps for later back to the system."""
+    pa.default_memory_pool().release_unused()
+
+
+def read_table(path: Path) -> pa.Table:
+    """Read a Parquet file; raises OutputError when it is missing or damaged."""
+    try:
+        return pq.read_table(path, page_checksum_verification=True)
+    except (OSError, pa.ArrowException) as error:
+        raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None

@@ -1,0 +1,64 @@
+"""A result table of any length, thinned to what a report shows: the front exactly, the named, the best, a sample."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from ..errors import Fault, OutputError
+from .tables import batches, best_rows, holds, release_memory
+
+MOST_ROWS = 150_000
+"""A table of up to this many rows is kept whole."""
+_BEST = 100
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Rows of the whole table: all, feasible, feasible and on the Pareto front, failed; and how many were left out."""
+
+    rows: int
+    feasible: int
+    front: int
+    failed: int
+    left_out: int
+
+
+def thinned(
+    path: Path, order: Sequence[str], see: Callable[[pa.Table], None] = lambda _: None
+) -> tuple[pd.DataFrame, Counts]:
+    """The table to show and the counts of the whole one; no more than a row group and what is kept are in memory.
+
+    Kept are all rows that are no sweep, the whole Pareto front, the best feasible designs by `order` (columns, all
+    maximized) and of the others every n-th. `see` is handed every row group of the whole table.
+    """
+    try:
+        total = int(pq.read_metadata(path).num_rows)
+    except (OSError, pa.ArrowException) as error:
+        raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
+    every = max(1, -(-total // MOST_ROWS))
+    kept: list[pa.Table] = []
+    best: pa.Table | None = None
+    feasible = front = failed = 0
+    for table in batches(path):
+        see(table)
+        ok, on_front = table["feasible"].to_numpy(), table["pareto"].to_numpy()
+        feasible += int(ok.sum())
+        front += int((ok & on_front).sum())
+        failed += int((~holds(table, "status", "ok")).sum())
+        always = ~holds(table, "kind", "sweep") | on_front
+        kept.append(table.filter(pa.array(always | (table["design_id"].to_numpy() % every == 0))))
+        if every > 1:
+            few = table.filter(pa.array(ok & ~always))
+            best = best_rows(few if best is None else pa.concat_tables([best, few]), order, _BEST)
+        release_memory()
+    if best is not None:
+        kept.append(best)
+    frame: pd.DataFrame = pa.concat_tables(kept).unify_dictionaries().to_pandas()
+    frame = frame.drop_duplicates("design_id").sort_values("design_id", ignore_index=True)
+    return frame, Counts(total, feasible, front, failed, total - len(frame))

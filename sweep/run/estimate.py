@@ -1,0 +1,124 @@
+"""What a run would do: how much of it is finished already, and what the rest takes in time, memory and disk."""
+
+from __future__ import annotations
+
+import resource
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import pyarrow as pa
+from threadpoolctl import threadpool_limits
+
+from ..results.folder import held_by
+from ..results.inventory import Inventory
+from ..results.journal import Journal
+from ..results.tables import RESULTS, encoded
+from ..study import Study
+from ..types import Progress
+from .plans import with_plans
+from .rows import Job, rules_of
+from .stop import Stop
+from .sweep import Sweep
+from .workers import Workers
+
+_SAMPLE = 256
+_BUDGET_S = 10.0
+_Kind = tuple[str, str, str]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Designs in all and finished already; chunks, seconds, bytes of memory and of disk of the others."""
+
+    designs: int
+    kept: int
+    chunks: int
+    seconds: float
+    memory_bytes: float
+    disk_bytes: float
+    searches: int
+
+
+def estimate(study: Study, output: Path, n_jobs: int, progress: Progress) -> Estimate:
+    """Plan, look at what is kept, and compute a few designs of every kind of chunk in this process."""
+    held = held_by(output)
+    whole = held is not None and held.is_of(study) and not Inventory(output).wrong([RESULTS], quick=True)
+    crew = Workers(n_jobs, Stop())
+    study = with_plans(study, crew.count, progress)
+    journal = Journal(output)
+    journal.check()
+    sweep = Sweep(study, rules_of(study), journal, crew)
+    todo = [] if whole else [job for job, key in zip(sweep.jobs, sweep.keys, strict=True) if key not in journal.entries]
+    rows = sum(job.stop - job.start for job in todo)
+    seconds, bytes_per_row = 0.0, 0.0
+    if todo:
+        seconds, bytes_per_row = _sampled(sweep, todo)
+    own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+    searches = 0 if whole or study.search is None else study.search.max_evaluations
+    memory = float(own) * (crew.count + 1 if crew.count > 1 else 1)
+    return Estimate(
+        study.n_designs,
+        study.n_designs - rows,
+        len(todo),
+        seconds / crew.count,
+        memory,
+        2 * rows * bytes_per_row,
+        searches,
+    )
+
+
+def _sampled(sweep: Sweep, todo: list[Job]) -> tuple[float, float]:
+    """Seconds of one worker for all of `todo`, and bytes per row, from the first designs of each kind of chunk."""
+    rows: dict[_Kind, int] = {}
+    firsts: dict[_Kind, Job] = {}
+    for job in todo:
+        kind: _Kind = (job.space.kind, job.space.name, job.scenario)
+        rows[kind] = rows.get(kind, 0) + job.stop - job.start
+        firsts.setdefault(kind, job)
+    ordered = sorted(firsts, key=lambda kind: -rows[kind])  # the largest first
+    tables: list[pa.Table] = []
+    total, measured = 0.0, 0
+    with threadpool_limits(1):
+        for per_row, table, kind in _measured(sweep, [(kind, firsts[kind]) for kind in ordered]):
+            total += per_row * rows[kind]
+            measured += rows[kind]
+            tables.append(table)
+    sample = pa.concat_tables(tables).unify_dictionaries()
+    bytes_per_row = (len(encoded(sample)) - len(encoded(sample.slice(0, 1)))) / max(1, sample.num_rows - 1)
+    return total * sum(rows.values()) / measured, bytes_per_row
+
+
+def _measured(sweep: Sweep, kinds: list[tuple[_Kind, Job]]) -> Iterator[tuple[float, pa.Table, _Kind]]:
+    """Seconds per design, sampled rows and kind, until the budget is spent."""
+    begun = time.monotonic()
+    for kind, job in kinds:
+        few = replace(job, stop=min(job.stop, job.start + _SAMPLE))
+        sweep.compute(replace(job, stop=job.start + 1))  # makes the scene's kernel
+        started = time.monotonic()
+        table = sweep.compute(few)
+        yield (time.monotonic() - started) / (few.stop - few.start), table, kind
+        if time.monotonic() - begun > _BUDGET_S:
+            return
+
+
+def estimate_lines(found: Estimate, output: Path) -> list[str]:
+    """The estimate in words."""
+    new = found.designs - found.kept
+    lines = [f"{found.designs:,} designs: {found.kept:,} finished, {new:,} in {found.chunks:,} chunks to compute."]
+    if new:
+        lines.append(
+            f"About {_time(found.seconds)}, {found.memory_bytes / 2**20:,.0f} MiB of memory, "
+            f"{found.disk_bytes / 2**20:,.1f} MiB of disk (half of it until the run is whole)."
+        )
+    if found.searches:
+        lines.append(f"The search's evaluations (at most {found.searches:,} and its front) come on top.")
+    return [*lines, f"Results go to {output}/; nothing was computed or written."]
+
+
+def _time(seconds: float) -> str:
+    if seconds < 120:
+        return f"{seconds:.1f} s"
+    return f"{seconds / 60:.0f} minutes" if seconds < 7200 else f"{seconds / 3600:.1f} hours"

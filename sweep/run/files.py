@@ -1,0 +1,223 @@
+"""The files of a run, each made from what it needs: all of them, or those that are missing or damaged."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import chain
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from ..metrics.bound import FEASIBLE
+from ..metrics.pareto import hypervolume
+from ..results.inventory import Inventory
+from ..results.journal import Journal
+from ..results.names import TABLES
+from ..results.tables import (
+    CURVES,
+    FRONT,
+    POINTS,
+    PROVENANCE,
+    RECOGNITION,
+    RESOLVED,
+    RESULTS,
+    SEARCH_LOG,
+    holds,
+    json_of,
+    sliced,
+    write_tables,
+)
+from ..search.limit import Limit
+from ..study import Study
+from ..types import Progress
+from .answers import Kept
+from .curves import curves_table, points_table
+from .front import Front, Gathered, few_of
+from .provenance import plan_facts, provenance, resolved_yaml
+from .recognition import recognition_table
+from .routes import Detours, detours_in_words
+from .rows import Rules, detours_of, with_local_front
+from .search import SearchAnswer, answer_row, front_table, limit_alone, run_search, search_facts, search_log
+from .sweep import Sweep
+from .workers import Workers
+
+
+def files_of(study: Study) -> set[str]:
+    """Names of the files that a run of the study makes."""
+    names = {RESULTS, CURVES, POINTS, RESOLVED, PROVENANCE}
+    if study.search is not None:
+        names |= {SEARCH_LOG, FRONT} if study.search.levels else {SEARCH_LOG}
+    asked = study.section.recognition
+    return names | ({RECOGNITION} if asked is not None and asked.patches else set())
+
+
+@dataclass
+class Making:
+    """One run of a study whose scenes are planned, in a folder that it holds.
+
+    `fail_fast`, `retry_failed` as for `Sweep.run`; `started`: when the run began, by the monotonic clock, seconds.
+    """
+
+    study: Study
+    rules: Rules
+    inventory: Inventory
+    crew: Workers
+    progress: Progress
+    fail_fast: bool
+    retry_failed: bool
+    started: float
+    made: set[str] = field(default_factory=set)
+    _failed: int = 0
+    _warnings: list[str] = field(default_factory=list)
+
+    def make(self, names: set[str]) -> None:
+        """Make these files; where a table comes out other than it was listed, all others, too.
+
+        Provenance comes last: what a folder without it holds is not a finished run.
+        """
+        before = dict(self.inventory.files)
+        todo = names
+        while todo:
+            if RESULTS in todo:
+                self._sweep()
+            if todo & {SEARCH_LOG, FRONT}:
+                self._write_search(todo)
+            if todo & {CURVES, POINTS, RECOGNITION}:
+                self._write_drawn(todo)
+            if RESOLVED in todo:
+                self.inventory.write({RESOLVED: resolved_yaml(self.study).encode("utf-8")})
+            if PROVENANCE in todo:
+                self.inventory.write({PROVENANCE: json_of(self._provenance()).encode("utf-8")})
+            self.made |= todo
+            changed = {n for n in self.made if before.get(n) != self.inventory.files[n]}
+            todo = files_of(self.study) - self.made if changed & {*TABLES} else set()
+        if changed:
+            self.inventory.outdate(rows=bool(changed & {*TABLES}))
+        self.journal.remove()
+
+    @cached_property
+    def journal(self) -> Journal:
+        """What an interrupted run has kept."""
+        journal = Journal(self.inventory.folder)
+        journal.check()
+        return journal
+
+    @cached_property
+    def sweep(self) -> Sweep:
+        """The chunks of the study."""
+        return Sweep(self.study, self.rules, self.journal, self.crew)
+
+    @cached_property
+    def answer(self) -> SearchAnswer | None:
+        """The search's, which comes first: a study that no design meets ends here."""
+        if self.study.search is None:
+            return None
+        parallel = Kept(self.crew, self.journal, self.sweep.fingerprint)
+        return run_search(self.study, self.study.search, parallel, self.progress)
+
+    @cached_property
+    def gathered(self) -> Gathered:
+        """What is drawn of the rows, out of the result table, which is as it was written."""
+        gathered = self._gathering()
+        sizes = [job.stop - job.start for job in self.sweep.jobs]
+        path = self.inventory.path(RESULTS)
+        parts = sliced(path, sizes if self.study.search is None else [*sizes, 1])
+        for job, table in zip(self.sweep.jobs, parts, strict=False):
+            self._failed += int(np.count_nonzero(~holds(table, "status", "ok")))
+            gathered.add(few_of(with_local_front(table, job, self.rules), self.rules))
+        for row in parts:  # the search's answer
+            gathered.add(row.set_column(row.schema.get_field_index("pareto"), "pareto", pa.array([True])))
+        gathered.finish()
+        return gathered
+
+    def _gathering(self) -> Gathered:
+        return Gathered(self.rules, next(iter(self.study.scenarios)))
+
+    def _sweep(self) -> None:
+        """Search and sweep, and write the result table."""
+        results = self.inventory.path(RESULTS)
+        intact = RESULTS in self.inventory.files and not self.inventory.wrong([RESULTS])
+        if intact and not self.inventory.facts.pop("detours", []):
+            self.sweep.refill(results)
+        answer, gathered, sweep = self.answer, self._gathering(), self.sweep
+        sweep.run(gathered, self.progress, fail_fast=self.fail_fast, retry_failed=self.retry_failed)
+        answered = [] if answer is None else [answer_row(self.study, answer, self.rules, self.study.n_designs)]
+        for row in answered:
+            gathered.add(row)
+        gathered.finish()
+        tables = map(gathered.front.marked, chain(sweep.tables(), answered))
+        write_tables(tables, self.rules.schema, results, self.inventory.seal(RESULTS))
+        detours: Detours = sum(map(detours_of, answered), sweep.detours)
+        self.inventory.facts["detours"] = [{"how": how, "why": why, "designs": n} for (how, why), n in detours.items()]
+        self.gathered, self._failed, self._warnings = gathered, sweep.failed, sweep.warnings
+
+    def _write_search(self, names: set[str]) -> None:
+        assert self.answer is not None
+        if SEARCH_LOG in names:
+            self.inventory.write_table(SEARCH_LOG, search_log(self.answer))
+        if FRONT in names:
+            self.inventory.write_table(FRONT, front_table(self.answer))
+
+    def _write_drawn(self, names: set[str]) -> None:
+        rows, on_front = self.gathered.frame(), self.gathered.front_frame()
+        if CURVES in names:
+            self.inventory.write_table(CURVES, curves_table(self.study, rows, on_front, self._limit()))
+        if POINTS in names:
+            self.inventory.write_table(POINTS, points_table(self.study, rows, on_front))
+        if RECOGNITION in names:
+            table = recognition_table(self.study, rows, self.crew, self.progress)
+            assert table is not None
+            self.inventory.write_table(RECOGNITION, table)
+
+    def _limit(self) -> Limit | None:
+        """The search's limit, found alone where the search itself need not be repeated."""
+        if "answer" in self.__dict__ or self.study.search is None:
+            return None if self.answer is None else self.answer.limit
+        return limit_alone(self.study, self.study.search)
+
+    def _provenance(self) -> dict[str, Any]:
+        study, gathered, answer = self.study, self.gathered, self.answer
+        found: dict[str, Any] = {
+            "designs": study.n_designs + (answer is not None),
+            "failed": self._failed,
+            "plans": plan_facts(study),
+            "trade_off": study.trade_off,
+            "detours": self.inventory.facts.setdefault("detours", []),
+        }
+        counted: Detours = Counter({(each["how"], each["why"]): each["designs"] for each in found["detours"]})
+        warnings = [*study.warnings, *self._warnings, *detours_in_words(counted)]
+        if answer is not None:
+            found["search"] = search_facts(study, answer)
+            if study.plans[answer.search.scenario].methods.saturation == "clip":
+                warnings.append("signals can saturate; the search sees the response before that, its row after")
+            if answer.front:
+                found["hypervolume"] = _hypervolumes(answer, gathered.swept)
+                found["hypervolume_least_sensitivity"] = answer.search.levels[0]
+        self.inventory.facts.setdefault("duration_s", round(time.monotonic() - self.started, 3))
+        return provenance(study, self.inventory.facts) | found | {"warnings": warnings}
+
+
+def fits(inventory: Inventory, study: Study, rules: Rules) -> bool:
+    """Whether the result table has the columns and the rows that this version of the program gives it."""
+    try:
+        held = pq.read_metadata(inventory.path(RESULTS))
+        wanted = study.n_designs + (study.search is not None)
+        return held.num_rows == wanted and bool(held.schema.to_arrow_schema().equals(rules.schema))
+    except (OSError, pa.ArrowException):
+        return False
+
+
+def _hypervolumes(answer: SearchAnswer, swept: Front) -> dict[str, float]:
+    """Area that the designs of sweep and search dominate above no separation and the lowest level of sensitivity."""
+    reference = np.array([0.0, answer.search.levels[0] - 1e-6])
+    runs = (*answer.runs, *(run for point in answer.front for run in point.runs))
+    found = [[e.objective, e.sensitivity] for run in runs for e in run.log if e.violation <= FEASIBLE]
+    return {
+        "sweep": hypervolume(swept.points(answer.search.space.cfa, answer.search.scenario), reference),
+        "search": hypervolume(np.array(found).reshape(-1, 2), reference),
+    }

@@ -1,0 +1,144 @@
+"""From finished chunks to one table: the front over all of them, and the few rows that reports draw, by streaming."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+
+from ..metrics.pareto import non_dominated
+from ..results.tables import best_rows, holds
+from ..types import BoolArray, FloatArray, IndexArray
+from .rows import Rules
+
+BEST_PER_CFA = 5
+"""Best feasible designs of each CFA's sweeps that the report lists and draws."""
+FRONT_ROWS = 200
+"""Designs of a front, spread evenly over it, whose curves and signals a report can show."""
+_MOST_CANDIDATES = 50_000
+_ALWAYS = ("reference", "design", "search")
+
+
+class Front:
+    """The non-dominated rows of each CFA and scenario, of tables whose `pareto` marks those of each table alone.
+
+    Both quantities of `axes` are maximized. A design takes part when it meets every constraint but those on these two,
+    so that the front shows the whole trade-off.
+    """
+
+    def __init__(self, axes: tuple[str, str], kind: str | None = None) -> None:
+        """`kind`: of the rows that take part; all without one."""
+        self._axes, self._kind = axes, kind
+        self._groups: dict[tuple[str, str], FloatArray] = {}
+        self._on_it: dict[tuple[str, str], set[tuple[float, ...]]] = {}
+
+    def add(self, table: pa.Table) -> None:
+        """Take in the rows that a table marks."""
+        for group, values in self._by_group(table).items():
+            both = np.concatenate([self._groups.get(group, np.empty((0, 2))), values])
+            if len(both) > _MOST_CANDIDATES:
+                both = _thinned(both)
+            self._groups[group] = both
+
+    def finish(self) -> None:
+        """Nothing more comes."""
+        self._groups = {group: _thinned(values) for group, values in self._groups.items()}
+        self._on_it = {group: set(map(tuple, values.tolist())) for group, values in self._groups.items()}
+
+    def points(self, cfa: str, scenario: str) -> FloatArray:
+        """The two quantities of a front's rows, ndarray[n, 2], each pair once."""
+        return self._groups.get((cfa, scenario), np.empty((0, 2)))
+
+    def marked(self, table: pa.Table) -> pa.Table:
+        """The table with `pareto` only where a row is on the whole front, which is finished."""
+        local, values, groups = self._candidates(table)
+        kept = [tuple(v) in self._on_it.get(g, ()) for v, g in zip(values.tolist(), groups, strict=True)]
+        front: BoolArray = np.zeros(table.num_rows, dtype=bool)
+        front[local] = kept
+        return table.set_column(table.schema.get_field_index("pareto"), table.schema.field("pareto"), pa.array(front))
+
+    def _candidates(self, table: pa.Table) -> tuple[IndexArray, FloatArray, list[tuple[str, str]]]:
+        wanted = table["pareto"].to_numpy()
+        if self._kind is not None:
+            wanted = wanted & holds(table, "kind", self._kind)
+        local = np.flatnonzero(wanted)
+        few = table.select([*self._axes, "cfa", "scenario"]).take(pa.array(local))
+        values = np.stack([few[name].to_numpy() for name in self._axes], axis=1)
+        return local, values, list(zip(few["cfa"].to_pylist(), few["scenario"].to_pylist(), strict=True))
+
+    def _by_group(self, table: pa.Table) -> dict[tuple[str, str], FloatArray]:
+        _, values, groups = self._candidates(table)
+        return {g: values[[other == g for other in groups]] for g in dict.fromkeys(groups)}
+
+
+def _thinned(values: FloatArray) -> FloatArray:
+    """The non-dominated rows, each once."""
+    return np.unique(values[non_dominated(values)], axis=0)
+
+
+class Gathered:
+    """What a run keeps of its rows: the front of all of them, that of the swept ones, and those that reports draw.
+
+    Those are every plain CFA, named design and answer, and in the first scenario the best swept designs of each CFA and
+    some of its front.
+    """
+
+    def __init__(self, rules: Rules, scenario: str) -> None:
+        """`scenario`: the first one, in which swept designs are drawn."""
+        self.rules, self.scenario = rules, scenario
+        self.front, self.swept = Front(rules.front), Front(rules.front, "sweep")
+        self._always: list[pa.Table] = [self.rules.schema.empty_table()]
+        self._best: dict[str, pa.Table] = {}
+        self._feasible: dict[str, pa.Table] = {}
+
+    def add(self, few: pa.Table) -> None:
+        """Take in what `few_of` a table gives."""
+        self.front.add(few)
+        self.swept.add(few)
+        always = holds(few, "kind", *_ALWAYS)
+        if always.any():
+            self._always.append(few.filter(pa.array(always)))
+        candidates = holds(few, "kind", "sweep") & holds(few, "scenario", self.scenario)
+        swept = few.filter(pa.array(candidates & few["feasible"].to_numpy()))
+        for cfa in swept["cfa"].unique().to_pylist():
+            own = swept.filter(pa.array(holds(swept, "cfa", cfa)))
+            both = pa.concat_tables([self._best[cfa], own]) if cfa in self._best else own
+            self._best[cfa] = best_rows(both, self.rules.order, BEST_PER_CFA)
+            marked = own.filter(own["pareto"])
+            both = pa.concat_tables([self._feasible[cfa], marked]) if cfa in self._feasible else marked
+            self._feasible[cfa] = self._non_dominated(both) if both.num_rows > _MOST_CANDIDATES else both
+
+    def _non_dominated(self, table: pa.Table) -> pa.Table:
+        values = np.stack([table[name].to_numpy() for name in self.rules.front], axis=1)
+        return table.filter(pa.array(non_dominated(values))).combine_chunks()
+
+    def finish(self) -> None:
+        """Nothing more comes."""
+        self.front.finish()
+        self.swept.finish()
+
+    def frame(self) -> pd.DataFrame:
+        """The rows to draw, `pareto` as on the whole front; ordered by their ids."""
+        return self._frame([*self._always, *self._best.values()])
+
+    def front_frame(self) -> pd.DataFrame:
+        """Feasible swept rows of the whole front in the first scenario, of each CFA evenly up to FRONT_ROWS."""
+        tables = [self.rules.schema.empty_table()]
+        for table in self._feasible.values():
+            found = self.front.marked(table)
+            found = found.filter(found["pareto"]).sort_by([(self.rules.front[1], "ascending")])
+            spread = np.linspace(0, max(0, found.num_rows - 1), min(FRONT_ROWS, found.num_rows)).round().astype(int)
+            tables.append(found.take(pa.array(spread)))
+        return self._frame(tables)
+
+    def _frame(self, tables: list[pa.Table]) -> pd.DataFrame:
+        frame: pd.DataFrame = self.front.marked(pa.concat_tables(tables).unify_dictionaries()).to_pandas()
+        return frame.sort_values("design_id", ignore_index=True)
+
+
+def few_of(table: pa.Table, rules: Rules) -> pa.Table:
+    """The rows of a chunk that `Gathered` may keep: those on its front, those that are no sweep, its best designs."""
+    wanted = table["pareto"].to_numpy() | holds(table, "kind", *_ALWAYS)
+    rest = table.filter(pa.array(table["feasible"].to_numpy() & ~wanted))
+    few = pa.concat_tables([table.filter(pa.array(wanted)), best_rows(rest, rules.order, BEST_PER_CFA)])
+    return few.combine_chunks()

@@ -1,0 +1,72 @@
+"""Where results come from: the resolved study, versions, digests, seed, platform."""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+from collections.abc import Mapping
+from dataclasses import asdict
+from importlib.metadata import version
+from io import StringIO
+from typing import Any
+
+from ruamel.yaml import YAML
+
+from ..results.identity import MODEL_VERSION, fingerprint
+from ..study import Study
+
+_PACKAGES = ("cfa-sweep", "numpy", "scipy", "numba", "scikit-learn", "pandas", "pyarrow", "joblib", "nlopt", "moocore")
+
+
+def resolved_yaml(study: Study) -> str:
+    """The study with every default written out; a study file itself."""
+    section = study.section.model_dump(mode="json", by_alias=True, exclude_none=True)
+    for key in ("sensor", "lights"):
+        section[key] = section[key].get("builtin", {k: v for k, v in section[key].items() if k != "builtin"})
+    text = StringIO()
+    yaml = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = False
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
+    yaml.dump(section, text)
+    return text.getvalue()
+
+
+def plan_facts(study: Study) -> dict[str, Any]:
+    """How each scene was simulated."""
+    return {
+        name: {
+            "key": plan.key,
+            "tolerance_dn": plan.tolerance_dn,
+            "promised_dn": plan.promised_dn,
+            "work": plan.work,
+            "reference_work": plan.reference_work,
+            "effects": [asdict(choice) for choice in plan.choices],
+        }
+        for name, plan in study.plans.items()
+    }
+
+
+def provenance(study: Study, how: Mapping[str, Any]) -> dict[str, Any]:
+    """Everything needed to run the study again, and what the machine was.
+
+    `how`: `command`, `duration_s`, `backend`, `scheduler` and `workers` of the run.
+    """
+    return {
+        "command": how["command"],
+        "duration_s": how["duration_s"],
+        "seed": study.section.seed,
+        "fingerprint": fingerprint(study),
+        "model_version": MODEL_VERSION,
+        "data_sha256": dict(study.digests),
+        "sensor": {"name": study.sensor.name, "source": study.sensor.source, "surrogate": study.sensor.surrogate},
+        "lights": {"name": study.lights.name, "source": study.lights.source, "surrogate": study.lights.surrogate},
+        "versions": {"python": platform.python_version()} | {name: version(name) for name in _PACKAGES},
+        "platform": platform.platform(),
+        "byte_order": sys.byteorder,
+        "cores": os.cpu_count(),
+        "backend": how["backend"],
+        "scheduler": how["scheduler"],
+        "workers": how["workers"],
+        "threads_per_worker": 1,
+    }

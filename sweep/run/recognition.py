@@ -1,0 +1,53 @@
+"""Recognition from raw patches: a row for each plain CFA, named design and answer of the search in each scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import joblib
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+
+from ..camera.imager import imager_of
+from ..camera.view import Setup
+from ..metrics.recognition import columns, recognize
+from ..study import Study
+from ..types import FloatArray, Progress
+from .curves import row_curves
+from .search import Parallel
+
+_KINDS = ("reference", "design", "search")
+
+
+def recognition_table(
+    study: Study, highlights: pd.DataFrame, parallel: Parallel, progress: Progress
+) -> pa.Table | None:
+    """Columns `design_id`, those of a design's name, `patches` and `recognition.columns`; None where none are drawn.
+
+    The random numbers of a row follow from the study's seed and its id.
+    """
+    asked = study.section.recognition
+    if asked is None or not asked.patches:
+        return None
+    keys = ["design_id", "kind", "name", "cfa", "scenario"]
+    rows = highlights[highlights["kind"].isin(_KINDS) & (highlights["status"] == "ok")].to_dict("records")
+    tasks = []
+    for row in rows:
+        space, curves = row_curves(study, row)
+        seed = (study.section.seed, int(row["design_id"]))
+        setup = study.setup(space, row["scenario"])
+        tasks.append(joblib.delayed(_recognized)(setup, curves, study.states, asked.patches, seed))
+    found = []
+    for row, values in zip(rows, parallel(iter(tasks)), strict=False):
+        found.append({key: row[key] for key in keys} | {"patches": asked.patches} | values)
+        progress("patches", len(found), len(rows))
+    text, number = pa.string(), pa.float64()
+    fields = [("design_id", pa.int64()), *((key, text) for key in keys[1:]), ("patches", pa.int64())]
+    return pa.Table.from_pylist(found, schema=pa.schema([*fields, *((name, number) for name in columns())]))
+
+
+def _recognized(
+    setup: Setup, curves: FloatArray, states: Sequence[str], patches: int, seed: tuple[int, int]
+) -> dict[str, float]:
+    return recognize(imager_of(setup), curves, states, patches, np.random.default_rng(seed))

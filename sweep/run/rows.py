@@ -1,0 +1,246 @@
+"""Jobs: chunks of designs, and the rows that they give."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from ..camera.plan.plan import Plan
+from ..camera.view import Setup
+from ..designs.block import by_edges
+from ..designs.space import Space
+from ..metrics.bound import FEASIBLE, Bound, total_violation
+from ..metrics.objective import Objective
+from ..metrics.pareto import non_dominated
+from ..results.identity import CHUNK
+from ..results.tables import holds, result_schema
+from ..study import Study
+from ..types import BoolArray, FloatArray
+from .routes import Asked, Detours, Found, block_of
+
+_WORDS = pa.dictionary(pa.int32(), pa.string())
+_MOST_CHUNKS, _LEAST_JOBS = 16, 64
+_DETOURS = b"cfa_sweep_detours"
+
+
+@dataclass(frozen=True)
+class Job:
+    """A run of consecutive designs of one space in one scenario; `first_id` is the row id of its first design."""
+
+    space: Space
+    scenario: str
+    start: int
+    stop: int
+    first_id: int
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What turns designs into rows: the table's schema, its quantities and the verdicts on them.
+
+    `front`: the two quantities of the Pareto front, whose constraints the designs on it need not meet.
+    """
+
+    schema: pa.Schema
+    columns: tuple[str, ...]
+    objective: Objective
+    constraints: Mapping[str, Bound]
+    front: tuple[str, str]
+    edge_shift_nm: float
+    plans: Mapping[str, Plan]
+    states: tuple[str, ...]
+
+    @property
+    def asked(self) -> Asked:
+        """What is asked of each design."""
+        return Asked(self.columns, self.objective, self.edge_shift_nm, self.states)
+
+    @property
+    def order(self) -> tuple[str, ...]:
+        """Quantities that say which design is best, the first one first, all maximized."""
+        return (self.objective.column, *self.front)
+
+
+def jobs_of(study: Study) -> Iterator[Job]:
+    """All jobs in the order of their rows."""
+    first_id = 0
+    for scenario in study.scenarios:
+        for space in study.spaces:
+            size = _job_size(study, space)
+            for start in range(0, space.size, size):
+                yield Job(space, scenario, start, min(start + size, space.size), first_id + start)
+            first_id += space.size
+
+
+def _job_size(study: Study, space: Space) -> int:
+    """Designs of a job: several chunks where many designs cost next to nothing, so that a job is not mostly overhead.
+
+    It does not depend on the workers, and so neither do the rows.
+    """
+    if study.states or not by_edges(space):
+        return CHUNK
+    return CHUNK * min(max(1, space.size // (CHUNK * _LEAST_JOBS)), _MOST_CHUNKS)
+
+
+def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
+    """Evaluate a job; a design that fails is a row with its status, and the others are kept.
+
+    `pareto` marks the non-dominated designs of this job alone, among those that meet every constraint but those on the
+    front's axes; `compaction.Front` finds those of the whole table. `detours_of` the table says which designs took
+    another route than their block's own.
+    """
+    points = job.space.points(job.start, job.stop)
+    found = _quantities(job, setup, rules)
+    columns, faults = found.columns, found.faults
+    ok = np.ones(len(points), dtype=bool)
+    ok[list(faults)] = False
+    own = job.space.violation(points)
+    violation = total_violation(columns, rules.constraints, own)
+    values = (
+        _labels(job)
+        | _how(rules.plans.get(job.scenario), len(points))
+        | {name: points[:, i] for i, name in enumerate(job.space.parameters)}
+        | columns
+    )
+    values |= {
+        "violation": np.where(ok, violation, np.nan),
+        "feasible": ok & (violation <= FEASIBLE),
+        "pareto": _local_front(columns, ok, own, rules),
+        "status": _status(faults, len(points)),
+    }
+    return _with_detours(_table(values, len(points), rules.schema), found.detours)
+
+
+def _local_front(columns: Mapping[str, FloatArray], ok: BoolArray, own: FloatArray, rules: Rules) -> BoolArray:
+    """The non-dominated designs of a chunk among those that meet every constraint but those on the front's axes."""
+    eligible = ok & (total_violation(columns, rules.constraints, own, leave_out=rules.front) <= FEASIBLE)
+    return non_dominated(np.stack([columns[name] for name in rules.front], axis=1), eligible)
+
+
+def with_local_front(table: pa.Table, job: Job, rules: Rules) -> pa.Table:
+    """A job's rows from a finished table, `pareto` again as `run_job` marks it, with the words alone that they use."""
+    names = {*rules.front, *rules.constraints}
+    columns = {name: table[name].to_numpy() for name in names}
+    marked = _local_front(
+        columns, holds(table, "status", "ok"), job.space.violation(job.space.points(job.start, job.stop)), rules
+    )
+    found = [
+        pa.array(marked) if f.name == "pareto" else table[f.name].cast(pa.string() if f.type == _WORDS else f.type)
+        for f in rules.schema
+    ]
+    return pa.table(found, names=rules.schema.names).cast(rules.schema)
+
+
+def job_key(job: Job, fingerprint: str, plan: Plan | None) -> str:
+    """SHA-256 of everything that a job's rows depend on; `fingerprint`: of the study, its data and the model."""
+    parts = [fingerprint, "" if plan is None else plan.key, job.scenario, job.space.kind, job.space.name]
+    return hashlib.sha256(json.dumps([*parts, job.start, job.stop]).encode()).hexdigest()
+
+
+def failed_rows(job: Job, rules: Rules, status: str) -> pa.Table:
+    """Rows of a job that could not be computed."""
+    points = job.space.points(job.start, job.stop)
+    values = (
+        _labels(job)
+        | _how(rules.plans.get(job.scenario), len(points))
+        | {name: points[:, i] for i, name in enumerate(job.space.parameters)}
+        | dict.fromkeys(("feasible", "pareto"), np.zeros(len(points), dtype=bool))
+    )
+    return _table(values | {"status": _word(status, len(points))}, len(points), rules.schema)
+
+
+def rules_of(study: Study) -> Rules:
+    """The rules of a study."""
+    schema = result_schema(study.parameters, study.columns)
+    return Rules(
+        schema,
+        study.columns,
+        study.objective,
+        study.constraints,
+        study.trade_off,
+        study.edge_shift_nm,
+        study.plans,
+        study.states,
+    )
+
+
+def _quantities(job: Job, setup: Setup, rules: Rules) -> Found:
+    """Every quantity, what went wrong with which design, and detours; a chunk at a time, which stays in the cache."""
+    parts: list[Found] = []
+    faults: dict[int, str] = {}
+    for start in range(job.start, job.stop, CHUNK):
+        part = block_of(job.space, start, min(start + CHUNK, job.stop), setup, rules.asked)
+        parts.append(part)
+        faults |= {start - job.start + index: text for index, text in part.faults.items()}
+    columns = {name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns}
+    return Found(columns, faults, sum((part.detours for part in parts), Counter()))
+
+
+def joined(tables: Sequence[pa.Table]) -> pa.Table:
+    """The rows of several tables of jobs, with the detours of all."""
+    detours = sum((detours_of(table) for table in tables), Counter())
+    return _with_detours(pa.concat_tables(tables).unify_dictionaries(), detours)
+
+
+def detours_of(table: pa.Table) -> Detours:
+    """How many designs of a job took another route than their block's own, and why."""
+    kept = (table.schema.metadata or {}).get(_DETOURS)
+    return Counter({(kind, fault): n for kind, fault, n in json.loads(kept)} if kept else {})
+
+
+def _with_detours(table: pa.Table, detours: Detours) -> pa.Table:
+    """The table with its detours in its metadata, which go where its rows go."""
+    if not detours:
+        return table
+    kept = json.dumps([(kind, fault, n) for (kind, fault), n in detours.items()]).encode()
+    return table.replace_schema_metadata({**(table.schema.metadata or {}), _DETOURS: kept})
+
+
+def _word(text: str | None, n: int) -> pa.Array:
+    """The same word, or none, in n rows."""
+    if text is None:
+        return pa.nulls(n, _WORDS)
+    return pa.DictionaryArray.from_arrays(pa.array(np.zeros(n, dtype=np.int32)), pa.array([text]))
+
+
+def _status(faults: Mapping[int, str], n: int) -> pa.Array:
+    """`ok`, but for the designs with a fault."""
+    if not faults:
+        return _word("ok", n)
+    return pa.array([faults.get(index, "ok") for index in range(n)], type=_WORDS)
+
+
+def _labels(job: Job) -> dict[str, Any]:
+    n, space = job.stop - job.start, job.space
+    return {
+        "design_id": np.arange(job.first_id, job.first_id + n),
+        "kind": _word(space.kind, n),
+        "name": _word(None if space.kind == "sweep" else space.name, n),
+        "cfa": _word(space.cfa, n),
+        "family": _word("none" if space.filter is None else space.filter.family.kind, n),
+        "scenario": _word(job.scenario, n),
+    }
+
+
+def _how(plan: Plan | None, n: int) -> dict[str, Any]:
+    """How the scene was simulated: the plan's key and its promise."""
+    return {} if plan is None else {"plan": _word(plan.key, n), "promised_dn": np.full(n, plan.promised_dn)}
+
+
+def _table(values: Mapping[str, pa.Array | FloatArray | BoolArray], n: int, schema: pa.Schema) -> pa.Table:
+    """Columns in the schema's order; a column that the space does not have is null, as is NaN."""
+
+    def column(field: pa.Field) -> pa.Array:
+        made = values.get(field.name)
+        if made is None:
+            return pa.nulls(n, field.type)
+        return made if isinstance(made, pa.Array) else pa.array(made, type=field.type, from_pandas=True)
+
+    return pa.Table.from_arrays([column(field) for field in schema], schema=schema)

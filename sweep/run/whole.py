@@ -1,0 +1,119 @@
+"""The whole run: what is finished stays, what is missing or damaged is made."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..disk import read_facts
+from ..errors import InfeasibleError, StudyError
+from ..results.folder import begin
+from ..results.inventory import Inventory
+from ..results.journal import Journal
+from ..results.lock import LOCK, locked
+from ..results.tables import PROVENANCE, PROVENANCE_KEYS, RESOLVED, RESULTS
+from ..study import Study
+from ..types import Progress
+from .files import Making, files_of, fits
+from .plans import with_plans
+from .provenance import resolved_yaml
+from .rows import rules_of
+from .stop import Stop, stop_on_signals
+from .workers import Workers, workers
+
+_HOW = ("command", "backend", "scheduler", "workers", "duration_s")
+"""What provenance and `run.json` both say of how a run went, so that either makes the other again."""
+_DETOURS = "detours"
+"""Of both as well: which designs took another route than their block's own."""
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """How a run goes about failing designs.
+
+    `fail_fast`: stop at the first one; `retry_failed`: compute the chunks again in which an earlier run had some.
+    """
+
+    fail_fast: bool = False
+    retry_failed: bool = False
+
+
+def run_study(
+    study: Study,
+    output: Path,
+    n_jobs: int,
+    progress: Progress,
+    command: Sequence[str] = (),
+    *,
+    backend: str = "loky",
+    scheduler: str | None = None,
+    wishes: Wishes = Wishes(),
+    stop: Stop | None = None,
+) -> tuple[str, ...]:
+    """Run a study into `output`; what an earlier run of the same study finished is kept, if it is not damaged.
+
+    Writes `results.parquet`, `search.parquet` and `front.parquet` (when the study searches), `curves.parquet`,
+    `points.parquet`, `recognition.parquet` (when the study asks for it), `study.resolved.yaml` and `provenance.json`,
+    each atomically, and lists them with their digests in `run.json` and `SHA256SUMS`. Files that the lists do not name
+    are not touched. Returns the names of the files that were made, none when nothing was left to do.
+
+    Raises OutputError when the folder is in use, holds another study, holds something else under the name of a file of
+    the run, or cannot be written; InfeasibleError, before anything is left behind, when the search finds no feasible
+    design; FailedDesignError for the first failing design, if it is wished; InterruptedRunError after SIGINT or
+    SIGTERM, which are taken here unless the caller takes them into `stop`.
+    """
+    started = time.monotonic()
+    with stop_on_signals(stop) as own, workers(Workers(n_jobs, own, backend, scheduler)) as crew, locked(output):
+        inventory = Inventory(output)
+        mended, wrong, how = inventory.wrong_lists(), _wrong(inventory, study), _how(inventory)
+        retry = wishes.retry_failed and bool(read_facts(output / PROVENANCE).get("failed", 0))
+        if retry or how is None:
+            how = {"command": list(command), "workers": crew.count, "backend": crew.backend, "scheduler": scheduler}
+            how[_DETOURS] = inventory.facts.get(_DETOURS, [])
+        inventory = begin(output, study, how | {"designs": study.n_designs})
+        if wrong == {RESOLVED}:
+            inventory.write({RESOLVED: resolved_yaml(study).encode("utf-8")})
+        elif wrong or retry:
+            try:
+                study = with_plans(study, crew.count, progress, stop=own)
+                rules = rules_of(study)
+                if retry or not fits(inventory, study, rules):
+                    wrong.add(RESULTS)
+                making = Making(study, rules, inventory, crew, progress, wishes.fail_fast, wishes.retry_failed, started)
+                making.make(wrong)
+                wrong |= making.made
+            except (StudyError, InfeasibleError):
+                _discard(inventory)
+                raise
+    return (*mended, *sorted(wrong))
+
+
+def _wrong(inventory: Inventory, study: Study) -> set[str]:
+    """Files of the study's run that are not what a run wrote."""
+    wrong = set(inventory.wrong(sorted(files_of(study))))
+    if not read_facts(inventory.path(PROVENANCE)).keys() >= set(PROVENANCE_KEYS):
+        wrong.add(PROVENANCE)
+    return wrong
+
+
+def _how(inventory: Inventory) -> dict[str, Any] | None:
+    """How the run went that finished in the folder, out of `run.json` or else of provenance; None where none did."""
+    if PROVENANCE not in inventory.files:
+        return None
+    intact = inventory.guarded or not inventory.wrong([PROVENANCE])
+    facts = inventory.facts if inventory.guarded else read_facts(inventory.path(PROVENANCE))
+    known = intact and facts.keys() >= {*_HOW}
+    return {key: facts[key] for key in (*_HOW, _DETOURS) if key in facts} if known else None
+
+
+def _discard(inventory: Inventory) -> None:
+    """Leave nothing of a run that has no result; what others have in the folder stays."""
+    Journal(inventory.folder).remove()
+    if inventory.discard():
+        with suppress(OSError):
+            (inventory.folder / LOCK).unlink()
+            inventory.folder.rmdir()

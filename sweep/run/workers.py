@@ -1,0 +1,213 @@
+"""Calls over worker processes, threads or a cluster: results in order, whatever becomes of the workers."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from itertools import islice
+from multiprocessing import get_context
+from typing import Any
+
+import joblib
+from joblib.externals.loky import ProcessPoolExecutor
+from threadpoolctl import threadpool_limits
+
+from ..errors import SweepError
+from .stop import Stop, without_interrupts
+from .worker_process import keep_freed_memory, preparing
+
+_LEAST_WINDOW, _WINDOW_PER_WORKER = 64, 16
+BACKENDS = ("loky", "threading", "dask")
+Call = tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
+"""A call that `joblib.delayed` has put off."""
+_Numbered = tuple[int, Call]
+
+
+class WorkerKilledError(SweepError):
+    """A call whose worker died twice."""
+
+
+@dataclass(frozen=True)
+class Workers:
+    """How many workers of which kind; never more than the cores, each with one thread for its libraries.
+
+    `scheduler`: address of a Dask scheduler, whose workers are used as they are.
+    """
+
+    n_jobs: int
+    stop: Stop
+    backend: str = "loky"
+    scheduler: str | None = None
+
+    @property
+    def count(self) -> int:
+        """Workers on this machine."""
+        return max(1, min(self.n_jobs, os.cpu_count() or 1))
+
+    def __call__(
+        self,
+        calls: Iterable[Call],
+        killed: Callable[[Call], Any] | None = None,
+        finished: Callable[[int, Any], None] | None = None,
+    ) -> Iterator[Any]:
+        """Results of delayed calls in their order; `finished` gets each with its number as soon as it is there.
+
+        When a worker dies, the calls under way run again, each in a process of its own. One that dies again goes to
+        `killed`, whose answer counts as its result; without it, WorkerKilledError is raised. Raises
+        InterruptedRunError after a stop was asked for and what came within its grace has been handed out. A result
+        that was handed out may be kept in peace: the stop waits until the next one is asked for.
+        """
+        rest = enumerate(calls)
+        early: dict[int, Any] = {}
+        turn = 0
+        # joblib goes on computing while results wait to be taken; a window bounds how many can wait.
+        window = max(_LEAST_WINDOW, _WINDOW_PER_WORKER * joblib.effective_n_jobs(self._n_jobs))
+        while not self.stop.requested and (some := list(islice(rest, window))):
+            for at, result in self._window(deque(some), killed):
+                with self.stop.held():
+                    if finished is not None:
+                        finished(at, result)
+                    early[at] = result
+                    while turn in early:
+                        yield early.pop(turn)
+                        turn += 1
+        self.stop.check()
+
+    def _window(self, waiting: deque[_Numbered], killed: Callable[[Call], Any] | None) -> Iterator[tuple[int, Any]]:
+        """Results of a few calls with their numbers, as they come; those that a stop leaves behind are left out."""
+        flying: dict[int, Call] = {}
+
+        def taken() -> Iterator[Call]:
+            while waiting and not self.stop.requested:
+                at, call = waiting.popleft()
+                flying[at] = call
+                yield (_numbered, (at, call), {})
+
+        while waiting and not self.stop.requested:
+            try:
+                parallel = joblib.Parallel(self._n_jobs, return_as="generator_unordered", pre_dispatch="3*n_jobs")
+                with self.stop.held(), without_interrupts():
+                    results = iter(parallel(taken()))
+                for at, result in self._gracefully(results):
+                    del flying[at]
+                    yield at, result
+            except Exception as error:
+                if not _is_death(error):
+                    raise
+            suspects = list(flying.items())
+            flying.clear()
+            for at, call in suspects:
+                if self.stop.requested:  # it may have ended the workers, too
+                    return
+                with self.stop.grace():
+                    result = self._again(call, killed)
+                yield at, result
+
+    def _gracefully(self, results: Iterator[Any]) -> Iterator[Any]:
+        """The same results; each is waited for as long as a stop allows."""
+        while True:
+            with self.stop.grace():
+                result = next(results, None)
+            if result is None:
+                return
+            yield result
+
+    @property
+    def _n_jobs(self) -> int:
+        return -1 if self.backend == "dask" else self.count
+
+    @staticmethod
+    def _again(call: Call, killed: Callable[[Call], Any] | None) -> Any:
+        try:
+            return alone(call)
+        except WorkerKilledError:
+            if killed is None:
+                raise
+            return killed(call)
+
+
+def usable_backend(backend: str) -> str:
+    """The backend; threads, where this machine has no semaphores for worker processes (no or a read-only /dev/shm)."""
+    if backend != "loky":
+        return backend
+    try:
+        get_context("fork").Semaphore()
+    except (ImportError, OSError):
+        return "threading"
+    return backend
+
+
+@contextmanager
+def workers(how: Workers) -> Iterator[Workers]:
+    """Start the backend and give the workers for as long as the block stands.
+
+    Raises SweepError when Dask is not installed or its scheduler does not answer.
+    """
+    how = replace(how, backend=usable_backend(how.backend))
+    settings: dict[str, Any] = {}
+    keep_freed_memory()  # with one worker, and with threads, the work is done in this process
+    with ExitStack() as stack:
+        stack.enter_context(warnings.catch_warnings())
+        # A run that ends early cancels what it has no use for.
+        warnings.filterwarnings("ignore", message=".*have been cancelled", category=UserWarning)
+        # loky starts a worker anew whose caches have grown, and hands it the calls again.
+        warnings.filterwarnings("ignore", message="A worker stopped while some jobs", category=UserWarning)
+        if how.backend == "dask":
+            stack.enter_context(_dask_client(how.scheduler))
+        elif how.backend == "loky":
+            settings = {"inner_max_num_threads": 1, "initializer": preparing(os.getpid())}
+        # This process computes, too; and a thread that ends gives back what it found, also to those beside it.
+        stack.enter_context(threadpool_limits(1))
+        stack.enter_context(joblib.parallel_config(how.backend, **settings))
+        yield how
+
+
+def alone(call: Call) -> Any:
+    """Result of a call in a process of its own; raises WorkerKilledError when that dies."""
+    process = ProcessPoolExecutor(max_workers=1, initializer=preparing(os.getpid()))
+    ended = False
+    try:
+        with without_interrupts():
+            coming = process.submit(_one_threaded, *call)
+        result = coming.result()
+        ended = True
+        return result
+    except BrokenProcessPool:
+        raise WorkerKilledError("a worker died twice at the same work: out of memory, or killed") from None
+    finally:
+        process.shutdown(kill_workers=not ended)
+
+
+def _one_threaded(function: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
+    """A call whose libraries use one thread: the same sums in the same order with any number of workers."""
+    with threadpool_limits(1):
+        return function(*arguments, **named)
+
+
+def _numbered(at: int, call: Call) -> tuple[int, Any]:
+    """The result of a call, and its number."""
+    return at, _one_threaded(*call)
+
+
+def _is_death(error: Exception) -> bool:
+    """Whether a worker died, as the backends say it: loky's broken pool, or Dask's KilledWorker."""
+    return isinstance(error, BrokenProcessPool) or type(error).__name__ == "KilledWorker"
+
+
+def _dask_client(scheduler: str | None) -> Any:
+    """A client of the scheduler; raises SweepError when Dask is not installed or the scheduler does not answer."""
+    if scheduler is None:
+        raise SweepError("--backend dask needs --scheduler tcp://HOST:PORT")
+    try:
+        from distributed import Client  # noqa: PLC0415  (an extra)
+    except ImportError:
+        raise SweepError("--backend dask needs Dask: pip install 'cfa-sweep[dask]'") from None
+    try:
+        return Client(scheduler, timeout="10s", set_as_default=True)  # type: ignore[no-untyped-call]
+    except (OSError, ValueError) as error:
+        raise SweepError(f"--scheduler {scheduler}: {str(error).splitlines()[0]}") from None

@@ -1,0 +1,1 @@
+"""The best design, and the proof of how good any could be."""

@@ -1,0 +1,243 @@
+"""All filters that a study allows, as a linear program, with bounds that hold whatever the solver's tolerance.
+
+A filter N lies between the least transmission and the base curve and keeps slope and sensitivities: rows a @ N >= h(t),
+where t is what the objective is to reach. A pair of signals whose side is decided is one more row: the difference of
+its responses in the modified channel. Weights y >= 0 of the rows give a bound that holds for any y: a filter that
+reaches t has y @ A N >= y @ h(t), but no filter of the box has more than V(y), the sum over the wavelengths of the
+larger of (A' y) low and (A' y) high. So none reaches a t with y @ h(t) > V(y). The solver's dual values only make it
+tight (Neumaier and Shcherbina, "Safe bounds in linear and mixed-integer linear programming", Math. Program. 99, 2004).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linprog
+from scipy.sparse import csr_matrix, diags_array, hstack, vstack
+
+from ..camera.imager import smooth_imager
+from ..metrics.bound import FEASIBLE, Bound
+from ..types import FloatArray, IndexArray
+from .problem import Problem
+
+ROUNDING = 1e-9
+"""Filters may exceed their base by this share: rounding."""
+_SUM_ROUNDING = 1e-12
+"""Rounding of a sum over rows and wavelengths, relative to the sum of its terms' sizes."""
+_INSIDE_DN = 2e-7
+"""Constrained distances are kept this far inside, beyond the solver's own tolerance."""
+_SOLVER_TOLERANCE = 1e-10
+_LEAST_WEIGHT = 1e-9
+"""Weights smaller than this share of the largest one are rounding, and left out."""
+_HALVINGS = 60
+_SOLVED, _INFEASIBLE = 0, 2
+
+
+@dataclass(frozen=True)
+class Sides:
+    """Pairs of signals with a decided side: their indices, and +1 where the first signal is above the other, or -1."""
+
+    pairs: tuple[int, ...] = ()
+    signs: tuple[float, ...] = ()
+
+    def joined(self, pairs: IndexArray, signs: FloatArray) -> Sides:
+        """These and more pairs."""
+        return Sides((*self.pairs, *map(int, pairs)), (*self.signs, *map(float, signs)))
+
+
+@dataclass(frozen=True)
+class Solved:
+    """What a linear program for a t and some sides found, in the objective's unit.
+
+    `beyond`: no filter with these sides reaches more (-inf: there is none), and already those of `needs` say so.
+    `curve`: the filter with the largest `margin` above t, QE; None where no filter was found.
+    """
+
+    beyond: float
+    margin: float = -np.inf
+    curve: FloatArray | None = None
+    needs: Sides = Sides()
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """Rows a @ N >= h(t) = max(least, rate t) - constant, each an ndarray[n]; `slack`: how far a design that counts as
+    feasible may be below `least`; `rate`: 0 where t does not matter.
+    """
+
+    matrix: csr_matrix
+    least: FloatArray
+    slack: FloatArray
+    rate: FloatArray
+    constant: FloatArray
+
+    def needed(self, t: float, *, relaxed: bool = False) -> FloatArray:
+        """h(t), ndarray[n]; `relaxed`: for designs that only count as feasible."""
+        least = self.least - self.slack if relaxed else self.least
+        return np.asarray(np.maximum(least, np.where(self.rate > 0, self.rate * t, -np.inf)) - self.constant)
+
+
+class FilterProgram:
+    """The filters of a problem without worst cases, and every pair of signals that may come too near.
+
+    `apart`: ndarray[n_pairs, n_wavelengths], DN per QE, the difference of each pair in the modified channel; a pair is
+    that of two signals in one place of the light. `reach`: ndarray[n_pairs, 2]: no filter with the first signal above
+    the other, or below it, reaches more. `top`: no filter at all reaches more (-inf: there is none).
+    `solved` counts the linear programs.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.base = problem.setup.base_qe[0]
+        bound = problem.constraints.get("min_transmission", Bound(min=0.0))
+        least = bound.min or 0.0
+        self.low = self.base * least
+        self._box = self.base * (least - FEASIBLE * bound.scale - ROUNDING), self.base * (1 + ROUNDING)
+        self._rows = self._fixed_rows()
+        self._set_pairs()
+        objective = self._rows.rate > 0
+        ends = (self._rows.matrix @ self._box[1] + self._rows.constant)[objective] / self._rows.rate[objective]
+        self.top = float(min(ends.min(initial=np.inf), self.reach.max(axis=1, initial=-np.inf).min(initial=np.inf)))
+        self._keep(np.flatnonzero(self.needed(max(self.top, 0.0)) > 0))
+        self._sizes = abs(self._rows.matrix) @ self.base, np.abs(self.apart) @ self.base
+        self.solved = 0
+
+    def _fixed_rows(self) -> _Rows:
+        """Slope and sensitivities."""
+        problem, size = self.problem, self.base.size
+        matrices: list[csr_matrix] = [csr_matrix((0, size))]
+        columns: list[FloatArray] = []
+        slope = problem.constraints.get("slope_per_nm")
+        if slope is not None and slope.max is not None:
+            step = csr_matrix(diags_array([-1.0, 1.0], offsets=[0, 1], shape=(size - 1, size)))
+            matrices += [step, -step]
+            step_nm = problem.setup.grid.step_nm
+            one = [-slope.max * step_nm, FEASIBLE * slope.scale * step_nm, 0.0, 0.0]
+            columns.append(np.tile(one, (2 * (size - 1), 1)))
+        for name, (row, constant) in self._sensitivities().items():
+            bound, weight = problem.constraints.get(name), problem.objective.weights.get(name)
+            slack = 0.0 if bound is None else FEASIBLE * bound.scale
+            least = -np.inf if bound is None or bound.min is None else bound.min
+            if least > -np.inf or weight is not None:
+                matrices.append(csr_matrix(row[None]))
+                columns.append(np.array([[least, slack, 0.0 if weight is None else 1 / weight, constant]]))
+            if bound is not None and bound.max is not None:
+                matrices.append(csr_matrix(-row[None]))
+                columns.append(np.array([[-bound.max, slack, 0.0, -constant]]))
+        table = np.concatenate([np.empty((0, 4)), *columns])
+        return _Rows(vstack(matrices).tocsr(), *table.T)
+
+    def _sensitivities(self) -> dict[str, tuple[FloatArray, float]]:
+        """Each sensitivity as (row, constant): row @ N + constant."""
+        setup, size = self.problem.setup, self.base.size
+        counts, modified = setup.mosaic.counts, setup.modified[0]
+        whole = counts.sum() * setup.clear_qe.sum()
+        others = float(np.delete(setup.qe.sum(axis=1) * counts, modified).sum())
+        return {
+            "sensitivity": (np.full(size, 1 / self.base.sum()), 0.0),
+            "cfa_sensitivity": (np.full(size, counts[modified] / whole), others / whole),
+        }
+
+    def _set_pairs(self) -> None:
+        problem, setup = self.problem, self.problem.setup
+        imager, channel = smooth_imager(setup), setup.modified[0]
+        # Exposure does not depend on N, so the response to a filter is linear, plus what does not depend on it.
+        gain = imager.electrons.per_qe(0, self.base[None])[:, :, channel]
+        fixed = np.delete(imager.smooth(self.base[None, None])[0], channel, axis=2)
+        apart, columns = [np.empty((0, self.base.size))], [np.empty((0, 4))]
+        for name, (a, b) in problem.pairs.items():
+            bound, weight = problem.constraints.get(name), problem.objective.weights.get(name)
+            if weight is None and (bound is None or bound.min is None):
+                continue
+            first, second = setup.members[a], setup.members[b]
+            apart.append((gain[:, first, None] - gain[:, None, second]).reshape(-1, self.base.size))
+            squared = ((fixed[:, first, None] - fixed[:, None, second]) ** 2).sum(axis=3).ravel()
+            least, slack = (0.0, 0.0) if bound is None else (bound.min or 0.0, FEASIBLE * bound.scale)
+            own = [least, slack, 0.0 if weight is None else 1 / weight]
+            columns.append(np.column_stack([squared, np.tile(own, (squared.size, 1))]))
+        self.apart = np.concatenate(apart)
+        self._squared, self._least, self._slack, self._rate = np.concatenate(columns).T
+        low, high = self._box
+        ends = [np.maximum(part, 0) @ high + np.minimum(part, 0) @ low for part in (self.apart, -self.apart)]
+        most = np.sqrt(self._squared[:, None] + np.maximum(np.stack(ends, axis=1), 0.0) ** 2) * (1 + _SUM_ROUNDING)
+        reach = np.divide(most, self._rate[:, None], out=np.full(most.shape, np.inf), where=self._rate[:, None] > 0)
+        self.reach = np.where(most < (self._least - self._slack)[:, None], -np.inf, reach)
+
+    def _keep(self, wanted: IndexArray) -> None:
+        self.apart, self.reach = self.apart[wanted], self.reach[wanted]
+        self._squared, self._least = self._squared[wanted], self._least[wanted]
+        self._slack, self._rate = self._slack[wanted], self._rate[wanted]
+
+    def needed(self, t: float, margin: float = 0.0, *, relaxed: bool = False) -> FloatArray:
+        """By how much each pair must differ in the modified channel for a t, DN, ndarray[n_pairs]; 0: anything goes.
+
+        `margin`: how much more is wanted, in the objective's unit.
+        """
+        least = self._least - self._slack if relaxed else self._least
+        asked = np.maximum(least, t * self._rate)
+        found = np.sqrt(np.maximum(0.0, asked**2 - self._squared))
+        inside = 0.0 if relaxed else np.where(self._least > 0, _INSIDE_DN, 0.0)
+        return np.asarray(np.where(found > 0, found + inside + self._rate * margin, 0.0), dtype=float)
+
+    def solve(self, t: float, sides: Sides) -> Solved:
+        """The filter with the largest margin above t, and how far filters with these sides can reach at most."""
+        self.solved += 1
+        pairs, signs = np.array(sides.pairs, dtype=np.intp), np.array(sides.signs)
+        some = self.needed(t)[pairs] > 0
+        pairs, signs = pairs[some], signs[some]
+        rows = vstack([self._rows.matrix, csr_matrix(signs[:, None] * self.apart[pairs])]).tocsr()
+        floor = np.concatenate([self._rows.needed(t), self.needed(t)[pairs]])
+        rate = np.concatenate([self._rows.rate, self._rate[pairs]])
+        status, weights, found = self._best_margin(rows, floor, rate)
+        if status == _INFEASIBLE:  # what does not depend on t cannot be met: the least that all rows must give up
+            sizes = np.concatenate([self._sizes[0], self._sizes[1][pairs]])
+            status, weights, found = self._best_margin(rows, floor, sizes)
+            found = None if found is None or found[-1] < -ROUNDING else found
+        if weights is None:
+            return Solved(np.inf)
+        weights[weights < _LEAST_WEIGHT * weights.max(initial=0.0)] = 0.0
+        used = weights[-pairs.size :] > 0 if pairs.size else some[:0]
+        needs = Sides().joined(pairs[used], signs[used])
+        beyond = self._beyond(weights, rows, pairs)
+        if found is None:
+            return Solved(beyond, needs=needs)
+        return Solved(beyond, float(found[-1]), found[:-1], needs)
+
+    def _best_margin(
+        self, rows: csr_matrix, floor: FloatArray, rate: FloatArray
+    ) -> tuple[int, FloatArray | None, FloatArray | None]:
+        """HiGHS' status, row weights and solution (N, m) of: maximize m subject to rows @ N >= floor + rate m."""
+        found = linprog(
+            c=np.append(np.zeros(self.base.size), -1.0),
+            A_ub=hstack([-rows, csr_matrix(rate[:, None])]).tocsr(),
+            b_ub=-floor,
+            bounds=np.column_stack([np.append(self.low, -np.inf), np.append(self.base, self.top + 1.0)]),
+            method="highs",
+            options={"primal_feasibility_tolerance": _SOLVER_TOLERANCE},
+        )
+        if found.status != _SOLVED:
+            return int(found.status), None, None
+        return _SOLVED, np.maximum(0.0, -found.ineqlin.marginals), found.x
+
+    def _beyond(self, weights: FloatArray, rows: csr_matrix, pairs: IndexArray) -> float:
+        """No filter with these rows reaches more, by their weights; inf where the weights do not say."""
+        low, high = self._box
+        summed = weights @ rows
+        most = float(np.maximum(summed * low, summed * high).sum())
+        most += _SUM_ROUNDING * float(weights @ np.concatenate([self._sizes[0], self._sizes[1][pairs]]))
+
+        def excluded(t: float) -> bool:
+            floor = np.concatenate([self._rows.needed(t, relaxed=True), self.needed(t, relaxed=True)[pairs]])
+            with np.errstate(invalid="ignore"):
+                return float(np.where(weights > 0, weights * floor, 0.0).sum()) > most
+
+        if excluded(0.0):
+            return -np.inf
+        if not excluded(self.top):
+            return np.inf
+        low_t, high_t = 0.0, self.top
+        for _ in range(_HALVINGS):
+            middle = (low_t + high_t) / 2
+            low_t, high_t = (low_t, middle) if excluded(middle) else (middle, high_t)
+        return high_t

@@ -1,0 +1,154 @@
+"""The limit of any filter: the best of all filters for one modified channel, not only those of a family.
+
+All filters means: every N between the least transmission and the base curve that meets the study's bounds on slope,
+sensitivities and CSDs, whichever of two signals it makes the brighter one. The limit is that of the response before
+clipping and quantization, in the scene of the search. The certificate is a bracket: a filter that attains the lower
+end, and linear programs that no filter above the upper end could meet. What only some families have (edges and bands,
+and their shifts in production) is left out: that makes the set of filters larger, so the upper end stays true for them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..camera.effects.saturation import top_e
+from ..camera.pixel import unquantized
+from ..camera.scene import WhitePatchExposure
+from ..errors import Fault, SweepError
+from ..metrics.bound import FEASIBLE, Bound
+from ..metrics.evaluate import DESIGNED, WORST, designed_quantities, smooth_csd, smooth_response
+from ..metrics.objective import Objective
+from ..types import FloatArray
+from .filter_program import ROUNDING, FilterProgram
+from .problem import Problem
+from .sides import SideSearch
+
+_SENSITIVITY_TOLERANCE = 1e-6
+_MOST_PROGRAMS = 5000
+_SHARES = (0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
+"""How far a solver's filter is moved toward one that is inside, to make up for the solver's tolerance."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """The bracket of the limit, in the objective's unit, and the filter that attains its lower end, QE.
+
+    `attained`: the objective for `curve` (ndarray[n_wavelengths]), evaluated like any design; no filter at all reaches
+    more than `proven`. Both are -inf, and `curve` is None, when no filter meets the constraints. `left_out`: what the
+    study asks for beyond the limit's own constraints. `programs`: number of linear programs solved for it;
+    `open_parts`: parts of the proof that were left open, so that the bracket is wider than it was to be; 0: none.
+    """
+
+    attained: float
+    proven: float
+    curve: FloatArray | None
+    left_out: tuple[str, ...] = ()
+    programs: int = 0
+    open_parts: int = 0
+
+
+def limit_of(problem: Problem, tolerance_dn: float = 1e-3, most_programs: int = _MOST_PROGRAMS) -> Limit:
+    """The limit of a problem with one modified channel, to `tolerance_dn` (1e-6 for an objective without a CSD).
+
+    At most about `most_programs` linear programs are solved for it; the bracket is wider where that is too few. Raises
+    SweepError where the response would not be linear; see `why_not`.
+    """
+    refused = why_not(problem)
+    if refused is not None:
+        raise SweepError(Fault(f"no limit: {refused}"))
+    nominal, left_out = _relaxed(problem)
+    program = FilterProgram(nominal)
+    tolerance = tolerance_dn if set(nominal.pairs) & set(nominal.objective.weights) else _SENSITIVITY_TOLERANCE
+
+    def value(curve: FloatArray, inside: FloatArray | None) -> tuple[float, FloatArray]:
+        return _inside(nominal, np.clip(curve, program.low, program.base), inside)
+
+    proof = SideSearch(program, value, tolerance, most_programs).run()
+    return Limit(proof.attained, proof.proven, proof.curve, left_out, program.solved, proof.open_parts)
+
+
+def why_not(problem: Problem) -> str | None:
+    """Why a problem has no linear limit; None when it has."""
+    for refused, reason in (
+        (problem.family.n_modified != 1, "more than one modified channel"),
+        (problem.objective.rule == "sum", "the objective is a sum"),
+        (problem.setup.pixel.crosstalk > 0, "crosstalk mixes the modified channel into others"),
+    ):
+        if refused:
+            return reason
+    if (_top(problem) > problem.setup.base_qe[0] * (1 + ROUNDING)).any():
+        return "filters of the box may exceed the curve that they replace"
+    if (problem.family.lower(problem.low, problem.high)[0] < -ROUNDING * problem.setup.base_qe[0]).any():
+        return "filters of the box may be below 0"
+    if _clips(problem):
+        return "signals exceed the full well or the range of the ADC"
+    if isinstance(problem.setup.scenario.exposure, WhitePatchExposure) and not _exposure_is_fixed(problem):
+        return "the modified channel could set the exposure"
+    return None
+
+
+def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
+    """The problem without what only families of edges have, worst cases as nominal ones; and what was left out."""
+    known = (*problem.pairs, *DESIGNED)
+    left_out = [name for name in problem.constraints if name.removeprefix(WORST) not in known]
+    kept: dict[str, Bound] = {}
+    for name, bound in problem.constraints.items():
+        plain = name.removeprefix(WORST)
+        if plain in known:
+            ends = [b for b in (bound, kept.get(plain)) if b is not None]
+            least, most = [b.min for b in ends if b.min is not None], [b.max for b in ends if b.max is not None]
+            kept[plain] = Bound.model_construct(min=max(least, default=None), max=min(most, default=None))
+    weights: dict[str, float] = {}
+    for name, weight in problem.objective.weights.items():
+        plain = name.removeprefix(WORST)
+        weights[plain] = min(weight, weights.get(plain, weight))
+    if any(name.startswith(WORST) for name in (*problem.constraints, *problem.objective.weights)):
+        left_out.append("edge shifts")
+    return replace(problem, objective=Objective(minimum=weights), constraints=kept), tuple(left_out)
+
+
+def _top(problem: Problem) -> FloatArray:
+    """No filter of the box exceeds this curve, ndarray[n_wavelengths]."""
+    return np.asarray(problem.family.upper(problem.low, problem.high)[0], dtype=float)
+
+
+def _clips(problem: Problem) -> bool:
+    """Whether the base curve's response, the largest that any of the filters has, is cut off when it is read out."""
+    setup = problem.setup
+    smooth = smooth_response(setup, setup.base_qe[None])
+    top_dn = unquantized(np.array(top_e(setup.pixel)), setup.pixel)
+    return bool((smooth > top_dn).any())
+
+
+def _exposure_is_fixed(problem: Problem) -> bool:
+    """Whether a channel that is not modified is at least as bright on white as the base curve."""
+    setup = problem.setup
+    rates = setup.qe.sum(axis=1)  # the white patch is flat in photons
+    kept = np.delete(rates, setup.modified)
+    return bool(kept.size and kept.max() >= rates[list(setup.modified)].max())
+
+
+def _inside(problem: Problem, curve: FloatArray, inside: FloatArray | None) -> tuple[float, FloatArray]:
+    """A solver's filter, moved by its tolerance toward the base curve or one that is `inside`; and what it attains."""
+    base = problem.setup.base_qe[0]
+    for end in (base,) if inside is None else (base, inside):
+        for share in _SHARES:
+            moved = np.asarray(curve + share * (end - curve), dtype=float)
+            attained = _attained(problem, moved)
+            if attained > -np.inf:
+                return attained, moved
+    return -np.inf, curve
+
+
+def _attained(problem: Problem, curve: FloatArray) -> float:
+    """The objective for a filter as the search evaluates it; -inf when it does not meet the constraints."""
+    curves = curve[None, None]
+    found = designed_quantities(problem.setup, curves)
+    for name in {*problem.objective.weights, *problem.constraints} & problem.pairs.keys():
+        found[name] = smooth_csd(problem.setup, curves, problem.pairs[name])
+    for name, bound in problem.constraints.items():
+        if not bound.violation(found[name])[0] <= FEASIBLE:
+            return -np.inf
+    return float(problem.objective.of(found)[0])

@@ -1,0 +1,105 @@
+"""The search as a mathematical problem: box, objective, constraints, and the log of what was evaluated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.stats import qmc
+
+from ..camera.view import Setup
+from ..curves.lights import Pair, class_pairs
+from ..designs.family import Family
+from ..metrics.bound import FEASIBLE, Bound
+from ..metrics.evaluate import WORST
+from ..metrics.objective import Objective
+from ..metrics.separation import csd_name
+from ..types import FloatArray, IndexArray
+
+SHIFTS = (-1.0, -0.5, 0.0, 0.5, 1.0)
+"""Where in the range of an edge shift the worst case is looked for, in units of its half width."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Maximize `objective` over the box `low`..`high` (ndarray[n_parameters]) under `constraints`.
+
+    Quantities are those of `evaluate`, `spaces.DIMENSIONS`, and `worst_<quantity>`, the smallest over edges that come
+    out up to `edge_shift_nm` off. Constraints give a minimum (`slope_per_nm`: a maximum; the sensitivities: either).
+    """
+
+    setup: Setup
+    family: Family
+    low: FloatArray
+    high: FloatArray
+    objective: Objective
+    constraints: Mapping[str, Bound]
+    edge_shift_nm: float = 0.0
+
+    @property
+    def pairs(self) -> dict[str, Pair]:
+        """The pair of signal types of each CSD."""
+        return {csd_name(pair): pair for pair in class_pairs(self.setup.lights.classes)}
+
+    @property
+    def free(self) -> IndexArray:
+        """Indices of the parameters that are not fixed."""
+        return np.flatnonzero(self.high > self.low)
+
+    def shifts_nm(self, quantity: str) -> tuple[float, ...]:
+        """Edge shifts over which a quantity is the smallest."""
+        return tuple(self.edge_shift_nm * s for s in SHIFTS) if quantity.startswith(WORST) else (0.0,)
+
+    def from_unit(self, u: FloatArray) -> FloatArray:
+        """Parameters from the free ones in units of the box: ndarray[..., n_free] -> ndarray[..., n_parameters]."""
+        x = np.broadcast_to(self.low, (*u.shape[:-1], self.low.size)).copy()
+        # Clipped: low + 1 * (high - low) may round to above high.
+        x[..., self.free] = np.clip(
+            x[..., self.free] + u * (self.high - self.low)[self.free],
+            self.low[self.free],
+            self.high[self.free],
+        )
+        return x
+
+    def to_unit(self, x: FloatArray) -> FloatArray:
+        """The free parameters in units of the box, clipped to it: [..., n_parameters] -> [..., n_free]."""
+        low, span = self.low[self.free], (self.high - self.low)[self.free]
+        return np.asarray(np.clip((x[..., self.free] - low) / span, 0.0, 1.0), dtype=float)
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """One logged evaluation: parameters, smooth objective, sensitivities, largest violation (0: feasible)."""
+
+    x: FloatArray
+    objective: float
+    sensitivity: float
+    cfa_sensitivity: float
+    violation: float
+
+
+@dataclass
+class SearchRun:
+    """What one start brought: the log of all evaluations, and how nlopt ended."""
+
+    start: int
+    status: str = "not started"
+    log: list[Evaluation] = field(default_factory=list)
+
+
+def best_feasible(log: Sequence[Evaluation]) -> Evaluation | None:
+    """The feasible evaluation with the largest objective, the earlier one on a tie; None when none is feasible."""
+    feasible = [e for e in log if e.violation <= FEASIBLE and np.isfinite(e.objective)]
+    return max(feasible, key=lambda e: e.objective, default=None)
+
+
+def starting_points(problem: Problem, starts: int, seed: int) -> FloatArray:
+    """Starting points from a scrambled Sobol set in units of the box, ndarray[starts, n_free]; one seed, one set."""
+    free = problem.free
+    dimensions = problem.family.start_dimensions or max(1, free.size)
+    sobol = qmc.Sobol(d=dimensions, scramble=True, rng=np.random.default_rng(seed))
+    points = np.asarray(sobol.random_base2(int(np.ceil(np.log2(max(2, starts)))))[:starts], dtype=float)
+    if problem.family.start_dimensions is None:
+        return points[:, : free.size]
+    return problem.to_unit(problem.family.start(points))

@@ -1,0 +1,183 @@
+"""On which side of the other each signal lies: a proof over all choices, by branch and bound.
+
+A filter may put some signals of a type above and others below those of the other type, so a bound for one choice of
+sides is none for all filters. A part of the choices is closed when a linear program over the filters with the sides
+that are decided so far reaches no more than the best filter known; else the pair that its best filter keeps least
+apart is decided either way. What is left open when the number of programs runs out counts with its own bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from itertools import count
+
+import numpy as np
+
+from ..types import FloatArray, IndexArray
+from .filter_program import FilterProgram, Sides
+
+_DIVE_STEPS = 40
+_DIVE_PAIRS = 8
+_MET = 1e-7
+"""Pairs that lack no more than this, DN, are met: the solver's tolerance."""
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What was found, in the objective's unit: no filter reaches more than `proven`, `curve` reaches `attained`.
+
+    `open_parts`: parts of the choice of sides that were not brought down to `attained` and the tolerance.
+    """
+
+    attained: float
+    curve: FloatArray | None
+    proven: float
+    open_parts: int
+
+
+class _Conflicts:
+    """Sets of sides that were closed: what holds them all is closed, and what holds all but one has that on the other
+    side. For each pair two literals: 2 pair with the first signal above, 2 pair + 1 below.
+    """
+
+    def __init__(self, n_pairs: int) -> None:
+        self._n = n_pairs
+        self._literals: list[int] = []
+        self._starts: list[int] = []
+
+    def add(self, sides: Sides) -> None:
+        """Remember that no part with these sides is left."""
+        if sides.pairs:
+            self._starts.append(len(self._literals))
+            self._literals += _literals(sides).tolist()
+
+    def applied(self, sides: Sides) -> Sides | None:
+        """The sides with all that follows from them; None where they are closed."""
+        literals, starts = np.array(self._literals, dtype=np.intp), np.array(self._starts, dtype=np.intp)
+        while starts.size:
+            outside = np.ones(2 * self._n, dtype=bool)
+            outside[_literals(sides)] = False
+            missing = np.add.reduceat(outside[literals], starts, dtype=np.intp)
+            if (missing == 0).any():
+                return None
+            last = np.repeat(missing == 1, np.diff(starts, append=literals.size)) & outside[literals]
+            forced = np.setdiff1d(literals[last] ^ 1, _literals(sides))
+            if not forced.size:
+                break
+            if np.isin(forced ^ 1, forced).any():
+                return None
+            sides = sides.joined(forced // 2, np.where(forced % 2, -1.0, 1.0))
+        return sides
+
+
+def _literals(sides: Sides) -> IndexArray:
+    return np.array([2 * pair + (sign < 0) for pair, sign in zip(sides.pairs, sides.signs, strict=True)], dtype=np.intp)
+
+
+class SideSearch:
+    """Branch and bound over the sides of a program's pairs.
+
+    `value`: the objective of a filter as a search evaluates it, with the filter moved inside the constraints by
+    rounding; -inf where it does not meet them.
+    """
+
+    def __init__(
+        self,
+        program: FilterProgram,
+        value: Callable[[FloatArray, FloatArray | None], tuple[float, FloatArray]],
+        tolerance: float,
+        most_programs: int,
+    ) -> None:
+        self._program = program
+        self._value = value
+        self._tolerance = tolerance
+        self._most = most_programs
+        self._conflicts = _Conflicts(len(program.apart))
+        self._best = self._closed = -np.inf
+        self._curve: FloatArray | None = None
+
+    def run(self) -> Proof:
+        """Close every part, the one that may reach most first, or as many as the number of programs allows."""
+        if self._program.top < 0:
+            return Proof(-np.inf, None, -np.inf, 0)
+        self._offer(self._program.base)
+        for side in (1.0, -1.0):
+            self._dive(side)
+        order = count()
+        parts = [(-self._program.top, next(order), Sides())]
+        left = []
+        while parts and -parts[0][0] > self._closing and self._program.solved < self._most:
+            beyond, _, sides = heappop(parts)
+            held = self._conflicts.applied(sides)
+            if held is None:
+                continue
+            beyond, more = self._divided(-beyond, held)
+            if beyond <= self._closing:
+                self._closed = max(self._closed, beyond)
+            elif not more:
+                left.append(beyond)
+            for bound, one in more:
+                heappush(parts, (-bound, next(order), one))
+        left += [-beyond for beyond, _, _ in parts]
+        far = sum(beyond > self._closing for beyond in left)
+        return Proof(self._best, self._curve, max([self._closed, self._best, *left]), far)
+
+    @property
+    def _closing(self) -> float:
+        """A part that reaches no more than this is closed."""
+        return self._best + self._tolerance
+
+    def _offer(self, curve: FloatArray) -> None:
+        """Take a filter as the best one if it is."""
+        value, moved = self._value(curve, self._curve)
+        if value > self._best:
+            self._best, self._curve = value, moved
+
+    def _divided(self, beyond: float, sides: Sides) -> tuple[float, list[tuple[float, Sides]]]:
+        """What a part can reach at most, and the parts that it falls into; none where it is closed or stays open."""
+        t = beyond
+        solved = self._program.solve(t, sides)
+        beyond = min(beyond, solved.beyond)
+        if solved.curve is not None:
+            self._offer(solved.curve)
+        if solved.beyond <= self._closing:
+            self._conflicts.add(solved.needs)
+            self._closed = max(self._closed, solved.beyond)
+        if solved.curve is None or beyond <= self._closing:
+            return beyond, []
+        apart = self._program.apart @ solved.curve
+        lacks = self._program.needed(t, solved.margin) - np.abs(apart)
+        lacks[list(sides.pairs)] = -np.inf
+        pair = int(np.argmax(lacks)) if lacks.size else -1
+        if pair < 0 or lacks[pair] <= _MET:
+            return beyond, [(beyond, sides)] if beyond < t else []
+        return beyond, [
+            (
+                min(beyond, float(self._program.reach[pair, int(sign < 0)])),
+                sides.joined(np.array([pair]), np.array([sign])),
+            )
+            for sign in (1.0, -1.0)
+        ]
+
+    def _dive(self, side: float) -> None:
+        """Look for a good filter with all pairs on one side: decide the worst ones, and lower t from above."""
+        program, beyond, sides = self._program, self._program.top, Sides()
+        for _ in range(_DIVE_STEPS):
+            if beyond <= self._closing or program.solved >= self._most:
+                return
+            t = beyond
+            solved = program.solve(t, sides)
+            beyond = min(beyond, solved.beyond)
+            if solved.curve is None:
+                return
+            self._offer(solved.curve)
+            apart = program.apart @ solved.curve
+            lacks = program.needed(t, solved.margin) - side * apart
+            lacks[list(sides.pairs)] = -np.inf
+            worst = np.argsort(-lacks, kind="stable")[:_DIVE_PAIRS]
+            worst = worst[lacks[worst] > _MET]
+            if not worst.size and not beyond < t:
+                return
+            sides = sides.joined(worst, np.full(worst.size, side))

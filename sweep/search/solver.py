@@ -1,0 +1,182 @@
+"""Constrained search for the best design; the only file that knows nlopt.
+
+Maximize a study's objective, such as the smallest distance of a pair of signal types. The minimum over pairs is not
+smooth, so it is written in the epigraph form: maximize t subject to (distance of every pair)^2 >= t^2, with exact
+gradients. The search sees the smooth response (unquantized, unclipped); every evaluation is logged, and the answer is
+the best feasible one of the log.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import replace
+
+import nlopt
+import numpy as np
+
+from ..metrics.bound import FEASIBLE
+from ..types import FloatArray
+from .gradients import Model, Point, is_distance
+from .problem import Problem, SearchRun
+
+GRADIENT = {"SLSQP": nlopt.LD_SLSQP, "MMA": nlopt.LD_MMA, "CCSAQ": nlopt.LD_CCSAQ}
+"""Gradient algorithms of nlopt that take inequality constraints, for the epigraph form."""
+DIRECT = {
+    "COBYLA": nlopt.LN_COBYLA,
+    "ORIG_DIRECT_L": nlopt.GN_ORIG_DIRECT_L,
+    "ISRES": nlopt.GN_ISRES,
+    "AGS": nlopt.GN_AGS,
+}
+"""Derivative-free algorithms that take inequality constraints, for the objective itself."""
+ALGORITHMS = (*GRADIENT, *DIRECT)
+"""Every algorithm that a study can name."""
+_ENDINGS = {
+    nlopt.SUCCESS: "success",
+    nlopt.FTOL_REACHED: "ftol_reached",
+    nlopt.XTOL_REACHED: "xtol_reached",
+    nlopt.MAXEVAL_REACHED: "maxeval_reached",
+}
+_X_TOLERANCE = 1e-9
+
+
+def search_from(
+    problem: Problem, start: int, u0: FloatArray, algorithm: str, max_evaluations: int, seed: int = 1
+) -> SearchRun:
+    """Search from one starting point with at most `max_evaluations` simulations.
+
+    `u0`: ndarray[n_free], in units of the box. The status is nlopt's word for how it ended; an early end is no
+    error, since the log keeps every evaluation. `seed` and `start` set the random numbers of the algorithms that use
+    them (ISRES).
+    """
+    run = SearchRun(start)
+    model = Model(problem, run, max_evaluations)
+    first = model.at(u0)
+    nlopt.srand(seed * 100_003 + start)
+    if algorithm in GRADIENT:
+        opt, z0 = _epigraph(problem, model, first, u0, algorithm)
+    else:
+        opt, z0 = _direct(model, first, u0, algorithm)
+    model.stop = opt.force_stop
+    opt.set_maxeval(10 * max_evaluations)  # simulations are counted by the model, which forces the stop
+    opt.set_xtol_rel(_X_TOLERANCE)
+    opt.set_xtol_abs(_X_TOLERANCE)
+    try:
+        opt.optimize(z0)
+        run.status = _ENDINGS.get(opt.last_optimize_result(), "unknown")
+    except nlopt.RoundoffLimited:
+        run.status = "roundoff_limited"
+    except nlopt.ForcedStop:
+        run.status = "maxeval_reached"
+    except (RuntimeError, nlopt.runtime_error):  # its own class; what it carries cannot leave this process
+        run.status = "failed"
+    return run
+
+
+def _epigraph(
+    problem: Problem, model: Model, first: Point, u0: FloatArray, algorithm: str
+) -> tuple[nlopt.opt, list[float]]:
+    """Maximize the sum of t_k (a minimum has one t) subject to rows of term k >= t_k^2 and the conditions; z = (u, t).
+
+    Each t_k is in units of its term's first value.
+    """
+    values = first.term_values
+    scale = np.maximum(values, 1.0)
+    n_free, n_rows = u0.size, first.terms.values.size
+    share = scale / scale.sum()
+    row_scale = scale[first.term] ** 2
+    opt = nlopt.opt(GRADIENT[algorithm], n_free + scale.size)
+
+    def objective(z: FloatArray, gradient: FloatArray) -> float:
+        model.at(z[:n_free])
+        if gradient.size:
+            gradient[:n_free] = 0.0
+            gradient[n_free:] = share
+        return float(share @ z[n_free:])
+
+    def constraints(result: FloatArray, z: FloatArray, gradient: FloatArray) -> None:
+        point = model.at(z[:n_free])
+        t = z[n_free:][point.term]
+        result[:n_rows] = t**2 - point.terms.values / row_scale
+        result[n_rows:] = point.conditions.values
+        if gradient.size:
+            gradient[:] = 0.0
+            gradient[:n_rows, :n_free] = -point.terms.by_u / row_scale[:, None]
+            gradient[np.arange(n_rows), n_free + point.term] = 2 * t
+            gradient[n_rows:, :n_free] = point.conditions.by_u
+
+    # No term exceeds its largest weight times the longest distance between two digital numbers.
+    reach = max(problem.objective.weights.values()) * problem.setup.longest_distance_dn / scale
+    opt.set_lower_bounds([0.0] * (n_free + scale.size))
+    opt.set_upper_bounds([1.0] * n_free + [max(float(r), 1.0) for r in reach])
+    opt.set_max_objective(objective)
+    opt.add_inequality_mconstraint(constraints, np.zeros(n_rows + first.conditions.values.size))
+    return opt, [*u0, *np.minimum(values / scale, 1.0)]
+
+
+def _direct(model: Model, first: Point, u0: FloatArray, algorithm: str) -> tuple[nlopt.opt, list[float]]:
+    """Maximize the objective itself, subject to the worst of the conditions."""
+    scale = float(np.maximum(first.term_values, 1.0).sum())
+    minimum = first.term.max() == 0
+
+    def objective(u: FloatArray, _: FloatArray) -> float:
+        values = model.at(u).term_values
+        return float(values.min() if minimum else values.sum()) / scale
+
+    opt = nlopt.opt(DIRECT[algorithm], u0.size)
+    opt.set_lower_bounds([0.0] * u0.size)
+    opt.set_upper_bounds([1.0] * u0.size)
+    opt.set_max_objective(objective)
+    opt.add_inequality_constraint(lambda u, _: float(model.at(u).conditions.values.max(initial=-1.0)), 0.0)
+    return opt, [*u0]
+
+
+def best_reachable(problem: Problem, quantity: str, starts: FloatArray, max_evaluations: int) -> float:
+    """The extreme that `quantity` reaches in the box when no other constraint counts: its largest value if the study
+    asks for a minimum, else its smallest. `starts`: ndarray[n, n_free].
+    """
+    alone = replace(problem, constraints={quantity: problem.constraints[quantity]})
+    sign = 1.0 if problem.constraints[quantity].min is not None else -1.0
+    found = [v for u0 in starts for v in _extremes(alone, quantity, sign, u0, max_evaluations)]
+    best = sign * max((sign * value for value in found), default=-np.inf)
+    return float(np.sqrt(best)) if is_distance(quantity) and best > 0 else best
+
+
+def _extremes(problem: Problem, quantity: str, sign: float, u0: FloatArray, max_evaluations: int) -> list[float]:
+    """Worst rows of a quantity at well-formed designs on the way to their extreme: maximize t, sign x rows >= t."""
+    n_own = problem.family.violation(problem.low[None]).shape[1]
+    model = Model(problem, SearchRun(0), max_evaluations)
+    first = model.at(u0).quantities[quantity]
+    scale = max(float(np.abs(first.values).max()), 1e-6)
+    n_rows = first.values.size
+    seen: list[float] = []
+
+    def objective(z: FloatArray, gradient: FloatArray) -> float:
+        point = model.at(z[:-1])
+        if point.evaluation.violation < np.inf and (point.conditions.values[:n_own] <= FEASIBLE).all():
+            seen.append(sign * float((sign * point.quantities[quantity].values).min()))
+        if gradient.size:
+            gradient[:] = 0.0
+            gradient[-1] = 1.0
+        return float(z[-1])
+
+    def conditions(result: FloatArray, z: FloatArray, gradient: FloatArray) -> None:
+        point = model.at(z[:-1])
+        rows = point.quantities[quantity]
+        result[:n_rows] = z[-1] - sign * rows.values / scale
+        result[n_rows:] = point.conditions.values[:n_own]
+        if gradient.size:
+            gradient[:n_rows, :-1] = -sign * rows.by_u / scale
+            gradient[:n_rows, -1] = 1.0
+            gradient[n_rows:, :-1] = point.conditions.by_u[:n_own]
+            gradient[n_rows:, -1] = 0.0
+
+    opt = nlopt.opt(nlopt.LD_SLSQP, u0.size + 1)
+    opt.set_lower_bounds([0.0] * u0.size + [-1e6])
+    opt.set_upper_bounds([1.0] * u0.size + [1e6])
+    opt.set_max_objective(objective)
+    opt.add_inequality_mconstraint(conditions, np.zeros(n_rows + n_own))
+    opt.set_maxeval(max_evaluations)
+    opt.set_xtol_rel(_X_TOLERANCE)
+    with contextlib.suppress(nlopt.RoundoffLimited, nlopt.runtime_error, RuntimeError):
+        opt.optimize([*u0, float((sign * first.values).min()) / scale])
+    return seen

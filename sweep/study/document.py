@@ -1,0 +1,204 @@
+"""YAML with line numbers, and pydantic's errors as one-line faults that name their line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import islice
+from pathlib import Path
+from types import UnionType
+from typing import Any, Union, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+
+from ..disk import NO_UTF_16, not_utf8, read_input
+from ..errors import MOST_FAULTS, Fault, StudyError, nearest
+from .yaml_tree import Key, Tree
+
+_MOST = (500_000, 50_000)
+"""Bytes of a study file, and keys and values in it."""
+_RESOLVED = ".resolved.yaml"
+_MOST_RESOLVED = (8_000_000, 400_000)
+"""Of a file of that name, as a run writes it: with every default, and each of up to 2000 scenarios."""
+_MOST_LOOKED_AT = 2 * MOST_FAULTS
+"""Of the faults that the schema finds; of a value that may have several types there is one for each."""
+
+
+class Document:
+    """A parsed YAML file that knows the line of each of its keys. `data`: its keys with plain values."""
+
+    def __init__(self, path: Path) -> None:
+        self.file = str(path)
+        most_bytes, most_values = _MOST_RESOLVED if path.name.endswith(_RESOLVED) else _MOST
+        self._tree = Tree(_text(path, most_bytes), self.file, most_values)
+        if not isinstance(self._tree.root, dict):
+            raise StudyError(
+                Fault(
+                    "a study file is a mapping of keys",
+                    self.file,
+                    1,
+                    allowed="`study: name` and further keys",
+                )
+            )
+        self.data: dict[str, Any] = self._tree.root
+
+    def line(self, path: Sequence[Key]) -> int:
+        """Line of the deepest key of `path` that the file has, from 1."""
+        node: Any = self.data
+        line = 1
+        for key in path:
+            if not _has(node, key):
+                break
+            line = self._tree.line(node, key) or line
+            node = _child(node, key)
+        return line
+
+    def fault(
+        self,
+        path: Sequence[Key],
+        problem: str,
+        value: object = None,
+        allowed: str | None = None,
+        near: str | None = None,
+    ) -> Fault:
+        """A fault at `path` of this file."""
+        return Fault(problem, self.file, self.line(path), dotted(path), value, allowed, near)
+
+    def faults(self, error: ValidationError, model: type[BaseModel]) -> list[Fault]:
+        """Pydantic's errors as faults of this file."""
+        found: dict[tuple[tuple[Key, ...], str], Fault] = {}
+        meant = set()
+        items = error.errors(include_url=False)
+        for item in islice(items, _MOST_LOOKED_AT):
+            path = self._known_path(item["loc"])
+            fault = self._fault(path, item, model)
+            found.setdefault((path, fault.problem), fault)
+            if item["type"] == "extra_forbidden":
+                meant.add((*path[:-1], fault.nearest))
+        # A misspelled key is one fault, not a second one because the right key is missing.
+        told = [fault for (path, problem), fault in found.items() if not (problem == "missing" and path in meant)]
+        more = len(items) - _MOST_LOOKED_AT
+        return [*told, Fault(f"and about {more:,} more faults", self.file)] if more > 0 else told
+
+    def _known_path(self, loc: Sequence[Key]) -> tuple[Key, ...]:
+        """`loc` without the tags that pydantic adds for unions, and with a missing last key kept."""
+        node: Any = self.data
+        path: list[Key] = []
+        varied: set[Key] = set()
+        for position, made in enumerate(loc):
+            key = _written(node, made)
+            if key != made:
+                varied = {part for name in node[key]["each"] for part in str(name).split(".")}
+            if _has(node, key):
+                path.append(key)
+                node = _child(node, key)
+            elif key in varied or (isinstance(node, dict) and position == len(loc) - 1):
+                path.append(key)
+        return tuple(path)
+
+    def _fault(self, path: tuple[Key, ...], item: Any, model: type[BaseModel]) -> Fault:
+        kind, value = item["type"], item["input"]
+        if kind == "extra_forbidden":
+            known = field_names(model, path[:-1], self.data)
+            return self.fault(path, "unknown key", None, ", ".join(known), nearest(path[-1], known))
+        if kind == "missing":
+            return self.fault(path, "missing")
+        if kind == "value_error":
+            return self.fault(path, str(item["ctx"]["error"]))
+        if kind == "union_tag_not_found":
+            return self.fault((*path, str(item["ctx"]["discriminator"]).strip("'")), "missing")
+        if kind == "union_tag_invalid":
+            tag = str(item["ctx"]["discriminator"]).strip("'")
+            expected = item["ctx"].get("expected_tags", "")
+            got = value.get(tag) if isinstance(value, dict) else value
+            return self.fault((*path, tag), "unknown kind", got, expected)
+        shown = value if not isinstance(value, dict | list) else type(value).__name__
+        return self.fault(path, "not allowed", shown, _readable(item["msg"]))
+
+
+def field_names(model: type[BaseModel], path: Sequence[Key], data: Any) -> list[str]:
+    """Keys that the section at `path` of a model knows; the section is found by its declared types."""
+    annotation: Any = model
+    node = data
+    for key in path:
+        node = _child(node, key)
+        choices = [option for option in _options(annotation) if _accepts(option, key)]
+        annotation = _inner(choices[0], key) if choices else None
+    for option in _options(annotation):
+        if isinstance(option, type) and issubclass(option, BaseModel):
+            kinds = option.model_fields.get("kind")
+            if kinds is None or not isinstance(node, dict) or node.get("kind", kinds.default) == kinds.default:
+                return [name for name, info in option.model_fields.items() if info.exclude is not True]
+    return []
+
+
+def _has(node: Any, key: Key) -> bool:
+    return (isinstance(node, dict) and key in node) or (
+        isinstance(node, list) and isinstance(key, int) and key < len(node)
+    )
+
+
+def _written(node: Any, key: Key) -> Key:
+    """The key as the file has it: a scenario made by `each` is named after the one that it was made from."""
+    if isinstance(node, dict) and isinstance(key, str) and key not in node:
+        for name, entry in node.items():
+            if isinstance(entry, dict) and isinstance(entry.get("each"), dict) and key.startswith(f"{name} "):
+                return str(name)
+    return key
+
+
+def _child(node: Any, key: Key) -> Any:
+    return node[key] if _has(node, key) else None
+
+
+def _options(annotation: Any) -> list[Any]:
+    origin = get_origin(annotation)
+    if origin in (Union, UnionType):
+        return [inner for option in get_args(annotation) for inner in _options(option)]
+    return [] if annotation in (None, type(None)) else [annotation]
+
+
+def _accepts(annotation: Any, key: Key) -> bool:
+    if get_origin(annotation) is dict:
+        return True
+    if get_origin(annotation) is list:
+        return isinstance(key, int)
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel) and key in annotation.model_fields
+
+
+def _inner(annotation: Any, key: Key) -> Any:
+    if get_origin(annotation) is dict:
+        return _unannotated(get_args(annotation)[1])
+    if get_origin(annotation) is list:
+        return _unannotated(get_args(annotation)[0])
+    return annotation.model_fields[str(key)].annotation
+
+
+def _unannotated(annotation: Any) -> Any:
+    return get_args(annotation)[0] if hasattr(annotation, "__metadata__") else annotation
+
+
+def dotted(path: Sequence[Key]) -> str:
+    """A path as people write it: `sweeps.main.grid`, `sensor.files[0].file`."""
+    text = ""
+    for key in path:
+        text += f"[{key}]" if isinstance(key, int) else f".{key}" if text else str(key)
+    return text
+
+
+def _readable(message: str) -> str:
+    plain = message.removeprefix("Input should be ").removeprefix("a valid ")
+    return "mapping" if plain.startswith("dictionary") else plain
+
+
+def _text(path: Path, most_bytes: int) -> str:
+    content = read_input(path, most_bytes, StudyError)
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        problem, wide = not_utf8(content, error)
+        line = None if wide else content.count(b"\n", 0, error.start) + 1
+        raise StudyError(Fault(problem, str(path), line, allowed=NO_UTF_16 if wide else "UTF-8")) from None
+    if "\0" in text:
+        line = text.count("\n", 0, text.index("\0")) + 1
+        raise StudyError(Fault("NUL characters in the text", str(path), line, allowed=NO_UTF_16))
+    return text

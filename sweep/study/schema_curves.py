@@ -1,0 +1,95 @@
+"""Sections of a study that name curves: a sensor's and lights', built in or from files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Annotated, Any
+
+from pydantic import ConfigDict, Field, WithJsonSchema, model_validator
+
+from ..curves.files import MOST_CURVES
+from ..curves.spectrum import Outside, Resampling
+from ..types import Ratio, Section
+
+Name = Annotated[str, Field(min_length=1, max_length=100)]
+Columns = Annotated[list[Name], Field(min_length=1, max_length=MOST_CURVES)]
+FilePath = Annotated[str, Field(min_length=1, max_length=4096)]
+
+
+class Documented(Section):
+    """A section whose keys are described by the text below them, for editors."""
+
+    model_config = ConfigDict(use_attribute_docstrings=True)
+
+
+class CurveFile(Documented):
+    """QE curves from one file: `columns` maps the sensor's curve names to the file's column names."""
+
+    file: FilePath
+    """Path of a .csv or .mat file, relative to the study or to the folder of --data.
+
+    At most 40 MB, 2,000 curves, 100,000 samples of each and 2,000,000 values; values are 0 to 1e100."""
+    columns: Annotated[dict[Name, Name], Field(min_length=1)]
+    """Channel of the sensor -> column of the file."""
+    scale: Ratio = 1.0
+    """Factor on the file's values: 0.01 for percent."""
+    resampling: Resampling = "linear"
+    """`mean` over each bin keeps the integral of lines that are finer than the grid."""
+    outside: Outside = "refuse"
+    """`zero` takes 0 where the samples end inside the grid."""
+
+
+class SensorSection(Documented):
+    """A built-in sensor by its name, or curves from files."""
+
+    builtin: str | None = None
+    name: Name | None = None
+    files: list[CurveFile] = []
+    clear: Name | None = None
+    """The reference of the CFA's sensitivity; the curve with the largest total where it is left out."""
+
+    @model_validator(mode="after")
+    def _one_source(self) -> SensorSection:
+        if (self.builtin is None) == (not self.files):
+            raise ValueError("a sensor is either the name of a built-in one or a mapping with `files`")
+        return self
+
+
+class LightFile(Documented):
+    """Lights from one file: `signals` maps a signal type to the file's columns."""
+
+    file: FilePath
+    """Path of a .csv or .mat file, relative to the study or to the folder of --data."""
+    quantity: Annotated[str, Field(pattern="^(energy|photons)$"), WithJsonSchema({"enum": ["energy", "photons"]})]
+    """What the file's numbers are."""
+    signals: Annotated[dict[Name, Columns], Field(min_length=1)]
+    resampling: Resampling = "linear"
+    """`mean` over each bin keeps the integral of lines that are finer than the grid."""
+    outside: Outside = "refuse"
+    """`zero` takes 0 where the samples end inside the grid."""
+
+
+class LightsSection(Documented):
+    """A built-in data set by its name, or lights from files."""
+
+    builtin: str | None = None
+    name: Name | None = None
+    files: list[LightFile] = []
+    photon_ratio: Ratio | None = None
+    """K: photons of a signal patch over those of the white patch; from the spectra where it is left out."""
+
+    @model_validator(mode="after")
+    def _one_source(self) -> LightsSection:
+        if (self.builtin is None) == (not self.files):
+            raise ValueError("lights are either the name of a built-in data set or a mapping with `files`")
+        return self
+
+
+def named(names: Iterable[str]) -> Any:
+    """The type of built-in names, as editors complete them; what is not among them is refused with the nearest."""
+    return Annotated[str, WithJsonSchema({"type": "string", "enum": list(names)})]
+
+
+def builtin(value: Any) -> Any:
+    """A name alone is that of a built-in one."""
+    return {"builtin": value} if isinstance(value, str) else value

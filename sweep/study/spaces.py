@@ -1,0 +1,167 @@
+"""The spaces of a study: plain CFAs, named designs, sweeps and boxes, with their families and axes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from ..camera.mosaic import Mosaic
+from ..camera.sensor import SensorCurves
+from ..curves.builtin.surrogate import surrogate_parameters
+from ..designs.family import Parameter
+from ..designs.registry import MAKERS, build_family
+from ..designs.space import Filter, Kind, Space
+from ..errors import SweepError, nearest
+from .schema import DesignSection, Modification, StudySection
+from .sources import Sources
+from .yaml_tree import Key
+
+_MOST_POINTS = 2_000_000
+
+
+@dataclass(frozen=True)
+class SpaceBuilder:
+    """Makes the spaces of a study; what is wrong goes to the faults of `sources`."""
+
+    section: StudySection
+    sources: Sources
+    sensor: SensorCurves
+    mosaics: Mapping[str, Mosaic]
+
+    def spaces(self) -> list[Space]:
+        """Plain CFAs (those whose every channel has a curve), then named designs, then sweeps."""
+        section = self.section
+        if not self._fits():
+            return []
+        entries = (*section.designs.values(), *section.sweeps.values(), *section.boxes.values())
+        changed = {(entry.cfa, channel) for entry in entries for channel in entry.channel}
+        spaces = []
+        for name, mosaic in self.mosaics.items():
+            missing = False
+            for channel in mosaic.channels:
+                curve = section.cfas[name].curves.get(channel, self.sensor.curve_name(name, channel))
+                if curve not in self.sensor.qe:
+                    missing = True
+                    if (name, channel) not in changed:
+                        self.sources.unknown(
+                            ("cfas", name), f"curve of channel {channel!r}", curve, list(self.sensor.qe)
+                        )
+            for channel in section.cfas[name].curves:
+                if channel not in mosaic.channels:
+                    self.sources.unknown(("cfas", name, "curves", channel), "channel", channel, list(mosaic.channels))
+            if not missing:
+                spaces.append(Space("reference", name, name))
+        for name, design in section.designs.items():
+            axes: dict[str, tuple[float, ...]] = {key: (value,) for key, value in self._built_in(name, design).items()}
+            spaces += self._filtered("design", name, design, axes, ("designs", name, "at"))
+        for name, sweep in section.sweeps.items():
+            axes = {key: axis.points() for key, axis in sweep.grid.items()}
+            spaces += self._filtered("sweep", name, sweep, axes, ("sweeps", name, "grid"))
+        for name, box in section.boxes.items():
+            axes = {key: axis.points() for key, axis in box.box.items()}
+            spaces += self._filtered("search", name, box, axes, ("boxes", name, "box"))
+        return spaces
+
+    def _fits(self) -> bool:
+        """Whether the axes of all grids and boxes can be written out; else adds a fault."""
+        grids = [sweep.grid for sweep in self.section.sweeps.values()]
+        total = sum(
+            axis.size for axes in (*grids, *(b.box for b in self.section.boxes.values())) for axis in axes.values()
+        )
+        if total > _MOST_POINTS:
+            allowed = f"at most {_MOST_POINTS:,} in all axes together"
+            self.sources.add(("sweeps",), "too many values of parameters", f"{total:,}", allowed)
+        return total <= _MOST_POINTS
+
+    def _built_in(self, name: str, design: DesignSection) -> Mapping[str, float]:
+        """A design's parameters, looked up when it names a built-in filter."""
+        if not isinstance(design.at, str):
+            return design.at
+        known = surrogate_parameters().stopbands
+        if design.at not in known:
+            self.sources.unknown(("designs", name, "at"), "built-in filter", design.at, list(known))
+            return {}
+        return known[design.at].model_dump()
+
+    def _check_channels(self, path: tuple[Key, ...], entry: Modification, mosaic: Mosaic | None) -> None:
+        """The channels that a family replaces: of the CFA, as many as the family wants, each once."""
+        for channel in entry.channel:
+            if mosaic is not None and channel not in mosaic.channels:
+                self.sources.unknown((*path, "channel"), f"channel of {entry.cfa}", channel, list(mosaic.channels))
+        if entry.family not in MAKERS:
+            self.sources.unknown((*path, "family"), "family", entry.family, list(MAKERS))
+        elif len(entry.channel) != MAKERS[entry.family].n_modified:
+            self.sources.add(
+                (*path, "channel"),
+                f"{entry.family} replaces {MAKERS[entry.family].n_modified} channel(s)",
+                entry.channel,
+            )
+        elif len(set(entry.channel)) < len(entry.channel):
+            self.sources.add((*path, "channel"), "a channel is named twice", entry.channel)
+
+    def _filtered(
+        self,
+        kind: Kind,
+        name: str,
+        entry: Modification,
+        axes: Mapping[str, tuple[float, ...]],
+        axes_path: tuple[Key, ...],
+    ) -> list[Space]:
+        before = len(self.sources.faults)
+        path = axes_path[:-1]
+        curves = list(self.sensor.qe)
+        mosaic = self.mosaics.get(entry.cfa)
+        if entry.cfa not in self.section.cfas:
+            self.sources.unknown((*path, "cfa"), "CFA", entry.cfa, list(self.section.cfas))
+        if entry.base not in curves:
+            self.sources.unknown((*path, "base"), "curve", entry.base, curves)
+        if isinstance(entry.to, str) and entry.to not in curves:
+            self.sources.unknown((*path, "to"), "curve", entry.to, curves)
+        self._check_channels(path, entry, mosaic)
+        if len(self.sources.faults) > before:
+            return []
+        base = self.sensor.curve(entry.base)
+        target = (
+            self.sensor.curve(entry.to) if isinstance(entry.to, str) else None if entry.to is None else base * entry.to
+        )
+        try:
+            family = build_family(entry.family, self.section.wavelengths.nodes_nm, base, target, entry.options)
+        except SweepError as error:
+            for fault in error.faults:
+                self.sources.add((*path, "family"), fault.problem, fault.value, fault.allowed)
+            return []
+        ordered = self._axes(axes, axes_path, family.parameters, open_ended=kind == "search")
+        if len(self.sources.faults) > before:
+            return []
+        made = Filter(family, tuple(entry.channel), entry.base, "" if entry.to is None else str(entry.to))
+        return [Space(kind, name, entry.cfa, made, tuple(ordered), gridded=kind != "search")]
+
+    def _axes(
+        self,
+        axes: Mapping[str, tuple[float, ...]],
+        path: tuple[Key, ...],
+        parameters: Sequence[Parameter],
+        *,
+        open_ended: bool,
+    ) -> list[tuple[float, ...]]:
+        """The values of each parameter, in order; one not named has its default, or its range if `open_ended`."""
+        known = [parameter.name for parameter in parameters]
+        misspelled = [name for name in axes if name not in known]
+        for name in misspelled:
+            self.sources.unknown((*path, name), "parameter", name, known)
+        meant = {nearest(name, known) for name in misspelled}
+        ordered = []
+        for parameter in parameters:
+            usual: tuple[float, ...] = () if parameter.default is None else (parameter.default,)
+            if open_ended and not usual:
+                usual = (parameter.low, parameter.high)
+            values = axes.get(parameter.name, usual)
+            if not values and parameter.name not in meant:
+                self.sources.add((*path, parameter.name), "missing")
+            for value in (min(values), max(values)) if values else ():
+                if not parameter.low <= value <= parameter.high:
+                    allowed = f"{parameter.low:g} to {parameter.high:g}"
+                    self.sources.add((*path, parameter.name), "out of range", value, allowed)
+                    break
+            ordered.append(values)
+        return ordered

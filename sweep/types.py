@@ -1,0 +1,41 @@
+"""Names of array types; the base of every section of a study file, and its numbers; who is told of progress."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.intp]
+BoolArray = NDArray[np.bool_]
+
+Progress = Callable[[str, int, int], None]
+"""Called with a phase, how much of it is done, and how much there is."""
+
+
+class Section(BaseModel):
+    """A frozen section; unknown keys, NaN, infinity and quoted numbers are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
+
+
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
+
+# Physical quantities have limits several orders of magnitude beyond any hardware or scene. They keep every product and
+# quotient of a study inside what a float holds, so that no result is an overflow.
+Number = Annotated[float, Field(ge=-1e30, le=1e30)]
+"""Any number of a study that is no physical quantity of its own: values of an axis, printed figures."""
+Share = Annotated[float, Field(ge=1e-9, le=1)]
+"""A share of a whole of which something is left."""
+Ratio = Annotated[float, Field(ge=1e-30, le=1e30)]
+"""A factor between two scales."""
+Meters = Annotated[float, Field(ge=1e-4, le=1e9)]
+"""0.1 mm to a million kilometers: from what is smaller than any lamp to beyond the Moon."""
+Seconds = Annotated[float, Field(ge=1e-15, le=1e9)]
+"""Femtoseconds to 30 years."""
