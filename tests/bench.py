@@ -27,8 +27,6 @@ import pyarrow.parquet as pq
 from scipy.signal import fftconvolve
 from scipy.spatial.distance import cdist
 from scipy.special import j1
-from sweep.metrics.separation.evaluate import evaluate
-from sweep.metrics.separation.separation import class_pairs, separation, separations_along
 from test_scale import large
 
 from sweep.camera.imager import Imager
@@ -39,6 +37,8 @@ from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.block import Curves, edges_of
 from sweep.designs.space import Space
+from sweep.metrics.evaluate import evaluate
+from sweep.metrics.separation import class_pairs, separation, separations_along
 from sweep.run import run_study
 from sweep.run.worker_process import keep_freed_memory
 from sweep.study import Study, load_study

@@ -13,13 +13,13 @@ from pathlib import Path
 
 import numpy as np
 from scipy.optimize import NonlinearConstraint, differential_evolution
-from sweep.metrics.separation.bound import FEASIBLE, total_violation
-from sweep.metrics.separation.evaluate import designed_quantities, smooth_response
-from sweep.metrics.separation.separation import separation
-from sweep.search.solver.limit import limit_of
-from sweep.search.solver.problem import starting_points
-from sweep.search.solver.solver import search_from
 
+from sweep.metrics.bound import FEASIBLE, total_violation
+from sweep.metrics.evaluate import designed_quantities, smooth_response
+from sweep.metrics.separation import separation
+from sweep.search.limit import limit_of
+from sweep.search.problem import starting_points
+from sweep.search.solver import search_from
 from sweep.study import load_study
 
 ROOT = Path(__file__).parent.parent

@@ -79,7 +79,7 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> Study:
     """A sweep alone, of two kinds of chunks."""
     from sweep.study import load_study
 
-    from .test_runner import study_file
+    from .build import study_file
 
     folder = tmp_path_factory.mktemp("study")
     path = study_file(folder)
@@ -89,7 +89,7 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> Study:
 
 @pytest.fixture(scope="session")
 def whole(plain: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
-    from .test_runner import ran
+    from .build import ran
 
     folder = tmp_path_factory.mktemp("whole")
     ran(plain, folder, 1)

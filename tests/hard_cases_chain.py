@@ -9,7 +9,6 @@ from typing import Any
 
 import mpmath as mp
 import numpy as np
-from sweep.metrics.separation.evaluate import evaluate, smooth_csd, smooth_response
 
 from sweep.camera.imager import Imager
 from sweep.camera.mosaic import Mosaic
@@ -19,6 +18,7 @@ from sweep.camera.view import Methods, Setup
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.stopband import Stopband
+from sweep.metrics.evaluate import evaluate, smooth_csd, smooth_response
 
 from .hard_cases import EPS, Result, hard_case, outcome, relative, worst
 

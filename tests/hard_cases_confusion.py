@@ -6,7 +6,8 @@ from itertools import product
 
 import mpmath as mp
 import numpy as np
-from sweep.metrics.separation.discrimination import contrast_to_noise, detectability, error_bound, pairwise_error
+
+from sweep.metrics.discrimination import contrast_to_noise, detectability, error_bound, pairwise_error
 
 from .hard_cases import EPS, Result, hard_case, outcome, relative, worst
 

@@ -10,7 +10,6 @@ from tempfile import TemporaryDirectory
 import mpmath as mp
 import numpy as np
 from scipy.io import savemat
-from sweep.metrics.separation.bound import FEASIBLE
 
 from sweep.camera.sensor import make_sensor
 from sweep.curves.files import read_curves
@@ -20,6 +19,7 @@ from sweep.designs.dual import Dual
 from sweep.designs.edge import edge, edge_gradient
 from sweep.designs.stopband import Stopband
 from sweep.errors import DataError, StudyError, SweepError
+from sweep.metrics.bound import FEASIBLE
 from sweep.study import load_study
 
 from .hard_cases import EPS, Result, hard_case, outcome, refused, worst

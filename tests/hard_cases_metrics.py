@@ -7,8 +7,9 @@ from fractions import Fraction
 import mpmath as mp
 import numpy as np
 from scipy.spatial import cKDTree
-from sweep.metrics.separation.pareto import non_dominated
-from sweep.metrics.separation.separation import separation, separations
+
+from sweep.metrics.pareto import non_dominated
+from sweep.metrics.separation import separation, separations
 
 from .hard_cases import EPS, Result, hard_case, outcome, relative, worst
 

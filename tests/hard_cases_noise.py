@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import mpmath as mp
 import numpy as np
-from sweep.metrics.separation.evaluate import evaluate
 
 from sweep.camera.effects.gaussian import rounding
 from sweep.camera.effects.noise import draws_dn
@@ -16,6 +15,7 @@ from sweep.camera.scene import Scenario
 from sweep.camera.view import Setup
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
+from sweep.metrics.evaluate import evaluate
 
 from .hard_cases import EPS, Result, hard_case, outcome, worst
 

@@ -7,7 +7,6 @@ from functools import cache
 
 import mpmath as mp
 import numpy as np
-from sweep.metrics.separation.evaluate import smooth_response
 
 from sweep.camera.effects import blur, sampling
 from sweep.camera.effects.blur import Profile, mean_over_disc, too_much, transfer
@@ -15,6 +14,7 @@ from sweep.camera.effects.sampling import covered
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scenario
+from sweep.metrics.evaluate import smooth_response
 
 from .hard_cases import EPS, Result, hard_case, outcome, relative, worst
 from .hard_cases_chain import FIXED, PAIR, RED, YELLOW, lights_of, lines, made, plain, random_qe

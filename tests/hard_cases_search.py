@@ -10,16 +10,16 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from scipy.optimize import brentq
-from sweep.metrics.separation.bound import FEASIBLE, Bound
-from sweep.metrics.separation.objective import Objective
-from sweep.search.solver.gradients import BACK_OFF
-from sweep.search.solver.limit import limit_of
-from sweep.search.solver.problem import Evaluation, Problem, best_feasible, starting_points
-from sweep.search.solver.solver import best_reachable, search_from
 
 from sweep.designs.stopband import Stopband
 from sweep.errors import InfeasibleError
+from sweep.metrics.bound import FEASIBLE, Bound
+from sweep.metrics.objective import Objective
 from sweep.run.search import run_search
+from sweep.search.gradients import BACK_OFF
+from sweep.search.limit import limit_of
+from sweep.search.problem import Evaluation, Problem, best_feasible, starting_points
+from sweep.search.solver import best_reachable, search_from
 from sweep.study import load_study
 
 from .hard_cases import EPS, Result, hard_case, outcome, worst

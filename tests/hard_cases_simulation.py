@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from sweep.metrics.separation.discrimination import error_bound, pairwise_error, state_error_bound
+
+from sweep.metrics.discrimination import error_bound, pairwise_error, state_error_bound
 
 from .hard_cases import Result, hard_case, worst
 from .hard_cases_confusion import FIRST, ONE, OTHER, SECOND, random_designs

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 
+from sweep.camera.imager import Imager
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.plan.bounds import Box
 from sweep.camera.scene import Scenario
 from sweep.camera.sensor import BUILT_IN_SENSORS
-from sweep.camera.view import Setup
+from sweep.camera.view import Methods, Setup
 from sweep.curves.builtin import BUILT_IN_LIGHTS
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.stopband import Stopband
+from sweep.metrics.evaluate import BEST_PLACE, evaluate, is_promised
 
 GRID, FINE = WavelengthGrid(step_nm=5), WavelengthGrid(step_nm=1)
 SENSOR = BUILT_IN_SENSORS["ar0820"](GRID)
@@ -196,3 +198,15 @@ HARD: tuple[Scene, ...] = (
         DARK | {"crosstalk": 0.02},
     ),
 )
+
+
+def columns(made: Scene, methods: Methods) -> np.ndarray:
+    """Every promised column of the scene's design; of the best place only where any is asked for."""
+    anywhere = asks_for_any_place(made)
+    found = evaluate(Imager(replace(made.setup, methods=methods)), made.curves)
+    return np.array([v[0] for n, v in found.items() if is_promised(n) and (anywhere or not n.startswith(BEST_PLACE))])
+
+
+def asks_for_any_place(made: Scene) -> bool:
+    target = made.setup.scenario.target
+    return target is not None and target.phase_px == "any"

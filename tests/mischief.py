@@ -6,11 +6,13 @@ import os
 import signal
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from sweep.designs.block import Edges
 from sweep.designs.space import Filter
 from sweep.designs.stopband import Stopband
 from sweep.results.identity import CHUNK
@@ -73,3 +75,10 @@ def half_done(study: Study, folder: Path) -> Journal:
     with pytest.raises(StoppedError):
         run_study(study, folder, 1, stop)
     return Journal(folder)
+
+
+def plant(patch: pytest.MonkeyPatch) -> None:
+    def broken(*_: Any) -> Any:
+        raise KeyError("planted")
+
+    patch.setattr(Edges, "product", broken)

@@ -7,9 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from sweep.metrics.separation.evaluate import BEST_PLACE, WORST, evaluate, is_promised
-from sweep.metrics.separation.separation import CSD
-from sweep.search.solver.problem import SHIFTS
 
 from sweep.camera.imager import Imager
 from sweep.camera.mosaic import Mosaic
@@ -20,6 +17,9 @@ from sweep.camera.view import Methods, Setup
 from sweep.designs.dual import Dual
 from sweep.designs.family import Family
 from sweep.designs.stopband import Stopband
+from sweep.metrics.evaluate import BEST_PLACE, WORST, evaluate, is_promised
+from sweep.metrics.separation import CSD
+from sweep.search.problem import SHIFTS
 
 from .hard_scenes import FAMILY, GRID, SENSOR, TILES, lights, target
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from sweep.metrics.separation.evaluate import is_promised
 
 from sweep.commands import app as cli
 from sweep.commands.audit import Audit, audit, sampled
 from sweep.errors import BrokenPromiseError
+from sweep.metrics.evaluate import is_promised
 from sweep.run import run_study
 from sweep.study import Study, load_study
 

@@ -12,8 +12,7 @@ from sweep.camera.plan.bounds import Box
 from sweep.camera.plan.plan import Planner
 from sweep.camera.view import REFERENCE
 
-from .hard_scenes import SENSOR, Scene, scene, target
-from .test_plan import columns
+from .hard_scenes import SENSOR, Scene, columns, scene, target
 
 _ARITHMETIC_DN = 1e-9
 MOSAIC = Mosaic.from_rows("few red", [["C", "C", "C", "C"]] * 3 + [["C", "C", "C", "R"]])

@@ -4,54 +4,26 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
-from sweep.metrics.separation.evaluate import evaluate
-from sweep.metrics.separation.separation import class_pairs, separations, separations_along
 
 from sweep.camera.imager import Imager
-from sweep.camera.view import Setup
 from sweep.designs import block as blocks
 from sweep.designs.block import Curves, edges_of
 from sweep.designs.free_form import FreeForm
 from sweep.designs.space import Filter, Space
 from sweep.designs.stopband import Stopband
+from sweep.metrics.evaluate import evaluate
+from sweep.metrics.separation import class_pairs, separations, separations_along
 
-from .hard_scenes import DARK, F2, FAMILY, FAR, FIXED, GRID, SENSOR, scene
+from .blocks import AXES, SETUPS, SPACE
+from .hard_scenes import GRID, SENSOR
 
-AXES = ((590.0, 600.0, 610.0), (5.0, 20.0), (640.0, 655.0), (0.0, 6.0, 30.0), (0.5, 1.0))
-SPACE = Space("sweep", "edges", "RYNCy", Filter(FAMILY, ("N",), "Y", "G"), AXES)
 EPS = np.finfo(float).eps
-
-
-def setup_of(scenario: dict[str, Any], pixel: dict[str, Any] | None = None, **methods: str) -> Setup:
-    made = scene("scene", "RYNCy", scenario, pixel).setup
-    return replace(made, methods=replace(made.methods, **methods))
-
-
-STRAIGHT = {"quantization": "skip", "saturation": "skip", "noise": "skip", "pedestal": "skip"}
-SETUPS = {
-    "chart": setup_of({}, **STRAIGHT),
-    "saturated": setup_of(
-        {"intensity_cd": 200, "exposure": {"kind": "fixed", "exposure_s": 4e-2}}, quantization="skip"
-    ),
-    "rounded": setup_of({}),
-    "noise": setup_of({"noise": True}, DARK | {"prnu": 0.01}),
-    "background": setup_of({"background_cd_m2": 300, "intensity_cd": 200, "exposure": FIXED}, **STRAIGHT),
-    "far": setup_of({"target": FAR, "optics": F2}, **STRAIGHT),
-    "far, pixel by pixel": setup_of({"target": FAR, "optics": F2}),
-    "any place": setup_of({"target": FAR | {"phase_px": "any"}, "optics": F2}, **STRAIGHT, phase="pixel"),
-    "crosstalk": setup_of({}, {"crosstalk": 0.1}),
-    "pulsed": setup_of(
-        {"drive": {"duty": 0.5, "frequency_hz": 90}, "exposure": {"kind": "fixed", "exposure_s": 0.003}}
-    ),
-    "coarse": setup_of({}, quadrature="every 5th", **STRAIGHT),
-}
 
 
 @pytest.mark.parametrize("name", list(SETUPS))

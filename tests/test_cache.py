@@ -15,7 +15,7 @@ from sweep.cache import Cache
 from sweep.camera.imager import imager_of
 from sweep.designs.block import Tables, edges_of
 
-from .test_blocks import SETUPS, SPACE
+from .blocks import SETUPS, SPACE
 
 N_THREADS = 8
 

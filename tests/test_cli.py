@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 from pathlib import Path
 
 import pandas as pd
@@ -11,21 +10,15 @@ from plotly.offline import get_plotlyjs
 
 from sweep.curves.files import read_curves
 
+from .build import SCENES, study_file
+from .commands import sweep
 from .conftest import SHARED, STUDIES, Finished, needs_measured
-from .test_runner import study_file
-from .test_scenes import SCENES
 
 
 @pytest.fixture(scope="module")
 def stopband(finished: Finished) -> tuple[Path, list[str]]:
     folder = finished("stopband")
     return folder, folder.with_name("stopband.said.txt").read_text().splitlines()
-
-
-def sweep(*arguments: str) -> subprocess.CompletedProcess[str]:
-    import sys
-
-    return subprocess.run([sys.executable, "-m", "sweep", *arguments], capture_output=True, text=True, check=False)
 
 
 def test_stopband_makes_its_files(stopband: tuple[Path, list[str]]) -> None:

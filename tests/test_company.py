@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sweep.metrics.separation.evaluate import evaluate
 
 from sweep.camera.imager import Imager
 from sweep.camera.mosaic import Mosaic
@@ -20,9 +19,10 @@ from sweep.designs.free_form import FreeForm
 from sweep.designs.products import row_products
 from sweep.designs.space import Filter, Space
 from sweep.designs.stopband import Stopband
+from sweep.metrics.evaluate import evaluate
 
+from .blocks import SETUPS, SPACE, setup_of
 from .hard_scenes import DARK, F2, FAMILY, FAR, FIXED, GRID, SENSOR, lights
-from .test_blocks import SETUPS, SPACE, setup_of
 
 # Crossed edges among them, which lift N above Y, so that it sets the exposure.
 AXES = ((590.0, 603.0, 690.0), (5.0, 20.0), (410.0, 640.0, 655.0), (0.0, 6.0, 30.0), (0.5, 0.8, 1.0))

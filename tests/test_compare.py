@@ -21,9 +21,9 @@ from sweep.report.compare.drawing import FrontsFigure, Line, Mark, draw_fronts, 
 from sweep.report.compare.fronts import Front, box_of, hypervolumes
 from sweep.study import load_study
 
+from .build import STUDY, ran
+from .commands import sweep
 from .tampering import listed_anew
-from .test_cli import sweep
-from .test_runner import STUDY, ran
 
 SWEEP = STUDY.replace("COUNT", "3").split("search:")[0]
 CHART = SWEEP.replace("  dim: {exposure: {kind: fixed, exposure_s: 0.002}}\n", "")

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sweep.metrics.separation.discrimination import NoiseShape, error_bound, pairwise_error
-from sweep.metrics.separation.evaluate import evaluate
 
 from sweep.camera.imager import Imager
 from sweep.camera.pixel import Pixel
-from sweep.metrics.separation import confusion
+from sweep.metrics import confusion
+from sweep.metrics.discrimination import NoiseShape, error_bound, pairwise_error
+from sweep.metrics.evaluate import evaluate
 from sweep.study import load_study
 
 from . import readout_oracle

@@ -22,9 +22,9 @@ from sweep.run.sweep import Sweep
 from sweep.run.workers import Workers
 from sweep.study import Study
 
+from .build import ran
 from .mischief import half_done, rows
 from .tampering import listed_anew
-from .test_runner import ran
 
 
 @pytest.fixture(scope="module")

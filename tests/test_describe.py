@@ -19,21 +19,9 @@ from sweep.curves.signal_color import VISIBLE, dominant_ranges_nm, light_color, 
 from sweep.errors import DataError, OutputError
 from sweep.study.editors import schema_text
 
+from .commands import sweep
 from .conftest import SHARED, needs_measured
-from .test_cli import sweep
-
-WAVE = np.arange(380.0, 781.0, 10)
-
-
-def bell(center_nm: float, sigma_nm: float) -> np.ndarray:
-    return np.exp(-0.5 * ((WAVE - center_nm) / sigma_nm) ** 2)
-
-
-def csv(folder: Path, header: str, *columns: np.ndarray, name: str = "curves.csv", encoding: str = "utf-8") -> Path:
-    path = folder / name
-    rows = [",".join(f"{number:.6g}" for number in row) for row in zip(*columns, strict=True)]
-    path.write_text("\n".join([header, *rows]) + "\n", encoding=encoding)
-    return path
+from .curve_texts import WAVE, bell, csv
 
 
 def is_png(path: Path) -> bool:

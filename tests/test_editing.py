@@ -17,10 +17,9 @@ from sweep.commands.list_studies import list_lines
 from sweep.study.document import Document
 from sweep.study.editors import SCHEMA_FILE, schema_text, study_schema
 
+from .build import made, study_file
+from .commands import sweep
 from .conftest import STUDIES
-from .test_cli import sweep
-from .test_new import made
-from .test_runner import study_file
 
 FILES = sorted(STUDIES.glob("*.yaml"))
 HEAVY = ["matplotlib", "pandas", "numba", "colour", "pyarrow", "scipy", "sklearn", "pydantic"]

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sweep.metrics.separation.evaluate import designed_quantities, evaluate, sensitivities_gradient, smooth_response
 
 from sweep.camera.imager import imager_of, smooth_imager
 from sweep.camera.mosaic import Mosaic
@@ -17,6 +16,7 @@ from sweep.camera.view import Setup
 from sweep.curves.builtin import BUILT_IN_LIGHTS
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.stopband import Stopband
+from sweep.metrics.evaluate import designed_quantities, evaluate, sensitivities_gradient, smooth_response
 
 GRID = WavelengthGrid()
 SENSOR = BUILT_IN_SENSORS["ar0820"](GRID)

@@ -19,9 +19,9 @@ from sweep.curves.isetcam import HINTS, color_hints, csv_text, isetcam_mat, uniq
 from sweep.errors import OutputError, SweepError
 from sweep.study import load_study
 
+from .build import ran, study_file
+from .commands import sweep
 from .tampering import listed_anew
-from .test_cli import sweep
-from .test_runner import ran, study_file
 
 FILES = """\
 study: files

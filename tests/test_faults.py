@@ -27,8 +27,8 @@ from sweep.run.sweep import KILLED
 from sweep.run.workers import Workers, workers
 from sweep.study import Study, load_study
 
+from .build import ran, study_file
 from .mischief import StoppedError, half_done, mischievous, rows
-from .test_runner import ran, study_file
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,6 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pytest
-from sweep.search.solver.problem import Evaluation, SearchRun
 
 from sweep.commands.status import status_lines
 from sweep.errors import OutputError
@@ -25,11 +24,12 @@ from sweep.results.journal import SHARDS, Entry, Journal
 from sweep.results.records import to_json
 from sweep.results.tables import encoded
 from sweep.run import output_folder, run_study
+from sweep.search.problem import Evaluation, SearchRun
 from sweep.study import Study, load_study
 
+from .build import study_file
 from .mischief import StoppedError, rows
-from .test_records import hostile
-from .test_runner import study_file
+from .tampering import hostile
 
 JOURNAL = f"{SHARDS}/_journal.jsonl"
 Attack = Callable[[Path, Path], None]

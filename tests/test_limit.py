@@ -8,14 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sweep.metrics.separation.bound import FEASIBLE, Bound, total_violation
-from sweep.metrics.separation.evaluate import designed_quantities, smooth_response
-from sweep.metrics.separation.objective import Objective
-from sweep.metrics.separation.pareto import hypervolume
-from sweep.metrics.separation.separation import separation
-from sweep.search.solver.limit import limit_of, why_not
-from sweep.search.solver.problem import Problem, best_feasible, starting_points
-from sweep.search.solver.solver import search_from
 
 from sweep.camera.scene import FixedExposure, Scenario
 from sweep.camera.view import Setup
@@ -23,7 +15,15 @@ from sweep.curves.lights import Lights
 from sweep.designs.free_form import FreeForm
 from sweep.designs.stopband import Stopband
 from sweep.errors import SweepError
+from sweep.metrics.bound import FEASIBLE, Bound, total_violation
+from sweep.metrics.evaluate import designed_quantities, smooth_response
+from sweep.metrics.objective import Objective
+from sweep.metrics.pareto import hypervolume
+from sweep.metrics.separation import separation
 from sweep.report.summary import _limit_line
+from sweep.search.limit import limit_of, why_not
+from sweep.search.problem import Problem, best_feasible, starting_points
+from sweep.search.solver import search_from
 from sweep.study import load_study
 
 from .conftest import STUDIES

@@ -17,8 +17,7 @@ from sweep.results.inventory import Inventory
 from sweep.run import output_folder, run_study
 from sweep.study import load_study
 
-from .commands import commanded
-from .test_cli import sweep
+from .commands import commanded, sweep
 
 STUDY = """\
 study: small

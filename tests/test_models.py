@@ -10,8 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
-from sweep.metrics.separation.pareto import non_dominated
-from sweep.metrics.separation.separation import cfa_sensitivity, separation
 
 from sweep.camera.effects import quantization, saturation
 from sweep.camera.imager import Imager
@@ -24,6 +22,8 @@ from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.edge import SPAN_PER_WIDTH, edge, edge_gradient
 from sweep.designs.stopband import Stopband
 from sweep.errors import SweepError
+from sweep.metrics.pareto import non_dominated
+from sweep.metrics.separation import cfa_sensitivity, separation
 
 
 @pytest.mark.parametrize(

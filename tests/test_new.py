@@ -16,14 +16,10 @@ from sweep.errors import DataError, OutputError, StudyError
 from sweep.study import load_study
 from sweep.study.document import Document
 
+from .build import made
+from .commands import sweep
 from .conftest import SHARED, needs_measured
-from .test_cli import sweep
-from .test_describe import WAVE, bell, csv
-
-
-def made(folder: Path, name: str = "mine", qe: Path | None = None, lights: Path | None = None) -> Path:
-    new_study(name, folder / "studies", qe, lights, "energy")
-    return folder / "studies" / f"{name}.yaml"
+from .curve_texts import WAVE, bell, csv
 
 
 @pytest.fixture

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from sweep.metrics.separation.discrimination import D_PRIME, ERROR
-from sweep.metrics.separation.evaluate import STATE_ERROR, evaluate
-from sweep.metrics.separation.recognition import MOST_LIKELY, RULES, recognize
 
 from sweep.camera.effects import noise
 from sweep.camera.imager import Imager
 from sweep.curves.lights import Lights
 from sweep.errors import StudyError
+from sweep.metrics.discrimination import D_PRIME, ERROR
+from sweep.metrics.evaluate import STATE_ERROR, evaluate
+from sweep.metrics.recognition import MOST_LIKELY, RULES, recognize
 from sweep.report import make_report, read_output, summary_lines
 from sweep.run import run_study
 from sweep.study import load_study

@@ -22,9 +22,9 @@ from sweep.results.names import is_drawn, is_own
 from sweep.run import output_folder, run_study
 from sweep.study import Study, load_study
 
+from .build import ran, study_file
 from .conftest import Finished
 from .mischief import StoppedError, half_done, rows
-from .test_runner import ran, study_file
 
 NAMES = (
     *("results.parquet", "curves.parquet", "provenance.json", "run.json", "SHA256SUMS", "study.resolved.yaml"),

@@ -14,8 +14,6 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.optimize import minimize
-from sweep.metrics.separation.evaluate import BEST_PLACE, evaluate
-from sweep.metrics.separation.separation import CSD
 
 from sweep.camera.between import Between
 from sweep.camera.effects import phase
@@ -23,6 +21,8 @@ from sweep.camera.imager import Imager
 from sweep.camera.kernel import make_kernel
 from sweep.camera.plan.plan import Plan, Planner
 from sweep.camera.view import REFERENCE, Methods, Setup
+from sweep.metrics.evaluate import BEST_PLACE, evaluate
+from sweep.metrics.separation import CSD
 from sweep.report.plans import plan_lines
 
 from .hard_scenes import DARK, F2, FAR, NEAR, TILES, Scene, scene, target

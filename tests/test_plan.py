@@ -12,8 +12,6 @@ from typing import Any
 import joblib
 import numpy as np
 import pytest
-from sweep.metrics.separation.evaluate import BEST_PLACE, evaluate, is_promised
-from sweep.metrics.separation.separation import CSD
 
 from sweep.camera.effects import blur, phase
 from sweep.camera.imager import Imager
@@ -21,15 +19,19 @@ from sweep.camera.plan.plan import Plan, Planner
 from sweep.camera.plan.promises import EFFECTS, READOUT
 from sweep.camera.view import METHODS, REFERENCE, Methods
 from sweep.errors import SweepError
+from sweep.metrics.evaluate import evaluate
+from sweep.metrics.separation import CSD
 from sweep.study import load_study
 
 from .conftest import STUDIES
-from .hard_scenes import F2, FAR, HARD, Scene, scene
+from .hard_scenes import F2, FAR, HARD, Scene, asks_for_any_place, columns, scene
 from .hard_scenes_alone import ALONE as SCENES_ALONE
 
 _ARITHMETIC_DN = 1e-9
 """Rounding of double precision itself."""
 _SEEN_DN = 1e-3
+_ALL_PLACES, _ALL_PLACES_DN = "within 0.01 DN", 0.02
+"""All places are looked at so closely; two distances are then off by so much."""
 
 
 @dataclass(frozen=True)
@@ -42,13 +44,6 @@ class Row:
     method: str
     promised: float
     realized: float
-
-
-def columns(made: Scene, methods: Methods) -> np.ndarray:
-    """Every promised column of the scene's design; of the best place only where any is asked for."""
-    anywhere = asks_for_any_place(made)
-    found = evaluate(Imager(replace(made.setup, methods=methods)), made.curves)
-    return np.array([v[0] for n, v in found.items() if is_promised(n) and (anywhere or not n.startswith(BEST_PLACE))])
 
 
 SCENES = (*HARD, *SCENES_ALONE)
@@ -71,7 +66,9 @@ def contract(made: Scene) -> list[Row]:
     """Every method of every effect, switched alone from every base from which a plan may switch it."""
     planner, noisy = Planner([made.box]), made.setup.scenario.noise is not None
     found = []
-    bases = {name: BASES[name] for name in (ALONE, STRAIGHT)} if asks_for_any_place(made) else BASES
+    bases = BASES
+    if asks_for_any_place(made):
+        bases = {name: replace(BASES[name], phase=_ALL_PLACES) for name in (ALONE, STRAIGHT)}
     for name, before in bases.items():
         if (name == "unrounded" and noisy) or (name == "no noise" and not noisy):
             continue
@@ -94,11 +91,6 @@ def contract(made: Scene) -> list[Row]:
                 realized = float(np.abs(columns(made, after) - reference).max())
                 found.append(Row(made.name, name, effect, method, promised, realized))
     return found
-
-
-def asks_for_any_place(made: Scene) -> bool:
-    target = made.setup.scenario.target
-    return target is not None and target.phase_px == "any"
 
 
 @cache
@@ -143,8 +135,8 @@ def test_there_are_enough_hard_scenes() -> None:
     assert len({made.name for made in SCENES}) == len(SCENES)
 
 
-def broken(rows: Iterable[Row]) -> list[Row]:
-    return [row for row in rows if not row.realized <= row.promised * (1 + 1e-9) + _ARITHMETIC_DN]
+def broken(rows: Iterable[Row], off_dn: float = _ARITHMETIC_DN) -> list[Row]:
+    return [row for row in rows if not row.realized <= row.promised * (1 + 1e-9) + off_dn]
 
 
 def test_no_method_changes_more_than_it_promises() -> None:
@@ -153,7 +145,7 @@ def test_no_method_changes_more_than_it_promises() -> None:
 
 @pytest.mark.slow
 def test_no_method_changes_more_than_it_promises_where_any_place_counts() -> None:
-    assert broken(all_contracts(anywhere=True)) == []
+    assert broken(all_contracts(anywhere=True), _ALL_PLACES_DN) == []
 
 
 def test_promises_are_not_uselessly_wide() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import struct
 from collections.abc import Mapping
@@ -13,11 +12,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sweep.search.solver.limit import Limit
-from sweep.search.solver.problem import Evaluation, SearchRun
 
 from sweep.results.records import from_json, to_json
+from sweep.search.limit import Limit
+from sweep.search.problem import Evaluation, SearchRun
 from sweep.types import FloatArray, IndexArray
+
+from .tampering import hostile
 
 numbers = st.floats(allow_nan=True, allow_infinity=True, allow_subnormal=True)
 
@@ -95,51 +96,6 @@ def test_fields_of_every_kind_come_back() -> None:
 def test_what_is_no_data_is_not_kept(value: object) -> None:
     with pytest.raises(TypeError, match="cannot be kept"):
         to_json(value)
-
-
-def hostile() -> list[bytes]:
-    good = json.loads(to_json(SearchRun(1, "success", [Evaluation(np.arange(3.0), 1.0, 2.0, 3.0, 0.0)])))
-    evaluation = good["log"][0]
-    array = evaluation["x"]
-    return [
-        b"",
-        b"null",
-        b"\xff\xfe",
-        b"cos\nsystem\n(S'true'\ntR.",  # a pickle
-        b"[" * 1_000_000,
-        b'{"a":' * 100_000 + b"1" + b"}" * 100_000,
-        *(
-            json.dumps(made).encode()
-            for made in (
-                [],
-                good | {"start": "1"},
-                good | {"start": True},
-                good | {"start": 1.0},
-                good | {"more": 1},
-                {key: good[key] for key in ("start", "log")},
-                good | {"log": {}},
-                good | {"log": [1]},
-                *(
-                    good | {"log": [evaluation | change]}
-                    for change in (
-                        {"objective": "x"},
-                        {"objective": "0x1p+99999"},
-                        {"objective": None},
-                        {"objective": [1.0]},
-                        {"x": [1.0]},
-                        {"x": array | {"shape": [4]}},
-                        {"x": array | {"shape": [-3]}},
-                        {"x": array | {"shape": [10**30, 0]}},
-                        {"x": array | {"shape": [True, 3]}},
-                        {"x": array | {"dtype": "|O"}},
-                        {"x": array | {"dtype": ">f8"}},
-                        {"x": array | {"base64": "!"}},
-                        {"x": array | {"base64": None}},
-                    )
-                ),
-            )
-        ),
-    ]
 
 
 @pytest.mark.parametrize("content", hostile())

@@ -11,9 +11,9 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from sweep.metrics.separation.pareto import knee
 
 from sweep.errors import OutputError
+from sweep.metrics.pareto import knee
 from sweep.report import read_output
 from sweep.report.history import history_of
 from sweep.report.page_data import payload
@@ -24,10 +24,9 @@ from sweep.results.profiles import Profile, Profiles
 from sweep.run.rows import Job, jobs_of, rules_of, run_job
 from sweep.study import Study, load_study
 
+from .build import large, ran, study_file
 from .conftest import Finished
 from .tampering import listed_anew
-from .test_runner import ran, study_file
-from .test_scale import large
 
 
 def test_the_knee_is_farthest_from_the_line_between_the_ends() -> None:

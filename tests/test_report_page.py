@@ -18,8 +18,8 @@ import pytest
 from sweep.report import make_report, read_output
 from sweep.study import load_study
 
+from .build import ran
 from .conftest import Finished
-from .test_runner import ran
 
 BROWSER = next((p for n in ("chromium", "chromium-browser", "google-chrome") if (p := shutil.which(n))), None)
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")

@@ -21,17 +21,10 @@ from sweep.run.routes import ALONE, BY_CURVES
 from sweep.run.rows import Job, detours_of, rules_of, run_job
 from sweep.study import Study
 
-from .mischief import StoppedError, mischievous, rows
-from .test_runner import ran
+from .build import ran
+from .mischief import StoppedError, mischievous, plant, rows
 
 FAULT = "KeyError: 'planted'"
-
-
-def plant(patch: pytest.MonkeyPatch) -> None:
-    def broken(*_: Any) -> Any:
-        raise KeyError("planted")
-
-    patch.setattr(Edges, "product", broken)
 
 
 def with_edges(study: Study) -> int:

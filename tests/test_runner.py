@@ -16,12 +16,12 @@ import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
-from sweep.metrics.separation.evaluate import evaluate, quantities
 
 from sweep.camera.imager import imager_of
 from sweep.designs.space import Filter, Space
 from sweep.designs.stopband import Stopband
 from sweep.errors import OutputError, StudyError
+from sweep.metrics.evaluate import evaluate, quantities
 from sweep.report import make_report, read_output
 from sweep.report.values import scenario_series
 from sweep.results.identity import CHUNK
@@ -31,43 +31,7 @@ from sweep.run import run_study
 from sweep.run.rows import Job, jobs_of, rules_of, run_job
 from sweep.study import Study, load_study
 
-STUDY = """\
-study: tiny
-sensor: ar0820
-lights: tl16
-scenarios:
-  chart: {exposure: {kind: white_patch}}
-  dim: {exposure: {kind: fixed, exposure_s: 0.002}}
-cfas: [RGGB, RYYCy, RYNCy]
-designs:
-  mine: {cfa: RYNCy, channel: N, base: Y, to: G, at: {left_nm: 606, left_width_nm: 36, right_nm: 646, right_width_nm: 7}}
-sweeps:
-  edges:
-    cfa: RYNCy
-    channel: N
-    base: Y
-    to: G
-    grid:
-      left_nm: {min: 590, max: 690, count: COUNT}
-      left_width_nm: [5, 10]
-      right_nm: {min: 640, max: 690, count: 51}
-      right_width_nm: [5, 25]
-constraints:
-  sensitivity: {min: 0.9}
-search: {starts: 4, max_evaluations: 200}
-"""
-
-
-def study_file(folder: Path, count: int = 26) -> Path:
-    path = folder / "tiny.yaml"
-    path.write_text(STUDY.replace("COUNT", str(count)))
-    return path
-
-
-def ran(study: Study, output: Path, jobs: int) -> list[tuple[str, int, int]]:
-    seen: list[tuple[str, int, int]] = []
-    run_study(study, output, jobs, lambda *call: seen.append(call))
-    return seen
+from .build import STUDY, ran, study_file
 
 
 @pytest.fixture(scope="module")

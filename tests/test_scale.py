@@ -17,30 +17,7 @@ from sweep.results.thinning import MOST_ROWS
 from sweep.run.rows import job_key, jobs_of
 from sweep.study import Study, load_study
 
-STUDY = """
-study: large
-sensor: ar0820
-lights: tl16
-cfas: [RGGB, RYNCy]
-sweeps:
-  edges:
-    cfa: RYNCy
-    channel: N
-    base: Y
-    to: G
-    grid:
-      left_nm: {min: 580, max: 620, count: LEFT}
-      left_width_nm: {min: 5, max: 40, count: 25}
-      right_nm: {min: 640, max: 680, count: 50}
-      right_width_nm: {min: 5, max: 40, count: 40}
-constraints: {sensitivity: {min: 0.9}}
-"""
-
-
-def large(folder: Path, left: int) -> Path:
-    path = folder / "large.yaml"
-    path.write_text(STUDY.replace("LEFT", str(left)))
-    return path
+from .build import large
 
 
 def test_a_hundred_thousand_chunks_have_keys_of_their_own(tmp_path: Path) -> None:

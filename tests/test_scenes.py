@@ -13,30 +13,8 @@ from sweep.report import make_report, read_output
 from sweep.run import run_study
 from sweep.study import load_study
 
+from .build import SCENES
 from .conftest import STUDIES
-
-SCENES = """\
-study: scenes
-sensor: ar0820
-lights: tl16
-wavelengths: {step_nm: 5}
-pixel: {read_noise_e: 2, offset_dn: 168}
-scenarios:
-  road:
-    target: {fov_deg: 60, phase_px: any}
-    optics: {f_number: 2}
-    noise: true
-    each: {target.distance_m: [150, 250]}
-tolerance_dn: 5
-cfas: [RGGB, RYNCy]
-sweeps:
-  edges:
-    cfa: RYNCy
-    channel: N
-    base: Y
-    to: G
-    grid: {left_nm: [600, 610], left_width_nm: 20, right_nm: 650, right_width_nm: 10}
-"""
 
 
 def test_scenes_are_planned_drawn_and_audited(tmp_path: Path) -> None:

@@ -6,18 +6,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sweep.metrics.separation.bound import FEASIBLE, Bound, total_violation
-from sweep.metrics.separation.evaluate import designed_quantities, smooth_response
-from sweep.metrics.separation.objective import Objective
-from sweep.metrics.separation.separation import separation
-from sweep.search.solver.limit import Limit, limit_of
-from sweep.search.solver.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
-from sweep.search.solver.solver import search_from
 
 from sweep.commands.app import main
 from sweep.designs.free_form import FreeForm
 from sweep.errors import BrokenProofError
+from sweep.metrics.bound import FEASIBLE, Bound, total_violation
+from sweep.metrics.evaluate import designed_quantities, smooth_response
+from sweep.metrics.objective import Objective
+from sweep.metrics.separation import separation
 from sweep.run import search as searching
+from sweep.search.limit import Limit, limit_of
+from sweep.search.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
+from sweep.search.solver import search_from
 from sweep.study import Study, load_study
 
 from .conftest import STUDIES

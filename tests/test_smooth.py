@@ -6,18 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sweep.metrics.separation.bound import Bound
-from sweep.metrics.separation.evaluate import designed_quantities, smooth_csd, smooth_response
-from sweep.metrics.separation.objective import Objective
-from sweep.metrics.separation.separation import separation
-from sweep.search.solver.gradients import Model
-from sweep.search.solver.limit import limit_of, why_not
-from sweep.search.solver.problem import Problem, SearchRun, best_feasible, starting_points
-from sweep.search.solver.solver import best_reachable, search_from
 
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scenario
 from sweep.camera.view import REFERENCE
+from sweep.metrics.bound import Bound
+from sweep.metrics.evaluate import designed_quantities, smooth_csd, smooth_response
+from sweep.metrics.objective import Objective
+from sweep.metrics.separation import separation
+from sweep.search.gradients import Model
+from sweep.search.limit import limit_of, why_not
+from sweep.search.problem import Problem, SearchRun, best_feasible, starting_points
+from sweep.search.solver import best_reachable, search_from
 from sweep.study import load_study
 
 from .conftest import STUDIES

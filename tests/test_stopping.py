@@ -22,7 +22,7 @@ from sweep.errors import InterruptedRunError
 from sweep.run.stop import GRACE_S, BrokenOffError, Stop, stop_on_signals
 from sweep.run.workers import Workers, workers
 
-from .test_runner import STUDY
+from .build import STUDY
 
 SLOWED = Path(__file__).parent / "slowed"
 SAID = "sweep: interrupted; finished chunks are kept, the same command continues\n"

@@ -6,50 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from sweep.errors import StudyError
 from sweep.results.identity import fingerprint
 from sweep.run.provenance import resolved_yaml
-from sweep.study import Study, folder_name, load_study
+from sweep.study import folder_name, load_study
 
+from .build import BASE, faults, load
 from .conftest import SHARED, STUDIES, needs_measured
 
-BASE = """\
-study: tiny
-sensor: ar0820
-lights: tl16
-cfas: [RGGB, RYNCy]
-designs:
-  mine: {cfa: RYNCy, channel: N, base: Y, to: G, at: {left_nm: 600, left_width_nm: 10, right_nm: 650, right_width_nm: 10}}
-sweeps:
-  edges:
-    cfa: RYNCy
-    channel: N
-    base: Y
-    to: G
-    grid:
-      left_nm: {min: 590, max: 610, count: 3}
-      left_width_nm: [5, 10]
-      right_nm: 650
-      right_width_nm: {min: 5, max: 25, count: 2}
-constraints:
-  sensitivity: {min: 0.9}
-search:
-  space: edges
-"""
 SENSOR_FILE = "sensor:\n  files:\n    - {file: qe.csv, columns: {R: R, C: C}}\n"
 LIGHT_FILE = "lights:\n  files:\n    - {file: led.csv, quantity: energy, signals: {red: [r], green: [g]}}\n"
-
-
-def load(tmp_path: Path, text: str) -> Study:
-    path = tmp_path / "tiny.yaml"
-    path.write_text(text, encoding="utf-8")
-    return load_study(path)
-
-
-def faults(tmp_path: Path, text: str) -> list[str]:
-    with pytest.raises(StudyError) as caught:
-        load(tmp_path, text)
-    return [str(fault).replace(f"{tmp_path}/", "") for fault in caught.value.faults]
 
 
 def test_a_study_is_resolved(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from .test_study import BASE, faults, load
+from .build import BASE, faults, load
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from sweep.results.identity import CHUNK
 from sweep.run.rows import Job, joined, rules_of, run_job
 from sweep.study import Study
 
-from .test_routes import plant
+from .mischief import plant
 
 STUDY = """\
 study: tiny

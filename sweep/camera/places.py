@@ -1,7 +1,7 @@
 """The smallest and the largest color separation distance over all real places of a light on the mosaic.
 
 The tile is divided into cells. In each, all distances are bounded from the responses at its four corners and from what
-may lie between them (`effects.between`); cells that may hold a smaller or a larger distance than those found, by more
+may lie between them (`between`); cells that may hold a smaller or a larger distance than those found, by more
 than the method of `phase` leaves open, are divided. The readout is taken as straight.
 """
 

@@ -24,7 +24,7 @@ def nearest_squared(response: FloatArray, bounds: IndexArray, out: FloatArray) -
 
     `response`: C-ordered ndarray[n_designs, CHANNELS, n_signals], finite, one class of signals after the other;
     `bounds`: ndarray[n_classes + 1], where each class begins. `out`: ndarray[n_designs, n_pairs], pairs in the order of
-    `metrics.class_pairs`.
+    `curves.lights.class_pairs`.
     """
     for d in range(response.shape[0]):
         values = response[d]

@@ -22,7 +22,7 @@ _ATTEMPTS, _PAUSE_S = 5, 0.02
 _SAYS = re.compile(rb"(process \d+ on [^\n]*)?")
 _MOST_SAID = 400
 _LEFT_OVER = re.compile(r"\.tmp-\d+-(SHA256SUMS|[\w.-]+\.(parquet|json|yaml|html|csv|png|svg))")
-"""Hidden names that `store.atomic` gives to files of a run."""
+"""Hidden names that `tables.atomic` gives to files of a run."""
 
 
 @contextmanager

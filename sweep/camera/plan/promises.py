@@ -3,7 +3,7 @@
 Effects are switched from the reference to their method one after the other; each promise bounds what that step changes
 in any CSD, for every design of the scene. So the sum bounds the whole. The readout's effects come first: once it is
 straight, what the optics change passes through it unchanged. Where it still bends, a promise of the optics is the
-smaller one of two bounds: what they move pixel by pixel (`effects.pixelwise`), and what they change in a straight
+smaller one of two bounds: what they move pixel by pixel (`pixelwise`), and what they change in a straight
 readout, with as much as both distances may differ from that. Where the light may fall anywhere, the promise of `phase`
 already holds the latter: its extremes are those of the straight response, so that is all that the optics change.
 """

@@ -44,7 +44,7 @@ def read_hard_cases(folder: Path) -> pd.DataFrame | None:
 
 
 def make_accuracy_report(folder: Path, report: AccuracyReport) -> None:
-    """Write `accuracy.html` into the folder; errors as for `store.atomic`."""
+    """Write `accuracy.html` into the folder; errors as for `tables.atomic`."""
     ladder = report.ladder.assign(
         faster=(report.ladder["reference_s"] / report.ladder["seconds"]).map("{:.3g}x".format)
     )

@@ -64,7 +64,7 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> list[str]:
     """Compare finished runs, write `compare.html`, `compare.csv`, `fronts.png`, `fronts.svg`, and say what was found.
 
     `to`: default outputs/compare-<a>-<b>. Raises SweepError unless there are 2 to 26; OutputError for a folder without
-    a finished run, where a file would be replaced that no comparison wrote, and as `store.atomic` does.
+    a finished run, where a file would be replaced that no comparison wrote, and as `tables.atomic` does.
     """
     if not 2 <= len(folders) <= len(_LETTERS):
         allowed = f"2 to {len(_LETTERS)} folders"

@@ -1,0 +1,142 @@
+"""Studies that tests run: texts, files, runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from sweep.commands.new import new_study
+from sweep.errors import StudyError
+from sweep.run import run_study
+from sweep.study import Study, load_study
+
+STUDY = """\
+study: tiny
+sensor: ar0820
+lights: tl16
+scenarios:
+  chart: {exposure: {kind: white_patch}}
+  dim: {exposure: {kind: fixed, exposure_s: 0.002}}
+cfas: [RGGB, RYYCy, RYNCy]
+designs:
+  mine: {cfa: RYNCy, channel: N, base: Y, to: G, at: {left_nm: 606, left_width_nm: 36, right_nm: 646, right_width_nm: 7}}
+sweeps:
+  edges:
+    cfa: RYNCy
+    channel: N
+    base: Y
+    to: G
+    grid:
+      left_nm: {min: 590, max: 690, count: COUNT}
+      left_width_nm: [5, 10]
+      right_nm: {min: 640, max: 690, count: 51}
+      right_width_nm: [5, 25]
+constraints:
+  sensitivity: {min: 0.9}
+search: {starts: 4, max_evaluations: 200}
+"""
+
+
+def study_file(folder: Path, count: int = 26) -> Path:
+    path = folder / "tiny.yaml"
+    path.write_text(STUDY.replace("COUNT", str(count)))
+    return path
+
+
+def ran(study: Study, output: Path, jobs: int) -> list[tuple[str, int, int]]:
+    seen: list[tuple[str, int, int]] = []
+    run_study(study, output, jobs, lambda *call: seen.append(call))
+    return seen
+
+
+SCENES = """\
+study: scenes
+sensor: ar0820
+lights: tl16
+wavelengths: {step_nm: 5}
+pixel: {read_noise_e: 2, offset_dn: 168}
+scenarios:
+  road:
+    target: {fov_deg: 60, phase_px: any}
+    optics: {f_number: 2}
+    noise: true
+    each: {target.distance_m: [150, 250]}
+tolerance_dn: 5
+cfas: [RGGB, RYNCy]
+sweeps:
+  edges:
+    cfa: RYNCy
+    channel: N
+    base: Y
+    to: G
+    grid: {left_nm: [600, 610], left_width_nm: 20, right_nm: 650, right_width_nm: 10}
+"""
+
+
+LARGE = """
+study: large
+sensor: ar0820
+lights: tl16
+cfas: [RGGB, RYNCy]
+sweeps:
+  edges:
+    cfa: RYNCy
+    channel: N
+    base: Y
+    to: G
+    grid:
+      left_nm: {min: 580, max: 620, count: LEFT}
+      left_width_nm: {min: 5, max: 40, count: 25}
+      right_nm: {min: 640, max: 680, count: 50}
+      right_width_nm: {min: 5, max: 40, count: 40}
+constraints: {sensitivity: {min: 0.9}}
+"""
+
+
+def large(folder: Path, left: int) -> Path:
+    path = folder / "large.yaml"
+    path.write_text(LARGE.replace("LEFT", str(left)))
+    return path
+
+
+BASE = """\
+study: tiny
+sensor: ar0820
+lights: tl16
+cfas: [RGGB, RYNCy]
+designs:
+  mine: {cfa: RYNCy, channel: N, base: Y, to: G, at: {left_nm: 600, left_width_nm: 10, right_nm: 650, right_width_nm: 10}}
+sweeps:
+  edges:
+    cfa: RYNCy
+    channel: N
+    base: Y
+    to: G
+    grid:
+      left_nm: {min: 590, max: 610, count: 3}
+      left_width_nm: [5, 10]
+      right_nm: 650
+      right_width_nm: {min: 5, max: 25, count: 2}
+constraints:
+  sensitivity: {min: 0.9}
+search:
+  space: edges
+"""
+
+
+def load(tmp_path: Path, text: str) -> Study:
+    path = tmp_path / "tiny.yaml"
+    path.write_text(text, encoding="utf-8")
+    return load_study(path)
+
+
+def faults(tmp_path: Path, text: str) -> list[str]:
+    with pytest.raises(StudyError) as caught:
+        load(tmp_path, text)
+    return [str(fault).replace(f"{tmp_path}/", "") for fault in caught.value.faults]
+
+
+def made(folder: Path, name: str = "mine", qe: Path | None = None, lights: Path | None = None) -> Path:
+    new_study(name, folder / "studies", qe, lights, "energy")
+    return folder / "studies" / f"{name}.yaml"
