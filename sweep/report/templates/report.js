@@ -395,7 +395,9 @@ if (view) {
   byId("pareto").on("plotly_unhover", () => { byId("hover").hidden = true; });
   byId("pareto").on("plotly_click", (event) => {
     const row = meant(event);
-    if (row !== undefined) choose(row);
+    if (row === undefined) return;
+    choose(row);
+    hover(event);  // after a quick click Plotly does not say again what is pointed at
   });
 }
 later("history", drawHistory);
