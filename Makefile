@@ -29,7 +29,7 @@ slow: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest -m slow $(PARALLEL) worksteal $(ARGS)
 
 accuracy: $(VENV)/.ready-dev
-	$(BIN)/python -m pytest tests/test_hard_cases.py --hard-cases outputs/accuracy/hard_cases.json
+	$(BIN)/python -m pytest tests/hard/test_hard_cases.py --hard-cases outputs/accuracy/hard_cases.json
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/sweep accuracy studies/accuracy.yaml $(ARGS)
 
 check: $(VENV)/.ready-dev

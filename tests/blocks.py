@@ -8,7 +8,7 @@ from typing import Any
 from sweep.camera.view import Setup
 from sweep.designs.space import Filter, Space
 
-from .hard_scenes import DARK, F2, FAMILY, FAR, FIXED, scene
+from .hard.scenes import DARK, F2, FAMILY, FAR, FIXED, scene
 
 AXES = ((590.0, 600.0, 610.0), (5.0, 20.0), (640.0, 655.0), (0.0, 6.0, 30.0), (0.5, 1.0))
 

@@ -14,7 +14,7 @@ import pytest
 
 from sweep.study import Study
 
-from .hard_cases import write_table
+from .hard.registry import write_table
 
 ROOT = Path(__file__).parent.parent
 STUDIES = ROOT / "studies"

@@ -1,0 +1,309 @@
+"""Every effect against a formula, a brute force or a simulation that shares no code with it."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from itertools import pairwise
+
+import mpmath as mp
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import dblquad, quad
+from scipy.special import j0, j1
+
+from sweep.camera.effects import (
+    blur,
+    crosstalk,
+    demosaic,
+    extinction,
+    flicker,
+    gaussian,
+    noise,
+    phase,
+    readout,
+    sampling,
+    saturation,
+)
+from sweep.camera.pixel import Pixel
+from sweep.camera.scene import Drive, FixedExposure, Scenario, Target
+from sweep.curves.color import luminance_per_photon_radiance
+from sweep.curves.spectrum import LIGHT_M_S, PLANCK_J_S, WavelengthGrid
+
+from ..hard.scenes import F2, FAR, NEAR, TILES, scene, target
+
+
+def disc_by_energy(radius: float, r: float, wavelength: float, f_number: float) -> float:
+    """Image of a disc at r, from the encircled energy 1 - J0^2 - J1^2 (Rayleigh) around r: another integral."""
+    k = math.pi / (wavelength * f_number)
+    if r == 0:
+        return 1 - j0(k * radius) ** 2 - j1(k * radius) ** 2
+
+    def ring(s: float) -> float:
+        inside = math.acos(max(-1.0, min(1.0, (s * s + r * r - radius * radius) / (2 * s * r)))) / math.pi
+        return 2 * j1(k * s) ** 2 / s * inside
+
+    ends = sorted({0.0, abs(radius - r), radius + r})
+    return sum(quad(ring, a, b, limit=2000, epsabs=1e-10)[0] for a, b in pairwise(ends))
+
+
+@pytest.mark.parametrize(("radius", "f_number"), [(6.2, 2.0), (18.9, 4.0), (1.0, 1.4), (3.0, 16.0)])
+def test_the_image_of_a_disc(radius: float, f_number: float) -> None:
+    waves = np.array([0.4, 0.55, 0.7])
+    profile = blur.Profile(radius, 2 * radius, waves, f_number, 0.0)
+    for r in (0.0, 0.3 * radius, 0.95 * radius, radius, 1.3 * radius):
+        found = profile.at(np.array([r]))[0]
+        exact = [disc_by_energy(radius, r, wave, f_number) for wave in waves]
+        np.testing.assert_allclose(found, exact, atol=2e-6)
+
+
+@pytest.mark.parametrize("w20_um", [0.0, 0.2, 1.5])
+def test_the_transfer_function_is_the_autocorrelation_of_the_pupil(w20_um: float) -> None:
+    wave, f_number = 0.55, 2.0
+    for share in (0.1, 0.5, 0.9):
+        nu = share / (wave * f_number)
+
+        def overlap(y: float, x: float, share: float = share) -> float:
+            one, other = (x + share) ** 2 + y * y, (x - share) ** 2 + y * y
+            return math.cos(2 * math.pi / wave * w20_um * (one - other)) / math.pi
+
+        def height(x: float, sign: float, share: float = share) -> float:
+            return sign * math.sqrt(max(0.0, 1 - (abs(x) + share) ** 2))
+
+        exact = dblquad(overlap, share - 1, 1 - share, partial(height, sign=-1), partial(height, sign=1), epsabs=1e-7)[
+            0
+        ]
+        found = blur.transfer(np.array([nu]), np.array([wave]), f_number, w20_um)[0, 0]
+        assert found == pytest.approx(exact, abs=1e-6)
+
+
+def test_defocus_is_the_shift_of_the_image() -> None:
+    scenario = Scenario.model_validate({"target": NEAR, "optics": {"f_number": 2.0, "focus_m": 2.0}})
+    f_mm = 2.1e-3 * 3840 / math.radians(120)
+    shift_mm = 1 / (1 / f_mm - 1 / 2000) - 1 / (1 / f_mm - 1 / 20_000)
+    assert blur.defocus_um(scenario, 2.1) == pytest.approx(1000 * shift_mm / (8 * 4), rel=1e-9)
+    assert blur.defocus_um(Scenario.model_validate({"target": NEAR, "optics": F2}), 2.1) == 0
+
+
+@pytest.mark.parametrize("w20_um", [0.0, 0.7])
+def test_mean_over_the_disc_is_that_of_its_profile(w20_um: float) -> None:
+    waves, radius = np.array([0.45, 0.65]), 5.0
+    profile = blur.Profile(radius, 2 * radius, waves, 2.0, w20_um)
+    for wide in (radius, 0.4 * radius, 1.5 * radius):
+        nodes, weights = np.polynomial.legendre.leggauss(400)
+        r = (nodes + 1) / 2 * wide
+        exact = (profile.at(r) * (r * weights)[:, None]).sum(axis=0) / wide
+        np.testing.assert_allclose(blur.mean_over_disc(radius, wide, waves, 2.0, w20_um), exact, atol=1e-7)
+
+
+def test_the_envelope_is_above_the_bessel_function() -> None:
+    x = np.concatenate([np.linspace(1e-6, 50, 500_001), np.geomspace(50, 1e5, 200_001)])
+    assert (np.abs(j1(x)) <= blur._envelope(x) * (1 + 1e-12)).all()
+
+
+@pytest.mark.parametrize(("f_number", "w20_um"), [(1.4, 0.0), (2.0, 0.0), (8.0, 0.0), (2.0, 0.3), (4.0, 2.0)])
+def test_interpolation_between_wavelengths_stays_within_its_bound(f_number: float, w20_um: float) -> None:
+    fine = np.linspace(0.4, 0.7, 601)
+    for radius in (1.0, 6.2, 18.9):
+        exact = blur.Profile(radius, 1.6 * radius, fine, f_number, w20_um).at(np.linspace(0, 1.6 * radius, 60))
+        for spacing in (0.002, 0.01, 0.05):
+            knots = np.arange(0.4, 0.7 + spacing / 2, spacing)
+            at = [np.abs(fine - k).argmin() for k in knots]
+            linear = np.stack([np.interp(fine, fine[at], row[at]) for row in exact])
+            bound = blur.interpolation_bound(radius, 0.0, knots, f_number, w20_um)
+            assert np.abs(linear - exact).max() <= bound + 1e-7
+
+
+@settings(max_examples=60)
+@given(st.floats(0.2, 8), st.floats(-1, 1), st.floats(-1, 1), st.floats(0.1, 0.5))
+def test_covered_pixels_add_up_to_the_disc(radius: float, x0: float, y0: float, half: float) -> None:
+    """Squares that touch each other cover all of the disc."""
+    n = math.ceil((radius + 1) / (2 * half)) + 2
+    x, y = np.meshgrid(x0 + 2 * half * np.arange(-n, n + 1), y0 + 2 * half * np.arange(-n, n + 1))
+    total = sampling.covered(x, y, half, radius).sum() * (2 * half) ** 2
+    # Squares whose corner lies on the circle lose half of the digits in a square root.
+    assert total == pytest.approx(math.pi * radius**2, rel=1e-8)
+
+
+def test_covered_share_by_counting() -> None:
+    u = (np.arange(2000) + 0.5) / 2000 - 0.5
+    for x, y, half, radius in ((1.7, 0.4, 0.5, 2.0), (0.0, 0.0, 0.4, 0.3), (-2.1, 1.2, 0.3, 2.5), (5.0, 5.0, 0.5, 2.0)):
+        inside = (x + 2 * half * u)[:, None] ** 2 + (y + 2 * half * u)[None] ** 2 <= radius**2
+        found = sampling.covered(np.array([x]), np.array([y]), half, radius)[0]
+        assert found == pytest.approx(inside.mean(), abs=1e-3)
+
+
+def test_a_pixel_sees_the_mean_of_the_image_over_its_aperture() -> None:
+    made = scene("far", "RGGB", {"target": FAR, "optics": F2})
+    seen = sampling.window(made.setup.mosaic, np.array([[0.3, 0.8]]), 3.5)
+    profile = blur.Profile(6.2, 12.0, np.array([0.55]), 2.0, 0.0)
+    light = sampling.light_on_pixels(
+        seen, np.ones(seen.dx.shape, dtype=bool) & (np.hypot(seen.dx, seen.dy) < 4), 0.4, 6.2 / 2.1, profile, 2.1
+    )
+    found = light.by_pixel()[..., 0]
+    u = ((np.arange(60) + 0.5) / 60 - 0.5) * 0.8
+    for row, column in ((4, 4), (2, 5), (6, 3)):
+        x, y = seen.dx[0, 0, column] + u, seen.dy[0, row, 0] + u
+        if np.hypot(seen.dx[0, 0, column], seen.dy[0, row, 0]) < 4:
+            r = np.hypot(x[:, None], y[None]) * 2.1
+            assert found[0, row, column] == pytest.approx(profile.at(r).mean(), abs=2e-4)
+
+
+@pytest.mark.parametrize("name", list(TILES))
+@pytest.mark.parametrize("method", ["skip", "tent"])
+def test_readouts_weigh_each_channel_to_one(name: str, method: str) -> None:
+    mosaic = TILES[name]
+    n = len(mosaic.channels)
+    places = np.random.default_rng(1).uniform(0, 4, (5, 2))
+    seen = sampling.window(mosaic, places, 5.0)
+    for weights in (
+        demosaic.center_weights(seen, np.rint(places) - places, method, mosaic),
+        sampling.mean_weights(seen, 0.5, 3.0, n),
+    ):
+        assert (weights >= 0).all()
+        for channel in range(n):
+            np.testing.assert_allclose(weights[:, seen.channel == channel].sum(axis=1), 1.0)
+
+
+def test_demosaicking_a_bayer_tile_is_bilinear() -> None:
+    seen = sampling.window(TILES["RGGB"], np.array([[0.0, 0.0]]), 3.0)
+    weights = demosaic.center_weights(seen, np.zeros((1, 2)), "tent", TILES["RGGB"])[0]
+    row, column = (int(np.abs(a).argmin()) for a in (seen.dy[0, :, 0], seen.dx[0, 0]))
+    around = weights[row - 1 : row + 2, column - 1 : column + 2]
+    np.testing.assert_allclose(around, [[0.25, 0.25, 0.25], [0.25, 1.0, 0.25], [0.25, 0.25, 0.25]])
+    assert weights.sum() == pytest.approx(3.0)
+
+
+def test_crosstalk_by_hand() -> None:
+    rng = np.random.default_rng(2)
+    light = rng.uniform(size=(1, 4, 5))
+    found = crosstalk.mixed(light, 0.2)
+    periodic = crosstalk.mixed(light, 0.2, periodic=True)
+    for row in range(4):
+        for column in range(5):
+            near = [(row + 1, column), (row - 1, column), (row, column + 1), (row, column - 1)]
+            inside = sum(light[0, r, c] for r, c in near if 0 <= r < 4 and 0 <= c < 5)
+            around = sum(light[0, r % 4, c % 5] for r, c in near)
+            assert found[0, row, column] == pytest.approx(0.8 * light[0, row, column] + 0.05 * inside)
+            assert periodic[0, row, column] == pytest.approx(0.8 * light[0, row, column] + 0.05 * around)
+
+
+def test_extinction_leaves_two_percent_at_the_visibility() -> None:
+    for visibility in (100.0, 3000.0, 20_000.0):
+        made = scene("fog", "RGGB", {"target": target(visibility, 10), "visibility_m": visibility}).setup
+        wave = np.array([450.0, 550.0, 650.0])
+        spectral = extinction.transmittance(made, "spectral", wave)
+        assert spectral[1] == pytest.approx(0.02, rel=1e-12)
+        assert (extinction.transmittance(made, "gray", wave) == pytest.approx(0.02)) is True
+        assert spectral[0] <= spectral[2]  # haze takes more of the blue; dense fog of all alike
+    assert extinction.size_exponent(400.0) == 0
+    assert extinction.size_exponent(5999.99) == pytest.approx(1.3, abs=1e-3)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.floats(0.05, 0.95), st.floats(0.05, 5))
+def test_flicker_by_sliding_an_exposure_over_the_pulses(duty: float, periods: float) -> None:
+    drive = Drive(duty=duty, frequency_hz=100.0)
+
+    def on_before(t: np.ndarray) -> np.ndarray:
+        return np.floor(t) * duty + np.minimum(t - np.floor(t), duty)
+
+    starts = np.concatenate([np.linspace(0, 1, 4001), [duty]])
+    light = (on_before(starts + periods) - on_before(starts)) / (periods * duty)
+    least, most = (float(v[0]) for v in flicker.extremes(drive, np.array([periods / 100])))
+    assert least == pytest.approx(light.min(), abs=1e-3 / periods / duty)
+    assert most == pytest.approx(light.max(), abs=1e-3 / periods / duty)
+    times = np.linspace(periods / 100, 2 * periods / 100, 3001)
+    each = flicker.extremes(drive, times)
+    low, high = flicker.smallest(drive, times[0], times[-1]), flicker.largest(drive, times[0], times[-1])
+    assert low <= each[0].min() + 1e-12
+    assert high >= each[1].max() - 1e-12
+    assert each[0].min() - low <= 2e-3
+    assert high - each[1].max() <= 2e-3
+
+
+def test_luminance_of_a_traffic_light() -> None:
+    assert Scenario(intensity_cd=200.0, exposure=FixedExposure(exposure_s=0.01)).luminance_cd_m2 == pytest.approx(
+        6366, abs=0.5
+    )
+    grid = WavelengthGrid()
+    line = (grid.nodes_nm == 555).astype(float)
+    per_photon = luminance_per_photon_radiance(grid, line[None])[0]
+    assert per_photon == pytest.approx(683.002 * PLANCK_J_S * LIGHT_M_S / 555e-9, rel=1e-4)
+
+
+PIXELS = {
+    "plain": Pixel(read_noise_e=2.0, offset_dn=64.0, prnu=0.01),
+    "no pedestal": Pixel(read_noise_e=3.0),
+    "well first": Pixel(read_noise_e=2.0, well_e=5000.0, gain_dn_per_e=0.4095),
+    "ADC first": Pixel(read_noise_e=5.0, gain_dn_per_e=0.6, offset_dn=100.0),
+}
+
+
+@pytest.mark.parametrize("name", list(PIXELS))
+@pytest.mark.parametrize("electrons", [0.5, 5.0, 300.0, 4900.0, 6600.0, 9900.0, 12_000.0])
+def test_mean_readout_agrees_with_monte_carlo(name: str, electrons: float) -> None:
+    pixel = PIXELS[name]
+    draws = noise.draws_dn(np.full(400_000, electrons), pixel, np.random.default_rng(5))
+    _, mean, variance = readout.moments(np.array([electrons]), pixel)[:, 0]
+    assert mean == pytest.approx(draws.mean(), abs=4 * draws.std() / math.sqrt(draws.size) + 1e-9)
+    # The band of a variance follows from the fourth moment of the draws.
+    fourth = ((draws - draws.mean()) ** 4).mean()
+    band = 4 * math.sqrt(max(0.0, fourth - draws.var() ** 2) / draws.size)
+    assert variance == pytest.approx(draws.var(), abs=band + 1e-12)
+
+
+def test_mean_readout_at_fifty_digits() -> None:
+    pixel = Pixel(read_noise_e=0.0, well_e=10_000.0, gain_dn_per_e=0.4, offset_dn=10.0)
+    for electrons in (20.0, 9950.0, 10_300.0):
+        with mp.workdps(50):
+            share, exact = mp.exp(-mp.mpf(electrons)), mp.mpf(0)
+            for count in range(13_000):
+                exact += share * (min(count, 10_000) * mp.mpf("0.4") + 10)
+                share *= mp.mpf(electrons) / (count + 1)
+        found = readout.moments(np.array([electrons]), pixel)[readout.UNROUNDED, 0]
+        assert found == pytest.approx(float(exact), abs=1e-9)
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.05, 0.2, 0.49, 0.51, 2.0])
+def test_dithering_by_the_steps_passed(sigma: float) -> None:
+    for x in (0.0, 0.2, 0.45, 0.7, 17.33):
+        with mp.workdps(30):
+            if sigma == 0:
+                exact = mp.floor(x + 0.5)
+            else:
+                exact = sum(
+                    k * (mp.ncdf((k + 0.5 - x) / sigma) - mp.ncdf((k - 0.5 - x) / sigma)) for k in range(-20, 60)
+                )
+        found = x + gaussian.rounding(np.array([x]), np.array([sigma]))[0][0]
+        assert found == pytest.approx(float(exact), abs=1e-9)
+
+
+def test_saturation_ends_at_the_first_of_well_and_adc() -> None:
+    assert saturation.top_e(Pixel()) == pytest.approx(10_000)
+    assert saturation.top_e(Pixel(gain_dn_per_e=0.5, offset_dn=95.0)) == pytest.approx(8000)
+    assert saturation.top_e(Pixel(gain_dn_per_e=0.1)) == pytest.approx(10_000)
+
+
+def test_places_are_nested_and_nearest_is_on_the_torus() -> None:
+    made = scene("any", "RGGB", {"target": FAR | {"phase_px": "any"}}).setup
+    fine, coarse = (phase.places_px(made, method) for method in ("quarter pixel", "pixel"))
+    assert len(fine) == 64
+    assert len(coarse) == 4
+    assert {tuple(p) for p in coarse} <= {tuple(p) for p in fine}
+    near = phase.nearest(made, np.array([[1.9, 0.1]]), coarse)
+    assert tuple(coarse[near[0]]) == (0.0, 0.0)
+
+
+def test_a_place_counts_within_the_tile() -> None:
+    one, other = (
+        scene("a", "RGGB", {"target": FAR | {"phase_px": p}}).setup for p in ([0.25, 1.5], [1e6 + 0.25, -0.5])
+    )
+    np.testing.assert_allclose(phase.places_px(one, "one"), phase.places_px(other, "one"), atol=1e-9)
+
+
+def test_focal_length_gives_the_pixels_per_radian() -> None:
+    assert Target(**FAR).focal_length_um(2.1) == pytest.approx(2.1 * 3840 / math.radians(30))
+    assert Target(**FAR).object_resolution_px == pytest.approx(5.9, abs=0.05)

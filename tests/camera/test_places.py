@@ -1,0 +1,320 @@
+"""Any place of a light: against a search of the continuum through the scene at one named place."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from sweep.camera.between import Between
+from sweep.camera.effects import phase
+from sweep.camera.imager import Imager
+from sweep.camera.kernel import make_kernel
+from sweep.camera.plan.plan import Plan, Planner
+from sweep.camera.view import REFERENCE, Methods, Setup
+from sweep.metrics.evaluate import BEST_PLACE, evaluate
+from sweep.metrics.separation import CSD
+from sweep.report.plans import plan_lines
+
+from ..hard.random_scenes import random_scene
+from ..hard.scenes import DARK, F2, FAR, NEAR, TILES, Scene, scene, target
+
+CSDS = ("csd_yellow_red", "csd_green_yellow")
+
+
+def at_place(made: Scene, x: float, y: float, methods: Methods = REFERENCE) -> dict[str, float]:
+    """Distances with the light at one named place."""
+    given = made.setup.scenario
+    assert given.target is not None
+    there = given.model_copy(update={"target": given.target.model_copy(update={"phase_px": (x, y)})})
+    columns = evaluate(Imager(replace(made.setup, scenario=there, methods=methods)), made.curves)
+    return {name: float(values[0]) for name, values in columns.items() if name.startswith(CSD)}
+
+
+@dataclass(frozen=True)
+class Planned:
+    """What the lines of plans ask of a study."""
+
+    plans: dict[str, Plan]
+
+
+def searched(
+    made: Scene, names: tuple[str, ...], per_pixel: int, methods: Methods = REFERENCE
+) -> Mapping[str, tuple[float, float]]:
+    """Smallest and largest distance over the tile: a grid that shares no place with a quarter pixel's, and a descent
+    without derivatives from its best places."""
+    rows, columns = made.setup.mosaic.indices.shape
+    x, y = np.meshgrid(
+        (np.arange(columns * per_pixel) + 0.37) / per_pixel, (np.arange(rows * per_pixel) + 0.37) / per_pixel
+    )
+    places = np.stack([x.ravel(), y.ravel()], axis=1)
+    values = [at_place(made, *place, methods) for place in places]
+    found = {}
+    for name in names:
+        ends = []
+        for sign in (1.0, -1.0):
+            signed = np.array([sign * value[name] for value in values])
+            best = float(signed.min())
+            for start in places[np.argsort(signed)[:2]]:
+                step = 0.4 / per_pixel
+                simplex = start + step * np.array([[0, 0], [1, 0], [0, 1]])
+                ended = minimize(
+                    lambda p, sign=sign, name=name: sign * at_place(made, p[0], p[1], methods)[name],
+                    start,
+                    method="Nelder-Mead",
+                    options={"initial_simplex": simplex, "maxfev": 40, "xatol": 1e-4, "fatol": 1e-5},
+                )
+                best = min(best, float(ended.fun))
+            ends.append(sign * best)
+        found[name] = (ends[0], ends[1])
+    return found
+
+
+def planned(made: Scene, tolerance_dn: float) -> tuple[Plan, dict[str, float]]:
+    plan = Planner([made.box]).plan(made.name, tolerance_dn)
+    columns = evaluate(Imager(replace(made.setup, methods=plan.methods)), made.curves)
+    return plan, {name: float(values[0]) for name, values in columns.items()}
+
+
+def broken(made: Scene, tolerance_dn: float, per_pixel: int, names: tuple[str, ...] = CSDS) -> list[Any]:
+    """What is further from the continuum than promised."""
+    plan, row = planned(made, tolerance_dn)
+    found = searched(made, names, per_pixel)
+    wrong = []
+    for name, (smallest, largest) in found.items():
+        for column, exact in ((name, smallest), (BEST_PLACE + name, largest)):
+            if not abs(row[column] - exact) <= plan.promised_dn * (1 + 1e-9) + 2e-4:  # what a descent leaves
+                wrong.append((made.name, column, row[column], exact, plan.promised_dn))
+    return wrong
+
+
+SMALL = {"target": target(300, 60, phase_px="any"), "optics": {"f_number": 1.4}, "noise": True}
+
+
+def test_the_worst_place_between_the_quarters_of_a_pixel() -> None:
+    made = scene("small", "RGGB", SMALL, DARK)
+    plan, row = planned(made, 0.1)
+    assert plan.kept
+    assert not broken(made, 0.1, 8)
+    lattice = evaluate(Imager(replace(made.setup, methods=replace(REFERENCE, phase="quarter pixel"))), made.curves)
+    assert row["csd_green_yellow"] < lattice["csd_green_yellow"][0] - 1  # what a lattice misses
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["RYNCy", "1x3", "center", "out of focus", "large pixels apart"])
+def test_any_place_is_the_continuum(name: str) -> None:
+    made = {
+        "RYNCy": scene("RYNCy", "RYNCy", SMALL | {"optics": F2}, DARK | {"crosstalk": 0.05}),
+        "1x3": scene("1x3", "1x3", SMALL | {"optics": F2}, DARK),
+        "center": scene("center", "RYNCy", SMALL | {"target": FAR | {"phase_px": "any", "readout": "center"}}, DARK),
+        "out of focus": scene("focus", "RGGB", SMALL | {"optics": F2 | {"focus_m": 3.0}}, DARK),
+        "large pixels apart": scene("apart", "RGGB", SMALL | {"optics": F2}, DARK | {"fill_factor": 0.3}),
+    }[name]
+    assert not broken(made, 0.5, 6)
+
+
+def any_place(seed: int) -> Scene:
+    """A random scene with the light at any place and a readout under noise."""
+    tried = seed
+    while True:
+        made = random_scene(tried)
+        given = made.setup.scenario
+        if given.target is not None and made.setup.mosaic.indices.size <= 4:
+            anywhere = given.target.model_copy(update={"phase_px": "any"})
+            setup = replace(made.setup, scenario=given.model_copy(update={"target": anywhere}))
+            return Scene(f"any {tried}", setup, made.curves[0][:1], replace(made.box, setup=setup))
+        tried += 1000
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_random_scenes_keep_their_promise_over_the_continuum(seed: int) -> None:
+    assert not broken(any_place(seed), float(10 ** np.random.default_rng(seed).uniform(-1, 1.5)), 4, CSDS[:1])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4, 34))
+def test_thirty_random_scenes_keep_their_promise_over_the_continuum(seed: int) -> None:
+    assert not broken(any_place(seed), float(10 ** np.random.default_rng(seed).uniform(-1, 1.5)), 6)
+
+
+def test_a_sharp_image_at_any_place() -> None:
+    made = scene("sharp", "RGGB", SMALL | {"noise": False})
+    methods = replace(REFERENCE, blur="skip", quantization="skip", saturation="skip", phase="within 1 DN")
+    row = evaluate(Imager(replace(made.setup, methods=methods)), made.curves)
+    smallest, largest = searched(made, CSDS[:1], 5, methods)[CSDS[0]]
+    assert row[CSDS[0]][0] == pytest.approx(smallest, abs=1 + 1e-3)
+    assert row[BEST_PLACE + CSDS[0]][0] == pytest.approx(largest, abs=1 + 1e-3)
+
+
+def test_a_plan_that_cannot_keep_the_tolerance_says_so() -> None:
+    """Whole numbers without noise jump from place to place: no more is promised than what rounding moves."""
+    made = scene("rounded", "RYNCy", {"target": FAR | {"phase_px": "any"}, "optics": F2})
+    plan, _ = planned(made, 0.1)
+    assert not plan.kept
+    # The worst place of the response before rounding, and its readout: the square root of four channels each.
+    assert plan.promised_dn == pytest.approx(4, abs=0.1)
+    assert "cannot be promised" in "".join(plan_lines(Planned({"rounded": plan}), explain=False))  # type: ignore[arg-type]
+    # A named place is computed exactly.
+    named = scene("named", "RYNCy", {"target": FAR, "optics": F2})
+    assert planned(named, 0.1)[0].promised_dn == 0
+
+
+def kernel_at(setup: Setup, methods: Methods, nodes_nm: np.ndarray, cases: phase.Cases) -> np.ndarray:
+    light = make_kernel(setup, methods, nodes_nm, by_pixel=False, work=Counter(), cases=cases).light
+    return np.broadcast_to(light, (*light.shape[:3], nodes_nm.size))
+
+
+def test_what_lies_between_the_corners_is_within_its_bound() -> None:
+    """The kernel at random places of cells against the weighted mean of those at the corners."""
+    rng = np.random.default_rng(5)
+    for made in (
+        scene("a", "RGGB", SMALL, {"crosstalk": 0.1}),
+        scene("b", "3x3", SMALL | {"optics": F2}, {"fill_factor": 0.5}),
+        scene("c", "quad", {"target": FAR | {"phase_px": "any", "readout": "center"}, "optics": F2}),
+        scene("d", "RYNCy", {"target": NEAR | {"phase_px": "any"}, "optics": F2}),
+    ):
+        setup, nodes = made.setup, np.linspace(400, 700, 7)
+        for blurred in ("every wavelength", "skip"):
+            methods = replace(REFERENCE, blur=blurred, noise="skip", quantization="skip", saturation="skip")
+            between = Between(setup, methods, nodes)
+            kernel = partial(kernel_at, setup, methods, nodes)
+            cells = phase.whole(setup.mosaic)
+            ratios = []
+            for half in (1 / 8, 1 / 64):
+                some = rng.integers(len(cells.centers), size=6)
+                inside = rng.uniform(-1, 1, (6, 2)) * (1 / 8 - half)
+                few = phase.Cells(cells.centers[some] + inside, cells.homes[some], half)
+                corners = kernel(few.corners).reshape(6, 4, *kernel(few.corners).shape[1:])
+                bound = between.of_cells(few.centers, half, few.homes, corners)
+                most = bound.kernel[..., :1] + bound.kernel[..., 1:].max(axis=3, initial=0.0, keepdims=True)
+                most = most + bound.tilt[:, :, None, None] * np.ptp(corners, axis=1) / 2
+                for _ in range(4):
+                    at = rng.uniform(-1, 1, (6, 2))
+                    shares = np.prod(1 + phase.CORNERS * at[:, None], axis=2) / 4  # bilinear
+                    there = kernel(phase.Cases(few.centers + half * at, few.homes))
+                    off = np.abs(there - np.einsum("nj,njukl->nukl", shares, corners))
+                    assert (off <= most + 1e-7).all()
+                    ratios += list(most[off > 1e-4] / off[off > 1e-4])
+            assert not ratios or np.median(ratios) < 60
+
+
+@pytest.mark.parametrize("name", list(TILES))
+def test_a_part_of_the_tile_stands_for_all(name: str) -> None:
+    """A place and its image in the part that is searched have the same distances."""
+    made = scene(name, name, SMALL | {"optics": F2, "noise": False})
+    methods = replace(REFERENCE, quantization="skip", saturation="skip", blur="skip")
+    cells = phase.whole(made.setup.mosaic)
+    size = np.array(made.setup.mosaic.indices.shape[::-1])
+    low, high = phase.domain_px(made.setup.mosaic)
+    assert (high - low <= size).all()
+    for place in np.random.default_rng(1).uniform(0, size, (20, 2)):
+        image = low + np.mod(place - low, size)
+        image = np.where(image > high, 2 * high - image, image)
+        if not (np.abs(cells.centers - image).max(axis=1) <= cells.half).any():  # beyond the diagonal
+            image = image[::-1]
+        assert (np.abs(cells.centers - image).max(axis=1) <= cells.half + 1e-12).any()
+        values = [at_place(made, *at, methods) for at in (place, image)]
+        assert values[0] == pytest.approx(values[1], rel=1e-9)
+
+
+def test_the_best_place_of_a_pulsed_light_is_the_best_of_the_worst_moments() -> None:
+    pulsed = {
+        "target": FAR | {"phase_px": "any"},
+        "optics": F2,
+        "noise": True,
+        "drive": {"duty": 0.5, "frequency_hz": 100},
+        "exposure": {"kind": "fixed", "exposure_s": 0.012},
+        "photon_radiance": 1e17,
+    }
+    made = scene("pulsed", "RYNCy", pulsed, DARK)
+    assert planned(made, 5.0)[0].kept
+    assert not broken(made, 5.0, 3, CSDS[:1])
+    # In a moment that is not the worst, more light separates more.
+    straight = replace(REFERENCE, phase="quarter pixel", noise="skip", quantization="skip", saturation="skip")
+    row = evaluate(Imager(replace(made.setup, methods=straight)), made.curves)
+    drive = made.setup.scenario.drive
+    assert drive is not None
+    # 1.2 periods hold 0.5 of light, and of the rest 0 to 0.2.
+    steady = {**pulsed, "drive": None}
+    even = evaluate(Imager(replace(scene("steady", "RYNCy", steady, DARK).setup, methods=straight)), made.curves)
+    for name in CSDS:
+        assert row[BEST_PLACE + name][0] == pytest.approx(even[BEST_PLACE + name][0] * 0.5 / 0.6, rel=1e-9)
+        assert row[name][0] == pytest.approx(even[name][0] * 0.5 / 0.6, rel=1e-9)
+
+
+def test_a_search_of_places_looks_at_few() -> None:
+    made = scene("small", "RGGB", SMALL, DARK)
+    counts = []
+    for within in ("within 10 DN", "within 1 DN", "within 0.1 DN", "within 0.01 DN"):
+        imager = Imager(replace(made.setup, methods=replace(REFERENCE, phase=within, blur="every 10 nm")))
+        evaluate(imager, made.curves)
+        counts.append(imager.work["places"])
+        again = imager.work["places"]
+        evaluate(imager, made.curves)
+        assert imager.work["places"] == again  # kernels are kept
+    assert counts == sorted(counts)
+    assert counts[-1] < 8000  # a lattice as fine as the finest cells has more than a hundred thousand
+
+
+STUDY = """\
+study: large
+sensor: ar0820
+lights: tl16
+wavelengths: {{step_nm: 5}}
+scenarios: {{road: {{target: {{distance_m: {distance}, fov_deg: 60, phase_px: any}}, noise: {noise}}}}}
+cfas:
+  wide: {{tile: [{tile}]}}
+"""
+_RUN = """\
+import resource, sys
+from pathlib import Path
+resource.setrlimit(resource.RLIMIT_AS, ({most}, {most}))
+from sweep.errors import SweepError
+from sweep.study import load_study
+from sweep.camera.imager import Imager
+from sweep.metrics.evaluate import evaluate
+try:
+    study = load_study(Path(sys.argv[1]))
+except SweepError as error:
+    sys.exit(str(error))
+space = study.spaces[0]
+if sys.argv[2] == "plan":
+    print(study.plan("road").promised_dn)
+else:
+    imager = Imager(study.setup(space, "road"))
+    print(len(imager.read(space.curves(space.points(0, 1), study.grid.size))[0][0]))
+"""
+
+
+def under_limit(tmp_path: Any, text: str, what: str) -> subprocess.CompletedProcess[str]:
+    """A study in a process of its own that may use 4 GiB of addresses, half of which libraries reserve."""
+    path = tmp_path / "large.yaml"
+    path.write_text(text)
+    program = _RUN.format(most=4 * 2**30)
+    arguments = [sys.executable, "-c", program, str(path), what]
+    return subprocess.run(arguments, capture_output=True, text=True, timeout=300, check=False)
+
+
+def test_a_tile_with_too_many_places_is_refused(tmp_path: Any) -> None:
+    tile = ", ".join(["[" + ", ".join("RGGB"[(2 * (r % 2) + c % 2)] for c in range(16)) + "]" for r in range(16)])
+    ended = under_limit(tmp_path, STUDY.format(distance=250, noise="true", tile=tile), "plan")
+    assert ended.returncode == 1, ended.stderr
+    assert "a tile of 256 pixels has too many places (CFA wide) (got '4,096'); allowed: at most 1,024" in ended.stderr
+
+
+def test_the_pixels_of_a_large_light_at_any_place_fit_into_memory(tmp_path: Any) -> None:
+    text = STUDY.format(distance=9, noise="true", tile="[R, G], [G, B]")
+    ended = under_limit(tmp_path, text, "read")
+    assert ended.returncode == 0, ended.stderr
+    assert int(ended.stdout) == 64
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < 3 * 2**20  # KiB

@@ -1,0 +1,93 @@
+"""Mean and variance of a digital number against sums over electrons and steps that share no code with them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sweep.camera.effects import noise_table, quantization, readout
+from sweep.camera.pixel import Pixel
+
+from .. import readout_oracle
+
+BELOW = Pixel(well_e=3001, gain_dn_per_e=0.2, read_noise_e=0.3, offset_dn=168)
+"""Its full well ends at 768.2 DN, so that the rounded number is 768 once the well is full."""
+
+
+@pytest.mark.parametrize("electrons", [3500.0, 1e5, 1e300])
+def test_a_full_well_dithers_no_step(electrons: float) -> None:
+    found = noise_table.rounded(np.array([electrons]), BELOW)[0]
+    assert found == pytest.approx(768, abs=1e-6)
+    assert noise_table.unrounded(np.array([electrons]), BELOW)[0] == pytest.approx(768.2, abs=1e-9)
+
+
+def random_pixel(seed: int) -> tuple[Pixel, list[float]]:
+    """Any pixel, and electrons from the dark to beyond its ends; full wells below and beyond the end of the ADC."""
+    rng = np.random.default_rng([seed, 23])
+    bits = int(rng.integers(8, 17))
+    gain = float(10 ** rng.uniform(-2, 1.3))
+    offset = float(rng.uniform(0, min(200, 2**bits / 3))) if rng.uniform() < 0.7 else 0.0
+    adc_e = (2**bits - 1 - offset) / gain
+    well = float(min(adc_e * 10 ** rng.uniform(-1, 0.3), 3e4)) if rng.uniform() < 0.7 else 3e4
+    read = float(rng.choice([0.0, 0.05, 0.3, 1.0, 2.0, 5.0, 30.0]))
+    pixel = Pixel(bits=bits, well_e=max(well, 20.0), gain_dn_per_e=gain, read_noise_e=read, offset_dn=offset)
+    end = min(pixel.well_e, adc_e)
+    return pixel, [
+        float(v) for v in (10 ** rng.uniform(-3, 0), end * rng.uniform(0.01, 1), end * rng.uniform(0.95, 1.05))
+    ]
+
+
+def check(pixel: Pixel, electrons: float) -> None:
+    """Sums to 1e-9 of the noise and 1e-13 of full scale; the table's cubic within 5/384 / 64^4 of a 4th derivative."""
+    mean, variance = readout_oracle.moments(electrons, pixel)
+    _, exact, spread = readout.moments(np.array([electrons]), pixel)[:, 0]
+    wide = pixel.dn_per_e * np.sqrt(electrons + pixel.read_noise_e**2 + (pixel.prnu * electrons) ** 2)
+    wide = min(wide, pixel.full_scale_dn) + 1
+    assert exact == pytest.approx(mean, abs=1e-9 * wide + 1e-12 * pixel.full_scale_dn)
+    assert spread == pytest.approx(variance, abs=3e-9 * wide**2)
+    found = noise_table.rounded(np.array([electrons]), pixel)[0], noise_table.variance(np.array([electrons]), pixel)[0]
+    assert found[0] == pytest.approx(mean, abs=3e-7 * wide)
+    assert found[1] == pytest.approx(variance, abs=3e-6 * wide**2)
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_mean_and_variance_are_those_of_every_count_and_step(seed: int) -> None:
+    pixel, signals = random_pixel(seed)
+    for electrons in signals:
+        check(pixel, electrons)
+
+
+@pytest.mark.slow
+def test_mean_and_variance_of_many_pixels() -> None:
+    for seed in range(1000, 1150):
+        pixel, signals = random_pixel(seed)
+        for electrons in signals:
+            check(pixel, electrons)
+
+
+@pytest.mark.parametrize("prnu", [0.003, 0.01, 0.1])
+@pytest.mark.parametrize(("read", "gain", "offset"), [(2.0, 0.4, 64.0), (0.1, 0.2, 168.3), (0.0, 3.0, 0.25)])
+def test_prnu_spreads_the_gains_of_poisson_electrons(prnu: float, read: float, gain: float, offset: float) -> None:
+    pixel = Pixel(well_e=800, gain_dn_per_e=gain, read_noise_e=read, offset_dn=offset, prnu=prnu)
+    for electrons in (0.5, 30.0, 700.0, 820.0):
+        check(pixel, electrons)
+
+
+def test_single_electrons_are_seen_as_steps() -> None:
+    # Without read noise, at 20 DN/e, rounding takes the same from every count: nothing dithers it.
+    pixel = Pixel(gain_dn_per_e=20, offset_dn=0.4)
+    shift = noise_table.rounded(np.array([5.0, 50.0]), pixel) - noise_table.unrounded(np.array([5.0, 50.0]), pixel)
+    assert shift == pytest.approx([-0.4, -0.4], abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_what_rounding_changes_is_within_its_promise_and_its_steepness(seed: int) -> None:
+    pixel, _ = random_pixel(seed + 300)
+    brightest = 1.2 * readout.Ends.of(pixel).full_e + 50
+    electrons = np.linspace(0, np.sqrt(brightest), 7001) ** 2
+    shift = noise_table.rounded(electrons, pixel) - noise_table.unrounded(electrons, pixel)
+    promised, slope = quantization._under_noise(pixel, brightest)
+    assert np.ptp(shift) <= promised + 1e-9
+    assert promised <= 1.02 * np.ptp(shift) + 1e-3
+    steepest = np.abs(np.diff(shift) / np.diff(electrons * pixel.dn_per_e)).max()
+    assert steepest <= slope * (1 + 1e-6) + 1e-6

@@ -1,0 +1,160 @@
+"""The commands as a user runs them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from plotly.offline import get_plotlyjs
+
+from sweep.curves.files import read_curves
+
+from ..build import SCENES, study_file
+from ..commanded import sweep
+from ..conftest import SHARED, STUDIES, Finished, needs_measured
+
+
+@pytest.fixture(scope="module")
+def stopband(finished: Finished) -> tuple[Path, list[str]]:
+    folder = finished("stopband")
+    return folder, folder.with_name("stopband.said.txt").read_text().splitlines()
+
+
+def test_stopband_makes_its_files(stopband: tuple[Path, list[str]]) -> None:
+    folder, _ = stopband
+    made = {path.name for path in folder.iterdir()} - {".lock"}
+    assert made == {
+        "results.parquet",
+        "search.parquet",
+        "curves.parquet",
+        "points.parquet",
+        "figures",
+        "front.parquet",
+        "study.resolved.yaml",
+        "provenance.json",
+        "run.json",
+        "SHA256SUMS",
+        "pareto.png",
+        "pareto.svg",
+        "report.html",
+    }
+    assert len(pd.read_parquet(folder / "results.parquet")) > 100_000
+
+
+def test_summary_is_true_and_short(stopband: tuple[Path, list[str]]) -> None:
+    folder, lines = stopband
+    frame = pd.read_parquet(folder / "results.parquet")
+    best = frame[frame["feasible"] & frame["kind"].isin(["sweep", "search"])]["csd_yellow_red"].max()
+    rggb = frame[frame["cfa"] == "RGGB"]["csd_yellow_red"].iloc[0]
+    assert len(lines) <= 12
+    assert f"is {best:.1f} DN" in lines[0]
+    assert f"RGGB {rggb:.0f} DN" in lines[1]
+    assert str(folder) in lines[-1]
+
+
+def test_report_stands_alone(stopband: tuple[Path, list[str]]) -> None:
+    page = (stopband[0] / "report.html").read_text()
+    assert page.count("data:image/png;base64,") >= 4
+    own = page.replace(get_plotlyjs(), "")  # what that may ask for, the page's policy forbids
+    assert "default-src 'none'" in own
+    assert "http://" not in own
+    assert "https://" not in own
+    assert "surrogate" in page
+    assert "RYN_4Cy" in page
+
+
+def test_report_command_makes_it_again(stopband: tuple[Path, list[str]]) -> None:
+    folder, lines = stopband
+    before = (folder / "report.html").read_bytes()
+    (folder / "report.html").unlink()
+    done = sweep("report", str(folder))
+    assert done.returncode == 0
+    assert done.stdout.splitlines() == lines
+    assert (folder / "report.html").read_bytes() == before
+
+
+def test_wrong_input_is_one_line_and_exit_2(tmp_path: Path) -> None:
+    wrong = tmp_path / "wrong.yaml"
+    wrong.write_text(study_file(tmp_path).read_text().replace("cfas: [RGGB", "cfas: [RGXB").replace("starts", "start"))
+    for arguments, lines in (
+        (("run", str(wrong), "--output", str(tmp_path / "out")), 1),
+        (("check", str(wrong)), 1),
+        (("run", str(tmp_path / "absent.yaml")), 1),
+        (("report", str(tmp_path)), 1),
+        (("plan", str(STUDIES / "stopband.yaml"), "--tolerance", "inf"), 1),
+        (("plan", str(STUDIES / "stopband.yaml"), "--tolerance", "nan"), 1),
+        (("check", str(tmp_path / "tiny.yaml"), "--data", str(tmp_path / "nowhere")), 1),
+    ):
+        done = sweep(*arguments)
+        assert done.returncode == 2
+        assert len(done.stderr.splitlines()) == lines, done.stderr
+        assert done.stderr.startswith("sweep: ")
+        assert "Traceback" not in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_check_counts_designs() -> None:
+    done = sweep("check", str(STUDIES / "stopband.yaml"))
+    assert done.returncode == 0
+    assert "116,286 designs" in done.stdout
+
+
+def test_plan_says_what_a_scene_calls_for(tmp_path: Path) -> None:
+    path = tmp_path / "scenes.yaml"
+    path.write_text(SCENES.replace("any", "[0.3, 0.2]").replace("[150, 250]", "[50, 250]"))
+    done = sweep("plan", str(path), "--explain", "--tolerance", "50")
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[0].startswith("road distance_m=50: promised ")
+    assert " of 50 DN" in lines[0]
+    for effect in ("noise", "blur", "sampling", "phase", "extinction"):
+        assert sum(line.strip().startswith(f"{effect} ") for line in lines) == 2
+    assert any(line.strip() == "extinction    skip                     0 DN  clear air" for line in lines)
+    assert any(line.strip().startswith("rejected: ") for line in lines)
+    assert "2 scenes" in lines[-1]
+
+
+def test_audit_without_a_run_is_one_line(tmp_path: Path) -> None:
+    done = sweep("audit", str(tmp_path))
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_hostile_names_come_out_as_text(tmp_path: Path) -> None:
+    name = "<script>alert(1)</script>"
+    text = study_file(tmp_path, 3).read_text().replace("study: tiny", f"study: '{name}'").replace("mine:", f"'{name}':")
+    (tmp_path / "hostile.yaml").write_text(text)
+    done = sweep("run", str(tmp_path / "hostile.yaml"), "--output", str(tmp_path / "out"), "--jobs", "1")
+    assert done.returncode == 0, done.stderr
+    (folder,) = (tmp_path / "out").iterdir()
+    page = (folder / "report.html").read_text()
+    assert "<script>alert" not in page
+    assert page.count("<script") == page.replace(get_plotlyjs(), "").count("</script") == 3
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;" in page
+
+
+def test_an_infeasible_study_names_the_constraint_and_writes_nothing(tmp_path: Path) -> None:
+    text = study_file(tmp_path).read_text().replace("{min: 0.9}", "{min: 1.01}")
+    (tmp_path / "infeasible.yaml").write_text(text)
+    done = sweep("run", str(tmp_path / "infeasible.yaml"), "--output", str(tmp_path / "out"), "--jobs", "1")
+    assert done.returncode == 3
+    assert "no feasible design was found" in done.stderr
+    assert "constraints.sensitivity: out of reach: sensitivity >= 1.01; the best value found is 1" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not list((tmp_path / "out").iterdir())
+
+
+@needs_measured
+def test_measured_curves_run_to_a_report(tmp_path: Path) -> None:
+    arguments = ("--data", str(SHARED / "data"), "--output", str(tmp_path), "--jobs", "2")
+    done = sweep("run", str(STUDIES / "measured.yaml"), *arguments)
+    assert done.returncode == 0, done.stderr
+    frame = pd.read_parquet(tmp_path / "measured" / "results.parquet")
+    best = frame[frame["feasible"] & (frame["cfa"] == "RGBN")]
+    plain = frame[frame["cfa"] == "RGBW"]["csd_yellow_red"].iloc[0]
+    assert best["csd_yellow_red"].max() > plain
+    curves = pd.read_parquet(tmp_path / "measured" / "curves.parquet")
+    raw = read_curves(SHARED / "data" / "qe_ar0132at_rgbw.csv")
+    at_630 = raw.values["W"][list(raw.wavelength_nm).index(630)]
+    assert curves.set_index("wavelength_nm").loc[630, "qe:W"] == pytest.approx(at_630, rel=1e-12)

@@ -1,0 +1,159 @@
+"""Every command ends in lines: no traceback for what a user, a machine or a shell does."""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import typer
+
+from sweep.commands.endings import ends_in_lines
+from sweep.errors import InfeasibleError
+
+from ..conftest import STUDIES
+
+COMMAND = [sys.executable, "-m", "sweep"]
+
+
+def said(*arguments: str, code: int = 2, **options: object) -> str:
+    """What a command that fails says: one line, which is returned without its name."""
+    done = subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, check=False, **options)  # type: ignore[call-overload]
+    assert done.returncode == code, done.stderr
+    assert done.stderr.startswith("sweep: "), done.stderr
+    assert done.stderr.count("\n") == 1, done.stderr
+    return done.stderr.removeprefix("sweep: ").rstrip("\n")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["run"], "Missing argument"),
+        (["run", "x.yaml", "--jobs", "0"], "--jobs"),
+        (["run", "x.yaml", "--jobs", "many"], "--jobs"),
+        (["run", "x.yaml", "--job", "2"], "No such option: --job"),
+        (["chek", "x.yaml"], "No such command 'chek'"),
+        (["check", "a", "b"], "unexpected extra argument"),
+        (["check", "nowhere.yaml"], "nowhere.yaml: cannot be read: No such file or directory"),
+    ],
+)
+def test_a_wrong_command_is_one_line(arguments: list[str], expected: str) -> None:
+    assert expected in said(*arguments)
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "expected"),
+    [
+        (MemoryError(), 2, "out of memory"),
+        (OSError(28, "No space left on device", "/x/y"), 2, "/x/y: No space left on device"),
+        (RuntimeError("can't start new thread"), 2, "threads: can't start new thread"),
+        (ImportError("libx.so: failed to map segment"), 2, "libx.so: failed to map segment"),
+        (UnicodeEncodeError("utf-8", "a\udcff", 1, 2, "surrogates not allowed"), 2, "no UTF-8"),
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (typer.Abort(), 130, "interrupted"),
+        (InfeasibleError("out of\nreach"), 3, "out of reach"),
+    ],
+)
+def test_what_a_machine_refuses_is_one_line(
+    error: BaseException, code: int, expected: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def command() -> None:
+        raise error
+
+    with pytest.raises(SystemExit) as ended:
+        ends_in_lines(command)
+    assert ended.value.code == code
+    text = capfd.readouterr().err
+    assert text.startswith("sweep: ")
+    assert text.count("\n") == 1
+    assert expected in text
+
+
+def test_a_fault_of_the_program_keeps_its_traceback() -> None:
+    with pytest.raises(ZeroDivisionError):
+        ends_in_lines(lambda: 1 / 0)
+
+
+def test_a_reader_that_leaves_is_no_fault() -> None:
+    with subprocess.Popen([*COMMAND, "schema"], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as run:
+        assert run.stdout is not None
+        assert run.stderr is not None
+        run.stdout.close()
+        assert run.stderr.read() == b""
+
+
+def test_an_output_without_room_is_one_line() -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run([*COMMAND, "schema"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == "sweep: No space left on device\n"
+
+
+def within(megabytes: int) -> Callable[[], None]:
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_AS, (megabytes * 2**20, megabytes * 2**20))
+
+    return limit
+
+
+def run_within(megabytes: int, output: Path) -> subprocess.CompletedProcess[str]:
+    arguments = ["run", str(STUDIES / "paper.yaml"), "--output", str(output), "--jobs", "1"]
+    limit = within(megabytes)
+    return subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, check=False, preexec_fn=limit)
+
+
+@pytest.mark.parametrize("megabytes", [300, 976])
+def test_too_little_memory_to_start_is_one_line(tmp_path: Path, megabytes: int) -> None:
+    done = run_within(megabytes, tmp_path)
+    assert done.returncode == 2
+    limits = f"limited to {megabytes} MiB; allowed: 1024 MiB and more (ulimit -v)"
+    assert done.stderr == f"sweep: the address space is {limits}\n"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("megabytes", [1100, 1300])
+def test_little_memory_is_enough_or_one_line(tmp_path: Path, megabytes: int) -> None:
+    done = run_within(megabytes, tmp_path)
+    told = [line for line in done.stderr.splitlines() if " left" not in line]  # but for progress
+    assert done.returncode in (0, 2), done.stderr
+    assert len(told) == (done.returncode == 2), done.stderr
+    assert all(line.startswith("sweep: ") for line in told)
+
+
+@pytest.mark.parametrize("encoding", ["ascii", pytest.param(None, marks=pytest.mark.slow)])
+def test_names_of_any_letters_in_an_ascii_locale(tmp_path: Path, encoding: str | None) -> None:
+    folder = tmp_path / "größe"
+    folder.mkdir()
+    study = folder / "größe.yaml"
+    text = (STUDIES / "paper.yaml").read_text(encoding="utf-8").replace("study: paper", 'study: "größe ü"')
+    study.write_text(text, encoding="utf-8")
+    locale = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    locale |= {} if encoding is None else {"PYTHONIOENCODING": encoding}
+    out = str(folder / "out")
+    commands = [["check", str(study)], ["list", str(folder), "--output", out]]
+    if encoding is not None:  # the longer ones once
+        commands.insert(1, ["run", str(study), "--output", out, "--jobs", "1"])
+        commands.append(["status", os.fsdecode(Path(out) / "gr__e__")])
+    for arguments in commands:
+        done = subprocess.run([*COMMAND, *arguments], capture_output=True, check=False, env={**os.environ, **locale})
+        assert done.returncode == 0, (arguments, done.stderr)
+        assert b"Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(
+    subprocess.run(["unshare", "-rm", "true"], capture_output=True, check=False).returncode != 0
+    if Path("/usr/bin/unshare").exists()
+    else True,
+    reason="this machine gives no mount namespace",
+)
+def test_without_shared_memory_threads_do_the_work(tmp_path: Path) -> None:
+    run = " ".join([*COMMAND, "run", str(STUDIES / "paper.yaml"), "--output", str(tmp_path), "--jobs", "2"])
+    script = f"mount -t tmpfs -o ro none /dev/shm && {run}"
+    done = subprocess.run(["unshare", "-rm", "sh", "-c", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    notes = [line for line in done.stderr.splitlines() if " left" not in line]
+    assert notes == ["Note: no shared memory (/dev/shm) for worker processes; backend threading."]

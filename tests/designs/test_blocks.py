@@ -1,0 +1,114 @@
+"""Dense and separable blocks: the same designs by two routes; compiled pair distances against brute force."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.distance import cdist
+
+from sweep.camera.imager import Imager
+from sweep.designs import block as blocks
+from sweep.designs.block import Curves, edges_of
+from sweep.designs.free_form import FreeForm
+from sweep.designs.space import Filter, Space
+from sweep.designs.stopband import Stopband
+from sweep.metrics.evaluate import evaluate
+from sweep.metrics.separation import class_pairs, separations, separations_along
+
+from ..blocks import AXES, SETUPS, SPACE
+from ..hard.scenes import GRID, SENSOR
+
+EPS = np.finfo(float).eps
+
+
+@pytest.mark.parametrize("name", list(SETUPS))
+def test_both_routes_say_the_same(name: str) -> None:
+    setup = SETUPS[name]
+    edges = edges_of(SPACE, 3, 69)
+    assert edges is not None
+    dense = evaluate(Imager(setup), Curves(edges.curves()))
+    fast = evaluate(Imager(setup), edges)
+    assert list(fast) == list(dense)
+    for column, values in dense.items():
+        # Two orders of the same sums over at most 301 wavelengths, of numbers up to full scale; far below 0.01 DN.
+        scale = setup.pixel.full_scale_dn * 8 if "csd" in column else 1.0
+        assert np.abs(fast[column] - values).max() <= 301 * EPS * scale, column
+
+
+def test_no_spectrum_is_made_by_the_separable_route(monkeypatch: pytest.MonkeyPatch) -> None:
+    edges = edges_of(SPACE, 0, SPACE.size)
+    assert edges is not None
+    monkeypatch.setattr(Stopband, "curves", None)
+    monkeypatch.setattr(Stopband, "edges", None)
+    evaluate(Imager(SETUPS["rounded"]), edges)
+
+
+def test_designs_that_set_the_exposure_take_the_dense_route() -> None:
+    # Crossed edges lift N above Y, which sets the exposure then.
+    crossed = replace(SPACE, axes=((690.0, 600.0), (5.0,), (410.0, 650.0), (5.0,), (0.5, 1.0)))
+    edges = edges_of(crossed, 0, crossed.size)
+    assert edges is not None
+    imager = Imager(SETUPS["chart"])
+    changing = imager.read_changing(edges)
+    assert changing is not None
+    found, dense = evaluate(imager, edges), evaluate(imager, edges.curves())
+    brighter = edges.curves().sum(axis=(1, 2)) > SENSOR.qe["Y"].sum()
+    np.testing.assert_array_equal(changing.which, ~brighter)
+    assert 0 < np.count_nonzero(brighter) < len(brighter)
+    assert np.ptp(found["exposure_s"]) > 0
+    np.testing.assert_array_equal(found["csd_yellow_red"][brighter], dense["csd_yellow_red"][brighter])
+    np.testing.assert_allclose(found["csd_yellow_red"], dense["csd_yellow_red"], rtol=1e-10)
+    every = imager.read_changing(edges.some(np.flatnonzero(brighter)))
+    assert every is None
+
+
+def test_the_separable_route_refuses_what_is_not_separable(monkeypatch: pytest.MonkeyPatch) -> None:
+    two = Stopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"], bands=2)
+    free = FreeForm(GRID.nodes_nm, SENSOR.qe["Y"], np.array([500.0, 600.0]))
+    for family, axes in ((two, AXES + AXES), (free, ((0.5,), (0.5,)))):
+        assert edges_of(Space("sweep", "x", "RYNCy", Filter(family, ("N",), "Y", ""), axes), 0, 1) is None
+    assert edges_of(Space("reference", "RGGB", "RGGB"), 0, 1) is None
+    assert edges_of(replace(SPACE, gridded=False), 0, 1) is None
+    monkeypatch.setattr(blocks, "_MOST_BYTES", 1000)
+    assert edges_of(SPACE, 0, 1) is None
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(st.integers(1, 9), min_size=2, max_size=5),
+    st.integers(1, 6),
+    st.integers(1, 20),
+    st.integers(0, 2**32 - 1),
+)
+def test_pair_distances_are_the_definition(sizes: list[int], channels: int, designs: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    total = sum(sizes)
+    order = rng.permutation(total)
+    ends = np.cumsum([0, *sizes])
+    members = {f"type {i}": order[a:b] for i, (a, b) in enumerate(pairwise(ends))}
+    fixed = rng.uniform(0, 4095, (total, channels))
+    changing = int(rng.integers(channels))
+    values = np.floor(rng.uniform(0, 4095, (designs, total)))
+    response = np.repeat(fixed[None], designs, axis=0)
+    response[..., changing] = values
+    along = separations_along(fixed, changing, values, members)
+    whole = separations(response, members)
+    for a, b in class_pairs(list(members)):
+        brute = [cdist(one[members[a]], one[members[b]]).min() for one in response]
+        np.testing.assert_allclose(whole[a, b], brute, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(along[a, b], brute, rtol=1e-12, atol=1e-12)
+
+
+def test_a_point_that_is_no_number_stays_one() -> None:
+    rng = np.random.default_rng(1)
+    values = rng.uniform(0, 100, (4, 6))
+    values[2, 1] = np.nan
+    members = {"a": np.array([0, 1]), "b": np.array([2, 3]), "c": np.array([4, 5])}
+    found = separations_along(rng.uniform(0, 100, (6, 3)), 1, values, members)
+    assert [bool(np.isnan(found[pair][2])) for pair in class_pairs(["a", "b", "c"])] == [True, True, False]
+    assert all(np.isfinite(np.delete(distance, 2)).all() for distance in found.values())

@@ -1,0 +1,308 @@
+"""Hard cases of the whole image chain: metamers, extreme exposures, everything clipped, float32, NaN in one design."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import mpmath as mp
+import numpy as np
+
+from sweep.camera.imager import Imager
+from sweep.camera.mosaic import Mosaic
+from sweep.camera.pixel import Pixel
+from sweep.camera.scene import FixedExposure, Scenario
+from sweep.camera.view import Methods, Setup
+from sweep.curves.lights import Lights
+from sweep.curves.spectrum import WavelengthGrid
+from sweep.designs.stopband import Stopband
+from sweep.metrics.evaluate import evaluate, smooth_csd, smooth_response
+
+from .registry import EPS, Result, hard_case, outcome, relative, worst
+
+GRID = WavelengthGrid(step_nm=5)
+WAVE = GRID.nodes_nm
+N = GRID.size
+RATIO = 0.08
+YELLOW, RED = 38, 48  # 590 and 640 nm
+NEAR = {"distance_m": 20, "fov_deg": 120}
+
+
+def lines(*nodes: int) -> np.ndarray:
+    """One photon each at nodes of the grid, ndarray[n_signals, n_wavelengths]."""
+    return np.eye(N)[list(nodes)] / GRID.step_nm
+
+
+def lights_of(types: tuple[str, ...], photons: np.ndarray) -> Lights:
+    return Lights("lines", tuple(f"{t}{i}" for i, t in enumerate(types)), types, photons, RATIO, "", True)
+
+
+def random_qe(seed: int, channels: int) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(0.05, 0.9, (channels, N))
+
+
+def made(
+    qe: np.ndarray,
+    lights: Lights,
+    scenario: dict[str, Any] | None = None,
+    pixel: dict[str, Any] | None = None,
+    cfa: str = "RGGB",
+    **methods: str,
+) -> Setup:
+    """A setup whose channel N, if there is one, is modified."""
+    mosaic = Mosaic.from_name(cfa)
+    modified = (mosaic.channels.index("N"),) if "N" in mosaic.channels else ()
+    given = Scenario.model_validate(scenario or {})
+    return Setup(GRID, mosaic, qe, modified, np.full(N, 0.9), lights, Pixel(**(pixel or {})), given, Methods(**methods))
+
+
+def beyond(setup: Setup, **scenario: object) -> Setup:
+    """The setup with figures of the scene that no study may have: the model itself has no limits."""
+    return replace(setup, scenario=setup.scenario.model_copy(update=scenario))
+
+
+def plain(setup: Setup) -> np.ndarray:
+    """No modified channel, one design."""
+    return np.empty((1, 0, setup.grid.size))
+
+
+def electrons_per_s(qe: float, radiance: float = 2e18, f_number: float = 4.0) -> mp.mpf:
+    """Of a laser line: pi L / (1 + 4 N^2) A QE, with A = (2.1 um)^2."""
+    area = (mp.mpf("2.1") * mp.mpf(10) ** -6) ** 2
+    return mp.pi * mp.mpf(radiance) / (1 + 4 * mp.mpf(f_number) ** 2) * area * mp.mpf(float(qe))
+
+
+FIXED = {"exposure": {"kind": "fixed", "exposure_s": 2e-3}}
+SCENES: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, str]]] = {
+    "white patch": ({}, {}, {}),
+    "fixed": (FIXED, {"offset_dn": 168.0}, {}),
+    "noise": (FIXED | {"noise": True}, {"offset_dn": 168.0, "read_noise_e": 2.0, "prnu": 0.01}, {}),
+    "off axis, crosstalk": (FIXED | {"off_axis_deg": 33.0}, {"crosstalk": 0.07}, {}),
+    "fog": (FIXED | {"target": NEAR, "visibility_m": 100.0}, {}, {"blur": "skip"}),
+    "center": (FIXED | {"target": NEAR | {"readout": "center"}}, {"crosstalk": 0.02}, {"blur": "skip"}),
+    "pulses": (FIXED | {"drive": {"duty": 0.4, "frequency_hz": 90.0}}, {}, {}),
+}
+
+
+@hard_case(
+    "metamers: laser lines at two wavelengths where every filter is alike",
+    oracle="exactly 0, in smooth and in read-out CSD, in seven kinds of scenes",
+    why="the same products are summed, the others are 0; equal numbers differ by exactly 0",
+)
+def metamers() -> Result:
+    errors = []
+    lights = lights_of(("yellow", "red"), lines(YELLOW, RED))
+    for scenario, pixel, methods in SCENES.values():
+        qe = random_qe(1, 3)
+        qe[:, RED] = qe[:, YELLOW]
+        setup = made(qe, lights, scenario, pixel, **methods)
+        errors += [evaluate(Imager(setup), plain(setup))["csd_yellow_red"], smooth_csd(setup, plain(setup), PAIR)]
+    return Result(float(np.max(errors)), 0.0)
+
+
+PAIR = ("yellow", "red")
+
+
+@hard_case(
+    "metamers under a filter that changes elsewhere",
+    oracle="exactly 0 for every stopband away from both lines",
+    why="the filter is exactly its base outside the band",
+)
+def metamers_beside_a_band() -> Result:
+    qe = random_qe(2, 4)
+    qe[:, RED] = qe[:, YELLOW]
+    setup = made(qe, lights_of(PAIR, lines(YELLOW, RED)), cfa="RYNC")
+    x = np.random.default_rng(3).uniform([605, 0, 618, 0, 0], [612, 6, 626, 6, 1], (200, 5))
+    curves = Stopband(WAVE, qe[2], 0.1 * qe[2]).curves(x)
+    assert (curves[:, 0] != qe[2]).any()
+    found = [evaluate(Imager(setup), curves)["csd_yellow_red"], smooth_csd(setup, curves, PAIR)]
+    return Result(float(np.max(found)), 0.0)
+
+
+@hard_case(
+    "metamers of many lines each",
+    oracle="0: both spectra give every filter the same sum of dyadic products",
+    why="sums of 61 terms with 3 roundings each: 64 half eps of the response, in 3 channels",
+)
+def broad_metamers() -> Result:
+    rng = np.random.default_rng(4)
+    qe = rng.integers(1, 2**10, (3, N)) / 2.0**10
+    first = rng.integers(2**8, 2**9, N) / 2.0**9
+    # A direction of integers that no filter sees: from the 3 x 4 system at the first four nodes.
+    a = (qe[:, :4] * 2**10).astype(int).tolist()
+    null = [
+        (-1) ** j * int(mp.nint(mp.det(mp.matrix([[r[k] for k in range(4) if k != j] for r in a])))) for j in range(4)
+    ]
+    second = first.copy()
+    second[:4] += np.array([float(mp.mpf(v) / max(map(abs, null)) / 8) for v in null])
+    photons = np.stack([first, second]) / (first.sum() * GRID.step_nm)
+    setup = made(qe, lights_of(PAIR, photons), {"exposure": {"kind": "fixed", "exposure_s": 1e-3}})
+    found = smooth_csd(setup, plain(setup), PAIR)[0]
+    response = float(smooth_response(setup, plain(setup)).max())
+    read = evaluate(Imager(setup), plain(setup))["csd_yellow_red"][0]
+    return Result(found if read == 0 else math.inf, 64 * EPS / 2 * response * 2 * math.sqrt(3))
+
+
+@hard_case(
+    "lines whose filters differ by 2^-16",
+    oracle="camera equation in 50 digits",
+    why="8 roundings of each response, so 8 eps of the response in each of 3 channels",
+)
+def near_metamers() -> Result:
+    qe = np.random.default_rng(5).integers(2**10, 2**14, (3, N)) / 2.0**14
+    qe[:, RED] = qe[:, YELLOW] + np.array([1, -2, 3]) * 2.0**-16
+    setup = made(qe, lights_of(PAIR, lines(YELLOW, RED)), FIXED)
+    found = smooth_csd(setup, plain(setup), PAIR)[0]
+    gain = electrons_per_s(1.0) * mp.mpf(2e-3) * 4095 / 10_000
+    exact = gain * mp.mpf(2) ** -16 * mp.sqrt(14)
+    return Result(abs(float(found - exact)), 8 * EPS * float(gain) * math.sqrt(3))
+
+
+@hard_case(
+    "exposures from 5e-324 to 1e300 s",
+    oracle="camera equation in 50 digits",
+    why="12 roundings of a response; in the smallest, the spacing 5e-324 times electrons/s and DN/e of each of 4 points",
+)
+def exposures() -> Result:
+    qe, results = random_qe(6, 3), []
+    lights = lights_of(PAIR, lines(YELLOW, RED))
+    for exposure_s in (5e-324, 1e-310, 1e-300, 1e-160, 1e-30, 1.0, 1e150, 1e300):
+        setup = beyond(made(qe, lights), exposure=FixedExposure.model_construct(exposure_s=exposure_s))
+        found = smooth_csd(setup, plain(setup), PAIR)[0]
+        gain = electrons_per_s(1.0) * mp.mpf(exposure_s) * 4095 / 10_000
+        exact = gain * mp.sqrt(sum((mp.mpf(float(a)) - mp.mpf(float(b))) ** 2 for a, b in qe[:, [YELLOW, RED]]))
+        allowed = 12 * EPS * float(gain) * math.sqrt(3) + 4 * 5e-324
+        read = evaluate(Imager(setup), plain(setup))["csd_yellow_red"][0]  # all is dark, or full
+        results.append((relative(found, exact), float(allowed / exact)))
+        results.append((float(read), 0.0))
+    return worst(results)
+
+
+@hard_case(
+    "lights from 1e-290 to 1e270 photons under the white-patch exposure",
+    oracle="level x full scale x K x QE over the brightest channel's mean, in 50 digits",
+    why="the exposure cancels the light: 61-term sums and 16 roundings of each response, 64 eps of it",
+)
+def radiances() -> Result:
+    qe, results = random_qe(7, 3), []
+    top = max(sum(mp.mpf(float(v)) for v in row) / N for row in qe)
+    scale = mp.mpf(0.95) * 4095 * mp.mpf(RATIO) / top
+    points = [[scale * mp.mpf(float(row[node])) for row in qe] for node in (YELLOW, RED)]
+    exact = mp.sqrt(sum((a - b) ** 2 for a, b in zip(*points, strict=True)))
+    for radiance in (1e-290, 1e-100, 2e18, 1e100, 1e270):
+        setup = beyond(made(qe, lights_of(PAIR, lines(YELLOW, RED))), photon_radiance=radiance)
+        found = smooth_csd(setup, plain(setup), PAIR)[0]
+        results.append((abs(float(found - exact)), 64 * EPS * float(max(map(max, points))) * math.sqrt(3)))
+    return worst(results)
+
+
+@hard_case(
+    "no light at all",
+    oracle="CSD exactly 0 at a fixed exposure; no exposure, and no number, for the white patch",
+    why="0 electrons; what the exposure of no light would be is not finite and never made up",
+)
+def no_light() -> Result:
+    lights = lights_of(PAIR, lines(YELLOW, RED))
+    good = True
+    for qe, radiance in ((np.zeros((3, N)), 2e18), (random_qe(8, 3), 5e-324)):
+        setup = beyond(made(qe, lights, FIXED), photon_radiance=radiance)
+        good &= evaluate(Imager(setup), plain(setup))["csd_yellow_red"][0] == 0 == smooth_csd(setup, plain(setup), PAIR)
+    with np.errstate(invalid="ignore"):
+        setup = made(np.zeros((3, N)), lights)
+        dark = evaluate(Imager(setup), plain(setup))
+    return outcome(bool(good and np.isnan(dark["csd_yellow_red"][0]) and np.isinf(dark["exposure_s"][0])))
+
+
+@hard_case(
+    "everything clipped",
+    oracle="CSD exactly 0 between points that all are at full scale",
+    why="full scale is one number, whatever was cut off above it",
+)
+def everything_clipped() -> Result:
+    errors = []
+    lights = lights_of(("green", *PAIR), lines(25, YELLOW, RED))
+    bright = {"exposure": {"kind": "fixed", "exposure_s": 1e4}}
+    pixels = ({}, {"offset_dn": 168.0}, {"gain_dn_per_e": 0.1}, {"well_e": 3000.0, "gain_dn_per_e": 3.0}, {"bits": 24})
+    for pixel in pixels:
+        for more in ({}, {"target": NEAR | {"readout": "center"}}, {"drive": {"duty": 0.9, "frequency_hz": 100.0}}):
+            setup = made(random_qe(9, 3), lights, bright | more, pixel)
+            found = evaluate(Imager(setup), plain(setup))
+            errors += [v for name, v in found.items() if name.startswith(("csd_", "best_place_"))]
+    return Result(float(np.max(errors)), 0.0)
+
+
+@hard_case(
+    "the nearest pair changes along a line of filters",
+    oracle="closed form: the distance of the outer pair, of the inner pair, and exactly 0 where two responses meet",
+    why="8 roundings of each response: 8 eps of the largest; equal filters are exactly equal responses",
+)
+def switch_along_filters() -> Result:
+    qe = np.full((4, N), 0.25)
+    qe[2] = 0.5
+    qe[2, 30], qe[2, RED] = 0.4375, 0.25  # N at 550 and 640 nm; the band holds 590 nm
+    setup = made(qe, lights_of(("yellow", "yellow", "red"), lines(30, YELLOW, RED)), FIXED, cfa="RYNC")
+    depth = np.arange(1025) / 1024
+    x = np.stack([np.full_like(depth, v) for v in (575.0, 0.0, 605.0, 0.0)] + [depth], axis=1)
+    found = smooth_csd(setup, Stopband(WAVE, qe[2], np.zeros(N)).curves(x), PAIR)
+    gain = electrons_per_s(1.0) * mp.mpf(2e-3) * 4095 / 10_000
+    exact = [gain * min(mp.mpf(3) / 16, abs(mp.mpf(1) / 4 - mp.mpf(k) / 2048)) for k in range(1025)]
+    results = [(abs(float(f - e)), 8 * EPS * float(gain)) for f, e in zip(found, exact, strict=True)]
+    return worst([*results, (float(found[512]), 0.0)])
+
+
+@hard_case(
+    "float32 curves",
+    oracle="math.fsum of the float32 values; the same scene in float64 before its rounding to float32",
+    why="a float32 curve is exact in float64: 64 eps; rounding it to float32 moves a sum of positive terms by 2^-24",
+)
+def float32_curves() -> Result:
+    qe = random_qe(10, 4)
+    lights = lights_of(PAIR, np.random.default_rng(11).dirichlet(np.ones(N), 2) / GRID.step_nm)
+    x = np.random.default_rng(12).uniform([560, 5, 620, 5, 0], [590, 30, 660, 30, 1], (20, 5))
+    curves = Stopband(WAVE, qe[2], 0.2 * qe[2]).curves(x)
+    setup = made(qe, lights, FIXED, cfa="RYNC")
+    narrow, small = replace(setup, qe=qe.astype(np.float32)), curves.astype(np.float32)
+    found = evaluate(Imager(narrow), small)
+    base, counts = narrow.qe[2], narrow.mosaic.counts
+    results = []
+    for index, curve in enumerate(small[:, 0]):
+        total = math.fsum(map(float, curve))
+        whole = math.fsum(
+            c * math.fsum(map(float, q)) for c, q in zip(counts, (*narrow.qe[:2], curve, narrow.qe[3]), strict=True)
+        )
+        steps = [abs(float(b) - float(a)) for a, b in pairwise(curve)]
+        exact = {
+            "sensitivity": total / math.fsum(map(float, base)),
+            "cfa_sensitivity": whole / 4 / math.fsum([0.9] * N),
+            "slope_per_nm": max(steps) / GRID.step_nm,
+            "min_transmission": min(float(a) / float(b) for a, b in zip(curve, base, strict=True)),
+        }
+        results += [(relative(found[name][index], value), 64 * EPS) for name, value in exact.items()]
+    one, other = smooth_response(narrow, small), smooth_response(setup, curves)
+    return worst([*results, (float((np.abs(one - other) / other).max()), 2.0**-24 + 64 * EPS)])
+
+
+@hard_case(
+    "a NaN in one design of a block",
+    oracle="the block without it",
+    why="designs share nothing but the order of a sum over the wavelengths: 64 eps of full scale",
+)
+def nan_in_one_design() -> Result:
+    qe = random_qe(13, 4)
+    lights = lights_of(PAIR, lines(YELLOW, RED))
+    x = np.random.default_rng(14).uniform([560, 5, 620, 5, 0], [590, 30, 660, 30, 1], (64, 5))
+    clean = Stopband(WAVE, qe[2], 0.2 * qe[2]).curves(x)
+    bad = clean.copy()
+    bad[17, 0, RED] = np.nan
+    error = 0.0
+    for scenario, pixel, methods in SCENES.values():
+        imager = Imager(made(qe, lights, scenario, pixel, "RYNC", **methods))
+        one, other = evaluate(imager, clean), evaluate(imager, bad)
+        if not np.isnan(other["csd_yellow_red"][17]):
+            return Result(np.inf, 0.0)
+        for name in one:
+            off = np.abs(np.delete(one[name], 17) - np.delete(other[name], 17)).max()
+            error = max(error, float(off) / (imager.readout.pixel.full_scale_dn if "csd" in name else 1.0))
+    return Result(error, 64 * EPS)

@@ -1,0 +1,203 @@
+"""Errors and their bounds against sums over every readout, which share no code with them."""
+
+from __future__ import annotations
+
+from itertools import pairwise, product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sweep.camera.imager import Imager
+from sweep.camera.pixel import Pixel
+from sweep.metrics import confusion
+from sweep.metrics.discrimination import NoiseShape, error_bound, pairwise_error
+from sweep.metrics.evaluate import evaluate
+from sweep.study import load_study
+
+from .. import readout_oracle
+from ..hard.scenes import DARK, F2, FAR, scene
+
+ONE, OTHER = np.array([0]), np.array([1])
+_FACTOR = 1.2
+_MOST_READOUTS = 1_000_000
+"""A pair with more is compared in fewer channels."""
+Numbers = tuple[int, np.ndarray]
+
+
+def summed(electrons: np.ndarray, pixel: Pixel) -> Numbers:
+    """First number and how often each occurs, of the sum of independent pixels."""
+    first, shares = 0, np.ones(1)
+    known: dict[float, Numbers] = {}
+    for n in electrons:
+        if n not in known:
+            numbers, often = readout_oracle.digital_numbers(float(n), pixel)
+            kept = np.flatnonzero(often > 1e-20)
+            known[n] = int(numbers[kept[0]]), often[kept[0] : kept[-1] + 1]
+        own_first, own = known[n]
+        first, shares = first + own_first, np.convolve(shares, own)
+    return first, shares
+
+
+def exact(ours: list[np.ndarray], theirs: list[np.ndarray], pixel: Pixel) -> float:
+    """The least error between two signals: half the sum of the lesser of both, over all readouts of all channels."""
+    p, q = np.ones(1), np.ones(1)
+    for a, b in zip(ours, theirs, strict=True):
+        (low_a, own_a), (low_b, own_b) = summed(a, pixel), summed(b, pixel)
+        low, high = min(low_a, low_b), max(low_a + own_a.size, low_b + own_b.size)
+        first, second = np.zeros(high - low), np.zeros(high - low)
+        first[low_a - low : low_a - low + own_a.size] = own_a
+        second[low_b - low : low_b - low + own_b.size] = own_b
+        some = np.maximum(first, second) > 1e-20
+        first, second = first[some], second[some]
+        p, q = np.outer(p, first).ravel(), np.outer(q, second).ravel()
+        kept = np.maximum(p, q) > 1e-16
+        p, q = p[kept], q[kept]
+    return float(0.5 * np.minimum(p, q).sum())
+
+
+def random_pair(seed: int) -> tuple[Pixel, list[np.ndarray], list[np.ndarray]]:
+    """A pixel, and what each pixel of each channel expects of two signals that are 0 to 7 deviations apart."""
+    rng = np.random.default_rng([seed, 29])
+    pixel = Pixel(
+        bits=int(rng.integers(8, 17)),
+        well_e=float(10 ** rng.uniform(1.3, 6)),
+        offset_dn=float(rng.uniform(0, 40)) if rng.uniform() < 0.7 else 0.0,
+    )
+    wide = rng.uniform() < 0.15  # up to 100 DN of noise in one channel, else 3 DN in up to three
+    most_dn = 100 if wide else 3
+    read_e = min(10 ** rng.uniform(-1, 1.5), most_dn / pixel.dn_per_e) if rng.uniform() < 0.8 else 0.0
+    pixel = pixel.model_copy(update={"read_noise_e": float(read_e)})
+    channels = 1 if wide else int(rng.integers(1, 4))
+    most_e = min(pixel.well_e * 1.05, (most_dn / pixel.dn_per_e) ** 2 + 3)
+    base = float(most_e * 10 ** rng.uniform(-3, 0))
+    noise = np.sqrt(base + pixel.read_noise_e**2 + 0.2 / pixel.dn_per_e**2)
+    pixels = [int(rng.integers(1, 4)) for _ in range(channels)]
+    ours = [np.full(n, base * rng.uniform(0.3, 1)) for n in pixels]
+    apart = [noise * rng.uniform(-1, 7) / np.sqrt(sum(pixels)) for _ in pixels]
+    theirs = [np.maximum(a + d, 0.0) for a, d in zip(ours, apart, strict=True)]
+    return pixel, ours, theirs
+
+
+def claimed(pixel: Pixel, ours: list[np.ndarray], theirs: list[np.ndarray]) -> tuple[float, float]:
+    """Error and bound as a study states them for a patch."""
+    ends = np.cumsum([0, *(a.size for a in ours)])
+    channels = [np.arange(low, high) for low, high in pairwise(ends)]
+    electrons = np.stack([np.concatenate(ours), np.concatenate(theirs)])[None]
+    found = confusion.errors(electrons, channels, pixel, {"a": ONE, "b": OTHER})
+    return float(found.error["a", "b"][0]), float(found.bound["a", "b"][0])
+
+
+def check(seed: int) -> None:
+    pixel, ours, theirs = random_pair(seed)
+    sizes = [max(summed(side[c], pixel)[1].size for side in (ours, theirs)) for c in range(len(ours))]
+    while len(sizes) > 1 and np.prod(sizes) > _MOST_READOUTS:
+        sizes, ours, theirs = sizes[:-1], ours[:-1], theirs[:-1]
+    error, bound = claimed(pixel, ours, theirs)
+    least = exact(ours, theirs, pixel)
+    assert least / _FACTOR <= error <= _FACTOR * least + 1e-15, (seed, error, least)
+    assert bound >= least, (seed, bound, least)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_errors_of_a_few_pixels_are_exact(seed: int) -> None:
+    check(seed)
+
+
+@pytest.mark.slow
+def test_errors_of_many_pixels_and_pairs_are_exact() -> None:
+    for seed in range(1000, 1300):
+        check(seed)
+
+
+COARSE = """
+study: coarse
+seed: 1
+sensor: ar0820
+lights: tl16
+pixel: {{bits: {bits}, well_e: {well}, read_noise_e: 2}}
+scenarios: {{dim: {{noise: true, exposure: {{kind: white_patch, level: {level}}}}}}}
+cfas: [RGGB]
+recognition: {{states: [green, yellow, red]}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("bits", "well", "level"), [(8, 10_000.0, 0.10), (8, 10_000.0, 0.20), (10, 1e5, 0.05), (8, 1e5, 0.03)]
+)
+def test_coarse_digital_numbers_are_not_told_apart_better_than_they_can_be(
+    tmp_path: Path, bits: int, well: float, level: float
+) -> None:
+    path = tmp_path / "coarse.yaml"
+    path.write_text(COARSE.format(bits=bits, well=well, level=level))
+    study = load_study(path)
+    space = next(iter(study.spaces))
+    imager = Imager(study.setup(space, "dim"))
+    curves = np.empty((1, 0, study.grid.size))
+    found = {name: values[0] for name, values in evaluate(imager, curves, ["green", "yellow", "red"]).items()}
+    electrons = imager.pixel_electrons(curves)[0, 0]
+    own = imager.readout.few_pixels
+    assert own is not None
+    # The distances of means do not say which pair is worst: all of them.
+    members = imager.setup.members
+    worst = max(
+        exact([electrons[i, c] for c in own], [electrons[j, c] for c in own], imager.readout.pixel)
+        for i, j in product(members["yellow"], members["red"])
+    )
+    assert worst / _FACTOR <= found["error_yellow_red"] <= _FACTOR * worst + 1e-15
+    assert found["error_bound_yellow_red"] >= worst
+
+
+@pytest.mark.parametrize("pixels", [1, 4, 12])
+def test_a_bound_of_many_pixels_holds_where_they_are_few_too(pixels: int) -> None:
+    """Bennett's bound, against exact sums: of steps that hardly flicker, of full wells, of a few photons."""
+    for seed in range(8):
+        pixel, ours, theirs = random_pair(seed + 500)
+        ours, theirs = (
+            [np.full(pixels, each[0]) for each in side[: 2 if pixels == 1 else 1]] for side in (ours, theirs)
+        )
+        least = exact(ours, theirs, pixel)
+        stats = [[readout_oracle.moments(float(each[0]), pixel) for each in side] for side in (ours, theirs)]
+        mean = np.array([[[m for m, _ in side] for side in stats]])
+        variance = np.array([[[v / pixels for _, v in side] for side in stats]])
+        electrons = np.array([[[each[0] for each in side] for side in (ours, theirs)]])
+        reach_e = 9 * (np.sqrt(electrons) + pixel.read_noise_e) + 27
+        reach = np.minimum(pixel.dn_per_e * reach_e + 1, pixel.full_scale_dn) / pixels
+        shape = NoiseShape(np.zeros(mean.shape, dtype=bool), reach)
+        assert pairwise_error(mean, variance, ONE, OTHER, shape)[0] >= least
+        assert error_bound(mean, variance, ONE, OTHER, shape)[0] >= least
+
+
+def test_noise_is_not_gaussian_where_a_pixel_is_cut_or_few_steps_flicker() -> None:
+    far = {"noise": True, "target": FAR, "optics": F2}
+    fine = Imager(scene("fine", "RYNCy", far, DARK).setup)
+    read = fine.read_with_noise(scene("fine", "RYNCy", far, DARK).curves)
+    assert read.gaussian.all()
+    for pixel in ({"bits": 8, "read_noise_e": 2.0}, {"read_noise_e": 3.0}, {"read_noise_e": 2.0, "offset_dn": 4090}):
+        made = scene("coarse", "RYNCy", far, pixel)
+        assert not Imager(made.setup).read_with_noise(made.curves).gaussian.all()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_gaussian_errors_are_within_a_factor_of_the_exact_ones_where_they_are_used(seed: int) -> None:
+    """Evidence for the rule of `NoisyReadout.gaussian`: read noise of 0.7 DN, or 4 steps of a pixel, and no end near."""
+    rng = np.random.default_rng([seed, 31])
+    read = float(10 ** rng.uniform(-0.5, 1))
+    pixel = Pixel(bits=int(rng.integers(8, 13)), well_e=float(10 ** rng.uniform(3, 5)), read_noise_e=read, offset_dn=60)
+    pixels = int(rng.choice([1, 4, 16]))
+    base = float(pixel.well_e * 10 ** rng.uniform(-2, -0.5))
+    noise = np.sqrt(base + read**2) / np.sqrt(pixels)
+    ours, theirs = [np.full(pixels, base)], [np.full(pixels, base + noise * rng.uniform(0, 7))]
+    stats = [readout_oracle.moments(float(side[0][0]), pixel) for side in (ours, theirs)]
+    mean, variance = (np.array([[[s[k]] for s in stats]]) for k in (0, 1))
+    dithered = pixel.dn_per_e * read >= 0.7 and pixel.offset_dn > 5 * pixel.dn_per_e * read
+    if dithered or variance.min() * pixels >= 16:
+        found = pairwise_error(mean, variance / pixels, ONE, OTHER)[0]
+        assert found >= exact(ours, theirs, pixel) / _FACTOR
+
+
+def test_what_is_not_a_number_stays_alone() -> None:
+    electrons = np.array([[[5.0], [50.0]], [[np.nan], [50.0]], [[5.0], [np.inf]]])
+    found = confusion.errors(electrons, [np.array([0])], Pixel(read_noise_e=2.0), {"a": ONE, "b": OTHER})
+    assert np.isnan(found.error["a", "b"]).tolist() == [False, True, False]
+    assert found.error["a", "b"][2] <= 1e-17

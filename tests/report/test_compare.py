@@ -1,0 +1,276 @@
+"""Finished runs side by side: what differs, whose front dominates what, who is best."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from shutil import copytree
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from sweep.errors import OutputError, SweepError
+from sweep.report import read_output
+from sweep.report.compare import compare_runs
+from sweep.report.compare.differences import study_differences
+from sweep.report.compare.drawing import FrontsFigure, Line, Mark, draw_fronts, pictures
+from sweep.report.compare.fronts import Front, box_of, hypervolumes
+from sweep.study import load_study
+
+from ..build import STUDY, ran
+from ..commanded import sweep
+from ..tampering import listed_anew
+
+SWEEP = STUDY.replace("COUNT", "3").split("search:")[0]
+CHART = SWEEP.replace("  dim: {exposure: {kind: fixed, exposure_s: 0.002}}\n", "")
+PLAIN = CHART.split("designs:")[0].replace(", RYNCy]", "]")
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Small finished runs, by what is special about them."""
+    folder = tmp_path_factory.mktemp("runs")
+    studies = {
+        "tiny": STUDY.replace("COUNT", "3").replace("200}", "200, front: {min: 0.9, max: 0.98, count: 3}}"),
+        "chart": CHART.replace("study: tiny", "study: chart"),
+        "brighter": CHART.replace("study: tiny", "study: brighter").replace("white_patch}", "white_patch, level: 0.8}"),
+        "plain": PLAIN.replace("study: tiny", "study: plain"),
+        "orange": CHART.replace("study: tiny", "study: orange") + "objective: csd_orange_red\n",
+        "combined": CHART.replace("study: tiny", "study: combined")
+        + "objective: {sum: {csd_yellow_red: 1, csd_orange_red: 2}}\n",
+        "deep": CHART.replace("study: tiny", "study: deep\npixel: {bits: 20}"),
+        "infeasible": CHART.replace("study: tiny", "study: infeasible").replace("min: 0.9", "min: 1.9"),
+        "hostile": CHART.replace("study: tiny", "study: '<script>alert(\"$x_1\")</script> 猫'").replace(
+            "mine:", "'<b>&$m':"
+        ),
+    }
+    made = {}
+    for name, text in studies.items():
+        (folder / f"{name}.yaml").write_text(text, encoding="utf-8")
+        made[name] = folder / "out" / name
+        ran(load_study(folder / f"{name}.yaml"), made[name], 1)
+    return made
+
+
+def compared(folders: Sequence[Path], to: Path) -> tuple[str, str]:
+    """What is printed, and the page."""
+    return "\n".join(compare_runs(folders, to)), (to / "compare.html").read_text(encoding="utf-8")
+
+
+def test_a_hypervolume_is_the_area_by_hand() -> None:
+    first = Front("A", "X", "s", False, np.array([[100.0, 0.905], [40.0, 0.95]]))
+    second = Front("B", "X", "s", True, np.array([[60.0, 1.0]]))
+    box = box_of([first, second])
+    np.testing.assert_allclose(box.reference, [0.0, 0.90], atol=1e-12)
+    np.testing.assert_array_equal(box.top, [100.0, 1.0])
+    table = hypervolumes([first, second], box)
+    # 100 DN up to 0.905, then 40 DN up to 0.95; 60 DN up to 1
+    np.testing.assert_allclose(table["hypervolume"], [100 * 0.005 + 40 * 0.045, 60 * 0.1], rtol=1e-9)
+    assert list(table["of the box"]) == ["23.0%", "60.0%"]
+
+
+def test_a_point_on_a_hundredth_counts() -> None:
+    front = Front("A", "X", "s", False, np.array([[50.0, 0.9]]))
+    box = box_of([front])
+    np.testing.assert_allclose(box.reference, [0.0, 0.89], atol=1e-12)
+    assert hypervolumes([front], box)["hypervolume"][0] == pytest.approx(0.5, rel=1e-9)
+
+
+def test_two_runs_say_who_is_best_and_by_how_much(runs: dict[str, Path], tmp_path: Path) -> None:
+    said, page = compared([runs["chart"], runs["brighter"]], tmp_path / "to")
+    best = {}
+    for name in ("chart", "brighter"):
+        frame = pd.read_parquet(runs[name] / "results.parquet")
+        best[name] = frame[frame["feasible"] & (frame["kind"] == "sweep")]["csd_yellow_red"].max()
+    less = best["chart"] - best["brighter"]
+    assert less > 0
+    assert (
+        f"Best yellow/red CSD: A chart with {best['chart']:.1f} DN; B brighter has {best['brighter']:.1f} DN, "
+        f"{less:.1f} DN ({less / best['chart']:.1%}) less." in said
+    )
+    assert "scenarios.chart.exposure.level  0.95     0.8" in said
+    assert "constraints" not in said.split("What differs in how")[0]
+    assert "used other curves" not in said
+    assert next(line.split() for line in said.splitlines() if line.startswith("RGGB"))[2] == "green/yellow"
+    table = pd.read_csv(tmp_path / "to" / "compare.csv")
+    np.testing.assert_allclose(table["value"], [best["chart"], best["brighter"]], rtol=1e-12)
+    assert {"csd_green_red", "left_nm", "sensitivity", "design_id"} <= set(table.columns)
+    assert {path.name for path in (tmp_path / "to").iterdir()} == {
+        "compare.html",
+        "compare.csv",
+        "fronts.png",
+        "fronts.svg",
+    }
+    assert page.count("data:image/png;base64,") == 1
+    assert "http://" not in page
+    assert "https://" not in page
+    assert "Best yellow/red CSD: A chart" in page
+
+
+def test_the_same_folder_twice_is_equal(runs: dict[str, Path], tmp_path: Path) -> None:
+    said, page = compared([runs["tiny"], runs["tiny"]], tmp_path)
+    assert "A tiny and B tiny are the same folder." in said
+    assert "; B tiny is equal." in said
+    assert "What differs in the studies: nothing" in said
+    assert "Equal in every CSD: RGGB, RYYCy, mine." in said
+    assert "Nothing: the studies are the same." in page
+
+
+def test_scenarios_and_fronts_that_all_have_are_compared(runs: dict[str, Path], tmp_path: Path) -> None:
+    said, _ = compared([runs["tiny"], runs["chart"], runs["brighter"]], tmp_path)
+    assert "Fronts are compared in the scenarios that all have: chart." in said
+    assert "above the reference of 0 DN at a sensitivity of" in said
+    assert "Fronts in dim" not in said
+    assert "traced by the search" in said
+    assert "scenarios.dim" in said
+    said, _ = compared([runs["tiny"], runs["tiny"]], tmp_path)
+    assert "Fronts in dim" in said
+
+
+def test_plain_cfas_alone_are_compared(runs: dict[str, Path], tmp_path: Path) -> None:
+    compared([runs["chart"], runs["chart"]], tmp_path)
+    assert (tmp_path / "fronts.png").exists()
+    said, page = compared([runs["plain"], runs["plain"]], tmp_path)
+    assert said.count("has no design that was swept or searched.") == 2
+    assert "There are no fronts to compare." in page
+    assert not (tmp_path / "fronts.png").exists()
+    assert "fronts.png" not in said
+    said, _ = compared([runs["plain"], runs["chart"]], tmp_path)
+    assert "Best yellow/red CSD: B chart with" in said
+
+
+def test_other_objectives_and_axes_are_not_mixed(runs: dict[str, Path], tmp_path: Path) -> None:
+    said, _ = compared([runs["chart"], runs["orange"]], tmp_path)
+    assert "different objectives" in said
+    assert "so none are compared" in said
+    assert "Best orange/red CSD: B orange with" in said
+    said, _ = compared([runs["orange"], runs["chart"], runs["brighter"]], tmp_path)
+    assert "compared are those of B chart and C brighter." in said
+
+
+def test_a_combined_objective_has_its_own_words(runs: dict[str, Path], tmp_path: Path) -> None:
+    said, _ = compared([runs["combined"], runs["combined"]], tmp_path)
+    assert "Best csd_yellow_red + 2 csd_orange_red: A combined with" in said
+
+
+def test_best_designs_of_different_scenarios_name_them(runs: dict[str, Path], tmp_path: Path) -> None:
+    copytree(runs["chart"], tmp_path / "other")
+    path = tmp_path / "other" / "results.parquet"
+    table = pq.read_table(path)
+    at = table.schema.get_field_index("scenario")
+    names = pa.array(["dusk"] * len(table)).dictionary_encode()
+    pq.write_table(table.set_column(at, table.schema.field(at), names), path)
+    study = tmp_path / "other" / "study.resolved.yaml"
+    study.write_text(re.sub(r"^  chart:", "  dusk:", study.read_text(), flags=re.MULTILINE))
+    listed_anew(tmp_path / "other")
+    said, _ = compared([runs["chart"], tmp_path / "other"], tmp_path / "to")
+    assert re.search(r"A chart with [0-9.]+ DN in chart; B chart is equal in dusk", said)
+
+
+def test_dn_of_other_meaning_are_not_ranked(runs: dict[str, Path], tmp_path: Path) -> None:
+    said, _ = compared([runs["chart"], runs["deep"]], tmp_path)
+    assert "Best yellow/red CSD in DN of 20 bits: B deep with" in said
+    assert "These are DN of different meaning, which are not ranked" in said
+    assert "so none are compared" in said
+    assert "Note: pixel differs: bits 12 / 20 (A chart, B deep)." in said
+    said, _ = compared([runs["chart"], runs["brighter"]], tmp_path)
+    assert "Note: scenario chart differs: exposure.level 0.95 / 0.8 (A chart, B brighter)." in said
+
+
+@pytest.mark.parametrize("name", ["compare.html", "compare.csv", "fronts.png", "fronts.svg"])
+def test_files_of_others_stay(runs: dict[str, Path], tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_bytes(b"mine")
+    with pytest.raises(OutputError, match="holds something else already"):
+        compare_runs([runs["plain"], runs["plain"]], tmp_path)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {name: b"mine"}
+
+
+def test_no_feasible_design_and_other_constraints_are_said(runs: dict[str, Path], tmp_path: Path) -> None:
+    said, _ = compared([runs["infeasible"], runs["chart"]], tmp_path)
+    assert "A infeasible has no feasible design." in said
+    assert "different constraints (A infeasible: sensitivity >= 1.9; B chart: sensitivity >= 0.9)" in said
+    assert pd.read_csv(tmp_path / "compare.csv")["value"].isna().tolist() == [True, False]
+
+
+def test_hostile_names_are_text(runs: dict[str, Path], tmp_path: Path) -> None:
+    said, page = compared([runs["hostile"], runs["chart"]], tmp_path)
+    assert "<script" not in page
+    assert "&lt;script&gt;" in page
+    assert "猫" in page
+    assert "A <script>" in said
+    assert (tmp_path / "fronts.svg").stat().st_size > 1000
+
+
+def test_other_curves_are_said(runs: dict[str, Path], tmp_path: Path) -> None:
+    copytree(runs["chart"], tmp_path / "other")
+    curves = pd.read_parquet(tmp_path / "other" / "curves.parquet")
+    curves.loc[100, "qe:R"] += 1e-9
+    lights = [name for name in curves.columns if name.startswith("light:")]
+    curves.loc[100, lights[0]] *= 1.1
+    curves.to_parquet(tmp_path / "other" / "curves.parquet", index=False)
+    listed_anew(tmp_path / "other")
+    said, _ = compared([runs["chart"], tmp_path / "other"], tmp_path / "to")
+    assert f"used other curves (sensor: R; lights: 1 of {len(lights)}): their results do not compare" in said
+
+
+def test_differences_are_shown_where_they_begin(runs: dict[str, Path]) -> None:
+    one = read_output(runs["chart"])
+    long = [float(number) for number in range(60)]
+    other = [*long[:50], 77.0, *long[51:]]
+
+    def rows(*extra: dict[str, object]) -> list[list[str]]:
+        from dataclasses import replace
+
+        outputs = {chr(65 + at): replace(one, study={"same": 1, **own}) for at, own in enumerate(extra)}
+        return study_differences(outputs).to_numpy().tolist()
+
+    ((key, first, second),) = rows({"x": {"values": long}}, {"x": {"values": other}})
+    assert key == "x.values"
+    assert "50.0" in first
+    assert "77.0" in second
+    assert len(first) < 80
+    assert rows({"x": {"y": 1}}, {}) == [["x", '{"y": 1}', "-"]]
+    assert rows({"x": {"y": 1}}, {"x": {"y": None}}, {"x": {}}) == [["x.y", "1", "null", "-"]]
+    a, b, c = rows({"x": long}, {"x": other}, {"x": [1, *long]})[0][1:]
+    assert len({a, b, c}) == 3
+
+
+def test_what_cannot_be_compared_is_one_line(runs: dict[str, Path], tmp_path: Path) -> None:
+    for folders in ([runs["chart"]], [runs["chart"]] * 27, [runs["chart"], tmp_path]):
+        with pytest.raises(SweepError) as caught:
+            compare_runs(folders, tmp_path / "to")
+        assert len(str(caught.value).splitlines()) == 1
+        assert caught.value.exit_code == 2
+    with pytest.raises(OutputError):
+        compare_runs([runs["chart"]] * 2, runs["chart"] / "run.json")
+    assert not (tmp_path / "to").exists()
+    done = sweep("compare", str(runs["chart"]), str(tmp_path))
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+
+
+def test_by_default_a_folder_of_both_names(
+    runs: dict[str, Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    said = compare_runs([runs["chart"], runs["plain"]], None)
+    assert "outputs/compare-chart-plain/" in said[-1]
+    assert (tmp_path / "outputs" / "compare-chart-plain" / "compare.html").is_file()
+    compare_runs([runs["chart"]] * 26, None)
+    assert max(len(path.name) for path in (tmp_path / "outputs").iterdir()) == 100
+
+
+def test_every_front_has_its_own_mark_and_runs_their_dash() -> None:
+    x = np.linspace(0.8, 1.0, 40)
+    lines = [Line(f"run {run} $", run, x, x * (run + 1), traced) for run in range(3) for traced in (False, True)]
+    figure = FrontsFigure("a $ title", "x", "y", lines, [Mark("A", 0, 0.9, 1.0)])
+    (axes,) = draw_fronts(figure).axes
+    drawn = axes.get_lines()
+    assert len({line.get_marker() for line in drawn}) == len(lines)
+    assert len({str(line._unscaled_dash_pattern) for line in drawn}) == 3  # type: ignore[attr-defined]
+    assert len({line.get_color() for line in drawn}) == 3
+    assert [line.get_markerfacecolor() == "white" for line in drawn] == [False, True] * 3
+    assert pictures(figure) == pictures(figure)

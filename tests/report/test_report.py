@@ -1,0 +1,241 @@
+"""What a report says and counts, without a picture."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from sweep.errors import OutputError
+from sweep.metrics.pareto import knee
+from sweep.report import read_output
+from sweep.report.history import history_of
+from sweep.report.page_data import payload
+from sweep.report.scenes import scene_groups
+from sweep.results.identity import CHUNK
+from sweep.results.output import Output
+from sweep.results.profiles import Profile, Profiles
+from sweep.run.rows import Job, jobs_of, rules_of, run_job
+from sweep.study import Study, load_study
+
+from ..build import large, ran, study_file
+from ..conftest import Finished
+from ..tampering import listed_anew
+
+
+def test_the_knee_is_farthest_from_the_line_between_the_ends() -> None:
+    # The line from (0, 10) to (2, 0); of the others (1, 9) is the farthest beyond it in the front's own units.
+    front = np.array([[0.0, 10.0], [0.5, 9.5], [1.0, 9.0], [1.8, 2.0], [2.0, 0.0]])
+    assert knee(front) == 2
+    assert knee(front * [1000, 1e-3] + [5, -7]) == 2  # the units do not matter
+    assert knee(front[:2]) is None
+    assert knee(np.array([[0.0, 2.0], [1.0, 1.0], [2.0, 0.0]])) is None  # a straight front has none
+    assert knee(np.array([[0.0, 2.0], [0.5, 0.6], [2.0, 0.0]])) is None  # nor has one that bends inward
+    assert knee(np.full((3, 2), 1.0)) is None
+    assert knee(np.array([[0.0, 2.0], [np.nan, 1.0], [2.0, 0.0]])) is None
+
+
+def table_of(frame: pd.DataFrame) -> pa.Table:
+    words = pa.dictionary(pa.int32(), pa.string())
+    table = pa.Table.from_pandas(frame, preserve_index=False)
+    for name in ("kind", "cfa", "scenario"):
+        table = table.set_column(table.column_names.index(name), name, table[name].cast(words))
+    return table
+
+
+def test_a_profile_is_the_best_of_all_feasible_designs_at_a_value() -> None:
+    random = np.random.default_rng(4)
+    n = 4000
+    frame = pd.DataFrame(
+        {
+            "kind": random.choice(["sweep", "design"], n, p=[0.9, 0.1]),
+            "cfa": random.choice(["A", "B"], n),
+            "scenario": random.choice(["one", "two"], n),
+            "left_nm": random.integers(0, 7, n) * 10.0 + 590,
+            "depth": np.ones(n),
+            "csd_yellow_red": random.normal(100, 30, n),
+            "feasible": random.random(n) < 0.5,
+        }
+    )
+    found = Profiles("csd_yellow_red", "one")
+    for part in np.array_split(np.arange(n), 5):
+        found.add(table_of(frame.iloc[part]))
+    own = frame[(frame["kind"] == "sweep") & (frame["scenario"] == "one") & frame["feasible"]]
+    for cfa in ("A", "B"):
+        (profile,) = found.found[cfa]  # one depth alone is no profile
+        assert profile.parameter == "left_nm"
+        for value, best in zip(profile.values, profile.best, strict=True):
+            assert best == own[(own["cfa"] == cfa) & (own["left_nm"] == value)]["csd_yellow_red"].max()
+        assert len(profile.values) == 7
+
+
+def test_many_values_keep_their_best_ones() -> None:
+    values = np.linspace(0, 1, 5001)
+    frame = pd.DataFrame({"left_nm": values, "csd_a_b": 5 - (values - 0.61) ** 2, "feasible": True})
+    frame = frame.assign(kind="sweep", cfa="A", scenario="one")
+    found = Profiles("csd_a_b", "one")
+    found.add(table_of(frame[["kind", "cfa", "scenario", "left_nm", "csd_a_b", "feasible"]]))
+    (profile,) = found.found["A"]
+    assert len(profile.values) < 100
+    assert profile.best.max() == frame["csd_a_b"].max()
+    assert profile.values[profile.best.argmax()] == pytest.approx(0.61)
+
+
+def test_what_keeps_the_objective_is_around_the_best_value() -> None:
+    values = np.arange(7.0)
+    profile = Profile("x", values, np.array([96.0, 10.0, 97.0, 100.0, 95.0, 94.0, 99.0]))
+    assert profile.keeps == (2.0, 4.0)
+    assert profile.drop == 90.0
+
+
+def test_the_history_ends_at_the_answer(finished: Finished) -> None:
+    folder = finished("stopband")
+    output = read_output(folder)
+    history = history_of(output)
+    assert history is not None
+    facts = json.loads((folder / "provenance.json").read_text())
+    log = pd.read_parquet(folder / "search.parquet")
+    assert history.evaluations[-1] == len(log) == facts["search"]["evaluations"] + facts["search"]["front_evaluations"]
+    assert np.nanmax([start.best[-1] for start in history.starts]) == facts["search"]["best_smooth_objective"]
+    assert history.best[-1] == pytest.approx(facts["search"]["best_smooth_objective"], rel=1e-6)
+    assert (np.diff(history.volume) >= 0).all()
+    # The area below a staircase, by hand: everything feasible, above no separation and the lowest level.
+    feasible = log[log["violation"] <= 1e-6].sort_values("sensitivity", ascending=False)
+    area, reached = 0.0, 0.0
+    for row in feasible.itertuples():
+        if row.objective > reached:
+            area += (row.objective - reached) * (row.sensitivity - history.least_sensitivity + 1e-6)
+            reached = row.objective
+    assert history.volume[-1] == pytest.approx(area, rel=1e-6)
+
+
+def test_every_scene_is_told_once_with_its_largest_promise(finished: Finished) -> None:
+    output = read_output(finished("fog"))
+    groups = scene_groups(output)
+    assert sorted(name for group in groups for name in group.scenarios) == sorted(output.study["scenarios"])
+    for group in groups:
+        plans = [output.provenance["plans"][name] for name in group.scenarios]
+        assert group.promised_dn == max(plan["promised_dn"] for plan in plans)
+        assert group.realized_dn is None
+    rows = pd.DataFrame({"scenario": [groups[0].scenarios[0]] * 2, "realized_dn": [0.01, 0.03]})
+    assert scene_groups(replace(output, audited=rows))[0].realized_dn == 0.03
+
+
+def test_a_long_table_keeps_its_front_in_a_small_page(tmp_path: Path) -> None:
+    """A table of 250,000 rows is thinned; the page's data does not grow with it, but for the front."""
+    folder = tmp_path / "out"
+    ran(load_study(large(tmp_path, 5)), folder, 2)
+    output: Output = read_output(folder)
+    drawn = payload(output)
+    table = pd.read_parquet(folder / "results.parquet")
+    front = table[table["pareto"] & table["feasible"] & (table["kind"] == "sweep")]
+    assert {row[0] for row in drawn["front"]["rows"]} == set(front["design_id"])
+    assert len(json.dumps(drawn)) < 3_000_000
+    assert output.counts.rows == len(table) > 250_000
+
+
+def test_a_job_of_several_chunks_has_their_rows(tmp_path: Path) -> None:
+    study: Study = load_study(large(tmp_path, 20))
+    whole = next(job for job in jobs_of(study) if job.space.kind == "sweep")
+    assert whole.stop - whole.start > CHUNK
+    setup, rules = study.setup(whole.space, whole.scenario), rules_of(study)
+    parts = [
+        Job(whole.space, whole.scenario, start, min(start + CHUNK, whole.stop), whole.first_id + start)
+        for start in range(0, whole.stop, CHUNK)
+    ]
+    together = run_job(whole, setup, rules).to_pandas()
+    each = pd.concat([run_job(part, setup, rules).to_pandas() for part in parts], ignore_index=True)
+    pd.testing.assert_frame_equal(together.drop(columns="pareto"), each.drop(columns="pareto"), check_categorical=False)
+
+
+def test_a_small_study_has_one_chunk_per_job(tmp_path: Path) -> None:
+    study = load_study(study_file(tmp_path))
+    assert all(job.stop - job.start <= CHUNK for job in jobs_of(study))
+
+
+def test_a_dollar_in_a_name_is_no_formula() -> None:
+    from sweep.report.figures import CurvesFigure, draw_curves, rendered
+
+    wave = np.linspace(400, 700, 4)
+    for name in (r"$\nonsense{", "a$b$c"):
+        figure = draw_curves(CurvesFigure(name, "QE", wave, {name: np.ones(4)}))
+        assert rendered(figure, "svg").startswith(b"<?xml")
+        assert not figure.axes[0].title.get_parse_math()
+
+
+def test_a_camera_of_one_channel_has_a_report(tmp_path: Path) -> None:
+    from sweep.report import make_report
+
+    path = tmp_path / "one.yaml"
+    path.write_text("study: one\nsensor: ar0820\nlights: tl16\ncfas: {CCCC: {tile: [[C, C], [C, C]]}}\n")
+    ran(load_study(path), tmp_path / "out", 1)
+    output = read_output(tmp_path / "out")
+    make_report(output)
+    assert payload(output)["views"] == []
+    assert "CCCC" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_a_csv_has_every_digit_whatever_numpy_prints(tmp_path: Path) -> None:
+    from sweep.results.tables import write_csv
+
+    value = 37.322915213043046
+    with np.printoptions(legacy="1.13"):
+        write_csv(pd.DataFrame({"a": [value, np.nan], "b": ["x,y", None]}), tmp_path / "t.csv")
+    found = pd.read_csv(tmp_path / "t.csv", float_precision="round_trip")
+    assert found["a"][0] == value
+    assert np.isnan(found["a"][1])
+    assert found["b"][0] == "x,y"
+
+
+@pytest.mark.parametrize("column", ["feasible", "status", "promised_dn", "csd_yellow_red", "sensitivity", "scenario"])
+def test_a_table_that_lacks_a_column_is_one_line(tmp_path: Path, column: str) -> None:
+    folder = tmp_path / "out"
+    ran(load_study(study_file(tmp_path, 2)), folder, 1)
+    path = folder / "results.parquet"
+    pq.write_table(pq.read_table(path).drop_columns([column]), path)
+    listed_anew(folder)
+    with pytest.raises(OutputError, match=f"results.parquet: lacks {column}; delete it"):
+        read_output(folder)
+
+
+def test_a_study_whose_designs_all_failed_says_why(tmp_path: Path) -> None:
+    from sweep.report import make_report, summary_lines
+
+    folder = tmp_path / "out"
+    path = study_file(tmp_path, 2)
+    path.write_text(path.read_text().split("search:")[0])
+    ran(load_study(path), folder, 1)
+    frame = pd.read_parquet(folder / "results.parquet")
+    swept = frame["kind"] == "sweep"
+    frame["status"] = frame["status"].astype(object)
+    frame.loc[swept, "status"] = "error: no light"
+    frame.loc[swept, ["feasible", "pareto"]] = False
+    schema = pq.read_schema(folder / "results.parquet")
+    pq.write_table(pa.Table.from_pandas(frame, schema=schema, preserve_index=False), folder / "results.parquet")
+    listed_anew(folder)
+    output = read_output(folder)
+    make_report(output)
+    assert summary_lines(output)[0] == "Every design failed: error: no light."
+    assert payload(output)["front"]["rows"] == []
+
+
+def test_a_single_design_has_a_report(tmp_path: Path) -> None:
+    from sweep.report import make_report
+
+    path = tmp_path / "single.yaml"
+    grid = "{left_nm: 610, left_width_nm: 5, right_nm: 650, right_width_nm: 5}"
+    path.write_text(
+        "study: single\nsensor: ar0820\nlights: tl16\ncfas: [RYNCy]\n"
+        f"sweeps: {{s: {{cfa: RYNCy, channel: N, base: Y, to: G, grid: {grid}}}}}\n"
+    )
+    ran(load_study(path), tmp_path / "out", 1)
+    output = read_output(tmp_path / "out")
+    make_report(output)
+    assert payload(output)["views"][0]["knee"] is None
+    assert len(output.best) == 1

@@ -1,0 +1,284 @@
+"""The reports as a person opens them: in a browser without a network, by pointing, clicking and ticking."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import io
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sweep.report import make_report, read_output
+from sweep.study import load_study
+
+from ..build import ran
+from ..conftest import Finished
+
+BROWSER = next((p for n in ("chromium", "chromium-browser", "google-chrome") if (p := shutil.which(n))), None)
+playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+pytestmark = pytest.mark.skipif(BROWSER is None, reason="there is no Chromium on this machine")
+
+
+@dataclass
+class Opened:
+    """An open page, and what it said and asked for."""
+
+    page: Any
+    errors: list[str] = field(default_factory=list)
+    requests: list[str] = field(default_factory=list)
+
+    def number_of_points(self) -> int:
+        count = "document.getElementById('pareto').data.reduce((n, t) => n + (t.customdata ? t.x.length : 0), 0)"
+        return int(self.page.evaluate(count))
+
+    def point_at(self, trace: str) -> tuple[float, float, int]:
+        """Place on the page of a trace's first point, and its row in the page's data."""
+        found = self.page.evaluate(
+            """(name) => {
+                document.getElementById('pareto').scrollIntoView();
+                const box = document.getElementById('pareto'), layout = box._fullLayout, place = box.getBoundingClientRect();
+                const trace = box.data.find((t) => t.name.startsWith(name));
+                return [place.left + layout._size.l + layout.xaxis.d2p(trace.x[0]),
+                        place.top + layout._size.t + layout.yaxis.d2p(trace.y[0]), trace.customdata[0]];
+            }""",
+            trace,
+        )
+        return float(found[0]), float(found[1]), int(found[2])
+
+    def details(self) -> dict[str, str]:
+        """What the page says of the chosen design."""
+        pairs = self.page.eval_on_selector_all(
+            "#details dl div", "(all) => all.map((d) => [d.children[0].textContent, d.children[1].textContent])"
+        )
+        return dict(pairs)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with playwright.sync_playwright() as started:
+        found = started.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        yield found
+        found.close()
+
+
+@pytest.fixture
+def opened(browser: Any) -> Iterator[Any]:
+    pages = []
+
+    def open_report(folder: Path, width: int = 1280) -> Opened:
+        page = browser.new_page(viewport={"width": width, "height": 1000})
+        pages.append(page)
+        seen = Opened(page)
+        page.on("console", lambda m: seen.errors.append(m.text) if m.type == "error" else None)
+        page.on("pageerror", lambda error: seen.errors.append(str(error)))
+        page.on("dialog", lambda dialog: seen.errors.append(f"dialog {dialog.message}") or dialog.dismiss())
+        page.on("request", lambda request: seen.requests.append(request.url))
+        page.goto((folder / "report.html").as_uri())
+        page.wait_for_selector("body[data-ready-ms]")
+        return seen
+
+    yield open_report
+    for page in pages:
+        page.close()
+
+
+def through(seen: Opened) -> None:
+    """Scroll through the whole page, so that everything is drawn."""
+    height = seen.page.evaluate("document.documentElement.scrollHeight")
+    for top in range(0, height, 700):
+        seen.page.evaluate(f"window.scrollTo(0, {top})")
+        seen.page.wait_for_timeout(60)
+    seen.page.evaluate("window.scrollTo(0, 0)")
+
+
+def ids(seen: Opened) -> list[int]:
+    """design_id of every row that the page holds."""
+    packed = seen.page.evaluate("JSON.parse(document.getElementById('data').textContent).design_id.bdata")
+    return [int(value) for value in np.frombuffer(base64.b64decode(packed), "<f8")]
+
+
+def agrees(printed: str, value: float) -> bool:
+    """Whether a printed number is the value, rounded to the digits that are printed (of a 32-bit float)."""
+    digits = len(printed.partition(".")[2])
+    return abs(float(printed) - value) <= 0.5 * 10**-digits + abs(value) * 2**-23
+
+
+@pytest.mark.parametrize("name", ["stopband", "fog", "paper"])
+@pytest.mark.parametrize("width", [1280, 400])
+def test_a_report_opens_without_an_error_or_a_request(finished: Finished, opened: Any, name: str, width: int) -> None:
+    seen = opened(finished(name), width)
+    through(seen)
+    assert seen.errors == []
+    assert seen.requests == [(finished(name) / "report.html").as_uri()]
+    assert seen.page.evaluate("document.documentElement.scrollWidth") == width
+    assert seen.page.locator("#pareto .plotly").count() == 1
+
+
+@pytest.mark.parametrize(("name", "trace"), [("stopband", "Pareto front"), ("fog", "RYN_4Cy"), ("paper", "RYN_2Cy")])
+def test_pointing_and_clicking_tell_of_a_design(finished: Finished, opened: Any, name: str, trace: str) -> None:
+    seen = opened(finished(name))
+    table = pd.read_parquet(finished(name) / "results.parquet").set_index("design_id")
+    x, y, row = seen.point_at(trace)
+    seen.page.mouse.move(x - 60, y - 60)
+    seen.page.mouse.move(x, y, steps=4)
+    seen.page.wait_for_selector("#hover", state="visible")
+    seen.page.mouse.click(x, y)
+    seen.page.wait_for_function("document.getElementById('curves').data.length > 0")
+    chosen = table.loc[int(seen.page.get_attribute("#details", "data-design"))]
+    # On the way another design may have been told.
+    title = "(id) => document.querySelector(id).firstElementChild.textContent"
+    seen.page.wait_for_function(f"({title})('#hover') === document.querySelector('#details h3').textContent")
+    pointed = seen.page.inner_text("#hover").splitlines()
+    said = seen.details()
+    assert agrees(said["yellow/red CSD"], chosen["csd_yellow_red"])
+    assert agrees(said["sensitivity"], chosen["sensitivity"])
+    assert f"yellow/red CSD: {said['yellow/red CSD']}" in pointed
+    names = seen.page.evaluate("document.getElementById('curves').data.map((t) => t.name)")
+    assert pointed[0] in names
+    assert {"Y", "G"} <= set(names)
+    signals = seen.page.evaluate("document.getElementById('clouds').data.reduce((n, t) => n + t.x.length, 0)")
+    assert signals == 51 * 3  # three planes of RYNCy's four channels
+    # A design with a name that lies within a marker's width is told first.
+    pointed_at = table.loc[ids(seen)[row]]
+    near = abs(pointed_at["csd_yellow_red"] - chosen["csd_yellow_red"]) < 2
+    assert chosen.name == pointed_at.name or (chosen["kind"] != "sweep" and near)
+
+
+def test_the_box_leaves_out_what_is_not_feasible(finished: Finished, opened: Any) -> None:
+    seen = opened(finished("stopband"))
+    before = seen.number_of_points()
+    seen.page.uncheck("#infeasible")
+    after = seen.number_of_points()
+    assert 100 < after < before
+    feasible = "document.getElementById('pareto').data.some((t) => t.name.startsWith('not feasible'))"
+    assert not seen.page.evaluate(feasible)
+    seen.page.check("#infeasible")
+    assert seen.number_of_points() == before
+
+
+def test_the_best_design_is_that_of_the_table(finished: Finished, opened: Any) -> None:
+    folder = finished("stopband")
+    table = pd.read_parquet(folder / "results.parquet")
+    best = table[table["feasible"] & table["kind"].isin(["sweep", "search"])].sort_values("csd_yellow_red").iloc[-1]
+    seen = opened(folder)
+    assert f"{best['csd_yellow_red']:.1f} DN" in seen.page.inner_text(".answer")
+    assert int(seen.page.get_attribute("#details", "data-design")) == best["design_id"]
+    said = seen.details()
+    for name, text in said.items():
+        column = {"CFA sensitivity": "cfa_sensitivity"}.get(name, name)
+        if column.endswith(" CSD"):
+            column = "csd_" + column.removesuffix(" CSD").replace("/", "_")
+        assert agrees(text, float(best[column])), name
+    assert {"left_nm", "right_width_nm", "sensitivity", "yellow/red CSD"} <= set(said)
+
+
+def test_the_saved_front_has_every_digit(finished: Finished, opened: Any) -> None:
+    folder = finished("stopband")
+    seen = opened(folder)
+    with seen.page.expect_download() as waiting:
+        seen.page.click("#save")
+    text = Path(waiting.value.path()).read_text()
+    rows = list(csv.DictReader(io.StringIO(text)))
+    table = pd.read_parquet(folder / "results.parquet").set_index("design_id")
+    front = table[table["pareto"] & table["feasible"] & (table["kind"] == "sweep")]
+    assert {int(row["design_id"]) for row in rows} == set(front.index)
+    for row in rows:
+        for column in ("left_nm", "csd_yellow_red", "sensitivity", "cfa_sensitivity", "slope_per_nm"):
+            assert float(row[column]) == front.loc[int(row["design_id"]), column]
+
+
+def test_brushing_an_axis_counts_what_is_left(finished: Finished, opened: Any) -> None:
+    seen = opened(finished("stopband"))
+    through(seen)
+    before = seen.page.inner_text("#brushed")
+    seen.page.evaluate("Plotly.restyle('parallel', {'dimensions[0].constraintrange': [[[610, 616]]]}, [0])")
+    seen.page.wait_for_function("(before) => document.getElementById('brushed').innerText !== before", arg=before)
+    kept, drawn = (int(word.replace(",", "")) for word in seen.page.inner_text("#brushed").split()[0:3:2])
+    dimension = seen.page.evaluate("Array.from(document.getElementById('parallel').data[0].dimensions[0].values)")
+    assert kept == sum(610 <= value <= 616 for value in dimension)
+    assert 0 < kept < drawn == len(dimension)
+
+
+def test_another_scenario_is_drawn_when_it_is_chosen(finished: Finished, opened: Any) -> None:
+    folder = finished("fog")
+    seen = opened(folder)
+    table = pd.read_parquet(folder / "results.parquet")
+    last = list(dict.fromkeys(table["scenario"]))[-1]
+    seen.page.select_option("#scenario", last)
+    rows = table[(table["scenario"] == last) & (table["kind"] == "design") & (table["name"] == "RYN_4Cy")]
+    drawn = seen.page.evaluate("document.getElementById('pareto').data.find((t) => t.name.startsWith('RYN_4Cy')).y[0]")
+    assert drawn == pytest.approx(rows["csd_yellow_red"].iloc[0], rel=1e-6)
+    assert seen.errors == []
+
+
+HOSTILE = """
+study: <script>alert(1)</script>
+question: "<img src=x onerror=alert(2)> & \\"quotes\\" - ünïcode?"
+sensor:
+  name: "</script><b>s</b>"
+  files: [{file: qe.csv, columns: {R: "r \\"<i>'", G: "gé&amp;", B: "b;--", W: "w</script>"}}]
+lights:
+  files:
+    - file: lights.csv
+      quantity: energy
+      signals: {green: ["g<u>"], yellow: ["y'\\""], red: ["r<script>alert(3)</script>"]}
+cfas: {RGGB: {tile: [[R, G], [G, B]]}, RGBN: {tile: [[R, G], [B, N]]}}
+designs:
+  "<b onmouseover=alert(4)>named</b>":
+    {cfa: RGBN, channel: N, base: W, to: G, at: {left_nm: 600, left_width_nm: 10, right_nm: 650, right_width_nm: 10}}
+sweeps:
+  s:
+    cfa: RGBN
+    channel: N
+    base: W
+    to: G
+    grid: {left_nm: [600, 610], left_width_nm: 10, right_nm: [640, 660], right_width_nm: 10}
+"""
+
+
+def hostile(folder: Path) -> Path:
+    wave = np.arange(380.0, 781.0, 5.0)
+
+    def bump(center: float, width: float) -> np.ndarray:
+        return np.asarray(np.exp(-0.5 * ((wave - center) / width) ** 2))
+
+    def write(name: str, columns: dict[str, np.ndarray]) -> None:
+        pd.DataFrame({"wavelength_nm": wave, **columns}).to_csv(folder / name, index=False)
+
+    qe = {
+        "r \"<i>'": 0.5 * bump(600, 40),
+        "gé&amp;": 0.5 * bump(540, 40),
+        "b;--": 0.5 * bump(460, 35),
+        "w</script>": 0.8 * bump(560, 120),
+    }
+    write("qe.csv", qe)
+    write("lights.csv", {"g<u>": bump(505, 12), "y'\"": bump(590, 10), "r<script>alert(3)</script>": bump(630, 10)})
+    path = folder / "hostile.yaml"
+    path.write_text(HOSTILE)
+    return path
+
+
+def test_names_come_out_as_text(tmp_path: Path, opened: Any) -> None:
+    folder = tmp_path / "out"
+    ran(load_study(hostile(tmp_path)), folder, 1)
+    make_report(read_output(folder))
+    seen = opened(folder)
+    through(seen)
+    assert seen.errors == []
+    assert seen.page.inner_text("h1") == "<script>alert(1)</script>"
+    assert "<img src=x onerror=alert(2)>" in seen.page.inner_text("body")
+    assert seen.page.locator("img[src=x]").count() == 0
+    x, y, _ = seen.point_at("&lt;b")
+    seen.page.mouse.click(x, y)
+    seen.page.wait_for_function("document.querySelector('#details h3').textContent.startsWith('<b')")
+    assert seen.page.inner_text("#details h3") == "<b onmouseover=alert(4)>named</b>"
+    titles = seen.page.evaluate("Array.from(document.querySelectorAll('.gtitle')).map((t) => t.textContent)")
+    assert any("<b onmouseover=alert(4)>named</b>" in title for title in titles)
+    assert seen.errors == []

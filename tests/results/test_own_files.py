@@ -1,0 +1,278 @@
+"""A run replaces, removes and follows only what is its own; a disk that refuses loses nothing that is finished."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from sweep.commands.audit import audit_output
+from sweep.commands.status import status_lines
+from sweep.errors import OutputError
+from sweep.report import make_report, read_output
+from sweep.results.inventory import Inventory
+from sweep.results.journal import SHARDS, Journal
+from sweep.results.lock import LOCK, locked
+from sweep.results.names import is_drawn, is_own
+from sweep.run import output_folder, run_study
+from sweep.study import Study, load_study
+
+from ..build import ran, study_file
+from ..conftest import Finished
+from ..mischief import StoppedError, half_done, rows
+
+NAMES = (
+    *("results.parquet", "curves.parquet", "provenance.json", "run.json", "SHA256SUMS", "study.resolved.yaml"),
+    *("report.html", "pareto.png", "figures/sensor.svg", "audit.parquet", "paper_comparison.csv", "search.parquet"),
+)
+
+
+@pytest.fixture(scope="module")
+def few(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    """Twelve designs, no search."""
+    path = study_file(tmp_path_factory.mktemp("study"), 3)
+    path.write_text(path.read_text().split("constraints:")[0].replace("count: 51", "count: 2"))
+    return load_study(path)
+
+
+@pytest.fixture(scope="module")
+def expected(few: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
+    folder = tmp_path_factory.mktemp("expected")
+    ran(few, folder, 1)
+    return rows(folder)
+
+
+@pytest.fixture
+def plain_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports whose pictures take no time."""
+    names = ("pareto", "sensor", "signals", "chart")
+    monkeypatch.setattr("sweep.report.page._drawings", lambda _: ((name, name, None) for name in names))
+    monkeypatch.setattr("sweep.report.page.rendered", lambda _, kind: kind.encode())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_file_that_was_there_before_is_told_and_stays(few: Study, tmp_path: Path, name: str) -> None:
+    base = tmp_path / "tiny"
+    (base / name).parent.mkdir(parents=True, exist_ok=True)
+    (base / name).write_text("mine")
+
+    def computed(*_: object) -> None:
+        pytest.fail("something was computed")
+
+    with pytest.raises(OutputError, match=f"{name}: is not of this run") as caught:
+        run_study(few, base, 1, computed)
+    assert len(caught.value.faults) == 1
+    assert (base / name).read_text() == "mine"
+    folder, note = output_folder(base, few)  # the command goes beside it, and says why
+    assert folder == tmp_path / "tiny-2"
+    assert note is not None
+    assert name in note
+    ran(few, folder, 1)
+    assert (base / name).read_text() == "mine"
+
+
+def test_a_file_put_there_while_a_run_is_interrupted_is_told(
+    few: Study, expected: pd.DataFrame, tmp_path: Path
+) -> None:
+    def stop(phase: str, *_: object) -> None:
+        if phase == "designs":
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        run_study(few, tmp_path, 1, stop)
+    (tmp_path / "figures").mkdir()
+    for name in ("report.html", "figures/chart.png", "curves.parquet"):
+        (tmp_path / name).write_text("mine")
+        with pytest.raises(OutputError, match=f"{name}: is not of this run"):
+            ran(few, tmp_path, 1)
+        assert (tmp_path / name).read_text() == "mine"
+        (tmp_path / name).unlink()
+    ran(few, tmp_path, 1)
+    pd.testing.assert_frame_equal(rows(tmp_path), expected)
+
+
+@pytest.mark.usefixtures("plain_pictures")
+@pytest.mark.parametrize("name", ["report.html", "pareto.svg", "figures/sensor.png"])
+def test_a_file_put_there_before_the_report_is_told(few: Study, tmp_path: Path, name: str) -> None:
+    ran(few, tmp_path, 1)
+    (tmp_path / "figures").mkdir()
+    (tmp_path / name).write_text("mine")
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file() and path.name != LOCK}
+    with pytest.raises(OutputError, match=f"{name}: is not of this run"):
+        make_report(read_output(tmp_path))
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file() and path.name != LOCK} == before
+
+
+@pytest.mark.usefixtures("plain_pictures")
+def test_other_files_of_the_folder_stay(few: Study, tmp_path: Path) -> None:
+    mine = (
+        "notes.md",
+        "shards/mine.txt",
+        "shards/data.parquet",
+        "figures/mine.png",
+        ".tmp-1-mine",
+        "shards/.tmp-7-x.y",
+    )
+    for name in mine:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(name)
+    ran(few, tmp_path, 1)
+    make_report(read_output(tmp_path))
+    make_report(read_output(tmp_path))
+    for name in mine:
+        assert (tmp_path / name).read_text() == name
+
+
+def outside(tmp_path: Path) -> Path:
+    target = tmp_path / "outside"
+    target.mkdir()
+    (target / "precious.txt").write_text("precious")
+    return target
+
+
+@pytest.mark.parametrize("name", [LOCK, SHARDS, "figures"])
+def test_a_link_in_the_place_of_an_own_folder_is_told(few: Study, tmp_path: Path, name: str) -> None:
+    target, folder = outside(tmp_path), tmp_path / "out"
+    folder.mkdir()
+    (folder / name).symlink_to(target / "precious.txt" if name == LOCK else target)
+    with pytest.raises(OutputError, match=f"{name}: is "):
+        ran(few, folder, 1)
+    assert [path.name for path in target.iterdir()] == ["precious.txt"]
+    assert (target / "precious.txt").read_text() == "precious"
+
+
+def test_a_lock_that_says_something_else_stays(few: Study, tmp_path: Path) -> None:
+    for content in (b"my notes", b"process 1 on me\nand more", b"x" * 100_000):
+        (tmp_path / LOCK).write_bytes(content)
+        with pytest.raises(OutputError, match=f"{LOCK}: is not of this run"):
+            ran(few, tmp_path, 1)
+        assert (tmp_path / LOCK).read_bytes() == content
+    (tmp_path / LOCK).unlink()
+    os.mkfifo(tmp_path / LOCK)  # opening it would wait for ever
+    with pytest.raises(OutputError, match=f"{LOCK}: is not of this run"):
+        ran(few, tmp_path, 1)
+
+
+@pytest.mark.usefixtures("plain_pictures")
+def test_links_in_the_place_of_files_are_replaced_not_followed(
+    few: Study, expected: pd.DataFrame, tmp_path: Path
+) -> None:
+    target, folder = outside(tmp_path), tmp_path / "out"
+    ran(few, folder, 1)
+    make_report(read_output(folder))
+    for name in ("results.parquet", "run.json", "report.html", "figures/chart.png"):
+        (folder / name).unlink()
+        (folder / name).symlink_to(target / "precious.txt")
+    ran(few, folder, 1)
+    make_report(read_output(folder), mend=True)
+    assert (target / "precious.txt").read_text() == "precious"
+    assert not any(path.is_symlink() for path in folder.rglob("*"))
+    pd.testing.assert_frame_equal(rows(folder), expected)
+    assert status_lines(folder, verify=True)[-1].startswith("ok")
+
+
+def test_the_folder_itself_may_be_a_link(few: Study, expected: pd.DataFrame, tmp_path: Path) -> None:
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "out").symlink_to(tmp_path / "disk")
+    ran(few, tmp_path / "out", 1)
+    pd.testing.assert_frame_equal(rows(tmp_path / "disk"), expected)
+
+
+def test_a_journal_that_is_a_link_is_not_written_through(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
+    target, folder = outside(tmp_path), tmp_path / "out"
+    half_done(plain, folder)
+    journal = folder / SHARDS / "_journal.jsonl"
+    journal.unlink()
+    journal.symlink_to(target / "precious.txt")
+    ran(plain, folder, 1)
+    assert (target / "precious.txt").read_text() == "precious"
+    pd.testing.assert_frame_equal(rows(folder), whole)
+
+
+def test_names_that_reports_give_are_known(finished: Finished) -> None:
+    """A picture of a new name is to be added to the names of a run's files."""
+    for study in ("stopband", "fog"):
+        folder = finished(study)
+        drawn = [path for path in folder.rglob("*") if path.suffix in (".png", ".svg", ".html")]
+        assert len(drawn) > 10
+        assert all(is_drawn(path.relative_to(folder).as_posix()) for path in drawn)
+        assert all(map(is_own, Inventory(folder).files))
+
+
+@pytest.mark.usefixtures("plain_pictures")
+def test_a_report_in_use_is_one_line(few: Study, tmp_path: Path) -> None:
+    ran(few, tmp_path, 1)
+    output = read_output(tmp_path)
+    with locked(tmp_path):
+        for write in (lambda: make_report(output), lambda: audit_output(tmp_path, None)):
+            with pytest.raises(OutputError, match=f"in use by another run .process {os.getpid()}"):
+                write()
+
+
+def refusing(monkeypatch: pytest.MonkeyPatch, at: int, number: int) -> list[str]:
+    """From the `at`-th on, no file takes its name; says which ones asked."""
+    asked: list[str] = []
+    replaced: Callable[[Path, Path], Path] = Path.replace
+
+    def replace_or_refuse(hidden: Path, path: Path) -> Path:
+        asked.append(path.name)
+        if len(asked) > at:
+            raise OSError(number, os.strerror(number))
+        return replaced(hidden, path)
+
+    monkeypatch.setattr(Path, "replace", replace_or_refuse)
+    return asked
+
+
+@pytest.mark.parametrize("step", [6, pytest.param(1, marks=pytest.mark.slow)])
+def test_wherever_the_disk_refuses_nothing_finished_is_lost(
+    few: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int
+) -> None:
+    study = replace(few, scenarios={"chart": few.scenarios["chart"]})
+    ran(study, tmp_path / "expected", 1)
+    with monkeypatch.context() as patch:
+        written = refusing(patch, 10**6, 0)
+        ran(study, tmp_path / "counted", 1)
+    assert len(written) > 15
+    for at in range(0, len(written), step):
+        folder = tmp_path / f"refused-{at}"
+        with monkeypatch.context() as patch:
+            refusing(patch, at, (errno.ENOSPC, errno.EROFS)[at % 2])
+            with pytest.raises(OutputError, match="cannot be written") as caught:
+                ran(study, folder, 1)
+        assert len(caught.value.faults) == 1
+        assert not list(folder.rglob(".tmp-*"))
+        kept = Journal(folder).entries
+        seen = ran(study, folder, 1)
+        counts = [done for phase, done, _ in seen if phase == "designs"]
+        assert counts[:1] in ([], [sum(entry.rows for entry in kept.values())])
+        assert not (folder / SHARDS).exists()
+        pd.testing.assert_frame_equal(rows(folder), rows(tmp_path / "expected"))
+        assert status_lines(folder, verify=True)[-1].startswith("ok")
+
+
+@pytest.mark.usefixtures("plain_pictures")
+def test_a_report_that_the_disk_refuses_loses_no_result(
+    few: Study, expected: pd.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ran(few, tmp_path, 1)
+    make_report(read_output(tmp_path))
+    with monkeypatch.context() as patch:
+        refusing(patch, 4, errno.ENOSPC)
+        with pytest.raises(OutputError, match="cannot be written: No space left"):
+            make_report(read_output(tmp_path))
+    (tmp_path / "report.html").unlink()
+    with monkeypatch.context() as patch:
+        refusing(patch, 0, errno.ENOSPC)
+        with pytest.raises(OutputError, match="cannot be written: No space left"):
+            make_report(read_output(tmp_path), mend=True)
+    pd.testing.assert_frame_equal(rows(tmp_path), expected)
+    with pytest.raises(OutputError, match=r"report\.html: is missing"):
+        status_lines(tmp_path)
+    make_report(read_output(tmp_path), mend=True)
+    assert status_lines(tmp_path, verify=True)[-1].startswith("ok")

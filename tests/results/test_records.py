@@ -1,0 +1,104 @@
+"""Kept answers: bit for bit what they were, and nothing but data of their types."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Literal, get_type_hints
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sweep.results.records import from_json, to_json
+from sweep.search.limit import Limit
+from sweep.search.problem import Evaluation, SearchRun
+from sweep.types import FloatArray, IndexArray
+
+from ..tampering import hostile
+
+numbers = st.floats(allow_nan=True, allow_infinity=True, allow_subnormal=True)
+
+
+def bits(value: float) -> bytes:
+    """NaN is one value, whatever its payload."""
+    return b"nan" if math.isnan(value) else struct.pack("<d", value)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.integers(0, 99),
+    st.text(),
+    st.lists(st.tuples(st.lists(numbers, max_size=4), numbers, numbers, numbers, numbers)),
+)
+def test_a_search_comes_back_bit_for_bit(start: int, status: str, logged: list[tuple[list[float], ...]]) -> None:
+    run = SearchRun(start, status, [Evaluation(np.array(x, dtype=float), *rest) for x, *rest in logged])
+    again = from_json(SearchRun, to_json(run))
+    assert (again.start, again.status, len(again.log)) == (start, status, len(logged))
+    for made, read in zip(run.log, again.log, strict=True):
+        assert read.x.dtype == np.float64
+        assert [bits(v) for v in read.x] == [bits(v) for v in made.x]
+        for name in ("objective", "sensitivity", "cfa_sensitivity", "violation"):
+            assert bits(getattr(read, name)) == bits(getattr(made, name))
+
+
+VALUES = {float: -0.1, str: '\u2028 \0 "', int: 2**70, bool: True}
+
+
+def value_of(kind: object) -> object:
+    """A value for a field of a limit, by its annotation."""
+    if kind in VALUES:
+        return VALUES[kind]  # type: ignore[index]
+    if "ndarray" in str(kind):
+        return np.array([0.1, -0.0, np.inf, np.nan, 5e-324])
+    if "tuple" in str(kind) or "list" in str(kind) or "Sequence" in str(kind):
+        return ()
+    return None
+
+
+def test_a_limit_comes_back_whatever_its_fields() -> None:
+    hints = get_type_hints(Limit)
+    limit = Limit(**{field.name: value_of(hints[field.name]) for field in fields(Limit)})  # type: ignore[arg-type]
+    again = from_json(Limit, to_json(limit))
+    for field in fields(Limit):
+        made, read = getattr(limit, field.name), getattr(again, field.name)
+        assert type(made) is type(read)
+        if isinstance(made, np.ndarray):
+            assert made.tobytes() == read.tobytes()
+        else:
+            assert made == read
+    assert from_json(Limit, to_json(Limit(-np.inf, np.inf, None))).proven == np.inf
+
+
+@dataclass(frozen=True)
+class Sample:
+    pair: tuple[int, str]
+    words: Mapping[str, tuple[float, ...]]
+    where: IndexArray | None
+    side: Literal["left", "right"] | None
+    grid: FloatArray
+    inner: SearchRun | None = None
+
+
+def test_fields_of_every_kind_come_back() -> None:
+    sample = Sample((3, "x"), {"a": (1.5, np.nan)}, np.arange(6).reshape(2, 3), "left", np.ones((2, 0)), SearchRun(1))
+    again = from_json(Sample, to_json(sample))
+    assert (again.pair, again.side, again.inner, again.grid.shape) == ((3, "x"), "left", SearchRun(1), (2, 0))
+    assert again.where.tolist() == [[0, 1, 2], [3, 4, 5]]
+    assert again.words["a"][0] == 1.5
+    assert math.isnan(again.words["a"][1])
+
+
+@pytest.mark.parametrize("value", [object(), np.array([object()]), {1: 2}, {3}, b"bytes", lambda: None])
+def test_what_is_no_data_is_not_kept(value: object) -> None:
+    with pytest.raises(TypeError, match="cannot be kept"):
+        to_json(value)
+
+
+@pytest.mark.parametrize("content", hostile())
+def test_a_text_that_is_no_answer_is_refused(content: bytes) -> None:
+    with pytest.raises(ValueError, match=r"^no <class"):
+        from_json(SearchRun, content)

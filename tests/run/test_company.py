@@ -1,0 +1,159 @@
+"""A design's numbers are the same bits alone, in any block, beside any other design, on both routes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sweep.camera.imager import Imager
+from sweep.camera.mosaic import Mosaic
+from sweep.camera.pixel import Pixel
+from sweep.camera.scene import Scenario
+from sweep.camera.view import Setup
+from sweep.designs.block import Curves, edges_of
+from sweep.designs.dual import Dual
+from sweep.designs.free_form import FreeForm
+from sweep.designs.products import row_products
+from sweep.designs.space import Filter, Space
+from sweep.designs.stopband import Stopband
+from sweep.metrics.evaluate import evaluate
+
+from ..blocks import SETUPS, SPACE, setup_of
+from ..hard.scenes import DARK, F2, FAMILY, FAR, FIXED, GRID, SENSOR, lights
+
+# Crossed edges among them, which lift N above Y, so that it sets the exposure.
+AXES = ((590.0, 603.0, 690.0), (5.0, 20.0), (410.0, 640.0, 655.0), (0.0, 6.0, 30.0), (0.5, 0.8, 1.0))
+MIXED = Space("sweep", "edges", "RYNCy", Filter(FAMILY, ("N",), "Y", "G"), AXES)
+MORE = {
+    "noise, far": setup_of({"noise": True, "target": FAR, "optics": F2}, DARK | {"prnu": 0.01}),
+    "background, pixel by pixel": setup_of(
+        {"background_cd_m2": 300, "intensity_cd": 200, "exposure": FIXED, "target": FAR, "optics": F2},
+        {"crosstalk": 0.1},
+    ),
+}
+STATES = ("green", "yellow", "red")
+
+
+def assert_same(found: dict[str, Any], which: Any, alone: dict[str, Any]) -> None:
+    assert list(found) == list(alone)
+    for name, values in alone.items():
+        np.testing.assert_array_equal(found[name][which], values, err_msg=name)
+
+
+@pytest.mark.parametrize("name", [*SETUPS, *MORE])
+@pytest.mark.parametrize("separable", [True, False])
+def test_a_design_alone_is_the_one_of_its_block(name: str, separable: bool) -> None:
+    setup = (SETUPS | MORE)[name]
+    states = STATES if setup.methods.quantization != "skip" and setup.methods.noise != "skip" else ()
+    imager = Imager(setup)
+    space = MIXED if setup.scenario.target is None else SPACE
+    block = edges_of(space, 0, space.size)
+    assert block is not None
+    curves = block.curves()
+    whole = evaluate(imager, block if separable else curves, states)
+    rng = np.random.default_rng(5)
+    parts = [np.array([at]) for at in range(0, space.size, 1 if setup.scenario.target is None else 5)]
+    parts += [np.arange(start, start + n) for n in (2, 3, 15, 16, 17, 31) for start in rng.integers(0, 40, 2)]
+    for part in parts:
+        some = edges_of(space, part[0], part[-1] + 1) if separable else Curves(curves[part])
+        assert some is not None
+        assert_same(whole, part, evaluate(imager, some, states))
+
+
+@pytest.mark.parametrize("separable", [True, False])
+def test_a_bad_design_changes_no_other(separable: bool) -> None:
+    imager = Imager(SETUPS["saturated" if separable else "chart"])  # one exposure for all; one that the design sets
+    fine = edges_of(SPACE, 0, SPACE.size)
+    assert fine is not None
+    bad = np.array([0, 17, 30])
+    others = np.delete(np.arange(SPACE.size), bad)
+    if separable:
+        depth = fine.depth.copy()
+        depth[bad] = np.nan
+        spoiled: Any = replace(fine, depth=depth)
+    else:
+        spoiled = fine.curves()
+        spoiled[bad] = np.nan
+    whole, found = (evaluate(imager, block) for block in (fine if separable else fine.curves(), spoiled))
+    assert_same(found, others, {name: values[others] for name, values in whole.items()})
+    assert np.isnan(found["csd_yellow_red"][bad]).all()
+
+
+@pytest.mark.parametrize(
+    "space",
+    [
+        Space(
+            "sweep",
+            "free",
+            "RYNCy",
+            Filter(FreeForm(GRID.nodes_nm, SENSOR.qe["Y"], np.arange(540.0, 700.0, 8.0)), ("N",), "Y", ""),
+            ((0.3, 0.7, 0.9), *(((0.2, 0.85),) * 5), *((0.6,),) * 14),
+        ),
+        Space(
+            "sweep",
+            "bands",
+            "RYNCy",
+            Filter(Stopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"], bands=2), ("N",), "Y", "G"),
+            (
+                (470.0, 480.0, 490.5),
+                (10.0,),
+                (540.0, 550.0),
+                (10.0, 17.0),
+                (1.0,),
+                (600.0, 610.0),
+                (8.0,),
+                (640.0, 660.0),
+                (5.0,),
+                (0.7, 1.0),
+            ),
+        ),
+    ],
+    ids=["free form", "two bands"],
+)
+def test_families_give_the_same_curves_and_lengths_alone(space: Space) -> None:
+    points = space.points(0, space.size)
+    whole = space.curves(points, GRID.size), space.violation(points), space.dimensions(points)
+    for at in range(space.size):
+        one = points[at : at + 1]
+        np.testing.assert_array_equal(space.curves(one, GRID.size)[0], whole[0][at])
+        np.testing.assert_array_equal(space.violation(one)[0], whole[1][at])
+        for name, values in space.dimensions(one).items():
+            np.testing.assert_array_equal(values[0], whole[2][name][at])
+
+
+@pytest.mark.parametrize(
+    "scenario", [{}, {"target": FAR, "optics": F2}, {"background_cd_m2": 300, "intensity_cd": 200, "exposure": FIXED}]
+)
+def test_two_modified_channels(scenario: dict[str, Any]) -> None:
+    mosaic = Mosaic.from_rows("RAACy", [["R", "Na"], ["Nb", "Cy"]])
+    qe = SENSOR.mosaic_qe(mosaic, {"Na": "Y", "Nb": "Y"})
+    modified = tuple(mosaic.channels.index(name) for name in ("Na", "Nb"))
+    setup = Setup(GRID, mosaic, qe, modified, SENSOR.qe["C"], lights(), Pixel(), Scenario.model_validate(scenario))
+    family = Dual(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["C"])
+    space = Space("sweep", "dual", "RAACy", Filter(family, ("Na", "Nb"), "Y", "C"), AXES)
+    curves = space.curves(space.points(0, 40), GRID.size)
+    imager = Imager(setup)
+    whole = evaluate(imager, curves)
+    for at in range(0, 40, 3):
+        assert_same(whole, slice(at, at + 1), evaluate(imager, curves[at : at + 1]))
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize(("k", "m"), [(1, 1), (7, 3), (61, 51), (301, 1), (301, 51), (602, 102), (301, 2000)])
+def test_products_of_rows(k: int, m: int, dtype: type) -> None:
+    rng = np.random.default_rng(k + m)
+    rows, matrix = (rng.random(shape).astype(dtype) for shape in ((150, k), (k, m)))
+    whole = row_products(rows, matrix)
+    assert whole.dtype == dtype
+    # An error of at most k roundings of a sum of positive numbers.
+    exact = rows.astype(np.longdouble) @ matrix.astype(np.longdouble)
+    assert (np.abs(whole - exact) <= k * np.finfo(dtype).eps * exact).all()
+    np.testing.assert_array_equal(row_products(np.asfortranarray(rows), matrix), whole)
+    for at in range(len(rows)):
+        np.testing.assert_array_equal(row_products(rows[at : at + 1], matrix)[0], whole[at])
+    for n in (0, 2, 15, 16, 17, 40, 149):
+        np.testing.assert_array_equal(row_products(rows[:n], matrix), whole[:n])
+        np.testing.assert_array_equal(row_products(rows[1 : 1 + n : 2], matrix), whole[1 : 1 + n : 2])

@@ -1,0 +1,275 @@
+"""What can go wrong in a run: killed workers, damaged files, failing designs, other studies, clusters."""
+
+from __future__ import annotations
+
+import errno
+import os
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import joblib
+import pandas as pd
+import psutil
+import pyarrow.parquet as pq
+import pytest
+from threadpoolctl import threadpool_info
+
+from sweep.commands.status import status_lines
+from sweep.errors import FailedDesignError, OutputError, SweepError
+from sweep.report import make_report, read_output
+from sweep.results.identity import CHUNK
+from sweep.results.journal import SHARDS, Journal
+from sweep.results.lock import locked
+from sweep.run import Wishes, estimate, estimate_lines, output_folder, run_study, with_plans
+from sweep.run.stop import Stop
+from sweep.run.sweep import KILLED
+from sweep.run.workers import Workers, workers
+from sweep.study import Study, load_study
+
+from ..build import ran, study_file
+from ..mischief import StoppedError, half_done, mischievous, rows
+
+
+@pytest.fixture(scope="module")
+def unharmed(plain: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
+    """What a mischievous study gives when its file is missing."""
+    folder = tmp_path_factory.mktemp("unharmed")
+    ran(mischievous(plain, folder / "missing"), folder, 1)
+    return pd.read_parquet(folder / "results.parquet")
+
+
+def test_a_worker_that_is_killed_once_costs_nothing(plain: Study, unharmed: pd.DataFrame, tmp_path: Path) -> None:
+    wish = tmp_path / "wish"
+    wish.write_text("kill 1 ")
+    ran(mischievous(plain, wish), tmp_path / "out", 2)
+    assert wish.read_text().split()[2] == "done"
+    pd.testing.assert_frame_equal(rows(tmp_path / "out"), unharmed)
+
+
+def test_a_design_that_kills_its_worker_is_a_row(plain: Study, tmp_path: Path) -> None:
+    wish = tmp_path / "wish"
+    wish.write_text("kill 1000000 ")
+    few = replace(plain, scenarios={"chart": plain.scenarios["chart"]})
+    sweep = few.spaces[-1]
+    few = replace(few, spaces=(replace(sweep, axes=((590.0, 600.0, 610.0), (5.0,), (660.0, 670.0), (5.0,), (1.0,))),))
+    ran(mischievous(few, tmp_path / "missing"), tmp_path / "fine", 1)
+    ran(mischievous(few, wish), tmp_path / "out", 2)
+    found, fine = rows(tmp_path / "out"), rows(tmp_path / "fine")
+    killed = found["left_nm"] == 590
+    assert list(found.loc[killed, "status"]) == [KILLED] * 2
+    assert found.loc[killed, "csd_yellow_red"].isna().all()
+    assert not found.loc[killed, ["feasible", "pareto"]].any(axis=None)
+    same = [name for name in found.columns if name != "pareto"]
+    words = {"status": str}  # the word of the killed rows is no category of the others
+    pd.testing.assert_frame_equal(found.loc[~killed, same].astype(words), fine.loc[~killed, same].astype(words))
+
+
+def test_a_worker_that_is_killed_while_scenes_are_planned_costs_nothing(plain: Study, tmp_path: Path) -> None:
+    wish = tmp_path / "wish"
+    wish.write_text("kill 1 ")
+    study = mischievous(plain, wish)
+    single = replace(study.spaces[-1], axes=((590.0,), (5.0,), (660.0,), (5.0,), (1.0,)))
+    study = replace(study, spaces=(*study.spaces[:-1], single))
+    plans = with_plans(study, 2, lambda *_: None).plans
+    assert wish.read_text().count("done") >= 2
+    wish.unlink()
+    assert plans == with_plans(study, 1, lambda *_: None).plans
+
+
+def test_failing_designs_stop_a_run_or_are_tried_again(plain: Study, unharmed: pd.DataFrame, tmp_path: Path) -> None:
+    wish = tmp_path / "wish"
+    wish.write_text("fail ")
+    study, folder = mischievous(plain, wish), tmp_path / "out"
+    with pytest.raises(FailedDesignError, match="no such filter"):
+        run_study(study, folder, 1, lambda *_: None, wishes=Wishes(fail_fast=True))
+    assert run_study(study, folder, 1, lambda *_: None)
+    failed = (rows(folder)["status"] != "ok").sum()
+    assert failed == 2 * 2 * 51 * 2  # in both scenes, every design of this edge
+    assert not run_study(study, folder, 1, lambda *_: None)
+    wish.unlink()
+    assert run_study(study, folder, 1, lambda *_: None, wishes=Wishes(retry_failed=True))
+    pd.testing.assert_frame_equal(rows(folder), unharmed)
+    assert not run_study(study, folder, 1, lambda *_: None, wishes=Wishes(retry_failed=True))
+
+
+@pytest.mark.parametrize("all_fail", [False, True])
+def test_a_named_design_that_fails_is_a_row(plain: Study, tmp_path: Path, all_fail: bool) -> None:
+    wish = tmp_path / "wish"
+    named = next(space for space in plain.spaces if space.kind == "design")
+    bad = replace(mischievous(plain, wish).spaces[-1], kind="design", name="bad", axes=((590.0,), *named.axes[1:]))
+    study = replace(plain, spaces=(bad,) if all_fail else (*plain.spaces[:-1], bad))
+
+    def fail_from_here(phase: str, done: int, total: int) -> None:
+        if phase == "scenes planned" and done == total:
+            wish.write_text("fail ")
+
+    run_study(study, tmp_path / "out", 1, fail_from_here)
+    found = rows(tmp_path / "out")
+    failed = found["name"] == "bad"
+    assert found.loc[failed, "status"].str.contains("no such filter").all()
+    assert (found.loc[~failed, "status"] == "ok").all()
+    make_report(read_output(tmp_path / "out"))
+
+
+def test_a_clock_that_goes_back_changes_nothing(
+    plain: Study, whole: pd.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = iter(range(10**9, 0, -3600))
+    monkeypatch.setattr(time, "time", lambda: float(next(now)))
+    half_done(plain, tmp_path)
+    with locked(tmp_path):
+        assert len(status_lines(tmp_path)) >= 2
+    ran(plain, tmp_path, 1)
+    pd.testing.assert_frame_equal(rows(tmp_path), whole)
+
+
+def test_status_of_a_run(plain: Study, tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="no run here"):
+        status_lines(tmp_path)
+    journal = half_done(plain, tmp_path)
+    done = sum(entry.rows for entry in journal.entries.values())
+    lines = status_lines(tmp_path)
+    assert lines[0].startswith(f"interrupted; the same command continues: {done:,} of {plain.n_designs:,} designs")
+    assert len(pd.read_parquet(tmp_path / SHARDS)) == done  # readable while it runs
+    with locked(tmp_path):
+        lines = status_lines(tmp_path)
+        assert lines[0].startswith(f"running (process {os.getpid()} on ")
+        assert "designs/s, about " in lines[1]
+    ran(plain, tmp_path, 1)
+    assert status_lines(tmp_path)[0].startswith(f"finished: {plain.n_designs:,} designs in ")
+
+
+def test_dry_run_counts_what_is_finished(plain: Study, tmp_path: Path) -> None:
+    found = estimate(plain, tmp_path / "out", 2, lambda *_: None)
+    assert (found.designs, found.kept) == (plain.n_designs, 0)
+    assert not (tmp_path / "out").exists()
+    half_done(plain, tmp_path / "out")
+    kept = sum(entry.rows for entry in Journal(tmp_path / "out").entries.values())
+    found = estimate(plain, tmp_path / "out", 2, lambda *_: None)
+    assert found.kept == kept
+    assert found.seconds > 0
+    assert found.memory_bytes > 50e6
+    # What the sample says of the disk is what the rest takes.
+    ran(plain, tmp_path / "out", 1)
+    bytes_per_row = (tmp_path / "out" / "results.parquet").stat().st_size / plain.n_designs
+    assert found.disk_bytes / 2 / (plain.n_designs - kept) == pytest.approx(bytes_per_row, rel=1.0)
+    found = estimate(plain, tmp_path / "out", 2, lambda *_: None)
+    assert (
+        estimate_lines(found, tmp_path)[0]
+        == f"{found.designs:,} designs: {found.designs:,} finished, 0 in 0 chunks to compute."
+    )
+
+
+def test_a_changed_study_goes_beside_the_old_one(plain: Study, tmp_path: Path) -> None:
+    base = tmp_path / "tiny"
+    assert output_folder(base, plain) == (base, None)
+    ran(plain, base, 1)
+    assert output_folder(base, plain) == (base, None)
+    path = study_file(tmp_path)
+    path.write_text(path.read_text().split("constraints:")[0].replace("exposure_s: 0.002", "exposure_s: 0.003"))
+    changed = load_study(path)
+    folder, note = output_folder(base, changed)
+    assert folder == tmp_path / "tiny-2"
+    assert note is not None
+    assert "changed scenarios.dim.exposure.exposure_s: 0.002 -> 0.003" in note
+    with pytest.raises(OutputError, match="holds another study"):
+        ran(changed, base, 1)
+    ran(changed, folder, 1)
+    assert output_folder(base, changed)[0] == folder
+    path.write_text(path.read_text().replace("0.003", "0.004"))
+    assert output_folder(base, load_study(path))[0] == tmp_path / "tiny-3"
+
+
+def test_a_disk_without_a_byte_left_is_one_line(plain: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "pwrite", full)
+    with pytest.raises(OutputError, match="cannot be written: No space left on device"):
+        ran(plain, tmp_path, 1)
+
+
+def test_threads_give_the_same_rows(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
+    run_study(plain, tmp_path, 2, lambda *_: None, backend="threading")
+    pd.testing.assert_frame_equal(rows(tmp_path), whole)
+
+
+def most_threads(pause_s: float) -> int:
+    found = []
+    for _ in range(20):
+        time.sleep(pause_s)
+        found += [library["num_threads"] for library in threadpool_info()]
+    return max(found)
+
+
+def test_threads_beside_each_other_do_not_give_their_libraries_more() -> None:
+    with workers(Workers(2, Stop(), "threading")) as crew:
+        calls = (joblib.delayed(most_threads)(0.001 * (i % 3 + 1)) for i in range(20))
+        assert set(crew(calls)) == {1}
+
+
+def test_workers_never_outnumber_the_cores(plain: Study, tmp_path: Path) -> None:
+    assert Workers(1000, Stop()).count == os.cpu_count()
+    run_study(plain, tmp_path, 1000, lambda *_: None, backend="threading")
+    facts = pd.read_json(tmp_path / "provenance.json", typ="series")
+    assert facts["workers"] * facts["threads_per_worker"] <= facts["cores"]
+
+
+def test_dask_needs_a_scheduler_that_answers() -> None:
+    for scheduler, said in ((None, "needs --scheduler"), ("tcp://127.0.0.1:9", "--scheduler tcp://127.0.0.1:9: ")):
+        with pytest.raises(SweepError, match=said), workers(Workers(2, Stop(), "dask", scheduler)):
+            pass
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_cluster_gives_the_same_rows_with_a_worker_killed(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    path = study_file(tmp_path, 201)
+    path.write_text(path.read_text().replace("starts: 4", "starts: 2"))
+    study = load_study(path)
+    ran(study, tmp_path / "one", 1)
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+    ) as cluster:
+        killed: list[int] = []
+
+        def kill_one(phase: str, done: int, _total: int) -> None:
+            if phase == "designs" and done > CHUNK and not killed:
+                worker = next(iter(cluster.workers.values()))
+                killed.append(worker.process.pid)
+                psutil.Process(worker.process.pid).kill()
+
+        run_study(study, tmp_path / "many", 2, kill_one, backend="dask", scheduler=cluster.scheduler_address)
+    assert killed
+    for name in ("results", "search"):
+        tables = [pq.read_table(tmp_path / folder / f"{name}.parquet") for folder in ("one", "many")]
+        assert tables[0].equals(tables[1])
+
+
+def test_a_search_that_was_killed_is_not_repeated(tmp_path: Path) -> None:
+    study = load_study(study_file(tmp_path))
+
+    def stop(phase: str, done: int, _total: int) -> None:
+        if phase == "search starts" and done == 2:
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        run_study(study, tmp_path / "out", 1, stop)
+    kept = {
+        entry.file: (tmp_path / "out" / SHARDS / entry.file).stat().st_mtime_ns
+        for entry in Journal(tmp_path / "out").entries.values()
+    }
+    assert len(kept) == 2
+    seen: list[dict[str, int]] = []
+
+    def look(phase: str, _done: int, _total: int) -> None:
+        if phase == "designs" and not seen:
+            seen.append({f: (tmp_path / "out" / SHARDS / f).stat().st_mtime_ns for f in kept})
+
+    run_study(study, tmp_path / "out", 1, look)
+    assert seen == [kept]
+    ran(study, tmp_path / "whole", 2)
+    for name in ("results", "search"):
+        tables = [pq.read_table(tmp_path / folder / f"{name}.parquet") for folder in ("out", "whole")]
+        assert tables[0].equals(tables[1])

@@ -1,0 +1,277 @@
+"""Runs: the same rows however they are made, and nothing finished is lost."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+
+from sweep.camera.imager import imager_of
+from sweep.designs.space import Filter, Space
+from sweep.designs.stopband import Stopband
+from sweep.errors import OutputError, StudyError
+from sweep.metrics.evaluate import evaluate, quantities
+from sweep.report import make_report, read_output
+from sweep.report.values import scenario_series
+from sweep.results.identity import CHUNK
+from sweep.results.journal import Journal
+from sweep.results.lock import locked
+from sweep.run import run_study
+from sweep.run.rows import Job, jobs_of, rules_of, run_job
+from sweep.study import Study, load_study
+
+from ..build import STUDY, ran, study_file
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    return load_study(study_file(tmp_path_factory.mktemp("study")))
+
+
+@pytest.fixture(scope="module")
+def output(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("out")
+    ran(study, folder, 1)
+    return folder
+
+
+def test_rows_stand_in_order_with_their_columns(study: Study, output: Path) -> None:
+    frame = pd.read_parquet(output / "results.parquet")
+    assert len(frame) == 2 * (2 + 1 + 26 * 2 * 51 * 2) + 1
+    assert list(frame["design_id"]) == list(range(len(frame)))
+    assert list(frame.columns) == [
+        *("design_id", "kind", "name", "cfa", "family", "scenario"),
+        *("left_nm", "left_width_nm", "right_nm", "right_width_nm", "depth"),
+        *quantities(study.lights),
+        *("edge_width_nm", "band_width_nm"),
+        *("violation", "limit", "gap", "feasible", "pareto", "plan", "promised_dn", "status"),
+    ]
+    assert set(frame["status"]) == {"ok"}
+    assert list(frame["kind"][:4]) == ["reference", "reference", "design", "sweep"]
+    assert frame["kind"].iloc[-1] == "search"
+    assert frame["sensitivity"].isna().sum() == 4  # two plain CFAs in two scenarios
+
+
+def test_a_row_is_what_its_parameters_say(study: Study, output: Path) -> None:
+    frame = pd.read_parquet(output / "results.parquet")
+    sweep = study.spaces[-1]
+    for scenario in ("chart", "dim"):
+        rows = frame[(frame["kind"] == "sweep") & (frame["scenario"] == scenario)].sample(5, random_state=3)
+        for _, row in rows.iterrows():
+            x = row[list(sweep.parameters)].to_numpy(dtype=float)[None]
+            found = evaluate(imager_of(study.setup(sweep, scenario)), sweep.curves(x, study.grid.size))
+            for name in quantities(study.lights):
+                assert row[name] == pytest.approx(found[name][0], rel=1e-12)
+            ordered = row["left_nm"] <= row["right_nm"] and (sweep.violation(x) == 0).all()
+            assert row["feasible"] == (ordered and row["sensitivity"] >= 0.9)
+
+
+def test_front_is_not_dominated(study: Study, output: Path) -> None:
+    frame = pd.read_parquet(output / "results.parquet")
+    for _, group in frame[frame["kind"] != "reference"].groupby("scenario", observed=True):
+        front = group[group["pareto"]]
+        assert len(front) > 3
+        formed = group[study.spaces[-1].violation(group[list(study.parameters)].to_numpy(dtype=float)) == 0]
+        for _, row in front.iterrows():
+            better = (formed["csd_yellow_red"] >= row["csd_yellow_red"]) & (formed["sensitivity"] >= row["sensitivity"])
+            strictly = (formed["csd_yellow_red"] > row["csd_yellow_red"]) | (formed["sensitivity"] > row["sensitivity"])
+            assert not (better & strictly).any()
+
+
+def test_search_answer_is_a_feasible_row_as_good_as_the_sweep(output: Path) -> None:
+    frame = pd.read_parquet(output / "results.parquet")
+    answer = frame.iloc[-1]
+    swept = frame[(frame["kind"] == "sweep") & (frame["scenario"] == "chart") & frame["feasible"]]
+    assert answer["feasible"]
+    assert answer["csd_yellow_red"] >= swept["csd_yellow_red"].max() - 2  # one quantization step of two points
+    log = pd.read_parquet(output / "search.parquet")
+    assert len(log) == json.loads((output / "provenance.json").read_text())["search"]["evaluations"]
+
+
+def test_two_workers_give_the_same_rows(study: Study, output: Path, tmp_path: Path) -> None:
+    ran(study, tmp_path, 2)
+    for name in ("results.parquet", "search.parquet", "curves.parquet"):
+        assert pq.read_table(tmp_path / name).equals(pq.read_table(output / name)), name
+    assert not (tmp_path / "shards").exists()
+
+
+def test_finished_chunks_are_not_computed_again(study: Study, output: Path, tmp_path: Path) -> None:
+    class StoppedError(Exception):
+        pass
+
+    def stop_after_a_chunk(phase: str, done: int, _total: int) -> None:
+        if phase == "designs" and done > CHUNK:
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        run_study(study, tmp_path, 1, stop_after_a_chunk)
+    shards = sorted((tmp_path / "shards").glob("*.parquet"))
+    kept = sum(pq.read_metadata(shard).num_rows for shard in shards)
+    assert kept > CHUNK
+    shards[0].write_bytes(shards[0].read_bytes()[:-40])  # a torn file is computed again, not trusted
+    kept -= 1
+    assert not (tmp_path / "results.parquet").exists()
+    seen = ran(study, tmp_path, 1)
+    assert next(call for call in seen if call[0] == "designs") == ("designs", kept, study.n_designs)
+    assert pq.read_table(tmp_path / "results.parquet").equals(pq.read_table(output / "results.parquet"))
+
+
+def test_a_failing_design_is_a_row(study: Study) -> None:
+    class Fragile(Stopband):
+        separable = None  # its curves are asked for
+
+        def curves(self, x: np.ndarray) -> np.ndarray:
+            if (x[:, 0] == 3).any():
+                raise ValueError("no such filter")
+            made = super().curves(x)
+            made[x[:, 0] == 5] = np.nan
+            return made
+
+    family = Fragile(study.grid.nodes_nm, study.sensor.qe["Y"], study.sensor.qe["G"])
+    axes = ((2.0, 3.0, 4.0, 5.0), (10.0,), (650.0,), (10.0,), (1.0,))
+    space = Space("sweep", "fragile", "RYNCy", Filter(family, ("N",), "Y", "G"), axes)
+    rules = replace(rules_of(study), constraints={})
+    rows = run_job(Job(space, "chart", 0, 4, 0), study.setup(space, "chart"), rules).to_pandas()
+    assert list(rows["status"]) == ["ok", "error: ValueError: no such filter", "ok", "not finite"]
+    assert list(rows["feasible"]) == [True, False, True, False]
+    assert list(rows["csd_yellow_red"].isna()) == [False, True, False, True]
+    assert not rows["pareto"][[1, 3]].any()
+
+
+def test_jobs_cover_every_design_once(study: Study) -> None:
+    jobs = list(jobs_of(study))
+    assert [job.first_id for job in jobs] == list(np.cumsum([0] + [j.stop - j.start for j in jobs[:-1]]))
+    assert sum(job.stop - job.start for job in jobs) == study.n_designs
+    shifted = replace(study, scenarios={"dim": study.scenarios["dim"]})
+    assert sum(job.stop - job.start for job in jobs_of(shifted)) == study.n_designs // 2
+
+
+def test_two_runs_at_once_are_refused(study: Study, tmp_path: Path) -> None:
+    with locked(tmp_path), pytest.raises(OutputError, match=f"in use by another run .process {os.getpid()}"):
+        ran(study, tmp_path, 1)
+    ran(study, tmp_path, 1)
+
+
+def started(folder: Path, output: Path, *extra: str, count: int = 401, **options: object) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "sweep", "run", str(study_file(folder, count)), "--output", str(output), *extra]
+    with (folder / "said").open("w") as said:
+        return subprocess.Popen(command, stderr=said, start_new_session=True, **options)  # type: ignore[call-overload, no-any-return]
+
+
+def chunks(folder: Path) -> int:
+    """Finished chunks of the sweep in a folder."""
+    return sum(entry.rows > 0 for entry in Journal(folder).entries.values())
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_a_killed_run_is_continued(tmp_path: Path, number: signal.Signals) -> None:
+    output = tmp_path / "out"
+    run = started(tmp_path, output, "--jobs", "2")
+    deadline = time.monotonic() + 60
+    while not chunks(output / "tiny"):
+        assert run.poll() is None, (tmp_path / "said").read_text()
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    if number == signal.SIGINT:
+        os.killpg(run.pid, number)  # as Ctrl-C on a terminal, which reaches the workers, too
+    else:
+        run.send_signal(number)
+    assert run.wait(timeout=60) == (-number if number == signal.SIGKILL else 130)
+    if number != signal.SIGKILL:
+        assert (
+            tmp_path / "said"
+        ).read_text() == "sweep: interrupted; finished chunks are kept, the same command continues\n"
+    assert not (output / "tiny" / "results.parquet").exists()
+    study = load_study(study_file(tmp_path, 401))
+    seen = ran(study, output / "tiny", 2)
+    assert next(call for call in seen if call[0] == "designs")[1] > 0
+    ran(study, tmp_path / "whole", 2)
+    tables = [pq.read_table(folder / "results.parquet") for folder in (output / "tiny", tmp_path / "whole")]
+    assert tables[0].equals(tables[1])
+
+
+def test_a_full_disk_is_one_line_and_loses_nothing(study: Study, output: Path, tmp_path: Path) -> None:
+    def small_files_only() -> None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (150_000, 150_000))
+
+    folder = tmp_path / "out" / "tiny"
+    run = started(tmp_path, tmp_path / "out", "--jobs", "1", count=26, preexec_fn=small_files_only)
+    assert run.wait(timeout=120) == 2
+    said = (tmp_path / "said").read_text()
+    assert said.count("\n") == 1, said
+    assert "cannot be written" in said
+    assert "File too large" in said
+    assert not list(folder.rglob(".tmp-*"))
+    kept = Journal(folder).entries
+    assert kept
+    seen = ran(study, folder, 1)  # the disk has room again
+    assert next(call for call in seen if call[0] == "designs")[1] == sum(entry.rows for entry in kept.values())
+    assert pq.read_table(folder / "results.parquet").equals(pq.read_table(output / "results.parquet"))
+
+
+def test_worst_cases_and_combined_objectives_are_columns(tmp_path: Path) -> None:
+    text = STUDY.replace("COUNT", "3").replace(
+        "sweeps:",
+        "production: {edge_shift_nm: 3}\nobjective: {minimum: {worst_csd_yellow_red: 2, sensitivity: 300}}\nsweeps:",
+    )
+    path = tmp_path / "tiny.yaml"
+    path.write_text(text)
+    study = load_study(path)
+    run_study(study, tmp_path / "out", 1, lambda *_: None)
+    frame = pd.read_parquet(tmp_path / "out" / "results.parquet")
+    assert set(frame["status"]) == {"ok"}
+    row = frame[frame["kind"] == "sweep"].iloc[17]
+    sweep = study.spaces[-1]
+    x = np.repeat(row[list(sweep.parameters)].to_numpy(dtype=float)[None], 5, axis=0)
+    x[:, [0, 2]] += np.array([-3.0, -1.5, 0, 1.5, 3.0])[:, None]
+    found = evaluate(imager_of(study.setup(sweep, row["scenario"])), sweep.curves(x, study.grid.size))
+    assert row["worst_csd_yellow_red"] == found["csd_yellow_red"].min()
+    assert row["worst_sensitivity"] == pytest.approx(found["sensitivity"].min(), rel=1e-12)
+    assert row["objective"] == min(2 * row["worst_csd_yellow_red"], 300 * row["sensitivity"])
+    plain = frame[frame["kind"] == "reference"]
+    assert (plain["worst_csd_yellow_red"] == plain["csd_yellow_red"]).all()
+    answer = frame.iloc[-1]
+    assert answer["kind"] == "search"
+    assert answer["objective"] >= frame[frame["feasible"] & (frame["kind"] == "sweep")]["objective"].max() - 4
+    make_report(read_output(tmp_path / "out"))
+    assert "smallest of 2 worst_csd_yellow_red, 300 sensitivity" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_a_scenario_may_have_any_name(tmp_path: Path) -> None:
+    path = study_file(tmp_path)
+    text = path.read_text().split("sweeps:")[0]
+    for old, new in (("chart", "road speed=high"), ("dim", "road speed=3")):
+        text = text.replace(f"  {old}:", f"  {new}:")
+    path.write_text(text)
+    ran(load_study(path), tmp_path / "out", 1)
+    output = read_output(tmp_path / "out")
+    make_report(output)
+    assert scenario_series(output) == {}
+
+
+@pytest.mark.parametrize(
+    ("pixel", "scene", "key"),
+    [
+        ("{pitch_um: 1.0e+200}", "noise: true", "pixel.pitch_um"),
+        ("{}", "optics: {f_number: 1.0e+300}", "scenarios.chart.optics.f_number"),
+    ],
+)
+def test_numbers_beyond_any_hardware_are_one_line(tmp_path: Path, pixel: str, scene: str, key: str) -> None:
+    path = study_file(tmp_path)
+    text = path.read_text().split("sweeps:")[0].replace("lights: tl16", f"lights: tl16\npixel: {pixel}")
+    path.write_text(text.replace("exposure: {kind: white_patch}", f"exposure: {{kind: white_patch}}, {scene}"))
+    with pytest.raises(StudyError, match=rf"tiny.yaml:\d+: {key}: not allowed .* allowed: ") as told:
+        load_study(path)
+    assert len(told.value.faults) == 1

@@ -1,0 +1,110 @@
+"""Runs of studies with scenes: planned, drawn, audited, measured."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from sweep.commands.accuracy.ladder import TOLERANCES_DN, accuracy
+from sweep.commands.audit import audit, audit_output, sampled
+from sweep.report import make_report, read_output
+from sweep.run import run_study
+from sweep.study import load_study
+
+from ..build import SCENES
+from ..conftest import STUDIES
+
+
+def test_scenes_are_planned_drawn_and_audited(tmp_path: Path) -> None:
+    path, folder = tmp_path / "scenes.yaml", tmp_path / "out"
+    path.write_text(SCENES)
+    study = load_study(path)
+    assert list(study.scenarios) == ["road distance_m=150", "road distance_m=250"]
+    run_study(study, folder, 1, lambda *_: None)
+    frame = pd.read_parquet(folder / "results.parquet")
+    assert set(frame["status"]) == {"ok"}
+    assert (frame["csd_yellow_red"] < frame["best_place_csd_yellow_red"]).all()
+    assert (frame["promised_dn"] <= 5).all()
+    assert (frame["promised_dn"] > 0).all()
+    output = read_output(folder)
+    make_report(output)
+    assert (folder / "figures" / "series-1.svg").is_file()
+    plans = output.provenance["plans"]
+    assert frame["plan"].iloc[0] == plans["road distance_m=150"]["key"]
+    effects = plans["road distance_m=150"]["effects"]
+    method = next(effect["method"] for effect in effects if effect["effect"] == "phase")
+    assert method in (folder / "report.html").read_text()
+    lines = audit_output(folder, None).lines
+    audited = pd.read_parquet(folder / "audit.parquet")
+    assert lines[0].startswith(f"{len(audited)} of {len(frame)} designs recomputed with every effect on: no error")
+    assert (audited["realized_dn"] <= audited["promised_dn"]).all()
+    assert audited["realized_dn"].max() > 1e-9
+    # The audit notices a row that is wrong by more than was promised, in any column that is promised.
+    few = frame[(frame["kind"] == "reference") & (frame["scenario"] == "road distance_m=250")]
+    for column in ("csd_yellow_red", "best_place_csd_yellow_red"):
+        wrong = few.assign(**{column: few[column] + 6})
+        found = audit(study, [wrong])
+        assert len(found.broken) == len(few) == 1
+        assert set(found.broken["quantity"]) == {column}
+
+
+def test_sampled_rows_are_the_front_and_a_hundredth() -> None:
+    n = 50_000
+    frame = pd.DataFrame(
+        {
+            "design_id": range(n),
+            "kind": ["sweep"] * n,
+            "pareto": [i % 5000 == 7 for i in range(n)],
+            "status": ["ok"] * n,
+        }
+    )
+    chosen = sampled(frame)
+    assert chosen["pareto"].sum() == 10
+    assert 400 < len(chosen) < 600
+    assert list(sampled(frame)["design_id"]) == list(chosen["design_id"])
+
+
+def test_a_study_of_a_searched_box_alone(tmp_path: Path) -> None:
+    text = (
+        "study: box\nsensor: ar0820\nlights: tl16\nwavelengths: {step_nm: 5}\ncfas: [RYNCy]\n"
+        "boxes: {x: {cfa: RYNCy, channel: N, base: Y, to: G, box: {left_nm: {min: 570, max: 630}, right_nm: {min: 640, max: 700}}}}\n"
+        "scenarios: {a: {}, b: {off_axis_deg: 20}}\nsearch: {starts: 2, max_evaluations: 20, scenario: b}\n"
+    )
+    path = tmp_path / "box.yaml"
+    path.write_text(text)
+    run_study(load_study(path), tmp_path / "out", 1, lambda *_: None)
+    frame = pd.read_parquet(tmp_path / "out" / "results.parquet")
+    assert list(frame["kind"]) == ["search"]
+    assert list(frame["scenario"]) == ["b"]
+    make_report(read_output(tmp_path / "out"))
+
+
+def test_an_audit_of_nothing_finds_nothing_broken() -> None:
+    frame = pd.DataFrame({"design_id": [0], "kind": ["reference"], "pareto": [False], "status": ["not finite"]})
+    assert audit(load_study(STUDIES / "stopband.yaml"), [frame]).broken.empty
+
+
+@pytest.mark.parametrize("place", ["[0.3, 0.6]", pytest.param("any", marks=pytest.mark.slow)])
+def test_accuracy_measures_a_ladder_of_tolerances(tmp_path: Path, place: str) -> None:
+    path = tmp_path / "scenes.yaml"
+    distances = "[250]" if place == "any" else "[150, 250]"
+    path.write_text(SCENES.replace("any", place).replace("[150, 250]", distances))
+    lines = accuracy(
+        load_study(path),
+        lambda step_nm: load_study(path, None, step_nm),
+        tmp_path / "out",
+        lambda *_: None,
+        most_designs=4,
+    )
+    table = pd.read_parquet(tmp_path / "out" / "accuracy.parquet")
+    assert len(table) == len(distances.split(",")) * len(TOLERANCES_DN)
+    assert (table["promised_dn"] <= table["tolerance_dn"]).all()
+    assert (table["realized_dn"] <= table["promised_dn"] * (1 + 1e-9) + 1e-9).all()
+    for _, rows in table.groupby("scenario"):
+        assert list(rows["work"]) == sorted(rows["work"])  # from the coarsest tolerance to the finest
+        assert (rows["work"] < rows["reference_work"]).all()
+        assert rows["plan"].nunique() >= 2
+    assert f"{len(table)} of {len(table)} realized errors are within their promise." in lines
+    assert (tmp_path / "out" / "accuracy.svg").is_file()

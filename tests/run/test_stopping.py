@@ -1,0 +1,266 @@
+"""A stop ends a run within seconds wherever it is, loses nothing that is finished, and leaves no process behind."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import joblib
+import numpy as np
+import psutil
+import pyarrow.parquet as pq
+import pytest
+
+from sweep.errors import InterruptedRunError
+from sweep.run.stop import GRACE_S, BrokenOffError, Stop, stop_on_signals
+from sweep.run.workers import Workers, workers
+
+from ..build import STUDY
+
+SLOWED = Path(__file__).parent.parent / "slowed"
+SAID = "sweep: interrupted; finished chunks are kept, the same command continues\n"
+PHASES = {
+    "planning": ("sweep.camera.plan.plan:Planner.plan", 2),
+    "search": ("sweep.search.solver:search_from", 3),
+    "sweep": ("sweep.metrics.evaluate:evaluate", 6),
+    "recognition": ("sweep.metrics.recognition:recognize", 2),
+    "tables": ("sweep.results.tables:write_tables", 1),
+    "points": ("sweep.results.tables:write_table", 2),
+    "report": ("sweep.report.page:make_report", 1),
+}
+WITHIN_S = 15.0
+"""The promise is five seconds on a machine that does nothing else."""
+
+
+def noisy_study(folder: Path) -> Path:
+    path = folder / "tiny.yaml"
+    text = STUDY.replace("COUNT", "5").replace("chart: {exposure: {kind: white_patch}}", "chart: {noise: true}")
+    text = text.replace("exposure_s: 0.002}}", "exposure_s: 0.002}, noise: true}")
+    path.write_text(text + "recognition: {states: [green, yellow, red], patches: 40}\n")
+    return path
+
+
+def command(folder: Path, *extra: str) -> list[str]:
+    return [sys.executable, "-m", "sweep", "run", str(folder / "tiny.yaml"), "--output", str(folder / "out"), *extra]
+
+
+def started(folder: Path, jobs: int, place: str, call: int) -> subprocess.Popen[bytes]:
+    """A run that is busy for a minute in one call."""
+    slow = {"SWEEP_SLOW_AT": place, "SWEEP_SLOW_CALL": str(call), "SWEEP_SLOW_FILE": str(folder / "slow.calls")}
+    with (folder / "said").open("w") as said:
+        return subprocess.Popen(
+            command(folder, "--jobs", str(jobs)),
+            stdout=subprocess.DEVNULL,
+            stderr=said,
+            start_new_session=True,
+            env={**os.environ, "PYTHONPATH": str(SLOWED), **slow},
+        )
+
+
+def wait_for(path: Path, run: subprocess.Popen[bytes], folder: Path) -> None:
+    deadline = time.monotonic() + 120
+    while not path.exists():
+        assert run.poll() is None, (folder / "said").read_text()
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def kept_rows(folder: Path) -> int:
+    journal = folder / "out" / "tiny" / "shards" / "_journal.jsonl"
+    return sum(json.loads(line)["rows"] for line in journal.read_text().splitlines()) if journal.exists() else 0
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("undisturbed")
+    noisy_study(folder)
+    subprocess.run(command(folder, "--jobs", "1"), check=True, stdout=subprocess.DEVNULL)
+    return folder / "out" / "tiny"
+
+
+def stopped(folder: Path, phase: str, jobs: int, number: signal.Signals) -> float:
+    """Stop a run that is busy in a phase; the seconds until it has ended. Its workers have ended, too."""
+    noisy_study(folder)
+    run = started(folder, jobs, *PHASES[phase])
+    wait_for(folder / "slow.busy", run, folder)
+    own = psutil.Process(run.pid).children(recursive=True)
+    begun = time.monotonic()
+    if number == signal.SIGINT:
+        os.killpg(run.pid, number)  # as Ctrl-C on a terminal
+    else:
+        run.send_signal(number)
+    assert run.wait(timeout=60) == 130
+    seconds = time.monotonic() - begun
+    _, alive = psutil.wait_procs(own, timeout=WITHIN_S)
+    assert not alive
+    said = (folder / "said").read_text()
+    assert [line for line in said.splitlines(keepends=True) if " left" not in line] == [SAID]  # but for progress
+    return seconds
+
+
+def assert_continues(folder: Path, undisturbed: Path) -> None:
+    done = subprocess.run(command(folder, "--jobs", "2"), capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    for name in ("results", "search", "points", "recognition", "curves"):
+        tables = [pq.read_table(place / f"{name}.parquet") for place in (folder / "out" / "tiny", undisturbed)]
+        assert tables[0].equals(tables[1]), name
+    assert not list((folder / "out").rglob(".tmp-*"))
+
+
+@pytest.mark.parametrize(
+    ("phase", "jobs", "number"),
+    [
+        pytest.param(phase, jobs, number, marks=[] if (phase, jobs) == ("sweep", 2) else pytest.mark.slow)
+        for phase in PHASES
+        for jobs, number in ((1, signal.SIGTERM), (2, signal.SIGINT))
+    ],
+)
+def test_a_stop_ends_every_phase(
+    tmp_path: Path, undisturbed: Path, phase: str, jobs: int, number: signal.Signals
+) -> None:
+    assert stopped(tmp_path, phase, jobs, number) < WITHIN_S
+    if phase == "sweep" and jobs == 2:
+        assert kept_rows(tmp_path) > 0
+    assert_continues(tmp_path, undisturbed)
+
+
+def raised_after(stop: Stop, at_most_s: float) -> float:
+    begun = time.monotonic()
+    try:
+        while time.monotonic() < begun + at_most_s:
+            time.sleep(0.01)
+    except BrokenOffError:
+        return time.monotonic() - begun
+    raise AssertionError(f"not broken off, asked: {stop.requested}")
+
+
+def asked() -> None:
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
+def in_peace(stop: Stop) -> None:
+    with stop.held():
+        asked()
+        time.sleep(0.3)  # nothing is raised here
+        assert stop.requested
+    raised_after(stop, 30)
+
+
+def with_grace(stop: Stop) -> None:
+    with stop.grace():
+        asked()
+        assert raised_after(stop, 30) >= GRACE_S
+
+
+def swallowed(stop: Stop) -> None:
+    with suppress(BrokenOffError):  # as a library may do
+        asked()
+        time.sleep(30)
+    raised_after(stop, 30)
+
+
+def asked_twice(stop: Stop) -> None:
+    with stop.grace():
+        asked()
+        time.sleep(0.1)
+        asked()  # whoever asks again does not wait
+        assert raised_after(stop, 30) < GRACE_S
+
+
+def asleep(_stop: Stop) -> None:
+    asked()
+    time.sleep(30)
+
+
+@pytest.mark.parametrize("work", [in_peace, with_grace, swallowed, asked_twice, asleep])
+def test_a_stop_breaks_off_at_once_but_what_is_held_or_has_grace(work: Callable[[Stop], None]) -> None:
+    def run() -> None:
+        with stop_on_signals() as stop:
+            work(stop)
+            raise BrokenOffError  # as it would have been
+
+    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+    with pytest.raises(InterruptedRunError, match="the same command continues"):
+        run()
+    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before
+
+
+def later(seconds: float, number: int) -> int:
+    time.sleep(seconds)
+    return number
+
+
+@pytest.mark.parametrize("backend", ["loky", "threading"])
+def test_results_are_handed_on_as_they_finish_and_given_in_order(backend: str) -> None:
+    finished: list[int] = []
+    with workers(Workers(2, Stop(), backend)) as crew:
+        calls = (joblib.delayed(later)(2.0 if number == 0 else 0.0, number) for number in range(6))
+        assert list(crew(calls, finished=lambda at, _: finished.append(at))) == list(range(6))
+    assert sorted(finished) == list(range(6))
+    assert finished[0] != 0  # the slow one did not hold up what was finished beside it
+
+
+def test_a_worker_whose_parent_was_killed_before_it_began_ends() -> None:
+    program = "import os, sys; from sweep.run.worker_process import prepare_worker; prepare_worker({}); print('lives')"
+    for parent, said in (("os.getppid()", "lives\n"), ("os.getppid() + 1", "")):
+        ended = subprocess.run(
+            [sys.executable, "-c", program.format(parent)], capture_output=True, text=True, check=False
+        )
+        assert (ended.stdout, ended.stderr, ended.returncode) == (said, "", int(not said))
+
+
+def workers_of(mark: str) -> list[psutil.Process]:
+    """Processes that were started with a mark in their environment."""
+    found = []
+    for process in psutil.process_iter():
+        with suppress(psutil.Error):
+            if process.environ().get("SWEEP_MARK") == mark:
+                found.append(process)
+    return found
+
+
+@pytest.mark.slow
+def test_fifty_kills_in_every_phase(tmp_path: Path, undisturbed: Path) -> None:
+    """Parents and workers, by three signals, at random moments; the rows are those of an undisturbed run each time."""
+    rng = np.random.default_rng(17)
+    kills, whole, out = {"run": 0, "worker": 0}, 0, tmp_path / "out" / "tiny"
+    noisy_study(tmp_path)
+    while sum(kills.values()) < 50:
+        with (tmp_path / "said").open("w") as said:
+            run = subprocess.Popen(
+                command(tmp_path, "--jobs", "2"),
+                stdout=subprocess.DEVNULL,
+                stderr=said,
+                start_new_session=True,
+                env=os.environ | {"SWEEP_MARK": str(tmp_path)},
+            )
+        wait_for(tmp_path / "out" / "tiny" / "run.json", run, tmp_path)
+        time.sleep(float(rng.uniform(0, 12)))
+        number = [signal.SIGKILL, signal.SIGTERM, signal.SIGINT][int(rng.integers(3))]
+        if rng.random() < 0.3 and run.poll() is None:
+            for process in psutil.Process(run.pid).children(recursive=True)[-1:]:
+                process.kill()
+                kills["worker"] += 1
+            time.sleep(float(rng.uniform(0, 4)))
+        if run.poll() is None:
+            os.kill(run.pid, number)
+            kills["run"] += 1
+        run.wait(timeout=120)
+        _, alive = psutil.wait_procs(workers_of(str(tmp_path)), timeout=WITHIN_S)
+        assert not alive
+        said_text = (tmp_path / "said").read_text()
+        assert "Traceback" not in said_text, said_text
+        if (out / "report.html").exists():
+            whole += 1
+            assert pq.read_table(out / "results.parquet").equals(pq.read_table(undisturbed / "results.parquet"))
+            for made in sorted(out.rglob("*"), reverse=True):
+                made.rmdir() if made.is_dir() else made.unlink()
+            out.rmdir()
+    assert_continues(tmp_path, undisturbed)

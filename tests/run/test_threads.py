@@ -1,0 +1,92 @@
+"""The same bits with any number of workers, and whatever number of threads the libraries are given."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from sweep.results.identity import CHUNK
+from sweep.run.rows import Job, joined, rules_of, run_job
+from sweep.study import Study
+
+from ..mischief import plant
+
+STUDY = """\
+study: tiny
+sensor: ar0820
+lights: tl16
+pixel: {crosstalk: 0.02}
+scenarios:
+  chart: {}
+  far: {target: {distance_m: 250, fov_deg: 30, phase_px: any}, optics: {f_number: 2}}
+cfas: [RGGB, RYNCy]
+sweeps:
+  edges:
+    cfa: RYNCy
+    channel: N
+    base: Y
+    to: G
+    grid: {left_nm: [590, 605, 690], left_width_nm: 5, right_nm: [420, 640, 655], right_width_nm: [5, 25]}
+  free:
+    cfa: RYNCy
+    family: free_form
+    channel: N
+    base: Y
+    options: {nodes: {start_nm: 560, stop_nm: 680, step_nm: 40}}
+    grid: {transmission_560_nm: [0.5, 1], transmission_600_nm: [0.2, 0.9], transmission_640_nm: [0.1, 1], transmission_680_nm: 1}
+tolerance_dn: 5
+search: {space: edges, starts: 2, max_evaluations: 30}
+"""
+FILES = ("results", "search", "points", "curves")
+
+
+def digests(folder: Path, jobs: int, threads: int) -> dict[str, str]:
+    """SHA-256 of each table's columns of a run with so many workers, whose libraries are told to use so many threads."""
+    study = folder / "tiny.yaml"
+    study.write_text(STUDY)
+    told = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), str(threads))
+    out = folder / f"{jobs}-{threads}"
+    command = [sys.executable, "-m", "sweep", "run", str(study), "--output", str(out), "--jobs", str(jobs)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env={**os.environ, **told})
+    assert done.returncode == 0, done.stderr
+    found = {}
+    for name in FILES:
+        table = pq.read_table(out / "tiny" / f"{name}.parquet")
+        found[name] = hashlib.sha256(repr(table.to_pydict()).encode()).hexdigest()  # a float's repr has every bit
+    return found
+
+
+@pytest.mark.parametrize(
+    "ways",
+    [
+        pytest.param(((1, 1), (1, 4)), id="threads"),
+        pytest.param(((1, 1), (1, 2), (2, 1), (2, 4)), id="threads and workers", marks=pytest.mark.slow),
+    ],
+)
+def test_threads_and_workers_change_no_bit(tmp_path: Path, ways: tuple[tuple[int, int], ...]) -> None:
+    first, *others = (digests(tmp_path, *way) for way in ways)
+    for way, other in zip(ways[1:], others, strict=True):
+        assert other == first, way
+
+
+@pytest.mark.parametrize("separable", [True, False])
+def test_parts_of_a_job_are_the_job(plain: Study, separable: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    if not separable:
+        plant(monkeypatch)  # which leaves the curves
+    space, rules = plain.spaces[-1], rules_of(plain)
+    size = CHUNK + 300
+    for scenario in plain.scenarios:
+        setup = plain.setup(space, scenario)
+        whole = run_job(Job(space, scenario, 0, size, 0), setup, rules)
+        ends = [0, 1, 2, 17, 33, 1024, 2049, CHUNK, CHUNK + 1, size]
+        parts = [run_job(Job(space, scenario, a, b, a), setup, rules) for a, b in pairwise(ends)]
+        columns = [name for name in rules.schema.names if name != "pareto"]  # that of each part alone
+        both = [table.select(columns).to_pydict() for table in (joined(parts), whole)]
+        assert repr(both[0]) == repr(both[1])

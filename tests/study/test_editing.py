@@ -1,0 +1,179 @@
+"""What helps while a study is written: its JSON Schema, the list of studies, the shell's completion, a quick --help."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from sweep.commands.completion import run_folders, study_files
+from sweep.commands.list_studies import list_lines
+from sweep.study.document import Document
+from sweep.study.editors import SCHEMA_FILE, schema_text, study_schema
+
+from ..build import made, study_file
+from ..commanded import sweep
+from ..conftest import STUDIES
+
+FILES = sorted(STUDIES.glob("*.yaml"))
+HEAVY = ["matplotlib", "pandas", "numba", "colour", "pyarrow", "scipy", "sklearn", "pydantic"]
+
+
+def errors(data: Any) -> list[str]:
+    jsonschema.Draft7Validator.check_schema(study_schema())
+    return [error.message for error in jsonschema.Draft7Validator(study_schema()).iter_errors(data)]
+
+
+def test_the_schema_beside_the_studies_is_what_the_command_makes(tmp_path: Path) -> None:
+    done = sweep("schema", "--output", str(tmp_path / SCHEMA_FILE))
+    assert done.returncode == 0
+    assert (tmp_path / SCHEMA_FILE).read_text(encoding="utf-8") == (STUDIES / SCHEMA_FILE).read_text(encoding="utf-8")
+    assert json.loads(schema_text()) == study_schema()
+
+
+def test_every_study_names_the_schema_first() -> None:
+    assert FILES
+    for path in FILES:
+        assert path.read_text().startswith(f"# yaml-language-server: $schema={SCHEMA_FILE}\n"), path
+
+
+def test_every_key_has_a_description() -> None:
+    schema = study_schema()
+    for name, section in {"study": schema, **schema["$defs"]}.items():
+        for key, prop in section.get("properties", {}).items():
+            assert prop.get("description") or "$ref" in prop, (name, key)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_every_study_fits_the_schema(path: Path) -> None:
+    assert errors(Document(path).data) == []
+
+
+def test_a_new_study_fits_the_schema(tmp_path: Path) -> None:
+    assert errors(Document(made(tmp_path)).data) == []
+
+
+SMALL: dict[str, Any] = {"study": "a", "sensor": "ar0820", "lights": "tl16", "cfas": ["RGGB"]}
+NEAR = {"target": {"fov_deg": 60}}
+FILTER = {"cfa": "RYNCy", "channel": "N", "base": "Y", "to": "G"}
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"cfas": {"RGGB": None, "RGBW": {"tile": [["R", "G"], ["B", "W"]]}}},
+        {"scenarios": {"a": {"noise": True}, "b": {"noise": {"read_noise_e": 1}}, "c": {"noise": False}}},
+        {"scenarios": {"road": NEAR | {"each": {"target.distance_m": {"min": 1, "max": 9, "count": 3}}}}},
+        {"scenarios": {"x": {"exposure": {"kind": "fixed"}, "each": {"exposure.exposure_s": [1e-3, 2e-3]}}}},
+        {"scenarios": {"x": {"target": {"distance_m": 9, "fov_deg": 9, "phase_px": [0.5, 1]}}}},
+        {"sweeps": {"x": FILTER | {"grid": {"left_nm": 600, "right_nm": [640, 650], "depth": {"values": [1]}}}}},
+        {"boxes": {"x": FILTER | {"channel": ["Na", "Nb"], "to": 0.1, "box": {"left_nm": {"min": 1, "max": 2}}}}},
+        {"objective": ["csd_yellow_red", "csd_orange_red"]},
+        {"objective": {"sum": {"csd_yellow_red": 2}}},
+    ],
+)
+def test_short_forms_fit_the_schema(more: dict[str, Any]) -> None:
+    assert errors(SMALL | more) == []
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"sensr": "ar0820"},
+        {"sensor": "ar0821"},
+        {"pixel": {"wel_e": 1}},
+        {"scenarios": {"x": {"nois": True}}},
+        {"scenarios": {"x": NEAR}},
+        {"scenarios": {"x": {"exposure": {"level": 0.5}}}},
+        {"scenarios": {"x": {"exposure": {"kind": "fixd"}}}},
+        {"scenarios": {"x": {"each": {"exposure.level": "0.5"}}}},
+        {"sweeps": {"x": FILTER | {"grd": {}}}},
+        {"search": {"start": 3}},
+        {"tolerance_dn": "0.1"},
+        {"objective": {"minimun": {"csd_yellow_red": 1}}},
+    ],
+)
+def test_what_is_misspelled_does_not_fit(more: dict[str, Any]) -> None:
+    assert errors(SMALL | more)
+
+
+def test_studies_are_listed_with_the_broken_ones(tmp_path: Path) -> None:
+    study_file(tmp_path)
+    (tmp_path / "broken.yaml").write_text("study: broken\nsensr: ar0820\nlights: tl16\ncfas: [RGGB]\n")
+    (tmp_path / "worse.yml").write_text("[")
+    lines = list_lines(tmp_path, tmp_path / "out")
+    assert [line.split()[0] for line in lines] == ["broken", "tiny", "worse", "3"]
+    assert "cannot be loaded" in lines[0]
+    assert "sensr: unknown key" in lines[0]
+    assert "not run" in lines[1]
+    assert "3 studies, 0 finished" in lines[3]
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_missing_or_empty_folder_is_told(tmp_path: Path) -> None:
+    assert sweep("list", str(tmp_path / "none")).returncode == 2
+    assert "No studies" in list_lines(tmp_path, tmp_path)[0]
+
+
+def test_an_interrupted_and_a_changed_run_are_told(tmp_path: Path) -> None:
+    from sweep.results.folder import begin
+    from sweep.study import load_study
+
+    path = study_file(tmp_path)
+    begin(tmp_path / "out" / "tiny", load_study(path), {})
+    assert "interrupted" in list_lines(tmp_path, tmp_path / "out")[0]
+    path.write_text(
+        path.read_text() + "seed: 77\n"
+        if "seed" not in path.read_text()
+        else path.read_text().replace("seed: 1", "seed: 77")
+    )
+    assert "changed since it was run" in list_lines(tmp_path, tmp_path / "out")[0]
+
+
+def test_the_shell_completes_studies_and_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in (
+        "studies/one.yaml",
+        "studies/two.yml",
+        "studies/[x].yaml",
+        "outputs/one/run.json",
+        "outputs/none/x.txt",
+    ):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    monkeypatch.chdir(tmp_path)
+    assert study_files("st") == ["studies/[x].yaml", "studies/one.yaml", "studies/two.yml"]
+    assert study_files("studies/o") == ["studies/one.yaml"]
+    assert study_files("studies/[") == ["studies/[x].yaml"]
+    assert study_files("nothing") == []
+    assert run_folders("") == run_folders("outputs/") == ["outputs/one"]
+    asked = {"_SWEEP_COMPLETE": "complete_bash", "COMP_WORDS": "sweep run studies/t", "COMP_CWORD": "2"}
+    assert shell(asked).splitlines() == ["studies/two.yml"]
+
+
+def shell(environment: dict[str, str]) -> str:
+    whole = os.environ | {"PYTHONPATH": str(STUDIES.parent)} | environment
+    command = [sys.executable, "-m", "sweep"]
+    return subprocess.run(command, env=whole, capture_output=True, text=True, check=True).stdout
+
+
+@pytest.mark.parametrize(
+    ("kind", "word"), [("bash", "complete -o default"), ("zsh", "#compdef sweep"), ("fish", "complete")]
+)
+def test_completion_scripts_are_made_without_a_terminal(kind: str, word: str) -> None:
+    script = shell({"_SWEEP_COMPLETE": f"source_{kind}"})
+    assert word in script
+    assert "_SWEEP_COMPLETE=complete" in script
+
+
+def test_help_imports_nothing_heavy() -> None:
+    code = "import sys, sweep.commands.app\ntry: sweep.commands.app.app(['--help'])\nexcept SystemExit: pass\nprint(*sys.modules, file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    for command in ("run", "describe", "new", "list", "schema"):
+        assert f" {command} " in done.stdout
+    assert not set(HEAVY) & set(done.stderr.split())

@@ -1,0 +1,381 @@
+"""Figures that no hardware has: one line, or numbers that are finite; nothing between."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Iterator
+from copy import deepcopy
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from ruamel.yaml import YAML
+
+from sweep.curves.color import chromaticity, color_matching, display_colors
+from sweep.curves.spectrum import WavelengthGrid
+from sweep.errors import StudyError, SweepError
+from sweep.run.rows import Job, rules_of, run_job
+from sweep.study import Study, load_study
+from sweep.study.editors import study_schema
+
+from ..mutations import at, written
+from ..watchdog import within
+
+HANG_S = 120.0
+# Every number that a study can say of pixel, optics, scene, exposure and noise.
+PATCH = """\
+photon_radiance: 2.0e+18
+off_axis_deg: 5.0
+exposure: {kind: white_patch, level: 0.95, photon_ratio: 0.08}
+optics: {f_number: 4.0, transmission: 0.9}
+noise: {read_noise_e: 3.0, dark_e_per_s: 2.0, prnu: 0.02}
+"""
+ROAD = """\
+intensity_cd: 200.0
+exposure: {kind: fixed, exposure_s: 0.004}
+optics: {f_number: 2.0, focus_m: 90.0, transmission: 0.9}
+target: {distance_m: 100.0, fov_deg: 60.0, width_px: 3840, diameter_m: 0.2, phase_px: [0.25, 0.5]}
+off_axis_deg: 10.0
+visibility_m: 500.0
+background_cd_m2: 10.0
+drive: {duty: 0.5, frequency_hz: 90.0}
+noise: {read_noise_e: 3.0, dark_e_per_s: 2.0, prnu: 0.02}
+"""
+STUDY = """\
+study: all
+sensor: ar0820
+lights: tl16
+wavelengths: {start_nm: 400.0, stop_nm: 700.0, step_nm: 10.0}
+pixel: {pitch_um: 2.1, fill_factor: 0.9, well_e: 10000.0, bits: 12, gain_dn_per_e: 0.4, offset_dn: 0.5, crosstalk: 0.01,
+  read_noise_e: 2.0, dark_e_per_s: 5.0, prnu: 0.01}
+tolerance_dn: 1.0
+geometry: {far: {distance_m: 100.0, fov_deg: 60.0, width_px: 3840, diameter_m: 0.2}}
+cfas: [RYNCy]
+designs:
+  one: {cfa: RYNCy, channel: N, base: Y, to: G, at: {left_nm: 600.0, left_width_nm: 10.0, right_nm: 650.0, right_width_nm: 10.0}}
+sweeps:
+  grid: {cfa: RYNCy, channel: N, base: Y, to: 0.1, grid: {left_nm: {min: 590.0, max: 610.0, count: 2}, left_width_nm: [5.0],
+    right_nm: 650.0, right_width_nm: {values: [5.0]}, depth: 1.0}}
+production: {edge_shift_nm: 2.0}
+recognition: {patches: 10, error_max: 0.001}
+objective: {minimum: {csd_yellow_red: 1.0}}
+constraints: {sensitivity: {min: 0.9}, slope_per_nm: {max: 0.06}}
+search: {space: grid, starts: 2, max_evaluations: 20, front: {min: 0.9, max: 1.0, count: 2}}
+seed: 3
+published: {table: {RYNCy: {csd_yellow_red: 31.0}}}
+"""
+
+
+def whole() -> dict[str, Any]:
+    yaml = YAML(typ="safe", pure=True)
+    return dict(yaml.load(STUDY)) | {"scenarios": {"patch": yaml.load(PATCH), "road": yaml.load(ROAD)}}
+
+
+def numbers(node: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    items = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+    for key, value in items:
+        if isinstance(value, int | float):
+            yield (*path, key)
+        yield from numbers(value, (*path, key))
+
+
+NUMBERS = list(numbers(whole()))
+
+
+def loaded(tmp_path: Path, tree: dict[str, Any]) -> Study:
+    path = tmp_path / "all.yaml"
+    path.write_bytes(written(tree))
+    with within(HANG_S):
+        return load_study(path)
+
+
+def statuses(study: Study, scenario: str) -> set[str]:
+    """Of the first designs of every space, computed as a run does it, where every warning is an error."""
+    planned = replace(study, plans={scenario: study.plan(scenario)})
+    rules, found = rules_of(planned), set()
+    for space in planned.spaces:
+        job = Job(space, scenario, 0, min(space.size, 2), 0)
+        found |= set(run_job(job, planned.setup(space, scenario), rules)["status"].to_pylist())
+    return found
+
+
+def test_the_study_says_every_number_that_the_schema_knows(tmp_path: Path) -> None:
+    loaded(tmp_path, whole())
+    schema = study_schema()
+    sections = (
+        "Pixel",
+        "Optics",
+        "ScenarioTemplate",
+        "Target",
+        "Geometry",
+        "Drive",
+        "Noise",
+        "FixedExposure",
+        "WhitePatchExposure",
+    )
+    known = {
+        key
+        for name in sections
+        for key, prop in schema["$defs"][name]["properties"].items()
+        if '"number"' in json.dumps(prop) or '"integer"' in json.dumps(prop)
+    }
+    said = {part for path in NUMBERS for part in path if isinstance(part, str)}
+    assert known <= said | {"phase_px", "each"}
+
+
+def test_every_physical_figure_has_limits_that_editors_know() -> None:
+    """All of pixel, optics, scene and exposure; an upper limit at least, and a lower one above 0 where 0 divides."""
+    schema = study_schema()["$defs"]
+    for name in ("Pixel", "Optics", "ScenarioTemplate", "Target", "Geometry", "Drive", "Noise", "FixedExposure"):
+        for key, prop in schema[name]["properties"].items():
+            for part in [prop, *prop.get("anyOf", [])]:
+                if part.get("type") in ("number", "integer") and key != "offset_dn":  # which full scale limits
+                    assert {"maximum", "exclusiveMaximum"} & set(part), (name, key)
+                    assert {"minimum", "exclusiveMinimum"} & set(part), (name, key)
+
+
+NONE: tuple[Any, ...] = (*(float("nan"), float("inf"), -float("inf"), 1e300, -1e300, True, "1", 10**99, -(10**99)),)
+
+
+def check_refused(tmp_path: Path, path: tuple[Any, ...], value: object) -> None:
+    tree = whole()
+    at(tree, path[:-1])[path[-1]] = value
+    with pytest.raises(StudyError) as caught:
+        loaded(tmp_path, tree)
+    lines = str(caught.value).splitlines()
+    assert str(path[0]) in lines[0]
+    assert len({line.split(": ")[0] for line in lines}) <= 2, lines  # in one place, though of two types
+
+
+def test_what_is_no_number_of_this_world_is_one_line(tmp_path: Path) -> None:
+    """Each field with one such value, the next field with the next."""
+    for index, path in enumerate(NUMBERS):
+        check_refused(tmp_path, path, NONE[index % len(NONE)])
+
+
+@pytest.mark.slow
+def test_whatever_is_no_number_of_this_world_is_one_line(tmp_path: Path) -> None:
+    for path in NUMBERS:
+        for value in NONE:
+            check_refused(tmp_path, path, value)
+
+
+def small_or_none(tmp_path: Path, path: tuple[Any, ...], value: float) -> Study | None:
+    tree = whole()
+    at(tree, path[:-1])[path[-1]] = value
+    try:
+        return loaded(tmp_path, tree)
+    except StudyError as error:
+        assert len(str(error).splitlines()) <= 2  # noqa: PT017
+        return None
+
+
+def test_the_smallest_numbers_are_refused_or_loaded(tmp_path: Path) -> None:
+    refused = [path for path in NUMBERS if small_or_none(tmp_path, path, 5e-324) is None]
+    assert ("pixel", "well_e") in refused
+    assert ("pixel", "offset_dn") not in refused
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "path", [p for p in NUMBERS if p[0] in ("pixel", "scenarios")], ids=lambda p: ".".join(map(str, p))
+)
+def test_the_smallest_numbers_are_harmless(tmp_path: Path, path: tuple[Any, ...]) -> None:
+    study = small_or_none(tmp_path, path, 5e-324)
+    if study is None:
+        return
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert statuses(study, str(path[1]) if path[0] == "scenarios" else "patch") == {"ok"}
+
+
+LIMITS: dict[str, tuple[float, float]] = {
+    **{"pitch_um": (1e-3, 1e5), "fill_factor": (1e-9, 1), "well_e": (1e-3, 1e7), "gain_dn_per_e": (1e-6, 1e9)},
+    **{"bits": (1, 24), "crosstalk": (0, 0.999999), "read_noise_e": (0, 1e4), "dark_e_per_s": (0, 1e15)},
+    **{"tolerance_dn": (1e-12, 1e12), "photon_radiance": (1, 1e40), "off_axis_deg": (0, 89.999999), "level": (1e-9, 1)},
+    **{
+        "photon_ratio": (1e-30, 1e30),
+        "f_number": (0.01, 1e6),
+        "transmission": (1e-9, 1),
+        "intensity_cd": (1e-12, 1e15),
+    },
+    **{"exposure_s": (1e-15, 1e9), "visibility_m": (1e-4, 1e9), "background_cd_m2": (0, 1e15)},
+    **{"duty": (1e-9, 1), "frequency_hz": (1e-6, 1e12)},
+}
+
+
+def beyond_hardware(rng: np.random.Generator) -> dict[str, Any]:
+    """The study with about half of its figures at one of their limits; the target's own would mostly be too large."""
+    tree = whole()
+    for path in NUMBERS:
+        if path[-1] in LIMITS and path[0] in ("pixel", "scenarios", "tolerance_dn") and rng.random() < 0.5:
+            low, high = LIMITS[path[-1]]
+            value = (low, high)[int(rng.integers(2))]
+            at(tree, path[:-1])[path[-1]] = int(value) if path[-1] == "bits" else float(value)
+    return tree
+
+
+def test_each_limit_is_where_the_schema_has_it() -> None:
+    for key, ends in LIMITS.items():
+        sections = [
+            s["properties"][key]
+            for s in [study_schema(), *study_schema()["$defs"].values()]
+            if key in s.get("properties", {})
+        ]
+        parts = [
+            part
+            for prop in sections
+            for part in [prop, *prop.get("anyOf", [])]
+            if "maximum" in part or "minimum" in part
+        ]
+        assert parts, key
+        for part in parts:
+            assert part.get("minimum", ends[0]) == ends[0], (key, part)
+            assert part.get("maximum", ends[1]) == ends[1], (key, part)
+
+
+@pytest.mark.slow
+def test_many_figures_at_their_limits_together(tmp_path: Path) -> None:
+    rng, computed = np.random.default_rng(2), 0
+    for _ in range(12):
+        tree = beyond_hardware(rng)
+        try:
+            study = loaded(tmp_path, tree)
+        except StudyError:
+            continue
+        with warnings.catch_warnings(), within(HANG_S):
+            warnings.simplefilter("error")
+            for name in study.scenarios:
+                assert statuses(study, name) == {"ok"}, tree
+        computed += 1
+    assert computed > 2
+
+
+def test_negative_zero_is_zero(tmp_path: Path) -> None:
+    tree = deepcopy(whole())
+    tree["pixel"]["offset_dn"] = -0.0
+    assert np.copysign(1, loaded(tmp_path, tree).pixel.offset_dn) == 1
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ("wavelengths: {step_nm: 5.0e-324}", "step_nm 4.94066e-324 is too fine: at most 20000 steps"),
+        ("wavelengths: {step_nm: 1.0e-4}", "too fine"),
+        ("wavelengths: {start_nm: 1.0e-300, stop_nm: 1.0e-299}", "between 200 and 2000"),
+        ("cfas: {X: {tile: [" + ", ".join(["[" + ", ".join("R" * 65) + "]"] * 2) + "]}}", "at most 64 items"),
+        ("cfas: {X: {tile: [" + ", ".join(["[R]"] * 65) + "]}}", "at most 64 items"),
+        ("cfas: {X: {tile: [" + ", ".join(["[" + ",".join("R" * 1500) + "]"]) + "]}}", "at most 64 items"),
+        ("sweeps: {e: {cfa: RGGB, channel: G, base: R, to: B, grid: {left_nm: {min: 1.0, max: 2.0, count: 1000000000}}}}", "1000000"),
+        ("scenarios: {a: {each: {off_axis_deg: {min: 0.0, max: 1.0, count: 1000000}}}}", "more than 2000 scenarios"),
+        ("scenarios: {a: {each: {x: {min: -1.0e+308, max: 1.0e+308, count: 3}}}}", "a number, a list of numbers"),
+        ("scenarios: {a: {each: {off_axis_deg: [1, 2], x: [true]}}}", "a number, a list of numbers"),
+        ("scenarios: {" + ", ".join(f"s{i}: {{}}" for i in range(2001)) + "}", "more than 2000 scenarios"),
+        ("scenarios: {a: {target: {distance_m: 9, fov_deg: 9, phase_px: [true, 1]}}}", "a place is `any`"),
+        ("scenarios: {a: {target: {distance_m: 9, fov_deg: 9, phase_px: [1.0e+10, 1]}}}", "a place is `any`"),
+        ("constraints: {sensitivity: {min: 5.0e-324}}", "too near to 0"),
+        ("recognition: {states: [" + ", ".join(f"s{i}" for i in range(41)) + "]}", "at most 40 items"),
+    ],
+)  # fmt: skip
+def test_sizes_are_limited(tmp_path: Path, more: str, said: str) -> None:
+    small = {"study": "study: a", "sensor": "sensor: ar0820", "lights": "lights: tl16", "cfas": "cfas: [RGGB]"}
+    path = tmp_path / "a.yaml"
+    path.write_text("\n".join((small | {more.split(":", maxsplit=1)[0]: more}).values()) + "\n")
+    with pytest.raises(StudyError) as caught, within(HANG_S):
+        load_study(path)
+    assert said in str(caught.value)
+    assert len(str(caught.value).splitlines()) <= 2
+
+
+def test_many_axes_are_refused_before_they_are_written_out(tmp_path: Path) -> None:
+    tree = whole()
+    axis = {"min": 590.0, "max": 610.0, "count": 1_000_000}
+    tree["sweeps"] = {f"s{i}": tree["sweeps"]["grid"] | {"grid": {f"x{j}": axis for j in range(50)}} for i in range(20)}
+    with pytest.raises(StudyError, match="too many values of parameters"):
+        loaded(tmp_path, tree)
+
+
+def test_many_keys_in_each_scenario_are_refused_before_they_are_copied(tmp_path: Path) -> None:
+    tree = whole()
+    tree["scenarios"] = {
+        "a": {"each": {"off_axis_deg": {"min": 0.0, "max": 1.0, "count": 2000}}, "x": {"y": [0] * 10_000}}
+    }
+    with pytest.raises(StudyError, match="more than 500,000 keys in all that `each` makes of it"):
+        loaded(tmp_path, tree)
+
+
+QE = "wavelength_nm,a,b\n300,0.5,0.1\n1200,0.5,0.6\n"
+
+
+def study_of(tmp_path: Path, leds: str, more: str = "") -> Path:
+    (tmp_path / "qe.csv").write_text(QE)
+    (tmp_path / "led.csv").write_text(leds)
+    (tmp_path / "a.yaml").write_text(
+        "study: a\nsensor: {files: [{file: qe.csv, columns: {A: a, B: b}}]}\n"
+        "lights: {files: [{file: led.csv, quantity: photons, outside: zero, signals: {one: [x], two: [y]}}]}\n"
+        "wavelengths: {start_nm: 850, stop_nm: 1000, step_nm: 5}\ncfas: [AABB]\nobjective: csd_one_two\n" + more
+    )
+    return tmp_path / "a.yaml"
+
+
+INFRARED = "wavelength_nm,x,y\n800,0,0\n880,1,0\n940,0,1\n1000,0,0\n"
+
+
+@pytest.mark.parametrize(
+    ("scene", "said"),
+    [
+        ("intensity_cd: 200", "a light that the eye does not see has no luminous intensity: led:x (got 200"),
+        ("background_cd_m2: 3", "a background on wavelengths that the eye does not see has no luminance (got 3"),
+    ],
+)
+def test_candelas_of_infrared_are_one_line(tmp_path: Path, scene: str, said: str) -> None:
+    path = study_of(tmp_path, INFRARED, f"scenarios: {{a: {{{scene}, exposure: {{kind: fixed, exposure_s: 0.01}}}}}}\n")
+    with pytest.raises(StudyError) as caught:
+        load_study(path)
+    assert said in str(caught.value)
+    assert str(caught.value).endswith("allowed: photons between 360 and 830 nm")
+
+
+def test_infrared_lights_are_computed_and_drawn_gray(tmp_path: Path) -> None:
+    study = load_study(study_of(tmp_path, INFRARED))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert statuses(study, "chart") == {"ok"}
+        np.testing.assert_array_equal(display_colors(study.grid, study.lights.photons), 0.5)
+        mixed = WavelengthGrid(start_nm=600, stop_nm=900, step_nm=1)
+        colors = display_colors(mixed, np.eye(mixed.size)[[30, 290]])
+    assert colors[0, 0] == pytest.approx(1)  # 630 nm: red
+    np.testing.assert_array_equal(colors[1], 0.5)
+    assert not color_matching(mixed)[:, 231:].any()  # beyond 830 nm
+    with np.errstate(invalid="ignore"):
+        assert np.isnan(chromaticity(mixed, np.eye(mixed.size)[[290]])).all()
+
+
+@pytest.mark.parametrize(
+    ("leds", "said"),
+    [
+        ("wavelength_nm,x,y\n850,5e-324,1\n1000,5e-324,1\n", "led.csv: x: the largest value is too small"),
+        (
+            "wavelength_nm,x,y\n850,1e308,1\n1000,1,1\n",
+            "led.csv:2: x: value too large (got '1e308'); allowed: 0 to 1e+100",
+        ),
+        ("wavelength_nm,x,y\n400,1,1\n850,5e-324,1\n1000,0,1\n", "a light has no photons on the wavelength grid"),
+    ],
+)
+def test_lights_of_extreme_power_are_one_line(tmp_path: Path, leds: str, said: str) -> None:
+    with pytest.raises(SweepError) as caught:
+        load_study(study_of(tmp_path, leds))
+    assert said in str(caught.value)
+
+
+def test_lights_of_any_sensible_power_are_the_same_lights(tmp_path: Path) -> None:
+    rows = [(850, 0.0, 1.0), (900, 3.0, 2.0), (1000, 1.0, 0.0)]
+    found = []
+    for scale in (1e-99, 1.0, 1e99):
+        leds = "wavelength_nm,x,y\n" + "".join(f"{w},{x * scale!r},{y * scale!r}\n" for w, x, y in rows)
+        found.append(load_study(study_of(tmp_path, leds)).lights.photons)
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-12)
+    np.testing.assert_allclose(found[2], found[1], rtol=1e-12)

@@ -1,0 +1,296 @@
+"""Study files: what is right loads, what is wrong gets one line with file:line, key, value, allowed, nearest name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from sweep.results.identity import fingerprint
+from sweep.run.provenance import resolved_yaml
+from sweep.study import folder_name, load_study
+
+from ..build import BASE, faults, load
+from ..conftest import SHARED, STUDIES, needs_measured
+
+SENSOR_FILE = "sensor:\n  files:\n    - {file: qe.csv, columns: {R: R, C: C}}\n"
+LIGHT_FILE = "lights:\n  files:\n    - {file: led.csv, quantity: energy, signals: {red: [r], green: [g]}}\n"
+
+
+def test_a_study_is_resolved(tmp_path: Path) -> None:
+    study = load(tmp_path, BASE)
+    assert [(s.kind, s.name, s.size) for s in study.spaces] == [
+        ("reference", "RGGB", 1),
+        ("design", "mine", 1),
+        ("sweep", "edges", 12),
+    ]
+    assert study.n_designs == 14
+    edges = study.spaces[2]
+    assert edges.points(0, 12)[[0, 1, 2, 11]].tolist() == [
+        [590, 5, 650, 5, 1],
+        [590, 5, 650, 25, 1],
+        [590, 10, 650, 5, 1],
+        [610, 10, 650, 25, 1],
+    ]
+    assert edges.points(5, 7).tolist() == edges.points(0, 12)[5:7].tolist()
+    assert study.objective.column == "csd_yellow_red"
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["paper", "stopband", "freeform", "dual", "rccb", "producible", "distance", "exposure", "night", "fog", "accuracy"],
+)
+def test_shipped_studies_load(name: str) -> None:
+    study = load_study(STUDIES / f"{name}.yaml")
+    assert study.name == name
+    if name == "stopband":
+        assert study.n_designs > 100_000
+
+
+@needs_measured
+def test_the_measured_study_loads() -> None:
+    study = load_study(STUDIES / "measured.yaml", SHARED / "data")
+    assert not study.sensor.surrogate
+    assert set(study.digests) == {
+        "qe_ar0132at_rgbw.csv",
+        "qe_ar0132at_rccc.csv",
+        "led_luxeon.csv",
+        "traffic_lica.csv",
+    }
+    assert study.lights.classes == ("green", "yellow", "red")
+    # one common scale: both files give the same clear pixel at 630 nm
+    assert study.sensor.qe["C"][230] == pytest.approx(study.sensor.qe["W"][230], rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        (
+            "search:\n",
+            "serach:\n",
+            "tiny.yaml:20: serach: unknown key; allowed: study, question, seed, wavelengths, sensor, pixel, lights, "
+            "scenarios, tolerance_dn, geometry, cfas, designs, sweeps, boxes, production, recognition, objective, constraints, search, published; did you mean 'search'?",
+        ),
+        (
+            "min: 590, max: 610",
+            "min: 610, max: 590",
+            "tiny.yaml:14: sweeps.edges.grid.left_nm: min 610 must not be above max 590",
+        ),
+        (
+            "    channel: N\n",
+            "    channel: NN\n",
+            "tiny.yaml:10: sweeps.edges.channel: unknown channel of RYNCy (got 'NN'); allowed: R, Y, N, Cy; "
+            "did you mean 'N'?",
+        ),
+        (
+            "    base: Y\n",
+            "    base: Yy\n",
+            "tiny.yaml:11: sweeps.edges.base: unknown curve (got 'Yy'); allowed: C, R, G, B, Y, Cy, Rx; did you mean 'Y'?",
+        ),
+        (
+            "[RGGB, RYNCy]",
+            "[RGXB, RYNCy]",
+            "tiny.yaml:4: cfas.RGXB: unknown curve of channel 'X' (got 'X'); allowed: C, R, G, B, Y, Cy, Rx; "
+            "did you mean 'Rx'?",
+        ),
+        (
+            "[RGGB, RYNCy]",
+            "[RGB, RYNCy]",
+            "tiny.yaml:4: cfas.RGB: not the name of a 2x2 CFA (got 'RGB')",
+        ),
+        (
+            "sensor: ar0820",
+            "sensor: ar0280",
+            "tiny.yaml:2: sensor: unknown built-in sensor (got 'ar0280'); allowed: ar0820, or a mapping with `files`; "
+            "did you mean 'ar0820'?",
+        ),
+        (
+            "left_nm: {min: 590, max: 610, count: 3}",
+            "left_um: {min: 0.59, max: 0.61, count: 3}",
+            "tiny.yaml:14: sweeps.edges.grid.left_um: unknown parameter (got 'left_um'); allowed: left_nm, left_width_nm, "
+            "right_nm, right_width_nm, depth; did you mean 'left_nm'?",
+        ),
+        (
+            "right_nm: 650\n",
+            "right_nm: 0.65\n",
+            "tiny.yaml:16: sweeps.edges.grid.right_nm: out of range (got 0.65); allowed: 200 to 2000",
+        ),
+        (
+            "sensitivity: {min: 0.9}",
+            "sensitivity: {min: '0.9'}",
+            "tiny.yaml:19: constraints.sensitivity.min: not allowed (got '0.9'); allowed: number",
+        ),
+        (
+            "sensitivity: {min: 0.9}",
+            "sensitivty: {min: 0.9}",
+            "tiny.yaml:19: constraints.sensitivty: unknown quantity (got 'sensitivty'); allowed: sensitivity, "
+            "cfa_sensitivity, slope_per_nm, min_transmission, edge_width_nm, band_width_nm, csd_green_yellow, csd_green_orange, csd_green_red, csd_yellow_orange, csd_yellow_red, "
+            "csd_orange_red; did you mean 'sensitivity'?",
+        ),
+        (
+            "  space: edges\n",
+            "  space: edges\n  algorithm: COBYLLA\n",
+            "tiny.yaml:22: search.algorithm: unknown algorithm",
+        ),
+        (
+            "  space: edges\n",
+            "  space: edges\n  starts: 0\n",
+            "tiny.yaml:22: search.starts: not allowed (got 0); allowed:",
+        ),
+        ("study: tiny\n", "", "tiny.yaml:1: study: missing"),
+        ("sensor: ar0820", "sensr: ar0820", "tiny.yaml:2: sensr: unknown key"),
+        (
+            "      right_nm: 650\n",
+            "",
+            "tiny.yaml:13: sweeps.edges.grid.right_nm: missing",
+        ),
+        ("study: tiny\n", "study: tiny\nstudy: again\n", "tiny.yaml:2: found duplicate key"),
+        ("[RGGB, RYNCy]", "[RGGB, RYNCy", "not valid YAML"),
+        (
+            "constraints:\n",
+            "objective: {minimum: {csd_yellow_red: 1, csd_yelow_red: 2}}\nconstraints:\n",
+            "tiny.yaml:18: objective.minimum.csd_yelow_red: unknown objective (got 'csd_yelow_red')",
+        ),
+        (
+            "constraints:\n",
+            "objective: {sum: {csd_yellow_red: -1}}\nconstraints:\n",
+            "tiny.yaml:18: objective.sum.csd_yellow_red: not allowed (got -1)",
+        ),
+        ("constraints:\n", "objective: {}\nconstraints:\n", "tiny.yaml:18: objective: an objective is a quantity"),
+        (
+            "constraints:\n",
+            "objective: worst_csd_yellow_red\nconstraints:\n",
+            "tiny.yaml:18: objective: worst_csd_yellow_red needs `production.edge_shift_nm`; allowed: a shift above 0",
+        ),
+        (
+            "constraints:\n",
+            "production: {edge_shift: 2}\nconstraints:\n",
+            "tiny.yaml:18: production.edge_shift: unknown key; allowed: edge_shift_nm; did you mean 'edge_shift_nm'?",
+        ),
+        (
+            "constraints:\n",
+            "constraints:\n  band_width_nm: {max: 30}\n",
+            "tiny.yaml:19: constraints.band_width_nm.max: band_width_nm has no `max` (got 30.0); allowed: `min`",
+        ),
+        (
+            "  space: edges\n",
+            "  front: {min: 0.9, max: 1.0, count: 3}\nobjective: sensitivity\n",
+            "search.front: the front is searched at levels of sensitivity, which is in the objective",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nwavelengths: {stop_nm: 800}\n",
+            "tiny.yaml:4: wavelengths: the built-in curves end before the grid (got '400 to 800 nm'); allowed: 400 to 700 nm",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\ngeometry:\n  near: {distance_km: 0.1, distance_m: 100, fov_deg: 60}\n",
+            "tiny.yaml:5: geometry.near.distance_km: unknown key; allowed: distance_m, fov_deg, width_px, diameter_m; "
+            "did you mean 'distance_m'?",
+        ),
+        ("sensor: ar0820\n", SENSOR_FILE, "tiny.yaml:4: sensor.files[0].file: no such file (got 'qe.csv')"),
+        (
+            "sensor: ar0820\n",
+            "sensor: ar0820\npixel: {well_ke: 10}\n",
+            "tiny.yaml:3: pixel.well_ke: unknown key; allowed: pitch_um, fill_factor, well_e, bits, gain_dn_per_e, "
+            "offset_dn, crosstalk, read_noise_e, dark_e_per_s, prnu; did you mean 'well_e'?",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\npixel: {pitch_um: .nan}\n",
+            "tiny.yaml:4: pixel.pitch_um: not allowed (got nan)",
+        ),
+        ("[RGGB, RYNCy]", "[[RGGB], RYNCy]", "tiny.yaml:4: cfas: a list of CFAs holds names"),
+        ("[RGGB, RYNCy]", "[RGGB, RYNCy, RGGB]", "tiny.yaml:4: cfas: a CFA is named twice"),
+        ("  space: edges\n", "  front: {min: 0.9, max: 1.0, count: 1}\n", "search.front: count 1 goes with min = max"),
+        ("lights: tl16\n", "lights: tl16\nwavelengths: {step_nm: 1.0e-9}\n", "wavelengths: step_nm 1e-09 is too fine"),
+        (
+            "lights: tl16\n",
+            "lights: tl16\npixel: {offset_dn: 100000}\n",
+            "pixel: offset_dn 100000 must be below full scale",
+        ),
+    ],
+)
+def test_a_fault_is_one_line(tmp_path: Path, old: str, new: str, expected: str) -> None:
+    assert old in BASE
+    found = faults(tmp_path, BASE.replace(old, new, 1))
+    assert len(found) == 1, found
+    assert expected in found[0]
+
+
+def test_every_fault_is_named_at_once(tmp_path: Path) -> None:
+    text = (
+        BASE.replace("base: Y\n", "base: Q\n").replace("sensitivity:", "sens:").replace("space: edges", "space: edge")
+    )
+    assert [line.split(":")[1] for line in faults(tmp_path, text)] == ["11", "19", "21"]
+
+
+@pytest.mark.parametrize(
+    ("qe", "expected"),
+    [
+        ("wavelength_nm,R,C\n400,0.1,0.5\n700,nan,0.5\n", "qe.csv:3: R: not a usable number (got 'nan')"),
+        ("wavelength_nm,R,C\n400,10,50\n700,20,50\n", "QE above 1 (looks like percent: set `scale: 0.01`) (got 20.0)"),
+        ("wavelength_nm,R,C\n450,0.1,0.5\n700,0.2,0.5\n", "qe.csv, column R: the curve is truncated"),
+        ("wavelength_um,R,C\n0.4,0.1,0.5\n0.7,0.2,0.5\n", "qe.csv:1: wavelength_um: wrong unit of wavelength"),
+        (
+            "wavelength_nm,r,C\n400,0.1,0.5\n700,0.2,0.5\n",
+            "qe.csv has no such column (got 'R'); allowed: r, C; did you mean 'r'?",
+        ),
+    ],
+)
+def test_a_wrong_curve_file_is_a_fault_of_the_study(tmp_path: Path, qe: str, expected: str) -> None:
+    (tmp_path / "qe.csv").write_text(qe)
+    text = f"study: s\n{SENSOR_FILE}lights: tl16\ncfas: [RCCC]\n"
+    found = faults(tmp_path, text)
+    assert any(expected in line for line in found), found
+
+
+def test_lights_from_files(tmp_path: Path) -> None:
+    (tmp_path / "led.csv").write_text("wavelength_nm,r,g\n390,0,1\n400,0,1\n500,0,1\n600,0,0\n640,1,0\n700,0,0\n")
+    text = f"study: s\nsensor: ar0820\n{LIGHT_FILE}cfas: [RGGB]\nobjective: csd_red_green\n"
+    study = load(tmp_path, text)
+    assert study.lights.classes == ("red", "green")
+    assert any("lie outside the wavelength grid" in warning for warning in study.warnings)
+    # energy times wavelength is photons: the red triangle is symmetric in neither
+    red = study.lights.photons[0]
+    assert red[235] / red[240] == pytest.approx(35 / 40 * 635 / 640, rel=1e-3)
+    (tmp_path / "led.csv").write_text("wavelength_nm,r,g\n400,0,1\n700,0,0\n")
+    assert "no photons" in faults(tmp_path, text)[0]
+
+
+def test_resolved_study_is_a_study_with_the_same_rows(tmp_path: Path) -> None:
+    study = load(tmp_path, BASE)
+    (tmp_path / "resolved.yaml").write_text(resolved_yaml(study))
+    again = load_study(tmp_path / "resolved.yaml")
+    assert again.section == study.section
+    assert fingerprint(again) == fingerprint(study)
+
+
+def test_fingerprint_changes_with_what_rows_depend_on(tmp_path: Path) -> None:
+    first = fingerprint(load(tmp_path, BASE))
+    assert fingerprint(load(tmp_path, BASE + "question: else\n")) == first
+    assert fingerprint(load(tmp_path, BASE.replace("min: 0.9", "min: 0.8"))) != first
+    assert fingerprint(load(tmp_path, BASE + "pixel: {bits: 10}\n")) != first
+
+
+def test_folder_names_stay_inside_the_output() -> None:
+    assert folder_name("stopband") == "stopband"
+    assert folder_name("../../etc") == ".._.._etc"
+    assert folder_name("..") == "_"
+    assert folder_name("<script>") == "_script_"
+
+
+def test_columns_of_signal_types_must_differ(tmp_path: Path) -> None:
+    (tmp_path / "led.csv").write_text("wavelength_nm,x\n400,1\n700,1\n")
+    types = "{a: [x], a_b: [x], b: [x], b_b: [x], a_b_b: [x]}"
+    text = BASE.replace(
+        "lights: tl16\n", f"lights:\n  files:\n    - {{file: led.csv, quantity: energy, signals: {types}}}\n"
+    )
+    found = faults(tmp_path, text.replace("constraints:\n", "objective: csd_a_b\nconstraints:\n"))
+    assert "the pairs a/b_b and a_b/b share the column csd_a_b_b" in found[0]
+
+
+def test_a_study_needs_designs(tmp_path: Path) -> None:
+    text = "study: tiny\nsensor: ar0820\nlights: tl16\ncfas: [RYNCy]\nboxes: {x: {cfa: RYNCy, channel: N, base: Y, to: G}}\n"
+    assert "cfas: no designs" in faults(tmp_path, text)[0]
+    assert load(tmp_path, text + "search: {starts: 2, max_evaluations: 10}\n").n_designs == 0

@@ -1,0 +1,283 @@
+"""Study files that would take all memory or all time: one line each, or quick."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from sweep.commands.list_studies import list_lines
+from sweep.curves.files import MOST_BYTES, MOST_CURVES, MOST_SAMPLES, MOST_VALUES
+from sweep.errors import MOST_FAULTS, Fault, StudyError, SweepError, nearest
+from sweep.results.tables import RESOLVED
+from sweep.study import load_study
+from sweep.study.document import Document
+from sweep.study.editors import study_schema
+from sweep.study.yaml_tree import MOST_DEPTH, Tree
+
+from ..watchdog import within
+
+SMALL = "study: a\nsensor: ar0820\nlights: tl16\ncfas: [RGGB]\n"
+HANG_S = 120.0
+
+
+def bomb() -> str:
+    """Nine lists of nine aliases each: 700 bytes for a billion values."""
+    lists = ["a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1]"]
+    lists += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 9)]
+    return SMALL + "\n".join(lists) + "\n"
+
+
+def merged_bomb() -> str:
+    """Mappings that merge each other twice."""
+    maps = ["m0: &m0 {a: 1, b: 2}", *(f"m{i}: &m{i} {{<<: [*m{i - 1}, *m{i - 1}], x: 1}}" for i in range(1, 40))]
+    return SMALL + "\n".join(maps) + "\n"
+
+
+TOO_MUCH: dict[str, tuple[Callable[[], str | bytes], str]] = {
+    "aliases of aliases": (bomb, "9: a4: more keys and values than a study has; allowed: at most 50,000"),
+    "merges of merges": (merged_bomb, "more keys and values than a study has"),
+    "a root in itself": (lambda: "&a {study: *a}", "1: study: an alias of what it stands in (got '*a')"),
+    "a list in itself": (lambda: SMALL + "x: &x [1, *x]", "5: x: an alias of what it stands in"),
+    "an alias of nothing": (lambda: SMALL + "x: *y\n", "5: x: an alias of nothing (got '*y')"),
+    "an ordered map": (lambda: "!!omap [study: a]", "1: a tag"),
+    "a set": (lambda: SMALL + "designs: !!set {a, b}\n", "5: designs: a tag (got 'tag:yaml.org,2002:set')"),
+    "a Python object": (lambda: SMALL + "question: !!python/object/apply:os.getcwd []\n", "5: question: a tag"),
+    "bytes": (lambda: SMALL + "question: !!binary aGVsbG8=\n", "5: question: a tag"),
+    "a tag of its own": (lambda: SMALL + "question: !mine x\n", "5: question: a tag (got '!mine')"),
+    "a long number": (lambda: SMALL + f"seed: {'9' * 60_000}\n", "5: seed: a number of 60,000 letters"),
+    "10^400": (lambda: SMALL + f"tolerance_dn: 1{'0' * 400}\n", "5: tolerance_dn: a number of 401 letters"),
+    "a long hexadecimal": (lambda: SMALL + f"seed: 0x{'f' * 5000}\n", "5: seed: a number of 5,002 letters"),
+    "a long fraction": (
+        lambda: SMALL + f"tolerance_dn: 0.{'1' * 5000}\n",
+        "5: tolerance_dn: a number of 5,002 letters",
+    ),
+    "no number": (lambda: SMALL + f"sensor2: {'x' * 300}\n", "5: sensor2: unknown key"),
+    "brackets": (
+        lambda: SMALL + "x: " + "[" * 5000 + "]" * 5000,
+        f"5: x: nested too deep; allowed: at most {MOST_DEPTH}",
+    ),
+    "braces": (lambda: SMALL + "x: " + "{a: " * 5000 + "}" * 5000, "nested too deep"),
+    "dashes": (lambda: SMALL + "x:\n" + "- " * 5000 + "1", "nested too deep"),
+    "question marks": (lambda: SMALL + "? " * 5000, "nested too deep"),
+    "indents": (lambda: "\n".join(" " * i + f"k{i}:" for i in range(800)), "nested too deep"),
+    "a long comment": (lambda: SMALL + "#" + "x" * 10_000_000, "the file is too large (got '10,000,051 bytes')"),
+    "many keys": (lambda: SMALL + "".join(f"k{i}: 1\n" for i in range(300_000)), "the file is too large"),
+    "fewer unknown keys": (lambda: SMALL + "".join(f"k{i}: 1\n" for i in range(20_000)), "k0: unknown key"),
+    "a long list": (lambda: SMALL + f"x: [{'590.0, ' * 200_000}1]", "the file is too large"),
+    "a shorter list": (lambda: SMALL + f"x: [{'1,' * 200_000}1]", "5: x: more keys and values than a study has"),
+    "two documents": (lambda: SMALL + "---\nstudy: b\n", "5: a second document; allowed: one study in a file"),
+    "many documents": (lambda: "---\n" * 100_000, "a second document"),
+    "YAML 1.1": (lambda: "%YAML 1.1\n---\n" + SMALL, "another version of YAML (got '%YAML 1.1')"),
+    "a key that is a list": (lambda: SMALL + "[1, 2]: 3\n", "5: a key that is no word"),
+    "UTF-16": (
+        lambda: SMALL.encode("utf-16"),
+        "not UTF-8 text (invalid start byte at byte 0); allowed: UTF-8; UTF-16?",
+    ),
+    "UTF-16 without its mark": (
+        lambda: SMALL.encode("utf-16-le"),
+        "1: NUL characters in the text; allowed: UTF-8; UTF-16?",
+    ),
+    "Latin-1": (
+        lambda: SMALL.encode() + b"question: caf\xe9\n",
+        "5: not UTF-8 text (invalid continuation byte at byte 63)",
+    ),
+    "a bell": (lambda: SMALL + "question: \x07\n", "5: not valid YAML: the character"),
+    "half a character": (lambda: SMALL + 'question: "\\ud800"\n', "question: not a character of a text"),
+    "an endless quote": (lambda: SMALL + 'question: "' + "x y\n" * 100_000, "5: question: not valid YAML"),
+    "a key of a megabyte": (lambda: SMALL + "? " + "x" * 400_000 + "\n: 1\n", "unknown key"),
+    "nothing": (lambda: "", "1: a study file is a mapping of keys"),
+}
+
+
+def refused(path: Path) -> list[str]:
+    with pytest.raises(StudyError) as caught, within(HANG_S):
+        load_study(path)
+    return [str(fault).replace(str(path), "FILE") for fault in caught.value.faults]
+
+
+@pytest.mark.parametrize("name", TOO_MUCH)
+def test_too_much_is_one_line(tmp_path: Path, name: str) -> None:
+    made, expected = TOO_MUCH[name]
+    text = made()
+    path = tmp_path / "a.yaml"
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    found = refused(path)
+    assert found[0].startswith("FILE:"), found
+    assert expected in found[0], found
+    assert len(found) <= MOST_FAULTS
+    assert all(len(line) < 10_000 and line.isprintable() for line in found)
+
+
+def test_many_faults_say_how_many_more(tmp_path: Path) -> None:
+    path = tmp_path / "a.yaml"
+    path.write_text(SMALL + "".join(f"k{i}: 1\n" for i in range(20_000)))
+    found = refused(path)
+    assert len(found) == MOST_FAULTS
+    assert "more faults" in found[-1]
+    assert str(SweepError([Fault(f"f{i}") for i in range(1000)])).endswith(f"and {1000 - MOST_FAULTS + 1} more faults")
+    assert len(str(SweepError([Fault(f"f{i}") for i in range(MOST_FAULTS)])).splitlines()) == MOST_FAULTS
+
+
+def test_names_steer_no_terminal_and_are_cut() -> None:
+    line = str(Fault("unknown\x1b[2J", "a\ud800.yaml", 3, "k" * 10**6, "v" * 10**6, "a, " * 10**6))
+    assert line.isprintable()
+    assert len(line) < 10_000
+    assert nearest("x" * 10**6, ["x" * 10**6]) is None
+
+
+def test_what_a_study_may_say_is_read_as_before(tmp_path: Path) -> None:
+    text = (
+        (
+            "%YAML 1.2\n---\nbase: &base {a: 1, b: [x, 'y', \"z\\n\"]}\n"
+            "more: {<<: *base, a: 2}\nmost: {<<: [{c: 3}, *base], d: *base}\n"
+            "numbers: [0, -0, +7, 0x1F, 0o17, 010, 1.5, -2e-3, .5, 6., 1E5, .inf, -.INF]\n"
+            "others: [~, null, , true, False, yes, 1_000, 2026-01-01, 1:30, -, ., e5, '1']\n'1': one\n2: two\ntrue: three\n"
+            "folded: >-\n  a\n  b\nliteral: |\n  a\n\n  b\nplain: a\n  b # no\nempty:\n"
+        )
+        .replace("null, ,", "null,")
+        .replace(" -, ", " ")
+    )
+    path = tmp_path / "a.yaml"
+    path.write_text(text)
+    data = Document(path).data
+    expected = YAML(typ="safe", pure=True).load(text.replace("1_000", "'1_000'").replace("2026-01-01", "'2026-01-01'"))
+    assert data == {("true" if key is True else str(key)): value for key, value in expected.items()}
+    assert str(data["numbers"][1]) == "0"
+    path.write_text("a: -0.0\n")
+    assert str(Document(path).data["a"]) == "0.0"
+
+
+def test_lines_are_those_of_keys_and_entries(tmp_path: Path) -> None:
+    path = tmp_path / "a.yaml"
+    path.write_text(
+        "# note\na:\n  b: [1,\n     2]\n  c:\n    - x: 1\n    - {y: 2,\n       z: 3}\nd: &d {e: 1}\nf: *d\ng:\n  <<: *d\n"
+    )
+    document = Document(path)
+    lines = {
+        ("a",): 2,
+        ("a", "b", 0): 3,
+        ("a", "b", 1): 4,
+        ("a", "c", 0, "x"): 6,
+        ("a", "c", 1): 7,
+        ("a", "c", 1, "z"): 8,
+        ("f",): 10,
+        ("f", "e"): 9,
+        ("g", "e"): 11,
+        ("g", "absent"): 11,
+        ("absent",): 1,
+    }
+    assert {key: document.line(key) for key in lines} == lines
+
+
+words = st.text(st.characters(exclude_categories=("Cc", "Cs")), max_size=8)
+scalars = st.none() | st.booleans() | st.integers(-(10**20), 10**20) | st.floats(allow_nan=False) | words
+values = st.recursive(
+    scalars, lambda one: st.lists(one, max_size=4) | st.dictionaries(words, one, max_size=4), max_leaves=20
+)
+
+
+@given(values)
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+def test_what_the_library_writes_is_read_as_it_reads_it(value: object) -> None:
+    yaml, text = YAML(typ="safe", pure=True), StringIO()
+    yaml.dump({"top": value}, text)
+    try:
+        expected = yaml.load(text.getvalue())
+    except YAMLError:  # it does not read all that it writes: {:0: null}
+        with pytest.raises(StudyError, match="not valid YAML"):
+            Tree(text.getvalue(), "a.yaml", 10_000)
+        return
+    assert Tree(text.getvalue(), "a.yaml", 10_000).root == expected
+
+
+def test_aliases_may_be_used_up_to_the_limit(tmp_path: Path) -> None:
+    path = tmp_path / "a.yaml"
+    path.write_text("a: &a [1, 2, 3]\nb: [*a, *a]\n")
+    document = Document(path)
+    assert document.data == {"a": [1, 2, 3], "b": [[1, 2, 3], [1, 2, 3]]}
+    text = path.read_text()  # the root, 2 keys, 4 values of a, b and twice the 4 of a
+    assert Tree(text, "a", 16).root == document.data
+    with pytest.raises(StudyError, match="2: b: more keys and values"):
+        Tree(text, "a", 15)
+
+
+def test_a_file_of_a_run_may_be_larger(tmp_path: Path) -> None:
+    assert RESOLVED.endswith(".resolved.yaml")
+    text = SMALL + "x: [" + "1, " * 60_000 + "]\n"
+    (tmp_path / "a.yaml").write_text(text)
+    assert "more keys and values" in refused(tmp_path / "a.yaml")[0]
+    (tmp_path / RESOLVED).write_text(text)
+    assert "unknown key" in refused(tmp_path / RESOLVED)[0]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+def test_only_files_are_read(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.yaml")
+    os.mkfifo(tmp_path / "pipe.csv")
+    (tmp_path / "folder.yaml").mkdir()
+    for path in (tmp_path / "pipe.yaml", Path("/dev/zero"), tmp_path / "folder.yaml", Path("/dev/full")):
+        assert "not a file; allowed: a file on a disk; no folder, pipe or device" in refused(path)[0]
+    for path, said in (
+        (tmp_path / "absent.yaml", "No such file"),
+        (tmp_path / ("n" * 300), "File name too long"),
+        (tmp_path / "a\0b", "embedded null"),
+        (Path("/proc/self/mem"), "cannot be read"),
+    ):
+        assert said in refused(path)[0]
+    study = tmp_path / "a.yaml"
+    for name in ("pipe.csv", "n" * 300 + ".csv", "n/" * 2000 + "x.csv", '"a\\tb.csv"'):
+        study.write_text(SMALL.replace("sensor: ar0820", f"sensor: {{files: [{{file: {name}, columns: {{R: R}}}}]}}"))
+        assert "2: sensor.files[0].file: no such file" in refused(study)[0]
+
+
+def test_the_schema_says_the_limits(tmp_path: Path) -> None:
+    """What it says is what holds."""
+    said = " ".join(study_schema()["description"].split())
+    assert "500,000 bytes, 50,000 keys and values" in said
+    assert f"{MOST_DEPTH} levels of nesting" in said
+    path, padded = tmp_path / "a.yaml", SMALL + "#" + "x" * (500_000 - len(SMALL) - 1)
+    path.write_text(padded)
+    load_study(path)
+    path.write_text(padded + "x")
+    assert "the file is too large" in refused(path)[0]
+    limits = (
+        f"{MOST_BYTES // 10**6} MB, {MOST_CURVES:,} curves, {MOST_SAMPLES:,} samples of each and {MOST_VALUES:,} values"
+    )
+    assert limits in study_schema()["$defs"]["CurveFile"]["properties"]["file"]["description"]
+
+
+def test_a_list_of_studies_goes_on_after_one_that_cannot_be_read(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_text(bomb())
+    os.mkfifo(tmp_path / "b.yaml")
+    (tmp_path / "c.yaml").write_text(SMALL)
+    with within(HANG_S):
+        lines = list_lines(tmp_path, tmp_path / "out")
+    assert ["cannot be loaded" in line for line in lines] == [True, True, False, False]
+    with pytest.raises(StudyError, match="no such folder"):
+        list_lines(tmp_path / ("n" * 300), tmp_path)
+
+
+def test_a_data_folder_that_cannot_be_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_text(SMALL)
+    for name in ("n" * 300, "absent", "a\0b"):
+        with pytest.raises(StudyError, match="no such folder"):
+            load_study(tmp_path / "a.yaml", tmp_path / name)
+
+
+def test_a_bomb_ends_the_command_with_one_line(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_text(bomb())
+    command = [sys.executable, "-m", "sweep", "check", str(tmp_path / "a.yaml")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(f"sweep: {tmp_path}/a.yaml:9: a4: more keys and values than a study has")
+    assert len(done.stderr.splitlines()) == 1

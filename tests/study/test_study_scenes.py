@@ -1,0 +1,107 @@
+"""Scenes in study files: what they become, and their faults."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from ..build import BASE, faults, load
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  far: {visibility_m: 100}\n",
+            "tiny.yaml:5: scenarios.far: visibility_m needs a target with a distance",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  far: {target: {distance_m: 100, fov_deg: 60, phase_px: all}}\n",
+            "tiny.yaml:5: scenarios.far.target.phase_px",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  far: {target: {distance_m: 100, fov_deg: 60, phase_px: [1]}}\n",
+            "tiny.yaml:5: scenarios.far.target.phase_px",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  far: {target: {fov_deg: 60}, each: {target.distance_km: [1], target.distance_m: [9]}}\n",
+            "tiny.yaml:5: scenarios.far.target.distance_km: unknown key; allowed: distance_m",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  far: {each: [1]}\n",
+            "tiny.yaml:4: scenarios: far: `each` maps keys such as target.distance_m to values",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  a: {target: {distance_m: 1, fov_deg: 60}}\n",
+            "tiny.yaml:5: scenarios.a.target: the light is too large (got '730.956 px'); allowed: at most 128 px",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  a: {target: {distance_m: 90, fov_deg: 60}, optics: {focus_m: 0.005}}\n",
+            "tiny.yaml:5: scenarios.a.optics.focus_m: too near for this lens (got '0.005 m'); allowed: more than 0.0154 m",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  a: {target: {distance_m: 90, fov_deg: 60}, optics: {f_number: 0.01}}\n",
+            "tiny.yaml:5: scenarios.a.optics.f_number: the image is too fine",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  a: {each: {off_axis_deg: [1, 2, 1]}}\n",
+            "tiny.yaml:4: scenarios: a: two scenarios are named 'a off_axis_deg=1'",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  a: {each: {off_axis_deg: [mean]}}\n",
+            "tiny.yaml:4: scenarios: a: each.off_axis_deg: a number, a list of numbers, or `min`, `max` and `count`",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  a: {intensity_cd: 200}\n",
+            "tiny.yaml:5: scenarios.a: intensity_cd needs a fixed exposure: the white patch is given in photons",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  a: {exposure: {exposure_s: 1}}\n",
+            "tiny.yaml:5: scenarios.a.exposure.kind: missing",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  far: {drive: {duty: 0.5, frequency_hz: 90}}\n",
+            "search.scenario: a search under a pulsed light needs a fixed exposure (got 'far')",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  night: {exposure: {kind: fixd, exposure_s: 1}}\n",
+            "tiny.yaml:5: scenarios.night.exposure.kind: unknown kind (got 'fixd'); allowed: 'white_patch', 'fixed'",
+        ),
+        (
+            "lights: tl16\n",
+            "lights: tl16\nscenarios:\n  night: {exposure: {kind: fixed, exposure_ms: 1, exposure_s: 1}}\n",
+            "tiny.yaml:5: scenarios.night.exposure.exposure_ms: unknown key; allowed: kind, exposure_s; "
+            "did you mean 'exposure_s'?",
+        ),
+        ("lights: tl16\n", "lights: tl16\ntolerance_dn: 0\n", "tiny.yaml:4: tolerance_dn: not allowed (got 0)"),
+    ],
+)
+def test_a_fault_of_a_scene_is_one_line(tmp_path: Path, old: str, new: str, expected: str) -> None:
+    found = faults(tmp_path, BASE.replace(old, new, 1))
+    assert len(found) == 1, found
+    assert expected in found[0]
+
+
+def test_each_makes_scenarios(tmp_path: Path) -> None:
+    scenes = "scenarios:\n  a:\n    target: {distance_m: 100, fov_deg: 60}\n    each: {target.width_px: [1920, 3840], off_axis_deg: {min: 0, max: 20, count: 3}}\n"
+    study = load(tmp_path, BASE.replace("lights: tl16\n", "lights: tl16\n" + scenes))
+    assert len(study.scenarios) == 6
+    assert study.scenarios["a width_px=1920 off_axis_deg=10"].off_axis_deg == 10
+    target = study.scenarios["a width_px=3840 off_axis_deg=0"].target
+    assert target is not None
+    assert target.width_px == 3840
