@@ -24,10 +24,10 @@ import joblib
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from build import large
 from scipy.signal import fftconvolve
 from scipy.spatial.distance import cdist
 from scipy.special import j1
-from test_scale import large
 
 from sweep.camera.imager import Imager
 from sweep.camera.mosaic import Mosaic
