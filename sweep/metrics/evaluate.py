@@ -90,7 +90,7 @@ def block_quantities(setup: Setup, block: Block) -> dict[str, FloatArray]:
     """What a design gives without any light, each ndarray[n_designs].
 
     `sensitivity`: total QE of the modified channels over that of the curves they replace (the paper's sensitivity of N,
-    with Y as the reference). `cfa_sensitivity`: see `separation.cfa_sensitivity`. `slope_per_nm`: the steepest slope of a
+    with Y as the reference). `cfa_sensitivity`: see `separation`. `slope_per_nm`: the steepest slope of a
     modified channel's QE. `min_transmission`: the smallest ratio of a modified channel to the curve it replaces.
     Without a modified channel all but `cfa_sensitivity` are NaN.
     """

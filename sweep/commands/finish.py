@@ -1,0 +1,17 @@
+"""What a run ends with: figures, the report, and a few lines for a person."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+
+def finish(folder: Path, *, mend: bool = False) -> None:
+    """Draw figures and report of a finished run, and say what it found; `mend`: only what is missing or damaged."""
+    from ..report import make_report, read_output, summary_lines
+
+    found = read_output(folder)
+    make_report(found, mend=mend)
+    for line in summary_lines(found):
+        typer.echo(line)

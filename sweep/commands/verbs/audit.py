@@ -1,0 +1,29 @@
+"""Recompute a sample of a run."""
+
+from __future__ import annotations
+
+import typer
+
+from ...errors import BrokenPromiseError
+from ..options import DataFolder, RunFolder
+from ..panels import RESULTS
+
+PANEL = RESULTS
+
+
+def audit(folder: RunFolder, data: DataFolder = None) -> None:
+    """Recompute the front and 1 % of a run's rows with every effect on: promised beside realized error.
+
+    Exit code 5 says that an error is larger than promised.
+    """
+    from ...results.tables import AUDIT
+    from ..audit import audit_output
+    from ..progress import ProgressDisplay
+
+    with ProgressDisplay() as display:
+        found = audit_output(folder, data, display.update)
+    for line in found.lines:
+        typer.echo(line)
+    typer.echo(f"Files: {folder}/: {AUDIT}.")
+    if found.faults:
+        raise BrokenPromiseError(found.faults)

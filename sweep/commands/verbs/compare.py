@@ -1,0 +1,29 @@
+"""Compare runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..completion import run_folders
+from ..panels import RESULTS
+
+PANEL = RESULTS
+
+
+def compare(
+    folders: Annotated[
+        list[Path],
+        typer.Argument(help="Output folders of two or more studies.", show_default=False, autocompletion=run_folders),
+    ],
+    output: Annotated[
+        Path | None, typer.Option(help="Folder for the comparison.", show_default="outputs/compare-A-B")
+    ] = None,
+) -> None:
+    """Compare finished runs: what their studies ask, best designs, fronts, versions."""
+    from ...report.compare import compare_runs
+
+    for line in compare_runs(folders, output):
+        typer.echo(line)

@@ -1,0 +1,28 @@
+"""Write a filter of a run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..options import RunFolder
+from ..panels import RESULTS
+
+PANEL = RESULTS
+
+
+def export(
+    folder: RunFolder,
+    design: Annotated[str, typer.Option(help="A design_id, a name (RYN_4Cy, RGGB), or best.", show_default=False)],
+    data: Annotated[
+        Path | None, typer.Option(help="Folder with the run's curve files, which are then read again and compared.")
+    ] = None,
+    to: Annotated[Path | None, typer.Option(help="Folder for the files.", show_default="FOLDER/export")] = None,
+) -> None:
+    """Write a filter of a finished run as CSV and as ISETCam color filters (.mat)."""
+    from ..export import export_design
+
+    for line in export_design(folder, design, data, to):
+        typer.echo(line)

@@ -1,0 +1,35 @@
+"""Say how scenes are simulated."""
+
+from __future__ import annotations
+
+import math
+import os
+from typing import Annotated
+
+import typer
+
+from ...errors import StudyError
+from ..options import DataFolder, StudyPath
+from ..panels import STUDIES
+
+PANEL = STUDIES
+
+
+def plan(
+    study: StudyPath,
+    data: DataFolder = None,
+    tolerance: Annotated[float | None, typer.Option(help="Tolerance of a CSD, DN.", show_default="the study's")] = None,
+    explain: Annotated[bool, typer.Option("--explain", help="Show the alternatives that were rejected.")] = False,
+) -> None:
+    """Say which effects each scene calls for, and why, without running it."""
+    from ...report.plans import plan_lines
+    from ...run import with_plans
+    from ...study import load_study
+    from ..progress import ProgressDisplay
+
+    if tolerance is not None and not 0 < tolerance < math.inf:
+        raise StudyError(f"--tolerance {tolerance:g}: must be above 0 DN, and finite")
+    with ProgressDisplay() as display:
+        planned = with_plans(load_study(study, data), os.cpu_count() or 1, display.update, tolerance)
+    for line in plan_lines(planned, explain=explain):
+        typer.echo(line)
