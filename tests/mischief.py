@@ -13,8 +13,8 @@ import pandas as pd
 import pytest
 
 from sweep.designs.block import Edges
+from sweep.designs.families.stopband import Stopband
 from sweep.designs.space import Filter
-from sweep.designs.stopband import Stopband
 from sweep.results.identity import CHUNK
 from sweep.results.journal import Journal
 from sweep.run import run_study

@@ -170,7 +170,7 @@ def by_edges(space: Space) -> bool:
 def _separable(space: Space) -> tuple[SeparableFamily, FloatArray, FloatArray] | None:
     """Family, base and change of a grid; None where the family is not separable, or its tables were too large."""
     family = None if space.filter is None else space.filter.family
-    if not space.gridded or not isinstance(family, SeparableFamily) or not family.separable:
+    if not space.gridded or not isinstance(family, SeparableFamily):
         return None
     n_left, n_right = (len(space.axes[at]) * len(space.axes[at + 1]) for at in (_LEFT, _RIGHT))
     base, change = family.separable

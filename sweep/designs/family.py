@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol, Self, runtime_checkable
+from typing import ClassVar, Protocol, Self, runtime_checkable
 
-from ..types import FloatArray
+from ..types import FloatArray, Section
 
 
 @dataclass(frozen=True)
@@ -22,11 +22,23 @@ class Parameter:
 class Family(Protocol):
     """A filter as a function of its parameters, for blocks of designs.
 
-    `kind` names the family, `n_modified` is the number of channels that it replaces.
+    `kind` names the family, `n_modified` is the number of channels that it replaces. `needs_target`: whether it goes
+    from its base to a target. `Options`: what it needs beside its parameters, from a study.
     """
 
-    kind: str
-    n_modified: int
+    kind: ClassVar[str]
+    n_modified: ClassVar[int]
+    needs_target: ClassVar[bool]
+    Options: ClassVar[type[Section]]
+
+    @classmethod
+    def of_study(
+        cls, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: Section
+    ) -> Family:
+        """The family over curves of a study, ndarray[n_wavelengths] each; no `target` where it needs none.
+
+        Raises SweepError for what does not fit together.
+        """
 
     @property
     def start_dimensions(self) -> int | None:
@@ -76,8 +88,8 @@ class SeparableFamily(Protocol):
     """
 
     @property
-    def separable(self) -> tuple[FloatArray, FloatArray] | None:
-        """Base and change, ndarray[n_wavelengths] each; None where this member of the family is not of that form."""
+    def separable(self) -> tuple[FloatArray, FloatArray]:
+        """Base and change, ndarray[n_wavelengths] each."""
 
     def edges(self, centers_and_widths: FloatArray) -> FloatArray:
         """Rising edges, ndarray[n, 2] -> ndarray[n, n_wavelengths]."""

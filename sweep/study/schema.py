@@ -11,7 +11,7 @@ from ..camera.scene import Geometry, Scenario
 from ..camera.sensor import BUILT_IN_SENSORS
 from ..curves.builtin import BUILT_IN_LIGHTS
 from ..curves.spectrum import WavelengthGrid
-from ..designs.registry import FamilyOptions
+from ..designs.registry import FamilyOptions, told
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective
 from ..types import Number, Section
@@ -46,8 +46,7 @@ class Modification(Documented):
 
     cfa: Name
     """One of `cfas`."""
-    family: Name = "stopband"
-    """stopband, multi_stopband (options: {bands: 2}), dual, or free_form (options: {nodes: {...}})."""
+    family: Annotated[Name, Field(description=f"One of {told()}.")] = "stopband"
     channel: Annotated[
         list[Name], BeforeValidator(_listed, json_schema_input_type=list[Name] | Name), Field(min_length=1)
     ]

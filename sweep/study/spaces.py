@@ -9,7 +9,7 @@ from ..camera.mosaic import Mosaic
 from ..camera.sensor import SensorCurves
 from ..curves.builtin.surrogate import surrogate_parameters
 from ..designs.family import Parameter
-from ..designs.registry import MAKERS, build_family
+from ..designs.registry import FAMILIES, build_family
 from ..designs.space import Filter, Kind, Space
 from ..errors import SweepError, nearest
 from .schema import DesignSection, Modification, StudySection
@@ -88,12 +88,12 @@ class SpaceBuilder:
         for channel in entry.channel:
             if mosaic is not None and channel not in mosaic.channels:
                 self.sources.unknown((*path, "channel"), f"channel of {entry.cfa}", channel, list(mosaic.channels))
-        if entry.family not in MAKERS:
-            self.sources.unknown((*path, "family"), "family", entry.family, list(MAKERS))
-        elif len(entry.channel) != MAKERS[entry.family].n_modified:
+        if entry.family not in FAMILIES:
+            self.sources.unknown((*path, "family"), "family", entry.family, list(FAMILIES))
+        elif len(entry.channel) != FAMILIES[entry.family].n_modified:
             self.sources.add(
                 (*path, "channel"),
-                f"{entry.family} replaces {MAKERS[entry.family].n_modified} channel(s)",
+                f"{entry.family} replaces {FAMILIES[entry.family].n_modified} channel(s)",
                 entry.channel,
             )
         elif len(set(entry.channel)) < len(entry.channel):

@@ -20,7 +20,7 @@ from sweep.camera.view import Setup
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.edge import SPAN_PER_WIDTH, edge, edge_gradient
-from sweep.designs.stopband import Stopband
+from sweep.designs.families.stopband import Stopband
 from sweep.errors import SweepError
 from sweep.metrics.pareto import non_dominated
 from sweep.metrics.separation import cfa_sensitivity, separation

@@ -14,9 +14,9 @@ from scipy.spatial.distance import cdist
 from sweep.camera.imager import Imager
 from sweep.designs import block as blocks
 from sweep.designs.block import Curves, edges_of
-from sweep.designs.free_form import FreeForm
+from sweep.designs.families.free_form import FreeForm
+from sweep.designs.families.stopband import MultiStopband, Stopband
 from sweep.designs.space import Filter, Space
-from sweep.designs.stopband import Stopband
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.separation import class_pairs, separations, separations_along
 
@@ -68,7 +68,7 @@ def test_designs_that_set_the_exposure_take_the_dense_route() -> None:
 
 
 def test_the_separable_route_refuses_what_is_not_separable(monkeypatch: pytest.MonkeyPatch) -> None:
-    two = Stopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"], bands=2)
+    two = MultiStopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"], bands=2)
     free = FreeForm(GRID.nodes_nm, SENSOR.qe["Y"], np.array([500.0, 600.0]))
     for family, axes in ((two, AXES + AXES), (free, ((0.5,), (0.5,)))):
         assert edges_of(Space("sweep", "x", "RYNCy", Filter(family, ("N",), "Y", ""), axes), 0, 1) is None

@@ -10,12 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sweep.designs.dual import Dual
+from sweep.designs.families.dual import Dual
+from sweep.designs.families.free_form import FreeForm
+from sweep.designs.families.stopband import MultiStopband, Stopband
 from sweep.designs.family import Family
-from sweep.designs.free_form import FreeForm
-from sweep.designs.registry import MAKERS, FamilyOptions, Maker, build_family
-from sweep.designs.stopband import Stopband
+from sweep.designs.registry import FAMILIES as REGISTERED
+from sweep.designs.registry import FamilyOptions, build_family
 from sweep.errors import SweepError
+from sweep.types import Section
 
 WAVE = np.arange(400.0, 701.0)
 BASE = 0.3 + 0.4 / (1 + np.exp(-(WAVE - 500) / 20))
@@ -25,7 +27,7 @@ CEILING = BASE + 0.05 + 0.02 * np.cos(WAVE / 30)
 FAMILIES: dict[str, tuple[Family, np.ndarray]] = {
     "stopband": (Stopband(WAVE, BASE, TARGET), np.array([601.3, 17.0, 652.7, 23.0, 0.8])),
     "multi_stopband": (
-        Stopband(WAVE, BASE, TARGET, 2),
+        MultiStopband(WAVE, BASE, TARGET, 2),
         np.array([501.3, 17.0, 540.2, 9.0, 0.5, 601.3, 12.0, 652.7, 23.0, 0.9]),
     ),
     "dual": (Dual(WAVE, BASE, CEILING), np.array([601.3, 17.0, 652.7, 23.0, 0.8])),
@@ -34,7 +36,7 @@ FAMILIES: dict[str, tuple[Family, np.ndarray]] = {
 
 
 def test_every_family_is_tested() -> None:
-    assert set(FAMILIES) == set(MAKERS)
+    assert set(FAMILIES) == set(REGISTERED)
 
 
 @pytest.mark.parametrize("name", list(FAMILIES))
@@ -44,7 +46,7 @@ def test_shapes_and_names(name: str) -> None:
     assert family.kind == name
     assert x.shape == (n,)
     assert len({p.name for p in family.parameters}) == n
-    assert family.n_modified == MAKERS[name].n_modified
+    assert family.n_modified == REGISTERED[name].n_modified
     block = np.stack([x, x, x])
     assert family.curves(block).shape == (3, family.n_modified, 301)
     assert family.gradient(x).shape == (n, family.n_modified, 301)
@@ -147,7 +149,7 @@ def test_dual_keeps_the_sum_and_the_ceiling(left: float, lw: float, right: float
 @settings(max_examples=100)
 @given(st.lists(st.floats(0, 40), min_size=8, max_size=8), st.lists(st.floats(0, 1), min_size=2, max_size=2))
 def test_well_formed_bands_do_not_overlap(gaps: list[float], depths: list[float]) -> None:
-    family = Stopband(WAVE, BASE, TARGET, 2)
+    family = MultiStopband(WAVE, BASE, TARGET, 2)
     l1 = 460 + gaps[0]
     r1 = l1 + gaps[1]
     l2 = r1 + gaps[2]
@@ -196,7 +198,7 @@ def test_a_family_is_built_by_its_name(name: str) -> None:
     }
     target = {"dual": CEILING, "free_form": None}.get(name, TARGET)
     made = build_family(name, WAVE, BASE, target, given.get(name, FamilyOptions()))
-    assert (made.kind, type(made), made.n_modified) == (name, type(family), MAKERS[name].n_modified)
+    assert (made.kind, type(made), made.n_modified) == (name, type(family), REGISTERED[name].n_modified)
     if name != "free_form":
         np.testing.assert_array_equal(made.curves(x[None]), family.curves(x[None]))
 
@@ -205,17 +207,20 @@ def test_a_name_in_no_registry_is_refused_and_one_that_is_added_gets_its_own_cla
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     with pytest.raises(
-        SweepError, match=r"unknown family \(got 'stopbnd'\); allowed: stopband, .*did you mean 'stopband'"
+        SweepError, match=r"unknown family \(got 'stopbnd'\); allowed: dual, .*did you mean 'stopband'"
     ):
         build_family("stopbnd", WAVE, BASE, TARGET, FamilyOptions())
 
     class Flat(FreeForm):
         kind = "flat"
+        Options = Section
 
-    flat = Maker(
-        1, needs_target=False, option=None, make=lambda wave, base, *_: Flat(wave, base, np.array([500.0, 600.0]))
-    )
-    monkeypatch.setitem(MAKERS, "flat", flat)
+        @classmethod
+        def of_study(cls, wavelength_nm, base, target, options):  # type: ignore[no-untyped-def]
+            assert (target, options) == (None, Section())
+            return cls(wavelength_nm, base, np.array([500.0, 600.0]))
+
+    monkeypatch.setitem(REGISTERED, "flat", Flat)
     assert type(build_family("flat", WAVE, BASE, None, FamilyOptions())) is Flat
     with pytest.raises(SweepError, match="flat has no `to`"):
         build_family("flat", WAVE, BASE, TARGET, FamilyOptions())

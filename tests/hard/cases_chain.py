@@ -17,7 +17,7 @@ from sweep.camera.scene import FixedExposure, Scenario
 from sweep.camera.view import Methods, Setup
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
-from sweep.designs.stopband import Stopband
+from sweep.designs.families.stopband import Stopband
 from sweep.metrics.evaluate import evaluate, smooth_csd, smooth_response
 
 from .registry import EPS, Result, hard_case, outcome, relative, worst

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from scipy.optimize import brentq
 
-from sweep.designs.stopband import Stopband
+from sweep.designs.families.stopband import Stopband
 from sweep.errors import InfeasibleError
 from sweep.metrics.bound import FEASIBLE, Bound
 from sweep.metrics.objective import Objective

@@ -14,9 +14,9 @@ from sweep.camera.pixel import Pixel
 from sweep.camera.plan.bounds import Box
 from sweep.camera.scene import Scenario
 from sweep.camera.view import Methods, Setup
-from sweep.designs.dual import Dual
+from sweep.designs.families.dual import Dual
+from sweep.designs.families.stopband import Stopband
 from sweep.designs.family import Family
-from sweep.designs.stopband import Stopband
 from sweep.metrics.evaluate import BEST_PLACE, WORST, evaluate, is_promised
 from sweep.metrics.separation import CSD
 from sweep.search.problem import SHIFTS

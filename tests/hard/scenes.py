@@ -18,7 +18,7 @@ from sweep.camera.view import Methods, Setup
 from sweep.curves.builtin import BUILT_IN_LIGHTS
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
-from sweep.designs.stopband import Stopband
+from sweep.designs.families.stopband import Stopband
 from sweep.metrics.evaluate import BEST_PLACE, evaluate, is_promised
 
 GRID, FINE = WavelengthGrid(step_nm=5), WavelengthGrid(step_nm=1)

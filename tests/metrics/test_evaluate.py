@@ -15,7 +15,7 @@ from sweep.camera.sensor import BUILT_IN_SENSORS
 from sweep.camera.view import Setup
 from sweep.curves.builtin import BUILT_IN_LIGHTS
 from sweep.curves.spectrum import WavelengthGrid
-from sweep.designs.stopband import Stopband
+from sweep.designs.families.stopband import Stopband
 from sweep.metrics.evaluate import designed_quantities, evaluate, sensitivities_gradient, smooth_response
 
 GRID = WavelengthGrid()

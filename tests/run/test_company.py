@@ -14,11 +14,11 @@ from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scenario
 from sweep.camera.view import Setup
 from sweep.designs.block import Curves, edges_of
-from sweep.designs.dual import Dual
-from sweep.designs.free_form import FreeForm
+from sweep.designs.families.dual import Dual
+from sweep.designs.families.free_form import FreeForm
+from sweep.designs.families.stopband import Stopband
 from sweep.designs.products import row_products
 from sweep.designs.space import Filter, Space
-from sweep.designs.stopband import Stopband
 from sweep.metrics.evaluate import evaluate
 
 from ..blocks import SETUPS, SPACE, setup_of

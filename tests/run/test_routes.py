@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 
 from sweep.designs.block import Edges
+from sweep.designs.families.stopband import Stopband
 from sweep.designs.space import Filter
-from sweep.designs.stopband import Stopband
 from sweep.disk import read_facts
 from sweep.report import read_output, summary_lines
 from sweep.results.identity import CHUNK

@@ -18,8 +18,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from sweep.camera.imager import imager_of
+from sweep.designs.families.stopband import Stopband
 from sweep.designs.space import Filter, Space
-from sweep.designs.stopband import Stopband
 from sweep.errors import OutputError, StudyError
 from sweep.metrics.evaluate import evaluate, quantities
 from sweep.report import make_report, read_output

@@ -12,8 +12,8 @@ import pytest
 from sweep.camera.scene import FixedExposure, Scenario
 from sweep.camera.view import Setup
 from sweep.curves.lights import Lights
-from sweep.designs.free_form import FreeForm
-from sweep.designs.stopband import Stopband
+from sweep.designs.families.free_form import FreeForm
+from sweep.designs.families.stopband import MultiStopband, Stopband
 from sweep.errors import SweepError
 from sweep.metrics.bound import FEASIBLE, Bound, total_violation
 from sweep.metrics.evaluate import designed_quantities, smooth_response
@@ -86,7 +86,7 @@ def random_filters(kind: str, count: int, rng: np.random.Generator) -> np.ndarra
         return family.curves(family.start(rng.uniform(size=(count, 3))))
     bands = 1 if kind == "stopband" else 2
     target = np.minimum(green, base) if kind == "stopband" else 0.05 * base
-    family = Stopband(wave, base, target, bands)
+    family = MultiStopband(wave, base, target, bands)
     edges = np.sort(rng.uniform(500, 690, (count, 2 * bands)), axis=1)
     x = np.empty((count, 5 * bands))
     for band in range(bands):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sweep.commands.app import main
-from sweep.designs.free_form import FreeForm
+from sweep.designs.families.free_form import FreeForm
 from sweep.errors import BrokenProofError
 from sweep.metrics.bound import FEASIBLE, Bound, total_violation
 from sweep.metrics.evaluate import designed_quantities, smooth_response

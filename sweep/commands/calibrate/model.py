@@ -16,7 +16,7 @@ from ...curves.builtin.tl16 import tl16
 from ...curves.color import REGIONS, chromaticity
 from ...curves.lights import Lights
 from ...curves.spectrum import WavelengthGrid
-from ...designs.stopband import Stopband
+from ...designs.families.stopband import Stopband
 from ...metrics.evaluate import designed_quantities, smooth_response
 from ...metrics.separation import csd_name, separations
 from ...types import FloatArray

@@ -18,7 +18,7 @@ from .run import Calibration
 
 _HEADER = """\
 Parameters of the built-in surrogate curves: sensor `ar0820` and traffic lights `tl16`. Modeled, not measured.
-Made by the command below; the models are sweep/curves/builtin and sweep/designs/stopband.py.
+Made by the command below; the models are sweep/curves/builtin and sweep/designs/families/stopband.py.
 photon_ratio: photons of a signal patch over those of the white patch.
 clear_pixel: QE joined by a monotone cubic. ir_cut: falling logistic edge before all pixels.
 filters: transmission = leak + (peak - leak) * product of logistic edges; leak at 400, 600 and 700 nm; 10-90 % widths.

@@ -5,11 +5,31 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from pydantic import model_validator
 
-from ..errors import Fault, SweepError
-from ..types import FloatArray
-from .family import Parameter
-from .products import row_products
+from ...errors import Fault, SweepError
+from ...types import FloatArray, Positive, Section
+from ..family import Parameter
+from ..products import row_products
+
+_MOST_NODES = 500
+
+
+class Nodes(Section):
+    """Equidistant nodes of a free-form filter."""
+
+    start_nm: Positive
+    stop_nm: Positive
+    step_nm: Positive
+
+    @model_validator(mode="after")
+    def _whole_steps(self) -> Nodes:
+        steps = (self.stop_nm - self.start_nm) / self.step_nm
+        if not 1 <= steps < _MOST_NODES:
+            raise ValueError(f"nodes: {steps + 1:g} of them; allowed: 2 to {_MOST_NODES}")
+        if not abs(steps - round(steps)) < 1e-6:
+            raise ValueError(f"step_nm {self.step_nm:g} must divide {self.stop_nm - self.start_nm:g}")
+        return self
 
 
 class FreeForm:
@@ -21,7 +41,13 @@ class FreeForm:
 
     kind = "free_form"
     n_modified = 1
+    needs_target = False
     start_dimensions: int | None = 3
+
+    class Options(Section):
+        """Where the transmission is free."""
+
+        nodes: Nodes
 
     def __init__(
         self, wavelength_nm: FloatArray, base: FloatArray, nodes_nm: FloatArray, shift_nm: float = 0.0
@@ -35,6 +61,21 @@ class FreeForm:
         hats = [np.interp(nominal_nm, nodes_nm, unit) for unit in np.eye(nodes_nm.size)]
         self._hats = np.stack(hats) * (base * inside)
         self._fixed = np.where(inside, 0.0, base)
+
+    @classmethod
+    def of_study(
+        cls, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: Section
+    ) -> FreeForm:
+        """See `Family.of_study`; raises SweepError for nodes outside the wavelengths."""
+        assert target is None
+        assert isinstance(options, FreeForm.Options)
+        nodes = options.nodes
+        if nodes.start_nm < wavelength_nm[0] or nodes.stop_nm > wavelength_nm[-1]:
+            place = f"{nodes.start_nm:g} to {nodes.stop_nm:g} nm"
+            allowed = f"{wavelength_nm[0]:g} to {wavelength_nm[-1]:g} nm"
+            raise SweepError(Fault("nodes outside the wavelength grid", value=place, allowed=allowed))
+        count = round((nodes.stop_nm - nodes.start_nm) / nodes.step_nm) + 1
+        return FreeForm(wavelength_nm, base, nodes.start_nm + nodes.step_nm * np.arange(count, dtype=float))
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

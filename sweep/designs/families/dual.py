@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..types import FloatArray
-from .stopband import Banded
+from ...errors import Fault, SweepError
+from ...types import FloatArray, Section
+from ..bands import Banded
 
 
 class Dual(Banded):
@@ -18,11 +19,22 @@ class Dual(Banded):
 
     kind = "dual"
     n_modified = 2
+    needs_target = True
+    Options = Section
 
     def __init__(self, wavelength_nm: FloatArray, base: FloatArray, ceiling: FloatArray) -> None:
         super().__init__(wavelength_nm, 1)
         self._base = base
         self._room = np.minimum(base, np.maximum(ceiling - base, 0.0))
+
+    @classmethod
+    def of_study(cls, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None, options: Section) -> Dual:
+        """See `Family.of_study`; raises SweepError for a ceiling that is nowhere above the base."""
+        assert target is not None
+        assert not options.model_fields_set
+        if not (target > base).any():
+            raise SweepError(Fault("dual needs a ceiling `to` above its base: there is no room to swing"))
+        return Dual(wavelength_nm, base, target)
 
     def curves(self, x: FloatArray) -> FloatArray:
         """QE of both channels, ndarray[n_designs, 2, n_wavelengths]; see `Family.curves`."""

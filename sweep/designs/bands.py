@@ -1,4 +1,4 @@
-"""Stopbands: a channel leaves its base curve for a target curve and comes back, once or several times."""
+"""Bands between two edges each: what families whose parameters are edges and depths have in common."""
 
 from __future__ import annotations
 
@@ -184,50 +184,3 @@ class Banded:
     def violation_gradient(self, x: FloatArray) -> FloatArray:
         """See `Bands.violation_gradient`."""
         return self._bands.violation_gradient(x)
-
-
-class Stopband(Banded):
-    """N = base + sum over bands of depth (target - base) (e(l; left) - e(l; right)).
-
-    One band is the paper's N_x with base Y and target G. `base`, `target`: QE, ndarray[n_wavelengths]. With the edges
-    in order, the bands lie between 0 and 1 and do not overlap, so N lies between its base and its target at every
-    wavelength, and is exactly the base outside the bands.
-    """
-
-    n_modified = 1
-
-    def __init__(self, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray, bands: int = 1) -> None:
-        self.kind = "stopband" if bands == 1 else "multi_stopband"
-        super().__init__(wavelength_nm, bands)
-        self._base = base
-        self._change = target - base
-
-    def curves(self, x: FloatArray) -> FloatArray:
-        """QE of the modified channel, ndarray[n_designs, 1, n_wavelengths]; see `Family.curves`."""
-        return (self._base + self._change * self._bands.shape(x))[:, None, :]
-
-    @property
-    def separable(self) -> tuple[FloatArray, FloatArray] | None:
-        """Of one band; see `SeparableFamily.separable`."""
-        return (self._base, self._change) if self.kind == "stopband" else None
-
-    def edges(self, centers_and_widths: FloatArray) -> FloatArray:
-        """See `SeparableFamily.edges`."""
-        return self._bands.edges(centers_and_widths)
-
-    def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """The base, or the target where it is higher and a band can reach; see `Family.upper`."""
-        return (self._base + np.maximum(self._change, 0.0) * self._bands.reach(low, high))[None, :]
-
-    def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
-        """The base, or the target where it is lower and a band can reach; see `Family.lower`."""
-        return (self._base + np.minimum(self._change, 0.0) * self._bands.reach(low, high))[None, :]
-
-    def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Base and change where the bands are least and most open; see `Family.hull`."""
-        ends = np.stack([self._base + self._change * shape for shape in self._bands.range(low, high)])
-        return ends.min(axis=0)[None, :], ends.max(axis=0)[None, :]
-
-    def gradient(self, x: FloatArray) -> FloatArray:
-        """Derivative by each parameter, ndarray[n_parameters, 1, n_wavelengths]; see `Family.gradient`."""
-        return (self._change * self._bands.gradient(x))[:, None, :]
