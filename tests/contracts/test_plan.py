@@ -57,9 +57,9 @@ BASES = {
     STRAIGHT: replace(REFERENCE, noise="skip", quantization="skip", saturation="skip"),
 }
 """From where methods are switched; over all places, which takes long, from the first and the last."""
-NOT_ALONE = {"sampling": STRAIGHT, "saturation": "unrounded"}
-"""Effects that no plan switches alone (without pixels nothing is read one by one; rounding clips, too), and from where
-they are seen."""
+NOT_ALONE = {"sampling": STRAIGHT, "saturation": "unrounded", "phase": STRAIGHT}
+"""Effects that no plan switches alone (without pixels nothing is read one by one; rounding clips, too; behind rounding
+without noise places are not left out), and from where they are seen."""
 
 
 def contract(made: Scene) -> list[Row]:
