@@ -206,9 +206,7 @@ def test_a_family_is_built_by_its_name(name: str) -> None:
 def test_a_name_in_no_registry_is_refused_and_one_that_is_added_gets_its_own_class(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    with pytest.raises(
-        SweepError, match=r"unknown family \(got 'stopbnd'\); allowed: dual, .*did you mean 'stopband'"
-    ):
+    with pytest.raises(SweepError, match=r"unknown family \(got 'stopbnd'\); allowed: dual, .*did you mean 'stopband'"):
         build_family("stopbnd", WAVE, BASE, TARGET, FamilyOptions())
 
     class Flat(FreeForm):
