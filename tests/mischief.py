@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from sweep.designs.block import Edges
-from sweep.designs.families.stopband import Stopband
+from sweep.designs.families.stopband import MultiStopband
 from sweep.designs.space import Filter
 from sweep.results.identity import CHUNK
 from sweep.results.journal import Journal
@@ -21,11 +21,10 @@ from sweep.run import run_study
 from sweep.study import Study
 
 
-class Mischief(Stopband):
-    """A stopband that does as its file says where its left edge is at 590 nm: `kill N` (N times), or `fail`."""
+class Mischief(MultiStopband):
+    """A band, by its curves, that does as its file says where its left edge is at 590 nm: `kill N` (N times), or `fail`."""
 
     file: Path
-    separable = None  # its curves are asked for
 
     def hull(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """A plan asks for it; the mischief is done for a single design."""
@@ -51,7 +50,7 @@ def mischievous(study: Study, file: Path) -> Study:
     """The study with a sweep whose first left edge does what `file` says."""
     sweep = study.spaces[-1]
     assert sweep.filter is not None
-    family = Mischief(study.grid.nodes_nm, study.sensor.qe["Y"], study.sensor.qe["G"])
+    family = Mischief(study.grid.nodes_nm, study.sensor.qe["Y"], study.sensor.qe["G"], 1)
     family.file = file
     made = replace(sweep, filter=Filter(family, sweep.filter.channels, sweep.filter.base, sweep.filter.target))
     return replace(study, spaces=(*study.spaces[:-1], made))

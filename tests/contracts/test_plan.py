@@ -57,9 +57,11 @@ BASES = {
     STRAIGHT: replace(REFERENCE, noise="skip", quantization="skip", saturation="skip"),
 }
 """From where methods are switched; over all places, which takes long, from the first and the last."""
-NOT_ALONE = {"sampling": STRAIGHT, "saturation": "unrounded", "phase": STRAIGHT}
-"""Effects that no plan switches alone (without pixels nothing is read one by one; rounding clips, too; behind rounding
-without noise places are not left out), and from where they are seen."""
+NOT_ALONE = {"sampling": STRAIGHT, "saturation": "unrounded"}
+"""Effects that no plan switches alone (without pixels nothing is read one by one; rounding clips, too), and from where
+they are seen."""
+SEEN_FROM = NOT_ALONE | {"phase": STRAIGHT}
+"""From where effects are seen that are not seen from the reference: a lattice of places, behind no rounding."""
 
 
 def contract(made: Scene) -> list[Row]:
@@ -107,7 +109,7 @@ def unseen(rows: Iterable[Row], effects: Mapping[str, Any]) -> dict[tuple[str, s
         (effect, method): [] for effect, module in effects.items() for method in module.METHODS[:-1]
     }
     for row in rows:
-        if row.base == NOT_ALONE.get(row.effect, ALONE) and row.realized > _SEEN_DN:
+        if row.base == SEEN_FROM.get(row.effect, ALONE) and row.realized > _SEEN_DN:
             seen[row.effect, row.method].append(row.scene)
     return {method: scenes for method, scenes in seen.items() if len(scenes) < 3}
 
