@@ -15,7 +15,7 @@ from sweep.camera.plan.bounds import Box
 from sweep.camera.scene import Scenario
 from sweep.camera.view import Methods, Setup
 from sweep.designs.families.dual import Dual
-from sweep.designs.families.stopband import Stopband
+from sweep.designs.families.stopband import MultiStopband
 from sweep.designs.family import Family
 from sweep.metrics.evaluate import BEST_PLACE, WORST, evaluate, is_promised
 from sweep.metrics.separation import CSD
@@ -24,7 +24,7 @@ from sweep.search.problem import SHIFTS
 from .scenes import FAMILY, GRID, SENSOR, TILES, lights, target
 
 _DUAL = Dual(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["C"])
-_TWO_BANDS = Stopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"], 2)
+_TWO_BANDS = MultiStopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"], 2)
 _TWO = Mosaic.from_rows("two", [["R", "N"], ["M", "Cy"]])
 _DESIGNS = 4
 _SHIFT_NM = 3.0

@@ -8,6 +8,16 @@ from pathlib import Path
 
 import pytest
 
+from . import (
+    cases_chain,  # noqa: F401
+    cases_confusion,  # noqa: F401
+    cases_curves,  # noqa: F401
+    cases_metrics,  # noqa: F401
+    cases_noise,  # noqa: F401
+    cases_optics,  # noqa: F401
+    cases_search,  # noqa: F401
+    cases_simulation,  # noqa: F401
+)
 from .registry import CASES, HardCase, Result, hard_case, worst, write_table
 
 LEAST = 40

@@ -16,7 +16,7 @@ from sweep.camera.view import Setup
 from sweep.designs.block import Curves, edges_of
 from sweep.designs.families.dual import Dual
 from sweep.designs.families.free_form import FreeForm
-from sweep.designs.families.stopband import Stopband
+from sweep.designs.families.stopband import MultiStopband
 from sweep.designs.products import row_products
 from sweep.designs.space import Filter, Space
 from sweep.metrics.evaluate import evaluate
@@ -96,7 +96,7 @@ def test_a_bad_design_changes_no_other(separable: bool) -> None:
             "sweep",
             "bands",
             "RYNCy",
-            Filter(Stopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"], bands=2), ("N",), "Y", "G"),
+            Filter(MultiStopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"], bands=2), ("N",), "Y", "G"),
             (
                 (470.0, 480.0, 490.5),
                 (10.0,),
