@@ -54,7 +54,7 @@ class Scan:
 def read_curves(path: Path) -> Curves:
     """Read every curve of a CSV or `.mat` file, unscaled and in the file's own quantity.
 
-    Raises DataError (file, line, column, value) on anything that is not clean: see `spectra.check_samples`.
+    Raises DataError (file, line, column, value) on anything that is not clean: see `spectrum.check_samples`.
     """
     scan = scan_curves(path)
     if scan.faults:
