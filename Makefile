@@ -11,7 +11,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 NAME ?= stopband
 ARGS ?=
-PARALLEL := -n logical --dist
+ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
+TESTS := $(ONE_THREAD) $(BIN)/python -m pytest -n logical --dist
 
 .PHONY: study report test slow accuracy check bench clean
 .DELETE_ON_ERROR:
@@ -23,14 +24,14 @@ report: $(VENV)/.ready
 	$(BIN)/sweep report outputs/$(NAME)
 
 test: $(VENV)/.ready-dev
-	$(BIN)/python -m pytest $(PARALLEL) loadfile $(ARGS)
+	$(TESTS) loadfile $(ARGS)
 
 slow: $(VENV)/.ready-dev
-	$(BIN)/python -m pytest -m slow $(PARALLEL) worksteal $(ARGS)
+	$(TESTS) worksteal -m slow $(ARGS)
 
 accuracy: $(VENV)/.ready-dev
-	$(BIN)/python -m pytest tests/hard/test_hard_cases.py --hard-cases outputs/accuracy/hard_cases.json
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/sweep accuracy studies/accuracy.yaml $(ARGS)
+	$(BIN)/python -m pytest tests/hard/test_hard_cases.py -m "slow or not slow" --hard-cases outputs/accuracy/hard_cases.json
+	$(ONE_THREAD) $(BIN)/sweep accuracy studies/accuracy.yaml $(ARGS)
 
 check: $(VENV)/.ready-dev
 	$(BIN)/ruff check sweep tests
@@ -38,8 +39,9 @@ check: $(VENV)/.ready-dev
 	$(BIN)/mypy
 
 bench: $(VENV)/.ready-bench
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/python tests/bench.py $(ARGS)
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/python tests/bench_search.py $(ARGS)
+	$(ONE_THREAD) $(BIN)/python tests/bench.py $(ARGS)
+	$(ONE_THREAD) $(BIN)/python tests/bench_search.py $(ARGS)
+	$(ONE_THREAD) $(BIN)/python tests/bench_work.py
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

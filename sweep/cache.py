@@ -7,11 +7,11 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from typing import Generic, TypeVar
 
-Key = TypeVar("Key", bound=Hashable)
-Value = TypeVar("Value")
+_Key = TypeVar("_Key", bound=Hashable)
+_Value = TypeVar("_Value")
 
 
-class Cache(Generic[Key, Value]):
+class Cache(Generic[_Key, _Value]):
     """The values that were used last, at most `most` of them.
 
     Threads wait for one another, so that each value is made once; what fails while it is made is not kept.
@@ -19,13 +19,13 @@ class Cache(Generic[Key, Value]):
 
     def __init__(self, most: int) -> None:
         self._most = most
-        self._values: OrderedDict[Key, Value] = OrderedDict()
+        self._values: OrderedDict[_Key, _Value] = OrderedDict()
         self._one_at_a_time = threading.RLock()
 
     def __len__(self) -> int:
         return len(self._values)
 
-    def get(self, key: Key, make: Callable[[], Value]) -> Value:
+    def get(self, key: _Key, make: Callable[[], _Value]) -> _Value:
         """The value of `key`, from `make` where it is not kept; raises what `make` raises."""
         with self._one_at_a_time:
             if key not in self._values:

@@ -1,9 +1,9 @@
-"""Names of array types; the base of every section of a study file, and its numbers; who is told of progress."""
+"""Names of array types; the base of every section of a study file, and its numbers; who is told of progress; calls."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Annotated
+from collections.abc import Callable, Iterable, Iterator
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,15 @@ BoolArray = NDArray[np.bool_]
 
 Progress = Callable[[str, int, int], None]
 """Called with a phase, how much of it is done, and how much there is."""
+Call = tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
+"""A call that is put off, in the form that joblib takes."""
+Parallel = Callable[[Iterable[Call]], Iterator[Any]]
+"""Answers of calls, which may be spread over the cores, in their order."""
+
+
+def delayed(function: Callable[..., Any], *arguments: Any) -> Call:
+    """The call of a function, put off."""
+    return function, arguments, {}
 
 
 class Section(BaseModel):

@@ -1,6 +1,6 @@
 """Speed, as ratios within one run: `make bench`. Writes outputs/bench/bench.json and .png; nothing here asserts a time.
 
-The yardsticks: what a user would write instead (a tidy script with SciPy's cdist, one design at a time; the same with
+The yardsticks: what an engineer would write instead (a script with SciPy's cdist, one design at a time; one with
 colour-science's spectra; an image per design), and what the machine can do (matrix products, a bare Parquet write).
 """
 
@@ -31,14 +31,15 @@ from scipy.special import j1
 
 from sweep.camera.imager import Imager
 from sweep.camera.mosaic import Mosaic
-from sweep.camera.scene import Scenario
-from sweep.camera.view import Setup
+from sweep.camera.scenario import Scenario
+from sweep.camera.view import View
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
-from sweep.designs.block import Curves, edges_of
+from sweep.designs.block import CurveBlock, edges_of
+from sweep.designs.edge import SPAN_PER_WIDTH
 from sweep.designs.space import Space
 from sweep.metrics.evaluate import evaluate
-from sweep.metrics.separation import class_pairs, separation, separations_along
+from sweep.metrics.separation import class_pairs, csd_name, separation, separations_along
 from sweep.run import run_study
 from sweep.run.worker_process import keep_freed_memory
 from sweep.study import Study, load_study
@@ -47,6 +48,7 @@ ROOT = Path(__file__).parent.parent
 OUTPUT = ROOT / "outputs" / "bench"
 BLOCK = 4096
 REPEATS = 7
+SCRIPTED = 2000
 
 
 def median_s(work: Callable[[], object], repeats: int = REPEATS) -> float:
@@ -60,79 +62,85 @@ def median_s(work: Callable[[], object], repeats: int = REPEATS) -> float:
     return statistics.median(times)
 
 
-def responses(setup: Setup, qe: np.ndarray) -> np.ndarray:
-    """Rounded DN of all signals in all channels, as the paper's exposure gives them: ndarray[n_signals, n_channels]."""
-    scale = 0.95 * 4095 * setup.lights.photon_ratio / (qe.sum(axis=1).max() / setup.grid.size)
-    return np.asarray(np.floor(setup.lights.photons @ qe.T * scale + 0.5))
+def script(view: View, target: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """All CSDs of stopbands, one design at a time, as an engineer writes it with NumPy and SciPy: ndarray[n, n_pairs].
+
+    `target`: QE inside the band. What no design changes is computed once; edges are smooth steps; then a matrix-vector product, and `cdist`.
+    """
+    (modified,) = view.modified
+    wave, base = view.grid.nodes_nm, view.qe[modified]
+    scale = 0.95 * 4095 * view.lights.photon_ratio / (view.qe.sum(axis=1).max() / wave.size)
+    signals = view.lights.photons * scale
+    fixed = np.floor(view.qe @ signals.T + 0.5)
+    members = list(view.members.values())
+    pairs = [(a, b) for at, a in enumerate(members) for b in members[at + 1 :]]
+    found = np.empty((len(points), len(pairs)))
+    for row, (left, left_width, right, right_width, depth) in enumerate(points):
+        t = np.clip((wave - left) / (left_width * SPAN_PER_WIDTH) + 0.5, 0, 1)
+        u = np.clip((wave - right) / (right_width * SPAN_PER_WIDTH) + 0.5, 0, 1)
+        band = t * t * t * (t * (6 * t - 15) + 10) - u * u * u * (u * (6 * u - 15) + 10)
+        qe = base + (target - base) * (depth * band)
+        fixed[modified] = np.floor(signals @ qe + 0.5)
+        seen = fixed.T
+        found[row] = [cdist(seen[a], seen[b]).min() for a, b in pairs]
+    return found
 
 
-def script(setup: Setup, space: Space, points: np.ndarray) -> None:
-    """All CSDs, one design at a time, as a tidy script would."""
-    members = list(setup.members.values())
-    for point in points:
-        qe = setup.qe.copy()
-        qe[setup.modified[0]] = space.curves(point[None], setup.grid.size)[0, 0]
-        response = responses(setup, qe)
-        for i, first in enumerate(members):
-            for second in members[i + 1 :]:
-                cdist(response[first], response[second]).min()
-
-
-def colour_script(setup: Setup, space: Space, points: np.ndarray) -> None:
+def colour_script(view: View, space: Space, points: np.ndarray) -> None:
     """The same with colour-science's spectral distributions."""
-    waves = setup.grid.nodes_nm
-    shape = colour.SpectralShape(waves[0], waves[-1], setup.grid.step_nm)
-    lights = [colour.SpectralDistribution(photons, waves).align(shape) for photons in setup.lights.photons]
+    waves = view.grid.nodes_nm
+    shape = colour.SpectralShape(waves[0], waves[-1], view.grid.step_nm)
+    lights = [colour.SpectralDistribution(photons, waves).align(shape) for photons in view.lights.photons]
     for point in points:
-        qe = setup.qe.copy()
-        qe[setup.modified[0]] = space.curves(point[None], setup.grid.size)[0, 0]
+        qe = view.qe.copy()
+        qe[view.modified[0]] = space.curves(point[None], view.grid.size)[0, 0]
         channels = [colour.SpectralDistribution(curve, waves).align(shape) for curve in qe]
         response = np.array([[(light * channel).values.sum() for channel in channels] for light in lights])
-        members = list(setup.members.values())
+        members = list(view.members.values())
         for i, first in enumerate(members):
             for second in members[i + 1 :]:
                 cdist(response[first], response[second]).min()
 
 
-def image_per_design(setup: Setup, radius_um: float, pixels: int = 24, per_pixel: int = 8) -> None:
+def image_per_design(view: View, radius_um: float, pixels: int = 24, per_pixel: int = 8) -> None:
     """A disc's image through an f/2 lens for every wavelength, sampled by the pixels, for one design."""
-    pitch = setup.pixel.pitch_um
+    pitch = view.pixel.pitch_um
     x = (np.arange(pixels * per_pixel) + 0.5) / per_pixel * pitch - pixels * pitch / 2
     r = np.hypot(*np.meshgrid(x, x))
     disc = (r <= radius_um).astype(float)
-    light = np.empty((setup.grid.size, pixels, pixels))
-    for index, wave_nm in enumerate(setup.grid.nodes_nm):
+    light = np.empty((view.grid.size, pixels, pixels))
+    for index, wave_nm in enumerate(view.grid.nodes_nm):
         v = np.maximum(np.pi * r / (wave_nm * 1e-3 * 2.0), 1e-9)
         airy = (2 * j1(v) / v) ** 2
         image = fftconvolve(disc, airy / airy.sum(), mode="same")
         light[index] = image.reshape(pixels, per_pixel, pixels, per_pixel).mean(axis=(1, 3))
-    for qe in setup.qe:
-        np.tensordot(setup.lights.photons * qe, light, axes=1)
+    for qe in view.qe:
+        np.tensordot(view.lights.photons * qe, light, axes=1)
 
 
-def swept(study: Study) -> tuple[Space, Setup]:
-    """The study's sweep and its setup."""
+def swept(study: Study) -> tuple[Space, View]:
+    """The study's sweep and its view."""
     space = next(s for s in study.spaces if s.kind == "sweep")
-    return space, study.setup(space, "chart")
+    return space, study.view(space, "chart")
 
 
 def distances(imager: Imager, block: Any) -> None:
     """All CSDs of a block."""
     changing = imager.read_changing(block)
     assert changing is not None
-    separations_along(changing.fixed[0], changing.channel, changing.values[:, 0], imager.setup.members)
+    separations_along(changing.fixed[0], changing.channel, changing.values[:, 0], imager.view.members)
 
 
 def rate_of(route: str, study: Study, seconds: float) -> float:
     """Designs per second of a route in this process, over some seconds."""
     keep_freed_memory()
-    space, setup = swept(study)
-    imager, points = Imager(setup), space.points(0, BLOCK)
+    space, view = swept(study)
+    imager, points = Imager(view), space.points(0, BLOCK)
     edges = edges_of(space, 0, BLOCK)
     assert edges is not None
     work: dict[str, Callable[[], object]] = {
         "separable": lambda: distances(imager, edges),
-        "dense": lambda: distances(imager, Curves(space.curves(points, setup.grid.size))),
+        "dense": lambda: distances(imager, CurveBlock(space.curves(points, view.grid.size))),
         "all_columns": lambda: evaluate(imager, edges),
     }
     work[route]()
@@ -160,23 +168,28 @@ def on_all_cores(study: Study, found: dict[str, Any], seconds: float = 2.0) -> N
 
 def kernels(study: Study, found: dict[str, Any]) -> None:
     """(a) Both routes against the scripts and the machine."""
-    space, setup = swept(study)
+    space, view = swept(study)
     points = space.points(0, BLOCK)
-    imager, members = Imager(setup), setup.members
+    imager, members = Imager(view), view.members
     edges = edges_of(space, 0, BLOCK)
     assert edges is not None
-    curves = space.curves(points, setup.grid.size)
-    flat, table = curves[:, 0], np.ascontiguousarray(setup.lights.photons.T)
-    found["script_designs_per_s"] = 300 / median_s(lambda: script(setup, space, points[:300]), 3)
-    found["colour_designs_per_s"] = 2 / median_s(lambda: colour_script(setup, space, points[:2]), 1)
+    curves = space.curves(points, view.grid.size)
+    flat, table = curves[:, 0], np.ascontiguousarray(view.lights.photons.T)
+    ours = evaluate(imager, edges)
+    target = study.sensor.qe["G"]
+    theirs = script(view, target, points[:SCRIPTED]).T
+    for pair, distances_dn in zip(class_pairs(list(members)), theirs, strict=True):  # the same figures, or no yardstick
+        np.testing.assert_allclose(ours[csd_name(pair)][:SCRIPTED], distances_dn, rtol=1e-12)
+    found["script_designs_per_s"] = SCRIPTED / median_s(lambda: script(view, target, points[:SCRIPTED]), 5)
+    found["colour_designs_per_s"] = 2 / median_s(lambda: colour_script(view, space, points[:2]), 1)
     found["separable_designs_per_s"] = BLOCK / median_s(lambda: distances(imager, edges), 30)
     found["dense_designs_per_s"] = BLOCK / median_s(
-        lambda: distances(imager, Curves(space.curves(points, setup.grid.size)))
+        lambda: distances(imager, CurveBlock(space.curves(points, view.grid.size)))
     )
     found["all_columns_designs_per_s"] = BLOCK / median_s(lambda: evaluate(imager, edges))
     bare = median_s(lambda: flat @ table, 30)
-    ours = median_s(lambda: Curves(curves).product(table, np.arange(setup.grid.size)), 30)
-    found["dense_product_over_bare_product"] = bare / ours
+    product = median_s(lambda: CurveBlock(curves).product(table, np.arange(view.grid.size)), 30)
+    found["dense_product_over_bare_product"] = bare / product
     found["dgemm_gflops"] = 2 * flat.shape[0] * flat.shape[1] * table.shape[1] / bare / 1e9
     large = np.ones(20_000_000)
     found["copy_gbytes_per_s"] = 2 * large.nbytes / median_s(large.copy, 3) / 1e9
@@ -225,15 +238,15 @@ def end_to_end(found: dict[str, Any]) -> None:
 
 def exponents(study: Study, found: dict[str, Any]) -> None:
     """(d) How the dense route's time grows, in blocks as a run has them: d log(time) / d log(size), from a fit."""
-    space, setup = swept(study)
+    space, view = swept(study)
 
-    def timed(made: Setup, designs: int) -> float:
+    def timed(made: View, designs: int) -> float:
         imager = Imager(made)
         size = min(designs, BLOCK)
-        some = space.curves(space.points(0, size), setup.grid.size)
-        if made.grid != setup.grid:
-            some = np.array([[np.interp(made.grid.nodes_nm, setup.grid.nodes_nm, c) for c in d] for d in some])
-        block = Curves(np.repeat(some, len(made.modified), axis=1))
+        some = space.curves(space.points(0, size), view.grid.size)
+        if made.grid != view.grid:
+            some = np.array([[np.interp(made.grid.nodes_nm, view.grid.nodes_nm, c) for c in d] for d in some])
+        block = CurveBlock(np.repeat(some, len(made.modified), axis=1))
 
         def all_blocks() -> None:
             for _ in range(designs // size):
@@ -241,37 +254,37 @@ def exponents(study: Study, found: dict[str, Any]) -> None:
 
         return median_s(all_blocks, 5)
 
-    def with_signals(n: int) -> Setup:
-        at = np.arange(n) % len(setup.lights.names)
+    def with_signals(n: int) -> View:
+        at = np.arange(n) % len(view.lights.names)
         kinds = ("green", "yellow", "orange", "red")
         types = tuple(kinds[k * 4 // n] for k in range(n))
         names = tuple(map(str, range(n)))
-        lights = Lights("many", names, types, setup.lights.photons[at], setup.lights.photon_ratio, "", True)
-        return replace(setup, lights=lights)
+        lights = Lights("many", names, types, view.lights.photons[at], view.lights.photon_ratio, "", True)
+        return replace(view, lights=lights)
 
-    def with_channels(n: int) -> Setup:
+    def with_channels(n: int) -> View:
         """A camera whose n channels are all modified."""
         names = tuple(f"N{k}" for k in range(n))
         mosaic = Mosaic.from_rows("many", [names])
-        qe = np.repeat(setup.base_qe, n, axis=0)
-        return replace(setup, mosaic=mosaic, qe=qe, modified=tuple(range(n)))
+        qe = np.repeat(view.base_qe, n, axis=0)
+        return replace(view, mosaic=mosaic, qe=qe, modified=tuple(range(n)))
 
-    def with_wavelengths(n: int) -> Setup:
-        old = setup.grid.nodes_nm
+    def with_wavelengths(n: int) -> View:
+        old = view.grid.nodes_nm
         grid = WavelengthGrid(start_nm=old[0], stop_nm=old[-1], step_nm=(old[-1] - old[0]) / (n - 1))
 
         def of(curves: np.ndarray) -> np.ndarray:
             return np.array([np.interp(grid.nodes_nm, old, curve) for curve in curves])
 
-        lights = replace(setup.lights, photons=of(setup.lights.photons))
-        return replace(setup, grid=grid, qe=of(setup.qe), clear_qe=of(setup.clear_qe[None])[0], lights=lights)
+        lights = replace(view.lights, photons=of(view.lights.photons))
+        return replace(view, grid=grid, qe=of(view.qe), clear_qe=of(view.clear_qe[None])[0], lights=lights)
 
     def exponent(sizes: tuple[int, ...], times: list[float]) -> float:
         return float(np.polyfit(np.log(sizes), np.log(times), 1)[0])
 
     designs, signals = (4096, 8192, 16384, 32768), (40, 80, 160, 320)
     channels, wavelengths = (1, 2, 3, 4), (151, 301, 601, 1201)
-    found["exponent_designs"] = exponent(designs, [timed(setup, n) for n in designs])
+    found["exponent_designs"] = exponent(designs, [timed(view, n) for n in designs])
     found["exponent_signals"] = exponent(signals, [timed(with_signals(n), 1024) for n in signals])
     found["exponent_channels"] = exponent(channels, [timed(with_channels(n), 1024) for n in channels])
     found["exponent_wavelengths"] = exponent(wavelengths, [timed(with_wavelengths(n), 1024) for n in wavelengths])
@@ -279,18 +292,18 @@ def exponents(study: Study, found: dict[str, Any]) -> None:
 
 def scene(study: Study, found: dict[str, Any]) -> None:
     """(f) A light at 250 m: each further design, and the first one with its kernels, against an image per design."""
-    space, setup = swept(study)
+    space, view = swept(study)
     far = {"target": {"distance_m": 250, "fov_deg": 30}, "optics": {"f_number": 2}}
-    setup = replace(setup, scenario=Scenario.model_validate(far))
-    target = setup.scenario.target
+    view = replace(view, scenario=Scenario.model_validate(far))
+    target = view.scenario.target
     assert target is not None
-    radius_um = target.object_resolution_px / 2 * setup.pixel.pitch_um
-    curves = space.curves(space.points(0, 64), setup.grid.size)
-    imager = Imager(setup)
-    direct = median_s(lambda: image_per_design(setup, radius_um), 3)
+    radius_um = target.object_resolution_px / 2 * view.pixel.pitch_um
+    curves = space.curves(space.points(0, 64), view.grid.size)
+    imager = Imager(view)
+    direct = median_s(lambda: image_per_design(view, radius_um), 3)
     found["scene_image_s"] = direct
     found["scene_design_over_image"] = direct / (median_s(lambda: evaluate(imager, curves)) / len(curves))
-    found["scene_first_design_over_image"] = direct / median_s(lambda: evaluate(Imager(setup), curves[:1]), 3)
+    found["scene_first_design_over_image"] = direct / median_s(lambda: evaluate(Imager(view), curves[:1]), 3)
 
 
 def drawn(found: dict[str, Any]) -> None:

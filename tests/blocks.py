@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from sweep.camera.view import Setup
+from sweep.camera.view import View
 from sweep.designs.space import Filter, Space
 
 from .hard.scenes import DARK, F2, FAMILY, FAR, FIXED, scene
@@ -16,28 +16,24 @@ AXES = ((590.0, 600.0, 610.0), (5.0, 20.0), (640.0, 655.0), (0.0, 6.0, 30.0), (0
 SPACE = Space("sweep", "edges", "RYNCy", Filter(FAMILY, ("N",), "Y", "G"), AXES)
 
 
-def setup_of(scenario: dict[str, Any], pixel: dict[str, Any] | None = None, **methods: str) -> Setup:
-    made = scene("scene", "RYNCy", scenario, pixel).setup
+def view_of(scenario: dict[str, Any], pixel: dict[str, Any] | None = None, **methods: str) -> View:
+    made = scene("scene", "RYNCy", scenario, pixel).view
     return replace(made, methods=replace(made.methods, **methods))
 
 
 STRAIGHT = {"quantization": "skip", "saturation": "skip", "noise": "skip", "pedestal": "skip"}
 
 
-SETUPS = {
-    "chart": setup_of({}, **STRAIGHT),
-    "saturated": setup_of(
-        {"intensity_cd": 200, "exposure": {"kind": "fixed", "exposure_s": 4e-2}}, quantization="skip"
-    ),
-    "rounded": setup_of({}),
-    "noise": setup_of({"noise": True}, DARK | {"prnu": 0.01}),
-    "background": setup_of({"background_cd_m2": 300, "intensity_cd": 200, "exposure": FIXED}, **STRAIGHT),
-    "far": setup_of({"target": FAR, "optics": F2}, **STRAIGHT),
-    "far, pixel by pixel": setup_of({"target": FAR, "optics": F2}),
-    "any place": setup_of({"target": FAR | {"phase_px": "any"}, "optics": F2}, **STRAIGHT, phase="pixel"),
-    "crosstalk": setup_of({}, {"crosstalk": 0.1}),
-    "pulsed": setup_of(
-        {"drive": {"duty": 0.5, "frequency_hz": 90}, "exposure": {"kind": "fixed", "exposure_s": 0.003}}
-    ),
-    "coarse": setup_of({}, quadrature="every 5th", **STRAIGHT),
+VIEWS = {
+    "chart": view_of({}, **STRAIGHT),
+    "saturated": view_of({"intensity_cd": 200, "exposure": {"kind": "fixed", "exposure_s": 4e-2}}, quantization="skip"),
+    "rounded": view_of({}),
+    "noise": view_of({"noise": True}, DARK | {"prnu": 0.01}),
+    "background": view_of({"background_cd_m2": 300, "intensity_cd": 200, "exposure": FIXED}, **STRAIGHT),
+    "far": view_of({"target": FAR, "optics": F2}, **STRAIGHT),
+    "far, pixel by pixel": view_of({"target": FAR, "optics": F2}),
+    "any place": view_of({"target": FAR | {"phase_px": "any"}, "optics": F2}, **STRAIGHT, phase="pixel"),
+    "crosstalk": view_of({}, {"crosstalk": 0.1}),
+    "pulsed": view_of({"drive": {"duty": 0.5, "frequency_hz": 90}, "exposure": {"kind": "fixed", "exposure_s": 0.003}}),
+    "coarse": view_of({}, quadrature="every 5th", **STRAIGHT),
 }

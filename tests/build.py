@@ -50,10 +50,32 @@ def ran(study: Study, output: Path, jobs: int) -> list[tuple[str, int, int]]:
     return seen
 
 
-SCENES = """\
-study: scenes
-sensor: ar0820
-lights: tl16
+def stopband_study(
+    name: str,
+    grid: str,
+    before: str = "",
+    after: str = "",
+    cfas: str = "[RGGB, RYNCy]",
+    curves: str = "sensor: ar0820\nlights: tl16\n",
+) -> str:
+    """A study that sweeps the edges of a stopband over a grid; `before` and `after`: its sections around CFAs and sweep."""
+    return f"""\
+study: {name}
+{curves}{before}cfas: {cfas}
+sweeps:
+  edges:
+    cfa: RYNCy
+    channel: N
+    base: Y
+    to: G
+    grid: {grid}
+{after}"""
+
+
+SCENES = stopband_study(
+    "scenes",
+    "{left_nm: [600, 610], left_width_nm: 20, right_nm: 650, right_width_nm: 10}",
+    before="""\
 wavelengths: {step_nm: 5}
 pixel: {read_noise_e: 2, offset_dn: 168}
 scenarios:
@@ -63,35 +85,18 @@ scenarios:
     noise: true
     each: {target.distance_m: [150, 250]}
 tolerance_dn: 5
-cfas: [RGGB, RYNCy]
-sweeps:
-  edges:
-    cfa: RYNCy
-    channel: N
-    base: Y
-    to: G
-    grid: {left_nm: [600, 610], left_width_nm: 20, right_nm: 650, right_width_nm: 10}
-"""
+""",
+)
 
-
-LARGE = """
-study: large
-sensor: ar0820
-lights: tl16
-cfas: [RGGB, RYNCy]
-sweeps:
-  edges:
-    cfa: RYNCy
-    channel: N
-    base: Y
-    to: G
-    grid:
+LARGE = stopband_study(
+    "large",
+    """
       left_nm: {min: 580, max: 620, count: LEFT}
       left_width_nm: {min: 5, max: 40, count: 25}
       right_nm: {min: 640, max: 680, count: 50}
-      right_width_nm: {min: 5, max: 40, count: 40}
-constraints: {sensitivity: {min: 0.9}}
-"""
+      right_width_nm: {min: 5, max: 40, count: 40}""",
+    after="constraints: {sensitivity: {min: 0.9}}\n",
+)
 
 
 def large(folder: Path, left: int) -> Path:

@@ -24,6 +24,5 @@ def commanded(*arguments: object) -> tuple[int, str, str]:
 
 
 def sweep(*arguments: str) -> subprocess.CompletedProcess[str]:
-    import sys
-
+    """The command in a process of its own."""
     return subprocess.run([sys.executable, "-m", "sweep", *arguments], capture_output=True, text=True, check=False)

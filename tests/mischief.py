@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sweep.designs.block import Edges
+from sweep.designs.block import EdgeBlock
 from sweep.designs.families.stopband import MultiStopband
 from sweep.designs.space import Filter
 from sweep.results.identity import CHUNK
@@ -80,4 +80,4 @@ def plant(patch: pytest.MonkeyPatch) -> None:
     def broken(*_: Any) -> Any:
         raise KeyError("planted")
 
-    patch.setattr(Edges, "product", broken)
+    patch.setattr(EdgeBlock, "product", broken)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ PACKAGE = Path(__file__).parent.parent / "sweep"
 # From the bottom. A unit is a module or a folder of the package.
 LEVELS = [
     {"errors"},
-    {"types", "cache", "disk"},
+    {"types", "cache", "disk", "found"},
     *({room} for room in ("curves", "designs", "camera", "metrics", "search", "study", "results", "run", "report")),
     {"commands"},
     {"__main__"},
@@ -20,13 +21,13 @@ LEVELS = [
 """Files that all rooms share, then the rooms from the lowest to the highest."""
 ONLY_USER = {
     "nlopt": ["search/solver"],
-    "joblib": ["run/", "commands/calibrate/"],
+    "joblib": ["run/"],
     "moocore": ["metrics/pareto"],
     "plotly": ["report/"],
     "jinja2": ["report/"],
     "typer": ["commands/"],
     "sklearn": ["metrics/recognition"],
-    "numba": ["designs/compiled", "camera/compiled", "camera/plan/compiled", "metrics/compiled"],
+    "numba": ["designs/compiled", "camera/compiled", "camera/plan/compiled", "metrics/compiled", "metrics/nearest"],
 }
 """Who alone may import a library: files, or all of a folder."""
 
@@ -174,3 +175,62 @@ def test_a_circle_is_found(tmp_path: Path, there: str, back: str) -> None:
     (tmp_path / folder / "__init__.py").write_text("from .b import x")
     (tmp_path / "camera" / "__init__.py").write_text("from .effects.b import x")
     assert len(circles(tmp_path)) == 1
+
+
+CONVENTIONS = {"PANEL", "lights", "Options"}
+"""What recipes ask of every file of a folder."""
+MOST_LINES, MOST_LINES_OF_A_FUNCTION = 300, 60
+
+
+def public_names(root: Path) -> dict[str, set[str]]:
+    """What the files of a package define for others, with the files."""
+    found: dict[str, set[str]] = {}
+    for path in root.rglob("*.py"):
+        for node in ast.parse(path.read_text()).body:
+            names = [node.name] if isinstance(node, ast.FunctionDef | ast.ClassDef) else []
+            if isinstance(node, ast.Assign):
+                names = [target.id for target in node.targets if isinstance(target, ast.Name)]
+            if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+                names = [node.target.id]
+            for name in names:
+                if not name.startswith("_") and not re.fullmatch(r"_?[A-Z]", name) and name not in CONVENTIONS:
+                    found.setdefault(name, set()).add(path.relative_to(root).as_posix())
+    return found
+
+
+def too_long(root: Path) -> list[str]:
+    found = []
+    for path in sorted(root.rglob("*.py")):
+        text = path.read_text()
+        if len(text.splitlines()) > MOST_LINES:
+            found.append(f"{path.relative_to(root)} has {len(text.splitlines())} lines")
+        for node in ast.walk(ast.parse(text)):
+            if (
+                isinstance(node, ast.FunctionDef)
+                and node.end_lineno
+                and node.end_lineno - node.lineno >= MOST_LINES_OF_A_FUNCTION
+            ):
+                found.append(f"{path.relative_to(root)}: {node.name} has {node.end_lineno - node.lineno + 1} lines")
+    return found
+
+
+def test_no_name_means_two_things() -> None:
+    """A command is called as its file in `verbs`, and so is the function there."""
+    names = public_names(PACKAGE)
+    assert {name: files for name, files in names.items() if len(files) > 1} == {}
+
+
+def test_modules_and_functions_are_short() -> None:
+    assert too_long(PACKAGE) == []
+
+
+def test_what_is_long_or_means_two_things_is_found(tmp_path: Path) -> None:
+    plant(
+        tmp_path,
+        {
+            "a/one.py": "def same() -> None: ...\n" + "x = 1\n" * 300,
+            "b/two.py": "same = 1\ndef f():\n" + "    g()\n" * 60,
+        },
+    )
+    assert public_names(tmp_path)["same"] == {"a/one.py", "b/two.py"}
+    assert too_long(tmp_path) == ["a/one.py has 301 lines", "b/two.py: f has 61 lines"]

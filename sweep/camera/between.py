@@ -21,7 +21,8 @@ from scipy.ndimage import maximum_filter1d
 from ..types import BoolArray, FloatArray, IndexArray
 from . import kernel
 from .effects import blur, crosstalk, demosaic, phase, sampling
-from .view import Methods, Setup
+from .methods import Methods
+from .view import View
 
 _SEGMENTS = 8
 """Parts of a pixel's edge over which the image's slope is bounded one by one."""
@@ -147,24 +148,24 @@ class Deviation(NamedTuple):
 class Between:
     """Bounds between places, for one way to compute the kernel of a scene."""
 
-    def __init__(self, setup: Setup, methods: Methods, knots_nm: FloatArray) -> None:
+    def __init__(self, view: View, methods: Methods, knots_nm: FloatArray) -> None:
         """The kernel is linear between the wavelengths `knots_nm`; a band is some of their intervals."""
-        target, n = setup.scenario.target, len(setup.mosaic.channels)
+        target, n = view.scenario.target, len(view.mosaic.channels)
         assert target is not None
-        self._setup, self._methods, self._target = setup, methods, target
-        self._half = setup.pixel.fill_factor**0.5 / 2
-        self._radii = sampling.radii_px(setup, target)
-        self._reach = sampling.reach_px(setup, target) + 0.5
-        self._share = 0.0 if methods.crosstalk == "skip" else setup.pixel.crosstalk
-        profile = kernel.profile_of(setup, methods, knots_nm)
-        self._knots_nm, self._pitch_um = knots_nm, setup.pixel.pitch_um
+        self._view, self._methods, self._target = view, methods, target
+        self._half = view.pixel.fill_factor**0.5 / 2
+        self._radii = sampling.radii_px(view, target)
+        self._reach = sampling.reach_px(view, target) + 0.5
+        self._share = crosstalk.share(view, methods.crosstalk)
+        profile = kernel.profile_of(view, methods, knots_nm)
+        self._knots_nm, self._pitch_um = knots_nm, view.pixel.pitch_um
         n_bands = min(_BANDS, knots_nm.size - 1) if profile is not None else 0
         self._ends = np.linspace(0, knots_nm.size - 1, n_bands + 1).astype(int) if n_bands else np.zeros(1, dtype=int)
-        total = setup.lights.photons.sum(axis=0)
-        self._middle = int(np.abs(knots_nm - setup.grid.nodes_nm @ total / total.sum()).argmin())
+        total = view.lights.photons.sum(axis=0)
+        self._middle = int(np.abs(knots_nm - view.grid.nodes_nm @ total / total.sum()).argmin())
         self._images = None if profile is None else self._images_of(profile)
         # What each pixel of a channel takes of the light through each channel's filter: mean, and largest deviation.
-        whole = (setup.mosaic.indices[..., None] == np.arange(n)).astype(float)
+        whole = (view.mosaic.indices[..., None] == np.arange(n)).astype(float)
         taken = crosstalk.mixed(whole[None], self._share, periodic=True)[0]
         own = [taken[whole[..., to] > 0] for to in range(n)]
         self._taken = np.stack([pixels.mean(axis=0) for pixels in own])
@@ -190,7 +191,7 @@ class Between:
         whole = np.abs(light.sum(axis=-1, keepdims=True))
         if self.n_parts == 1:
             return np.asarray(whole, dtype=float)
-        band = np.searchsorted(self._knots_nm[self._ends[1:-1]], self._setup.grid.nodes_nm)
+        band = np.searchsorted(self._knots_nm[self._ends[1:-1]], self._view.grid.nodes_nm)
         return np.concatenate([whole, np.abs(light) @ np.eye(self.n_parts - 1)[band]], axis=-1)
 
     def _kernel_ranges(self, corners: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
@@ -206,7 +207,7 @@ class Between:
 
         `corners`: kernel at their corners, ndarray[n, 4, n_channels, n_channels, n_knots or 1].
         """
-        step = max(1, _AT_ONCE // (kernel.pixels_per_place(self._setup) * len(self._setup.mosaic.channels)))
+        step = max(1, _AT_ONCE // (kernel.pixels_per_place(self._view) * len(self._view.mosaic.channels)))
         of = self._of_center if self._target.readout == "center" else self._of_mean
         parts = [
             of(centers[at : at + step], h, homes[at : at + step], corners[at : at + step])
@@ -223,13 +224,13 @@ class Between:
 
     def _own(self, seen: sampling.Window) -> FloatArray:
         """Which channel is whose, ndarray[rows, columns, n_channels]."""
-        return np.asarray(seen.channel[..., None] == np.arange(len(self._setup.mosaic.channels)), dtype=float)
+        return np.asarray(seen.channel[..., None] == np.arange(len(self._view.mosaic.channels)), dtype=float)
 
     def _of_center(self, centers: FloatArray, h: float, homes: FloatArray, _: FloatArray) -> Deviation:
         """The weights of a demosaicked pixel are the same in the whole cell."""
-        seen = sampling.window(self._setup.mosaic, centers, self._reach)
+        seen = sampling.window(self._view.mosaic, centers, self._reach)
         own = self._own(seen)
-        weights = demosaic.center_weights(seen, homes - centers, self._methods.demosaic, self._setup.mosaic)
+        weights = demosaic.center_weights(seen, homes - centers, self._methods.demosaic, self._view.mosaic)
         spread = crosstalk.mixed(weights[..., None] * own, self._share)
         wanted = np.asarray((spread > 0).any(axis=3))
         cell, row, column = np.nonzero(wanted)
@@ -243,7 +244,7 @@ class Between:
         """See the head of this file. A ratio k = M / D is that of the interpolations, r, but for dev(M - r D) / D; r is
         a mean of the corners' values, and dev(M - r D) is the sum of dev(weight x (light - r)) over the pixels.
         """
-        seen = sampling.window(self._setup.mosaic, centers, self._reach)
+        seen = sampling.window(self._view.mosaic, centers, self._reach)
         own = self._own(seen)
         area = _of_disc(seen.dx, seen.dy, self._half, self._radii[1], h)
         sudden = area.jump[0] + area.jump[1]

@@ -16,9 +16,10 @@ from ..designs.block import Block
 from ..designs.products import row_products
 from ..types import BoolArray, FloatArray
 from .effects import flicker, quadrature
+from .exposure import exposure_times, white_irradiance
 from .kernel import Kernel
-from .scene import WhitePatchExposure
-from .view import Setup, background_irradiance, exposure_times, per_photon, signal_irradiance, white_irradiance
+from .registry import factor_of_light
+from .view import View, background_irradiance, per_photon, signal_irradiance
 
 _KEPT = 15_000_000
 """Largest table of signals times kernel that is kept."""
@@ -40,23 +41,28 @@ class Changing:
 
 
 class Electrons:
-    """What a kernel gives of designs. `work` counts the values that are computed, by effect."""
+    """What a kernel gives of designs. `work` counts the values that are computed, by effect.
 
-    def __init__(self, setup: Setup, kernel: Kernel, work: Counter[str], dtype: DTypeLike = np.float64) -> None:
+    `kernel`: the scene's. `signals`, `background`, `white`: electrons/s for each QE of light, background and the
+    white patch at every wavelength, ndarray[n_signals, n_wavelengths] and ndarray[n_wavelengths]. `fixed`: electrons/s
+    of what no design changes, ndarray[n_cases, n_signals, n_units].
+    """
+
+    def __init__(self, view: View, kernel: Kernel, work: Counter[str], dtype: DTypeLike = np.float64) -> None:
         """`dtype`: of the product of curves and scene, where the scene's table is small enough to be kept."""
-        self.setup = setup
+        self.view = view
         self._work = work
-        self._light, self._uniform = kernel.light, kernel.uniform
-        self._nodes = quadrature.nodes(setup.grid.size, setup.methods.quadrature)
-        at_all = self._nodes.size == setup.grid.size
-        self._hats = None if at_all else quadrature.hats(setup.grid.size, self._nodes)
-        self.signals = signal_irradiance(setup) * per_photon(setup)
-        self._background = background_irradiance(setup) * per_photon(setup)
-        self._white = white_irradiance(setup) * per_photon(setup)
-        fixed, modified = list(setup.fixed), list(setup.modified)
-        # Electrons/s of what no design changes, [n_cases, n_signals, n_units] and [n_cases, n_units].
-        self._fixed = self._products(kernel.light[:, :, fixed], setup.qe[None, fixed])[0]
-        self._fixed_uniform = kernel.uniform[:, :, fixed] @ (setup.qe[fixed] @ self._background)
+        self.kernel = kernel
+        self._nodes = quadrature.nodes(view.grid.size, view.methods.quadrature)
+        at_all = self._nodes.size == view.grid.size
+        self._hats = None if at_all else quadrature.between_nodes(view.grid.size, self._nodes)
+        self.signals = signal_irradiance(view) * per_photon(view)
+        dimmed = factor_of_light(view, view.methods, view.grid.nodes_nm, background=True)
+        self.background = background_irradiance(view) * per_photon(view) * dimmed
+        self.white = white_irradiance(view) * per_photon(view)
+        fixed, modified = list(view.fixed), list(view.modified)
+        self.fixed = self._products(kernel.light[:, :, fixed], view.qe[None, fixed])[0]
+        self._fixed_uniform = kernel.uniform[:, :, fixed] @ (view.qe[fixed] @ self.background)
         self._modified_uniform = kernel.uniform[:, :, modified]
         # Units that look through a filter that changes; electrons/s per QE of it, kept where the table is small.
         self._touched = np.flatnonzero((kernel.light[:, :, modified] != 0).any(axis=(0, 2, 3)))
@@ -71,7 +77,7 @@ class Electrons:
     def _products(self, light: FloatArray, qe: FloatArray) -> FloatArray:
         """Sum over channels and wavelengths of kernel, QE and signals, [n_designs, n_cases, n_signals, n_units]."""
         cases, units, channels, _ = light.shape
-        size, n, n_signals = self.setup.grid.size, len(qe), len(self.signals)
+        size, n, n_signals = self.view.grid.size, len(qe), len(self.signals)
         weights = np.broadcast_to(light, (cases, units, channels, size)).reshape(cases * units, channels * size)
         seen = self._looked_at(qe)[:, :, None] * self.signals  # [n_designs, channels, n_signals, n_wavelengths]
         moved = np.moveaxis(seen, 2, 1).reshape(n, n_signals, channels * size)
@@ -92,7 +98,7 @@ class Electrons:
 
         `curves`: QE of the modified channels, ndarray[n_designs, n_modified, n_wavelengths].
         """
-        found = np.repeat(self._fixed[None], len(curves), axis=0)
+        found = np.repeat(self.fixed[None], len(curves), axis=0)
         if not self._touched.size:
             return found
         if self._kept is None:
@@ -100,30 +106,30 @@ class Electrons:
         else:
             qe = curves[:, :, self._nodes].reshape(len(curves), -1).astype(self._kept.dtype)
             self._work["response"] += len(curves) * self._kept.size
-            part = row_products(qe, self._kept).reshape(len(curves), *self._fixed.shape[:2], self._touched.size)
+            part = row_products(qe, self._kept).reshape(len(curves), *self.fixed.shape[:2], self._touched.size)
         found[..., self._touched] += part
         return found
 
     def exposure_s(self, curves: FloatArray) -> FloatArray:
         """Exposure of each design, s, ndarray[n_designs]."""
-        return exposure_times(self.setup, curves @ self._white)
+        return exposure_times(self.view, curves @ self.white)
 
     def scales(self, exposure_s: FloatArray) -> FloatArray:
         """Light relative to its mean in the cases of a pulsed light, ndarray[n_designs, n_scales]."""
-        found = flicker.scales(self.setup, self.setup.methods.flicker, exposure_s)
+        found = flicker.scales(self.view, self.view.methods.flicker, exposure_s)
         if found.shape[1] > 1:
             self._work["flicker"] += found.size
         return found
 
     def expected(self, curves: FloatArray, scales: FloatArray, exposure_s: FloatArray) -> FloatArray:
         """Expected electrons before the full well, ndarray[n_designs, n_cases x n_scales, n_signals, n_units]."""
-        uniform = self._fixed_uniform + self._through_filters(curves @ self._background)
-        uniform = uniform + self.setup.pixel.dark_e_per_s
+        uniform = self._fixed_uniform + self.through_filters(curves @ self.background)
+        uniform = uniform + self.view.pixel.dark_e_per_s
         both = self.rates(curves)[:, :, None] * scales[:, None, :, None, None] + uniform[:, :, None, None, :]
         flat = both.reshape(len(curves), -1, *both.shape[3:])
         return np.asarray(flat * exposure_s[:, None, None, None], dtype=float)
 
-    def _through_filters(self, rates: FloatArray) -> FloatArray:
+    def through_filters(self, rates: FloatArray) -> FloatArray:
         """What the units get of a uniform light, ndarray[n_designs, n_cases, n_units].
 
         `rates`: electrons/s of the modified channels, ndarray[n_designs, n_modified].
@@ -139,69 +145,33 @@ class Electrons:
         Needs a modified channel that no other unit looks through, and a light that does not pulse. Designs whose
         modified channel sets the exposure are left out.
         """
-        setup = self.setup
+        view = self.view
         touched = np.flatnonzero((self._modified_uniform != 0).any(axis=(0, 2)))
-        if len(setup.modified) != 1 or self._kept is None or self._touched.size != 1:
+        if len(view.modified) != 1 or self._kept is None or self._touched.size != 1:
             return None
         if not np.array_equal(touched, self._touched):
             return None
-        everywhere = np.arange(setup.grid.size)
-        time_s = exposure_times(setup, np.zeros((1, 1)))
-        which = exposure_times(setup, block.product(self._white[:, None], everywhere)) == time_s
+        everywhere = np.arange(view.grid.size)
+        time_s = exposure_times(view, np.zeros((1, 1)))
+        which = exposure_times(view, block.product(self.white[:, None], everywhere)) == time_s
         if not which.any() or not np.isfinite(time_s[0]) or self.scales(time_s).shape[1] > 1:
             return None
         some = block if which.all() else block.some(np.flatnonzero(which))
         unit = int(self._touched[0])
         self._work["response"] += len(some) * self._kept.size
-        part = some.product(self._kept, self._nodes).reshape(len(some), len(self._fixed), -1)
-        uniform = some.product(self._background[:, None], everywhere) * self._modified_uniform[:, unit, 0]
-        uniform = self._fixed_uniform[:, unit] + uniform + setup.pixel.dark_e_per_s
-        rest = self._fixed + (self._fixed_uniform + setup.pixel.dark_e_per_s)[:, None]
-        values = (self._fixed[:, :, unit] + part + uniform[:, :, None]) * time_s[0]
+        part = some.product(self._kept, self._nodes).reshape(len(some), len(self.fixed), -1)
+        uniform = some.product(self.background[:, None], everywhere) * self._modified_uniform[:, unit, 0]
+        uniform = self._fixed_uniform[:, unit] + uniform + view.pixel.dark_e_per_s
+        rest = self.fixed + (self._fixed_uniform + view.pixel.dark_e_per_s)[:, None]
+        values = (self.fixed[:, :, unit] + part + uniform[:, :, None]) * time_s[0]
         return Changing(rest * time_s[0], unit, values, float(time_s[0]), which)
-
-    def gradient(self, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
-        """Exact derivative of `expected` at one design, with that of its exposure; a pulse's share of it is held.
-
-        `curves`: ndarray[n_modified, n_wavelengths]; `curves_gradient`: ndarray[n_parameters, n_modified,
-        n_wavelengths]. Returns electrons per unit of parameter, ndarray[n_parameters, n_cases x n_scales, n_signals,
-        n_units].
-        """
-        one = curves[None]
-        exposure_s = self.exposure_s(one)
-        scales = self.scales(exposure_s)
-        whole = self.expected(one, scales, exposure_s)[0]
-        light = (self.rates(curves_gradient) - self._fixed)[:, :, None] * scales[0][None, None, :, None, None]
-        uniform = self._through_filters(curves_gradient @ self._background)
-        slope = (light + uniform[:, :, None, None, :]).reshape(len(curves_gradient), *whole.shape) * exposure_s
-        if isinstance(self.setup.scenario.exposure, WhitePatchExposure):
-            rates = one[0] @ self._white
-            fixed = self.setup.qe[list(self.setup.fixed)] @ self._white
-            if rates.size and rates.max() > fixed.max(initial=0.0):
-                top = int(np.argmax(rates))
-                relative = (curves_gradient[:, top] @ self._white) / rates[top]
-                slope = slope - relative[:, None, None, None] * whole
-        return np.asarray(slope, dtype=float)
 
     def light_dn(self, curves: FloatArray, exposure_s: float) -> FloatArray:
         """What each signal gives through each channel's filter where its image is whole, in a pulse's darkest moment.
 
         `curves`: of one design, ndarray[n_modified, n_wavelengths]. DN, ndarray[n_signals, n_channels, n_wavelengths].
         """
-        qe = self.setup.qe.copy()
-        qe[list(self.setup.modified)] = curves
-        scale = self.scales(np.array([exposure_s]))[0].min() * exposure_s * self.setup.pixel.dn_per_e
+        qe = self.view.qe.copy()
+        qe[list(self.view.modified)] = curves
+        scale = self.scales(np.array([exposure_s]))[0].min() * exposure_s * self.view.pixel.dn_per_e
         return np.asarray(self.signals[:, None] * self._looked_at(qe) * scale, dtype=float)
-
-    def per_qe(self, modified: int, curves: FloatArray) -> FloatArray:
-        """DN per QE of one modified channel at every wavelength, with the exposure of the design `curves`.
-
-        ndarray[n_cases, n_signals, n_units, n_wavelengths]; the smooth response is linear in it where N does not set
-        the exposure.
-        """
-        exposure_s = self.exposure_s(curves[None])
-        scales = self.scales(exposure_s)[0]
-        light = self._light[:, None, None, :, self.setup.modified[modified]] * self.signals[:, None, :]
-        uniform = self._uniform[:, None, None, :, self.setup.modified[modified], None] * self._background
-        both = light * scales[None, :, None, None, None] + uniform
-        return np.asarray(both.reshape(-1, *both.shape[2:]) * (exposure_s[0] * self.setup.pixel.dn_per_e), dtype=float)

@@ -1,7 +1,7 @@
 """The image chain of a scene: light on the pixels, electrons, full well, readout, for a block of designs.
 
 In the physical order: optics blur, pixel aperture and mosaic sampling with crosstalk (the kernel), photon noise, full
-well, read noise, pedestal, ADC, readout. Only what `Setup.methods` names is computed.
+well, read noise, pedestal, ADC, readout. Only what `View.methods` names is computed.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import hashlib
 import pickle
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -24,10 +24,9 @@ from .effects import phase
 from .electrons import Changing, Electrons
 from .kernel import blocks, make_kernel
 from .noisy_readout import NoisyReadout
-from .pixel import unquantized
 from .places import AnyPlace
 from .readout import Readout
-from .view import Methods, Setup
+from .view import View
 
 _BLOCK = 2_000_000
 """Values of a block of pixels that are held at once."""
@@ -41,7 +40,7 @@ class Imager:
 
     def __init__(
         self,
-        setup: Setup,
+        view: View,
         work: Counter[str] | None = None,
         dtype: DTypeLike = np.float64,
         cases: phase.Cases | None = None,
@@ -49,19 +48,19 @@ class Imager:
         """`dtype`: of the product of curves and scene, where the scene's table is small enough to be kept. `cases`:
         places of the light instead of those of the method of `phase`.
         """
-        self.setup = setup
+        self.view = view
         self.work: Counter[str] = Counter() if work is None else work
-        methods, grid = setup.methods, setup.grid
-        by_pixel, targeted = not methods.straight, setup.scenario.target is not None
-        every = blocks(setup, phase.cases(setup, methods.phase) if cases is None else cases) if targeted else []
+        methods, grid = view.methods, view.grid
+        by_pixel, targeted = not methods.straight, view.scenario.target is not None
+        every = blocks(view, phase.cases(view, methods.phase) if cases is None else cases) if targeted else []
         # Where the kernels of all places would be too large to hold, those of the others are made as they are read.
         self._others = every[1:] if by_pixel and methods.sampling != "skip" else []
         cases = every[0] if self._others else cases
-        kernel = make_kernel(setup, methods, grid.nodes_nm, by_pixel=by_pixel, work=self.work, cases=cases)
+        kernel = make_kernel(view, methods, grid.nodes_nm, by_pixel=by_pixel, work=self.work, cases=cases)
         self.n_cases, self.n_units = kernel.light.shape[:2]
         self.n_places = self.n_cases + sum(len(block.places_px) for block in self._others)
-        self.electrons = Electrons(setup, kernel, self.work, dtype)
-        self.readout = Readout(setup, kernel, self.work)
+        self.electrons = Electrons(view, kernel, self.work, dtype)
+        self.readout = Readout(view, kernel, self.work)
 
     def read_changing(self, block: Block) -> Changing | None:
         """`Electrons.changing` as read, DN; None, too, where a channel is read from several units."""
@@ -71,23 +70,10 @@ class Imager:
         transfer = self.readout.transfer
         return replace(found, fixed=transfer(found.fixed), values=transfer(found.values))
 
-    def smooth(self, curves: FloatArray) -> FloatArray:
-        """Unquantized, unclipped response, DN, ndarray[n_designs, n_cases, n_signals, n_channels]."""
-        exposure_s = self.electrons.exposure_s(curves)
-        expected = self.electrons.expected(curves, self.electrons.scales(exposure_s), exposure_s)
-        return self.readout.folded(unquantized(expected, self.readout.pixel))
-
-    def smooth_gradient(self, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
-        """Exact derivative of `smooth` at one design, as `Electrons.gradient`.
-
-        Returns DN per unit of parameter, ndarray[n_parameters, n_cases, n_signals, n_channels].
-        """
-        return self.readout.folded(self.electrons.gradient(curves, curves_gradient) * self.setup.pixel.dn_per_e)
-
     @cached_property
     def anywhere(self) -> AnyPlace | None:
         """The scene with the light at any place, where that is asked for and more than a lattice of places counts."""
-        return AnyPlace(self.setup, self.work) if phase.all_count(self.setup) else None
+        return AnyPlace(self.view, self.work) if phase.all_count(self.view, self.view.methods) else None
 
     def read(self, curves: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The readout, DN, ndarray[n_designs, n_cases, n_signals, n_channels], and exposure, s, ndarray[n_designs]."""
@@ -97,12 +83,12 @@ class Imager:
 
     def _rest(self) -> Iterator[Imager]:
         """The places whose kernels are not held, block by block."""
-        return (Imager(self.setup, self.work, cases=block) for block in self._others)
+        return (Imager(self.view, self.work, cases=block) for block in self._others)
 
     def read_with_noise(self, curves: FloatArray) -> NoisyReadout:
         """The readout as from `read`, with its variance and what errors need to know of it.
 
-        Pixels are read one by one, so saturation and quantization must be among the setup's methods.
+        Pixels are read one by one, so saturation and quantization must be among the view's methods.
         """
         exposure_s = self.electrons.exposure_s(curves)
         parts = [self.readout.with_noise(electrons) for electrons in self._blocks(curves, exposure_s)]
@@ -132,22 +118,14 @@ class Imager:
             raise SweepError(Fault("too many pixels to draw", value=f"{self.n_places} places", allowed=most))
         exposure_s = self.electrons.exposure_s(curves)
         found = self.electrons.expected(curves, self.electrons.scales(exposure_s), exposure_s)
-        if self.readout.by_tile:
-            return found[..., self.setup.mosaic.indices.ravel()]
+        if self.readout.by_channel and self.view.scenario.target is None:
+            return found[..., self.view.mosaic.indices.ravel()]
         return found
 
 
 _imagers: Cache[bytes, Imager] = Cache(16)
 
 
-def imager_of(setup: Setup) -> Imager:
-    """The imager of a setup; the latest ones are kept, so that a kernel is made once in a process."""
-    return _imagers.get(hashlib.sha256(pickle.dumps(setup)).digest(), lambda: Imager(setup))
-
-
-def smooth_imager(setup: Setup) -> Imager:
-    """The imager of a setup without clipping and rounding, on every wavelength: what a search sees."""
-    straight = {"saturation": "skip", "quantization": "skip", "noise": "skip", "quadrature": "grid"}
-    if setup.methods.flicker == "fine":  # of a straight response the ends are the extremes
-        straight["flicker"] = "ends"
-    return imager_of(replace(setup, methods=Methods(**{**asdict(setup.methods), **straight})))
+def imager_of(view: View) -> Imager:
+    """The imager of a view; the latest ones are kept, so that a kernel is made once in a process."""
+    return _imagers.get(hashlib.sha256(pickle.dumps(view)).digest(), lambda: Imager(view))

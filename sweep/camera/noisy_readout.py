@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..types import BoolArray, FloatArray
-from .effects import noise_table
+from .noisy import table
 from .pixel import Pixel
 
 _DITHERED_DN = 0.7
@@ -34,7 +34,7 @@ class NoisyReadout:
 
 def is_cut(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     """1 where the full well or an end of the ADC cuts a pixel's noise, else 0; of expected electrons of any shape."""
-    low, high = noise_table.unclipped_e(pixel)
+    low, high = table.unclipped_e(pixel)
     return ((electrons < low) | (electrons > high)).astype(float)
 
 

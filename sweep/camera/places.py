@@ -16,12 +16,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..cache import Cache
+from ..curves.hats import hats
 from ..curves.lights import Pair, class_pairs
 from ..types import FloatArray, IndexArray
 from .between import Between, Deviation
-from .effects import blur, extinction, illumination, phase
+from .effects import blur, phase
+from .effects.base import KernelEffect
 from .kernel import make_kernel
-from .view import REFERENCE, Setup
+from .methods import REFERENCE
+from .registry import EFFECTS, WHOLE_LIGHT, factor_of_light
+from .view import View
 
 _UNIT_PX = 2.0**-40
 """Places are told apart in this unit."""
@@ -48,10 +52,10 @@ class Extremes:
 class _Geometry:
     """Kernels at places and in cells of places, kept: what designs, spaces and tolerances of one scene share."""
 
-    def __init__(self, setup: Setup) -> None:
-        self._setup, wave = setup, setup.grid.nodes_nm
-        self.knots_nm = wave if setup.methods.blur == "skip" else blur.knots(wave, setup.methods.blur)
-        self.between = Between(setup, setup.methods, self.knots_nm)
+    def __init__(self, view: View) -> None:
+        self._view, wave = view, view.grid.nodes_nm
+        self.knots_nm = wave if view.methods.blur == "skip" else blur.knots(wave, view.methods.blur)
+        self.between = Between(view, view.methods, self.knots_nm)
         self._kernels: dict[tuple[int, ...], FloatArray] = {}
         self._deviations: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
         self._one_at_a_time = threading.Lock()
@@ -64,7 +68,7 @@ class _Geometry:
 
     def _named(self, places: FloatArray, homes: FloatArray) -> list[tuple[int, ...]]:
         """A name for each place (ndarray[n, 2]), with the pixel that is read out there, where one is."""
-        target = self._setup.scenario.target
+        target = self._view.scenario.target
         assert target is not None
         names = np.rint(places / _UNIT_PX).astype(np.int64)
         if target.readout == "center":
@@ -79,8 +83,8 @@ class _Geometry:
             self._kernels.clear()
         new = {name: at for at, name in enumerate(names) if name not in self._kernels}
         if new:
-            cases, methods = corners.some(np.array(list(new.values()))), self._setup.methods
-            made = make_kernel(self._setup, methods, self.knots_nm, by_pixel=False, work=work, cases=cases)
+            cases, methods = corners.some(np.array(list(new.values()))), self._view.methods
+            made = make_kernel(self._view, methods, self.knots_nm, by_pixel=False, work=work, cases=cases)
             work["places"] += len(new)
             whole = np.broadcast_to(made.light, (*made.light.shape[:3], self.knots_nm.size))
             self._kernels |= dict(zip(new, whole, strict=True))
@@ -108,13 +112,12 @@ def forget_geometries() -> None:
     _geometries.clear()
 
 
-def _geometry_of(setup: Setup) -> _Geometry:
+def _geometry_of(view: View) -> _Geometry:
     """The geometry of a scene: filters, noise and the light's way to the lens have no part in it."""
-    kept = {effect: getattr(setup.methods, effect) for effect in ("sampling", "demosaic", "blur", "crosstalk")}
-    methods = replace(REFERENCE, **kept, extinction="skip", illumination="skip")
-    bare = replace(
-        setup, methods=methods, modified=(), qe=np.zeros_like(setup.qe), clear_qe=np.zeros_like(setup.clear_qe)
-    )
+    own = [name for name, effect in EFFECTS.items() if isinstance(effect, KernelEffect) and not effect.is_limit]
+    kept = {name: getattr(view.methods, name) for name in own}
+    methods = replace(REFERENCE, **kept, **WHOLE_LIGHT)
+    bare = replace(view, methods=methods, modified=(), qe=np.zeros_like(view.qe), clear_qe=np.zeros_like(view.clear_qe))
     return _geometries.get(hashlib.sha256(pickle.dumps(bare)).digest(), lambda: _Geometry(bare))
 
 
@@ -124,15 +127,14 @@ class AnyPlace:
     `work` counts the places and cells that are computed; those of other designs of the scene are kept.
     """
 
-    def __init__(self, setup: Setup, work: Counter[str]) -> None:
-        within_dn, wave = phase.within_dn(setup.methods.phase), setup.grid.nodes_nm
+    def __init__(self, view: View, work: Counter[str]) -> None:
+        within_dn, wave = phase.within_dn(view.methods.phase), view.grid.nodes_nm
         if within_dn is None:
-            raise ValueError(f"{setup.methods.phase!r} looks at a lattice of places")
-        self.within_dn, self.members = within_dn, setup.members
-        self._mosaic, self._work, self._geometry = setup.mosaic, work, _geometry_of(setup)
-        self._hats = np.stack([np.interp(wave, self._geometry.knots_nm, unit) for unit in np.eye(self.n_knots)])
-        falls = illumination.factor(setup, setup.methods.illumination)
-        self._dimmed = falls * extinction.transmittance(setup, setup.methods.extinction, wave)
+            raise ValueError(f"{view.methods.phase!r} looks at a lattice of places")
+        self.within_dn, self.members = within_dn, view.members
+        self._mosaic, self._work, self._geometry = view.mosaic, work, _geometry_of(view)
+        self._hats = hats(wave, self._geometry.knots_nm)
+        self._dimmed = factor_of_light(view, view.methods, wave)
 
     @property
     def n_knots(self) -> int:

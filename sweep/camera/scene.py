@@ -114,16 +114,15 @@ def _noise(value: Any) -> Any:
     return value
 
 
-class Scenario(Section):
-    """What the camera sees, and how it is exposed.
+class Scene(Section):
+    """What the camera sees, and how it is exposed; `Scenario` adds what single effects ask for.
 
     Without a `target` every signal is a self-emissive patch that fills the field. Signals have the same photon count,
     `photon_radiance` (photons/s/sr/m^2, summed over the wavelength grid), or, with `intensity_cd`, the luminance of a
-    light of that luminous intensity and the target's diameter (0.2 m without a target). `visibility_m`: the distance at
-    which the air leaves 2 % (Koschmieder's meteorological range); it dims a target. `background_cd_m2`: light that is
-    added over the whole field, also in front of the target, flat in photons and not dimmed. `off_axis_deg`: field
-    angle. `noise`: photon, read and dark noise and PRNU act before the mean is taken; true, or figures of its own.
-    Limits: 1 to 1e40 photons (the sun's disc: 1e25), 1e-12 to 1e15 cd, a background up to 1e15 cd/m^2 (the sun: 2e9).
+    light of that luminous intensity and the target's diameter (0.2 m without a target). `background_cd_m2`: light that
+    is added over the whole field, also in front of the target, flat in photons. `drive`: of a pulsed LED. `noise`:
+    photon, read and dark noise and PRNU act before the mean is taken; true, or figures of its own. Limits: 1 to 1e40
+    photons (the sun's disc: 1e25), 1e-12 to 1e15 cd, a background up to 1e15 cd/m^2 (the sun: 2e9).
     """
 
     photon_radiance: float = Field(default=2e18, ge=1, le=1e40)
@@ -131,16 +130,12 @@ class Scenario(Section):
     exposure: Annotated[WhitePatchExposure | FixedExposure, Field(discriminator="kind")] = WhitePatchExposure()
     optics: Optics = Optics()
     target: Target | None = None
-    off_axis_deg: float = Field(default=0.0, ge=0, lt=90)
-    visibility_m: Meters | None = None
     background_cd_m2: float = Field(default=0.0, ge=0, le=1e15)
     drive: Drive | None = None
     noise: Annotated[Noise | None, BeforeValidator(_noise, json_schema_input_type=bool | Noise | None)] = None
 
     @model_validator(mode="after")
-    def _goes_together(self) -> Scenario:
-        if self.visibility_m is not None and self.target is None:
-            raise ValueError("visibility_m needs a target with a distance")
+    def _goes_together(self) -> Scene:
         if self.intensity_cd is not None and isinstance(self.exposure, WhitePatchExposure):
             raise ValueError("intensity_cd needs a fixed exposure: the white patch is given in photons")
         return self

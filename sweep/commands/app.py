@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from pkgutil import iter_modules
-
 import typer
 
+from ..found import files_in
 from . import verbs
 from .endings import ends_in_lines
 from .panels import PANELS
@@ -20,8 +18,7 @@ app = typer.Typer(
 
 
 def _add_verbs() -> None:
-    found = [import_module(f"{verbs.__name__}.{module.name}") for module in iter_modules(verbs.__path__)]
-    for module in sorted(found, key=lambda module: PANELS.index(module.PANEL)):
+    for module in sorted(files_in(verbs), key=lambda module: PANELS.index(module.PANEL)):
         function = module.__name__.rpartition(".")[2]
         app.command(function.rstrip("_"), rich_help_panel=module.PANEL)(getattr(module, function))
 

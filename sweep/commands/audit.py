@@ -12,15 +12,15 @@ import pandas as pd
 import pyarrow as pa
 
 from ..camera.imager import imager_of
-from ..camera.view import REFERENCE
+from ..camera.methods import REFERENCE
 from ..designs.space import Space
 from ..errors import Fault
-from ..metrics.evaluate import WORST, evaluate, is_promised
+from ..metrics.evaluate import evaluate
 from ..report import read_output, study_of
+from ..results.designs import row_space
 from ..results.inventory import Inventory
 from ..results.lock import locked
 from ..results.tables import AUDIT, RESULTS, batches
-from ..run.curves import row_space
 from ..search.problem import SHIFTS
 from ..study import Study
 from ..types import FloatArray, Progress
@@ -84,7 +84,7 @@ def sampled(table: pd.DataFrame, share: float = SHARE) -> pd.DataFrame:
     return table[wanted & (table["status"] == "ok")]
 
 
-def audit(study: Study, tables: Iterable[pd.DataFrame], progress: Progress = lambda *_: None) -> Audit:
+def audit_rows(study: Study, tables: Iterable[pd.DataFrame], progress: Progress = lambda *_: None) -> Audit:
     """Recompute the sample with the reference; `study` is the one that made the tables."""
     samples, n_designs = [], 0
     for table in tables:
@@ -103,7 +103,7 @@ def audit_output(folder: Path, data: Path | None, progress: Progress = lambda *_
     """Audit a finished run and write its rows beside it; errors as for `Inventory.write`."""
     output = read_output(folder, audited=False)
     study = study_of(output, data)
-    found = audit(study, (table.to_pandas() for table in batches(folder / RESULTS)), progress)
+    found = audit_rows(study, (table.to_pandas() for table in batches(folder / RESULTS)), progress)
     with locked(folder):
         Inventory(folder).write_table(AUDIT, pa.Table.from_pandas(found.rows, preserve_index=False))
     return found
@@ -118,7 +118,7 @@ def mend_audit(folder: Path, data: Path | None) -> None:
 
 def _rows(study: Study, sample: pd.DataFrame) -> Iterator[list[dict[str, object]]]:
     """The audited rows of a sample, a block of designs of one space and scenario at a time."""
-    promised = [name for name in sample.columns if is_promised(name)]
+    promised = [name for name, quantity in study.quantities.items() if quantity.promised]
     groups: dict[tuple[int, str], tuple[Space, list[dict[str, object]]]] = {}
     for row in sample.to_dict("records"):
         space = row_space(study, row)
@@ -151,9 +151,11 @@ def _compared(
 
 def _exact(study: Study, space: Space, scenario: str, points: FloatArray) -> dict[str, FloatArray]:
     """The promised columns with every effect on, ndarray[n_designs] each."""
-    imager = imager_of(replace(study.setup(space, scenario), methods=REFERENCE))
+    imager = imager_of(replace(study.view(space, scenario), methods=REFERENCE))
     shifts = [study.edge_shift_nm * s for s in SHIFTS if s] if study.edge_shift_nm and space.filter is not None else []
     cases = [evaluate(imager, space.curves(points, study.grid.size), study.states)]
     cases += [evaluate(imager, space.curves(points, study.grid.size, shift)) for shift in shifts]
-    found = {name: values for name, values in cases[0].items() if is_promised(name)}
-    return found | {WORST + name: np.min([case[name] for case in cases], axis=0) for name in found}
+    promised = [quantity for quantity in study.quantities.values() if quantity.promised]
+    worst = [quantity for quantity in promised if quantity.extreme == "worst edges"]
+    found = {quantity.name: cases[0][quantity.name] for quantity in promised if quantity not in worst}
+    return found | {quantity.name: quantity.worse([case[quantity.of] for case in cases]) for quantity in worst}

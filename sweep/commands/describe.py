@@ -13,8 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..curves.facts import Facts, Quantity, condensed, facts_of, notes
+from ..curves.facts import Facts, condensed, facts_of, notes
 from ..curves.files import scan_curves
+from ..curves.light_unit import LightUnit
 from ..curves.signal_color import LightColor
 from ..disk import read_input
 from ..errors import Fault, OutputError
@@ -46,7 +47,7 @@ class Description:
     faults: tuple[Fault, ...]
 
 
-def describe(path: Path, folder: Path, quantity: Quantity | None = None) -> Description:
+def described(path: Path, folder: Path, quantity: LightUnit | None = None) -> Description:
     """Describe a CSV or `.mat` file of curves and draw it to `folder`/<stem>.png.
 
     `quantity`: the curves are lights, in energy or photons; None guesses whether they are lights (then in energy) or
@@ -104,7 +105,7 @@ def _range(facts: Facts) -> str:
     return f"Wavelengths: {wave[0]:g} to {wave[-1]:g} nm{read_as}, {step}, {wave.size:,} samples."
 
 
-def _guess(facts: Facts, quantity: Quantity | None) -> str:
+def _guess(facts: Facts, quantity: LightUnit | None) -> str:
     if quantity is not None:
         return f"Read as light spectra in {quantity}, as --quantity says."
     broad, top = np.median([c.width_nm for c in facts.curves]), max(c.peak for c in facts.curves)

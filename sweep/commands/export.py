@@ -15,9 +15,8 @@ from ..camera.mosaic import Mosaic
 from ..curves.isetcam import color_hints, csv_text, filter_names, isetcam_mat, unique_names
 from ..errors import Fault, OutputError, SweepError, nearest
 from ..report import Output, check_kept, read_output, study_of
-from ..report.names import amount, readable
+from ..results.designs import row_curves
 from ..results.tables import RESULTS, batches, write_bytes
-from ..run.curves import row_curves
 from ..study import Study, folder_name
 from ..types import FloatArray
 
@@ -134,19 +133,19 @@ def _streamed(path: Path, design_id: int) -> dict[str, Any]:
 def filters_of(study: Study, row: Mapping[Any, Any]) -> Filters:
     """The channels of a row's CFA, with its filters computed from its parameters."""
     space, made = row_curves(study, row)
-    setup = study.setup(space, row["scenario"])
-    qe = setup.qe.copy()
-    qe[list(setup.modified)] = made[0]
+    view = study.view(space, row["scenario"])
+    qe = view.qe.copy()
+    qe[list(view.modified)] = made[0]
     channels, base = ((), "") if space.filter is None else (space.filter.channels, space.filter.base)
     base_qe = study.sensor.curve(base) if base else np.zeros(study.grid.size)
-    return Filters(setup.mosaic, study.grid.nodes_nm, qe, dict.fromkeys(channels, base), base_qe)
+    return Filters(view.mosaic, study.grid.nodes_nm, qe, dict.fromkeys(channels, base), base_qe)
 
 
 def _verify(output: Output, row: Mapping[Any, Any], filters: Filters) -> None:
     """Compare the filter with what the run kept of it, and with the row's sensitivity."""
     made = [filters.curves[channel] for channel in filters.bases]
-    kept = {f"{what}:{row['design_id']}:{k}": v for what in ("design", "front") for k, v in enumerate(made)}
-    check_kept(output, kept)
+    kept = output.curves.designs.get(int(row["design_id"]), {})
+    check_kept(output, kept, {channel: filters.curves[channel] for channel in filters.bases})
     if made:
         ratio = sum(values.sum() for values in made) / (len(made) * filters.base_qe.sum())
         if not abs(ratio - row["sensitivity"]) <= _SAME_TOTAL * max(1.0, ratio):
@@ -169,19 +168,19 @@ def _parameters(output: Output, row: Mapping[Any, Any]) -> dict[str, float]:
 
 def _design(output: Output, row: Mapping[Any, Any]) -> str:
     name = f"{row['name']}, " if isinstance(row["name"], str) else ""
-    return " ".join(f"{name}design {row['design_id']} of {output.study['study']}".split())
+    return " ".join(f"{name}design {row['design_id']} of {output.study.study}".split())
 
 
 def _comment(output: Output, row: Mapping[Any, Any], filters: Filters) -> str:
     own = ", ".join(f"{name}={value:.12g}" for name, value in _parameters(output, row).items())
     replaced = ", ".join(f"{channel} replaces {base}" for channel, base in filters.bases.items())
-    origin = output.provenance["sensor"]
-    kind = "surrogate: modeled, not measured" if origin["surrogate"] else f"from {origin['source']}"
+    origin = output.provenance.sensor
+    kind = "surrogate: modeled, not measured" if origin.surrogate else f"from {origin.source}"
     parts = [
         f"{row['cfa']}: {_design(output, row)}",
         *([f"{row['family']}: {replaced}; {own}"] if own else []),
         "data is QE, electrons per photon, filters and silicon together: set the pixel's spectral QE to 1",
-        f"sensor {origin['name']}, {kind}",
+        f"sensor {origin.name}, {kind}",
         "filterOrder is the tile",
     ]
     return ". ".join(" ".join(part.split()) for part in parts) + "."
@@ -196,14 +195,15 @@ def _lines(output: Output, row: Mapping[Any, Any], filters: Filters) -> list[str
         more = f" and {len(own) - _MOST_SHOWN} more" if len(own) > _MOST_SHOWN else ""
         lines.append(f"Parameters: {shown}{more}.")
     distances = ", ".join(
-        f"{readable(name).removesuffix(' CSD')} {amount(name, row[name], 1)}" for name in output.distances
+        f"{'/'.join(column.pair or ())} {column.amount(row[column.name])}"
+        for column in (output.columns[name] for name in output.distances)
     )
-    where = f" in {row['scenario']}" if len(output.study["scenarios"]) > 1 else ""
+    where = f" in {row['scenario']}" if len(output.scenarios) > 1 else ""
     modified = f"sensitivity {row['sensitivity']:.4f}, " if filters.bases else ""
     lines.append(f"CSDs{where}: {distances}; {modified}CFA sensitivity {row['cfa_sensitivity']:.4f}.")
     if not row["feasible"]:
         lines.append("Note: the design does not meet the study's constraints.")
-    if output.provenance["sensor"]["surrogate"]:
+    if output.provenance.sensor.surrogate:
         lines.append("Note: the curves are surrogates, modeled from stated parameters, not measured.")
     return lines
 

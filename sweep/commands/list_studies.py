@@ -7,7 +7,6 @@ from pathlib import Path
 
 from ..disk import is_folder, read_facts
 from ..errors import Fault, StudyError, SweepError
-from ..report.names import amount
 from ..results.folder import held_by
 from ..results.lock import holder
 from ..results.tables import PROVENANCE
@@ -71,8 +70,8 @@ def _state(study: Study, outputs: Path) -> str:
         return "interrupted"
     found = read_facts(folder / PROVENANCE).get("search") or {}
     best = found.get("best_smooth_objective")
-    column = study.objective.column
-    return "finished" if best is None else f"finished, search found {amount(column, best, 1)}"
+    goal = study.quantities[study.objective.column]
+    return "finished" if best is None else f"finished, search found {goal.amount(best)}"
 
 
 def _short(study: Study) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
@@ -16,7 +16,6 @@ RunFolder = Annotated[
     Path, typer.Argument(help="Output folder of a study.", show_default=False, autocompletion=run_folders)
 ]
 Outputs = Annotated[Path, typer.Option(help="Folder for the results of all studies.")]
-Quantity = Literal["energy", "photons"]
 DataFolder = Annotated[
     Path | None, typer.Option("--data", help="Folder that the study's files are looked for in first.")
 ]

@@ -1,7 +1,7 @@
 """Groups of commands in the help, in order."""
 
-STUDIES = "Studies"
-RESULTS = "Results"
-CURVES = "Files of curves"
-TOOL = "The tool itself"
-PANELS = (STUDIES, RESULTS, CURVES, TOOL)
+OF_STUDIES = "Studies"
+OF_RESULTS = "Results"
+OF_CURVES = "Files of curves"
+OF_TOOL = "The tool itself"
+PANELS = (OF_STUDIES, OF_RESULTS, OF_CURVES, OF_TOOL)

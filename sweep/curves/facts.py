@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from ..errors import Fault
 from ..types import FloatArray
 from .files import Scan, distinct
+from .light_unit import LightUnit
 from .signal_color import VISIBLE, LightColor, light_color
 from .spectrum import WavelengthGrid, photons_from_energy, resample
 
-Quantity = Literal["energy", "photons"]
 _NEEDED = WavelengthGrid()
 _BROAD_NM = 70.0
 """Equivalent width (integral over peak) from which on a curve is rather a pixel's than an LED's."""
@@ -82,7 +81,7 @@ class Facts:
         broad = sum(curve.width_nm >= _BROAD_NM for curve in lit)
         return bool(lit) and 2 * broad >= len(lit) and max(curve.peak for curve in lit) <= _PERCENT
 
-    def colors(self, quantity: Quantity) -> Mapping[str, LightColor | None]:
+    def colors(self, quantity: LightUnit) -> Mapping[str, LightColor | None]:
         """The color of each curve read as a light."""
         found = {}
         for curve in self.curves:

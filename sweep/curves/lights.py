@@ -20,6 +20,11 @@ def class_pairs(classes: Sequence[str]) -> tuple[Pair, ...]:
     return tuple(combinations(classes, 2))
 
 
+def pair_name(what: str, pair: Pair) -> str:
+    """The name of something measured of a pair: `what_a_b`."""
+    return f"{what}_{pair[0]}_{pair[1]}"
+
+
 @dataclass(frozen=True)
 class Lights:
     """Signals with equal photon counts.

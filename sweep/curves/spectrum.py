@@ -5,7 +5,7 @@ A curve that is not clean (NaN, negative, unsorted, duplicated or truncated data
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -96,68 +96,47 @@ class Curves:
             ) from None
 
 
+def _wavelength_faults(wave: FloatArray) -> Iterator[Fault]:
+    if not np.isfinite(wave).all():
+        yield Fault("wavelength is not a finite number", allowed="finite nm")
+        return
+    step = np.diff(wave)
+    if (step == 0).any():
+        twice = float(wave[1:][step == 0][0])
+        yield Fault("wavelength occurs twice", value=twice, allowed="strictly increasing")
+    elif not (step > 0).all():
+        first = float(wave[1:][step < 0][0])
+        yield Fault("wavelengths are not sorted", value=first, allowed="strictly increasing")
+    if not (wave[0] >= 100 and wave[-1] <= 20000):
+        hints = ((1e-4, "looks like m"), (20.0, "looks like um"), (np.inf, "not optical wavelengths in nm"))
+        hint = next(hint for below, hint in hints if not wave[-1] >= below)
+        yield Fault(f"wavelength unit: {hint}", value=(float(wave[0]), float(wave[-1])), allowed="100 to 20000 nm")
+
+
+def _value_faults(wave: FloatArray, data: FloatArray) -> Iterator[Fault]:
+    bad = ~np.isfinite(data)
+    if bad.any():
+        yield Fault(f"value at {wave[bad][0]:g} nm is not a finite number", value=float(data[bad][0]), allowed=">= 0")
+    elif (data < 0).any():
+        at = int(np.argmax(data < 0))
+        yield Fault(f"negative value at {wave[at]:g} nm", value=float(data[at]), allowed=">= 0")
+    elif data.max() > LARGEST:
+        at, allowed = int(np.argmax(data)), f"0 to {LARGEST:g}"
+        yield Fault(f"value at {wave[at]:g} nm is too large", value=float(data[at]), allowed=allowed)
+    elif 0 < data.max() < LEAST_PEAK:
+        allowed = f"0 everywhere, or {LEAST_PEAK:g} or more somewhere"
+        yield Fault("the largest value is too small", value=float(data.max()), allowed=allowed)
+
+
 def check_samples(wavelength_nm: ArrayLike, values: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Return both as float arrays of equal length, or raise DataError with one fault per thing wrong."""
     wave = np.asarray(wavelength_nm, dtype=float)
     data = np.asarray(values, dtype=float)
-    faults: list[Fault] = []
     if wave.ndim != 1 or data.shape != wave.shape or wave.size < 2:
         raise DataError(
             Fault("a curve needs two or more samples, one value per wavelength", value=(wave.shape, data.shape))
         )
-    if not np.isfinite(wave).all():
-        faults.append(Fault("wavelength is not a finite number", allowed="finite nm"))
-    else:
-        step = np.diff(wave)
-        if (step == 0).any():
-            faults.append(
-                Fault(
-                    "wavelength occurs twice",
-                    value=float(wave[1:][step == 0][0]),
-                    allowed="strictly increasing",
-                )
-            )
-        elif not (step > 0).all():
-            faults.append(
-                Fault(
-                    "wavelengths are not sorted",
-                    value=float(wave[1:][step < 0][0]),
-                    allowed="strictly increasing",
-                )
-            )
-        if not (wave[0] >= 100 and wave[-1] <= 20000):
-            hint = (
-                "looks like um"
-                if wave[-1] < 20
-                else "looks like m"
-                if wave[-1] < 1e-4
-                else "not optical wavelengths in nm"
-            )
-            faults.append(
-                Fault(
-                    f"wavelength unit: {hint}",
-                    value=(float(wave[0]), float(wave[-1])),
-                    allowed="100 to 20000 nm",
-                )
-            )
-    bad = ~np.isfinite(data)
-    if bad.any():
-        faults.append(
-            Fault(
-                f"value at {wave[bad][0]:g} nm is not a finite number",
-                value=float(data[bad][0]),
-                allowed=">= 0",
-            )
-        )
-    elif (data < 0).any():
-        at = int(np.argmax(data < 0))
-        faults.append(Fault(f"negative value at {wave[at]:g} nm", value=float(data[at]), allowed=">= 0"))
-    elif data.max() > LARGEST:
-        at, allowed = int(np.argmax(data)), f"0 to {LARGEST:g}"
-        faults.append(Fault(f"value at {wave[at]:g} nm is too large", value=float(data[at]), allowed=allowed))
-    elif 0 < data.max() < LEAST_PEAK:
-        allowed = f"0 everywhere, or {LEAST_PEAK:g} or more somewhere"
-        faults.append(Fault("the largest value is too small", value=float(data.max()), allowed=allowed))
+    faults = [*_wavelength_faults(wave), *_value_faults(wave, data)]
     if faults:
         raise DataError(faults)
     return wave, data

@@ -1,8 +1,8 @@
 """Blocks of designs, as the image chain needs them: products of their filters with weights, and shapes of the curves.
 
-Two routes with one signature. `Curves` takes any filters, as one matrix product. `Edges` takes designs of a grid of
-stopbands: N = base + depth (target - base) (e_left - e_right), so a product is that of the base and two look-ups in
-tables over the grid's edges, exact up to rounding; no spectrum is touched per design.
+Two routes with one signature. `CurveBlock` takes any filters, as one matrix product. `EdgeBlock` takes designs of a
+grid of stopbands: N = base + depth (target - base) (e_left - e_right), so a product is that of the base and two
+look-ups in tables over the grid's edges, exact up to rounding; no spectrum is touched per design.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Block(Protocol):
 
 
 @dataclass(frozen=True)
-class Curves:
+class CurveBlock:
     """Any filters: `qe`, ndarray[n_designs, n_modified, n_wavelengths]."""
 
     qe: FloatArray
@@ -66,9 +66,9 @@ class Curves:
         flat = seen.reshape(len(self.qe), -1)
         return row_products(flat.astype(weights.dtype, copy=False), weights)
 
-    def some(self, which: IndexArray) -> Curves:
+    def some(self, which: IndexArray) -> CurveBlock:
         """See `Block.some`."""
-        return Curves(self.qe[which])
+        return CurveBlock(self.qe[which])
 
     def shapes(self, base_qe: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See `Block.shapes`."""
@@ -109,7 +109,7 @@ class Tables:
 
 
 @dataclass(frozen=True)
-class Edges:
+class EdgeBlock:
     """Designs `start`..`stop`-1 of a grid of stopbands, or the `chosen` ones of these, by their edges' numbers."""
 
     space: Space
@@ -129,11 +129,11 @@ class Edges:
         points = self.space.points(self.start, self.stop)
         return self.space.curves(points if self.chosen is None else points[self.chosen], self.tables.base.size)
 
-    def some(self, which: IndexArray) -> Edges:
+    def some(self, which: IndexArray) -> EdgeBlock:
         """See `Block.some`."""
         chosen = which if self.chosen is None else self.chosen[which]
         ends = (self.at_left[which], self.at_right[which], self.depth[which])
-        return Edges(self.space, self.start, self.stop, self.tables, *ends, chosen)
+        return EdgeBlock(self.space, self.start, self.stop, self.tables, *ends, chosen)
 
     def product(self, weights: FloatArray, nodes: IndexArray) -> FloatArray:
         """See `Block.product`."""
@@ -177,7 +177,7 @@ def _separable(space: Space) -> tuple[SeparableFamily, FloatArray, FloatArray] |
     return (family, base, change) if (n_left + n_right) * base.size * base.itemsize <= _MOST_BYTES else None
 
 
-def edges_of(space: Space, start: int, stop: int) -> Edges | None:
+def edges_of(space: Space, start: int, stop: int) -> EdgeBlock | None:
     """The designs of a grid by their edges; None where the family is not separable, or its tables were too large."""
     found = _separable(space)
     if found is None:
@@ -197,4 +197,4 @@ def edges_of(space: Space, start: int, stop: int) -> Edges | None:
     left, left_width, right, right_width, depth = space.digits(start, stop)
     at_left = left * len(space.axes[_LEFT_WIDTH]) + left_width
     at_right = right * len(space.axes[_RIGHT_WIDTH]) + right_width
-    return Edges(space, start, stop, tables, at_left, at_right, np.asarray(space.axes[_DEPTH], dtype=float)[depth])
+    return EdgeBlock(space, start, stop, tables, at_left, at_right, np.asarray(space.axes[_DEPTH], dtype=float)[depth])

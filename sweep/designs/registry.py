@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from pkgutil import iter_modules
 from typing import Any
 
 from pydantic import create_model
 
 from ..errors import Fault, SweepError, nearest
+from ..found import files_in
 from ..types import FloatArray, Section
 from . import families
 from .family import Family
 
 
 def _found() -> dict[str, type[Family]]:
-    modules = [import_module(f"{families.__name__}.{module.name}") for module in iter_modules(families.__path__)]
-    own = [value for module in modules for value in vars(module).values() if "kind" in getattr(value, "__dict__", {})]
+    every = [value for file in files_in(families) for value in vars(file).values()]
+    own = [value for value in every if "kind" in getattr(value, "__dict__", {})]
     return {family.kind: family for family in own}
 
 

@@ -10,10 +10,7 @@ import numpy as np
 
 from ..types import FloatArray, IndexArray
 from .family import Family
-from .products import row_products
 
-DIMENSIONS = ("edge_width_nm", "band_width_nm")
-"""Lengths of a family's design that a producer asks for."""
 Kind = Literal["reference", "design", "sweep", "search"]
 
 
@@ -76,13 +73,6 @@ class Space:
             return np.empty((len(points), 0, n_wavelengths))
         family = self.filter.family
         return (family.shifted(shift_nm) if shift_nm else family).curves(points)
-
-    def dimensions(self, points: FloatArray) -> dict[str, FloatArray]:
-        """The narrowest edge and band of each design, nm, ndarray[n_designs]; NaN for what the family does not have."""
-        rows = {} if self.filter is None else self.filter.family.dimensions
-        nothing = np.full((len(points), 1), np.nan)
-        lengths = {name: row_products(points, rows[name].T) if name in rows else nothing for name in DIMENSIONS}
-        return {name: values.min(axis=1) for name, values in lengths.items()}
 
     def violation(self, points: FloatArray) -> FloatArray:
         """Largest violation of the family's own conditions, ndarray[n_designs]; 0 where a design is well formed."""

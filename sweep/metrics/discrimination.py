@@ -19,25 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from ..curves.lights import Pair
 from ..types import BoolArray, FloatArray, IndexArray
 from .separation import pair_blocks
 
-CNR, D_PRIME, ERROR, ERROR_BOUND = "cnr_", "dprime_", "error_", "error_bound_"
-"""How the names of a pair's noise metrics begin."""
-STATE_ERROR_BOUND = "state_error_bound"
-"""Name of `state_error_bound`."""
 _LEAST_VARIANCE = 2e-9
 """Variance, DN^2, that a channel may have although it counts as certain."""
 _LEFT_OUT = 1e-12
 """A pixel of up to a thousand goes beyond its reach at most this often; Gaussian tails are trusted down to here."""
-
-
-def noise_names(pair: Pair) -> tuple[str, ...]:
-    """Names of a pair's four metrics: contrast to noise, d', error, bound of the error."""
-    one, other = pair
-    prefixes = (CNR, D_PRIME, ERROR, ERROR_BOUND)
-    return tuple(f"{prefix}{one}_{other}" for prefix in prefixes)
 
 
 def contrast_to_noise(mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:

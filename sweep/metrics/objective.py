@@ -1,16 +1,22 @@
-"""What a study maximizes: one quantity, or the smallest or the sum of several weighted ones."""
+"""What a study maximizes: one quantity, or several weighted ones under a rule."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, GetJsonSchemaHandler, model_validator
+from pydantic import Field, GetJsonSchemaHandler, create_model, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
+from ..found import made_in
 from ..types import FloatArray, Section
+from . import rules
+from .quantity import Asked, Quantity
+from .registry import quantities_of
+from .rule import Rule
+from .rules.minimum import Minimum
 
 Weight = Annotated[float, Field(ge=1e-6, le=1e6)]
 
@@ -18,21 +24,23 @@ COMBINED = "objective"
 """Column of an objective that is not simply one of the quantities."""
 
 
-class Objective(Section):
-    """Maximize the smallest (`minimum`) or the sum (`sum`) of weight x quantity.
+RULES: Mapping[str, Rule] = {rule.name: rule for rule in made_in(rules, Rule)}
+"""Every rule by its key in a study."""
+_FIELDS: dict[str, Any] = {name: (dict[str, Weight], {}) for name in RULES}
+
+
+class Objective(create_model("_Rules", __base__=Section, **_FIELDS)):  # type: ignore[misc]
+    """Maximize weight x quantity of several quantities under one rule, such as the smallest (`minimum`) or the `sum`.
 
     A name alone is that quantity; a list is the smallest of its members.
     """
-
-    minimum: dict[str, Weight] = {}
-    sum: dict[str, Weight] = {}
 
     @model_validator(mode="before")
     @classmethod
     def _from_names(cls, value: Any) -> Any:
         names = [value] if isinstance(value, str) else value
         if isinstance(names, list) and all(isinstance(name, str) for name in names):
-            return {"minimum": dict.fromkeys(names, 1.0)}
+            return {Minimum.name: dict.fromkeys(names, 1.0)}
         return value
 
     @classmethod
@@ -43,19 +51,21 @@ class Objective(Section):
 
     @model_validator(mode="after")
     def _one_rule(self) -> Objective:
-        if bool(self.minimum) == bool(self.sum):
-            raise ValueError("an objective is a quantity, a list, `minimum: {quantity: weight}` or `sum: {...}`")
+        if sum(bool(getattr(self, name)) for name in RULES) != 1:
+            known = " or ".join(f"`{name}: {{quantity: weight}}`" for name in RULES)
+            raise ValueError(f"an objective is a quantity, a list, {known}")
         return self
+
+    @property
+    def rule(self) -> Rule:
+        """How the weighted quantities become one number."""
+        return next(rule for name, rule in RULES.items() if getattr(self, name))
 
     @property
     def weights(self) -> Mapping[str, float]:
         """Quantity -> weight."""
-        return self.minimum or self.sum
-
-    @property
-    def rule(self) -> Literal["minimum", "sum"]:
-        """How the weighted quantities become one number."""
-        return "minimum" if self.minimum else "sum"
+        found: Mapping[str, float] = getattr(self, self.rule.name)
+        return found
 
     @property
     def column(self) -> str:
@@ -64,11 +74,16 @@ class Objective(Section):
 
     def of(self, columns: Mapping[str, FloatArray]) -> FloatArray:
         """Its value from the quantities, ndarray[n_designs] each."""
-        terms = np.stack([weight * columns[name] for name, weight in self.weights.items()])
-        return np.asarray(terms.min(axis=0) if self.minimum else terms.sum(axis=0), dtype=float)
+        return self.rule.of(np.stack([weight * columns[name] for name, weight in self.weights.items()]))
 
     def __str__(self) -> str:
         terms = [name if weight == 1 else f"{weight:g} {name}" for name, weight in self.weights.items()]
-        if len(terms) == 1:
-            return terms[0]
-        return f"smallest of {', '.join(terms)}" if self.minimum else " + ".join(terms)
+        return terms[0] if len(terms) == 1 else self.rule.words(terms)
+
+
+def columns_of(asked: Asked, objective: Objective) -> Mapping[str, Quantity]:
+    """The quantities of a study's result table, in order: those of all metrics, and a combined objective."""
+    if objective.column != COMBINED:
+        return quantities_of(asked)
+    whole = Quantity(COMBINED, COMBINED, f"the study's objective: {objective}", wanted="more")
+    return {**quantities_of(asked), COMBINED: whole}

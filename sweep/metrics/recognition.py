@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest
 
 from ..camera.effects import noise
 from ..camera.imager import Imager
@@ -37,13 +36,16 @@ def _lda(n_states: int) -> Any:
 
 CLASSIFIERS: Mapping[str, Callable[[int], Any]] = {"nearest_centroid": _nearest_centroid, "lda": _lda}
 """Classifiers that are trained on raw patches."""
-RULES = (MOST_LIKELY, *CLASSIFIERS)
+DECIDERS = (MOST_LIKELY, *CLASSIFIERS)
 
 
 def columns() -> tuple[str, ...]:
     """Names of what `recognize` finds: accuracy of each rule with its 95 % interval, and its worst state's."""
-    ends = ("", "_low", "_high", "_worst_state")
-    return tuple(f"{rule}_accuracy{end}" for rule in RULES for end in ends)
+    return tuple(name for rule in DECIDERS for name in _columns_of(rule))
+
+
+def _columns_of(rule: str) -> tuple[str, ...]:
+    return tuple(f"{rule}_accuracy{end}" for end in ("", "_low", "_high", "_worst_state"))
 
 
 def recognize(
@@ -57,7 +59,7 @@ def recognize(
     other. The most likely rule takes the channels' readout and the signal with the largest Gaussian likelihood at the
     patch's place, and says its state. Intervals are Wilson's.
     """
-    members = {name: imager.setup.members[name] for name in states}
+    members = {name: imager.view.members[name] for name in states}
     signals = np.concatenate(list(members.values()))
     state = np.concatenate([np.full(len(own), name) for name, own in members.items()])
     electrons = imager.pixel_electrons(curves)[0]
@@ -110,8 +112,10 @@ class _MostLikely:
 
 
 def _accuracy(rule: str, truth: Any, said: Any) -> Iterator[tuple[str, float]]:
+    from scipy.stats import binomtest
+
     right = np.asarray(truth == said)
     interval = binomtest(int(right.sum()), right.size).proportion_ci(_CONFIDENCE, method="wilson")
     worst = min(float(right[truth == state].mean()) for state in np.unique(truth))
     values = (float(right.mean()), float(interval.low), float(interval.high), worst)
-    yield from zip((name for name in columns() if name.startswith(f"{rule}_accuracy")), values, strict=True)
+    yield from zip(_columns_of(rule), values, strict=True)

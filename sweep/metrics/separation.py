@@ -6,11 +6,9 @@ from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
-from ..curves.lights import Pair, class_pairs
+from ..curves.lights import Pair, class_pairs, pair_name
 from ..types import FloatArray, IndexArray
 
-CSD = "csd_"
-"""How the name of a color separation distance begins."""
 _BLOCK_PAIRS = 262_144
 """Pair distances held at once per channel: 2 MiB, so that a block stays in cache."""
 _SMALLEST = 1e-140
@@ -19,7 +17,7 @@ _SMALLEST = 1e-140
 
 def csd_name(pair: Pair) -> str:
     """Column name of a pair's color separation distance, in DN."""
-    return f"{CSD}{pair[0]}_{pair[1]}"
+    return pair_name("csd", pair)
 
 
 def separation(response: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
@@ -87,7 +85,7 @@ def _all_pairs(first: IndexArray, second: IndexArray) -> tuple[IndexArray, Index
 
 def separations(response: FloatArray, members: Mapping[str, IndexArray]) -> dict[Pair, FloatArray]:
     """CSD of every pair of signal types; `members` maps a type to its signal indices. Shapes as in `separation`."""
-    from ..designs.compiled import CHANNELS, nearest_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from .nearest import CHANNELS, nearest_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     n_designs, _, n_channels = response.shape
     pairs = class_pairs(list(members))
@@ -109,7 +107,7 @@ def separations_along(
     `fixed`: ndarray[n_signals, n_channels], DN, what they share in the others; `values`: ndarray[n_designs, n_signals],
     that of `channel`.
     """
-    from ..designs.compiled import nearest_along_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from .nearest import nearest_along_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     def whole(some: IndexArray | slice) -> FloatArray:
         response = np.repeat(fixed[None], len(values[some]), axis=0)

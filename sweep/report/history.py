@@ -9,7 +9,6 @@ import pandas as pd
 
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.pareto import hypervolume
-from ..metrics.separation import CSD
 from ..results.output import Output
 from ..types import FloatArray, IndexArray
 
@@ -56,7 +55,7 @@ def history_of(output: Output) -> History | None:
     levels = log["sensitivity_min"].dropna()
     least = float(min(levels)) if len(levels) else bound.min or 0.0
     reference = np.array([0.0, least - 1e-6])
-    volume = [hypervolume(pairs[:n][feasible[:n]], reference) for n in at] if CSD in output.objective else None
+    volume = [hypervolume(pairs[:n][feasible[:n]], reference) for n in at] if output.goal.role == "separation" else None
     return History(starts, at, best[at - 1], None if volume is None else np.array(volume), least)
 
 

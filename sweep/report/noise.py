@@ -7,8 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from ..metrics.discrimination import STATE_ERROR_BOUND
-from ..metrics.evaluate import STATE_ERROR
+from ..metrics.columns.confusion import D_PRIME, STATE_ERROR, STATE_ERROR_BOUND
 from ..metrics.recognition import CLASSIFIERS, MOST_LIKELY
 from ..results.output import Output
 from ..types import FloatArray
@@ -21,8 +20,8 @@ _RULE_NAMES = {MOST_LIKELY: "most likely signal", "nearest_centroid": "nearest c
 
 def _allowed(output: Output) -> float | None:
     """The largest error at which a design is usable; None in a study that does not ask."""
-    asked = output.study.get("recognition")
-    return None if asked is None else float(asked["error_max"])
+    asked = output.study.recognition
+    return None if asked is None else asked.error_max
 
 
 def all_series(output: Output) -> list[SeriesFigure]:
@@ -35,10 +34,10 @@ def noise_figures(output: Output) -> Iterator[SeriesFigure]:
     allowed = _allowed(output)
     if allowed is None:
         return
-    rows = output.kind("reference", "design", "search")
+    rows = output.few
     for (base, key), scenarios in scenario_series(output).items():
         x = np.array(list(scenarios.values()))
-        title = f"{output.study['study']}: {base}"
+        title = f"{output.study.study}: {base}"
         errors = {n: Line(np.maximum(y, _LEAST), None) for n, y in over_series(rows, scenarios, STATE_ERROR).items()}
         label = f"how often the worst pair of states is confused ({_LEAST:g}: or less)"
         yield SeriesFigure(title, key, label, x, errors, "", log_y=True, level=allowed)
@@ -59,7 +58,7 @@ def usable_lines(output: Output) -> Iterator[str]:
     allowed = _allowed(output)
     if allowed is None:
         return
-    rows = output.kind("reference", "design", "search")
+    rows = output.few
     for (base, key), scenarios in scenario_series(output).items():
         each = over_series(rows, scenarios, STATE_ERROR)
         found = [f"{name} {_range(np.array(list(scenarios.values())), y <= allowed)}" for name, y in each.items()]
@@ -82,12 +81,12 @@ def _range(x: FloatArray, usable: np.ndarray) -> str:
     return "at " + " ".join(f"{v:g}" for v in x[usable])
 
 
-def recognition_table(output: Output) -> pd.DataFrame:
+def told_apart_table(output: Output) -> pd.DataFrame:
     """Errors in closed form and accuracies on drawn patches, a row per design and scenario."""
     if _allowed(output) is None:
         return pd.DataFrame()
-    rows = output.kind("reference", "design", "search")
-    dprime = [name for name in rows.columns if name.startswith("dprime_")]
+    rows = output.few
+    dprime = [name for name, column in output.columns.items() if column.metric == D_PRIME]
     shown = pd.DataFrame({"name": rows["name"].astype(str), "scenario": rows["scenario"].astype(str)})
     shown["smallest d'"] = rows[dprime].min(axis=1).map("{:.2f}".format)
     for column, label in ((STATE_ERROR, "pairwise error"), (STATE_ERROR_BOUND, "bound of the error")):

@@ -9,18 +9,16 @@ from typing import TYPE_CHECKING
 import pandas as pd
 import pyarrow as pa
 
-from ..metrics.objective import Objective
 from ..results.inventory import Inventory
 from ..results.lock import locked
 from ..results.names import FIGURES, REPORT, is_drawn
 from ..results.output import Output
 from ..results.profiles import profile_table
-from ..results.tables import csv_of, encoded
+from ..results.tables import FOUND, NAMED, PLAIN, csv_of, encoded
 from . import tables
 from . import values as content
 from .figures import draw_chart, draw_clouds, draw_curves, draw_pareto, rendered
-from .names import readable
-from .noise import all_series, recognition_table
+from .noise import all_series, told_apart_table
 from .page_data import payload
 from .pages import inlined, library, page, rows, script
 from .published import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
@@ -77,8 +75,8 @@ def _html(output: Output, images: Sequence[tuple[str, str]], published: pd.DataF
         study=output.study,
         folder=output.folder.as_posix(),
         quoted=shlex.quote(output.folder.as_posix()),
-        objective=str(Objective.model_validate(output.study["objective"])),
-        objective_words=readable(output.objective),
+        objective=str(output.objective),
+        objective_words=output.goal.words,
         answer=answer_sentences(output),
         counts=counts_line(output),
         interactive=drawn if drawn["views"] or drawn["series"] else None,
@@ -93,20 +91,20 @@ def _html(output: Output, images: Sequence[tuple[str, str]], published: pd.DataF
         images=images,
         comparison=rows(tables.comparison_table(output)),
         best=rows(tables.best_table(output)),
-        recognition=rows(recognition_table(output)),
+        recognition=rows(told_apart_table(output)),
         geometry=rows(tables.geometry_table(output)),
         published=rows(published),
         constraints={name: str(bound) for name, bound in output.constraints.items()},
         summary=summary_lines(output),
-        provenance=output.provenance,
-        limited=(output.provenance.get("search") or {}).get("limit_proven") is not None,
+        provenance=output.provenance.model_dump(mode="json"),
+        limited=output.provenance.search is not None and output.provenance.search.limit_proven is not None,
     )
 
 
 def _drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
     """(file name, caption, figure) of everything that is drawn."""
-    scenario = next(iter(output.study["scenarios"]))
-    cfas = list(dict.fromkeys(str(m["cfa"]) for m in content.modifications(output)))
+    scenario = output.scenarios[0]
+    cfas = list(dict.fromkeys(m.cfa for m in content.modifications(output)))
     for number, cfa in enumerate(cfas or [None]):
         figure = draw_pareto(content.pareto_figure(output, scenario, cfa))
         yield ("pareto" if number == 0 else f"pareto-{number + 1}"), f"Trade-off{f' of {cfa}' if cfa else ''}", figure
@@ -118,8 +116,8 @@ def _drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
     yield "signals", "Spectra of the signals", draw_curves(content.lights_figure(output))
     yield "chart", "The color checker chart", draw_chart(content.chart_figure(output))
     for name, caption, kinds in (
-        ("clouds-cfas", "Signals in the channels of the plain CFAs", ("reference",)),
-        ("clouds-designs", "Signals in the channels of the named and the found designs", ("design", "search")),
+        ("clouds-cfas", "Signals in the channels of the plain CFAs", (PLAIN,)),
+        ("clouds-designs", "Signals in the channels of the named and the found designs", (NAMED, FOUND)),
     ):
         found = content.clouds(output, *kinds)
         if found:

@@ -12,17 +12,17 @@ import pandas as pd
 
 from ..metrics.pareto import knee
 from ..results.output import Output
+from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
 from . import values as content
 from .figures import COLORS, CURVE_COLORS, TYPE_COLORS, ParetoFigure, even
 from .history import history_of
-from .names import readable
 from .noise import all_series
 from .series import SeriesFigure
-from .tables import QUANTITIES
 
 _MOST_POINTS = 6_000
 """Swept designs of each group, feasible or not, that the page holds; the front and the named designs are all there."""
 _BEST_ROWS = 9
+_OF_PARAMETERS, _OF_OTHERS = 2, 4
 GROUPS = ("infeasible", "feasible", "front", "named", "best")
 _PUBLISHED = "RYN_4Cy"
 _PUBLISHED_LABEL = "our counterpart of the paper's N_4"
@@ -33,9 +33,9 @@ def payload(output: Output) -> dict[str, Any]:
     rows = _rows(output)
     columns = _columns(output, rows)
     return {
-        "study": str(output.study["study"]),
-        "axes": {"x": output.trade_off[1], "y": output.trade_off[0]},
-        "objective": output.objective,
+        "study": output.study.study,
+        "axes": {"x": output.trade_off[1].name, "y": output.trade_off[0].name},
+        "objective": output.goal.name,
         "parameters": [name for name in output.parameters if name in columns],
         "columns": columns,
         "groups": list(GROUPS),
@@ -47,12 +47,12 @@ def payload(output: Output) -> dict[str, Any]:
         "views": list(_views(output, rows)),
         "curves": _curves(output),
         "clouds": _clouds(output, rows),
-        "cloud_scenario": next(iter(output.study["scenarios"])),
+        "cloud_scenario": output.scenarios[0],
         "profiles": _profiles(output),
         "history": _history(output),
         "front": _front(output, rows),
         "series": [_series(series) for series in all_series(output)],
-        "swept": bool((rows["kind"] == "sweep").any()),
+        "swept": bool((rows["kind"] == SWEPT).any()),
         "colors": {"groups": COLORS, "curves": CURVE_COLORS, "types": TYPE_COLORS},
         "folder": shlex.quote(output.folder.as_posix()),
     }
@@ -71,8 +71,8 @@ def _words(values: pd.Series) -> dict[str, Any]:
 
 def _rows(output: Output) -> pd.DataFrame:
     """Designs to show: all on the front, named or found, and an even share of the others."""
-    table = output.table[(output.table["status"] == "ok") & (output.table["kind"] != "reference")]
-    swept = table["kind"] == "sweep"
+    table = output.table[(output.table["status"] == "ok") & (output.table["kind"] != PLAIN)]
+    swept = table["kind"] == SWEPT
     always = ~swept | (table["pareto"] & table["feasible"])
     parts = [table[always], output.best.head(_BEST_ROWS)]
     for feasible in (False, True):
@@ -84,9 +84,7 @@ def _rows(output: Output) -> pd.DataFrame:
 def _groups(rows: pd.DataFrame) -> np.ndarray:
     """Index into GROUPS of each row."""
     front = rows["feasible"] & rows["pareto"]
-    return np.select(
-        [rows["kind"] == "search", rows["kind"] == "design", front, rows["feasible"]], [4, 3, 2, 1], default=0
-    )
+    return np.select([rows["kind"] == FOUND, rows["kind"] == NAMED, front, rows["feasible"]], [4, 3, 2, 1], default=0)
 
 
 def _is_named(row: Mapping[Any, Any]) -> bool:
@@ -95,35 +93,39 @@ def _is_named(row: Mapping[Any, Any]) -> bool:
 
 def _names(output: Output, row: Mapping[Any, Any]) -> dict[str, str]:
     """A design's name, to write beside its point and in full; the published one says so."""
-    entry = output.study.get("designs", {}).get(row["name"], {})
     name = str(row["name"])
-    return {"short": name, "long": f"{name} ({_PUBLISHED_LABEL})" if entry.get("at") == _PUBLISHED else name}
+    entry = output.study.designs.get(name)
+    return {
+        "short": name,
+        "long": f"{name} ({_PUBLISHED_LABEL})" if entry is not None and entry.at == _PUBLISHED else name,
+    }
 
 
 def _columns(output: Output, rows: pd.DataFrame) -> dict[str, dict[str, Any]]:
     """Column -> label, digits and values of everything that says something about a design."""
+    axes = [axis.name for axis in output.trade_off]
     wanted = (
-        *output.trade_off,
+        *axes,
         *output.parameters,
         *output.distances,
-        *QUANTITIES,
+        *output.light,
         *output.further,
         "violation",
     )
     found = {}
     for name in dict.fromkeys(wanted):
         values = rows[name].to_numpy(dtype=float)
-        if np.isfinite(values).any() or name in output.trade_off:
-            digits = 1 if "csd_" in name else 2 if name in output.parameters else 4
-            label = name if name in output.parameters else readable(name)
-            found[name] = {"label": label, "digits": digits, "values": _packed(values, "f4")}
+        if np.isfinite(values).any() or name in axes:
+            own = output.columns.get(name)
+            digits = own.digits if own is not None else _OF_PARAMETERS if name in output.parameters else _OF_OTHERS
+            found[name] = {"label": output.words(name), "digits": digits, "values": _packed(values, "f4")}
     return found
 
 
 def _views(output: Output, rows: pd.DataFrame) -> Iterator[dict[str, Any]]:
     """What is drawn around the points of each scenario and CFA: lines, levels of plain CFAs, bound, knee."""
-    for scenario in output.study["scenarios"]:
-        for cfa in dict.fromkeys(str(m["cfa"]) for m in content.modifications(output)):
+    for scenario in output.scenarios:
+        for cfa in dict.fromkeys(m.cfa for m in content.modifications(output)):
             figure = content.pareto_figure(output, scenario, cfa)
             yield {
                 "scenario": scenario,
@@ -148,28 +150,20 @@ def _knee(figure: ParetoFigure, output: Output, rows: pd.DataFrame) -> int | Non
     if found is None:
         return None
     x, y = values[found]
-    same = rows[(rows[output.trade_off[1]] == x) & (rows[output.trade_off[0]] == y)]
+    same = rows[(rows[output.trade_off[1].name] == x) & (rows[output.trade_off[0].name] == y)]
     return int(same.index[0])
 
 
 def _curves(output: Output) -> dict[str, Any]:
     """QE of the sensor's and the kept designs' channels over the wavelength, and the limits'."""
-    kept: dict[str, list[dict[str, str]]] = {}
-    for column in output.curves.columns:
-        kind, _, rest = column.partition(":")
-        if kind in ("design", "front"):
-            kept.setdefault(rest.split(":")[0], []).append(_packed(output.curves[column], "f4"))
+    curves = output.curves
     return {
-        "wavelength_nm": _packed(output.curves["wavelength_nm"], "f4"),
-        "sensor": {c.removeprefix("qe:"): _packed(output.curves[c], "f4") for c in _starting(output, "qe:")},
-        "limits": {c.removeprefix("limit:"): _packed(output.curves[c], "f4") for c in _starting(output, "limit:")},
-        "designs": kept,
+        "wavelength_nm": _packed(curves.wavelength_nm, "f4"),
+        "sensor": {name: _packed(qe, "f4") for name, qe in curves.sensor.items()},
+        "limits": {cfa: _packed(qe, "f4") for cfa, qe in curves.limits.items()},
+        "designs": {str(at): [_packed(qe, "f4") for qe in made.values()] for at, made in curves.designs.items()},
         "ends": {cfa: content.end_curves(output, cfa) for cfa in dict.fromkeys(output.table["cfa"].astype(str))},
     }
-
-
-def _starting(output: Output, prefix: str) -> list[str]:
-    return [column for column in output.curves.columns if column.startswith(prefix)]
 
 
 def _clouds(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
@@ -212,7 +206,7 @@ def _history(output: Output) -> dict[str, Any] | None:
         "best": _finite(history.best),
         "volume": None if history.volume is None else history.volume.tolist(),
         "least_sensitivity": history.least_sensitivity,
-        "label": readable(output.objective),
+        "label": output.goal.words,
     }
 
 
@@ -240,9 +234,9 @@ def _series(series: SeriesFigure) -> dict[str, Any]:
 
 def _front(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
     """The feasible front, every digit of it, for its file."""
-    own = rows[rows["feasible"] & rows["pareto"] & (rows["kind"] == "sweep")]
+    own = rows[rows["feasible"] & rows["pareto"] & (rows["kind"] == SWEPT)]
     names = ["design_id", "scenario", "cfa", *_used(own, output.parameters), *output.distances]
-    names += [name for name in dict.fromkeys((*QUANTITIES, *output.further)) if name not in names]
+    names += [name for name in dict.fromkeys((*output.light, *output.further)) if name not in names]
     return {"columns": names, "rows": [[_plain(value) for value in row] for row in own[names].itertuples(index=False)]}
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..camera.plan.plan import Plan
-from ..camera.plan.promises import EFFECTS
+from ..camera.registry import EFFECTS
 from ..study import Study
 
 

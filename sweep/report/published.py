@@ -16,17 +16,17 @@ def comparison_with_published(output: Output) -> pd.DataFrame:
     `ours` is rounded to the digits that are printed, and `error` is its difference; `ours_exact` is not rounded. Ours
     is of the study's first scenario. Empty when the study publishes nothing.
     """
-    first = next(iter(output.study["scenarios"]))
-    named = output.kind("reference", "design")
+    first = output.scenarios[0]
+    named = output.named
     named = named[named["scenario"] == first].set_index("name")
     rows = []
-    for table, entries in output.study.get("published", {}).items():
+    for table, entries in output.study.published.items():
         for name, values in entries.items():
             for quantity, paper in values.items():
                 if quantity == OBJECT_RESOLUTION:
-                    exact = output.geometry[name].object_resolution_px
+                    exact = output.study.geometry[name].object_resolution_px
                 else:
-                    exact = float(named.loc[name, quantity])
+                    exact = float(named[quantity][name])
                 ours = round(exact, _decimals(paper))
                 error = round(ours - paper, 12)
                 rows.append((table, name, quantity, paper, ours, error, error / paper if paper else None, exact))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import pandas as pd
 
+from ..results.facts import EffectFacts
 from ..results.output import Output
 
 
@@ -20,7 +20,7 @@ class SceneGroup:
     """
 
     scenarios: tuple[str, ...]
-    effects: tuple[dict[str, Any], ...]
+    effects: tuple[EffectFacts, ...]
     promised_dn: float
     realized_dn: float | None
     tolerance_dn: float
@@ -36,31 +36,31 @@ class SceneGroup:
     @property
     def computed(self) -> str:
         """Effects that were computed."""
-        return ", ".join(e["effect"] for e in self.effects if e["method"] not in ("skip", "one"))
+        return ", ".join(each.effect for each in self.effects if each.is_computed)
 
 
 def scene_groups(output: Output) -> list[SceneGroup]:
     """All scenes, those with the same methods together, each effect with its largest promise among them."""
-    plans = output.provenance["plans"]
+    plans = output.provenance.plans
     groups: dict[tuple[tuple[str, str], ...], list[str]] = {}
     for name, plan in plans.items():
-        groups.setdefault(tuple((e["effect"], e["method"]) for e in plan["effects"]), []).append(name)
+        groups.setdefault(tuple((each.effect, each.method) for each in plan.effects), []).append(name)
     found = []
     for names in groups.values():
         own = [plans[name] for name in names]
         effects = (
-            max(choices, key=lambda e: e["promised_dn"])
-            for choices in zip(*(plan["effects"] for plan in own), strict=True)
+            max(choices, key=lambda each: each.promised_dn)
+            for choices in zip(*(plan.effects for plan in own), strict=True)
         )
         found.append(
             SceneGroup(
                 tuple(names),
                 tuple(effects),
-                max(plan["promised_dn"] for plan in own),
+                max(plan.promised_dn for plan in own),
                 _realized(output, names),
-                own[0]["tolerance_dn"],
-                sum(plan["work"] for plan in own),
-                sum(plan["reference_work"] for plan in own),
+                own[0].tolerance_dn,
+                sum(plan.work for plan in own),
+                sum(plan.reference_work for plan in own),
             )
         )
     return found
@@ -97,11 +97,11 @@ def effect_table(group: SceneGroup) -> pd.DataFrame:
     return pd.DataFrame(
         [
             {
-                "effect": e["effect"],
-                "method": e["method"],
-                "promised / DN": f"{e['promised_dn']:.2g}",
-                "reason": e["reason"],
+                "effect": each.effect,
+                "method": each.method,
+                "promised / DN": f"{each.promised_dn:.2g}",
+                "reason": each.reason,
             }
-            for e in group.effects
+            for each in group.effects
         ]
     )

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
+from ..results.facts import SearchFacts
 from ..results.output import Output
-from .names import amount, readable
+from ..results.tables import FOUND, NAMED, SWEPT
 from .noise import usable_lines
 from .published import comparison_lines, comparison_with_published
 from .series import SeriesFigure
@@ -22,23 +21,23 @@ _MOST_SCENARIOS = 8
 
 def answer_sentences(output: Output) -> list[str]:
     """The question's answer: the best feasible design, and who leads over the scenarios, or in the only one."""
-    limits = " and ".join(f"{readable(q)} {bound}" for q, bound in output.constraints.items())
+    limits = " and ".join(f"{output.words(q)} {bound}" for q, bound in output.constraints.items())
     under = f" with {limits}" if limits else ""
     found = []
-    searched = output.kind("sweep", "search")
+    searched = output.kind(SWEPT, FOUND)
     if len(searched) and output.best.empty:
         failed = searched[searched["status"] != "ok"]
         every = len(failed) == len(searched)
         found.append(f"Every design failed: {failed['status'].iloc[0]}." if every else f"No design is feasible{under}.")
     elif not output.best.empty:
         best = output.best.iloc[0]
-        where = f", in {best['scenario']}" if len(output.study["scenarios"]) > 1 else ""
+        where = f", in {best['scenario']}" if len(output.scenarios) > 1 else ""
         found.append(
-            f"The best {readable(output.objective)}{under} is {amount(output.objective, best[output.objective], 1)} "
+            f"The best {output.goal.words}{under} is {output.goal.amount(best[output.goal.name], 1)} "
             f"(sensitivity {best['sensitivity']:.4f}, {best['cfa']}, found by the {best['kind']}{where})."
         )
     found += [_leaders(series) for series in series_figures(output)]
-    return found + (_scene_lines(output) if len(output.study["scenarios"]) == 1 else [])
+    return found + (_scene_lines(output) if len(output.scenarios) == 1 else [])
 
 
 def _leaders(series: SeriesFigure) -> str:
@@ -57,18 +56,17 @@ def _leaders(series: SeriesFigure) -> str:
 def _scene_lines(output: Output) -> list[str]:
     """CFAs and named designs in each scenario; of many scenarios the first and the last ones."""
     shown = output.trade_off[0]
-    title = f"{readable(shown).capitalize().replace('csd', 'CSD')} of the named CFAs and designs:"
-    rows = output.kind("reference", "design")
-    scenarios = list(output.study["scenarios"])
+    title = f"{shown.words[:1].upper()}{shown.words[1:]} of the named CFAs and designs:"
+    rows, scenarios = output.named, output.scenarios
     lines = []
     for name in scenarios if len(scenarios) <= _MOST_SCENARIOS else [*scenarios[:4], "", *scenarios[-2:]]:
         if not name:
             lines.append(f"({len(scenarios) - 6} more scenarios in the report.)")
             continue
         each = ", ".join(
-            f"{row['name']} {amount(shown, row[shown])}"
-            + (f" at {row['sensitivity']:.3f}" if row["kind"] == "design" and len(scenarios) == 1 else "")
-            for row in rows[(rows["scenario"] == name) & rows[shown].notna()].to_dict("records")
+            f"{row['name']} {shown.amount(row[shown.name], 0)}"
+            + (f" at {row['sensitivity']:.3f}" if row["kind"] == NAMED and len(scenarios) == 1 else "")
+            for row in rows[(rows["scenario"] == name) & rows[shown.name].notna()].to_dict("records")
         )
         if each:
             lines.append(f"{title} {each}." if len(scenarios) == 1 else f"{name}: {each}.")
@@ -78,7 +76,7 @@ def _scene_lines(output: Output) -> list[str]:
 def summary_lines(output: Output) -> list[str]:
     """What a run found and where its files are."""
     lines = answer_sentences(output)
-    if len(output.study["scenarios"]) > 1:
+    if len(output.scenarios) > 1:
         lines += _scene_lines(output)
     if not output.best.empty:
         best = output.best.iloc[0]
@@ -95,34 +93,32 @@ def summary_lines(output: Output) -> list[str]:
     lines += comparison_lines(comparison_with_published(output))
     lines.append(counts_line(output))
     lines.append(_plan_line(output))
-    search = output.provenance.get("search")
+    search = output.provenance.search
     if search:
-        found = f"{amount(output.objective, search['best_smooth_objective'], 2)} before clipping and quantization"
-        lines.append(
-            f"Search: {search['algorithm']}, {search['starts']} starts, {search['evaluations']} evaluations: {found}."
-        )
+        found = f"{output.goal.amount(search.best_smooth_objective, 2)} before clipping and quantization"
+        lines.append(f"Search: {search.algorithm}, {search.starts} starts, {search.evaluations} evaluations: {found}.")
         lines.append(_limit_line(output, search))
-    areas = output.provenance.get("hypervolume")
+    areas = output.provenance.hypervolume
     if areas:
         both = ", ".join(f"{name} {area:.3f}" for name, area in areas.items() if area > 0)
-        least = output.provenance["hypervolume_least_sensitivity"]
+        least = output.provenance.hypervolume_least_sensitivity
         lines.append(f"Hypervolume (DN x sensitivity, above 0 and a sensitivity of {least:g}): {both}.")
-    lines += [f"Note: {warning}." for warning in output.provenance["warnings"]]
-    if output.provenance["sensor"]["surrogate"] or output.provenance["lights"]["surrogate"]:
+    lines += [f"Note: {warning}." for warning in output.provenance.warnings]
+    if output.provenance.sensor.surrogate or output.provenance.lights.surrogate:
         lines.append("Note: built-in curves are surrogates, modeled from stated parameters, not measured.")
-    lines.append(f"Took {output.provenance['duration_s']:.1f} s with {output.provenance['workers']} workers.")
+    lines.append(f"Took {output.provenance.duration_s:.1f} s with {output.provenance.workers} workers.")
     lines.append(f"Files: {output.folder}/: results.parquet, report.html, pareto.png, provenance.json.")
     return lines
 
 
 def _plan_line(output: Output) -> str:
     """What was simulated, over all scenarios."""
-    plans = output.provenance["plans"].values()
-    computed = dict.fromkeys(e["effect"] for p in plans for e in p["effects"] if e["method"] not in ("skip", "one"))
-    promised = max(plan["promised_dn"] for plan in plans)
-    tolerance = max(plan["tolerance_dn"] for plan in plans)
+    plans = output.provenance.plans
+    computed = dict.fromkeys(effect for plan in plans.values() for effect in plan.computed)
+    promised = max(plan.promised_dn for plan in plans.values())
+    tolerance = max(plan.tolerance_dn for plan in plans.values())
     line = f"Simulated: {', '.join(computed)}; all else changes a CSD by at most {promised:.2g} of {tolerance:g} DN."
-    short = [name for name, plan in output.provenance["plans"].items() if plan["promised_dn"] > plan["tolerance_dn"]]
+    short = [name for name, plan in plans.items() if plan.promised_dn > plan.tolerance_dn]
     return f"{line} The tolerance cannot be promised in {', '.join(short)}." if short else line
 
 
@@ -137,22 +133,20 @@ def counts_line(output: Output) -> str:
     return f"{text}."
 
 
-def _limit_line(output: Output, search: Mapping[str, Any]) -> str:
+def _limit_line(output: Output, search: SearchFacts) -> str:
     """The bracket of the limit: what is proven, for which filters and which response."""
-    if search["no_limit"] is not None:
-        return f"Limit: none computed ({search['no_limit']})."
-    proven = amount(output.objective, search["limit_proven"], 3)
-    gap = "nothing is left to gain" if search["gap"] is None else f"the search's answer is {search['gap']:.1%} below"
-    if "limit_open_parts" not in search:
-        return f"Limit: {proven}, by an earlier version, not proven for every filter (run the study again); {gap}."
-    without = f" but {', '.join(search['limit_left_out'])}" if search["limit_left_out"] else ""
+    if search.no_limit is not None or search.limit_proven is None:
+        return f"Limit: none computed ({search.no_limit})."
+    proven = output.goal.amount(search.limit_proven, 3)
+    gap = "nothing is left to gain" if search.gap is None else f"the search's answer is {search.gap:.1%} below"
+    without = f" but {', '.join(search.limit_left_out)}" if search.limit_left_out else ""
     proof = f"no filter exceeds {proven} (proven)"
-    if search["limit_attained"] is not None:
-        proof += f" and one attains {amount(output.objective, search['limit_attained'], 3)}"
-    if search["limit_open_parts"]:
-        programs, parts = search["limit_programs"], search["limit_open_parts"]
+    if search.limit_attained is not None:
+        proof += f" and one attains {output.goal.amount(search.limit_attained, 3)}"
+    if search.limit_open_parts:
+        programs, parts = search.limit_programs, search.limit_open_parts
         proof += f", but the limit itself is not proven: {parts} parts are open after {programs} linear programs"
-    levels = search["front_limits_open"]
+    levels = search.front_limits_open
     return (
         f"Limit of any filter: {proof}; {gap}. This is for filters between the least transmission and the curve that "
         f"they replace, under the same constraints{without}, before clipping and quantization."

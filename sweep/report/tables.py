@@ -5,17 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from ..metrics.evaluate import WORST
-from ..metrics.separation import CSD
 from ..results.output import Output
 
-QUANTITIES = ("sensitivity", "cfa_sensitivity")
+_DIGITS = 4
+"""Of columns that are no quantities."""
 
 
 def comparison_table(output: Output) -> pd.DataFrame:
     """Plain CFAs, named designs and the search's answer with all CSDs and sensitivities."""
-    rows = output.kind("reference", "design", "search")
-    return _shown(rows, ["name", "scenario", *output.distances, *QUANTITIES, *output.further, "feasible"])
+    columns = ["name", "scenario", *output.distances, *output.light, *output.further, "feasible"]
+    return _shown(output, output.few, columns)
 
 
 def best_table(output: Output, most: int = 12) -> pd.DataFrame:
@@ -28,11 +27,11 @@ def best_table(output: Output, most: int = 12) -> pd.DataFrame:
         "scenario",
         *output.parameters,
         *output.distances,
-        *QUANTITIES,
+        *output.light,
         *output.further,
         "pareto",
     ]
-    return _shown(ranked, columns)
+    return _shown(output, ranked, columns)
 
 
 def geometry_table(output: Output) -> pd.DataFrame:
@@ -44,17 +43,16 @@ def geometry_table(output: Output) -> pd.DataFrame:
             "fov_deg": g.fov_deg,
             "object_resolution_px": round(g.object_resolution_px, 1),
         }
-        for name, g in output.geometry.items()
+        for name, g in output.study.geometry.items()
     ]
     return pd.DataFrame(rows)
 
 
-def _shown(rows: pd.DataFrame, columns: list[str]) -> pd.DataFrame:
+def _shown(output: Output, rows: pd.DataFrame, columns: list[str]) -> pd.DataFrame:
     shown = rows[columns].copy()
     for column in columns:
-        if column.removeprefix(WORST).startswith(CSD):
-            shown[column] = shown[column].round(1)
-        elif shown[column].dtype == np.float64:
-            shown[column] = shown[column].round(4)
+        if shown[column].dtype == np.float64:
+            own = output.columns.get(column)
+            shown[column] = shown[column].round(_DIGITS if own is None else own.digits)
     several = rows["scenario"].nunique() > 1
     return shown if several else shown.drop(columns="scenario")

@@ -8,56 +8,60 @@ import numpy as np
 import pandas as pd
 
 from ..curves.color import display_colors
-from ..curves.spectrum import WavelengthGrid
-from ..metrics.evaluate import BEST_PLACE, WORST
+from ..metrics.quantity import Column
+from ..results.facts import Origin
 from ..results.output import Output
+from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
+from ..study.schema import Modification
 from .figures import TYPE_COLORS, ChartFigure, Cloud, CurvesFigure, ParetoFigure, Points
-from .names import amount, axis_label, label, worst_case
+from .names import label
 from .series import Line, SeriesFigure
 
 LIMIT_NAME = "limit of any filter, unquantized"
-_SENSITIVITY_LABELS = {
-    "sensitivity": "sensitivity of the modified channel (1 = the channel it replaces)",
-    "cfa_sensitivity": "sensitivity of the CFA (1 = a sensor without color filters)",
-}
 
 
 def pareto_figure(output: Output, scenario: str, cfa: str | None) -> ParetoFigure:
     """CSD against sensitivity in a scenario, for the designs of one CFA (None: named designs of any CFA)."""
     table = output.table[(output.table["scenario"] == scenario) & (output.table["status"] == "ok")]
     designs = table if cfa is None else table[table["cfa"] == cfa]
-    swept = designs[designs["kind"] == "sweep"]
-    named = designs[designs["kind"] == "design"]
-    found = designs[designs["kind"] == "search"]
-    references = table[table["kind"] == "reference"]
+    swept, named, found = (designs[designs["kind"] == kind] for kind in (SWEPT, NAMED, FOUND))
+    references = table[table["kind"] == PLAIN]
+    separation, sensitivity = output.trade_off
     front = swept["pareto"] & swept["feasible"]
     groups = {
         "infeasible": _points(output, swept[~swept["feasible"]]),
         "feasible": _points(output, swept[swept["feasible"] & ~front]),
         "front": _points(output, swept[front]),
         "named": _points(output, named, list(named["name"])),
-        "best": _points(output, found, [amount(output.trade_off[0], v) for v in found[output.trade_off[0]]]),
+        "best": _points(output, found, [separation.amount(v, 0) for v in found[separation.name]]),
     }
-    bound = output.constraints.get(output.trade_off[1])
+    bound = output.constraints.get(sensitivity.name)
     limit = None if bound is None else bound.min
     where = "" if cfa is None else f", {cfa}"
     return ParetoFigure(
-        title=f"{output.study['study']}{where}: what separation costs in sensitivity",
-        x_label=worst_case(output.trade_off[1]) + _SENSITIVITY_LABELS[output.trade_off[1].removeprefix(WORST)],
-        y_label=axis_label(output.trade_off[0]),
+        title=f"{output.study.study}{where}: what separation costs in sensitivity",
+        x_label=_whole_words(output, sensitivity),
+        y_label=separation.axis,
         groups=groups,
         lines=_trade_offs(output, scenario, cfa),
-        levels=dict(zip(references["cfa"], references[output.trade_off[0]], strict=True)),
+        levels=dict(zip(references["cfa"], references[separation.name], strict=True)),
         bound=limit,
-        bound_text="" if limit is None else f"{worst_case(output.trade_off[1])}sensitivity >= {limit:g}",
+        bound_text="" if limit is None else f"{sensitivity.words} >= {limit:g}",
     )
+
+
+def _whole_words(output: Output, column: Column) -> str:
+    """What a column means; of a worst case that of the quantity itself."""
+    plain = output.columns[column.of] if column.extreme else column
+    return column.words.removesuffix(plain.words) + plain.meaning
 
 
 def _trade_offs(output: Output, scenario: str, cfa: str | None) -> dict[str, Points]:
     """What the search traced, and the limit, where the search is of this CFA and scenario."""
-    if output.front is None or cfa not in set(output.kind("search")["cfa"]):
+    search = output.provenance.search
+    if output.front is None or search is None or search.scenario != scenario:
         return {}
-    if output.provenance["search"]["scenario"] != scenario:
+    if cfa not in set(output.kind(FOUND)["cfa"]):
         return {}
     traced = output.front.dropna(subset=["objective"])
     bounded = output.front.dropna(subset=["limit"])
@@ -69,14 +73,14 @@ def _trade_offs(output: Output, scenario: str, cfa: str | None) -> dict[str, Poi
 
 def _points(output: Output, rows: pd.DataFrame, labels: Sequence[str] = ()) -> Points:
     separation, sensitivity = output.trade_off
-    x = rows[sensitivity].to_numpy(dtype=float)
-    return Points(x, rows[separation].to_numpy(dtype=float), tuple(map(str, labels)))
+    x = rows[sensitivity.name].to_numpy(dtype=float)
+    return Points(x, rows[separation.name].to_numpy(dtype=float), tuple(map(str, labels)))
 
 
 def scenario_series(output: Output) -> dict[tuple[str, str], dict[str, float]]:
     """Sets of scenarios that differ in one number: (name, key) -> scenario -> number, in order of the numbers."""
     groups: dict[tuple[str, str], dict[str, float]] = {}
-    for name in output.study["scenarios"]:
+    for name in output.scenarios:
         base, _, last = str(name).rpartition(" ")
         key, equals, number = last.partition("=")
         value = _number(number)
@@ -106,50 +110,44 @@ def over_series(rows: pd.DataFrame, scenarios: Mapping[str, float], column: str)
 
 def series_figures(output: Output) -> list[SeriesFigure]:
     """A figure for each set of scenarios that differ in one number: the separation of every named design over it."""
-    rows = output.kind("reference", "design", "search")
-    separation = output.trade_off[0]
-    best_place = BEST_PLACE + separation
+    rows, separation = output.few, output.trade_off[0]
+    best_place = next(
+        (c.name for c in output.columns.values() if (c.extreme, c.of) == ("best place", separation.name)), ""
+    )
     figures = []
     for (base, key), scenarios in scenario_series(output).items():
         upper = over_series(rows, scenarios, best_place) if best_place in rows else {}
         upper = {name: values for name, values in upper.items() if np.isfinite(values).all()}
-        lines = {n: Line(y, upper.get(n)) for n, y in over_series(rows, scenarios, separation).items()}
+        lines = {n: Line(y, upper.get(n)) for n, y in over_series(rows, scenarios, separation.name).items()}
         if lines:
             band = "over the places on the mosaic" if upper else ""
-            title = f"{output.study['study']}: {base}"
+            title = f"{output.study.study}: {base}"
             x = np.array(list(scenarios.values()))
-            figures.append(SeriesFigure(title, key, axis_label(separation), x, lines, band))
+            figures.append(SeriesFigure(title, key, separation.axis, x, lines, band))
     return figures
 
 
 def sensor_figure(output: Output) -> CurvesFigure:
     """The sensor's QE curves."""
-    curves = _curves(output, "qe:")
-    return CurvesFigure(f"Quantum efficiency, {_origin(output, 'sensor')}", "QE", _wave(output), curves)
+    title = f"Quantum efficiency, {_name(output.provenance.sensor)}"
+    return CurvesFigure(title, "QE", output.curves.wavelength_nm, output.curves.sensor)
 
 
 def lights_figure(output: Output) -> CurvesFigure:
     """The photon spectra of all signals."""
-    bundles = {f"{kind} ({len(photons)})": photons for kind, photons in _lights(output).items()}
+    bundles = {f"{kind} ({len(photons)})": photons for kind, photons in output.curves.bundles.items()}
     colors = {name: TYPE_COLORS[kind] for kind in TYPE_COLORS for name in bundles if name.startswith(f"{kind} (")}
-    title = f"Signals, {_origin(output, 'lights')}"
-    return CurvesFigure(title, "photons per nm, each signal 1 photon", _wave(output), bundles, colors=colors)
+    title = f"Signals, {_name(output.provenance.lights)}"
+    return CurvesFigure(
+        title, "photons per nm, each signal 1 photon", output.curves.wavelength_nm, bundles, colors=colors
+    )
 
 
 def chart_figure(output: Output) -> ChartFigure:
     """The color checker chart that the signals make."""
-    grid = WavelengthGrid(**output.study["wavelengths"])
-    patches = {kind: display_colors(grid, photons) for kind, photons in _lights(output).items()}
+    grid = output.study.wavelengths
+    patches = {kind: display_colors(grid, photons) for kind, photons in output.curves.bundles.items()}
     return ChartFigure("Color checker chart: a patch per signal, as near as sRGB comes", patches)
-
-
-def _lights(output: Output) -> dict[str, np.ndarray]:
-    """Signal type -> photon spectra, ndarray[n_signals, n_wavelengths]."""
-    types: dict[str, list[str]] = {}
-    for column in output.curves.columns:
-        if column.startswith("light:"):
-            types.setdefault(column.split(":")[1], []).append(column)
-    return {kind: output.curves[columns].to_numpy().T for kind, columns in types.items()}
 
 
 def clouds(output: Output, *kinds: str) -> list[list[Cloud]]:
@@ -158,7 +156,7 @@ def clouds(output: Output, *kinds: str) -> list[list[Cloud]]:
     A CFA of one channel has none.
     """
     rows = output.kind(*kinds)
-    rows = rows[(rows["scenario"] == next(iter(output.study["scenarios"]))) & (rows["status"] == "ok")]
+    rows = rows[(rows["scenario"] == output.scenarios[0]) & (rows["status"] == "ok")]
     found = []
     for row in rows.to_dict("records"):
         points = output.points[output.points["design_id"] == row["design_id"]]
@@ -183,44 +181,35 @@ def filters_figure(output: Output, cfa: str) -> CurvesFigure:
     rows = drawn(output)
     rows = rows[rows["cfa"] == cfa]
     ends = end_curves(output, cfa)
-    curves = {name: values for name, values in _curves(output, "qe:").items() if name in ends}
+    curves = {name: values for name, values in output.curves.sensor.items() if name in ends}
     for row in rows.to_dict("records"):
-        made = [c for c in output.curves.columns if c.startswith(f"design:{row['design_id']}:")]
-        for number, column in enumerate(made):
-            name = label(row) if len(made) == 1 else f"{label(row)}, {'ab'[number]}"
-            curves[name] = output.curves[column].to_numpy()
-    if f"limit:{cfa}" in output.curves.columns:
-        curves[LIMIT_NAME] = output.curves[f"limit:{cfa}"].to_numpy()
+        made = output.curves.drawn[row["design_id"]]
+        curves |= {label(row) + (f", {channel}" if len(made) > 1 else ""): qe for channel, qe in made.items()}
+    if cfa in output.curves.limits:
+        curves[LIMIT_NAME] = output.curves.limits[cfa]
     dashed = (*ends, LIMIT_NAME)
-    return CurvesFigure(f"{cfa}: modified channel", "QE", _wave(output), curves, dashed, {LIMIT_NAME: "#000000"})
+    return CurvesFigure(
+        f"{cfa}: modified channel", "QE", output.curves.wavelength_nm, curves, dashed, {LIMIT_NAME: "#000000"}
+    )
 
 
 def end_curves(output: Output, cfa: str) -> list[str]:
     """Names of the sensor's curves that a CFA's filters go between, and those of the green and the yellow pixel."""
-    entries = [entry for entry in modifications(output) if entry["cfa"] == cfa]
-    ends = {end for entry in entries for end in (entry["base"], entry.get("to")) if isinstance(end, str)} | {"G", "Y"}
-    return [name for name in _curves(output, "qe:") if name in ends]
+    entries = [entry for entry in modifications(output) if entry.cfa == cfa]
+    ends = {end for entry in entries for end in (entry.base, entry.to) if isinstance(end, str)} | {"G", "Y"}
+    return [name for name in output.curves.sensor if name in ends]
 
 
-def modifications(output: Output) -> list[dict[str, object]]:
-    """The study's named designs and sweeps."""
-    return [entry for key in ("designs", "sweeps", "boxes") for entry in output.study.get(key, {}).values()]
+def modifications(output: Output) -> list[Modification]:
+    """The study's named designs, sweeps and boxes."""
+    study = output.study
+    return [*study.designs.values(), *study.sweeps.values(), *study.boxes.values()]
 
 
 def drawn(output: Output) -> pd.DataFrame:
     """Rows whose filter's curve was kept: named designs, the search's answer, the best of each sweep."""
-    ids = [int(c.split(":")[1]) for c in output.curves.columns if c.startswith("design:")]
-    return output.table[output.table["design_id"].isin(ids)]
+    return output.table[output.table["design_id"].isin(output.curves.drawn)]
 
 
-def _curves(output: Output, prefix: str) -> dict[str, np.ndarray]:
-    return {c.removeprefix(prefix): output.curves[c].to_numpy() for c in output.curves.columns if c.startswith(prefix)}
-
-
-def _wave(output: Output) -> np.ndarray:
-    return output.curves["wavelength_nm"].to_numpy()
-
-
-def _origin(output: Output, what: str) -> str:
-    origin = output.provenance[what]
-    return f"{origin['name']}{' (surrogate: modeled, not measured)' if origin['surrogate'] else ''}"
+def _name(origin: Origin) -> str:
+    return f"{origin.name}{' (surrogate: modeled, not measured)' if origin.surrogate else ''}"

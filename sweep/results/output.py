@@ -3,39 +3,47 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
+from pydantic import BaseModel
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from ..camera.scene import Geometry
 from ..errors import Fault, OutputError
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective
-from ..metrics.separation import CSD
-from ..study import Study, load_study
+from ..metrics.quantity import Column
+from ..study import KeptSources, Study, StudySection, load_study
 from ..types import FloatArray
+from .curves import SCHEMA as CURVES_SCHEMA
+from .curves import KeptCurves
+from .facts import Provenance, lacking
 from .inventory import Inventory, no_run
-from .profiles import Profile, Profiles
+from .profiles import ParameterProfile, Profiles
 from .tables import (
     AUDIT,
     CURVES,
+    FEW,
+    FOUND,
     FRONT,
+    NAMED,
+    PLAIN,
     POINTS,
     PROVENANCE,
-    PROVENANCE_KEYS,
     RECOGNITION,
     RESOLVED,
     RESULTS,
+    ROW_COLUMNS,
     SEARCH_LOG,
+    SWEPT,
     read_table,
 )
 from .thinning import Counts, thinned
@@ -43,83 +51,117 @@ from .thinning import Counts, thinned
 _SAME = 1e-12
 """Curves that were computed twice, on other machines, differ by no more."""
 _MOST_SHOWN = 10
-_RESULT_COLUMNS = (
-    *("design_id", "kind", "name", "cfa", "family", "scenario", "sensitivity", "cfa_sensitivity", "violation"),
-    *("feasible", "pareto", "plan", "promised_dn", "status"),
-)
-_STUDY_KEYS = ("study", "seed", "wavelengths", "scenarios", "objective")
+_ALWAYS_WRITTEN = ("study", "seed", "wavelengths", "scenarios", "objective")
+"""Keys of every resolved study: it has its defaults, too, so that one that lacks them was cut."""
+_Key = TypeVar("_Key")
+_Model = TypeVar("_Model", bound=BaseModel)
 
 
 @dataclass(frozen=True)
 class Output:
     """What a run left in its folder; of a long result table, `table` holds what a report shows.
 
-    `profiles`: over the whole table, per CFA. `searched`: the search's evaluations. `audited`: rows of `sweep audit`.
+    `study`: the study that was run, and `resolved` its file. `profiles`: over the whole table, per CFA. `searched`: the
+    search's evaluations. `audited`: rows of `sweep audit`.
     """
 
     folder: Path
-    study: Mapping[str, Any]
-    provenance: Mapping[str, Any]
+    study: StudySection
+    resolved: Mapping[str, Any]
+    provenance: Provenance
     table: pd.DataFrame
     counts: Counts
-    curves: pd.DataFrame
+    curves: KeptCurves
     points: pd.DataFrame
     front: pd.DataFrame | None
     recognition: pd.DataFrame | None
     searched: pd.DataFrame | None
     audited: pd.DataFrame | None
-    profiles: Mapping[str, Sequence[Profile]]
+    profiles: Mapping[str, Sequence[ParameterProfile]]
 
     @property
-    def objective(self) -> str:
+    def objective(self) -> Objective:
+        """What the study maximizes."""
+        return self.study.objective
+
+    @property
+    def goal(self) -> Column:
         """Column of what the study maximizes."""
-        return Objective.model_validate(self.study["objective"]).column
+        return self.columns[self.objective.column]
 
     @property
-    def trade_off(self) -> tuple[str, str]:
+    def trade_off(self) -> tuple[Column, Column]:
         """Axes of the Pareto front: separation, sensitivity.
 
         `pareto` marks it among the designs that meet every constraint but those on these two.
         """
-        separation, sensitivity = self.provenance["trade_off"]
-        return separation, sensitivity
+        separation, sensitivity = self.provenance.trade_off
+        return self.columns[separation], self.columns[sensitivity]
+
+    @cached_property
+    def columns(self) -> dict[str, Column]:
+        """Quantities of the result table by their names."""
+        return {column.name: column for column in self.provenance.quantities}
 
     @property
     def distances(self) -> list[str]:
         """Columns of all CSDs."""
-        return [name for name in self.table.columns if name.startswith(CSD)]
+        return [name for name, c in self.columns.items() if c.role == "separation" and not c.extreme]
+
+    @property
+    def light(self) -> list[str]:
+        """Columns of the sensitivities."""
+        return [name for name, c in self.columns.items() if c.role == "light" and not c.extreme]
 
     @property
     def further(self) -> list[str]:
         """Columns that the study's objective and constraints name beside the CSDs and the sensitivities."""
-        named = (*self.constraints, *Objective.model_validate(self.study["objective"]).weights, self.objective)
-        return [n for n in dict.fromkeys(named) if n not in self.distances and not n.startswith(("sens", "cfa_sens"))]
+        named = (*self.constraints, *self.objective.weights, self.objective.column)
+        return [name for name in dict.fromkeys(named) if name not in (*self.distances, *self.light)]
 
     @property
     def parameters(self) -> list[str]:
         """Columns of the families' parameters."""
-        columns = list(self.table.columns)
-        return columns[columns.index("scenario") + 1 : columns.index(self.distances[0])]
+        return list(self.provenance.parameters)
 
     @property
-    def constraints(self) -> dict[str, Bound]:
+    def constraints(self) -> Mapping[str, Bound]:
         """The study's constraints."""
-        return {name: Bound(**bound) for name, bound in self.study.get("constraints", {}).items()}
+        return self.study.constraints
 
     @property
-    def geometry(self) -> dict[str, Geometry]:
-        """The study's distance scenarios."""
-        return {name: Geometry(**entry) for name, entry in self.study.get("geometry", {}).items()}
+    def scenarios(self) -> list[str]:
+        """Names of the scenes, in order."""
+        return list(self.study.scenarios)
+
+    def words(self, column: str) -> str:
+        """A column's name as people write it."""
+        return self.columns[column].words if column in self.columns else column
+
+    @property
+    def order(self) -> tuple[str, str, str]:
+        """Columns that say which design is best, the first one first, all maximized."""
+        return (self.objective.column, *self.provenance.trade_off)
 
     @cached_property
     def best(self) -> pd.DataFrame:
         """Feasible swept and searched designs, best first."""
-        candidates = self.table[self.table["feasible"] & self.table["kind"].isin(["sweep", "search"])]
-        return candidates.sort_values([self.objective, *self.trade_off, "design_id"], ascending=[False] * 3 + [True])
+        candidates = self.table[self.table["feasible"] & self.table["kind"].isin([SWEPT, FOUND])]
+        return candidates.sort_values([*self.order, "design_id"], ascending=[False] * 3 + [True])
 
     def kind(self, *kinds: str) -> pd.DataFrame:
-        """Rows of some kinds."""
+        """Rows of some kinds: see `tables.PLAIN` and what stands beside it."""
         return self.table[self.table["kind"].isin(kinds)]
+
+    @property
+    def named(self) -> pd.DataFrame:
+        """Plain CFAs and named designs."""
+        return self.kind(PLAIN, NAMED)
+
+    @property
+    def few(self) -> pd.DataFrame:
+        """The same and the search's answer."""
+        return self.kind(*FEW)
 
 
 def read_output(folder: Path, *, audited: bool = True) -> Output:
@@ -136,26 +178,46 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
     if not audited and AUDIT in optional:
         optional.remove(AUDIT)
     inventory.require([RESULTS, CURVES, POINTS, RESOLVED, PROVENANCE, *optional])
-    study = _mapping(folder / RESOLVED, lambda text: YAML(typ="safe").load(text), _STUDY_KEYS)
-    provenance = _mapping(folder / PROVENANCE, json.loads, PROVENANCE_KEYS)
-    objective = Objective.model_validate(study["objective"]).column
-    if len(provenance["trade_off"]) != 2 or any("name" not in provenance[what] for what in ("sensor", "lights")):
-        raise _lacking(folder / PROVENANCE, ["trade_off, or the names of sensor and lights"])
-    _check_columns(folder / RESULTS, [*_RESULT_COLUMNS, objective, *provenance["trade_off"]])
-    for name, columns in ((CURVES, ["wavelength_nm"]), (POINTS, ["design_id", "signal_type", "channel", "dn"])):
-        _check_columns(folder / name, columns)
+    resolved = _mapping(folder / RESOLVED, lambda text: YAML(typ="safe").load(text))
+    if lacks := [key for key in _ALWAYS_WRITTEN if key not in resolved]:
+        raise _lacking(folder / RESOLVED, lacks)
+    study = _checked(folder / RESOLVED, StudySection, resolved)
+    provenance = _checked(folder / PROVENANCE, Provenance, _mapping(folder / PROVENANCE, json.loads))
+    objective = study.objective.column
+    _check_columns(folder / RESULTS, [*ROW_COLUMNS, *provenance.parameters, *(c.name for c in provenance.quantities)])
+    _check_columns(folder / POINTS, ["design_id", "signal_type", "channel", "dn"])
     if FRONT in optional:
         _check_columns(folder / FRONT, ["sensitivity_min", "objective", "sensitivity", "limit"])
-    profiles = Profiles(objective, next(iter(study["scenarios"])))
-    table, counts = thinned(folder / RESULTS, [objective, *provenance["trade_off"]], profiles.add)
-    curves, points = (read_table(folder / name).to_pandas() for name in (CURVES, POINTS))
+    profiles = Profiles(objective, next(iter(study.scenarios)), provenance.parameters)
+    table, counts = thinned(folder / RESULTS, [objective, *provenance.trade_off], profiles.add)
+    points = read_table(folder / POINTS).to_pandas()
     front, recognition, searched, audit = (
         read_table(folder / name).to_pandas() if name in optional else None
         for name in (FRONT, RECOGNITION, SEARCH_LOG, AUDIT)
     )
     return Output(
-        folder, study, provenance, table, counts, curves, points, front, recognition, searched, audit, profiles.found
+        folder=folder,
+        study=study,
+        resolved=resolved,
+        provenance=provenance,
+        table=table,
+        counts=counts,
+        curves=_kept_curves(folder / CURVES),
+        points=points,
+        front=front,
+        recognition=recognition,
+        searched=searched,
+        audited=audit,
+        profiles=profiles.found,
     )
+
+
+def _kept_curves(path: Path) -> KeptCurves:
+    _check_columns(path, CURVES_SCHEMA.names)
+    try:
+        return KeptCurves.of_table(read_table(path))
+    except ValueError as error:
+        raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
 
 
 def study_of(output: Output, data: Path | None) -> Study:
@@ -164,20 +226,18 @@ def study_of(output: Output, data: Path | None) -> Study:
     Raises OutputError when the curves are not those that the run kept.
     """
     path = output.folder / RESOLVED
-    if data is None and output.provenance.get("data_sha256"):
-        return load_study(path, kept={str(name): values.to_numpy() for name, values in output.curves.items()})
+    if data is None and output.provenance.data_sha256:
+        return load_study(path, kept=KeptSources(output.curves.sensor, output.curves.lights))
     study = load_study(path, data)
     lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
-    made = {f"qe:{name}": values for name, values in study.sensor.qe.items()}
-    made |= {f"light:{kind}:{name}": values for kind, name, values in lights}
-    check_kept(output, made)
+    check_kept(output, output.curves.sensor, study.sensor.qe)
+    check_kept(output, output.curves.lights, {(kind, name): values for kind, name, values in lights})
     return study
 
 
-def check_kept(output: Output, made: Mapping[str, FloatArray]) -> None:
+def check_kept(output: Output, kept: Mapping[_Key, FloatArray], made: Mapping[_Key, FloatArray]) -> None:
     """Compare curves with those that the run kept under these names; raises OutputError where they differ."""
-    kept = output.curves
-    other = [name for name, values in made.items() if name in kept and not _same(kept[name].to_numpy(), values)]
+    other = [str(name) for name, values in made.items() if name in kept and not _same(kept[name], values)]
     if other:
         shown = ", ".join(other[:_MOST_SHOWN]) + (" and more" if len(other) > _MOST_SHOWN else "")
         problem = f"computed again, these are not what the run has: {shown}"
@@ -188,17 +248,21 @@ def _same(one: FloatArray, other: FloatArray) -> bool:
     return one.shape == other.shape and bool(np.abs(one - other).max(initial=0.0) <= _SAME)
 
 
-def _mapping(path: Path, parse: Any, keys: Sequence[str]) -> dict[str, Any]:
+def _mapping(path: Path, parse: Callable[[str], Any]) -> dict[str, Any]:
     try:
         found = parse(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError, YAMLError) as error:
         raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
     if not isinstance(found, dict):
         raise OutputError(Fault("not a mapping", str(path)))
-    lacking = [key for key in keys if key not in found]
-    if lacking:
-        raise _lacking(path, lacking)
     return found
+
+
+def _checked(path: Path, kind: type[_Model], data: Mapping[str, Any]) -> _Model:
+    """The data as an object; raises OutputError that names what is missing or no such thing."""
+    if lacks := lacking(kind, data):
+        raise _lacking(path, lacks[:_MOST_SHOWN])
+    return kind.model_validate(data)
 
 
 def _lacking(path: Path, what: Sequence[str]) -> OutputError:

@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from ..metrics.separation import CSD
 from ..types import FloatArray
 from .tables import holds
 
@@ -18,7 +17,7 @@ _MOST_PLACES, _MOST_PROFILES = 60, 9
 
 
 @dataclass(frozen=True)
-class Profile:
+class ParameterProfile:
     """The best objective of all feasible designs that have one parameter at a value: ndarray[n_values] each."""
 
     parameter: str
@@ -48,37 +47,35 @@ class Profiles:
 
     objective: str
     scenario: str
+    parameters: Sequence[str]
     _best: dict[str, dict[str, pd.Series]] = field(default_factory=dict)
 
     def add(self, table: pa.Table) -> None:
         """Take in some rows of the result table."""
         wanted = holds(table, "kind", "sweep") & holds(table, "scenario", self.scenario)
-        names = table.column_names
-        first = names.index("scenario") + 1
-        parameters = names[first : next(at for at, name in enumerate(names) if name.startswith(CSD))]
-        feasible = table.select([*parameters, self.objective, "cfa"]).filter(
+        feasible = table.select([*self.parameters, self.objective, "cfa"]).filter(
             pa.array(wanted & table["feasible"].to_numpy())
         )
         for cfa, rows in feasible.to_pandas().groupby("cfa", observed=True):
-            self._take(str(cfa), rows, parameters, self.objective)
+            self._take(str(cfa), rows)
 
-    def _take(self, cfa: str, rows: pd.DataFrame, parameters: list[str], objective: str) -> None:
+    def _take(self, cfa: str, rows: pd.DataFrame) -> None:
         mine = self._best.setdefault(cfa, {})
-        for name in parameters:
+        for name in self.parameters:
             own = rows.dropna(subset=[name])
             if own.empty:
                 continue
-            best = own.groupby(name)[objective].max()
+            best = own.groupby(name)[self.objective].max()
             if name in mine:
                 best = pd.concat([mine[name], best]).groupby(level=0).max()
             mine[name] = _places(best)
 
     @property
-    def found(self) -> dict[str, list[Profile]]:
+    def found(self) -> dict[str, list[ParameterProfile]]:
         """CFA -> profiles of the parameters that matter most, of those that have more than one value."""
         made = {
             cfa: [
-                Profile(name, best.index.to_numpy(dtype=float), best.to_numpy(dtype=float))
+                ParameterProfile(name, best.index.to_numpy(dtype=float), best.to_numpy(dtype=float))
                 for name, best in mine.items()
                 if len(best) > 1
             ]
@@ -97,7 +94,7 @@ def _places(best: pd.Series) -> pd.Series:
     return best.loc[kept.to_numpy()]
 
 
-def profile_table(profiles: Sequence[Profile]) -> pd.DataFrame:
+def profile_table(profiles: Sequence[ParameterProfile]) -> pd.DataFrame:
     """What each parameter's value matters, in figures."""
     return pd.DataFrame(
         [

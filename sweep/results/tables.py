@@ -31,20 +31,26 @@ POINTS = "points.parquet"
 RECOGNITION = "recognition.parquet"
 AUDIT = "audit.parquet"
 PROVENANCE = "provenance.json"
-PROVENANCE_KEYS = (
-    "designs",
-    "duration_s",
-    "fingerprint",
-    "lights",
-    "plans",
-    "sensor",
-    "trade_off",
-    "warnings",
-    "workers",
-)
-"""What is read there again; one of an earlier version may lack some."""
 RESOLVED = "study.resolved.yaml"
 _REPEATING = "cfa_sweep_parameters"
+_TEXT = pa.dictionary(pa.int32(), pa.string())
+_KEYS = (
+    pa.field("design_id", pa.int64(), nullable=False),
+    *(pa.field(name, _TEXT) for name in ("kind", "name", "cfa", "family", "scenario")),
+)
+_VERDICTS = (
+    *(pa.field(name, pa.float64()) for name in ("violation", "limit", "gap")),
+    *(pa.field(name, pa.bool_()) for name in ("feasible", "pareto")),
+    pa.field("plan", _TEXT),
+    pa.field("promised_dn", pa.float64()),
+    pa.field("status", _TEXT),
+)
+ROW_COLUMNS = tuple(each.name for each in (*_KEYS, *_VERDICTS))
+"""Columns of every result table; parameters and quantities stand between the keys and the verdicts."""
+PLAIN, NAMED, SWEPT, FOUND = "reference", "design", "sweep", "search"
+"""Kinds of rows: a plain CFA, a named design, one that was swept, the search's answer."""
+FEW = (PLAIN, NAMED, FOUND)
+"""Kinds of which there are few rows."""
 ROW_GROUP = 131_072
 """Rows that are read and written at once."""
 _TABLES_AHEAD = 3
@@ -54,12 +60,8 @@ Seal = Callable[[Path], None]
 
 def result_schema(parameters: Sequence[str], quantities: Sequence[str]) -> pa.Schema:
     """Columns of the result table: keys, a column per parameter (unit in its name), quantities, verdicts."""
-    text, number = pa.dictionary(pa.int32(), pa.string()), pa.float64()
-    fields = [pa.field("design_id", pa.int64(), nullable=False)]
-    fields += [pa.field(name, text) for name in ("kind", "name", "cfa", "family", "scenario")]
-    fields += [pa.field(name, number) for name in (*parameters, *quantities, "violation", "limit", "gap")]
-    fields += [pa.field("feasible", pa.bool_()), pa.field("pareto", pa.bool_())]
-    fields += [pa.field("plan", text), pa.field("promised_dn", number), pa.field("status", text)]
+    number = pa.float64()
+    fields = list(_KEYS) + [pa.field(name, number) for name in (*parameters, *quantities)] + list(_VERDICTS)
     return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION, _REPEATING: json.dumps(list(parameters))})
 
 

@@ -14,7 +14,8 @@ from ..results.journal import Journal
 from ..results.records import from_json, to_json
 from ..search.limit import Limit
 from ..search.problem import Problem, SearchRun
-from .workers import Call, Workers
+from ..types import Call
+from .workers import Workers
 
 
 @dataclass
@@ -73,5 +74,5 @@ def _fits(answer: Any, call: Call) -> bool:
             e.x.shape == low.shape and bool(((low <= e.x) & (e.x <= high)).all()) for e in answer.log
         )
     if isinstance(answer, Limit) and answer.curve is not None:
-        return answer.curve.shape == (problem.setup.grid.size,) and bool(np.isfinite(answer.curve).all())
+        return answer.curve.shape == (problem.view.grid.size,) and bool(np.isfinite(answer.curve).all())
     return True

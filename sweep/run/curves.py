@@ -10,27 +10,38 @@ import pandas as pd
 import pyarrow as pa
 
 from ..camera.imager import imager_of
-from ..designs.space import Space
+from ..results.curves import FilterCurves, KeptCurves
+from ..results.designs import row_curves
 from ..search.limit import Limit
 from ..study import Study
 
 
-def curves_table(study: Study, rows: pd.DataFrame, on_front: pd.DataFrame, limit: Limit | None) -> pa.Table:
-    """Columns `wavelength_nm`, `qe:<curve>`, `light:<type>:<name>`, `design:<design_id>:<k>`, `front:<design_id>:<k>`
-    of those rows of the front that are not drawn anyway, `limit:<cfa>`.
+def kept_curves(study: Study, rows: pd.DataFrame, on_front: pd.DataFrame, limit: Limit | None) -> KeptCurves:
+    """Curves of the sensor, the lights, the drawn designs, those rows of the front that are not drawn anyway, the
+    limit.
     """
-    columns: dict[str, Any] = {"wavelength_nm": study.grid.nodes_nm}
-    columns |= {f"qe:{name}": values for name, values in study.sensor.qe.items()}
-    lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
-    columns |= {f"light:{kind}:{name}": values for kind, name, values in lights}
     drawn = _drawn(study, rows)
-    for what, some in (("design", drawn), ("front", _others(on_front, drawn))):
-        for row in some:
-            for index, curve in enumerate(row_curves(study, row)[1][0]):
-                columns[f"{what}:{row['design_id']}:{index}"] = curve
+    lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
+    limits = {}
     if limit is not None and limit.curve is not None and study.search is not None:
-        columns[f"limit:{study.search.space.cfa}"] = limit.curve
-    return pa.table(columns)
+        limits[study.search.space.cfa] = limit.curve
+    return KeptCurves(
+        study.grid.nodes_nm,
+        dict(study.sensor.qe),
+        {(kind, name): values for kind, name, values in lights},
+        _channels(study, drawn),
+        _channels(study, _others(on_front, drawn)),
+        limits,
+    )
+
+
+def _channels(study: Study, rows: Sequence[Mapping[Hashable, Any]]) -> dict[int, FilterCurves]:
+    found = {}
+    for row in rows:
+        space, curves = row_curves(study, row)
+        channels = () if space.filter is None else space.filter.channels
+        found[int(row["design_id"])] = dict(zip(channels, curves[0], strict=True))
+    return found
 
 
 def points_table(study: Study, rows: pd.DataFrame, on_front: pd.DataFrame) -> pa.Table:
@@ -43,14 +54,14 @@ def points_table(study: Study, rows: pd.DataFrame, on_front: pd.DataFrame) -> pa
     found = [schema.empty_table()]
     for row in [*drawn, *_others(on_front, drawn)]:
         space, curves = row_curves(study, row)
-        setup = study.setup(space, row["scenario"])
-        response = imager_of(setup).read(curves)[0][0, 0]
+        view = study.view(space, row["scenario"])
+        response = imager_of(view).read(curves)[0][0, 0]
         signals, channels = response.shape
         columns = (
             np.full(response.size, row["design_id"]),
             np.repeat(study.lights.types, channels),
             np.repeat(study.lights.names, channels),
-            np.tile(setup.mosaic.channels, signals),
+            np.tile(view.mosaic.channels, signals),
             response.ravel(),
         )
         arrays = [pa.array(values, type=kind) for values, kind in zip(columns, schema.types, strict=True)]
@@ -71,20 +82,3 @@ def _drawn(study: Study, rows: pd.DataFrame) -> list[dict[Hashable, Any]]:
     first = (rows["scenario"] == next(iter(study.scenarios))) | (rows["kind"] == "search")
     shown = rows[first & (rows["status"] == "ok")]
     return shown.to_dict("records")
-
-
-def row_space(study: Study, row: Mapping[Any, Any]) -> Space:
-    """The space that a row belongs to."""
-    if row["kind"] == "search":
-        assert study.search is not None
-        return study.search.space
-    within = row["design_id"] % sum(space.size for space in study.spaces)  # ids run through the spaces of each scenario
-    ends = np.cumsum([space.size for space in study.spaces])
-    return study.spaces[int(np.searchsorted(ends, within, side="right"))]
-
-
-def row_curves(study: Study, row: Mapping[Any, Any]) -> tuple[Space, Any]:
-    """The space that a row belongs to and its filters' curves, ndarray[1, n_modified, n_wavelengths]."""
-    space = row_space(study, row)
-    point = np.array([[row[name] for name in space.parameters]], dtype=float)
-    return space, space.curves(point, study.grid.size)

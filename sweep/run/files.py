@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 
 from ..metrics.bound import FEASIBLE
 from ..metrics.pareto import hypervolume
+from ..results.facts import Provenance
 from ..results.inventory import Inventory
 from ..results.journal import Journal
 from ..results.names import TABLES
@@ -36,7 +37,7 @@ from ..search.limit import Limit
 from ..study import Study
 from ..types import Progress
 from .answers import Kept
-from .curves import curves_table, points_table
+from .curves import kept_curves, points_table
 from .front import Front, Gathered, few_of
 from .provenance import plan_facts, provenance, resolved_yaml
 from .recognition import recognition_table
@@ -92,7 +93,7 @@ class Making:
             if RESOLVED in todo:
                 self.inventory.write({RESOLVED: resolved_yaml(self.study).encode("utf-8")})
             if PROVENANCE in todo:
-                self.inventory.write({PROVENANCE: json_of(self._provenance()).encode("utf-8")})
+                self.inventory.write({PROVENANCE: json_of(self._provenance().model_dump(mode="json")).encode("utf-8")})
             self.made |= todo
             changed = {n for n in self.made if before.get(n) != self.inventory.files[n]}
             todo = files_of(self.study) - self.made if changed & {*TABLES} else set()
@@ -166,7 +167,7 @@ class Making:
     def _write_drawn(self, names: set[str]) -> None:
         rows, on_front = self.gathered.frame(), self.gathered.front_frame()
         if CURVES in names:
-            self.inventory.write_table(CURVES, curves_table(self.study, rows, on_front, self._limit()))
+            self.inventory.write_table(CURVES, kept_curves(self.study, rows, on_front, self._limit()).table())
         if POINTS in names:
             self.inventory.write_table(POINTS, points_table(self.study, rows, on_front))
         if RECOGNITION in names:
@@ -180,13 +181,15 @@ class Making:
             return None if self.answer is None else self.answer.limit
         return limit_alone(self.study, self.study.search)
 
-    def _provenance(self) -> dict[str, Any]:
+    def _provenance(self) -> Provenance:
         study, gathered, answer = self.study, self.gathered, self.answer
         found: dict[str, Any] = {
             "designs": study.n_designs + (answer is not None),
             "failed": self._failed,
             "plans": plan_facts(study),
             "trade_off": study.trade_off,
+            "parameters": study.parameters,
+            "quantities": [quantity.column for quantity in study.quantities.values()],
             "detours": self.inventory.facts.setdefault("detours", []),
         }
         counted: Detours = Counter({(each["how"], each["why"]): each["designs"] for each in found["detours"]})
@@ -199,7 +202,7 @@ class Making:
                 found["hypervolume"] = _hypervolumes(answer, gathered.swept)
                 found["hypervolume_least_sensitivity"] = answer.search.levels[0]
         self.inventory.facts.setdefault("duration_s", round(time.monotonic() - self.started, 3))
-        return provenance(study, self.inventory.facts) | found | {"warnings": warnings}
+        return Provenance(**provenance(study, self.inventory.facts), **found, warnings=tuple(warnings))
 
 
 def fits(inventory: Inventory, study: Study, rules: Rules) -> bool:

@@ -7,7 +7,7 @@ import pandas as pd
 import pyarrow as pa
 
 from ..metrics.pareto import non_dominated
-from ..results.tables import best_rows, holds
+from ..results.tables import FEW, best_rows, holds
 from ..types import BoolArray, FloatArray, IndexArray
 from .rows import Rules
 
@@ -16,7 +16,6 @@ BEST_PER_CFA = 5
 FRONT_ROWS = 200
 """Designs of a front, spread evenly over it, whose curves and signals a report can show."""
 _MOST_CANDIDATES = 50_000
-_ALWAYS = ("reference", "design", "search")
 
 
 class Front:
@@ -95,7 +94,7 @@ class Gathered:
         """Take in what `few_of` a table gives."""
         self.front.add(few)
         self.swept.add(few)
-        always = holds(few, "kind", *_ALWAYS)
+        always = holds(few, "kind", *FEW)
         if always.any():
             self._always.append(few.filter(pa.array(always)))
         candidates = holds(few, "kind", "sweep") & holds(few, "scenario", self.scenario)
@@ -138,7 +137,7 @@ class Gathered:
 
 def few_of(table: pa.Table, rules: Rules) -> pa.Table:
     """The rows of a chunk that `Gathered` may keep: those on its front, those that are no sweep, its best designs."""
-    wanted = table["pareto"].to_numpy() | holds(table, "kind", *_ALWAYS)
+    wanted = table["pareto"].to_numpy() | holds(table, "kind", *FEW)
     rest = table.filter(pa.array(table["feasible"].to_numpy() & ~wanted))
     few = pa.concat_tables([table.filter(pa.array(wanted)), best_rows(rest, rules.order, BEST_PER_CFA)])
     return few.combine_chunks()

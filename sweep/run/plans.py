@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import joblib
-
 from ..study import Study
-from ..types import Progress
+from ..types import Progress, delayed
 from .stop import Stop
 from .workers import Workers, workers
 
@@ -20,7 +18,7 @@ def with_plans(
     A scene whose worker dies is planned again. Raises InterruptedRunError after `stop` was asked for.
     """
     names = list(study.scenarios)
-    calls = (joblib.delayed(study.plan)(name, tolerance_dn) for name in names)
+    calls = (delayed(study.plan, name, tolerance_dn) for name in names)
     plans = {}
     # One scene is planned faster than workers are started.
     how = Workers(min(n_jobs, len(names)), Stop() if stop is None else stop)

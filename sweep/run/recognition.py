@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import joblib
 import numpy as np
 import pandas as pd
 import pyarrow as pa
 
 from ..camera.imager import imager_of
-from ..camera.view import Setup
+from ..camera.view import View
 from ..metrics.recognition import columns, recognize
+from ..results.designs import row_curves
+from ..results.tables import FEW
 from ..study import Study
-from ..types import FloatArray, Progress
-from .curves import row_curves
-from .search import Parallel
-
-_KINDS = ("reference", "design", "search")
+from ..types import FloatArray, Parallel, Progress, delayed
 
 
 def recognition_table(
@@ -31,13 +28,13 @@ def recognition_table(
     if asked is None or not asked.patches:
         return None
     keys = ["design_id", "kind", "name", "cfa", "scenario"]
-    rows = highlights[highlights["kind"].isin(_KINDS) & (highlights["status"] == "ok")].to_dict("records")
+    rows = highlights[highlights["kind"].isin(FEW) & (highlights["status"] == "ok")].to_dict("records")
     tasks = []
     for row in rows:
         space, curves = row_curves(study, row)
         seed = (study.section.seed, int(row["design_id"]))
-        setup = study.setup(space, row["scenario"])
-        tasks.append(joblib.delayed(_recognized)(setup, curves, study.states, asked.patches, seed))
+        view = study.view(space, row["scenario"])
+        tasks.append(delayed(_recognized, view, curves, study.states, asked.patches, seed))
     found = []
     for row, values in zip(rows, parallel(iter(tasks)), strict=False):
         found.append({key: row[key] for key in keys} | {"patches": asked.patches} | values)
@@ -48,6 +45,6 @@ def recognition_table(
 
 
 def _recognized(
-    setup: Setup, curves: FloatArray, states: Sequence[str], patches: int, seed: tuple[int, int]
+    view: View, curves: FloatArray, states: Sequence[str], patches: int, seed: tuple[int, int]
 ) -> dict[str, float]:
-    return recognize(imager_of(setup), curves, states, patches, np.random.default_rng(seed))
+    return recognize(imager_of(view), curves, states, patches, np.random.default_rng(seed))

@@ -6,35 +6,40 @@ Where a route fails the next one is taken, and how many designs took it is hande
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..camera.imager import imager_of
-from ..camera.view import Setup
-from ..designs.block import Block, Curves, Edges, edges_of
-from ..designs.space import DIMENSIONS, Space
-from ..metrics.evaluate import WORST, evaluate, noise_quantities, shiftable
-from ..metrics.objective import COMBINED, Objective
+from ..camera.view import View
+from ..designs.block import Block, CurveBlock, EdgeBlock, edges_of
+from ..designs.space import Space
+from ..metrics.evaluate import evaluate, family_quantities
+from ..metrics.objective import COMBINED, Objective, columns_of
+from ..metrics.quantity import Asked, Columns, Quantity
 from ..search.problem import SHIFTS
 from ..types import FloatArray
 
 BY_CURVES = "computed from their curves, since the fast way by their edges failed"
 ALONE = "computed one by one, since their block failed"
 _MOST_LETTERS = 200
-Columns = dict[str, FloatArray]
 Detours = Counter[tuple[str, str]]
 """How many designs took another route than their block's own: (BY_CURVES or ALONE, the fault of the own route)."""
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What is asked of each design: quantities, the objective, shifts of its edges, states to tell apart."""
+class Request:
+    """What is wanted of each design: quantities, the objective, and shifts of its edges."""
 
-    columns: tuple[str, ...]
+    asked: Asked
     objective: Objective
     edge_shift_nm: float
-    states: tuple[str, ...]
+
+    @property
+    def quantities(self) -> Mapping[str, Quantity]:
+        """Every column by its name."""
+        return columns_of(self.asked, self.objective)
 
 
 @dataclass(frozen=True)
@@ -46,7 +51,7 @@ class Found:
     detours: Detours
 
 
-def block_of(space: Space, start: int, stop: int, setup: Setup, asked: Asked) -> Found:
+def block_of(space: Space, start: int, stop: int, view: View, request: Request) -> Found:
     """Designs `start`..`stop`-1 of a space.
 
     By their edges where the family is separable, else from their curves. Where the fast way fails, all of them from
@@ -56,18 +61,18 @@ def block_of(space: Space, start: int, stop: int, setup: Setup, asked: Asked) ->
     points = space.points(start, stop)
     detours: Detours = Counter()
     faults: dict[int, str] = {}
-    fast: Edges | None = None
+    fast: EdgeBlock | None = None
     try:
         fast = edges_of(space, start, stop)
-        columns = _columns(space, setup, points, asked, fast)
+        columns = _columns(space, view, points, request, fast)
     except Exception as error:  # one design must not take the others with it
         own = text_of(error)
         try:
-            columns = _columns(space, setup, points, asked)
+            columns = _columns(space, view, points, request)
             detours[BY_CURVES, own] = len(points)
         except Exception:
-            columns, faults, detours = _one_by_one(space, start, setup, points, asked, own)
-    return Found(columns, _not_finite(columns, setup, asked) | faults, detours)
+            columns, faults, detours = _one_by_one(space, start, view, points, request, own)
+    return Found(columns, _not_finite(columns, view, request) | faults, detours)
 
 
 def text_of(error: Exception) -> str:
@@ -75,23 +80,25 @@ def text_of(error: Exception) -> str:
     return " ".join(f"{type(error).__name__}: {error}".split())[:_MOST_LETTERS]
 
 
-def _columns(space: Space, setup: Setup, points: FloatArray, asked: Asked, block: Block | None = None) -> Columns:
+def _columns(space: Space, view: View, points: FloatArray, request: Request, block: Block | None = None) -> Columns:
     """Every quantity of a block of designs, ndarray[n_designs] each; `block`: these very designs, if a faster one."""
-    size = setup.grid.size
-    imager = imager_of(setup)
-    designs = Curves(space.curves(points, size)) if block is None else block
-    columns = evaluate(imager, designs, asked.states) | space.dimensions(points)
-    if asked.edge_shift_nm:
-        shifts = [asked.edge_shift_nm * s for s in SHIFTS if s] if space.filter is not None else []
+    size = view.grid.size
+    imager = imager_of(view)
+    designs = CurveBlock(space.curves(points, size)) if block is None else block
+    columns = evaluate(imager, designs, request.asked.states)
+    columns |= family_quantities(None if space.filter is None else space.filter.family, points)
+    if request.edge_shift_nm:
+        shifts = [request.edge_shift_nm * s for s in SHIFTS if s] if space.filter is not None else []
         cases = [columns, *(evaluate(imager, space.curves(points, size, shift)) for shift in shifts)]
-        columns |= {WORST + n: np.min([case[n] for case in cases], axis=0) for n in shiftable(setup.lights)}
-    if asked.objective.column == COMBINED:
-        columns[COMBINED] = asked.objective.of(columns)
+        worst = [quantity for quantity in request.quantities.values() if quantity.extreme == "worst edges"]
+        columns |= {quantity.name: quantity.worse([case[quantity.of] for case in cases]) for quantity in worst}
+    if request.objective.column == COMBINED:
+        columns[COMBINED] = request.objective.of(columns)
     return columns
 
 
 def _one_by_one(
-    space: Space, start: int, setup: Setup, points: FloatArray, asked: Asked, own: str
+    space: Space, start: int, view: View, points: FloatArray, request: Request, own: str
 ) -> tuple[Columns, dict[int, str], Detours]:
     """Each design by its own route, else from its curves; `own`: the fault of the whole block."""
     found: list[Columns | None] = []
@@ -100,39 +107,38 @@ def _one_by_one(
     for index, point in enumerate(points):
         at = start + index
         try:
-            found.append(_columns(space, setup, point[None], asked, edges_of(space, at, at + 1)))
+            found.append(_columns(space, view, point[None], request, edges_of(space, at, at + 1)))
             detours[ALONE, own] += 1
         except Exception as error:
             try:
-                found.append(_columns(space, setup, point[None], asked))
+                found.append(_columns(space, view, point[None], request))
                 detours[BY_CURVES, text_of(error)] += 1
             except Exception as last:  # the row says what happened
                 found.append(None)
                 faults[index] = f"error: {text_of(last)}"
     nothing = np.array([np.nan])
-    columns = {n: np.concatenate([nothing if c is None else c[n] for c in found]) for n in asked.columns}
+    columns = {n: np.concatenate([nothing if c is None else c[n] for c in found]) for n in request.quantities}
     return columns, faults, detours
 
 
-def _not_finite(columns: Columns, setup: Setup, asked: Asked) -> dict[int, str]:
+def _not_finite(columns: Columns, view: View, request: Request) -> dict[int, str]:
     """Designs with a quantity that is no finite number, though each of them has it."""
-    lacking = _may_lack(setup, asked)
-    unbounded = set(noise_quantities(asked.states))  # a signal without noise is told apart for certain
+    lacking = _may_lack(view, request)
+    infinite = {name for name, quantity in request.quantities.items() if quantity.infinite}
     numbers = [
-        np.where(values == np.inf, 0.0, values) if name in unbounded else values
+        np.where(values == np.inf, 0.0, values) if name in infinite else values
         for name, values in columns.items()
         if name not in lacking
     ]
     return {int(index): "not finite" for index in np.flatnonzero(~np.isfinite(numbers).all(axis=0))}
 
 
-def _may_lack(setup: Setup, asked: Asked) -> set[str]:
-    """Quantities that a design may not have: dimensions; of a plain CFA, all that a modified channel has."""
-    lacking = {*DIMENSIONS}
-    if not setup.modified:
-        lacking |= {"sensitivity", "slope_per_nm", "min_transmission", WORST + "sensitivity"}
-        if lacking & set(asked.objective.weights):
-            lacking.add(COMBINED)
+def _may_lack(view: View, request: Request) -> set[str]:
+    """Quantities that a design may not have: those of a family; of a plain CFA, all that a modified channel has."""
+    without = ("family",) if view.modified else ("family", "modified")
+    lacking = {name for name, quantity in request.quantities.items() if quantity.needs in without}
+    if lacking & set(request.objective.weights):
+        lacking.add(COMBINED)
     return lacking
 
 

@@ -13,17 +13,16 @@ import numpy as np
 import pyarrow as pa
 
 from ..camera.plan.plan import Plan
-from ..camera.view import Setup
+from ..camera.view import View
 from ..designs.block import by_edges
 from ..designs.space import Space
 from ..metrics.bound import FEASIBLE, Bound, total_violation
-from ..metrics.objective import Objective
 from ..metrics.pareto import non_dominated
 from ..results.identity import CHUNK
 from ..results.tables import holds, result_schema
 from ..study import Study
 from ..types import BoolArray, FloatArray
-from .routes import Asked, Detours, Found, block_of
+from .routes import Detours, Found, Request, block_of
 
 _WORDS = pa.dictionary(pa.int32(), pa.string())
 _MOST_CHUNKS, _LEAST_JOBS = 16, 64
@@ -43,29 +42,21 @@ class Job:
 
 @dataclass(frozen=True)
 class Rules:
-    """What turns designs into rows: the table's schema, its quantities and the verdicts on them.
+    """What turns designs into rows: the table's schema, what is wanted of designs and the verdicts on them.
 
     `front`: the two quantities of the Pareto front, whose constraints the designs on it need not meet.
     """
 
     schema: pa.Schema
-    columns: tuple[str, ...]
-    objective: Objective
+    request: Request
     constraints: Mapping[str, Bound]
     front: tuple[str, str]
-    edge_shift_nm: float
     plans: Mapping[str, Plan]
-    states: tuple[str, ...]
-
-    @property
-    def asked(self) -> Asked:
-        """What is asked of each design."""
-        return Asked(self.columns, self.objective, self.edge_shift_nm, self.states)
 
     @property
     def order(self) -> tuple[str, ...]:
         """Quantities that say which design is best, the first one first, all maximized."""
-        return (self.objective.column, *self.front)
+        return (self.request.objective.column, *self.front)
 
 
 def jobs_of(study: Study) -> Iterator[Job]:
@@ -89,7 +80,7 @@ def _job_size(study: Study, space: Space) -> int:
     return CHUNK * min(max(1, space.size // (CHUNK * _LEAST_JOBS)), _MOST_CHUNKS)
 
 
-def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
+def run_job(job: Job, view: View, rules: Rules) -> pa.Table:
     """Evaluate a job; a design that fails is a row with its status, and the others are kept.
 
     `pareto` marks the non-dominated designs of this job alone, among those that meet every constraint but those on the
@@ -97,7 +88,7 @@ def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
     another route than their block's own.
     """
     points = job.space.points(job.start, job.stop)
-    found = _quantities(job, setup, rules)
+    found = _quantities(job, view, rules)
     columns, faults = found.columns, found.faults
     ok = np.ones(len(points), dtype=bool)
     ok[list(faults)] = False
@@ -158,25 +149,17 @@ def failed_rows(job: Job, rules: Rules, status: str) -> pa.Table:
 
 def rules_of(study: Study) -> Rules:
     """The rules of a study."""
-    schema = result_schema(study.parameters, study.columns)
-    return Rules(
-        schema,
-        study.columns,
-        study.objective,
-        study.constraints,
-        study.trade_off,
-        study.edge_shift_nm,
-        study.plans,
-        study.states,
-    )
+    schema = result_schema(study.parameters, list(study.quantities))
+    request = Request(study.asked, study.objective, study.edge_shift_nm)
+    return Rules(schema, request, study.constraints, study.trade_off, study.plans)
 
 
-def _quantities(job: Job, setup: Setup, rules: Rules) -> Found:
+def _quantities(job: Job, view: View, rules: Rules) -> Found:
     """Every quantity, what went wrong with which design, and detours; a chunk at a time, which stays in the cache."""
     parts: list[Found] = []
     faults: dict[int, str] = {}
     for start in range(job.start, job.stop, CHUNK):
-        part = block_of(job.space, start, min(start + CHUNK, job.stop), setup, rules.asked)
+        part = block_of(job.space, start, min(start + CHUNK, job.stop), view, rules.request)
         parts.append(part)
         faults |= {start - job.start + index: text for index, text in part.faults.items()}
     columns = {name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns}

@@ -2,46 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import islice
+from dataclasses import dataclass
 from typing import Any
 
-import joblib
 import numpy as np
 import pyarrow as pa
 
 from ..designs.space import Space
-from ..errors import BrokenProofError, Fault, InfeasibleError
-from ..metrics.bound import FEASIBLE, Bound
+from ..errors import Fault, InfeasibleError
+from ..metrics.bound import FEASIBLE
 from ..results.tables import front_schema, search_schema
 from ..search.limit import Limit, limit_of, why_not
 from ..search.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
 from ..search.solver import best_reachable, search_from
+from ..search.trade_off import Effort, FrontPoint, check_proof, gap_of, trade_off
 from ..study import Search, Study
-from ..types import FloatArray, Progress
+from ..types import FloatArray, Parallel, Progress, delayed
 from .rows import Job, Rules, run_job
 
-Parallel = Callable[[Iterable[Any]], Iterator[Any]]
-"""Results of delayed calls, in their order."""
-_FRONT_STARTS = 2
-_FRONT_LIMIT_DN = 0.02
-_FRONT_PROGRAMS = 1000
-"""Linear programs for the limit at each level; a level of the built-in studies takes about ten."""
-_PROOF_TOLERANCE = 1e-9
-"""A design may exceed a proven limit by this share, which is rounding, and no more."""
-_NO_LIMIT = 0.05
 _REACH_STARTS = 8
-
-
-@dataclass(frozen=True)
-class FrontPoint:
-    """The best design with at least `level` of sensitivity (None: none was found), and the limit there."""
-
-    level: float
-    best: Evaluation | None
-    runs: tuple[SearchRun, ...]
-    limit: Limit | None
 
 
 @dataclass(frozen=True)
@@ -58,24 +37,7 @@ class SearchAnswer:
     @property
     def gap(self) -> float | None:
         """How far the answer is below what is proven to be out of reach, relative."""
-        return None if self.limit is None else _gap(self.best, self.limit)
-
-
-def _checked(best: Evaluation | None, limit: Limit | None, where: str) -> None:
-    """Raise BrokenProofError where a design that the search found is better than what is proven to be out of reach."""
-    if best is None or limit is None or best.objective <= limit.proven + _PROOF_TOLERANCE * max(1.0, limit.proven):
-        return
-    raise BrokenProofError(
-        Fault(
-            f"broken proof{where}: the search found {best.objective:.9g}, but the limit says that no filter has more "
-            f"than {limit.proven:.9g}; what is finished is kept; this is a fault of the program, not of the study"
-        )
-    )
-
-
-def _gap(best: Evaluation, limit: Limit) -> float | None:
-    """Relative distance of an answer from the limit; none where the limit itself is no more than its own accuracy."""
-    return None if limit.proven <= _NO_LIMIT else max(0.0, 1 - best.objective / limit.proven)
+        return None if self.limit is None else gap_of(self.best, self.limit)
 
 
 def run_search(study: Study, search: Search, parallel: Parallel, progress: Progress) -> SearchAnswer:
@@ -89,8 +51,7 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     starts = starting_points(problem, n_starts, study.section.seed)
     each = search.max_evaluations // n_starts
     tasks = (
-        joblib.delayed(search_from)(problem, i, u, search.algorithm, each, study.section.seed)
-        for i, u in enumerate(starts)
+        delayed(search_from, problem, i, u, search.algorithm, each, study.section.seed) for i, u in enumerate(starts)
     )
     runs: list[SearchRun] = []
     for run in parallel(tasks):
@@ -101,8 +62,9 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
         raise _infeasible(study, problem, starts[:_REACH_STARTS], each)
     no_limit = why_not(problem)
     limit = limit_of(problem) if no_limit is None else None
-    _checked(best, limit, "")
-    front = _front(problem, search, starts, each, study.section.seed, parallel, progress) if search.levels else ()
+    check_proof(best, limit)
+    effort = Effort(search.algorithm, starts, each, study.section.seed)
+    front = trade_off(problem, search.levels, effort, parallel, progress) if search.levels else ()
     return SearchAnswer(search, tuple(runs), best, limit, no_limit, front)
 
 
@@ -122,56 +84,13 @@ def _infeasible(study: Study, problem: Problem, starts: FloatArray, each: int) -
     return InfeasibleError(faults)
 
 
-def _front(
-    problem: Problem, search: Search, starts: FloatArray, each: int, seed: int, parallel: Parallel, progress: Progress
-) -> tuple[FrontPoint, ...]:
-    """The same search at each level of sensitivity, from a few points, then from what the neighboring levels found."""
-    at_level = [replace(problem, constraints=_with_sensitivity(problem, level)) for level in search.levels]
-    limits: list[Limit | None] = [None] * len(at_level)
-    if why_not(problem) is None:
-        limits = list(parallel(joblib.delayed(limit_of)(p, _FRONT_LIMIT_DN, _FRONT_PROGRAMS) for p in at_level))
-    runs: list[list[SearchRun]] = [[] for _ in at_level]
-    done, total = 0, 2 * len(at_level)
-
-    def searched(points: Sequence[Sequence[FloatArray]]) -> None:
-        nonlocal done
-        found = parallel(
-            [
-                joblib.delayed(search_from)(at_level[k], len(runs[k]) + i, u, search.algorithm, each, seed)
-                for k, own in enumerate(points)
-                for i, u in enumerate(own)
-            ]
-        )
-        for k, own in enumerate(points):
-            runs[k] += islice(found, len(own))
-            done += 1
-            progress("front levels", done, total)
-
-    def best(k: int) -> Evaluation | None:
-        return best_feasible([e for run in runs[k] for e in run.log]) if 0 <= k < len(runs) else None
-
-    searched([[*starts[:_FRONT_STARTS]]] * len(at_level))
-    found = [(best(k - 1), best(k + 1)) for k in range(len(at_level))]
-    searched([[problem.to_unit(e.x) for e in both if e is not None] for both in found])
-    points = tuple(FrontPoint(level, best(k), tuple(runs[k]), limits[k]) for k, level in enumerate(search.levels))
-    for point in points:
-        _checked(point.best, point.limit, f" at a sensitivity of {point.level:g} and more")
-    return points
-
-
-def _with_sensitivity(problem: Problem, level: float) -> dict[str, Bound]:
-    given = problem.constraints.get("sensitivity")
-    top = None if given is None or given.max is None or given.max < level else given.max
-    return {**problem.constraints, "sensitivity": Bound(min=level, max=top)}
-
-
 def answer_row(study: Study, answer: SearchAnswer, rules: Rules, first_id: int) -> pa.Table:
     """The search's answer as the camera reads it out, with its limit and gap."""
     space = answer.search.space
     axes = tuple((float(value),) for value in answer.best.x)
     found = Space("search", f"best of {space.name}", space.cfa, space.filter, axes)
     job = Job(found, answer.search.scenario, 0, 1, first_id)
-    row = run_job(job, study.setup(found, job.scenario), rules)
+    row = run_job(job, study.view(found, job.scenario), rules)
     if answer.limit is not None:
         for name, value in (("limit", answer.limit.proven), ("gap", answer.gap)):
             index = row.schema.get_field_index(name)
@@ -237,6 +156,6 @@ def front_table(answer: SearchAnswer) -> pa.Table:
             row |= dict(zip(names, map(float, point.best.x), strict=True))
         if point.limit is not None and np.isfinite(point.limit.proven):
             row["limit"] = point.limit.proven
-            row["gap"] = None if point.best is None else _gap(point.best, point.limit)
+            row["gap"] = None if point.best is None else gap_of(point.best, point.limit)
         rows.append(row)
     return pa.Table.from_pylist(rows, schema=front_schema(names))

@@ -9,20 +9,19 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
-import joblib
 import pyarrow as pa
 
-from ..camera.view import Setup
+from ..camera.view import View
 from ..errors import FailedDesignError, Fault, OutputError
 from ..results.identity import fingerprint
 from ..results.journal import Journal, Shard
 from ..results.tables import sliced
 from ..study import Study
-from ..types import Progress
+from ..types import Call, Progress, delayed
 from .front import Gathered, few_of
 from .routes import Detours
 from .rows import Job, Rules, detours_of, failed_rows, job_key, jobs_of, joined, run_job, with_local_front
-from .workers import Call, WorkerKilledError, Workers, alone
+from .workers import WorkerKilledError, Workers, alone
 
 KILLED = "error: its worker died twice"
 
@@ -55,19 +54,19 @@ class Sweep:
         return [job_key(job, self.fingerprint, self.study.plans.get(job.scenario)) for job in self.jobs]
 
     @cached_property
-    def _setups(self) -> dict[tuple[str, str, str], Setup]:
+    def _views(self) -> dict[tuple[str, str, str], View]:
         return {
-            (space.kind, space.name, scenario): self.study.setup(space, scenario)
+            (space.kind, space.name, scenario): self.study.view(space, scenario)
             for scenario in self.study.scenarios
             for space in self.study.spaces
         }
 
-    def _setup(self, job: Job) -> Setup:
-        return self._setups[job.space.kind, job.space.name, job.scenario]
+    def _view(self, job: Job) -> View:
+        return self._views[job.space.kind, job.space.name, job.scenario]
 
     def compute(self, job: Job) -> pa.Table:
         """Rows of a job, in this process."""
-        return run_job(job, self._setup(job), self.rules)
+        return run_job(job, self._view(job), self.rules)
 
     def refill(self, results: Path) -> None:
         """Take what the journal lacks out of a result table of this study, but for chunks with failed designs.
@@ -106,7 +105,7 @@ class Sweep:
         todo = [index for index, key in enumerate(self.keys) if key not in entries]
         done = sum(entries[key].rows for key in self.keys if key in entries)
         progress("designs", done, self.study.n_designs)
-        calls = (joblib.delayed(_shard)(self.jobs[i], self._setup(self.jobs[i]), self.rules) for i in todo)
+        calls = (delayed(_shard, self.jobs[i], self._view(self.jobs[i]), self.rules) for i in todo)
 
         def keep(at: int, found: tuple[Shard, pa.Table]) -> None:
             self.journal.save(self.keys[todo[at]], todo[at], found[0])
@@ -124,7 +123,7 @@ class Sweep:
         for index, (job, key) in enumerate(zip(self.jobs, self.keys, strict=True)):
             table = self._kept(index)
             if table is None:
-                shard, _ = _shard(job, self._setup(job), self.rules)
+                shard, _ = _shard(job, self._view(job), self.rules)
                 self.journal.save(key, index, shard)
                 table = shard.table()
             self.failed += self.journal.entries[key].failed
@@ -140,10 +139,10 @@ class Sweep:
         return table
 
 
-def _shard(job: Job, setup: Setup, rules: Rules) -> tuple[Shard, pa.Table]:
+def _shard(job: Job, view: View, rules: Rules) -> tuple[Shard, pa.Table]:
     """A job's rows as a file's content, and the few that `Gathered` takes in."""
     started = time.monotonic()
-    table = run_job(job, setup, rules)
+    table = run_job(job, view, rules)
     return Shard.of(table, time.monotonic() - started), few_of(table, rules)
 
 
@@ -155,13 +154,13 @@ def _quarantined(call: Call) -> tuple[Shard, pa.Table]:
 
 
 def _halved(call: Call) -> pa.Table:
-    job, setup, rules = call[1]
+    job, view, rules = call[1]
     if job.stop - job.start == 1:
         return failed_rows(job, rules, KILLED)
     middle = (job.start + job.stop) // 2
     tables = []
     for half in (replace(job, stop=middle), replace(job, start=middle, first_id=job.first_id + middle - job.start)):
-        part: Call = (call[0], (half, setup, rules), {})
+        part: Call = (call[0], (half, view, rules), {})
         try:
             tables.append(alone(part)[0].table())
         except WorkerKilledError:

@@ -11,11 +11,12 @@ from typing import Any
 
 from ..disk import read_facts
 from ..errors import InfeasibleError, StudyError
+from ..results.facts import Provenance, lacking
 from ..results.folder import begin
 from ..results.inventory import Inventory
 from ..results.journal import Journal
 from ..results.lock import LOCK, locked
-from ..results.tables import PROVENANCE, PROVENANCE_KEYS, RESOLVED, RESULTS
+from ..results.tables import PROVENANCE, RESOLVED, RESULTS
 from ..study import Study
 from ..types import Progress
 from .files import Making, files_of, fits
@@ -95,7 +96,7 @@ def run_study(
 def _wrong(inventory: Inventory, study: Study) -> set[str]:
     """Files of the study's run that are not what a run wrote."""
     wrong = set(inventory.wrong(sorted(files_of(study))))
-    if not read_facts(inventory.path(PROVENANCE)).keys() >= set(PROVENANCE_KEYS):
+    if lacking(Provenance, read_facts(inventory.path(PROVENANCE))):
         wrong.add(PROVENANCE)
     return wrong
 

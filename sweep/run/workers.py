@@ -18,13 +18,12 @@ from joblib.externals.loky import ProcessPoolExecutor
 from threadpoolctl import threadpool_limits
 
 from ..errors import SweepError
+from ..types import Call
 from .stop import Stop, without_interrupts
 from .worker_process import keep_freed_memory, preparing
 
 _LEAST_WINDOW, _WINDOW_PER_WORKER = 64, 16
 BACKENDS = ("loky", "threading", "dask")
-Call = tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
-"""A call that `joblib.delayed` has put off."""
 _Numbered = tuple[int, Call]
 
 

@@ -13,10 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linprog
-from scipy.sparse import csr_matrix, diags_array, hstack, vstack
+from scipy.sparse import csr_matrix, hstack, vstack
 
-from ..camera.imager import smooth_imager
+from ..camera.linear import smooth_imager
 from ..metrics.bound import FEASIBLE, Bound
 from ..types import FloatArray, IndexArray
 from .problem import Problem
@@ -89,7 +88,7 @@ class FilterProgram:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self.base = problem.setup.base_qe[0]
+        self.base = problem.view.base_qe[0]
         bound = problem.constraints.get("min_transmission", Bound(min=0.0))
         least = bound.min or 0.0
         self.low = self.base * least
@@ -104,53 +103,39 @@ class FilterProgram:
         self.solved = 0
 
     def _fixed_rows(self) -> _Rows:
-        """Slope and sensitivities."""
-        problem, size = self.problem, self.base.size
-        matrices: list[csr_matrix] = [csr_matrix((0, size))]
-        columns: list[FloatArray] = []
-        slope = problem.constraints.get("slope_per_nm")
-        if slope is not None and slope.max is not None:
-            step = csr_matrix(diags_array([-1.0, 1.0], offsets=[0, 1], shape=(size - 1, size)))
-            matrices += [step, -step]
-            step_nm = problem.setup.grid.step_nm
-            one = [-slope.max * step_nm, FEASIBLE * slope.scale * step_nm, 0.0, 0.0]
-            columns.append(np.tile(one, (2 * (size - 1), 1)))
-        for name, (row, constant) in self._sensitivities().items():
-            bound, weight = problem.constraints.get(name), problem.objective.weights.get(name)
-            slack = 0.0 if bound is None else FEASIBLE * bound.scale
-            least = -np.inf if bound is None or bound.min is None else bound.min
+        """Every quantity that is linear in the filter and constrained, or part of the objective."""
+        matrices: list[csr_matrix] = [csr_matrix((0, self.base.size))]
+        columns: list[FloatArray] = [np.empty((0, 4))]
+        for quantity in sorted(self.problem.quantities.values(), key=lambda q: q.wanted):  # steepness first
+            bound = self.problem.constraints.get(quantity.name, Bound.model_construct(min=None, max=None))
+            weight = self.problem.objective.weights.get(quantity.name)
+            if quantity.linear is None or (bound.min is None and bound.max is None and weight is None):
+                continue
+            made = quantity.linear(self.problem.view)
+            slack = FEASIBLE * bound.scale * made.scale
+            least = -np.inf if bound.min is None else bound.min * made.scale
             if least > -np.inf or weight is not None:
-                matrices.append(csr_matrix(row[None]))
-                columns.append(np.array([[least, slack, 0.0 if weight is None else 1 / weight, constant]]))
-            if bound is not None and bound.max is not None:
-                matrices.append(csr_matrix(-row[None]))
-                columns.append(np.array([[-bound.max, slack, 0.0, -constant]]))
-        table = np.concatenate([np.empty((0, 4)), *columns])
-        return _Rows(vstack(matrices).tocsr(), *table.T)
-
-    def _sensitivities(self) -> dict[str, tuple[FloatArray, float]]:
-        """Each sensitivity as (row, constant): row @ N + constant."""
-        setup, size = self.problem.setup, self.base.size
-        counts, modified = setup.mosaic.counts, setup.modified[0]
-        whole = counts.sum() * setup.clear_qe.sum()
-        others = float(np.delete(setup.qe.sum(axis=1) * counts, modified).sum())
-        return {
-            "sensitivity": (np.full(size, 1 / self.base.sum()), 0.0),
-            "cfa_sensitivity": (np.full(size, counts[modified] / whole), others / whole),
-        }
+                rate = 0.0 if weight is None else made.scale / weight
+                matrices.append(made.rows)
+                columns.append(np.tile([least, slack, rate, made.constant], (made.rows.shape[0], 1)))
+            if bound.max is not None:
+                matrices.append(-made.rows)
+                most = [-bound.max * made.scale, slack, 0.0, -made.constant]
+                columns.append(np.tile(most, (made.rows.shape[0], 1)))
+        return _Rows(vstack(matrices).tocsr(), *np.concatenate(columns).T)
 
     def _set_pairs(self) -> None:
-        problem, setup = self.problem, self.problem.setup
-        imager, channel = smooth_imager(setup), setup.modified[0]
+        problem, view = self.problem, self.problem.view
+        imager, channel = smooth_imager(view), view.modified[0]
         # Exposure does not depend on N, so the response to a filter is linear, plus what does not depend on it.
-        gain = imager.electrons.per_qe(0, self.base[None])[:, :, channel]
+        gain = imager.per_qe(0, self.base[None])[:, :, channel]
         fixed = np.delete(imager.smooth(self.base[None, None])[0], channel, axis=2)
         apart, columns = [np.empty((0, self.base.size))], [np.empty((0, 4))]
         for name, (a, b) in problem.pairs.items():
             bound, weight = problem.constraints.get(name), problem.objective.weights.get(name)
             if weight is None and (bound is None or bound.min is None):
                 continue
-            first, second = setup.members[a], setup.members[b]
+            first, second = view.members[a], view.members[b]
             apart.append((gain[:, first, None] - gain[:, None, second]).reshape(-1, self.base.size))
             squared = ((fixed[:, first, None] - fixed[:, None, second]) ** 2).sum(axis=3).ravel()
             least, slack = (0.0, 0.0) if bound is None else (bound.min or 0.0, FEASIBLE * bound.scale)
@@ -208,6 +193,8 @@ class FilterProgram:
         self, rows: csr_matrix, floor: FloatArray, rate: FloatArray
     ) -> tuple[int, FloatArray | None, FloatArray | None]:
         """HiGHS' status, row weights and solution (N, m) of: maximize m subject to rows @ N >= floor + rate m."""
+        from scipy.optimize import linprog  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
         found = linprog(
             c=np.append(np.zeros(self.base.size), -1.0),
             A_ub=hstack([-rows, csr_matrix(rate[:, None])]).tocsr(),

@@ -8,14 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
-from ..camera.imager import Imager, smooth_imager
-from ..curves.lights import Pair
+from ..camera.linear import smooth_imager
+from ..designs.block import CurveBlock
 from ..metrics.bound import FEASIBLE, Bound
-from ..metrics.evaluate import WORST, designed_quantities, sensitivities_gradient
+from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY, Sensitivity
+from ..metrics.quantity import Quantity
+from ..metrics.smooth import Rows, SmoothDesign
 from ..types import FloatArray, IndexArray
 from .problem import Evaluation, Problem, SearchRun
 
@@ -23,36 +24,8 @@ BACK_OFF = 1e-8
 """The search keeps this far (relative) inside each bound, so that rounding does not leave its answer outside."""
 _ON_BOUND = -0.5 * FEASIBLE
 """The same where nothing lies inside, such as a slope of 0: half of what still counts as feasible."""
-_MOST = {"min_transmission": 1.0, "sensitivity": 1.0}
-"""What a quantity reaches at most when a filter replaces a curve that it does not exceed."""
 _CONDITION_NM = 100.0
 """Scale of the families' own conditions, so that they weigh like the others."""
-
-
-@dataclass(frozen=True)
-class Rows:
-    """Smooth functions at a point, ndarray[n], with their derivatives by u, ndarray[n, n_free]."""
-
-    values: FloatArray
-    by_u: FloatArray
-
-    def scaled(self, factor: float, offset: float = 0.0) -> Rows:
-        """factor x rows + offset."""
-        return Rows(factor * self.values + offset, factor * self.by_u)
-
-    @staticmethod
-    def joined(parts: list[Rows]) -> Rows:
-        """All rows, in order."""
-        return Rows(np.concatenate([p.values for p in parts]), np.concatenate([p.by_u for p in parts]))
-
-    @property
-    def finite(self) -> bool:
-        """Whether all of it is numbers."""
-        return bool(np.isfinite(self.values).all() and np.isfinite(self.by_u).all())
-
-    def cleaned(self) -> Rows:
-        """Zeros for what is not a number."""
-        return Rows(*(np.nan_to_num(v, posinf=0, neginf=0) for v in (self.values, self.by_u)))
 
 
 @dataclass(frozen=True)
@@ -88,66 +61,19 @@ def _finite(point: Point) -> Point:
     )
 
 
-def is_distance(quantity: str) -> bool:
-    """Whether a quantity is a CSD, whose rows are squared distances."""
-    return quantity.removeprefix(WORST).startswith("csd_")
-
-
-class _Simulation:
-    """One design, as it comes out with its edges shifted, with derivatives by the free parameters."""
-
-    def __init__(self, imager: Imager, curves: FloatArray, by_u: FloatArray) -> None:
-        self._imager = imager
-        self._setup = setup = imager.setup
-        self._curves = curves
-        self._by_u = by_u
-        self.amounts = {name: float(v[0]) for name, v in designed_quantities(setup, curves[None]).items()}
-
-    @cached_property
-    def _response(self) -> tuple[FloatArray, FloatArray]:
-        curves = self._curves
-        return self._imager.smooth(curves[None])[0], self._imager.smooth_gradient(curves, self._by_u)
-
-    def squared(self, pair: Pair) -> Rows:
-        """Squared distances of all pairs of signals of two types, in every case."""
-        response, by_u = self._response
-        first, second = (self._setup.members[name] for name in pair)
-        apart = (response[:, first, None] - response[:, None, second]).reshape(-1, response.shape[-1])
-        apart_by_u = (by_u[:, :, first, None] - by_u[:, :, None, second]).reshape(len(by_u), *apart.shape)
-        return Rows((apart**2).sum(axis=1), 2 * (apart_by_u * apart).sum(axis=2).T)
-
-    def sensitivity(self, name: str) -> Rows:
-        """One of the sensitivities: one row."""
-        by_u = sensitivities_gradient(self._setup, self._by_u)[name]
-        return Rows(np.array([self.amounts[name]]), by_u[None])
-
-    def slope(self) -> Rows:
-        """Up and down slopes at every wavelength, 1/nm."""
-        step = self._setup.grid.step_nm
-        steep = np.diff(self._curves, axis=-1).ravel() / step
-        by_u = np.diff(self._by_u, axis=-1).reshape(len(self._by_u), -1).T / step
-        return Rows(np.concatenate([steep, -steep]), np.vstack([by_u, -by_u]))
-
-    def transmission(self) -> Rows:
-        """Curve over base at every wavelength where there is a base."""
-        base = self._setup.base_qe.ravel()
-        some = base > 0
-        by_u = self._by_u.reshape(len(self._by_u), -1).T
-        return Rows(self._curves.ravel()[some] / base[some], by_u[some] / base[some, None])
-
-
 class Model:
     """The smooth problem in units of the box; one simulation per point, shared by objective and constraints."""
 
     def __init__(self, problem: Problem, run: SearchRun, budget: int) -> None:
         self._problem = problem
-        self._imager = smooth_imager(problem.setup)
+        self._quantities = problem.quantities
+        self._imager = smooth_imager(problem.view)
         self._run = run
         self._budget = budget
         self.stop: Callable[[], object] | None = None
         self._span = (problem.high - problem.low)[problem.free]
         wanted = (*problem.objective.weights, *problem.constraints)
-        shifts = dict.fromkeys(s for name in ("nominal", *wanted) for s in problem.shifts_nm(name))
+        shifts = dict.fromkeys((0.0, *(shift for name in wanted for shift in problem.shifts_nm(name))))
         self._families = {s: problem.family.shifted(s) if s else problem.family for s in shifts}
         self._back_off = {name: _back_off(problem, name, bound) for name, bound in problem.constraints.items()}
         self._seen: dict[bytes, Point] = {}
@@ -172,68 +98,45 @@ class Model:
         problem, free = self._problem, self._problem.free
         x = problem.from_unit(u)
         made = {
-            shift: _Simulation(
-                self._imager, family.curves(x[None])[0], family.gradient(x)[free] * self._span[:, None, None]
-            )
-            for shift, family in self._families.items()
+            shift: SmoothDesign(self._imager, family, x, free, self._span) for shift, family in self._families.items()
         }
-        terms, objective = self._terms(made, x)
+        terms, objective = self._terms(made)
         own = problem.family.violation(x[None])[0]
         conditions = [Rows(own, problem.family.violation_gradient(x)[:, free] * self._span).scaled(1 / _CONDITION_NM)]
         worst = float(max(own.max(initial=0.0), 0.0))
         quantities = {}
         for name, bound in problem.constraints.items():
-            rows = quantities[name] = self._rows(name, made, x)
-            conditions += _conditions(name, bound, rows, self._back_off[name])
-            worst = max(worst, float(bound.violation(np.array([_value(name, rows)]))[0]))
-        amounts = made[0.0].amounts
-        evaluation = Evaluation(x, objective, amounts["sensitivity"], amounts["cfa_sensitivity"], worst)
-        own_term = np.arange(len(terms)) if problem.objective.rule == "sum" else np.zeros(len(terms), dtype=int)
+            rows = quantities[name] = self._rows(name, made)
+            conditions += _conditions(self._quantities[name], bound, rows, self._back_off[name])
+            worst = max(worst, float(bound.violation(np.array([self._quantities[name].value(rows)]))[0]))
+        light = Sensitivity().of_designs(problem.view, CurveBlock(made[0.0].curves[None]))
+        own, whole = (float(light[name][0]) for name in (SENSITIVITY, CFA_SENSITIVITY))
+        evaluation = Evaluation(x, objective, own, whole, worst)
+        own_term = np.arange(len(terms)) * (not problem.objective.rule.smallest)  # what is smallest needs one bound
         term = np.repeat(own_term, [rows.values.size for rows in terms])
         return Point(evaluation, Rows.joined(terms), term, Rows.joined(conditions), quantities)
 
-    def _terms(self, made: Mapping[float, _Simulation], x: FloatArray) -> tuple[list[Rows], float]:
+    def _terms(self, made: Mapping[float, SmoothDesign]) -> tuple[list[Rows], float]:
         """The squared rows of each weighted quantity of the objective, and the objective's value."""
         terms, columns = [], {}
         for name, weight in self._problem.objective.weights.items():
-            rows = self._rows(name, made, x)
-            columns[name] = np.array([_value(name, rows)])
-            if not is_distance(name):
+            quantity, rows = self._quantities[name], self._rows(name, made)
+            columns[name] = np.array([quantity.value(rows)])
+            if not quantity.squared:
                 rows = Rows(rows.values**2, 2 * rows.values[:, None] * rows.by_u)
             terms.append(rows.scaled(weight**2))
         return terms, float(self._problem.objective.of(columns)[0])
 
-    def _rows(self, name: str, made: Mapping[float, _Simulation], x: FloatArray) -> Rows:
-        """The rows whose smallest (of a slope: largest; of a CSD: root of the smallest) is the quantity."""
-        problem = self._problem
-        if name in problem.family.dimensions:
-            matrix = problem.family.dimensions[name]
-            return Rows(matrix @ x, matrix[:, problem.free] * self._span)
-        plain = name.removeprefix(WORST)
-        found = []
-        for shift in problem.shifts_nm(name):
-            simulation = made[shift]
-            if plain in problem.pairs:
-                found.append(simulation.squared(problem.pairs[plain]))
-            elif plain == "slope_per_nm":
-                found.append(simulation.slope())
-            elif plain == "min_transmission":
-                found.append(simulation.transmission())
-            else:
-                found.append(simulation.sensitivity(plain))
-        return Rows.joined(found)
-
-
-def _value(name: str, rows: Rows) -> float:
-    """The quantity from its rows."""
-    if name == "slope_per_nm":
-        return float(rows.values.max())
-    return float(np.sqrt(rows.values.min()) if is_distance(name) else rows.values.min())
+    def _rows(self, name: str, made: Mapping[float, SmoothDesign]) -> Rows:
+        """The rows from which the quantity follows, see `Quantity.value`."""
+        smooth = self._quantities[name].smooth
+        assert smooth is not None
+        return Rows.joined([smooth(made[shift]) for shift in self._problem.shifts_nm(name)])
 
 
 def _back_off(problem: Problem, name: str, bound: Bound) -> float:
     """How far inside a bound to keep, relative: not at all where it is the end of what the quantity can be."""
-    most = _MOST.get(name.removeprefix(WORST), np.inf)
+    most = problem.quantities[name].most
     if name in problem.family.dimensions:
         rows = problem.family.dimensions[name]
         most = float((np.maximum(rows, 0) @ problem.high + np.minimum(rows, 0) @ problem.low).min())
@@ -241,10 +144,10 @@ def _back_off(problem: Problem, name: str, bound: Bound) -> float:
     return _ON_BOUND if at_end else BACK_OFF
 
 
-def _conditions(name: str, bound: Bound, rows: Rows, back_off: float) -> list[Rows]:
+def _conditions(quantity: Quantity, bound: Bound, rows: Rows, back_off: float) -> list[Rows]:
     """Rows that are <= 0 where the bound is kept, `back_off` inside, relative to its scale."""
     found, scale = [], bound.scale
-    if bound.min is not None and is_distance(name):
+    if bound.min is not None and quantity.squared:
         found.append(rows.scaled(-1 / scale**2, (bound.min * (1 + back_off) / scale) ** 2))
     elif bound.min is not None:
         found.append(rows.scaled(-1 / scale, bound.min / scale + back_off))

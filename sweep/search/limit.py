@@ -9,17 +9,19 @@ and their shifts in production) is left out: that makes the set of filters large
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..camera.effects.saturation import top_e
+from ..camera.exposure import may_set_exposure
 from ..camera.pixel import unquantized
-from ..camera.scene import WhitePatchExposure
 from ..errors import Fault, SweepError
 from ..metrics.bound import FEASIBLE, Bound
-from ..metrics.evaluate import DESIGNED, WORST, designed_quantities, smooth_csd, smooth_response
+from ..metrics.evaluate import designed_quantities
 from ..metrics.objective import Objective
+from ..metrics.smooth import smooth_csd, smooth_response
 from ..types import FloatArray
 from .filter_program import ROUNDING, FilterProgram
 from .problem import Problem
@@ -71,40 +73,45 @@ def limit_of(problem: Problem, tolerance_dn: float = 1e-3, most_programs: int = 
 
 def why_not(problem: Problem) -> str | None:
     """Why a problem has no linear limit; None when it has."""
-    for refused, reason in (
-        (problem.family.n_modified != 1, "more than one modified channel"),
-        (problem.objective.rule == "sum", "the objective is a sum"),
-        (problem.setup.pixel.crosstalk > 0, "crosstalk mixes the modified channel into others"),
-    ):
-        if refused:
-            return reason
-    if (_top(problem) > problem.setup.base_qe[0] * (1 + ROUNDING)).any():
-        return "filters of the box may exceed the curve that they replace"
-    if (problem.family.lower(problem.low, problem.high)[0] < -ROUNDING * problem.setup.base_qe[0]).any():
-        return "filters of the box may be below 0"
-    if _clips(problem):
-        return "signals exceed the full well or the range of the ADC"
-    if isinstance(problem.setup.scenario.exposure, WhitePatchExposure) and not _exposure_is_fixed(problem):
-        return "the modified channel could set the exposure"
-    return None
+    unknown = [name for name in problem.objective.weights if not problem.quantities[name].has_limit]
+    base, family = problem.view.base_qe[0], problem.family
+    reasons: tuple[tuple[Callable[[], bool], str], ...] = (
+        (lambda: family.n_modified != 1, "more than one modified channel"),
+        (lambda: not problem.objective.rule.smallest, f"the objective is a {problem.objective.rule.name}"),
+        (lambda: bool(unknown), f"{', '.join(unknown)} is not linear in the filter"),
+        (lambda: problem.view.pixel.crosstalk > 0, "crosstalk mixes the modified channel into others"),
+        (
+            lambda: bool((_top(problem) > base * (1 + ROUNDING)).any()),
+            "filters of the box may exceed the curve that they replace",
+        ),
+        (
+            lambda: bool((family.lower(problem.low, problem.high)[0] < -ROUNDING * base).any()),
+            "filters of the box may be below 0",
+        ),
+        (lambda: _clips(problem), "signals exceed the full well or the range of the ADC"),
+        (lambda: may_set_exposure(problem.view), "the modified channel could set the exposure"),
+    )
+    return next((reason for refused, reason in reasons if refused()), None)
 
 
 def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
     """The problem without what only families of edges have, worst cases as nominal ones; and what was left out."""
-    known = (*problem.pairs, *DESIGNED)
-    left_out = [name for name in problem.constraints if name.removeprefix(WORST) not in known]
+    quantities = problem.quantities
+    plains = {name: quantities[name].of or name for name in (*problem.constraints, *problem.objective.weights)}
+    known = {name for name, plain in plains.items() if quantities[plain].has_limit}
+    left_out = [name for name in problem.constraints if name not in known]
     kept: dict[str, Bound] = {}
     for name, bound in problem.constraints.items():
-        plain = name.removeprefix(WORST)
-        if plain in known:
+        plain = plains[name]
+        if name in known:
             ends = [b for b in (bound, kept.get(plain)) if b is not None]
             least, most = [b.min for b in ends if b.min is not None], [b.max for b in ends if b.max is not None]
             kept[plain] = Bound.model_construct(min=max(least, default=None), max=min(most, default=None))
     weights: dict[str, float] = {}
     for name, weight in problem.objective.weights.items():
-        plain = name.removeprefix(WORST)
+        plain = plains[name]
         weights[plain] = min(weight, weights.get(plain, weight))
-    if any(name.startswith(WORST) for name in (*problem.constraints, *problem.objective.weights)):
+    if any(name != plain for name, plain in plains.items()):
         left_out.append("edge shifts")
     return replace(problem, objective=Objective(minimum=weights), constraints=kept), tuple(left_out)
 
@@ -116,23 +123,15 @@ def _top(problem: Problem) -> FloatArray:
 
 def _clips(problem: Problem) -> bool:
     """Whether the base curve's response, the largest that any of the filters has, is cut off when it is read out."""
-    setup = problem.setup
-    smooth = smooth_response(setup, setup.base_qe[None])
-    top_dn = unquantized(np.array(top_e(setup.pixel)), setup.pixel)
+    view = problem.view
+    smooth = smooth_response(view, view.base_qe[None])
+    top_dn = unquantized(np.array(top_e(view.pixel)), view.pixel)
     return bool((smooth > top_dn).any())
-
-
-def _exposure_is_fixed(problem: Problem) -> bool:
-    """Whether a channel that is not modified is at least as bright on white as the base curve."""
-    setup = problem.setup
-    rates = setup.qe.sum(axis=1)  # the white patch is flat in photons
-    kept = np.delete(rates, setup.modified)
-    return bool(kept.size and kept.max() >= rates[list(setup.modified)].max())
 
 
 def _inside(problem: Problem, curve: FloatArray, inside: FloatArray | None) -> tuple[float, FloatArray]:
     """A solver's filter, moved by its tolerance toward the base curve or one that is `inside`; and what it attains."""
-    base = problem.setup.base_qe[0]
+    base = problem.view.base_qe[0]
     for end in (base,) if inside is None else (base, inside):
         for share in _SHARES:
             moved = np.asarray(curve + share * (end - curve), dtype=float)
@@ -145,9 +144,9 @@ def _inside(problem: Problem, curve: FloatArray, inside: FloatArray | None) -> t
 def _attained(problem: Problem, curve: FloatArray) -> float:
     """The objective for a filter as the search evaluates it; -inf when it does not meet the constraints."""
     curves = curve[None, None]
-    found = designed_quantities(problem.setup, curves)
+    found = designed_quantities(problem.view, curves)
     for name in {*problem.objective.weights, *problem.constraints} & problem.pairs.keys():
-        found[name] = smooth_csd(problem.setup, curves, problem.pairs[name])
+        found[name] = smooth_csd(problem.view, curves, problem.pairs[name])
     for name, bound in problem.constraints.items():
         if not bound.violation(found[name])[0] <= FEASIBLE:
             return -np.inf

@@ -6,15 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.stats import qmc
 
-from ..camera.view import Setup
-from ..curves.lights import Pair, class_pairs
+from ..camera.view import View
+from ..curves.lights import Pair
 from ..designs.family import Family
 from ..metrics.bound import FEASIBLE, Bound
-from ..metrics.evaluate import WORST
 from ..metrics.objective import Objective
-from ..metrics.separation import csd_name
+from ..metrics.quantity import Asked, Quantity
+from ..metrics.registry import quantities_of
 from ..types import FloatArray, IndexArray
 
 SHIFTS = (-1.0, -0.5, 0.0, 0.5, 1.0)
@@ -25,11 +24,11 @@ SHIFTS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 class Problem:
     """Maximize `objective` over the box `low`..`high` (ndarray[n_parameters]) under `constraints`.
 
-    Quantities are those of `evaluate`, `spaces.DIMENSIONS`, and `worst_<quantity>`, the smallest over edges that come
-    out up to `edge_shift_nm` off. Constraints give a minimum (`slope_per_nm`: a maximum; the sensitivities: either).
+    Quantities are those of `metrics.registry` with smooth rows; the worst ones are over edges that come out up to
+    `edge_shift_nm` off.
     """
 
-    setup: Setup
+    view: View
     family: Family
     low: FloatArray
     high: FloatArray
@@ -38,9 +37,15 @@ class Problem:
     edge_shift_nm: float = 0.0
 
     @property
+    def quantities(self) -> Mapping[str, Quantity]:
+        """What objective and constraints may name."""
+        return quantities_of(Asked(self.view.lights.classes, edge_shift=True))
+
+    @property
     def pairs(self) -> dict[str, Pair]:
-        """The pair of signal types of each CSD."""
-        return {csd_name(pair): pair for pair in class_pairs(self.setup.lights.classes)}
+        """The pair of signal types of each distance."""
+        own = [q for q in self.quantities.values() if q.squared and not q.extreme]
+        return {q.name: q.pair for q in own if q.pair is not None}
 
     @property
     def free(self) -> IndexArray:
@@ -49,7 +54,8 @@ class Problem:
 
     def shifts_nm(self, quantity: str) -> tuple[float, ...]:
         """Edge shifts over which a quantity is the smallest."""
-        return tuple(self.edge_shift_nm * s for s in SHIFTS) if quantity.startswith(WORST) else (0.0,)
+        worst = self.quantities[quantity].extreme == "worst edges"
+        return tuple(self.edge_shift_nm * s for s in SHIFTS) if worst else (0.0,)
 
     def from_unit(self, u: FloatArray) -> FloatArray:
         """Parameters from the free ones in units of the box: ndarray[..., n_free] -> ndarray[..., n_parameters]."""
@@ -96,6 +102,8 @@ def best_feasible(log: Sequence[Evaluation]) -> Evaluation | None:
 
 def starting_points(problem: Problem, starts: int, seed: int) -> FloatArray:
     """Starting points from a scrambled Sobol set in units of the box, ndarray[starts, n_free]; one seed, one set."""
+    from scipy.stats import qmc  # noqa: PLC0415  (slow to import; only a search draws points)
+
     free = problem.free
     dimensions = problem.family.start_dimensions or max(1, free.size)
     sobol = qmc.Sobol(d=dimensions, scramble=True, rng=np.random.default_rng(seed))

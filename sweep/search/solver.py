@@ -16,7 +16,7 @@ import numpy as np
 
 from ..metrics.bound import FEASIBLE
 from ..types import FloatArray
-from .gradients import Model, Point, is_distance
+from .gradients import Model, Point
 from .problem import Problem, SearchRun
 
 GRADIENT = {"SLSQP": nlopt.LD_SLSQP, "MMA": nlopt.LD_MMA, "CCSAQ": nlopt.LD_CCSAQ}
@@ -55,7 +55,7 @@ def search_from(
     if algorithm in GRADIENT:
         opt, z0 = _epigraph(problem, model, first, u0, algorithm)
     else:
-        opt, z0 = _direct(model, first, u0, algorithm)
+        opt, z0 = _direct(problem, model, first, u0, algorithm)
     model.stop = opt.force_stop
     opt.set_maxeval(10 * max_evaluations)  # simulations are counted by the model, which forces the stop
     opt.set_xtol_rel(_X_TOLERANCE)
@@ -75,14 +75,14 @@ def search_from(
 def _epigraph(
     problem: Problem, model: Model, first: Point, u0: FloatArray, algorithm: str
 ) -> tuple[nlopt.opt, list[float]]:
-    """Maximize the sum of t_k (a minimum has one t) subject to rows of term k >= t_k^2 and the conditions; z = (u, t).
+    """Maximize the rule of the t_k (a minimum has one t) subject to rows of term k >= t_k^2 and the conditions.
 
-    Each t_k is in units of its term's first value.
+    z = (u, t); each t_k is in units of its term's first value.
     """
-    values = first.term_values
+    values, rule = first.term_values, problem.objective.rule
     scale = np.maximum(values, 1.0)
     n_free, n_rows = u0.size, first.terms.values.size
-    share = scale / scale.sum()
+    unit = float(rule.of(scale))
     row_scale = scale[first.term] ** 2
     opt = nlopt.opt(GRADIENT[algorithm], n_free + scale.size)
 
@@ -90,8 +90,8 @@ def _epigraph(
         model.at(z[:n_free])
         if gradient.size:
             gradient[:n_free] = 0.0
-            gradient[n_free:] = share
-        return float(share @ z[n_free:])
+            gradient[n_free:] = rule.gradient(scale * z[n_free:]) * scale / unit
+        return float(rule.of(scale * z[n_free:])) / unit if scale.size > 1 else float(z[-1])
 
     def constraints(result: FloatArray, z: FloatArray, gradient: FloatArray) -> None:
         point = model.at(z[:n_free])
@@ -105,7 +105,7 @@ def _epigraph(
             gradient[n_rows:, :n_free] = point.conditions.by_u
 
     # No term exceeds its largest weight times the longest distance between two digital numbers.
-    reach = max(problem.objective.weights.values()) * problem.setup.longest_distance_dn / scale
+    reach = max(problem.objective.weights.values()) * problem.view.longest_distance_dn / scale
     opt.set_lower_bounds([0.0] * (n_free + scale.size))
     opt.set_upper_bounds([1.0] * n_free + [max(float(r), 1.0) for r in reach])
     opt.set_max_objective(objective)
@@ -113,14 +113,15 @@ def _epigraph(
     return opt, [*u0, *np.minimum(values / scale, 1.0)]
 
 
-def _direct(model: Model, first: Point, u0: FloatArray, algorithm: str) -> tuple[nlopt.opt, list[float]]:
+def _direct(
+    problem: Problem, model: Model, first: Point, u0: FloatArray, algorithm: str
+) -> tuple[nlopt.opt, list[float]]:
     """Maximize the objective itself, subject to the worst of the conditions."""
-    scale = float(np.maximum(first.term_values, 1.0).sum())
-    minimum = first.term.max() == 0
+    rule = problem.objective.rule
+    scale = float(rule.of(np.maximum(first.term_values, 1.0)))
 
     def objective(u: FloatArray, _: FloatArray) -> float:
-        values = model.at(u).term_values
-        return float(values.min() if minimum else values.sum()) / scale
+        return float(rule.of(model.at(u).term_values)) / scale
 
     opt = nlopt.opt(DIRECT[algorithm], u0.size)
     opt.set_lower_bounds([0.0] * u0.size)
@@ -138,7 +139,7 @@ def best_reachable(problem: Problem, quantity: str, starts: FloatArray, max_eval
     sign = 1.0 if problem.constraints[quantity].min is not None else -1.0
     found = [v for u0 in starts for v in _extremes(alone, quantity, sign, u0, max_evaluations)]
     best = sign * max((sign * value for value in found), default=-np.inf)
-    return float(np.sqrt(best)) if is_distance(quantity) and best > 0 else best
+    return float(np.sqrt(best)) if problem.quantities[quantity].squared and best > 0 else best
 
 
 def _extremes(problem: Problem, quantity: str, sign: float, u0: FloatArray, max_evaluations: int) -> list[float]:

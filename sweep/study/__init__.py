@@ -2,5 +2,7 @@
 
 from .load import folder_name, load_study
 from .model import Search, Study
+from .schema import StudySection
+from .sources import KeptSources
 
-__all__ = ["Search", "Study", "folder_name", "load_study"]
+__all__ = ["KeptSources", "Search", "Study", "StudySection", "folder_name", "load_study"]

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
-from ..camera.scene import Scenario
+from ..camera.scenario import Scenario
 from ..types import Number, Section
 from .schema_curves import Name
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -10,11 +9,11 @@ from pydantic import ValidationError
 from ..curves.spectrum import WavelengthGrid
 from ..disk import is_folder
 from ..errors import Fault, StudyError
-from ..types import FloatArray
 from .document import Document
 from .model import Study
 from .resolve import resolve
 from .schema import StudySection
+from .sources import KeptSources
 
 _ALLOWED = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.")
 
@@ -23,7 +22,7 @@ def load_study(
     path: Path,
     data: Path | None = None,
     step_nm: float | None = None,
-    kept: Mapping[str, FloatArray] | None = None,
+    kept: KeptSources | None = None,
 ) -> Study:
     """Read and check a study file.
 

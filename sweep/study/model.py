@@ -7,21 +7,23 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..camera.methods import REFERENCE
 from ..camera.mosaic import Mosaic
 from ..camera.pixel import Pixel
 from ..camera.plan.bounds import Box
 from ..camera.plan.plan import Plan, Planner
-from ..camera.scene import Geometry, Scenario
+from ..camera.scenario import Scenario
+from ..camera.scene import Geometry
 from ..camera.sensor import SensorCurves
-from ..camera.view import REFERENCE, Setup
+from ..camera.view import View
 from ..curves.lights import Lights, Pair, class_pairs
 from ..curves.spectrum import WavelengthGrid
-from ..designs.space import DIMENSIONS, Space
+from ..designs.space import Space
 from ..errors import Fault, StudyError
 from ..metrics.bound import Bound
-from ..metrics.evaluate import BEST_PLACE, WORST, noise_quantities, quantities, shiftable
-from ..metrics.objective import COMBINED, Objective
-from ..metrics.separation import CSD, csd_name
+from ..metrics.objective import Objective, columns_of
+from ..metrics.quantity import Asked, Quantity
+from ..metrics.separation import csd_name
 from ..search.problem import SHIFTS, Problem
 from .schema import StudySection
 
@@ -70,12 +72,14 @@ class Study:
         return self.section.production.edge_shift_nm
 
     @property
-    def columns(self) -> tuple[str, ...]:
+    def quantities(self) -> Mapping[str, Quantity]:
         """Quantities of the result table: those of a design, worst cases over the edge shift, a combined objective."""
-        worst = [WORST + name for name in shiftable(self.lights)] if self.edge_shift_nm else []
-        combined = [COMBINED] if self.objective.column == COMBINED else []
-        places = [BEST_PLACE + csd_name(pair) for pair in self.pairs] if self.any_place else []
-        return (*quantities(self.lights), *DIMENSIONS, *places, *worst, *noise_quantities(self.states), *combined)
+        return columns_of(self.asked, self.objective)
+
+    @property
+    def asked(self) -> Asked:
+        """What the study asks for of its designs."""
+        return Asked(self.lights.classes, self.states, self.any_place, self.edge_shift_nm > 0)
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -99,10 +103,10 @@ class Study:
 
         The separation is the objective, or, where that is a sensitivity, the first CSD that is constrained.
         """
-        column = self.objective.column
-        if not column.endswith("sensitivity"):
+        column, known = self.objective.column, self.quantities
+        if known[column].role != "light":
             return column, "sensitivity"
-        constrained = [name for name in self.constraints if name.startswith((CSD, WORST + CSD))]
+        constrained = [name for name in self.constraints if known[name].role == "separation"]
         return (constrained or [csd_name(self.pairs[0])])[0], column
 
     @property
@@ -115,7 +119,7 @@ class Study:
         """Designs of all spaces, over all scenarios."""
         return sum(space.size for space in self.spaces) * len(self.scenarios)
 
-    def setup(self, space: Space, scenario: str) -> Setup:
+    def view(self, space: Space, scenario: str) -> View:
         """What the designs of `space` share in a scenario."""
         mosaic, scene = self.mosaics[space.cfa], self.scenarios[scenario]
         replaced = dict(self.section.cfas[space.cfa].curves)
@@ -123,7 +127,7 @@ class Study:
         if space.filter is not None:
             replaced |= dict.fromkeys(space.filter.channels, space.filter.base)
             modified = tuple(mosaic.channels.index(channel) for channel in space.filter.channels)
-        return Setup(
+        return View(
             grid=self.grid,
             mosaic=mosaic,
             qe=self.sensor.mosaic_qe(mosaic, replaced),
@@ -137,18 +141,18 @@ class Study:
 
     def box(self, space: Space, scenario: str) -> Box:
         """What the designs of `space` can be, for a plan of the scenario."""
-        setup = replace(self.setup(space, scenario), methods=REFERENCE)
-        low, high = setup.qe.copy(), setup.qe.copy()
+        view = replace(self.view(space, scenario), methods=REFERENCE)
+        low, high = view.qe.copy(), view.qe.copy()
         if space.filter is not None:
             ends = [np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max)]
             shifts = [self.edge_shift_nm * s for s in SHIFTS] if self.edge_shift_nm else [0.0]
             families = [space.filter.family.shifted(shift) for shift in shifts]
             lows, highs = zip(*(family.hull(*ends) for family in families), strict=True)
-            low[list(setup.modified)] = np.min(lows, axis=0)
-            high[list(setup.modified)] = np.max(highs, axis=0)
+            low[list(view.modified)] = np.min(lows, axis=0)
+            high[list(view.modified)] = np.max(highs, axis=0)
         searched = self.search is not None and self.search.space is space and self.search.scenario == scenario
         evaluations = self.search.max_evaluations if searched and self.search is not None else 0
-        return Box(setup, low, high, space.size + evaluations)
+        return Box(view, low, high, space.size + evaluations)
 
     def plan(self, scenario: str, tolerance_dn: float | None = None) -> Plan:
         """The cheapest plan of a scenario that holds for all designs of the study.
@@ -168,7 +172,7 @@ class Study:
         """The search as a mathematical problem."""
         assert search.space.filter is not None
         return Problem(
-            setup=self.setup(search.space, search.scenario),
+            view=self.view(search.space, search.scenario),
             family=search.space.filter.family,
             low=np.array([min(axis) for axis in search.space.axes], dtype=float),
             high=np.array([max(axis) for axis in search.space.axes], dtype=float),

@@ -10,19 +10,17 @@ from ..camera.kernel import too_large
 from ..camera.mosaic import Mosaic
 from ..camera.scene import OBJECT_RESOLUTION, WhitePatchExposure
 from ..curves.color import VISIBLE_NM
-from ..curves.lights import Lights, Pair, class_pairs
-from ..designs.space import DIMENSIONS, Space
+from ..curves.lights import Lights
+from ..designs.space import Space
 from ..errors import StudyError, SweepError
-from ..metrics.discrimination import CNR, D_PRIME, noise_names
-from ..metrics.evaluate import DESIGNED, WORST, noise_quantities, shiftable
-from ..metrics.separation import csd_name
+from ..metrics.quantity import Asked, Quantity
+from ..metrics.registry import listed, quantities_of
 from ..search.solver import ALGORITHMS
-from ..types import FloatArray
 from .axes import Axis
 from .document import Document
 from .model import Search, Study
 from .schema import CfaSection, StudySection
-from .sources import Sources
+from .sources import KeptSources, Sources
 from .spaces import SpaceBuilder
 from .yaml_tree import Key
 
@@ -35,7 +33,7 @@ class _Resolver:
     """Turns a checked schema into a Study, collecting every fault that it finds."""
 
     def __init__(
-        self, document: Document, section: StudySection, folders: list[Path], kept: Mapping[str, FloatArray] | None
+        self, document: Document, section: StudySection, folders: list[Path], kept: KeptSources | None
     ) -> None:
         self.document = document
         self.section = section
@@ -59,7 +57,7 @@ class _Resolver:
         self.check_objective(lights)
         self.check_constraints(lights)
         self.check_published(lights, mosaics)
-        search = self.search(spaces)
+        search = self.search(spaces, lights)
         if self.faults:
             raise StudyError(self.faults)
         study = Study(
@@ -90,15 +88,22 @@ class _Resolver:
             raise StudyError(self.faults)
         return study
 
+    def asked(self, lights: Lights, *, edge_shift: bool | None = None) -> Asked:
+        """What an objective or a constraint can name; `edge_shift`: as if worst cases were asked for, or not."""
+        recognition = self.section.recognition
+        states = () if recognition is None else tuple(recognition.states or lights.classes)
+        shifts = self.section.production.edge_shift_nm > 0 if edge_shift is None else edge_shift
+        return Asked(lights.classes, states, edge_shift=shifts)
+
     def check_columns(self, lights: Lights) -> None:
-        """Every pair of signal types has a column of its own."""
-        seen: dict[str, tuple[str, str]] = {}
-        for pair in class_pairs(lights.classes):
-            name = csd_name(pair)
-            if name in seen:
-                problem = f"the pairs {'/'.join(seen[name])} and {'/'.join(pair)} share the column {name}"
+        """Every pair of signal types has columns of its own."""
+        seen: dict[str, Quantity] = {}
+        for quantity in listed(self.asked(lights, edge_shift=False)):
+            other = seen.setdefault(quantity.name, quantity)
+            if other.pair != quantity.pair and other.pair is not None and quantity.pair is not None:
+                pairs = f"{'/'.join(other.pair)} and {'/'.join(quantity.pair)}"
+                problem = f"the pairs {pairs} share the column {quantity.name}"
                 self.add(("lights",), problem, None, "other names of signal types")
-            seen[name] = pair
 
     def check_luminances(self, lights: Lights) -> None:
         """Candelas are given of lights, and of a background, that the eye sees."""
@@ -127,7 +132,7 @@ class _Resolver:
         """The kernels of every scene and CFA fit into memory. Raises StudyError."""
         for name in study.scenarios:
             for space in study.spaces:
-                if (refused := too_large(study.setup(space, name))) is not None:
+                if (refused := too_large(study.view(space, name))) is not None:
                     problem, value, allowed = refused
                     self.add(("scenarios", name, "target"), f"{problem} (CFA {space.cfa})", value, allowed)
                     raise StudyError(self.faults)
@@ -137,12 +142,6 @@ class _Resolver:
         asked = self.section.recognition
         if asked is None:
             return
-        seen: dict[str, Pair] = {}
-        for pair in class_pairs(asked.states or lights.classes):
-            for column in noise_names(pair):  # error_bound_a_b: the bound of a and b, or the error of bound_a and b
-                if seen.setdefault(column, pair) != pair and len(set(pair)) == 2:
-                    problem = f"the pairs {'/'.join(seen[column])} and {'/'.join(pair)} share the column {column}"
-                    self.add(("lights",), problem, None, "other names of signal types")
         for name in asked.states or ():
             if name not in lights.classes:
                 self.unknown(("recognition", "states"), "signal type", name, list(lights.classes))
@@ -165,7 +164,8 @@ class _Resolver:
 
     def check_published(self, lights: Lights, mosaics: Mapping[str, Mosaic]) -> None:
         section = self.section
-        columns = [*DESIGNED, *(csd_name(pair) for pair in class_pairs(lights.classes))]
+        nominal = quantities_of(Asked(lights.classes)).values()
+        columns = [q.name for q in nominal if q.ends and q.needs != "family"]
         known = dict.fromkeys([*mosaics, *section.designs, *section.geometry])
         for table, rows in section.published.items():
             for row, values in rows.items():
@@ -177,49 +177,39 @@ class _Resolver:
                     if row in known and quantity not in names:
                         self.unknown((*path, quantity), "quantity", quantity, names)
 
-    def named_quantities(self, lights: Lights) -> list[str]:
-        """Quantities that an objective or a constraint can name."""
-        worst = [WORST + name for name in shiftable(lights)] if self.section.production.edge_shift_nm else []
-        distances = (csd_name(pair) for pair in class_pairs(lights.classes))
-        return [*DESIGNED, *DIMENSIONS, *distances, *worst, *self.noise_quantities(lights)]
-
-    def noise_quantities(self, lights: Lights) -> tuple[str, ...]:
-        asked = self.section.recognition
-        return () if asked is None else noise_quantities(asked.states or lights.classes)
-
-    def check_quantity(self, path: tuple[Key, ...], what: str, name: str, known: list[str]) -> bool:
+    def check_quantity(self, path: tuple[Key, ...], what: str, name: str, known: list[str], lights: Lights) -> bool:
+        """Add a fault where the name is not `known`."""
         if name in known:
             return True
-        if name.startswith(WORST) and not self.section.production.edge_shift_nm:
+        shifted = quantities_of(self.asked(lights, edge_shift=True)).get(name)
+        if shifted is not None and shifted.extreme == "worst edges" and not self.section.production.edge_shift_nm:
             self.add(path, f"{name} needs `production.edge_shift_nm`", None, "a shift above 0")
         else:
             self.unknown(path, what, name, known)
         return False
 
     def check_objective(self, lights: Lights) -> None:
-        known = [name for name in self.named_quantities(lights) if name.removeprefix(WORST) in shiftable(lights)]
+        goals = [name for name, quantity in quantities_of(self.asked(lights)).items() if quantity.goal]
         path: tuple[Key, ...] = ("objective",)
         given = self.document.data.get("objective")
         for name in self.section.objective.weights:
-            inner = (*path, self.section.objective.rule, name) if isinstance(given, dict) else path
-            self.check_quantity(inner, "objective", name, known)
+            inner = (*path, self.section.objective.rule.name, name) if isinstance(given, dict) else path
+            self.check_quantity(inner, "objective", name, goals, lights)
 
     def check_constraints(self, lights: Lights) -> None:
-        quantities, noisy = self.named_quantities(lights), self.noise_quantities(lights)
+        known = {name: q for name, q in quantities_of(self.asked(lights)).items() if q.ends}
         for name, bound in self.section.constraints.items():
             path = ("constraints", name)
-            known = self.check_quantity(path, "quantity", name, quantities)
-            of_noise = name in noisy
-            if of_noise and self.section.search is not None:
+            if not self.check_quantity(path, "quantity", name, list(known), lights):
+                continue
+            if known[name].smooth is None and self.section.search is not None:
                 self.add(path, f"the search does not know {name}", None, "a study without `search`")
-            if known and name not in ("sensitivity", "cfa_sensitivity"):
-                small = name == "slope_per_nm" or (of_noise and not name.startswith((CNR, D_PRIME)))
-                wrong = "min" if small else "max"
-                if getattr(bound, wrong) is not None:
-                    right = "max" if wrong == "min" else "min"
-                    self.add((*path, wrong), f"{name} has no `{wrong}`", getattr(bound, wrong), f"`{right}`")
+            for end in ("min", "max"):
+                if end not in known[name].ends and getattr(bound, end) is not None:
+                    right = " or ".join(f"`{each}`" for each in known[name].ends)
+                    self.add((*path, end), f"{name} has no `{end}`", getattr(bound, end), right)
 
-    def search(self, spaces: list[Space]) -> Search | None:
+    def search(self, spaces: list[Space], lights: Lights) -> Search | None:
         section = self.section.search
         if section is None:
             return None
@@ -242,7 +232,7 @@ class _Resolver:
             self.unknown(("search", "algorithm"), what, section.algorithm, list(ALGORITHMS))
         if chosen not in boxes or section.algorithm not in ALGORITHMS or self.faults:
             return None
-        self.check_searched(boxes[chosen])
+        self.check_searched(boxes[chosen], lights)
         levels: tuple[float, ...] = ()
         if section.front is not None:
             axis = Axis(min=section.front.min, max=section.front.max, count=section.front.count)
@@ -253,24 +243,23 @@ class _Resolver:
             self.add(("search", "scenario"), "a search under a pulsed light needs a fixed exposure", scenario)
         return Search(boxes[chosen], scenario, section.algorithm, section.starts, section.max_evaluations, levels)
 
-    def check_searched(self, space: Space) -> None:
+    def check_searched(self, space: Space, lights: Lights) -> None:
         """What the searched family must have for the study's constraints, and the front for its objective."""
         assert space.filter is not None
-        own = space.filter.family.dimensions
+        own, known = space.filter.family.dimensions, quantities_of(self.asked(lights))
         for name in self.section.constraints:
-            if name in DIMENSIONS and name not in own:
+            if name in known and known[name].needs == "family" and name not in own:
                 self.add(
                     ("constraints", name), f"{space.filter.family.kind} has no {name}", None, ", ".join(own) or "none"
                 )
         assert self.section.search is not None
-        if self.section.search.front is not None and any("sensitivity" in n for n in self.section.objective.weights):
+        light = any(known[name].role == "light" for name in self.section.objective.weights if name in known)
+        if self.section.search.front is not None and light:
             problem = "the front is searched at levels of sensitivity, which is in the objective"
             self.add(("search", "front"), problem, None, "an objective of CSDs")
 
 
-def resolve(
-    document: Document, section: StudySection, folders: list[Path], kept: Mapping[str, FloatArray] | None = None
-) -> Study:
+def resolve(document: Document, section: StudySection, folders: list[Path], kept: KeptSources | None = None) -> Study:
     """Make the study; `folders` are searched in order for its files. Raises StudyError with every fault found.
 
     `kept`: curves to take instead of those in files, see `Sources`.

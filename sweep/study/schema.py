@@ -7,9 +7,10 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, model_validator
 
 from ..camera.pixel import Pixel
-from ..camera.scene import Geometry, Scenario
+from ..camera.scenario import Scenario
+from ..camera.scene import Geometry
 from ..camera.sensor import BUILT_IN_SENSORS
-from ..curves.builtin import BUILT_IN_LIGHTS
+from ..curves.builtin.registry import BUILT_IN_LIGHTS
 from ..curves.spectrum import WavelengthGrid
 from ..designs.registry import FamilyOptions, told
 from ..metrics.bound import Bound

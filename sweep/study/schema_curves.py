@@ -12,7 +12,7 @@ from ..curves.spectrum import Outside, Resampling
 from ..types import Ratio, Section
 
 Name = Annotated[str, Field(min_length=1, max_length=100)]
-Columns = Annotated[list[Name], Field(min_length=1, max_length=MOST_CURVES)]
+FileColumns = Annotated[list[Name], Field(min_length=1, max_length=MOST_CURVES)]
 FilePath = Annotated[str, Field(min_length=1, max_length=4096)]
 
 
@@ -62,7 +62,7 @@ class LightFile(Documented):
     """Path of a .csv or .mat file, relative to the study or to the folder of --data."""
     quantity: Annotated[str, Field(pattern="^(energy|photons)$"), WithJsonSchema({"enum": ["energy", "photons"]})]
     """What the file's numbers are."""
-    signals: Annotated[dict[Name, Columns], Field(min_length=1)]
+    signals: Annotated[dict[Name, FileColumns], Field(min_length=1)]
     resampling: Resampling = "linear"
     """`mean` over each bin keeps the integral of lines that are finer than the grid."""
     outside: Outside = "refuse"

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from ..camera.sensor import BUILT_IN_SENSORS, SensorCurves, make_sensor
-from ..curves.builtin import BUILT_IN_LIGHTS
+from ..curves.builtin.registry import BUILT_IN_LIGHTS
 from ..curves.builtin.surrogate import BUILT_IN_RANGE_NM
 from ..curves.files import digest, read_curves
 from ..curves.lights import Lights, make_lights
@@ -29,17 +29,28 @@ _CUT_OFF = 0.01
 """Share of a light's photons outside the grid from which on the user is told."""
 
 
+_Key = TypeVar("_Key")
+
+
+@dataclass(frozen=True)
+class KeptSources:
+    """Curves to take instead of those in files, on the study's grid: QE by name, photons by type and name."""
+
+    sensor: Mapping[str, FloatArray]
+    lights: Mapping[tuple[str, str], FloatArray]
+
+
 @dataclass
 class Sources:
     """Reads the files of one study, each once; collects faults, warnings and digests.
 
-    `kept`: the curves of a finished run (`store.CURVES`) by their columns; no file is read then.
+    `kept`: the curves of a finished run; no file is read then.
     """
 
     document: Document
     grid: WavelengthGrid
     folders: Sequence[Path]
-    kept: Mapping[str, FloatArray] | None = None
+    kept: KeptSources | None = None
     faults: list[Fault] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     digests: dict[str, str] = field(default_factory=dict)
@@ -70,7 +81,7 @@ class Sources:
                 if name in qe:
                     self.add(place, "the curve is defined twice", name)
                 if self.kept is not None:
-                    values = self._kept(place, f"qe:{name}")
+                    values = self._kept(place, self.kept.sensor, name)
                 else:
                     values = self._column(place, curves, column, entry)
                     values = None if values is None else values * entry.scale
@@ -108,7 +119,7 @@ class Sources:
                     place = (*path, "signals", signal_type, position)
                     label = f"{Path(entry.file).stem}:{column}"
                     if self.kept is not None:
-                        photons = self._kept(place, f"light:{signal_type}:{label}")
+                        photons = self._kept(place, self.kept.lights, (signal_type, label))
                     else:
                         photons = self._photons(place, curves, column, entry)
                     if photons is not None:
@@ -191,11 +202,10 @@ class Sources:
                 self.add(path, f"{entry.file}, column {column}: {fault.problem}", fault.value, fault.allowed)
             return None
 
-    def _kept(self, path: tuple[Key, ...], name: str) -> FloatArray | None:
-        assert self.kept is not None
-        if name not in self.kept:
+    def _kept(self, path: tuple[Key, ...], curves: Mapping[_Key, FloatArray], name: _Key) -> FloatArray | None:
+        if name not in curves:
             self.add(path, "the run kept no such curve", name)
-        return self.kept.get(name)
+        return curves.get(name)
 
     def _curves(self, path: tuple[Key, ...], entry: CurveFile | LightFile) -> Curves | None:
         if self.kept is not None:

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sweep.camera.methods import REFERENCE
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.plan.bounds import Box
 from sweep.camera.plan.plan import Planner
-from sweep.camera.view import REFERENCE
 
 from ..hard.scenes import SENSOR, Scene, columns, scene, target
 
@@ -28,8 +28,8 @@ def saturated(place: list[float] | str, readout: str, level: float) -> Scene:
         given = {"target": light, "optics": {"f_number": 2.8}, "intensity_cd": 200}
         given["exposure"] = {"kind": "fixed", "exposure_s": exposure_s}
         found = scene("saturated", "RCCC", given, {"crosstalk": 0.1})
-        setup = replace(found.setup, mosaic=MOSAIC, qe=SENSOR.mosaic_qe(MOSAIC, None))
-        return Scene("saturated", setup, found.curves, Box(setup, setup.qe, setup.qe, 1))
+        view = replace(found.view, mosaic=MOSAIC, qe=SENSOR.mosaic_qe(MOSAIC, None))
+        return Scene("saturated", view, found.curves, Box(view, view.qe, view.qe, 1))
 
     brightest = float(Planner([made(1e-3).box])._scenes[0].reach.brightest_dn.max())
     return made(1e-3 * 4095 * level / brightest)

@@ -15,7 +15,7 @@ from sweep.cache import Cache
 from sweep.camera.imager import imager_of
 from sweep.designs.block import Tables, edges_of
 
-from ..blocks import SETUPS, SPACE
+from ..blocks import SPACE, VIEWS
 
 N_THREADS = 8
 
@@ -110,12 +110,12 @@ def test_tables_of_grids_are_shared_by_threads() -> None:
 
 
 def test_imagers_are_shared_by_threads() -> None:
-    setup = SETUPS["chart"]
-    setups = [replace(setup, pixel=setup.pixel.model_copy(update={"read_noise_e": float(at)})) for at in range(20)]
+    view = VIEWS["chart"]
+    views = [replace(view, pixel=view.pixel.model_copy(update={"read_noise_e": float(at)})) for at in range(20)]
 
     def work(number: int) -> None:
         for turn in range(20):
-            mine = setups[(turn * (number + 1)) % len(setups)]
-            assert imager_of(mine).setup.pixel.read_noise_e == mine.pixel.read_noise_e
+            mine = views[(turn * (number + 1)) % len(views)]
+            assert imager_of(mine).view.pixel.read_noise_e == mine.pixel.read_noise_e
 
     at_once(work)

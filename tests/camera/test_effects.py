@@ -20,15 +20,15 @@ from sweep.camera.effects import (
     demosaic,
     extinction,
     flicker,
-    gaussian,
     noise,
     phase,
-    readout,
     sampling,
     saturation,
 )
+from sweep.camera.noisy import gaussian, moments
 from sweep.camera.pixel import Pixel
-from sweep.camera.scene import Drive, FixedExposure, Scenario, Target
+from sweep.camera.scenario import Scenario
+from sweep.camera.scene import Drive, FixedExposure, Target
 from sweep.curves.color import luminance_per_photon_radiance
 from sweep.curves.spectrum import LIGHT_M_S, PLANCK_J_S, WavelengthGrid
 
@@ -137,7 +137,7 @@ def test_covered_share_by_counting() -> None:
 
 def test_a_pixel_sees_the_mean_of_the_image_over_its_aperture() -> None:
     made = scene("far", "RGGB", {"target": FAR, "optics": F2})
-    seen = sampling.window(made.setup.mosaic, np.array([[0.3, 0.8]]), 3.5)
+    seen = sampling.window(made.view.mosaic, np.array([[0.3, 0.8]]), 3.5)
     profile = blur.Profile(6.2, 12.0, np.array([0.55]), 2.0, 0.0)
     light = sampling.light_on_pixels(
         seen, np.ones(seen.dx.shape, dtype=bool) & (np.hypot(seen.dx, seen.dy) < 4), 0.4, 6.2 / 2.1, profile, 2.1
@@ -192,11 +192,11 @@ def test_crosstalk_by_hand() -> None:
 
 def test_extinction_leaves_two_percent_at_the_visibility() -> None:
     for visibility in (100.0, 3000.0, 20_000.0):
-        made = scene("fog", "RGGB", {"target": target(visibility, 10), "visibility_m": visibility}).setup
+        made = scene("fog", "RGGB", {"target": target(visibility, 10), "visibility_m": visibility}).view
         wave = np.array([450.0, 550.0, 650.0])
-        spectral = extinction.transmittance(made, "spectral", wave)
+        spectral = extinction.Extinction().transmittance(made, "spectral", wave)
         assert spectral[1] == pytest.approx(0.02, rel=1e-12)
-        assert (extinction.transmittance(made, "gray", wave) == pytest.approx(0.02)) is True
+        assert (extinction.Extinction().transmittance(made, "gray", wave) == pytest.approx(0.02)) is True
         assert spectral[0] <= spectral[2]  # haze takes more of the blue; dense fog of all alike
     assert extinction.size_exponent(400.0) == 0
     assert extinction.size_exponent(5999.99) == pytest.approx(1.3, abs=1e-3)
@@ -247,7 +247,7 @@ PIXELS = {
 def test_mean_readout_agrees_with_monte_carlo(name: str, electrons: float) -> None:
     pixel = PIXELS[name]
     draws = noise.draws_dn(np.full(400_000, electrons), pixel, np.random.default_rng(5))
-    _, mean, variance = readout.moments(np.array([electrons]), pixel)[:, 0]
+    _, mean, variance = moments.moments(np.array([electrons]), pixel)[:, 0]
     assert mean == pytest.approx(draws.mean(), abs=4 * draws.std() / math.sqrt(draws.size) + 1e-9)
     # The band of a variance follows from the fourth moment of the draws.
     fourth = ((draws - draws.mean()) ** 4).mean()
@@ -263,7 +263,7 @@ def test_mean_readout_at_fifty_digits() -> None:
             for count in range(13_000):
                 exact += share * (min(count, 10_000) * mp.mpf("0.4") + 10)
                 share *= mp.mpf(electrons) / (count + 1)
-        found = readout.moments(np.array([electrons]), pixel)[readout.UNROUNDED, 0]
+        found = moments.moments(np.array([electrons]), pixel)[moments.UNROUNDED, 0]
         assert found == pytest.approx(float(exact), abs=1e-9)
 
 
@@ -288,19 +288,17 @@ def test_saturation_ends_at_the_first_of_well_and_adc() -> None:
 
 
 def test_places_are_nested_and_nearest_is_on_the_torus() -> None:
-    made = scene("any", "RGGB", {"target": FAR | {"phase_px": "any"}}).setup
+    made = scene("any", "RGGB", {"target": FAR | {"phase_px": "any"}}).view
     fine, coarse = (phase.places_px(made, method) for method in ("quarter pixel", "pixel"))
     assert len(fine) == 64
     assert len(coarse) == 4
     assert {tuple(p) for p in coarse} <= {tuple(p) for p in fine}
-    near = phase.nearest(made, np.array([[1.9, 0.1]]), coarse)
+    near = phase.nearest_places(made, np.array([[1.9, 0.1]]), coarse)
     assert tuple(coarse[near[0]]) == (0.0, 0.0)
 
 
 def test_a_place_counts_within_the_tile() -> None:
-    one, other = (
-        scene("a", "RGGB", {"target": FAR | {"phase_px": p}}).setup for p in ([0.25, 1.5], [1e6 + 0.25, -0.5])
-    )
+    one, other = (scene("a", "RGGB", {"target": FAR | {"phase_px": p}}).view for p in ([0.25, 1.5], [1e6 + 0.25, -0.5]))
     np.testing.assert_allclose(phase.places_px(one, "one"), phase.places_px(other, "one"), atol=1e-9)
 
 

@@ -15,13 +15,15 @@ import numpy as np
 import pytest
 
 from sweep.camera.effects.blur import transfer
-from sweep.camera.imager import Imager, smooth_imager
+from sweep.camera.imager import Imager
+from sweep.camera.linear import smooth_imager
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Optics, Pixel, irradiance_factor
 from sweep.camera.plan.bounds import Box
 from sweep.camera.plan.plan import Planner
-from sweep.camera.scene import FixedExposure, Scenario
-from sweep.camera.view import Setup
+from sweep.camera.scenario import Scenario
+from sweep.camera.scene import FixedExposure
+from sweep.camera.view import View
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
 
@@ -47,7 +49,7 @@ def pixel() -> Pixel:
     )
 
 
-def isetcam_setup(mosaic: Mosaic, magnification: float, exposure_s: float, kept: np.ndarray | float = 1.0) -> Setup:
+def isetcam_view(mosaic: Mosaic, magnification: float, exposure_s: float, kept: np.ndarray | float = 1.0) -> View:
     """The reference's patches and sensor; a lens at a finite distance has a magnification, which dims its image.
 
     `kept`: share of the light that the blur leaves, per wavelength.
@@ -65,7 +67,7 @@ def isetcam_setup(mosaic: Mosaic, magnification: float, exposure_s: float, kept:
         optics=Optics(f_number=optics.f_number, transmission=dimmed),
         exposure=FixedExposure(exposure_s=exposure_s),
     )
-    return Setup(WavelengthGrid(step_nm=5), mosaic, qe, (), qe[0], lights, pixel(), scenario)
+    return View(WavelengthGrid(step_nm=5), mosaic, qe, (), qe[0], lights, pixel(), scenario)
 
 
 def columns_of(mosaic: Mosaic) -> list[int]:
@@ -74,9 +76,9 @@ def columns_of(mosaic: Mosaic) -> list[int]:
     return [names.index({"C": "W"}.get(channel, channel)) for channel in mosaic.channels]
 
 
-def every_channel() -> Setup:
+def every_channel() -> View:
     """All channels of the reference side by side, read out with everything on."""
-    return isetcam_setup(Mosaic.from_rows("all", [reference()["qe_names"]]), 0.0, 1.0)
+    return isetcam_view(Mosaic.from_rows("all", [reference()["qe_names"]]), 0.0, 1.0)
 
 
 NOTHING = np.empty((1, 0, 61))
@@ -88,8 +90,8 @@ def electrons(cfa: str, mode: str) -> tuple[np.ndarray, dict[str, Any]]:
     ref = reference()
     run = next(r for r in ref["runs"] if r["cfa"] == cfa and r["mode"] == mode)
     every = Mosaic.from_rows("all", [ref["qe_names"]])
-    setup = isetcam_setup(every, ref["skip_magnification"], run["skip_exposure_s"])
-    return smooth_imager(setup).electrons.rates(NOTHING)[0, 0] * run["skip_exposure_s"], run
+    view = isetcam_view(every, ref["skip_magnification"], run["skip_exposure_s"])
+    return smooth_imager(view).electrons.rates(NOTHING)[0, 0] * run["skip_exposure_s"], run
 
 
 @pytest.mark.parametrize("mode", ["fixed", "auto"])
@@ -161,13 +163,13 @@ def test_a_uniform_field_agrees_through_the_whole_image_chain(cfa: str) -> None:
     mosaic = Mosaic.from_name(cfa)
     columns, constants = columns_of(mosaic), ref["constants"]
     kept = kept_at_the_center(float(constants["f_number"]))
-    setup = isetcam_setup(mosaic, constants["magnification"], run["exposure_s"], kept)
-    plan = Planner([Box(setup, setup.qe, setup.qe, 1)]).plan("uniform", 0.1)
+    view = isetcam_view(mosaic, constants["magnification"], run["exposure_s"], kept)
+    plan = Planner([Box(view, view.qe, view.qe, 1)]).plan("uniform", 0.1)
     assert "quantization" in plan.computed
-    smooth = smooth_imager(setup).smooth(NOTHING)[0, 0]
+    smooth = smooth_imager(view).smooth(NOTHING)[0, 0]
     volts = np.array(run["uniform_volts_unclipped"], dtype=float)[:, columns]
     np.testing.assert_allclose(smooth, 4096 * volts, atol=0.1, rtol=0)
-    dn = Imager(replace(setup, methods=plan.methods)).read(NOTHING)[0][0, 0]
+    dn = Imager(replace(view, methods=plan.methods)).read(NOTHING)[0][0, 0]
     expected = np.minimum(np.array(run["uniform_dn"], dtype=float)[:, columns], 4095)
     near_a_step = np.abs(4096 * volts - np.floor(4096 * volts) - 0.5) < 0.1
     assert ((dn == expected) | near_a_step).all()

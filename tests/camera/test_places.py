@@ -19,10 +19,11 @@ from sweep.camera.between import Between
 from sweep.camera.effects import phase
 from sweep.camera.imager import Imager
 from sweep.camera.kernel import make_kernel
+from sweep.camera.methods import REFERENCE, Methods
 from sweep.camera.plan.plan import Plan, Planner
-from sweep.camera.view import REFERENCE, Methods, Setup
-from sweep.metrics.evaluate import BEST_PLACE, evaluate
-from sweep.metrics.separation import CSD
+from sweep.camera.view import View
+from sweep.metrics.evaluate import evaluate
+from sweep.metrics.quantity import BEST_PLACE
 from sweep.report.plans import plan_lines
 
 from ..hard.random_scenes import random_scene
@@ -33,11 +34,11 @@ CSDS = ("csd_yellow_red", "csd_green_yellow")
 
 def at_place(made: Scene, x: float, y: float, methods: Methods = REFERENCE) -> dict[str, float]:
     """Distances with the light at one named place."""
-    given = made.setup.scenario
+    given = made.view.scenario
     assert given.target is not None
     there = given.model_copy(update={"target": given.target.model_copy(update={"phase_px": (x, y)})})
-    columns = evaluate(Imager(replace(made.setup, scenario=there, methods=methods)), made.curves)
-    return {name: float(values[0]) for name, values in columns.items() if name.startswith(CSD)}
+    columns = evaluate(Imager(replace(made.view, scenario=there, methods=methods)), made.curves)
+    return {name: float(values[0]) for name, values in columns.items() if name.startswith("csd_")}
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ def searched(
 ) -> Mapping[str, tuple[float, float]]:
     """Smallest and largest distance over the tile: a grid that shares no place with a quarter pixel's, and a descent
     without derivatives from its best places."""
-    rows, columns = made.setup.mosaic.indices.shape
+    rows, columns = made.view.mosaic.indices.shape
     x, y = np.meshgrid(
         (np.arange(columns * per_pixel) + 0.37) / per_pixel, (np.arange(rows * per_pixel) + 0.37) / per_pixel
     )
@@ -81,7 +82,7 @@ def searched(
 
 def planned(made: Scene, tolerance_dn: float) -> tuple[Plan, dict[str, float]]:
     plan = Planner([made.box]).plan(made.name, tolerance_dn)
-    columns = evaluate(Imager(replace(made.setup, methods=plan.methods)), made.curves)
+    columns = evaluate(Imager(replace(made.view, methods=plan.methods)), made.curves)
     return plan, {name: float(values[0]) for name, values in columns.items()}
 
 
@@ -105,7 +106,7 @@ def test_the_worst_place_between_the_quarters_of_a_pixel() -> None:
     plan, row = planned(made, 0.1)
     assert plan.kept
     assert not broken(made, 0.1, 8)
-    lattice = evaluate(Imager(replace(made.setup, methods=replace(REFERENCE, phase="quarter pixel"))), made.curves)
+    lattice = evaluate(Imager(replace(made.view, methods=replace(REFERENCE, phase="quarter pixel"))), made.curves)
     assert row["csd_green_yellow"] < lattice["csd_green_yellow"][0] - 1  # what a lattice misses
 
 
@@ -127,11 +128,11 @@ def any_place(seed: int) -> Scene:
     tried = seed
     while True:
         made = random_scene(tried)
-        given = made.setup.scenario
-        if given.target is not None and made.setup.mosaic.indices.size <= 4:
+        given = made.view.scenario
+        if given.target is not None and made.view.mosaic.indices.size <= 4:
             anywhere = given.target.model_copy(update={"phase_px": "any"})
-            setup = replace(made.setup, scenario=given.model_copy(update={"target": anywhere}))
-            return Scene(f"any {tried}", setup, made.curves[0][:1], replace(made.box, setup=setup))
+            view = replace(made.view, scenario=given.model_copy(update={"target": anywhere}))
+            return Scene(f"any {tried}", view, made.curves[0][:1], replace(made.box, view=view))
         tried += 1000
 
 
@@ -150,7 +151,7 @@ def test_thirty_random_scenes_keep_their_promise_over_the_continuum(seed: int) -
 def test_a_sharp_image_at_any_place() -> None:
     made = scene("sharp", "RGGB", SMALL | {"noise": False})
     methods = replace(REFERENCE, blur="skip", quantization="skip", saturation="skip", phase="within 1 DN")
-    row = evaluate(Imager(replace(made.setup, methods=methods)), made.curves)
+    row = evaluate(Imager(replace(made.view, methods=methods)), made.curves)
     smallest, largest = searched(made, CSDS[:1], 5, methods)[CSDS[0]]
     assert row[CSDS[0]][0] == pytest.approx(smallest, abs=1 + 1e-3)
     assert row[BEST_PLACE + CSDS[0]][0] == pytest.approx(largest, abs=1 + 1e-3)
@@ -169,8 +170,8 @@ def test_a_plan_that_cannot_keep_the_tolerance_says_so() -> None:
     assert planned(named, 0.1)[0].promised_dn == 0
 
 
-def kernel_at(setup: Setup, methods: Methods, nodes_nm: np.ndarray, cases: phase.Cases) -> np.ndarray:
-    light = make_kernel(setup, methods, nodes_nm, by_pixel=False, work=Counter(), cases=cases).light
+def kernel_at(view: View, methods: Methods, nodes_nm: np.ndarray, cases: phase.Cases) -> np.ndarray:
+    light = make_kernel(view, methods, nodes_nm, by_pixel=False, work=Counter(), cases=cases).light
     return np.broadcast_to(light, (*light.shape[:3], nodes_nm.size))
 
 
@@ -183,12 +184,12 @@ def test_what_lies_between_the_corners_is_within_its_bound() -> None:
         scene("c", "quad", {"target": FAR | {"phase_px": "any", "readout": "center"}, "optics": F2}),
         scene("d", "RYNCy", {"target": NEAR | {"phase_px": "any"}, "optics": F2}),
     ):
-        setup, nodes = made.setup, np.linspace(400, 700, 7)
+        view, nodes = made.view, np.linspace(400, 700, 7)
         for blurred in ("every wavelength", "skip"):
             methods = replace(REFERENCE, blur=blurred, noise="skip", quantization="skip", saturation="skip")
-            between = Between(setup, methods, nodes)
-            kernel = partial(kernel_at, setup, methods, nodes)
-            cells = phase.whole(setup.mosaic)
+            between = Between(view, methods, nodes)
+            kernel = partial(kernel_at, view, methods, nodes)
+            cells = phase.whole(view.mosaic)
             ratios = []
             for half in (1 / 8, 1 / 64):
                 some = rng.integers(len(cells.centers), size=6)
@@ -213,9 +214,9 @@ def test_a_part_of_the_tile_stands_for_all(name: str) -> None:
     """A place and its image in the part that is searched have the same distances."""
     made = scene(name, name, SMALL | {"optics": F2, "noise": False})
     methods = replace(REFERENCE, quantization="skip", saturation="skip", blur="skip")
-    cells = phase.whole(made.setup.mosaic)
-    size = np.array(made.setup.mosaic.indices.shape[::-1])
-    low, high = phase.domain_px(made.setup.mosaic)
+    cells = phase.whole(made.view.mosaic)
+    size = np.array(made.view.mosaic.indices.shape[::-1])
+    low, high = phase.domain_px(made.view.mosaic)
     assert (high - low <= size).all()
     for place in np.random.default_rng(1).uniform(0, size, (20, 2)):
         image = low + np.mod(place - low, size)
@@ -241,12 +242,12 @@ def test_the_best_place_of_a_pulsed_light_is_the_best_of_the_worst_moments() -> 
     assert not broken(made, 5.0, 3, CSDS[:1])
     # In a moment that is not the worst, more light separates more.
     straight = replace(REFERENCE, phase="quarter pixel", noise="skip", quantization="skip", saturation="skip")
-    row = evaluate(Imager(replace(made.setup, methods=straight)), made.curves)
-    drive = made.setup.scenario.drive
+    row = evaluate(Imager(replace(made.view, methods=straight)), made.curves)
+    drive = made.view.scenario.drive
     assert drive is not None
     # 1.2 periods hold 0.5 of light, and of the rest 0 to 0.2.
     steady = {**pulsed, "drive": None}
-    even = evaluate(Imager(replace(scene("steady", "RYNCy", steady, DARK).setup, methods=straight)), made.curves)
+    even = evaluate(Imager(replace(scene("steady", "RYNCy", steady, DARK).view, methods=straight)), made.curves)
     for name in CSDS:
         assert row[BEST_PLACE + name][0] == pytest.approx(even[BEST_PLACE + name][0] * 0.5 / 0.6, rel=1e-9)
         assert row[name][0] == pytest.approx(even[name][0] * 0.5 / 0.6, rel=1e-9)
@@ -256,7 +257,7 @@ def test_a_search_of_places_looks_at_few() -> None:
     made = scene("small", "RGGB", SMALL, DARK)
     counts = []
     for within in ("within 10 DN", "within 1 DN", "within 0.1 DN", "within 0.01 DN"):
-        imager = Imager(replace(made.setup, methods=replace(REFERENCE, phase=within, blur="every 10 nm")))
+        imager = Imager(replace(made.view, methods=replace(REFERENCE, phase=within, blur="every 10 nm")))
         evaluate(imager, made.curves)
         counts.append(imager.work["places"])
         again = imager.work["places"]
@@ -291,7 +292,7 @@ space = study.spaces[0]
 if sys.argv[2] == "plan":
     print(study.plan("road").promised_dn)
 else:
-    imager = Imager(study.setup(space, "road"))
+    imager = Imager(study.view(space, "road"))
     print(len(imager.read(space.curves(space.points(0, 1), study.grid.size))[0][0]))
 """
 
@@ -312,6 +313,7 @@ def test_a_tile_with_too_many_places_is_refused(tmp_path: Any) -> None:
     assert "a tile of 256 pixels has too many places (CFA wide) (got '4,096'); allowed: at most 1,024" in ended.stderr
 
 
+@pytest.mark.slow
 def test_the_pixels_of_a_large_light_at_any_place_fit_into_memory(tmp_path: Any) -> None:
     text = STUDY.format(distance=9, noise="true", tile="[R, G], [G, B]")
     ended = under_limit(tmp_path, text, "read")

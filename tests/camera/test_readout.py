@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sweep.camera.effects import noise_table, quantization, readout
+from sweep.camera.effects import quantization
+from sweep.camera.noisy import moments, table
 from sweep.camera.pixel import Pixel
 
 from .. import readout_oracle
@@ -16,9 +17,9 @@ BELOW = Pixel(well_e=3001, gain_dn_per_e=0.2, read_noise_e=0.3, offset_dn=168)
 
 @pytest.mark.parametrize("electrons", [3500.0, 1e5, 1e300])
 def test_a_full_well_dithers_no_step(electrons: float) -> None:
-    found = noise_table.rounded(np.array([electrons]), BELOW)[0]
+    found = table.mean_rounded(np.array([electrons]), BELOW)[0]
     assert found == pytest.approx(768, abs=1e-6)
-    assert noise_table.unrounded(np.array([electrons]), BELOW)[0] == pytest.approx(768.2, abs=1e-9)
+    assert table.mean_unrounded(np.array([electrons]), BELOW)[0] == pytest.approx(768.2, abs=1e-9)
 
 
 def random_pixel(seed: int) -> tuple[Pixel, list[float]]:
@@ -40,12 +41,12 @@ def random_pixel(seed: int) -> tuple[Pixel, list[float]]:
 def check(pixel: Pixel, electrons: float) -> None:
     """Sums to 1e-9 of the noise and 1e-13 of full scale; the table's cubic within 5/384 / 64^4 of a 4th derivative."""
     mean, variance = readout_oracle.moments(electrons, pixel)
-    _, exact, spread = readout.moments(np.array([electrons]), pixel)[:, 0]
+    _, exact, spread = moments.moments(np.array([electrons]), pixel)[:, 0]
     wide = pixel.dn_per_e * np.sqrt(electrons + pixel.read_noise_e**2 + (pixel.prnu * electrons) ** 2)
     wide = min(wide, pixel.full_scale_dn) + 1
     assert exact == pytest.approx(mean, abs=1e-9 * wide + 1e-12 * pixel.full_scale_dn)
     assert spread == pytest.approx(variance, abs=3e-9 * wide**2)
-    found = noise_table.rounded(np.array([electrons]), pixel)[0], noise_table.variance(np.array([electrons]), pixel)[0]
+    found = table.mean_rounded(np.array([electrons]), pixel)[0], table.variance(np.array([electrons]), pixel)[0]
     assert found[0] == pytest.approx(mean, abs=3e-7 * wide)
     assert found[1] == pytest.approx(variance, abs=3e-6 * wide**2)
 
@@ -76,16 +77,16 @@ def test_prnu_spreads_the_gains_of_poisson_electrons(prnu: float, read: float, g
 def test_single_electrons_are_seen_as_steps() -> None:
     # Without read noise, at 20 DN/e, rounding takes the same from every count: nothing dithers it.
     pixel = Pixel(gain_dn_per_e=20, offset_dn=0.4)
-    shift = noise_table.rounded(np.array([5.0, 50.0]), pixel) - noise_table.unrounded(np.array([5.0, 50.0]), pixel)
+    shift = table.mean_rounded(np.array([5.0, 50.0]), pixel) - table.mean_unrounded(np.array([5.0, 50.0]), pixel)
     assert shift == pytest.approx([-0.4, -0.4], abs=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(12))
 def test_what_rounding_changes_is_within_its_promise_and_its_steepness(seed: int) -> None:
     pixel, _ = random_pixel(seed + 300)
-    brightest = 1.2 * readout.Ends.of(pixel).full_e + 50
+    brightest = 1.2 * moments.Ends.of(pixel).full_e + 50
     electrons = np.linspace(0, np.sqrt(brightest), 7001) ** 2
-    shift = noise_table.rounded(electrons, pixel) - noise_table.unrounded(electrons, pixel)
+    shift = table.mean_rounded(electrons, pixel) - table.mean_unrounded(electrons, pixel)
     promised, slope = quantization._under_noise(pixel, brightest)
     assert np.ptp(shift) <= promised + 1e-9
     assert promised <= 1.02 * np.ptp(shift) + 1e-3

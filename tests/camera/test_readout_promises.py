@@ -12,8 +12,8 @@ from scipy.stats import norm, poisson
 
 from sweep.camera.effects import pedestal, saturation
 from sweep.camera.imager import Imager
+from sweep.camera.methods import Methods
 from sweep.camera.pixel import Pixel
-from sweep.camera.view import Methods
 
 from ..hard.scenes import scene
 
@@ -61,7 +61,7 @@ def electrons_up_to(brightest_dn: float, pixel: Pixel, offset: float) -> list[Fr
 @pytest.mark.parametrize("share", [0.3, 0.9, 1.05, 1.4])
 def test_the_pedestal_without_noise(name: str, quantization: str, clip: str, share: float) -> None:
     made = scene("one", "RGGB", {}, PIXELS[name])
-    pixel, methods = made.setup.pixel, Methods(quantization=quantization, saturation=clip)
+    pixel, methods = made.view.pixel, Methods(quantization=quantization, saturation=clip)
     brightest_dn = share * pixel.full_scale_dn
     offset = pixel.offset_dn
     changes = [
@@ -69,7 +69,7 @@ def test_the_pedestal_without_noise(name: str, quantization: str, clip: str, sha
         for e in electrons_up_to(brightest_dn, pixel, offset)
     ]
     realized = float(max(changes) - min(changes))
-    promised = pedestal.promise(made.setup, brightest_dn, methods)
+    promised = pedestal.Pedestal().range_dn(made.view, brightest_dn, methods)
     assert realized <= promised + 1e-9
     assert promised <= realized + (1.0 if quantization == "round" else 1e-9)
     if offset == math.floor(offset) and brightest_dn + offset < pixel.full_scale_dn - 1:
@@ -81,14 +81,14 @@ def test_the_pedestal_without_noise(name: str, quantization: str, clip: str, sha
 @pytest.mark.parametrize("share", [0.3, 0.9, 1.05, 1.4])
 def test_the_full_well_without_noise(name: str, quantization: str, share: float) -> None:
     made = scene("one", "RGGB", {}, PIXELS[name])
-    pixel = made.setup.pixel
+    pixel = made.view.pixel
     brightest_dn = share * pixel.full_scale_dn
     changes = [
         value(e, pixel, pixel.offset_dn, Methods(quantization=quantization, saturation="skip"))
         - value(e, pixel, pixel.offset_dn, Methods(quantization=quantization))
         for e in electrons_up_to(brightest_dn, pixel, pixel.offset_dn)
     ]
-    promised = saturation.promise(made.setup, brightest_dn / pixel.dn_per_e, Methods(quantization=quantization))
+    promised = saturation.Saturation().range_dn(made.view, brightest_dn, Methods(quantization=quantization))
     assert promised == pytest.approx(float(max(changes) - min(changes)), abs=1e-9)
 
 
@@ -97,10 +97,10 @@ def test_a_whole_pedestal_cancels_to_the_last_digit() -> None:
     made = scene("one", "RGGB", {}, {"offset_dn": 4_000_000.0, "bits": 24, "well_e": 1e7, "gain_dn_per_e": 1.0})
     steps = np.arange(1, 41) + 0.5
     electrons = np.concatenate([np.nextafter(steps, 0), steps, np.nextafter(steps, 99)])
-    with_it = Imager(made.setup).readout.transfer(electrons)
-    without = Imager(
-        scene("one", "RGGB", {}, {"bits": 24, "well_e": 1e7, "gain_dn_per_e": 1.0}).setup
-    ).readout.transfer(electrons)
+    with_it = Imager(made.view).readout.transfer(electrons)
+    without = Imager(scene("one", "RGGB", {}, {"bits": 24, "well_e": 1e7, "gain_dn_per_e": 1.0}).view).readout.transfer(
+        electrons
+    )
     np.testing.assert_array_equal(with_it - without, 4_000_000.0)
     np.testing.assert_array_equal(
         without, np.repeat([[0], [1], [1]], 40, axis=1).ravel() + np.tile(np.arange(1, 41), 3)
@@ -139,11 +139,11 @@ def test_the_pedestal_under_noise(
 ) -> None:
     given = {"offset_dn": offset, "bits": 8, "well_e": 650.0, "gain_dn_per_e": 0.4, "read_noise_e": read_noise_e}
     made = scene("one", "RGGB", {"noise": True}, given)
-    pixel = made.setup.pixel
+    pixel = made.view.pixel
     grid = np.concatenate([np.linspace(0, 4, 6), np.linspace(5, brightest_e, 12), brightest_e - np.linspace(0, 3, 4)])
     changes = [
         means(e, pixel, offset, rounds=rounds, law=law) - means(e, pixel, 0.0, rounds=rounds, law=law) for e in grid
     ]
     methods = Methods(quantization="round" if rounds else "skip")
-    promised = pedestal.promise(made.setup, brightest_e * pixel.dn_per_e, methods)
+    promised = pedestal.Pedestal().range_dn(made.view, brightest_e * pixel.dn_per_e, methods)
     assert max(changes) - min(changes) <= promised + 1e-6

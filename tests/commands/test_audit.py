@@ -10,31 +10,25 @@ import pandas as pd
 import pytest
 
 from sweep.commands import app as cli
-from sweep.commands.audit import Audit, audit, sampled
+from sweep.commands.audit import Audit, audit_rows, sampled
 from sweep.errors import BrokenPromiseError
-from sweep.metrics.evaluate import is_promised
 from sweep.run import run_study
 from sweep.study import Study, load_study
 
-STUDY = """\
-study: audited
-sensor: ar0820
-lights: tl16
+from ..build import stopband_study
+
+STUDY = stopband_study(
+    "audited",
+    "{left_nm: [600, 610], left_width_nm: 20, right_nm: [640, 650], right_width_nm: 10}",
+    before="""\
 wavelengths: {step_nm: 5}
 pixel: {offset_dn: 168}
 scenarios: {chart: {}, dim: {exposure: {kind: white_patch, level: 0.3}}}
 tolerance_dn: 5
-cfas: [RGGB, RYNCy]
 production: {edge_shift_nm: 2}
-sweeps:
-  edges:
-    cfa: RYNCy
-    channel: N
-    base: Y
-    to: G
-    grid: {left_nm: [600, 610], left_width_nm: 20, right_nm: [640, 650], right_width_nm: 10}
-search: {starts: 1, max_evaluations: 10}
-"""
+""",
+    after="search: {starts: 1, max_evaluations: 10}\n",
+)
 
 
 @pytest.fixture(scope="module")
@@ -48,15 +42,15 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, pd.DataFrame]:
 
 def test_every_promised_column_is_compared(run: tuple[Study, pd.DataFrame]) -> None:
     study, frame = run
-    assert audit(study, [frame]).faults == []
-    promised = [name for name in frame.columns if is_promised(name)]
+    assert audit_rows(study, [frame]).faults == []
+    promised = [name for name, quantity in study.quantities.items() if quantity.promised]
     assert [name for name in promised if name.startswith("worst_")]
     row = sampled(frame).index[-1]
     for name in promised:
         for wrong in (frame.loc[row, name] + 6, np.nan):
             changed = frame.copy()
             changed.loc[row, name] = wrong
-            found = audit(study, [changed])
+            found = audit_rows(study, [changed])
             assert list(found.broken["design_id"]) == [frame.loc[row, "design_id"]]
             assert list(found.broken["quantity"]) == [name]
             assert f"design {frame.loc[row, 'design_id']}: {name} is off" in str(found.faults[0])
@@ -65,7 +59,7 @@ def test_every_promised_column_is_compared(run: tuple[Study, pd.DataFrame]) -> N
 def test_progress_counts_all_that_is_recomputed(run: tuple[Study, pd.DataFrame]) -> None:
     study, frame = run
     calls: list[tuple[str, int, int]] = []
-    found = audit(study, [frame.iloc[:5], frame.iloc[5:]], lambda *call: calls.append(call))
+    found = audit_rows(study, [frame.iloc[:5], frame.iloc[5:]], lambda *call: calls.append(call))
     total = len(sampled(frame))
     assert total == len(found.rows) >= 5
     assert {(phase, n) for phase, _, n in calls} == {("designs recomputed", total)}

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from sweep.commands.describe import describe
+from sweep.commands.describe import described
 from sweep.commands.schema import write_schema
 from sweep.curves.facts import condensed, facts_of
 from sweep.curves.files import scan_curves
@@ -34,7 +34,7 @@ def faults(path: Path) -> list[str]:
 
 def test_qe_is_guessed_and_its_peak_named(tmp_path: Path) -> None:
     path = csv(tmp_path, "wavelength_nm,R,G", WAVE, 0.6 * bell(600, 50), 0.7 * bell(540, 50))
-    found = describe(path, tmp_path)
+    found = described(path, tmp_path)
     text = "\n".join(found.lines)
     assert "2 curves: R, G." in text
     assert "380 to 780 nm, step 10 nm, 41 samples" in text
@@ -48,7 +48,7 @@ def test_qe_is_guessed_and_its_peak_named(tmp_path: Path) -> None:
 
 def test_percent_is_told_with_its_scale(tmp_path: Path) -> None:
     path = csv(tmp_path, "wavelength_nm,G", WAVE, 70 * bell(540, 50))
-    assert any("scale: 0.01" in line for line in describe(path, tmp_path).lines)
+    assert any("scale: 0.01" in line for line in described(path, tmp_path).lines)
 
 
 def test_lights_have_the_chromaticity_that_colour_science_gives(tmp_path: Path) -> None:
@@ -59,7 +59,7 @@ def test_lights_have_the_chromaticity_that_colour_science_gives(tmp_path: Path) 
     for quantity, energy in (("energy", values), ("photons", values / fine)):
         light = colour.SpectralDistribution(energy, fine)
         oracle = colour.XYZ_to_xy(colour.sd_to_XYZ(light, method="Integration"))
-        (line,) = (line for line in describe(path, tmp_path, quantity).lines if line.startswith("  led"))
+        (line,) = (line for line in described(path, tmp_path, quantity).lines if line.startswith("  led"))
         words = line.split("xy ")[1].replace(",", "").split()
         np.testing.assert_allclose([float(words[0]), float(words[1])], oracle, atol=4e-4)
 
@@ -133,9 +133,9 @@ def test_every_fault_is_one_line_and_the_rest_is_described(tmp_path: Path, text:
     found = faults(path)
     assert len(found) == len(words)
     assert all(word in line for word, line in zip(words, found, strict=True)), found
-    described = describe(path, tmp_path / "out")
-    assert described.lines[-1].startswith("Picture: ")
-    assert not any("clean" in line for line in described.lines)
+    lines = described(path, tmp_path / "out").lines
+    assert lines[-1].startswith("Picture: ")
+    assert not any("clean" in line for line in lines)
 
 
 def test_micrometers_and_foreign_texts_are_read_as_meant(tmp_path: Path) -> None:
@@ -151,34 +151,34 @@ def test_micrometers_and_foreign_texts_are_read_as_meant(tmp_path: Path) -> None
 def test_odd_files_are_described(tmp_path: Path) -> None:
     name = 'it\'s "$x_1$" \u4fe1\u53f7 _a'
     quoted = csv(tmp_path, 'wavelength_nm,"it\'s ""$x_1$"" \u4fe1\u53f7 _a"', WAVE, bell(590, 20))
-    assert any(name in line for line in describe(quoted, tmp_path).lines)
+    assert any(name in line for line in described(quoted, tmp_path).lines)
     many = csv(
         tmp_path,
         "wavelength_nm," + ",".join(f"l{i}" for i in range(200)),
         WAVE,
         *[bell(400 + i, 20) for i in range(200)],
     )
-    lines = describe(many, tmp_path).lines
+    lines = described(many, tmp_path).lines
     assert sum(line.startswith("  l") for line in lines) == 200
     assert len(lines) < 210
-    zeros = describe(csv(tmp_path, "wavelength_nm,a", WAVE, 0 * WAVE), tmp_path).lines
+    zeros = described(csv(tmp_path, "wavelength_nm,a", WAVE, 0 * WAVE), tmp_path).lines
     assert any("no value is above 0: a" in line for line in zeros)
     huge = csv(tmp_path, "wavelength_nm,a", WAVE, 1e308 * np.ones(WAVE.size))
-    assert describe(huge, tmp_path).lines
+    assert described(huge, tmp_path).lines
     (tmp_path / "escape.csv").write_text("wavelength_nm,a\x1b[31m\n400,1\n700,1\n")
-    assert not any("\x1b" in line for line in describe(tmp_path / "escape.csv", tmp_path).lines)
+    assert not any("\x1b" in line for line in described(tmp_path / "escape.csv", tmp_path).lines)
     for text in ("", "wavelength_nm\n400\n", "wavelength_nm,R\n", "wavelength_nm,R\n400,nan\n"):
         (tmp_path / "none.csv").write_text(text)
         if text:
-            assert describe(tmp_path / "none.csv", tmp_path).faults
+            assert described(tmp_path / "none.csv", tmp_path).faults
             continue
         with pytest.raises(DataError, match="empty"):
-            describe(tmp_path / "none.csv", tmp_path)
+            described(tmp_path / "none.csv", tmp_path)
 
 
 def test_mat_of_isetcam_is_described(tmp_path: Path) -> None:
     savemat(tmp_path / "q.mat", {"wavelength": WAVE, "data": np.where(WAVE == 500, np.nan, bell(600, 50))})
-    found = describe(tmp_path / "q.mat", tmp_path)
+    found = described(tmp_path / "q.mat", tmp_path)
     assert "1 curve: curve_1" in found.lines[0]
     assert "500 nm is not a finite number" in str(found.faults[0])
 
@@ -200,14 +200,14 @@ def test_measured_files_are_taken_for_what_they_are(tmp_path: Path) -> None:
         ("led_luxeon", "light"),
         ("traffic_lica", "light"),
     ):
-        found = describe(SHARED / "data" / f"{name}.csv", tmp_path)
+        found = described(SHARED / "data" / f"{name}.csv", tmp_path)
         assert any(f"A guess: {guess}" in line for line in found.lines)
         assert not found.faults
 
 
 def test_names_that_look_the_same_keep_their_colors(tmp_path: Path) -> None:
     path = csv(tmp_path, "wavelength_nm,r\x07,r\\x07", WAVE, bell(505, 8), bell(628, 8))
-    green, red = (line for line in describe(path, tmp_path, "energy").lines if line.startswith("  r"))
+    green, red = (line for line in described(path, tmp_path, "energy").lines if line.startswith("  r"))
     assert "r\\x07  " in green
     assert "r\\x07 (3)" in red
     assert ("green" in green, "red of EN" in red) == (True, True)
@@ -215,13 +215,13 @@ def test_names_that_look_the_same_keep_their_colors(tmp_path: Path) -> None:
 
 def test_a_picture_of_another_stays(tmp_path: Path) -> None:
     path = csv(tmp_path, "wavelength_nm,G", WAVE, 0.5 * bell(540, 50))
-    describe(path, tmp_path)
+    described(path, tmp_path)
     picture = tmp_path / "curves.png"
     assert matplotlib.image.imread(picture).shape[2] == 4
-    describe(path, tmp_path)
+    described(path, tmp_path)
     picture.write_bytes(b"mine")
     with pytest.raises(OutputError, match="holds something else already"):
-        describe(path, tmp_path)
+        described(path, tmp_path)
     assert picture.read_bytes() == b"mine"
 
 

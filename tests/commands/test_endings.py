@@ -15,18 +15,12 @@ import typer
 from sweep.commands.endings import ends_in_lines
 from sweep.errors import InfeasibleError
 
+from ..build import BASE
+from ..commanded import commanded
 from ..conftest import STUDIES
 
 COMMAND = [sys.executable, "-m", "sweep"]
-
-
-def said(*arguments: str, code: int = 2, **options: object) -> str:
-    """What a command that fails says: one line, which is returned without its name."""
-    done = subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, check=False, **options)  # type: ignore[call-overload]
-    assert done.returncode == code, done.stderr
-    assert done.stderr.startswith("sweep: "), done.stderr
-    assert done.stderr.count("\n") == 1, done.stderr
-    return done.stderr.removeprefix("sweep: ").rstrip("\n")
+SWEPT = BASE.split("constraints:", maxsplit=1)[0]
 
 
 @pytest.mark.parametrize(
@@ -42,7 +36,11 @@ def said(*arguments: str, code: int = 2, **options: object) -> str:
     ],
 )
 def test_a_wrong_command_is_one_line(arguments: list[str], expected: str) -> None:
-    assert expected in said(*arguments)
+    code, out, said = commanded(*arguments)
+    assert (code, out) == (2, "")
+    assert said.startswith("sweep: "), said
+    assert said.count("\n") == 1, said
+    assert expected in said
 
 
 @pytest.mark.parametrize(
@@ -124,23 +122,32 @@ def test_little_memory_is_enough_or_one_line(tmp_path: Path, megabytes: int) -> 
     assert all(line.startswith("sweep: ") for line in told)
 
 
-@pytest.mark.parametrize("encoding", ["ascii", pytest.param(None, marks=pytest.mark.slow)])
-def test_names_of_any_letters_in_an_ascii_locale(tmp_path: Path, encoding: str | None) -> None:
+@pytest.mark.parametrize(
+    ("encoding", "verbs"),
+    [
+        ("ascii", ("run", "status")),
+        *(pytest.param(encoding, ("check", "list"), marks=pytest.mark.slow) for encoding in ("ascii", None)),
+    ],
+)
+def test_names_of_any_letters_in_an_ascii_locale(tmp_path: Path, encoding: str | None, verbs: tuple[str, ...]) -> None:
     folder = tmp_path / "größe"
     folder.mkdir()
     study = folder / "größe.yaml"
-    text = (STUDIES / "paper.yaml").read_text(encoding="utf-8").replace("study: paper", 'study: "größe ü"')
-    study.write_text(text, encoding="utf-8")
+    study.write_text(SWEPT.replace("study: tiny", 'study: "größe ü"'), encoding="utf-8")
     locale = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
     locale |= {} if encoding is None else {"PYTHONIOENCODING": encoding}
     out = str(folder / "out")
-    commands = [["check", str(study)], ["list", str(folder), "--output", out]]
-    if encoding is not None:  # the longer ones once
-        commands.insert(1, ["run", str(study), "--output", out, "--jobs", "1"])
-        commands.append(["status", os.fsdecode(Path(out) / "gr__e__")])
-    for arguments in commands:
-        done = subprocess.run([*COMMAND, *arguments], capture_output=True, check=False, env={**os.environ, **locale})
-        assert done.returncode == 0, (arguments, done.stderr)
+    arguments = {
+        "check": [str(study)],
+        "list": [str(folder), "--output", out],
+        "run": [str(study), "--output", out, "--jobs", "1"],
+        "status": [os.fsdecode(Path(out) / "gr__e__")],
+    }
+    for verb in verbs:
+        done = subprocess.run(
+            [*COMMAND, verb, *arguments[verb]], capture_output=True, check=False, env={**os.environ, **locale}
+        )
+        assert done.returncode == 0, (verb, done.stderr)
         assert b"Traceback" not in done.stderr
 
 
@@ -151,7 +158,9 @@ def test_names_of_any_letters_in_an_ascii_locale(tmp_path: Path, encoding: str |
     reason="this machine gives no mount namespace",
 )
 def test_without_shared_memory_threads_do_the_work(tmp_path: Path) -> None:
-    run = " ".join([*COMMAND, "run", str(STUDIES / "paper.yaml"), "--output", str(tmp_path), "--jobs", "2"])
+    study = tmp_path / "tiny.yaml"
+    study.write_text(SWEPT)
+    run = " ".join([*COMMAND, "run", str(study), "--output", str(tmp_path), "--jobs", "2"])
     script = f"mount -t tmpfs -o ro none /dev/shm && {run}"
     done = subprocess.run(["unshare", "-rm", "sh", "-c", script], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

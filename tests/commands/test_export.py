@@ -19,26 +19,22 @@ from sweep.curves.isetcam import HINTS, color_hints, csv_text, isetcam_mat, uniq
 from sweep.errors import OutputError, SweepError
 from sweep.study import load_study
 
-from ..build import ran, study_file
-from ..commanded import sweep
+from ..build import ran, stopband_study, study_file
+from ..commanded import commanded, sweep
 from ..tampering import listed_anew
 
-FILES = """\
-study: files
+FILES = stopband_study(
+    "files",
+    "{left_nm: [600, 610], left_width_nm: 10, right_nm: [650, 660, 670], right_width_nm: 10}",
+    cfas="[RYNCy]",
+    curves="""\
 sensor:
   name: mine
   files: [{file: qe.csv, columns: {R: red, G: green, Y: yellow, Cy: cyan}, scale: 0.5}]
 lights:
   files: [{file: lights.csv, quantity: photons, signals: {yellow: [a], red: [b]}}]
-cfas: [RYNCy]
-sweeps:
-  edges:
-    cfa: RYNCy
-    channel: N
-    base: Y
-    to: G
-    grid: {left_nm: [600, 610], left_width_nm: 10, right_nm: [650, 660, 670], right_width_nm: 10}
-"""
+""",
+)
 
 
 @pytest.fixture(scope="module")
@@ -66,9 +62,9 @@ def distances(folder: Path, channels: dict[str, np.ndarray]) -> dict[str, float]
     """All CSDs by plain NumPy: photons x QE, the brightest channel on white at 0.95 of full scale, rounding."""
     spectra = pd.read_parquet(folder / "curves.parquet")
     types: dict[str, list[np.ndarray]] = {}
-    for column in spectra.columns:
-        if column.startswith("light:"):
-            types.setdefault(column.split(":")[1], []).append(spectra[column].to_numpy())
+    lights = spectra[spectra["kind"] == "light"]
+    for (kind, _), light in lights.groupby(["signal_type", "curve"], sort=False, observed=True):
+        types.setdefault(str(kind), []).append(light["value"].to_numpy())
     qe = np.stack(list(channels.values()))
     white = qe.sum(axis=1).max() / qe.shape[1]
     gain = 0.95 * 4095 * surrogate_parameters().photon_ratio / white
@@ -157,10 +153,10 @@ def test_other_curves_than_those_of_the_run_are_refused(from_files: Path, tmp_pa
     lines = (data / "qe.csv").read_text().splitlines()
     at = next(number for number, line in enumerate(lines) if line.startswith("650.0,"))
     (data / "qe.csv").write_text("\n".join([*lines[:at], "650.0,0.5,0.1,0.5,0.1", *lines[at + 1 :]]))
-    with pytest.raises(OutputError, match=r"not what the run has: qe:"):
+    with pytest.raises(OutputError, match=r"not what the run has: R"):
         export_design(from_files, "3", data, tmp_path / "to")
     assert not (tmp_path / "to").exists()
-    with pytest.raises(OutputError, match=r"not what the run has: qe:"):
+    with pytest.raises(OutputError, match=r"not what the run has: R"):
         audit_output(from_files, data)
     assert not (from_files / "audit.parquet").exists()
     audit_output(from_files, None)  # with the curves that the run kept
@@ -172,7 +168,7 @@ def test_a_row_that_was_tampered_with_is_refused(tiny: Path, tmp_path: Path) -> 
 
     copytree(tiny, tmp_path / "run")
     frame = pd.read_parquet(tmp_path / "run" / "results.parquet")
-    assert f"design:{frame['design_id'].iloc[30]}:0" not in pd.read_parquet(tiny / "curves.parquet")
+    assert frame["design_id"].iloc[30] not in set(pd.read_parquet(tiny / "curves.parquet")["design_id"])
     frame.loc[30, "right_nm"] += 1
     status = frame["status"].astype(object)
     status[31] = "error: KeyError: x"
@@ -201,8 +197,8 @@ def test_unknown_keys_are_one_line(tiny: Path, tmp_path: Path) -> None:
     for folder, to in ((tmp_path, None), (tiny, tiny / "run.json")):
         with pytest.raises(OutputError):
             export_design(folder, "best", None, to)
-    done = sweep("export", str(tiny), "--design", "mime", "--to", str(tmp_path))
-    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1), done.stderr
+    code, _, said = commanded("export", tiny, "--design", "mime", "--to", tmp_path)
+    assert (code, len(said.splitlines())) == (2, 1), said
     assert not list(tmp_path.iterdir())
 
 

@@ -17,7 +17,7 @@ from sweep.study import load_study
 from sweep.study.document import Document
 
 from ..build import made
-from ..commanded import sweep
+from ..commanded import commanded, sweep
 from ..conftest import SHARED, needs_measured
 from ..curve_texts import WAVE, bell, csv
 
@@ -209,6 +209,7 @@ def test_any_column_name_survives_yaml(tmp_path: Path, text: str) -> None:
 
 
 @needs_measured
+@pytest.mark.usefixtures("plain_pictures")
 def test_measured_files_lead_to_a_report_without_editing(tmp_path: Path) -> None:
     data, path = SHARED / "data", tmp_path / "studies" / "mine.yaml"
     files = ("--qe", str(data / "qe_ar0132at_rgbw.csv"), "--lights", str(data / "led_luxeon.csv"))
@@ -220,8 +221,8 @@ def test_measured_files_lead_to_a_report_without_editing(tmp_path: Path) -> None
     assert lights.signals["yellow"] == ["amber_592"]
     small = re.sub("count: 3.", "count: 3", path.read_text()).replace("starts: 16", "starts: 1")
     path.write_text(re.sub("  front.*", "", small))
-    run = sweep("run", str(path), "--output", str(tmp_path / "out"), "--jobs", "1")
-    assert run.returncode == 0, run.stderr
-    assert "RGBN" in run.stdout.splitlines()[0]
+    code, out, said = commanded("run", path, "--output", tmp_path / "out", "--jobs", 1)
+    assert code == 0, said
+    assert "RGBN" in out.splitlines()[0]
     assert "finished, search found" in list_lines(path.parent, tmp_path / "out")[0]
     assert np.all([(tmp_path / "out" / "mine" / name).is_file() for name in ("report.html", "pareto.png")])

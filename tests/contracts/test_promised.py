@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import joblib
 import numpy as np
 import pytest
 
+from sweep.camera.methods import REFERENCE
 from sweep.camera.plan.plan import Planner
-from sweep.camera.view import REFERENCE
 
+from ..crew import side_by_side
 from ..hard.random_scenes import columns, random_scene
 
 _ARITHMETIC_DN = 1e-9
@@ -32,7 +32,7 @@ def keep_a_plan(seed: int) -> tuple[int, float, float, float, str]:
 
 def check(seeds: range) -> None:
     """Every plan keeps its promise, and the promises are not uselessly wide."""
-    found = joblib.Parallel(n_jobs=2, batch_size=10)(joblib.delayed(keep_a_plan)(seed) for seed in seeds)
+    found = side_by_side(keep_a_plan, seeds)
     assert [row for row in found if not row[2] <= row[1]] == []
     assert [row for row in found if not row[3] <= row[2] * (1 + 1e-9) + _ARITHMETIC_DN] == []
     ratios = [promised / realized for _, _, promised, realized, _ in found if realized > 1e-3]

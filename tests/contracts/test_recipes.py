@@ -1,13 +1,22 @@
-"""What `sweep/README.md` says is enough to add a family or a command: one new file, and it works everywhere."""
+"""What `sweep/README.md` says is enough to add something: one new file, and it works everywhere."""
 
 from __future__ import annotations
 
+import json
+import math
 import subprocess
 import sys
 from pathlib import Path
 
+import colour
+import numpy as np
 import pandas as pd
 import pytest
+from scipy.spatial.distance import cdist
+
+from sweep.camera.sensor import BUILT_IN_SENSORS
+from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
+from sweep.curves.spectrum import WavelengthGrid
 
 GRAY = '''\
 """A filter that takes the same share of all light."""
@@ -71,20 +80,190 @@ sweeps:
 constraints: {sensitivity: {min: 0.6}}
 search: {starts: 2, max_evaluations: 60}
 """
+WINDSHIELD = '''\
+"""A windshield of tinted glass."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from sweep.camera.effects.base import LightEffect, SceneOptions
+
+
+class Options(SceneOptions):
+    """`windshield_transmittance`: at 550 nm."""
+
+    windshield_transmittance: Annotated[float, Field(gt=0, le=1)] = 1.0
+
+
+class Windshield(LightEffect):
+    name = "windshield"
+    methods = ("skip", "spectral")
+    order = 5
+    Options = Options
+
+    def exact(self, shot):
+        return "no windshield" if Options.of(shot.scenario).windshield_transmittance == 1 else None
+
+    def transmittance(self, shot, method, wavelength_nm):
+        at_550_nm = 1.0 if method == "skip" else Options.of(shot.scenario).windshield_transmittance
+        return at_550_nm ** (550.0 / wavelength_nm)
+'''
+DRIVEN = """\
+study: NAME
+sensor: ar0820
+lights: tl16
+cfas: [RGGB]
+tolerance_dn: TOLERANCE
+scenarios:
+  open: &open {exposure: {kind: fixed, exposure_s: 0.004}, background_cd_m2: 30}
+  behind: {<<: *open, windshield_transmittance: 0.7}
+"""
 HELLO = '''\
 """Say hello."""
 
 import typer
 
-from sweep.commands.panels import TOOL
+from sweep.commands.panels import OF_TOOL
 
-PANEL = TOOL
+PANEL = OF_TOOL
 
 
 def hello(name: str) -> None:
     """Greet somebody."""
     typer.echo(f"Hello, {name}.")
 '''
+
+RED_SHARE = '''\
+"""How much of the red light a filter lets through."""
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from sweep.metrics.quantity import DesignMetric, LinearRows, Quantity
+from sweep.metrics.smooth import Rows
+
+NAME = "red_share"
+
+
+def _weights(view):
+    red = np.where(view.grid.nodes_nm >= 600, 1.0, 0.0)
+    return red / (red @ view.base_qe[0])
+
+
+def _rows(design):
+    weights = _weights(design.view)
+    return Rows(design.curves @ weights, (design.by_u @ weights).T)
+
+
+class RedShare(DesignMetric):
+    order = 9
+
+    def quantities(self, asked):
+        return (
+            Quantity(
+                NAME,
+                NAME,
+                "QE of the modified channel from 600 nm on, over that of its base",
+                label="share of red",
+                wanted="more",
+                ends=("min",),
+                goal=True,
+                needs="modified",
+                smooth=_rows,
+                linear=lambda view: LinearRows(csr_matrix(_weights(view)[None])),
+            ),
+        )
+
+    def of_designs(self, view, block):
+        if not view.modified:
+            return {NAME: np.full(len(block), np.nan)}
+        return {NAME: block.curves()[:, 0] @ _weights(view)}
+'''
+DARKEST = '''\
+"""The weakest signal of a scene."""
+
+from sweep.metrics.quantity import Quantity, ReadoutMetric
+
+
+class Darkest(ReadoutMetric):
+    order = 10
+
+    def quantities(self, asked):
+        return (Quantity("darkest_dn", "darkest_dn", "weakest signal in its best channel", "DN", wanted="more", ends=("min",)),)
+
+    def of_readout(self, response, members):
+        return {"darkest_dn": response.max(axis=2).min(axis=1)}
+'''
+WITH_METRICS = """\
+study: red
+sensor: ar0820
+lights: tl16
+cfas: [RYNCy]
+production: {edge_shift_nm: 2}
+sweeps:
+  edges:
+    cfa: RYNCy
+    channel: N
+    base: Y
+    to: 0.2
+    grid: {left_nm: {min: 590, max: 630, count: 9}, left_width_nm: [6], right_nm: {min: 640, max: 670, count: 4}, right_width_nm: [6], depth: [1]}
+constraints: {red_share: {min: 0.8}}
+search: {starts: 3, max_evaluations: 150}
+"""
+GEOMETRIC = '''\
+"""The geometric mean of the terms."""
+
+import numpy as np
+
+from sweep.metrics.rule import Rule
+
+
+class Geometric(Rule):
+    name = "geometric"
+
+    def of(self, terms):
+        return np.exp(np.log(np.maximum(terms, 1e-12)).mean(axis=0))
+
+    def gradient(self, terms):
+        return self.of(terms) / (len(terms) * np.maximum(terms, 1e-12))
+
+    def words(self, terms):
+        return f"geometric mean of {', '.join(terms)}"
+'''
+LAMPS = '''\
+"""Three lamps of one wavelength each."""
+
+import numpy as np
+
+from sweep.curves.lights import make_lights
+
+
+def lights(grid):
+    lines = {"green": 520, "yellow": 590, "red": 630}
+    signals = [(f"{name} lamp", name, np.exp(-(((grid.nodes_nm - at) / 9) ** 2))) for name, at in lines.items()]
+    return make_lights(grid, "lamps", signals, "made for a test")
+'''
+
+
+PROMISES = """\
+import sys
+import sweep.camera.effects as room
+room.__path__.append(sys.argv[1])
+from dataclasses import replace
+from sweep.camera.methods import REFERENCE
+from sweep.camera.plan.promises import Promises
+from tests.hard.scenes import DARK, F2, FAR, columns, scene
+lit = {"intensity_cd": 200, "background_cd_m2": 2000, "windshield_transmittance": 0.7}
+timed = [{**lit, "exposure": {"kind": "fixed", "exposure_s": exposure_s}} for exposure_s in (1e-3, 4e-3)]
+noisy = [{**each, "noise": True} for each in (*timed, {**timed[0], "target": FAR, "optics": F2})]
+straight = replace(REFERENCE, noise="skip", quantization="skip", saturation="skip")
+for given, before in [*((each, REFERENCE) for each in noisy), *((each, straight) for each in timed)]:
+    made = scene("tinted", "RYNCy", given, DARK)
+    after = replace(before, windshield="skip")
+    realized = abs(columns(made, after) - columns(made, before)).max()
+    print(Promises(made.box).promise("windshield", before, after), realized)
+"""
 
 
 def with_file(package: str, file: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
@@ -118,9 +297,135 @@ def test_a_family_is_one_new_file(tmp_path: Path) -> None:
     assert "unknown family (got 'gray')" in without.stderr
 
 
+def test_a_new_effect_promises_what_it_changes(tmp_path: Path) -> None:
+    """In straight readouts and in noisy ones that clip, of the light and of the background."""
+    (tmp_path / "windshield.py").write_text(WINDSHIELD)
+    program = [sys.executable, "-c", PROMISES, str(tmp_path)]
+    done = subprocess.run(program, capture_output=True, text=True, check=False, cwd=Path(__file__).parents[2])
+    assert done.returncode == 0, done.stderr
+    found = [[float(value) for value in line.split()] for line in done.stdout.splitlines()]
+    assert len(found) == 5
+    assert all(1 < realized <= promised for promised, realized in found), found
+
+
 def test_a_command_is_one_new_file(tmp_path: Path) -> None:
     file = tmp_path / "hello.py"
     file.write_text(HELLO)
     done = with_file("sweep.commands.verbs", file, "hello", "world")
     assert (done.returncode, done.stdout, done.stderr) == (0, "Hello, world.\n", "")
     assert " hello " in with_file("sweep.commands.verbs", file, "--help").stdout
+
+
+def run_with(tmp_path: Path, package: str, file: str, program: str, study: str, *more: str) -> Path:
+    """The folder of a finished run of a study, with one more file in a package."""
+    path = tmp_path / "more" / file
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(program)
+    (tmp_path / "study.yaml").write_text(study)
+    done = with_file(package, path, "run", tmp_path / "study.yaml", "--output", tmp_path / "out", "--jobs", 1, *more)
+    assert done.returncode == 0, done.stderr
+    (folder,) = (tmp_path / "out").iterdir()
+    return folder
+
+
+def test_a_metric_is_one_new_file(tmp_path: Path) -> None:
+    (tmp_path / "more").mkdir()
+    (tmp_path / "more" / "darkest.py").write_text(DARKEST)
+    folder = run_with(tmp_path, "sweep.metrics.columns", "red_share.py", RED_SHARE, WITH_METRICS)
+    rows = pd.read_parquet(folder / "results.parquet")
+    assert set(rows["status"]) == {"ok"}
+    curves = pd.read_parquet(folder / "curves.parquet")
+    base = curves[(curves["kind"] == "qe") & (curves["curve"] == "Y")].set_index("wavelength_nm")["value"]
+    drawn = curves[curves["kind"] == "design"].groupby("design_id")
+    points = pd.read_parquet(folder / "points.parquet")
+    for design, curve in drawn:
+        row = rows.loc[design]
+        own = curve.set_index("wavelength_nm")["value"]
+        assert row["red_share"] == pytest.approx(own.loc[600:].sum() / base.loc[600:].sum(), rel=1e-12)
+        own_points = points[points["design_id"] == design]
+        assert row["darkest_dn"] == own_points.groupby("signal")["dn"].max().min()
+    # The worst case over shifted edges, the constraint, the search and the limit know it.
+    made = rows[rows["kind"] != "reference"]
+    assert (made["worst_red_share"] <= made["red_share"]).all()
+    assert (made["worst_red_share"] < made["red_share"]).any()
+    assert (made["feasible"] == (made["red_share"] >= 0.8 * (1 - 1e-9))).all()
+    best, swept = rows[rows["kind"] == "search"].iloc[0], made[(made["kind"] == "sweep") & made["feasible"]]
+    assert best["red_share"] == pytest.approx(0.8, abs=1e-6)
+    assert best["csd_yellow_red"] >= swept["csd_yellow_red"].max() - 1
+    search = json.loads((folder / "provenance.json").read_text())["search"]
+    assert search["limit_proven"] >= best["csd_yellow_red"] - 1
+    assert search["limit_left_out"] == []
+    assert "share of red" in (folder / "report.html").read_text()
+
+
+def test_an_objective_rule_is_one_new_file(tmp_path: Path) -> None:
+    study = WITH_METRICS.replace(
+        "constraints: {red_share: {min: 0.8}}",
+        "objective: {geometric: {csd_yellow_red: 1, csd_green_yellow: 1}}\nconstraints: {sensitivity: {min: 0.8}}",
+    )
+    folder = run_with(tmp_path, "sweep.metrics.rules", "geometric.py", GEOMETRIC, study)
+    rows = pd.read_parquet(folder / "results.parquet")
+    swept = rows[rows["kind"] == "sweep"]
+    mean = np.sqrt(swept["csd_yellow_red"] * swept["csd_green_yellow"])
+    assert swept["objective"].tolist() == pytest.approx(mean.tolist(), rel=1e-12)
+    search = json.loads((folder / "provenance.json").read_text())["search"]
+    assert search["best_smooth_objective"] >= swept[swept["feasible"]]["objective"].max() - 1
+    assert "geometric mean of csd_yellow_red, csd_green_yellow" in (folder / "report.html").read_text()
+
+
+def test_a_data_set_is_one_new_file(tmp_path: Path) -> None:
+    study = "study: lamps\nsensor: ar0820\nlights: lamps\ncfas: [RGGB]\n"
+    folder = run_with(tmp_path, "sweep.curves.builtin.data_sets", "lamps.py", LAMPS, study)
+    (row,) = pd.read_parquet(folder / "results.parquet").to_dict("records")
+    points = pd.read_parquet(folder / "points.parquet").pivot_table(index="signal_type", columns="channel", values="dn")
+    apart = np.linalg.norm(points.loc["yellow"] - points.loc["red"])
+    assert row["csd_yellow_red"] == pytest.approx(apart)
+
+
+def distance_dn(tint: float) -> float:
+    """CSD of red and yellow of the study's scene behind a tint, rounded, summed up from curves alone."""
+    grid = WavelengthGrid()
+    nodes = grid.nodes_nm
+    sensor, lights = BUILT_IN_SENSORS["ar0820"](grid), BUILT_IN_LIGHTS["tl16"](grid)
+    qe = np.stack([sensor.qe[name] for name in "RGB"]) * tint ** (550.0 / nodes)
+    # 2e18 photons/s/sr/m^2 through f/4 onto pixels of 2.1 um, 10,000 e at 4095 DN.
+    dn_per_radiance = math.pi / (1 + 4 * 4.0**2) * (2.1e-6) ** 2 * 0.004 * 0.4095
+    # 30 cd/m^2, flat in photons: 683 lm/W times V and the energy of a photon, h c / wavelength.
+    photopic = colour.SDS_LEFS["CIE 1924 Photopic Standard Observer"]
+    seen = np.interp(nodes, photopic.wavelengths, photopic.values, left=0, right=0)
+    flat = 30 / (683 * (seen * 6.62607015e-34 * 299792458 / (nodes * 1e-9)).sum())
+    dn = dn_per_radiance * (2e18 * grid.step_nm * lights.photons @ qe.T + flat * qe.sum(axis=1))
+    read = np.floor(dn + 0.5)
+    return float(cdist(read[lights.members["yellow"]], read[lights.members["red"]]).min())
+
+
+def test_an_effect_is_one_new_file(tmp_path: Path) -> None:
+    file, study = tmp_path / "more" / "windshield.py", tmp_path / "driven.yaml"
+    file.parent.mkdir()
+    file.write_text(WINDSHIELD)
+    found = {}
+    for name, tolerance_dn in (("close", 0.1), ("far", 5000)):
+        study.write_text(DRIVEN.replace("NAME", name).replace("TOLERANCE", str(tolerance_dn)))
+        done = with_file("sweep.camera.effects", file, "run", study, "--output", tmp_path / "out", "--jobs", 1)
+        assert done.returncode == 0, done.stderr
+        out = tmp_path / "out" / name
+        rows = pd.read_parquet(out / "results.parquet").set_index("scenario")["csd_yellow_red"]
+        plans = json.loads((out / "provenance.json").read_text())["plans"]
+        own = {scene: next(e for e in plan["effects"] if e["effect"] == "windshield") for scene, plan in plans.items()}
+        found[name] = rows, own, plans["behind"]["promised_dn"]
+        assert own["open"]["reason"] == "no windshield"
+        assert "windshield" in (out / "report.html").read_text()
+    rows, own, _ = found["close"]
+    assert rows["open"] == pytest.approx(distance_dn(1.0), abs=1e-9)
+    assert rows["behind"] == pytest.approx(distance_dn(0.7), abs=1e-9)
+    assert rows["behind"] < 0.8 * rows["open"]
+    assert own["behind"]["method"] == "spectral"
+    # A wide tolerance leaves it out, and promises what that changes.
+    left_out, own, promised_dn = found["far"]
+    assert own["behind"]["method"] == "skip"
+    assert 0 < abs(left_out["behind"] - rows["behind"]) <= promised_dn
+    without = subprocess.run(
+        [sys.executable, "-m", "sweep", "check", study], capture_output=True, text=True, check=False
+    )
+    assert without.returncode == 2
+    assert "windshield_transmittance" in without.stderr

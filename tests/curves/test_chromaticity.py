@@ -6,8 +6,8 @@ import colour
 import numpy as np
 import pytest
 
-from sweep.curves.builtin import BUILT_IN_LIGHTS
 from sweep.curves.builtin.led import led_photons
+from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
 from sweep.curves.color import REGIONS, chromaticity, display_colors
 from sweep.curves.spectrum import WavelengthGrid
 

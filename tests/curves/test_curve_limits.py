@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from sweep.commands.describe import describe
+from sweep.commands.describe import described
 from sweep.curves.files import MOST_CURVES, MOST_SAMPLES, read_curves, scan_curves
 from sweep.curves.spectrum import LARGEST, LEAST_PEAK, check_samples
 from sweep.errors import DataError, SweepError
@@ -270,4 +270,4 @@ def test_pipes_are_no_curve_files_and_no_pictures(tmp_path: Path) -> None:
             read_curves(path)
     good = lines(tmp_path / "a.csv", "wavelength_nm,R", "400,0.1", "550,0.5", "700,0.1")
     with pytest.raises(SweepError, match="not a file"), within(HANG_S):
-        describe(good, tmp_path)
+        described(good, tmp_path)

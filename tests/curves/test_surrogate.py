@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from sweep.camera.sensor import BUILT_IN_SENSORS
-from sweep.curves.builtin import BUILT_IN_LIGHTS
 from sweep.curves.builtin.led import led_photons
+from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
 from sweep.curves.lights import peak_normalized_ratio
 from sweep.curves.spectrum import WavelengthGrid
 

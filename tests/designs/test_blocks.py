@@ -13,30 +13,30 @@ from scipy.spatial.distance import cdist
 
 from sweep.camera.imager import Imager
 from sweep.designs import block as blocks
-from sweep.designs.block import Curves, edges_of
+from sweep.designs.block import CurveBlock, edges_of
 from sweep.designs.families.free_form import FreeForm
 from sweep.designs.families.stopband import MultiStopband, Stopband
 from sweep.designs.space import Filter, Space
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.separation import class_pairs, separations, separations_along
 
-from ..blocks import AXES, SETUPS, SPACE
+from ..blocks import AXES, SPACE, VIEWS
 from ..hard.scenes import GRID, SENSOR
 
 EPS = np.finfo(float).eps
 
 
-@pytest.mark.parametrize("name", list(SETUPS))
+@pytest.mark.parametrize("name", list(VIEWS))
 def test_both_routes_say_the_same(name: str) -> None:
-    setup = SETUPS[name]
+    view = VIEWS[name]
     edges = edges_of(SPACE, 3, 69)
     assert edges is not None
-    dense = evaluate(Imager(setup), Curves(edges.curves()))
-    fast = evaluate(Imager(setup), edges)
+    dense = evaluate(Imager(view), CurveBlock(edges.curves()))
+    fast = evaluate(Imager(view), edges)
     assert list(fast) == list(dense)
     for column, values in dense.items():
         # Two orders of the same sums over at most 301 wavelengths, of numbers up to full scale; far below 0.01 DN.
-        scale = setup.pixel.full_scale_dn * 8 if "csd" in column else 1.0
+        scale = view.pixel.full_scale_dn * 8 if "csd" in column else 1.0
         assert np.abs(fast[column] - values).max() <= 301 * EPS * scale, column
 
 
@@ -45,7 +45,7 @@ def test_no_spectrum_is_made_by_the_separable_route(monkeypatch: pytest.MonkeyPa
     assert edges is not None
     monkeypatch.setattr(Stopband, "curves", None)
     monkeypatch.setattr(Stopband, "edges", None)
-    evaluate(Imager(SETUPS["rounded"]), edges)
+    evaluate(Imager(VIEWS["rounded"]), edges)
 
 
 def test_designs_that_set_the_exposure_take_the_dense_route() -> None:
@@ -53,7 +53,7 @@ def test_designs_that_set_the_exposure_take_the_dense_route() -> None:
     crossed = replace(SPACE, axes=((690.0, 600.0), (5.0,), (410.0, 650.0), (5.0,), (0.5, 1.0)))
     edges = edges_of(crossed, 0, crossed.size)
     assert edges is not None
-    imager = Imager(SETUPS["chart"])
+    imager = Imager(VIEWS["chart"])
     changing = imager.read_changing(edges)
     assert changing is not None
     found, dense = evaluate(imager, edges), evaluate(imager, edges.curves())

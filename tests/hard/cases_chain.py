@@ -11,14 +11,17 @@ import mpmath as mp
 import numpy as np
 
 from sweep.camera.imager import Imager
+from sweep.camera.methods import Methods
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
-from sweep.camera.scene import FixedExposure, Scenario
-from sweep.camera.view import Methods, Setup
+from sweep.camera.scenario import Scenario
+from sweep.camera.scene import FixedExposure
+from sweep.camera.view import View
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.families.stopband import Stopband
-from sweep.metrics.evaluate import evaluate, smooth_csd, smooth_response
+from sweep.metrics.evaluate import evaluate
+from sweep.metrics.smooth import smooth_csd, smooth_response
 
 from .registry import EPS, Result, hard_case, outcome, relative, worst
 
@@ -50,22 +53,22 @@ def made(
     pixel: dict[str, Any] | None = None,
     cfa: str = "RGGB",
     **methods: str,
-) -> Setup:
-    """A setup whose channel N, if there is one, is modified."""
+) -> View:
+    """A view whose channel N, if there is one, is modified."""
     mosaic = Mosaic.from_name(cfa)
     modified = (mosaic.channels.index("N"),) if "N" in mosaic.channels else ()
     given = Scenario.model_validate(scenario or {})
-    return Setup(GRID, mosaic, qe, modified, np.full(N, 0.9), lights, Pixel(**(pixel or {})), given, Methods(**methods))
+    return View(GRID, mosaic, qe, modified, np.full(N, 0.9), lights, Pixel(**(pixel or {})), given, Methods(**methods))
 
 
-def beyond(setup: Setup, **scenario: object) -> Setup:
-    """The setup with figures of the scene that no study may have: the model itself has no limits."""
-    return replace(setup, scenario=setup.scenario.model_copy(update=scenario))
+def beyond(view: View, **scenario: object) -> View:
+    """The view with figures of the scene that no study may have: the model itself has no limits."""
+    return replace(view, scenario=view.scenario.model_copy(update=scenario))
 
 
-def plain(setup: Setup) -> np.ndarray:
+def plain(view: View) -> np.ndarray:
     """No modified channel, one design."""
-    return np.empty((1, 0, setup.grid.size))
+    return np.empty((1, 0, view.grid.size))
 
 
 def electrons_per_s(qe: float, radiance: float = 2e18, f_number: float = 4.0) -> mp.mpf:
@@ -97,8 +100,8 @@ def metamers() -> Result:
     for scenario, pixel, methods in SCENES.values():
         qe = random_qe(1, 3)
         qe[:, RED] = qe[:, YELLOW]
-        setup = made(qe, lights, scenario, pixel, **methods)
-        errors += [evaluate(Imager(setup), plain(setup))["csd_yellow_red"], smooth_csd(setup, plain(setup), PAIR)]
+        view = made(qe, lights, scenario, pixel, **methods)
+        errors += [evaluate(Imager(view), plain(view))["csd_yellow_red"], smooth_csd(view, plain(view), PAIR)]
     return Result(float(np.max(errors)), 0.0)
 
 
@@ -113,11 +116,11 @@ PAIR = ("yellow", "red")
 def metamers_beside_a_band() -> Result:
     qe = random_qe(2, 4)
     qe[:, RED] = qe[:, YELLOW]
-    setup = made(qe, lights_of(PAIR, lines(YELLOW, RED)), cfa="RYNC")
+    view = made(qe, lights_of(PAIR, lines(YELLOW, RED)), cfa="RYNC")
     x = np.random.default_rng(3).uniform([605, 0, 618, 0, 0], [612, 6, 626, 6, 1], (200, 5))
     curves = Stopband(WAVE, qe[2], 0.1 * qe[2]).curves(x)
     assert (curves[:, 0] != qe[2]).any()
-    found = [evaluate(Imager(setup), curves)["csd_yellow_red"], smooth_csd(setup, curves, PAIR)]
+    found = [evaluate(Imager(view), curves)["csd_yellow_red"], smooth_csd(view, curves, PAIR)]
     return Result(float(np.max(found)), 0.0)
 
 
@@ -138,10 +141,10 @@ def broad_metamers() -> Result:
     second = first.copy()
     second[:4] += np.array([float(mp.mpf(v) / max(map(abs, null)) / 8) for v in null])
     photons = np.stack([first, second]) / (first.sum() * GRID.step_nm)
-    setup = made(qe, lights_of(PAIR, photons), {"exposure": {"kind": "fixed", "exposure_s": 1e-3}})
-    found = smooth_csd(setup, plain(setup), PAIR)[0]
-    response = float(smooth_response(setup, plain(setup)).max())
-    read = evaluate(Imager(setup), plain(setup))["csd_yellow_red"][0]
+    view = made(qe, lights_of(PAIR, photons), {"exposure": {"kind": "fixed", "exposure_s": 1e-3}})
+    found = smooth_csd(view, plain(view), PAIR)[0]
+    response = float(smooth_response(view, plain(view)).max())
+    read = evaluate(Imager(view), plain(view))["csd_yellow_red"][0]
     return Result(found if read == 0 else math.inf, 64 * EPS / 2 * response * 2 * math.sqrt(3))
 
 
@@ -153,8 +156,8 @@ def broad_metamers() -> Result:
 def near_metamers() -> Result:
     qe = np.random.default_rng(5).integers(2**10, 2**14, (3, N)) / 2.0**14
     qe[:, RED] = qe[:, YELLOW] + np.array([1, -2, 3]) * 2.0**-16
-    setup = made(qe, lights_of(PAIR, lines(YELLOW, RED)), FIXED)
-    found = smooth_csd(setup, plain(setup), PAIR)[0]
+    view = made(qe, lights_of(PAIR, lines(YELLOW, RED)), FIXED)
+    found = smooth_csd(view, plain(view), PAIR)[0]
     gain = electrons_per_s(1.0) * mp.mpf(2e-3) * 4095 / 10_000
     exact = gain * mp.mpf(2) ** -16 * mp.sqrt(14)
     return Result(abs(float(found - exact)), 8 * EPS * float(gain) * math.sqrt(3))
@@ -169,12 +172,12 @@ def exposures() -> Result:
     qe, results = random_qe(6, 3), []
     lights = lights_of(PAIR, lines(YELLOW, RED))
     for exposure_s in (5e-324, 1e-310, 1e-300, 1e-160, 1e-30, 1.0, 1e150, 1e300):
-        setup = beyond(made(qe, lights), exposure=FixedExposure.model_construct(exposure_s=exposure_s))
-        found = smooth_csd(setup, plain(setup), PAIR)[0]
+        view = beyond(made(qe, lights), exposure=FixedExposure.model_construct(exposure_s=exposure_s))
+        found = smooth_csd(view, plain(view), PAIR)[0]
         gain = electrons_per_s(1.0) * mp.mpf(exposure_s) * 4095 / 10_000
         exact = gain * mp.sqrt(sum((mp.mpf(float(a)) - mp.mpf(float(b))) ** 2 for a, b in qe[:, [YELLOW, RED]]))
         allowed = 12 * EPS * float(gain) * math.sqrt(3) + 4 * 5e-324
-        read = evaluate(Imager(setup), plain(setup))["csd_yellow_red"][0]  # all is dark, or full
+        read = evaluate(Imager(view), plain(view))["csd_yellow_red"][0]  # all is dark, or full
         results.append((relative(found, exact), float(allowed / exact)))
         results.append((float(read), 0.0))
     return worst(results)
@@ -192,8 +195,8 @@ def radiances() -> Result:
     points = [[scale * mp.mpf(float(row[node])) for row in qe] for node in (YELLOW, RED)]
     exact = mp.sqrt(sum((a - b) ** 2 for a, b in zip(*points, strict=True)))
     for radiance in (1e-290, 1e-100, 2e18, 1e100, 1e270):
-        setup = beyond(made(qe, lights_of(PAIR, lines(YELLOW, RED))), photon_radiance=radiance)
-        found = smooth_csd(setup, plain(setup), PAIR)[0]
+        view = beyond(made(qe, lights_of(PAIR, lines(YELLOW, RED))), photon_radiance=radiance)
+        found = smooth_csd(view, plain(view), PAIR)[0]
         results.append((abs(float(found - exact)), 64 * EPS * float(max(map(max, points))) * math.sqrt(3)))
     return worst(results)
 
@@ -207,11 +210,11 @@ def no_light() -> Result:
     lights = lights_of(PAIR, lines(YELLOW, RED))
     good = True
     for qe, radiance in ((np.zeros((3, N)), 2e18), (random_qe(8, 3), 5e-324)):
-        setup = beyond(made(qe, lights, FIXED), photon_radiance=radiance)
-        good &= evaluate(Imager(setup), plain(setup))["csd_yellow_red"][0] == 0 == smooth_csd(setup, plain(setup), PAIR)
+        view = beyond(made(qe, lights, FIXED), photon_radiance=radiance)
+        good &= evaluate(Imager(view), plain(view))["csd_yellow_red"][0] == 0 == smooth_csd(view, plain(view), PAIR)
     with np.errstate(invalid="ignore"):
-        setup = made(np.zeros((3, N)), lights)
-        dark = evaluate(Imager(setup), plain(setup))
+        view = made(np.zeros((3, N)), lights)
+        dark = evaluate(Imager(view), plain(view))
     return outcome(bool(good and np.isnan(dark["csd_yellow_red"][0]) and np.isinf(dark["exposure_s"][0])))
 
 
@@ -227,8 +230,8 @@ def everything_clipped() -> Result:
     pixels = ({}, {"offset_dn": 168.0}, {"gain_dn_per_e": 0.1}, {"well_e": 3000.0, "gain_dn_per_e": 3.0}, {"bits": 24})
     for pixel in pixels:
         for more in ({}, {"target": NEAR | {"readout": "center"}}, {"drive": {"duty": 0.9, "frequency_hz": 100.0}}):
-            setup = made(random_qe(9, 3), lights, bright | more, pixel)
-            found = evaluate(Imager(setup), plain(setup))
+            view = made(random_qe(9, 3), lights, bright | more, pixel)
+            found = evaluate(Imager(view), plain(view))
             errors += [v for name, v in found.items() if name.startswith(("csd_", "best_place_"))]
     return Result(float(np.max(errors)), 0.0)
 
@@ -242,10 +245,10 @@ def switch_along_filters() -> Result:
     qe = np.full((4, N), 0.25)
     qe[2] = 0.5
     qe[2, 30], qe[2, RED] = 0.4375, 0.25  # N at 550 and 640 nm; the band holds 590 nm
-    setup = made(qe, lights_of(("yellow", "yellow", "red"), lines(30, YELLOW, RED)), FIXED, cfa="RYNC")
+    view = made(qe, lights_of(("yellow", "yellow", "red"), lines(30, YELLOW, RED)), FIXED, cfa="RYNC")
     depth = np.arange(1025) / 1024
     x = np.stack([np.full_like(depth, v) for v in (575.0, 0.0, 605.0, 0.0)] + [depth], axis=1)
-    found = smooth_csd(setup, Stopband(WAVE, qe[2], np.zeros(N)).curves(x), PAIR)
+    found = smooth_csd(view, Stopband(WAVE, qe[2], np.zeros(N)).curves(x), PAIR)
     gain = electrons_per_s(1.0) * mp.mpf(2e-3) * 4095 / 10_000
     exact = [gain * min(mp.mpf(3) / 16, abs(mp.mpf(1) / 4 - mp.mpf(k) / 2048)) for k in range(1025)]
     results = [(abs(float(f - e)), 8 * EPS * float(gain)) for f, e in zip(found, exact, strict=True)]
@@ -262,8 +265,8 @@ def float32_curves() -> Result:
     lights = lights_of(PAIR, np.random.default_rng(11).dirichlet(np.ones(N), 2) / GRID.step_nm)
     x = np.random.default_rng(12).uniform([560, 5, 620, 5, 0], [590, 30, 660, 30, 1], (20, 5))
     curves = Stopband(WAVE, qe[2], 0.2 * qe[2]).curves(x)
-    setup = made(qe, lights, FIXED, cfa="RYNC")
-    narrow, small = replace(setup, qe=qe.astype(np.float32)), curves.astype(np.float32)
+    view = made(qe, lights, FIXED, cfa="RYNC")
+    narrow, small = replace(view, qe=qe.astype(np.float32)), curves.astype(np.float32)
     found = evaluate(Imager(narrow), small)
     base, counts = narrow.qe[2], narrow.mosaic.counts
     results = []
@@ -280,7 +283,7 @@ def float32_curves() -> Result:
             "min_transmission": min(float(a) / float(b) for a, b in zip(curve, base, strict=True)),
         }
         results += [(relative(found[name][index], value), 64 * EPS) for name, value in exact.items()]
-    one, other = smooth_response(narrow, small), smooth_response(setup, curves)
+    one, other = smooth_response(narrow, small), smooth_response(view, curves)
     return worst([*results, (float((np.abs(one - other) / other).max()), 2.0**-24 + 64 * EPS)])
 
 

@@ -204,6 +204,7 @@ def nan_beside_the_underflow() -> Result:
     "ten million designs, one of them NaN",
     oracle="a front by construction: 1025 points on a line, all others 0.01 below it",
     why="multiples of 2^-30 subtract exactly; the NaN design neither is on the front nor keeps others off it",
+    slow=True,
 )
 def ten_million_rows() -> Result:
     n, bad = 10_000_000, 7_654_321

@@ -5,14 +5,14 @@ from __future__ import annotations
 import mpmath as mp
 import numpy as np
 
-from sweep.camera.effects.gaussian import rounding
 from sweep.camera.effects.noise import draws_dn
-from sweep.camera.effects.readout import moments
 from sweep.camera.imager import Imager
 from sweep.camera.mosaic import Mosaic
+from sweep.camera.noisy.gaussian import rounding
+from sweep.camera.noisy.moments import moments
 from sweep.camera.pixel import Pixel
-from sweep.camera.scene import Scenario
-from sweep.camera.view import Setup
+from sweep.camera.scenario import Scenario
+from sweep.camera.view import View
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.metrics.evaluate import evaluate
@@ -114,7 +114,7 @@ def few_electrons() -> Result:
     return moments_result([(pixel, 1e-3) for pixel in (*PIXELS.values(), DEEP)])
 
 
-@hard_case("electrons of 9e6", oracle="sum over counts and steps, 25 digits; straight", why=WHY)
+@hard_case("electrons of 9e6", oracle="sum over counts and steps, 25 digits; straight", why=WHY, slow=True)
 def many_electrons() -> Result:
     return moments_result([(pixel, 9e6) for pixel in (PLAIN, PIXELS["well below the ADC"], DEEP)])
 
@@ -124,7 +124,9 @@ def dark() -> Result:
     return moments_result([(pixel, n) for pixel in (PLAIN, PIXELS["hardly any read noise"], DEEP) for n in (0.0, 0.5)])
 
 
-@hard_case("electrons at full well and at the ADC's end", oracle="sum over counts and steps, 25 digits", why=WHY)
+@hard_case(
+    "electrons at full well and at the ADC's end", oracle="sum over counts and steps, 25 digits", why=WHY, slow=True
+)
 def at_the_ends() -> Result:
     cases = [(PIXELS[name], 9990.0) for name in ("hardly any read noise", "no read noise")]
     return moments_result([*cases, (PIXELS["ADC first"], 6700.0), (PIXELS["well below the ADC"], 9990.0)])
@@ -135,7 +137,7 @@ def chain(pixel: Pixel) -> Imager:
     grid = WavelengthGrid(step_nm=100)
     lights = Lights("two", ("a", "b"), ("a", "b"), np.eye(4)[:2] / 100, 1.0, "", True)
     scenario = Scenario.model_validate({"noise": True, "exposure": {"kind": "fixed", "exposure_s": 1.0}})
-    return Imager(Setup(grid, Mosaic.from_rows("W", [["W"]]), np.ones((1, 4)), (), np.ones(4), lights, pixel, scenario))
+    return Imager(View(grid, Mosaic.from_rows("W", [["W"]]), np.ones((1, 4)), (), np.ones(4), lights, pixel, scenario))
 
 
 @hard_case(
@@ -237,6 +239,7 @@ def all_clipped() -> Result:
     "noise metrics of signals that all fill the range",
     oracle="coincident: CSD, contrast and d' exactly 0, error 1/2, bound 1",
     why="equal means differ by exactly 0",
+    slow=True,
 )
 def metrics_of_the_clipped() -> Result:
     found = evaluate(chain(PLAIN), np.empty((1, 0, 4)), ["a", "b"])

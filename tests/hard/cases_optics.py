@@ -13,8 +13,8 @@ from sweep.camera.effects.blur import Profile, mean_over_disc, too_much, transfe
 from sweep.camera.effects.sampling import covered
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
-from sweep.camera.scene import Scenario
-from sweep.metrics.evaluate import smooth_response
+from sweep.camera.scenario import Scenario
+from sweep.metrics.smooth import smooth_response
 
 from .cases_chain import FIXED, PAIR, RED, YELLOW, lights_of, lines, made, plain, random_qe
 from .registry import EPS, Result, hard_case, outcome, relative, worst
@@ -211,8 +211,8 @@ def disc_scene(across_px: float, **target: object) -> dict[str, object]:
 
 def response_of(scenario: dict[str, object], cfa: str = "RGGB") -> np.ndarray:
     qe = random_qe(21, len(Mosaic.from_name(cfa).channels))
-    setup = made(qe, lights_of(PAIR, lines(YELLOW, RED)), scenario, cfa=cfa, blur="skip")
-    return smooth_response(setup, plain(setup))[0, 0]
+    view = made(qe, lights_of(PAIR, lines(YELLOW, RED)), scenario, cfa=cfa, blur="skip")
+    return smooth_response(view, plain(view))[0, 0]
 
 
 @hard_case(

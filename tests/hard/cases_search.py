@@ -22,6 +22,7 @@ from sweep.search.problem import Evaluation, Problem, best_feasible, starting_po
 from sweep.search.solver import best_reachable, search_from
 from sweep.study import load_study
 
+from ..build import stopband_study
 from .cases_chain import FIXED, GRID, PAIR, RED, WAVE, YELLOW, N, electrons_per_s, lights_of, lines, made
 from .registry import EPS, Result, hard_case, outcome, worst
 
@@ -38,10 +39,10 @@ FIXED_PART = float(np.sum((CURVES[[0, 1, 3], YELLOW] - CURVES[[0, 1, 3], RED]) *
 
 def depth_problem(constraints: dict[str, Bound], objective: str = "csd_yellow_red") -> Problem:
     """A wall from 602.5 to 662.5 nm over a red line, of any depth, in a flat filter of QE 1/2."""
-    setup = made(CURVES, lights_of(PAIR, lines(YELLOW, RED)), FIXED, cfa="RYNC")
+    view = made(CURVES, lights_of(PAIR, lines(YELLOW, RED)), FIXED, cfa="RYNC")
     low, high = (np.array([602.5, 0.0, 662.5, 0.0, depth]) for depth in (0.0, 1.0))
     family = Stopband(WAVE, CURVES[2], np.zeros(N))
-    return Problem(setup, family, low, high, Objective(minimum={objective: 1.0}), constraints)
+    return Problem(view, family, low, high, Objective(minimum={objective: 1.0}), constraints)
 
 
 def csd_of(depth: float) -> float:
@@ -122,7 +123,7 @@ def rise(wave: np.ndarray, center: float, width: float) -> np.ndarray:
 def edge_on_the_constraint() -> Result:
     led = np.exp(-0.5 * ((WAVE - np.array([[592.0], [637.0]])) / 9) ** 2)
     photons = led / led.sum(axis=1, keepdims=True) / GRID.step_nm
-    setup = made(CURVES, lights_of(PAIR, photons), FIXED, cfa="RYNC")
+    view = made(CURVES, lights_of(PAIR, photons), FIXED, cfa="RYNC")
     low, high = (np.array([left, 20.0, 680.0, 10.0, 1.0]) for left in (570.0, 660.0))
     family = Stopband(WAVE, CURVES[2], np.full(N, 0.05))
 
@@ -142,7 +143,7 @@ def edge_on_the_constraint() -> Result:
     exact = csd(at)
     assert max(csd(float(left)) for left in allowed_edges) <= exact  # the constraint is active
     problem = Problem(
-        setup, family, low, high, Objective(minimum={"csd_yellow_red": 1.0}), {"sensitivity": Bound(min=least)}
+        view, family, low, high, Objective(minimum={"csd_yellow_red": 1.0}), {"sensitivity": Bound(min=least)}
     )
     best = found_by(problem)
     per_nm = abs(csd(at + 1e-4) - csd(at - 1e-4)) / 2e-4
@@ -193,24 +194,17 @@ def best_values() -> Result:
     return worst(results)
 
 
-STUDY = """\
-study: impossible
-sensor: ar0820
-lights: tl16
-scenarios: {chart: {}}
-cfas: [RYNCy]
-sweeps:
-  edges:
-    cfa: RYNCy
-    channel: N
-    base: Y
-    to: G
-    grid: {left_nm: [590, 605], left_width_nm: 10, right_nm: [650, 670], right_width_nm: 10}
+STUDY = stopband_study(
+    "impossible",
+    "{left_nm: [590, 605], left_width_nm: 10, right_nm: [650, 670], right_width_nm: 10}",
+    cfas="[RYNCy]",
+    after="""\
 constraints:
   sensitivity: {min: 0.99}
   csd_yellow_red: {min: 1.0e+5}
 search: {starts: 4, max_evaluations: 200}
-"""
+""",
+)
 
 
 @hard_case(

@@ -9,19 +9,22 @@ from typing import Any
 import numpy as np
 
 from sweep.camera.imager import Imager
+from sweep.camera.methods import Methods
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.plan.bounds import Box
-from sweep.camera.scene import Scenario
-from sweep.camera.view import Methods, Setup
+from sweep.camera.scenario import Scenario
+from sweep.camera.view import View
+from sweep.curves.lights import class_pairs
 from sweep.designs.families.dual import Dual
 from sweep.designs.families.stopband import MultiStopband
 from sweep.designs.family import Family
-from sweep.metrics.evaluate import BEST_PLACE, WORST, evaluate, is_promised
-from sweep.metrics.separation import CSD
+from sweep.metrics.evaluate import evaluate
+from sweep.metrics.quantity import WORST
+from sweep.metrics.separation import csd_name
 from sweep.search.problem import SHIFTS
 
-from .scenes import FAMILY, GRID, SENSOR, TILES, lights, target
+from .scenes import FAMILY, GRID, SENSOR, TILES, lights, promised_names, target
 
 _DUAL = Dual(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["C"])
 _TWO_BANDS = MultiStopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"], 2)
@@ -43,7 +46,7 @@ class RandomScene:
     """
 
     name: str
-    setup: Setup
+    view: View
     curves: tuple[np.ndarray, ...]
     box: Box
     tolerance_dn: float
@@ -51,7 +54,7 @@ class RandomScene:
     @property
     def anywhere(self) -> bool:
         """Whether any place of the light is asked for."""
-        target = self.setup.scenario.target
+        target = self.view.scenario.target
         return target is not None and target.phase_px == "any"
 
 
@@ -64,7 +67,7 @@ def random_scene(seed: int) -> RandomScene:
     mosaic = _TWO if cfa == "two" else TILES[cfa]
     modified = tuple(mosaic.channels.index(name) for name in ("N", "M") if name in mosaic.channels)
     scenario = Scenario.model_validate(given)
-    setup = Setup(
+    view = View(
         grid=GRID,
         mosaic=mosaic,
         qe=SENSOR.mosaic_qe(mosaic, dict.fromkeys((mosaic.channels[i] for i in modified), "Y") if modified else None),
@@ -74,22 +77,24 @@ def random_scene(seed: int) -> RandomScene:
         pixel=Pixel(**pixel) if scenario.noise is None else scenario.noise.of(Pixel(**pixel)),
         scenario=scenario,
     )
-    low, high = setup.qe.copy(), setup.qe.copy()
+    low, high = view.qe.copy(), view.qe.copy()
     curves: tuple[np.ndarray, ...] = (np.empty((1, 0, GRID.size)),)
     if modified:
         curves, lower, upper = _designs(rng, len(modified))
         low[list(modified)], high[list(modified)] = lower, upper
     tolerance = float(10 ** rng.uniform(-2, 2.5))
-    return RandomScene(f"random {seed}", setup, curves, Box(setup, low, high, 1000), tolerance)
+    return RandomScene(f"random {seed}", view, curves, Box(view, low, high, 1000), tolerance)
 
 
 def columns(made: RandomScene, methods: Methods) -> dict[str, np.ndarray]:
     """Every promised column of all designs of a scene, ndarray[n_designs], as a run has them."""
-    imager = Imager(replace(made.setup, methods=methods))
+    imager = Imager(replace(made.view, methods=methods))
     cases = [evaluate(imager, curves) for curves in made.curves]
-    found = {n: v for n, v in cases[0].items() if is_promised(n) and (made.anywhere or not n.startswith(BEST_PLACE))}
+    promised = promised_names(made.view, any_place=made.anywhere)
+    found = {name: cases[0][name] for name in promised}
     if len(cases) > 1:
-        found |= {WORST + n: np.min([case[n] for case in cases], axis=0) for n in cases[0] if n.startswith(CSD)}
+        distances = [csd_name(pair) for pair in class_pairs(made.view.lights.classes)]
+        found |= {WORST + name: np.min([case[name] for case in cases], axis=0) for name in distances}
     return found
 
 

@@ -35,22 +35,25 @@ class Result:
 
 @dataclass(frozen=True)
 class HardCase:
-    """A case: its name, what it is compared with, and how the allowed error is derived."""
+    """A case: its name, what it is compared with, how the allowed error is derived, and whether it takes seconds."""
 
     name: str
     oracle: str
     why: str
     run: Callable[[], Result]
+    slow: bool
 
 
 CASES: list[HardCase] = []
 
 
-def hard_case(name: str, *, oracle: str, why: str) -> Callable[[Callable[[], Result]], Callable[[], Result]]:
-    """Register a function as a case; it runs with 50 digits in mpmath."""
+def hard_case(
+    name: str, *, oracle: str, why: str, slow: bool = False
+) -> Callable[[Callable[[], Result]], Callable[[], Result]]:
+    """Register a function as a case; it runs with 50 digits in mpmath. `slow`: it takes seconds."""
 
     def register(run: Callable[[], Result]) -> Callable[[], Result]:
-        CASES.append(HardCase(name, oracle, why, mp.workdps(50)(run)))
+        CASES.append(HardCase(name, oracle, why, mp.workdps(50)(run), slow))
         return run
 
     return register

@@ -9,17 +9,20 @@ from typing import Any
 import numpy as np
 
 from sweep.camera.imager import Imager
+from sweep.camera.methods import Methods
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.plan.bounds import Box
-from sweep.camera.scene import Scenario
+from sweep.camera.scenario import Scenario
 from sweep.camera.sensor import BUILT_IN_SENSORS
-from sweep.camera.view import Methods, Setup
-from sweep.curves.builtin import BUILT_IN_LIGHTS
+from sweep.camera.view import View
+from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.families.stopband import Stopband
-from sweep.metrics.evaluate import BEST_PLACE, evaluate, is_promised
+from sweep.metrics.evaluate import evaluate
+from sweep.metrics.quantity import Asked
+from sweep.metrics.registry import quantities_of
 
 GRID, FINE = WavelengthGrid(step_nm=5), WavelengthGrid(step_nm=1)
 SENSOR = BUILT_IN_SENSORS["ar0820"](GRID)
@@ -52,7 +55,7 @@ class Scene:
     """A scene with one design, and the box of designs that the plan is for."""
 
     name: str
-    setup: Setup
+    view: View
     curves: np.ndarray
     box: Box
 
@@ -71,7 +74,7 @@ def scene(
     sensor = SENSOR if grid is GRID else BUILT_IN_SENSORS["ar0820"](grid)
     family = FAMILY if grid is GRID else Stopband(grid.nodes_nm, sensor.qe["Y"], sensor.qe["G"])
     modified = (mosaic.channels.index("N"),) if "N" in mosaic.channels else ()
-    setup = Setup(
+    view = View(
         grid,
         mosaic,
         sensor.mosaic_qe(mosaic, {"N": "Y"} if modified else None),
@@ -83,11 +86,11 @@ def scene(
     )
     x = LOW + (HIGH - LOW) * np.random.default_rng(seed).uniform(size=5)
     curves = family.curves(x[None]) if modified else np.empty((1, 0, grid.size))
-    low, high = setup.qe.copy(), setup.qe.copy()
+    low, high = view.qe.copy(), view.qe.copy()
     if modified:
         hull = family.hull(LOW, HIGH) if wide else (curves[0], curves[0])
         low[list(modified)], high[list(modified)] = hull
-    return Scene(name, setup, curves, Box(setup, low, high, 1000))
+    return Scene(name, view, curves, Box(view, low, high, 1000))
 
 
 def target(distance_m: float, fov_deg: float, **more: Any) -> dict[str, Any]:
@@ -203,10 +206,16 @@ HARD: tuple[Scene, ...] = (
 def columns(made: Scene, methods: Methods) -> np.ndarray:
     """Every promised column of the scene's design; of the best place only where any is asked for."""
     anywhere = asks_for_any_place(made)
-    found = evaluate(Imager(replace(made.setup, methods=methods)), made.curves)
-    return np.array([v[0] for n, v in found.items() if is_promised(n) and (anywhere or not n.startswith(BEST_PLACE))])
+    found = evaluate(Imager(replace(made.view, methods=methods)), made.curves)
+    return np.array([found[name][0] for name in promised_names(made.view, any_place=anywhere)])
+
+
+def promised_names(view: View, *, any_place: bool) -> list[str]:
+    """Columns that a plan's promise holds for."""
+    asked = Asked(view.lights.classes, any_place=any_place)
+    return [name for name, quantity in quantities_of(asked).items() if quantity.promised]
 
 
 def asks_for_any_place(made: Scene) -> bool:
-    target = made.setup.scenario.target
+    target = made.view.scenario.target
     return target is not None and target.phase_px == "any"

@@ -28,7 +28,9 @@ def json_number(value: float) -> float | str:
     return value if math.isfinite(value) else str(value)
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+@pytest.mark.parametrize(
+    "case", [pytest.param(case, id=case.name, marks=[pytest.mark.slow] if case.slow else []) for case in CASES]
+)
 def test_hard_case(case: HardCase, hard_case_rows: list[dict[str, object]]) -> None:
     row = {"case": case.name, "oracle": case.oracle, "error": "raised", "allowed": 0.0, "why": case.why}
     hard_case_rows.append(row)

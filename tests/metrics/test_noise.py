@@ -13,9 +13,9 @@ from sweep.camera.effects import noise
 from sweep.camera.imager import Imager
 from sweep.curves.lights import Lights
 from sweep.errors import StudyError
-from sweep.metrics.discrimination import D_PRIME, ERROR
-from sweep.metrics.evaluate import STATE_ERROR, evaluate
-from sweep.metrics.recognition import MOST_LIKELY, RULES, recognize
+from sweep.metrics.columns.confusion import D_PRIME, ERROR, STATE_ERROR
+from sweep.metrics.evaluate import evaluate
+from sweep.metrics.recognition import DECIDERS, MOST_LIKELY, recognize
 from sweep.report import make_report, read_output, summary_lines
 from sweep.run import run_study
 from sweep.study import load_study
@@ -40,15 +40,15 @@ NOISY = (
 
 @pytest.mark.parametrize("made", NOISY, ids=lambda made: made.name)
 def test_mean_and_variance_of_the_readout_agree_with_draws_of_every_pixel(made: Scene) -> None:
-    imager = Imager(made.setup)
+    imager = Imager(made.view)
     read = imager.read_with_noise(made.curves)
     mean, variance = read.mean, read.variance
-    np.testing.assert_array_equal(mean, Imager(made.setup).read(made.curves)[0])
+    np.testing.assert_array_equal(mean, Imager(made.view).read(made.curves)[0])
     electrons = imager.pixel_electrons(made.curves)[0]
     per_place = len(electrons) // imager.n_cases
     draws, rng = 20_000, np.random.default_rng(7)
     for case in {0, len(electrons) - 1}:
-        for signal in (0, len(made.setup.lights.names) - 1):
+        for signal in (0, len(made.view.lights.names) - 1):
             pixels = noise.draws_dn(
                 np.broadcast_to(electrons[case, signal], (draws, electrons.shape[2])), imager.readout.pixel, rng
             )
@@ -63,18 +63,18 @@ def test_mean_and_variance_of_the_readout_agree_with_draws_of_every_pixel(made: 
 
 def test_a_scene_has_its_own_noise() -> None:
     own = scene("own", "RGGB", {"noise": {"read_noise_e": 50, "prnu": 0.02}}, DARK)
-    loaded = own.setup.scenario.noise
+    loaded = own.view.scenario.noise
     assert loaded is not None
-    pixel = loaded.of(own.setup.pixel)
+    pixel = loaded.of(own.view.pixel)
     assert (pixel.read_noise_e, pixel.prnu, pixel.offset_dn) == (50, 0.02, 64)
 
 
 def test_the_most_likely_signal_errs_as_rarely_as_its_closed_forms_say() -> None:
     made = scene("dim", "RYNCy", {"noise": True, "exposure": {"kind": "white_patch", "level": 0.02}}, DARK)
-    lights = made.setup.lights
+    lights = made.view.lights
     kept = [lights.types.index("yellow"), lights.types.index("red")]
     two = Lights("two", ("y", "r"), ("yellow", "red"), lights.photons[kept], lights.photon_ratio, "", True)
-    imager, states = Imager(replace(made.setup, lights=two)), ["yellow", "red"]
+    imager, states = Imager(replace(made.view, lights=two)), ["yellow", "red"]
     closed = {name: values[0] for name, values in evaluate(imager, made.curves, states).items()}
     found = recognize(imager, made.curves, states, 40_000, np.random.default_rng(3))
     least, most = 1 - found[f"{MOST_LIKELY}_accuracy_high"], 1 - found[f"{MOST_LIKELY}_accuracy_low"]
@@ -90,10 +90,10 @@ def test_more_noise_is_never_better() -> None:
     levels = [scene("read", "RYNCy", {"noise": {"read_noise_e": e}}, {"offset_dn": 900}) for e in (1, 10, 50, 200)]
     found = []
     for made in levels:
-        noise_of = made.setup.scenario.noise
+        noise_of = made.view.scenario.noise
         assert noise_of is not None
-        setup = replace(made.setup, pixel=noise_of.of(made.setup.pixel))
-        found.append(evaluate(Imager(setup), made.curves, made.setup.lights.classes))
+        view = replace(made.view, pixel=noise_of.of(made.view.pixel))
+        found.append(evaluate(Imager(view), made.curves, made.view.lights.classes))
     for name in found[0]:
         values = [float(columns[name][0]) for columns in found]
         if name.startswith((D_PRIME, "cnr_")):
@@ -105,13 +105,13 @@ def test_more_noise_is_never_better() -> None:
 @pytest.mark.parametrize("pixel", [{"offset_dn": 4090}, {"bits": 2}])
 def test_readouts_that_are_certain_and_the_same_tell_nothing(pixel: dict[str, float]) -> None:
     made = scene("patch", "RGGB", {"noise": {"read_noise_e": 3}}, pixel)
-    imager = Imager(replace(made.setup, pixel=made.setup.pixel.model_copy(update={"read_noise_e": 3.0})))
+    imager = Imager(replace(made.view, pixel=made.view.pixel.model_copy(update={"read_noise_e": 3.0})))
     read = imager.read_with_noise(made.curves)
     mean, variance = read.mean, read.variance
     certain = variance == 0
     assert certain.any()
     assert (mean[certain] == np.rint(mean[certain])).all()
-    states = made.setup.lights.classes
+    states = made.view.lights.classes
     found = evaluate(imager, made.curves, states)
     drawn = recognize(imager, made.curves, states, 200, np.random.default_rng(3))
     assert 1 - drawn[f"{MOST_LIKELY}_accuracy_worst_state"] <= found["state_error_bound"][0] + 0.05
@@ -150,9 +150,9 @@ def test_a_noisy_study_from_file_to_report(tmp_path: Path) -> None:
     assert (results["error_yellow_red"] <= results["error_bound_yellow_red"]).all()
     assert results.loc[results["scenario"] == "dim level=0.02", STATE_ERROR].min() > 1e-3
     assert len(recognition) == 2  # RGGB in both scenes; RYNCy has no curve of its own for N
-    assert {f"{rule}_accuracy" for rule in RULES} <= set(recognition.columns)
+    assert {f"{rule}_accuracy" for rule in DECIDERS} <= set(recognition.columns)
     bright, dim = (recognition[recognition["scenario"] == f"dim level={level}"].iloc[0] for level in (0.5, 0.02))
-    for rule in RULES:
+    for rule in DECIDERS:
         assert bright[f"{rule}_accuracy"] > dim[f"{rule}_accuracy"]
         assert dim[f"{rule}_accuracy_low"] < dim[f"{rule}_accuracy"] < dim[f"{rule}_accuracy_high"]
     output = read_output(tmp_path / "1")
@@ -164,7 +164,7 @@ def test_a_noisy_study_from_file_to_report(tmp_path: Path) -> None:
     for rule in ("nearest centroid", "LDA", "most likely signal"):
         assert f"accuracy, {rule}" in page
     # The plan keeps what the metrics need.
-    methods = {c["effect"]: c["method"] for c in output.provenance["plans"]["dim level=0.5"]["effects"]}
+    methods = {each.effect: each.method for each in output.provenance.plans["dim level=0.5"].effects}
     assert (methods["noise"], methods["quantization"], methods["saturation"]) == ("expected", "round", "clip")
 
 

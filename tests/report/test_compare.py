@@ -17,8 +17,8 @@ from sweep.errors import OutputError, SweepError
 from sweep.report import read_output
 from sweep.report.compare import compare_runs
 from sweep.report.compare.differences import study_differences
-from sweep.report.compare.drawing import FrontsFigure, Line, Mark, draw_fronts, pictures
-from sweep.report.compare.fronts import Front, box_of, hypervolumes
+from sweep.report.compare.drawing import FrontLine, FrontsFigure, Mark, draw_fronts, pictures
+from sweep.report.compare.fronts import ComparedFront, box_of, hypervolumes
 from sweep.study import load_study
 
 from ..build import STUDY, ran
@@ -62,8 +62,8 @@ def compared(folders: Sequence[Path], to: Path) -> tuple[str, str]:
 
 
 def test_a_hypervolume_is_the_area_by_hand() -> None:
-    first = Front("A", "X", "s", False, np.array([[100.0, 0.905], [40.0, 0.95]]))
-    second = Front("B", "X", "s", True, np.array([[60.0, 1.0]]))
+    first = ComparedFront("A", "X", "s", False, np.array([[100.0, 0.905], [40.0, 0.95]]))
+    second = ComparedFront("B", "X", "s", True, np.array([[60.0, 1.0]]))
     box = box_of([first, second])
     np.testing.assert_allclose(box.reference, [0.0, 0.90], atol=1e-12)
     np.testing.assert_array_equal(box.top, [100.0, 1.0])
@@ -74,7 +74,7 @@ def test_a_hypervolume_is_the_area_by_hand() -> None:
 
 
 def test_a_point_on_a_hundredth_counts() -> None:
-    front = Front("A", "X", "s", False, np.array([[50.0, 0.9]]))
+    front = ComparedFront("A", "X", "s", False, np.array([[50.0, 0.9]]))
     box = box_of([front])
     np.testing.assert_allclose(box.reference, [0.0, 0.89], atol=1e-12)
     assert hypervolumes([front], box)["hypervolume"][0] == pytest.approx(0.5, rel=1e-9)
@@ -208,13 +208,16 @@ def test_hostile_names_are_text(runs: dict[str, Path], tmp_path: Path) -> None:
 def test_other_curves_are_said(runs: dict[str, Path], tmp_path: Path) -> None:
     copytree(runs["chart"], tmp_path / "other")
     curves = pd.read_parquet(tmp_path / "other" / "curves.parquet")
-    curves.loc[100, "qe:R"] += 1e-9
-    lights = [name for name in curves.columns if name.startswith("light:")]
-    curves.loc[100, lights[0]] *= 1.1
+    curves.loc[(curves["curve"] == "R") & (curves["wavelength_nm"] == 500), "value"] += 1e-9
+    lights = curves["kind"] == "light"
+    curves.loc[lights.idxmax(), "value"] *= 1.1
     curves.to_parquet(tmp_path / "other" / "curves.parquet", index=False)
     listed_anew(tmp_path / "other")
     said, _ = compared([runs["chart"], tmp_path / "other"], tmp_path / "to")
-    assert f"used other curves (sensor: R; lights: 1 of {len(lights)}): their results do not compare" in said
+    assert (
+        f"used other curves (sensor: R; lights: 1 of {curves[lights]['curve'].nunique()}): their results do not compare"
+        in said
+    )
 
 
 def test_differences_are_shown_where_they_begin(runs: dict[str, Path]) -> None:
@@ -225,7 +228,7 @@ def test_differences_are_shown_where_they_begin(runs: dict[str, Path]) -> None:
     def rows(*extra: dict[str, object]) -> list[list[str]]:
         from dataclasses import replace
 
-        outputs = {chr(65 + at): replace(one, study={"same": 1, **own}) for at, own in enumerate(extra)}
+        outputs = {chr(65 + at): replace(one, resolved={"same": 1, **own}) for at, own in enumerate(extra)}
         return study_differences(outputs).to_numpy().tolist()
 
     ((key, first, second),) = rows({"x": {"values": long}}, {"x": {"values": other}})
@@ -265,7 +268,7 @@ def test_by_default_a_folder_of_both_names(
 
 def test_every_front_has_its_own_mark_and_runs_their_dash() -> None:
     x = np.linspace(0.8, 1.0, 40)
-    lines = [Line(f"run {run} $", run, x, x * (run + 1), traced) for run in range(3) for traced in (False, True)]
+    lines = [FrontLine(f"run {run} $", run, x, x * (run + 1), traced) for run in range(3) for traced in (False, True)]
     figure = FrontsFigure("a $ title", "x", "y", lines, [Mark("A", 0, 0.9, 1.0)])
     (axes,) = draw_fronts(figure).axes
     drawn = axes.get_lines()

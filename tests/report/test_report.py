@@ -20,7 +20,7 @@ from sweep.report.page_data import payload
 from sweep.report.scenes import scene_groups
 from sweep.results.identity import CHUNK
 from sweep.results.output import Output
-from sweep.results.profiles import Profile, Profiles
+from sweep.results.profiles import ParameterProfile, Profiles
 from sweep.run.rows import Job, jobs_of, rules_of, run_job
 from sweep.study import Study, load_study
 
@@ -63,7 +63,7 @@ def test_a_profile_is_the_best_of_all_feasible_designs_at_a_value() -> None:
             "feasible": random.random(n) < 0.5,
         }
     )
-    found = Profiles("csd_yellow_red", "one")
+    found = Profiles("csd_yellow_red", "one", ["left_nm", "depth"])
     for part in np.array_split(np.arange(n), 5):
         found.add(table_of(frame.iloc[part]))
     own = frame[(frame["kind"] == "sweep") & (frame["scenario"] == "one") & frame["feasible"]]
@@ -79,7 +79,7 @@ def test_many_values_keep_their_best_ones() -> None:
     values = np.linspace(0, 1, 5001)
     frame = pd.DataFrame({"left_nm": values, "csd_a_b": 5 - (values - 0.61) ** 2, "feasible": True})
     frame = frame.assign(kind="sweep", cfa="A", scenario="one")
-    found = Profiles("csd_a_b", "one")
+    found = Profiles("csd_a_b", "one", ["left_nm"])
     found.add(table_of(frame[["kind", "cfa", "scenario", "left_nm", "csd_a_b", "feasible"]]))
     (profile,) = found.found["A"]
     assert len(profile.values) < 100
@@ -89,7 +89,7 @@ def test_many_values_keep_their_best_ones() -> None:
 
 def test_what_keeps_the_objective_is_around_the_best_value() -> None:
     values = np.arange(7.0)
-    profile = Profile("x", values, np.array([96.0, 10.0, 97.0, 100.0, 95.0, 94.0, 99.0]))
+    profile = ParameterProfile("x", values, np.array([96.0, 10.0, 97.0, 100.0, 95.0, 94.0, 99.0]))
     assert profile.keeps == (2.0, 4.0)
     assert profile.drop == 90.0
 
@@ -118,10 +118,10 @@ def test_the_history_ends_at_the_answer(finished: Finished) -> None:
 def test_every_scene_is_told_once_with_its_largest_promise(finished: Finished) -> None:
     output = read_output(finished("fog"))
     groups = scene_groups(output)
-    assert sorted(name for group in groups for name in group.scenarios) == sorted(output.study["scenarios"])
+    assert sorted(name for group in groups for name in group.scenarios) == sorted(output.scenarios)
     for group in groups:
-        plans = [output.provenance["plans"][name] for name in group.scenarios]
-        assert group.promised_dn == max(plan["promised_dn"] for plan in plans)
+        plans = [output.provenance.plans[name] for name in group.scenarios]
+        assert group.promised_dn == max(plan.promised_dn for plan in plans)
         assert group.realized_dn is None
     rows = pd.DataFrame({"scenario": [groups[0].scenarios[0]] * 2, "realized_dn": [0.01, 0.03]})
     assert scene_groups(replace(output, audited=rows))[0].realized_dn == 0.03
@@ -130,7 +130,7 @@ def test_every_scene_is_told_once_with_its_largest_promise(finished: Finished) -
 def test_a_long_table_keeps_its_front_in_a_small_page(tmp_path: Path) -> None:
     """A table of 250,000 rows is thinned; the page's data does not grow with it, but for the front."""
     folder = tmp_path / "out"
-    ran(load_study(large(tmp_path, 5)), folder, 2)
+    ran(load_study(large(tmp_path, 5)), folder, 1)
     output: Output = read_output(folder)
     drawn = payload(output)
     table = pd.read_parquet(folder / "results.parquet")
@@ -144,13 +144,13 @@ def test_a_job_of_several_chunks_has_their_rows(tmp_path: Path) -> None:
     study: Study = load_study(large(tmp_path, 20))
     whole = next(job for job in jobs_of(study) if job.space.kind == "sweep")
     assert whole.stop - whole.start > CHUNK
-    setup, rules = study.setup(whole.space, whole.scenario), rules_of(study)
+    view, rules = study.view(whole.space, whole.scenario), rules_of(study)
     parts = [
         Job(whole.space, whole.scenario, start, min(start + CHUNK, whole.stop), whole.first_id + start)
         for start in range(0, whole.stop, CHUNK)
     ]
-    together = run_job(whole, setup, rules).to_pandas()
-    each = pd.concat([run_job(part, setup, rules).to_pandas() for part in parts], ignore_index=True)
+    together = run_job(whole, view, rules).to_pandas()
+    each = pd.concat([run_job(part, view, rules).to_pandas() for part in parts], ignore_index=True)
     pd.testing.assert_frame_equal(together.drop(columns="pareto"), each.drop(columns="pareto"), check_categorical=False)
 
 

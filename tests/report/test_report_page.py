@@ -110,8 +110,13 @@ def agrees(printed: str, value: float) -> bool:
     return abs(float(printed) - value) <= 0.5 * 10**-digits + abs(value) * 2**-23
 
 
-@pytest.mark.parametrize("name", ["stopband", "fog", "paper"])
-@pytest.mark.parametrize("width", [1280, 400])
+@pytest.mark.parametrize(
+    ("name", "width"),
+    [
+        *(("stopband", 1280), ("stopband", 400), ("fog", 1280)),
+        *(pytest.param(*page, marks=pytest.mark.slow) for page in (("fog", 400), ("paper", 1280), ("paper", 400))),
+    ],
+)
 def test_a_report_opens_without_an_error_or_a_request(finished: Finished, opened: Any, name: str, width: int) -> None:
     seen = opened(finished(name), width)
     through(seen)
@@ -121,20 +126,22 @@ def test_a_report_opens_without_an_error_or_a_request(finished: Finished, opened
     assert seen.page.locator("#pareto .plotly").count() == 1
 
 
-@pytest.mark.parametrize(("name", "trace"), [("stopband", "Pareto front"), ("fog", "RYN_4Cy"), ("paper", "RYN_2Cy")])
+@pytest.mark.parametrize(
+    ("name", "trace"),
+    [("stopband", "Pareto front"), ("fog", "RYN_4Cy"), pytest.param("paper", "RYN_2Cy", marks=pytest.mark.slow)],
+)
 def test_pointing_and_clicking_tell_of_a_design(finished: Finished, opened: Any, name: str, trace: str) -> None:
     seen = opened(finished(name))
     table = pd.read_parquet(finished(name) / "results.parquet").set_index("design_id")
     x, y, row = seen.point_at(trace)
-    seen.page.mouse.move(x - 60, y - 60)
-    seen.page.mouse.move(x, y, steps=4)
+    seen.page.mouse.move(x, y)  # in one step: a design on the way would be told, and clicked, first
     seen.page.wait_for_selector("#hover", state="visible")
     seen.page.mouse.click(x, y)
     seen.page.wait_for_function("document.getElementById('curves').data.length > 0")
-    chosen = table.loc[int(seen.page.get_attribute("#details", "data-design"))]
-    # On the way another design may have been told.
+    # The page opens with a design that is told already, and on the way another one may have been.
     title = "(id) => document.querySelector(id).firstElementChild.textContent"
     seen.page.wait_for_function(f"({title})('#hover') === document.querySelector('#details h3').textContent")
+    chosen = table.loc[int(seen.page.get_attribute("#details", "data-design"))]
     pointed = seen.page.inner_text("#hover").splitlines()
     said = seen.details()
     assert agrees(said["yellow/red CSD"], chosen["csd_yellow_red"])

@@ -17,23 +17,18 @@ from sweep.results.inventory import Inventory
 from sweep.run import output_folder, run_study
 from sweep.study import load_study
 
+from ..build import stopband_study
 from ..commanded import commanded, sweep
 
-STUDY = """\
-study: small
-sensor: ar0820
-lights: tl16
+STUDY = stopband_study(
+    "small",
+    "{left_nm: [590, 600, 610], left_width_nm: 5, right_nm: {min: 640, max: 690, count: 51}, right_width_nm: 5}",
+    before="""\
 scenarios:
   chart: {exposure: {kind: white_patch}, noise: true}
 pixel: {read_noise_e: 2}
-cfas: [RGGB, RYNCy]
-sweeps:
-  edges:
-    cfa: RYNCy
-    channel: N
-    base: Y
-    to: G
-    grid: {left_nm: [590, 600, 610], left_width_nm: 5, right_nm: {min: 640, max: 690, count: 51}, right_width_nm: 5}
+""",
+    after="""\
 constraints:
   sensitivity: {min: 0.9}
 search: {starts: 1, max_evaluations: 20, front: {min: 0.8, max: 0.9, count: 2}}
@@ -41,7 +36,8 @@ recognition: {states: [green, yellow, red], patches: 20}
 published:
   Table 2:
     RGGB: {csd_yellow_red: 138}
-"""
+""",
+)
 LISTS = ("run.json", "SHA256SUMS")
 READ = (
     *("results.parquet", "search.parquet", "front.parquet", "curves.parquet", "points.parquet", "recognition.parquet"),

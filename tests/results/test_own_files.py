@@ -47,14 +47,6 @@ def expected(few: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFra
     return rows(folder)
 
 
-@pytest.fixture
-def plain_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Reports whose pictures take no time."""
-    names = ("pareto", "sensor", "signals", "chart")
-    monkeypatch.setattr("sweep.report.page._drawings", lambda _: ((name, name, None) for name in names))
-    monkeypatch.setattr("sweep.report.page.rendered", lambda _, kind: kind.encode())
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_a_file_that_was_there_before_is_told_and_stays(few: Study, tmp_path: Path, name: str) -> None:
     base = tmp_path / "tiny"

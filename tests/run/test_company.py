@@ -11,25 +11,25 @@ import pytest
 from sweep.camera.imager import Imager
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
-from sweep.camera.scene import Scenario
-from sweep.camera.view import Setup
-from sweep.designs.block import Curves, edges_of
+from sweep.camera.scenario import Scenario
+from sweep.camera.view import View
+from sweep.designs.block import CurveBlock, edges_of
 from sweep.designs.families.dual import Dual
 from sweep.designs.families.free_form import FreeForm
 from sweep.designs.families.stopband import MultiStopband
 from sweep.designs.products import row_products
 from sweep.designs.space import Filter, Space
-from sweep.metrics.evaluate import evaluate
+from sweep.metrics.evaluate import evaluate, family_quantities
 
-from ..blocks import SETUPS, SPACE, setup_of
+from ..blocks import SPACE, VIEWS, view_of
 from ..hard.scenes import DARK, F2, FAMILY, FAR, FIXED, GRID, SENSOR, lights
 
 # Crossed edges among them, which lift N above Y, so that it sets the exposure.
 AXES = ((590.0, 603.0, 690.0), (5.0, 20.0), (410.0, 640.0, 655.0), (0.0, 6.0, 30.0), (0.5, 0.8, 1.0))
 MIXED = Space("sweep", "edges", "RYNCy", Filter(FAMILY, ("N",), "Y", "G"), AXES)
 MORE = {
-    "noise, far": setup_of({"noise": True, "target": FAR, "optics": F2}, DARK | {"prnu": 0.01}),
-    "background, pixel by pixel": setup_of(
+    "noise, far": view_of({"noise": True, "target": FAR, "optics": F2}, DARK | {"prnu": 0.01}),
+    "background, pixel by pixel": view_of(
         {"background_cd_m2": 300, "intensity_cd": 200, "exposure": FIXED, "target": FAR, "optics": F2},
         {"crosstalk": 0.1},
     ),
@@ -43,29 +43,40 @@ def assert_same(found: dict[str, Any], which: Any, alone: dict[str, Any]) -> Non
         np.testing.assert_array_equal(found[name][which], values, err_msg=name)
 
 
-@pytest.mark.parametrize("name", [*SETUPS, *MORE])
-@pytest.mark.parametrize("separable", [True, False])
-def test_a_design_alone_is_the_one_of_its_block(name: str, separable: bool) -> None:
-    setup = (SETUPS | MORE)[name]
-    states = STATES if setup.methods.quantization != "skip" and setup.methods.noise != "skip" else ()
-    imager = Imager(setup)
-    space = MIXED if setup.scenario.target is None else SPACE
+LONG = [("pulsed", False)]
+"""Blocks that take seconds as a whole: for the long tests alone."""
+
+
+@pytest.mark.parametrize(
+    ("name", "separable", "step"),
+    [
+        pytest.param(name, separable, step, marks=[pytest.mark.slow] if step == 1 else [])
+        for name in (*VIEWS, *MORE)
+        for separable in (True, False)
+        for step in ((1,) if (name, separable) in LONG else (1, 11))
+    ],
+)
+def test_a_design_alone_is_the_one_of_its_block(name: str, separable: bool, step: int) -> None:
+    view = (VIEWS | MORE)[name]
+    states = STATES if view.methods.quantization != "skip" and view.methods.noise != "skip" else ()
+    imager = Imager(view)
+    space = MIXED if view.scenario.target is None else SPACE
     block = edges_of(space, 0, space.size)
     assert block is not None
     curves = block.curves()
     whole = evaluate(imager, block if separable else curves, states)
     rng = np.random.default_rng(5)
-    parts = [np.array([at]) for at in range(0, space.size, 1 if setup.scenario.target is None else 5)]
+    parts = [np.array([at]) for at in range(0, space.size, 1 if view.scenario.target is None else 5)]
     parts += [np.arange(start, start + n) for n in (2, 3, 15, 16, 17, 31) for start in rng.integers(0, 40, 2)]
-    for part in parts:
-        some = edges_of(space, part[0], part[-1] + 1) if separable else Curves(curves[part])
+    for part in parts[::step]:
+        some = edges_of(space, part[0], part[-1] + 1) if separable else CurveBlock(curves[part])
         assert some is not None
         assert_same(whole, part, evaluate(imager, some, states))
 
 
 @pytest.mark.parametrize("separable", [True, False])
 def test_a_bad_design_changes_no_other(separable: bool) -> None:
-    imager = Imager(SETUPS["saturated" if separable else "chart"])  # one exposure for all; one that the design sets
+    imager = Imager(VIEWS["saturated" if separable else "chart"])  # one exposure for all; one that the design sets
     fine = edges_of(SPACE, 0, SPACE.size)
     assert fine is not None
     bad = np.array([0, 17, 30])
@@ -115,12 +126,12 @@ def test_a_bad_design_changes_no_other(separable: bool) -> None:
 )
 def test_families_give_the_same_curves_and_lengths_alone(space: Space) -> None:
     points = space.points(0, space.size)
-    whole = space.curves(points, GRID.size), space.violation(points), space.dimensions(points)
+    whole = space.curves(points, GRID.size), space.violation(points), family_quantities(space.filter.family, points)
     for at in range(space.size):
         one = points[at : at + 1]
         np.testing.assert_array_equal(space.curves(one, GRID.size)[0], whole[0][at])
         np.testing.assert_array_equal(space.violation(one)[0], whole[1][at])
-        for name, values in space.dimensions(one).items():
+        for name, values in family_quantities(space.filter.family, one).items():
             np.testing.assert_array_equal(values[0], whole[2][name][at])
 
 
@@ -131,11 +142,11 @@ def test_two_modified_channels(scenario: dict[str, Any]) -> None:
     mosaic = Mosaic.from_rows("RAACy", [["R", "Na"], ["Nb", "Cy"]])
     qe = SENSOR.mosaic_qe(mosaic, {"Na": "Y", "Nb": "Y"})
     modified = tuple(mosaic.channels.index(name) for name in ("Na", "Nb"))
-    setup = Setup(GRID, mosaic, qe, modified, SENSOR.qe["C"], lights(), Pixel(), Scenario.model_validate(scenario))
+    view = View(GRID, mosaic, qe, modified, SENSOR.qe["C"], lights(), Pixel(), Scenario.model_validate(scenario))
     family = Dual(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["C"])
     space = Space("sweep", "dual", "RAACy", Filter(family, ("Na", "Nb"), "Y", "C"), AXES)
     curves = space.curves(space.points(0, 40), GRID.size)
-    imager = Imager(setup)
+    imager = Imager(view)
     whole = evaluate(imager, curves)
     for at in range(0, 40, 3):
         assert_same(whole, slice(at, at + 1), evaluate(imager, curves[at : at + 1]))

@@ -13,7 +13,7 @@ import pandas as pd
 import psutil
 import pyarrow.parquet as pq
 import pytest
-from threadpoolctl import threadpool_info
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from sweep.commands.status import status_lines
 from sweep.errors import FailedDesignError, OutputError, SweepError
@@ -32,17 +32,26 @@ from ..mischief import StoppedError, half_done, mischievous, rows
 
 
 @pytest.fixture(scope="module")
-def unharmed(plain: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
+def fewer(plain: Study) -> Study:
+    """A sweep alone, with a tenth of its right edges: designs by their curves take longer."""
+    sweep = plain.spaces[-1]
+    few = replace(sweep, axes=(*sweep.axes[:2], sweep.axes[2][::10], *sweep.axes[3:]))
+    return replace(plain, spaces=(*plain.spaces[:-1], few))
+
+
+@pytest.fixture(scope="module")
+def unharmed(fewer: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
     """What a mischievous study gives when its file is missing."""
     folder = tmp_path_factory.mktemp("unharmed")
-    ran(mischievous(plain, folder / "missing"), folder, 1)
+    ran(mischievous(fewer, folder / "missing"), folder, 1)
     return pd.read_parquet(folder / "results.parquet")
 
 
-def test_a_worker_that_is_killed_once_costs_nothing(plain: Study, unharmed: pd.DataFrame, tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_a_worker_that_is_killed_once_costs_nothing(fewer: Study, unharmed: pd.DataFrame, tmp_path: Path) -> None:
     wish = tmp_path / "wish"
     wish.write_text("kill 1 ")
-    ran(mischievous(plain, wish), tmp_path / "out", 2)
+    ran(mischievous(fewer, wish), tmp_path / "out", 2)
     assert wish.read_text().split()[2] == "done"
     pd.testing.assert_frame_equal(rows(tmp_path / "out"), unharmed)
 
@@ -52,12 +61,12 @@ def test_a_design_that_kills_its_worker_is_a_row(plain: Study, tmp_path: Path) -
     wish.write_text("kill 1000000 ")
     few = replace(plain, scenarios={"chart": plain.scenarios["chart"]})
     sweep = few.spaces[-1]
-    few = replace(few, spaces=(replace(sweep, axes=((590.0, 600.0, 610.0), (5.0,), (660.0, 670.0), (5.0,), (1.0,))),))
+    few = replace(few, spaces=(replace(sweep, axes=((590.0, 600.0, 610.0), (5.0,), (660.0,), (5.0,), (1.0,))),))
     ran(mischievous(few, tmp_path / "missing"), tmp_path / "fine", 1)
     ran(mischievous(few, wish), tmp_path / "out", 2)
     found, fine = rows(tmp_path / "out"), rows(tmp_path / "fine")
     killed = found["left_nm"] == 590
-    assert list(found.loc[killed, "status"]) == [KILLED] * 2
+    assert list(found.loc[killed, "status"]) == [KILLED]
     assert found.loc[killed, "csd_yellow_red"].isna().all()
     assert not found.loc[killed, ["feasible", "pareto"]].any(axis=None)
     same = [name for name in found.columns if name != "pareto"]
@@ -65,6 +74,7 @@ def test_a_design_that_kills_its_worker_is_a_row(plain: Study, tmp_path: Path) -
     pd.testing.assert_frame_equal(found.loc[~killed, same].astype(words), fine.loc[~killed, same].astype(words))
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_while_scenes_are_planned_costs_nothing(plain: Study, tmp_path: Path) -> None:
     wish = tmp_path / "wish"
     wish.write_text("kill 1 ")
@@ -77,15 +87,15 @@ def test_a_worker_that_is_killed_while_scenes_are_planned_costs_nothing(plain: S
     assert plans == with_plans(study, 1, lambda *_: None).plans
 
 
-def test_failing_designs_stop_a_run_or_are_tried_again(plain: Study, unharmed: pd.DataFrame, tmp_path: Path) -> None:
+def test_failing_designs_stop_a_run_or_are_tried_again(fewer: Study, unharmed: pd.DataFrame, tmp_path: Path) -> None:
     wish = tmp_path / "wish"
     wish.write_text("fail ")
-    study, folder = mischievous(plain, wish), tmp_path / "out"
+    study, folder = mischievous(fewer, wish), tmp_path / "out"
     with pytest.raises(FailedDesignError, match="no such filter"):
         run_study(study, folder, 1, lambda *_: None, wishes=Wishes(fail_fast=True))
     assert run_study(study, folder, 1, lambda *_: None)
     failed = (rows(folder)["status"] != "ok").sum()
-    assert failed == 2 * 2 * 51 * 2  # in both scenes, every design of this edge
+    assert failed == 2 * 2 * 6 * 2  # in both scenes, every design of this edge
     assert not run_study(study, folder, 1, lambda *_: None)
     wish.unlink()
     assert run_study(study, folder, 1, lambda *_: None, wishes=Wishes(retry_failed=True))
@@ -93,6 +103,7 @@ def test_failing_designs_stop_a_run_or_are_tried_again(plain: Study, unharmed: p
     assert not run_study(study, folder, 1, lambda *_: None, wishes=Wishes(retry_failed=True))
 
 
+@pytest.mark.usefixtures("plain_pictures")
 @pytest.mark.parametrize("all_fail", [False, True])
 def test_a_named_design_that_fails_is_a_row(plain: Study, tmp_path: Path, all_fail: bool) -> None:
     wish = tmp_path / "wish"
@@ -204,7 +215,7 @@ def most_threads(pause_s: float) -> int:
 
 
 def test_threads_beside_each_other_do_not_give_their_libraries_more() -> None:
-    with workers(Workers(2, Stop(), "threading")) as crew:
+    with threadpool_limits(2), workers(Workers(2, Stop(), "threading")) as crew:  # whatever the environment says
         calls = (joblib.delayed(most_threads)(0.001 * (i % 3 + 1)) for i in range(20))
         assert set(crew(calls)) == {1}
 
@@ -225,7 +236,7 @@ def test_dask_needs_a_scheduler_that_answers() -> None:
 @pytest.mark.filterwarnings("ignore")
 def test_a_cluster_gives_the_same_rows_with_a_worker_killed(tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
-    path = study_file(tmp_path, 201)
+    path = study_file(tmp_path, 101)
     path.write_text(path.read_text().replace("starts: 4", "starts: 2"))
     study = load_study(path)
     ran(study, tmp_path / "one", 1)

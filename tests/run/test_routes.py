@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sweep.designs.block import Edges
+from sweep.designs.block import EdgeBlock
 from sweep.designs.families.stopband import MultiStopband, Stopband
 from sweep.designs.space import Filter
 from sweep.disk import read_facts
@@ -101,27 +101,27 @@ def fragile_job(study: Study, kind: type[MultiStopband]) -> tuple[Job, Any, Any]
     family = kind(study.grid.nodes_nm, study.sensor.qe["Y"], study.sensor.qe["G"], *bands)
     axes = ((590.0, 600.0, 610.0, 655.5), (5.0, 20.0), (640.0, 650.0, 660.0), (5.0,), (0.3, 1.0))
     space = replace(study.spaces[-1], filter=Filter(family, ("N",), "Y", "G"), axes=axes)
-    return Job(space, "chart", 0, space.size, 0), study.setup(space, "chart"), rules_of(study)
+    return Job(space, "chart", 0, space.size, 0), study.view(space, "chart"), rules_of(study)
 
 
 @pytest.mark.parametrize("separable", [True, False])
 def test_designs_beside_a_bad_one_are_those_of_a_whole_block(
     plain: Study, monkeypatch: pytest.MonkeyPatch, separable: bool
 ) -> None:
-    job, setup, rules = fragile_job(plain, FragileEdges if separable else Fragile)
+    job, view, rules = fragile_job(plain, FragileEdges if separable else Fragile)
     whole = Stopband if separable else MultiStopband
     fine = run_job(*fragile_job(plain, whole)).to_pandas()
     assert not detours_of(run_job(*fragile_job(plain, whole)))
     if separable:  # a bad design breaks the fast way, too
-        way = Edges.product
+        way = EdgeBlock.product
 
-        def broken(self: Edges, *arguments: Any) -> Any:
+        def broken(self: EdgeBlock, *arguments: Any) -> Any:
             if (self.space.points(self.start, self.stop)[:, 0] == 600).any():
                 raise ValueError("no such edge")
             return way(self, *arguments)
 
-        monkeypatch.setattr(Edges, "product", broken)
-    table = run_job(job, setup, rules)
+        monkeypatch.setattr(EdgeBlock, "product", broken)
+    table = run_job(job, view, rules)
     found = table.to_pandas()
     bad = found["left_nm"] == 600
     assert set(found.loc[bad, "status"]) == {"error: ValueError: no such filter at all"}

@@ -7,22 +7,29 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from sweep.commands.accuracy.ladder import TOLERANCES_DN, accuracy
-from sweep.commands.audit import audit, audit_output, sampled
+from sweep.commands.accuracy.ladder import TOLERANCES_DN, measure_accuracy
+from sweep.commands.audit import audit_output, audit_rows, sampled
 from sweep.report import make_report, read_output
 from sweep.run import run_study
-from sweep.study import load_study
+from sweep.study import Study, load_study
 
 from ..build import SCENES
 from ..conftest import STUDIES
 
 
-def test_scenes_are_planned_drawn_and_audited(tmp_path: Path) -> None:
-    path, folder = tmp_path / "scenes.yaml", tmp_path / "out"
-    path.write_text(SCENES)
-    study = load_study(path)
+@pytest.fixture(scope="module")
+def road(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
+    """A study with a light at any place, and the folder of its run."""
+    folder = tmp_path_factory.mktemp("scenes")
+    (folder / "scenes.yaml").write_text(SCENES)
+    study = load_study(folder / "scenes.yaml")
+    run_study(study, folder / "out", 1, lambda *_: None)
+    return study, folder / "out"
+
+
+def test_scenes_are_planned_and_drawn(road: tuple[Study, Path]) -> None:
+    study, folder = road
     assert list(study.scenarios) == ["road distance_m=150", "road distance_m=250"]
-    run_study(study, folder, 1, lambda *_: None)
     frame = pd.read_parquet(folder / "results.parquet")
     assert set(frame["status"]) == {"ok"}
     assert (frame["csd_yellow_red"] < frame["best_place_csd_yellow_red"]).all()
@@ -31,21 +38,31 @@ def test_scenes_are_planned_drawn_and_audited(tmp_path: Path) -> None:
     output = read_output(folder)
     make_report(output)
     assert (folder / "figures" / "series-1.svg").is_file()
-    plans = output.provenance["plans"]
-    assert frame["plan"].iloc[0] == plans["road distance_m=150"]["key"]
-    effects = plans["road distance_m=150"]["effects"]
-    method = next(effect["method"] for effect in effects if effect["effect"] == "phase")
+    plans = output.provenance.plans
+    assert frame["plan"].iloc[0] == plans["road distance_m=150"].key
+    effects = plans["road distance_m=150"].effects
+    method = next(effect.method for effect in effects if effect.effect == "phase")
     assert method in (folder / "report.html").read_text()
+
+
+@pytest.mark.slow
+def test_scenes_keep_their_promise_in_an_audit(road: tuple[Study, Path]) -> None:
+    _, folder = road
     lines = audit_output(folder, None).lines
     audited = pd.read_parquet(folder / "audit.parquet")
+    frame = pd.read_parquet(folder / "results.parquet")
     assert lines[0].startswith(f"{len(audited)} of {len(frame)} designs recomputed with every effect on: no error")
     assert (audited["realized_dn"] <= audited["promised_dn"]).all()
     assert audited["realized_dn"].max() > 1e-9
-    # The audit notices a row that is wrong by more than was promised, in any column that is promised.
+
+
+def test_an_audit_notices_a_wrong_row_in_any_promised_column(road: tuple[Study, Path]) -> None:
+    study, folder = road
+    frame = pd.read_parquet(folder / "results.parquet")
     few = frame[(frame["kind"] == "reference") & (frame["scenario"] == "road distance_m=250")]
     for column in ("csd_yellow_red", "best_place_csd_yellow_red"):
         wrong = few.assign(**{column: few[column] + 6})
-        found = audit(study, [wrong])
+        found = audit_rows(study, [wrong])
         assert len(found.broken) == len(few) == 1
         assert set(found.broken["quantity"]) == {column}
 
@@ -66,6 +83,7 @@ def test_sampled_rows_are_the_front_and_a_hundredth() -> None:
     assert list(sampled(frame)["design_id"]) == list(chosen["design_id"])
 
 
+@pytest.mark.usefixtures("plain_pictures")
 def test_a_study_of_a_searched_box_alone(tmp_path: Path) -> None:
     text = (
         "study: box\nsensor: ar0820\nlights: tl16\nwavelengths: {step_nm: 5}\ncfas: [RYNCy]\n"
@@ -83,20 +101,26 @@ def test_a_study_of_a_searched_box_alone(tmp_path: Path) -> None:
 
 def test_an_audit_of_nothing_finds_nothing_broken() -> None:
     frame = pd.DataFrame({"design_id": [0], "kind": ["reference"], "pareto": [False], "status": ["not finite"]})
-    assert audit(load_study(STUDIES / "stopband.yaml"), [frame]).broken.empty
+    assert audit_rows(load_study(STUDIES / "stopband.yaml"), [frame]).broken.empty
 
 
-@pytest.mark.parametrize("place", ["[0.3, 0.6]", pytest.param("any", marks=pytest.mark.slow)])
-def test_accuracy_measures_a_ladder_of_tolerances(tmp_path: Path, place: str) -> None:
+@pytest.mark.parametrize(
+    ("place", "distances", "designs"),
+    [
+        ("[0.3, 0.6]", "[250]", 4),
+        pytest.param("[0.3, 0.6]", "[150, 250]", 4, marks=pytest.mark.slow),
+        pytest.param("any", "[250]", 2, marks=pytest.mark.slow),
+    ],
+)
+def test_accuracy_measures_a_ladder_of_tolerances(tmp_path: Path, place: str, distances: str, designs: int) -> None:
     path = tmp_path / "scenes.yaml"
-    distances = "[250]" if place == "any" else "[150, 250]"
     path.write_text(SCENES.replace("any", place).replace("[150, 250]", distances))
-    lines = accuracy(
+    lines = measure_accuracy(
         load_study(path),
         lambda step_nm: load_study(path, None, step_nm),
         tmp_path / "out",
         lambda *_: None,
-        most_designs=4,
+        most_designs=designs,
     )
     table = pd.read_parquet(tmp_path / "out" / "accuracy.parquet")
     assert len(table) == len(distances.split(",")) * len(TOLERANCES_DN)

@@ -21,8 +21,10 @@ import pytest
 from sweep.errors import InterruptedRunError
 from sweep.run.stop import GRACE_S, BrokenOffError, Stop, stop_on_signals
 from sweep.run.workers import Workers, workers
+from sweep.study import load_study
 
-from ..build import STUDY
+from ..build import STUDY, ran
+from ..commanded import commanded
 
 SLOWED = Path(__file__).parent.parent / "slowed"
 SAID = "sweep: interrupted; finished chunks are kept, the same command continues\n"
@@ -41,7 +43,11 @@ WITHIN_S = 15.0
 
 def noisy_study(folder: Path) -> Path:
     path = folder / "tiny.yaml"
-    text = STUDY.replace("COUNT", "5").replace("chart: {exposure: {kind: white_patch}}", "chart: {noise: true}")
+    text = (
+        STUDY.replace("COUNT", "5")
+        .replace("count: 51", "count: 7")
+        .replace("chart: {exposure: {kind: white_patch}}", "chart: {noise: true}")
+    )
     text = text.replace("exposure_s: 0.002}}", "exposure_s: 0.002}, noise: true}")
     path.write_text(text + "recognition: {states: [green, yellow, red], patches: 40}\n")
     return path
@@ -80,8 +86,7 @@ def kept_rows(folder: Path) -> int:
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("undisturbed")
-    noisy_study(folder)
-    subprocess.run(command(folder, "--jobs", "1"), check=True, stdout=subprocess.DEVNULL)
+    ran(load_study(noisy_study(folder)), folder / "out" / "tiny", 1)
     return folder / "out" / "tiny"
 
 
@@ -106,14 +111,16 @@ def stopped(folder: Path, phase: str, jobs: int, number: signal.Signals) -> floa
 
 
 def assert_continues(folder: Path, undisturbed: Path) -> None:
-    done = subprocess.run(command(folder, "--jobs", "2"), capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    """The same command, in this process."""
+    code, _, said = commanded(*command(folder, "--jobs", "2")[3:])
+    assert code == 0, said
     for name in ("results", "search", "points", "recognition", "curves"):
         tables = [pq.read_table(place / f"{name}.parquet") for place in (folder / "out" / "tiny", undisturbed)]
         assert tables[0].equals(tables[1]), name
     assert not list((folder / "out").rglob(".tmp-*"))
 
 
+@pytest.mark.usefixtures("plain_pictures")
 @pytest.mark.parametrize(
     ("phase", "jobs", "number"),
     [
@@ -227,6 +234,7 @@ def workers_of(mark: str) -> list[psutil.Process]:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("plain_pictures")
 def test_fifty_kills_in_every_phase(tmp_path: Path, undisturbed: Path) -> None:
     """Parents and workers, by three signals, at random moments; the rows are those of an undisturbed run each time."""
     rng = np.random.default_rng(17)
@@ -242,7 +250,7 @@ def test_fifty_kills_in_every_phase(tmp_path: Path, undisturbed: Path) -> None:
                 env=os.environ | {"SWEEP_MARK": str(tmp_path)},
             )
         wait_for(tmp_path / "out" / "tiny" / "run.json", run, tmp_path)
-        time.sleep(float(rng.uniform(0, 12)))
+        time.sleep(float(rng.uniform(0, 8)))
         number = [signal.SIGKILL, signal.SIGTERM, signal.SIGINT][int(rng.integers(3))]
         if rng.random() < 0.3 and run.poll() is None:
             for process in psutil.Process(run.pid).children(recursive=True)[-1:]:

@@ -16,24 +16,21 @@ from sweep.results.identity import CHUNK
 from sweep.run.rows import Job, joined, rules_of, run_job
 from sweep.study import Study
 
+from ..build import stopband_study
 from ..mischief import plant
 
-STUDY = """\
-study: tiny
-sensor: ar0820
-lights: tl16
+STUDY = stopband_study(
+    "tiny",
+    "{left_nm: [590, 605, 690], left_width_nm: 5, right_nm: [420, 640, 655], right_width_nm: [5, 25]}",
+    before="""\
 pixel: {crosstalk: 0.02}
 scenarios:
   chart: {}
-  far: {target: {distance_m: 250, fov_deg: 30, phase_px: any}, optics: {f_number: 2}}
-cfas: [RGGB, RYNCy]
-sweeps:
-  edges:
-    cfa: RYNCy
-    channel: N
-    base: Y
-    to: G
-    grid: {left_nm: [590, 605, 690], left_width_nm: 5, right_nm: [420, 640, 655], right_width_nm: [5, 25]}
+  far: {target: {distance_m: 250, fov_deg: 30, phase_px: any}, optics: {f_number: 4}}
+tolerance_dn: 20
+search: {space: edges, starts: 2, max_evaluations: 30}
+""",
+    after="""\
   free:
     cfa: RYNCy
     family: free_form
@@ -41,10 +38,16 @@ sweeps:
     base: Y
     options: {nodes: {start_nm: 560, stop_nm: 680, step_nm: 40}}
     grid: {transmission_560_nm: [0.5, 1], transmission_600_nm: [0.2, 0.9], transmission_640_nm: [0.1, 1], transmission_680_nm: 1}
-tolerance_dn: 5
-search: {space: edges, starts: 2, max_evaluations: 30}
-"""
+""",
+)
 FILES = ("results", "search", "points", "curves")
+RUN = """\
+import sys
+from pathlib import Path
+from sweep.run import run_study
+from sweep.study import load_study
+run_study(load_study(Path(sys.argv[1])), Path(sys.argv[2]), int(sys.argv[3]), lambda *_: None)
+"""
 
 
 def digests(folder: Path, jobs: int, threads: int) -> dict[str, str]:
@@ -53,12 +56,12 @@ def digests(folder: Path, jobs: int, threads: int) -> dict[str, str]:
     study.write_text(STUDY)
     told = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), str(threads))
     out = folder / f"{jobs}-{threads}"
-    command = [sys.executable, "-m", "sweep", "run", str(study), "--output", str(out), "--jobs", str(jobs)]
+    command = [sys.executable, "-c", RUN, str(study), str(out), str(jobs)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, env={**os.environ, **told})
     assert done.returncode == 0, done.stderr
     found = {}
     for name in FILES:
-        table = pq.read_table(out / "tiny" / f"{name}.parquet")
+        table = pq.read_table(out / f"{name}.parquet")
         found[name] = hashlib.sha256(repr(table.to_pydict()).encode()).hexdigest()  # a float's repr has every bit
     return found
 
@@ -83,10 +86,10 @@ def test_parts_of_a_job_are_the_job(plain: Study, separable: bool, monkeypatch: 
     space, rules = plain.spaces[-1], rules_of(plain)
     size = CHUNK + 300
     for scenario in plain.scenarios:
-        setup = plain.setup(space, scenario)
-        whole = run_job(Job(space, scenario, 0, size, 0), setup, rules)
+        view = plain.view(space, scenario)
+        whole = run_job(Job(space, scenario, 0, size, 0), view, rules)
         ends = [0, 1, 2, 17, 33, 1024, 2049, CHUNK, CHUNK + 1, size]
-        parts = [run_job(Job(space, scenario, a, b, a), setup, rules) for a, b in pairwise(ends)]
+        parts = [run_job(Job(space, scenario, a, b, a), view, rules) for a, b in pairwise(ends)]
         columns = [name for name in rules.schema.names if name != "pareto"]  # that of each part alone
         both = [table.select(columns).to_pydict() for table in (joined(parts), whole)]
         assert repr(both[0]) == repr(both[1])

@@ -9,18 +9,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sweep.camera.scene import FixedExposure, Scenario
-from sweep.camera.view import Setup
+from sweep.camera.scenario import Scenario
+from sweep.camera.scene import FixedExposure
+from sweep.camera.view import View
 from sweep.curves.lights import Lights
 from sweep.designs.families.free_form import FreeForm
 from sweep.designs.families.stopband import MultiStopband, Stopband
 from sweep.errors import SweepError
 from sweep.metrics.bound import FEASIBLE, Bound, total_violation
-from sweep.metrics.evaluate import designed_quantities, smooth_response
+from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.objective import Objective
 from sweep.metrics.pareto import hypervolume
 from sweep.metrics.separation import separation
+from sweep.metrics.smooth import smooth_response
 from sweep.report.summary import _limit_line
+from sweep.results.facts import SearchFacts
 from sweep.search.limit import limit_of, why_not
 from sweep.search.problem import Problem, best_feasible, starting_points
 from sweep.search.solver import search_from
@@ -35,12 +38,12 @@ LIMIT = limit_of(PROBLEM)
 
 
 def csd(problem: Problem, curves: np.ndarray) -> np.ndarray:
-    first, second = (problem.setup.members[name] for name in problem.pairs["csd_yellow_red"])
-    return separation(smooth_response(problem.setup, curves)[:, 0], first, second)
+    first, second = (problem.view.members[name] for name in problem.pairs["csd_yellow_red"])
+    return separation(smooth_response(problem.view, curves)[:, 0], first, second)
 
 
 def feasible(problem: Problem, curves: np.ndarray) -> np.ndarray:
-    amounts = designed_quantities(problem.setup, curves)
+    amounts = designed_quantities(problem.view, curves)
     return total_violation(amounts, problem.constraints, np.zeros(len(curves))) <= FEASIBLE
 
 
@@ -48,7 +51,7 @@ def test_the_bracket_is_tight_and_attained_by_its_filter() -> None:
     assert LIMIT.curve is not None
     curve = LIMIT.curve
     assert 0 <= LIMIT.proven - LIMIT.attained <= 2e-3
-    assert ((curve >= 0) & (curve <= PROBLEM.setup.base_qe[0])).all()
+    assert ((curve >= 0) & (curve <= PROBLEM.view.base_qe[0])).all()
     assert feasible(PROBLEM, curve[None, None])[0]
     assert csd(PROBLEM, curve[None, None])[0] == pytest.approx(LIMIT.attained, rel=1e-12)
 
@@ -58,11 +61,11 @@ def test_one_pair_of_signals_has_a_closed_form() -> None:
     lights = STUDY.lights
     keep = [lights.members["yellow"][3], lights.members["red"][5]]
     two = Lights("two", ("y", "r"), ("yellow", "red"), lights.photons[keep], lights.photon_ratio, "", True)
-    problem = replace(PROBLEM, setup=replace(PROBLEM.setup, lights=two), constraints={"sensitivity": Bound(min=0.93)})
+    problem = replace(PROBLEM, view=replace(PROBLEM.view, lights=two), constraints={"sensitivity": Bound(min=0.93)})
     found = limit_of(problem)
-    base = problem.setup.base_qe[0]
-    response = smooth_response(problem.setup, base[None, None])[0, 0]
-    channel = problem.setup.modified[0]
+    base = problem.view.base_qe[0]
+    response = smooth_response(problem.view, base[None, None])[0, 0]
+    channel = problem.view.modified[0]
     gain = response[:, channel] / (two.photons @ base)
     per_qe = gain[0] * two.photons[0] - gain[1] * two.photons[1]
     budget = 0.07 * base.sum()
@@ -79,7 +82,7 @@ def test_one_pair_of_signals_has_a_closed_form() -> None:
 
 
 def random_filters(kind: str, count: int, rng: np.random.Generator) -> np.ndarray:
-    base, green = PROBLEM.setup.base_qe[0], STUDY.sensor.qe["G"]
+    base, green = PROBLEM.view.base_qe[0], STUDY.sensor.qe["G"]
     wave = STUDY.grid.nodes_nm
     if kind == "free_form":
         family = FreeForm(wave, base, np.arange(540.0, 701.0, 4.0))
@@ -102,8 +105,8 @@ def random_filters(kind: str, count: int, rng: np.random.Generator) -> np.ndarra
 def test_no_random_feasible_filter_beats_the_limit(kind: str) -> None:
     curves = random_filters(kind, 20_000, np.random.default_rng(11))
     # Scaled toward the base until the sensitivity holds, so that every filter takes part.
-    base = PROBLEM.setup.base_qe
-    lost = 1 - designed_quantities(PROBLEM.setup, curves)["sensitivity"]
+    base = PROBLEM.view.base_qe
+    lost = 1 - designed_quantities(PROBLEM.view, curves)["sensitivity"]
     share = np.minimum(1.0, 0.1 / np.maximum(lost, 1e-12))[:, None, None]
     curves = base + share * (curves - base)
     ok = feasible(PROBLEM, curves)
@@ -111,6 +114,7 @@ def test_no_random_feasible_filter_beats_the_limit(kind: str) -> None:
     assert csd(PROBLEM, curves[ok]).max() <= LIMIT.proven
 
 
+@pytest.mark.slow
 def test_free_form_search_comes_within_one_percent() -> None:
     study = load_study(STUDIES / "freeform.yaml")
     assert study.search is not None
@@ -129,7 +133,7 @@ def test_a_tighter_study_has_a_lower_limit() -> None:
     found = limit_of(tight)
     assert found.curve is not None
     assert found.proven < LIMIT.attained
-    assert (found.curve >= 0.3 * PROBLEM.setup.base_qe[0] * (1 - 1e-9)).all()
+    assert (found.curve >= 0.3 * PROBLEM.view.base_qe[0] * (1 - 1e-9)).all()
     steep = replace(PROBLEM, constraints={**PROBLEM.constraints, "slope_per_nm": Bound(max=0.04)})
     assert limit_of(steep).proven <= LIMIT.proven
     nothing = replace(PROBLEM, constraints={"sensitivity": Bound(min=1.01)})
@@ -170,8 +174,8 @@ def test_the_limit_of_the_smallest_of_several_distances() -> None:
     two = replace(PROBLEM, objective=Objective(minimum={"csd_yellow_red": 1.0, "csd_orange_red": 2.0}))
     found = limit_of(two)
     assert found.curve is not None
-    members = PROBLEM.setup.members
-    response = smooth_response(PROBLEM.setup, found.curve[None, None])[:, 0]
+    members = PROBLEM.view.members
+    response = smooth_response(PROBLEM.view, found.curve[None, None])[:, 0]
     yr, orange = (separation(response, members[kind], members["red"])[0] for kind in ("yellow", "orange"))
     assert min(yr, 2 * orange) == pytest.approx(found.attained, rel=1e-12)
     assert found.proven <= LIMIT.proven + 1e-3
@@ -203,43 +207,57 @@ def test_hypervolume_of_two_steps() -> None:
 
 def test_no_limit_is_claimed_where_it_would_not_hold() -> None:
     wave, cyan, green = STUDY.grid.nodes_nm, STUDY.sensor.qe["Cy"], STUDY.sensor.qe["G"]
-    above = replace(PROBLEM, family=Stopband(wave, cyan, green), setup=_with_base(cyan))
+    above = replace(PROBLEM, family=Stopband(wave, cyan, green), view=_with_base(cyan))
     assert why_not(above) == "filters of the box may exceed the curve that they replace"
-    below = replace(PROBLEM, family=Stopband(wave, PROBLEM.setup.base_qe[0], -0.1 * green))
+    below = replace(PROBLEM, family=Stopband(wave, PROBLEM.view.base_qe[0], -0.1 * green))
     assert why_not(below) == "filters of the box may be below 0"
-    scenario = replace(PROBLEM.setup, scenario=Scenario(exposure=FixedExposure(exposure_s=1000.0)))
-    assert why_not(replace(PROBLEM, setup=scenario)) == "signals exceed the full well or the range of the ADC"
+    scenario = replace(PROBLEM.view, scenario=Scenario(exposure=FixedExposure(exposure_s=1000.0)))
+    assert why_not(replace(PROBLEM, view=scenario)) == "signals exceed the full well or the range of the ADC"
 
 
-def _with_base(curve: np.ndarray) -> Setup:
-    qe = PROBLEM.setup.qe.copy()
-    qe[PROBLEM.setup.modified[0]] = curve
-    return replace(PROBLEM.setup, qe=qe)
+def _with_base(curve: np.ndarray) -> View:
+    qe = PROBLEM.view.qe.copy()
+    qe[PROBLEM.view.modified[0]] = curve
+    return replace(PROBLEM.view, qe=qe)
 
 
 def test_words_say_what_is_proven() -> None:
-    """A finished proof, one that was cut short, levels that were, and the limit of an earlier version."""
-    output: Any = SimpleNamespace(objective="csd_yellow_red")
-    search = {
-        "no_limit": None,
-        "gap": 0.1,
-        "limit_attained": 90.0,
-        "limit_proven": 100.0,
-        "limit_left_out": ["edge_width_nm"],
-    }
-    done = search | {"limit_programs": 9, "limit_open_parts": 0, "front_limits_open": 0}
+    """A finished proof, one that was cut short, and levels that were."""
+    output: Any = SimpleNamespace(goal=PROBLEM.quantities["csd_yellow_red"])
+    done = SearchFacts(
+        algorithm="SLSQP",
+        scenario="chart",
+        space="edges",
+        starts=1,
+        evaluations=1,
+        endings=("success",),
+        objective="csd_yellow_red",
+        best_smooth_objective=90.0,
+        best_sensitivity=0.9,
+        limit_attained=90.0,
+        limit_proven=100.0,
+        limit_left_out=("edge_width_nm",),
+        limit_programs=9,
+        limit_open_parts=0,
+        front_limits_open=0,
+        gap=0.1,
+        no_limit=None,
+        front_evaluations=0,
+    )
     words = _limit_line(output, done)
     assert (
         "no filter exceeds 100.000 DN (proven) and one attains 90.000 DN; the search's answer is 10.0% below" in words
     )
     assert "under the same constraints but edge_width_nm, before clipping and quantization" in words
     assert "open" not in words
-    cut = _limit_line(output, done | {"limit_open_parts": 3})
+    cut = _limit_line(output, done.model_copy(update={"limit_open_parts": 3}))
     assert "the limit itself is not proven: 3 parts are open after 9 linear programs" in cut
-    unknown = _limit_line(output, done | {"limit_attained": None})
+    unknown = _limit_line(output, done.model_copy(update={"limit_attained": None}))
     assert "no filter exceeds 100.000 DN (proven); the search's answer is 10.0% below" in unknown
-    assert "At 2 levels of the front the line is an upper bound" in _limit_line(output, done | {"front_limits_open": 2})
-    assert "not proven for every filter" in _limit_line(output, search)
+    levels = done.model_copy(update={"front_limits_open": 2})
+    assert "At 2 levels of the front the line is an upper bound" in _limit_line(output, levels)
+    none = done.model_copy(update={"no_limit": "the objective is a sum", "limit_proven": None})
+    assert _limit_line(output, none) == "Limit: none computed (the objective is a sum)."
 
 
 @pytest.mark.parametrize("level", [0.8, 0.9, 0.97, 1.0])

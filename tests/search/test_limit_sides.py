@@ -11,9 +11,10 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 
 from sweep.designs.families.free_form import FreeForm
 from sweep.metrics.bound import FEASIBLE, Bound, total_violation
-from sweep.metrics.evaluate import designed_quantities, smooth_response
+from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.objective import Objective
 from sweep.metrics.separation import separation
+from sweep.metrics.smooth import smooth_response
 from sweep.search.limit import Limit, limit_of
 from sweep.search.problem import Problem, best_feasible, starting_points
 from sweep.search.solver import search_from
@@ -79,8 +80,8 @@ def coarse(tmp_path_factory: pytest.TempPathFactory) -> Problem:
 
 def smallest(problem: Problem, curve: np.ndarray, name: str) -> float:
     """A CSD of the smooth response, the smallest over the places of the light."""
-    first, second = (problem.setup.members[kind] for kind in problem.pairs[name])
-    response = smooth_response(problem.setup, curve[None, None])[0]
+    first, second = (problem.view.members[kind] for kind in problem.pairs[name])
+    response = smooth_response(problem.view, curve[None, None])[0]
     return min(float(separation(place[None], first, second)[0]) for place in response)
 
 
@@ -88,10 +89,10 @@ def check_attained(problem: Problem, limit: Limit) -> None:
     """The filter of the limit meets everything, and reaches what is said."""
     assert limit.curve is not None
     curves = limit.curve[None, None]
-    amounts = designed_quantities(problem.setup, curves)
+    amounts = designed_quantities(problem.view, curves)
     amounts |= {n: np.array([smallest(problem, limit.curve, n)]) for n in problem.constraints if n in problem.pairs}
     assert total_violation(amounts, problem.constraints, np.zeros(1))[0] <= FEASIBLE
-    assert ((limit.curve >= 0) & (limit.curve <= problem.setup.base_qe[0])).all()
+    assert ((limit.curve >= 0) & (limit.curve <= problem.view.base_qe[0])).all()
     reached = min(w * smallest(problem, limit.curve, name) for name, w in problem.objective.weights.items())
     assert reached == pytest.approx(limit.attained, rel=1e-12)
 
@@ -109,16 +110,16 @@ class Pairs:
 
 
 def pairs_of(problem: Problem) -> Pairs:
-    setup, size, channel = problem.setup, problem.setup.grid.size, problem.setup.modified[0]
-    dark = smooth_response(setup, np.zeros((1, 1, size)))[0]
-    gain = smooth_response(setup, np.eye(size)[:, None])[..., channel] - dark[..., channel]
+    view, size, channel = problem.view, problem.view.grid.size, problem.view.modified[0]
+    dark = smooth_response(view, np.zeros((1, 1, size)))[0]
+    gain = smooth_response(view, np.eye(size)[:, None])[..., channel] - dark[..., channel]
     found = []
     for name, kinds in problem.pairs.items():
         weight, bound = problem.objective.weights.get(name), problem.constraints.get(name)
         if weight is None and bound is None:
             continue
-        for one in setup.members[kinds[0]]:
-            for other in setup.members[kinds[1]]:
+        for one in view.members[kinds[0]]:
+            for other in view.members[kinds[1]]:
                 for place in range(len(dark)):
                     rest = np.delete(dark[place, one] - dark[place, other], channel)
                     least, rate = 0.0 if bound is None else bound.min, 0.0 if weight is None else 1 / weight
@@ -137,7 +138,7 @@ def largest(problem: Problem, t: float) -> float:
     """t and the largest margin above it, by a MILP with a binary per pair; exactly the limit where the other channels do
     not matter, and below t where no filter reaches t.
     """
-    pairs, base = pairs_of(problem), problem.setup.base_qe[0]
+    pairs, base = pairs_of(problem), problem.view.base_qe[0]
     needed = np.sqrt(np.maximum(np.maximum(pairs.least, t * pairs.rate) ** 2 - pairs.squared, 0))
     asked = needed > 0
     apart, needed, rate = pairs.apart[asked], needed[asked], pairs.rate[asked, None]
@@ -146,7 +147,7 @@ def largest(problem: Problem, t: float) -> float:
     most = needed + rate[:, 0] * (t + 1)
     above, below = most - np.minimum(apart, 0) @ base, most + np.maximum(apart, 0) @ base
     step, none = np.diff(np.eye(size), axis=0), np.zeros((size - 1, n + 1))
-    slope = problem.constraints["slope_per_nm"].max * problem.setup.grid.step_nm
+    slope = problem.constraints["slope_per_nm"].max * problem.view.grid.step_nm
     found = milp(
         np.append(np.zeros(size + n), -1.0),
         constraints=[
@@ -180,7 +181,7 @@ def agrees(problem: Problem) -> Limit:
 def random_problem(template: Problem, seed: int) -> Problem:
     """3 to 8 lights of each type anywhere, under a random curve; the other channels are flat, or nearly."""
     rng = np.random.default_rng(seed)
-    wave = template.setup.grid.nodes_nm
+    wave = template.view.grid.nodes_nm
     counts = 3 + rng.binomial(5, 0.2, 2)
     photons = np.concatenate(
         [
@@ -188,18 +189,18 @@ def random_problem(template: Problem, seed: int) -> Problem:
             for count, ends in zip(counts, ((480, 640), (500, 680)), strict=True)
         ]
     )
-    photons /= photons.sum(axis=1, keepdims=True) * template.setup.grid.step_nm
+    photons /= photons.sum(axis=1, keepdims=True) * template.view.grid.step_nm
     types = ("yellow",) * counts[0] + ("red",) * counts[1]
-    lights = replace(template.setup.lights, names=tuple(map(str, range(counts.sum()))), types=types, photons=photons)
+    lights = replace(template.view.lights, names=tuple(map(str, range(counts.sum()))), types=types, photons=photons)
     base = np.interp(wave, np.linspace(400, 700, 7), rng.uniform(0.05, 0.85, 7))
-    qe = template.setup.qe.copy()
-    qe[template.setup.modified[0]] = base
+    qe = template.view.qe.copy()
+    qe[template.view.modified[0]] = base
     qe[0] = 0.5 + (seed % 2) * 0.02 * np.interp(wave, [500, 680], [0, 1])
     qe[1] = 0.3
     family = FreeForm(wave, base, np.arange(400.0, 701.0, 20.0))
     return replace(
         template,
-        setup=replace(template.setup, lights=lights, qe=qe),
+        view=replace(template.view, lights=lights, qe=qe),
         family=family,
         low=np.zeros(family.nodes_nm.size),
         high=np.ones(family.nodes_nm.size),
@@ -242,11 +243,11 @@ def test_two_hundred_limits_are_those_of_a_milp(coarse: Problem) -> None:
 def test_several_csds_have_sides_of_their_own(coarse: Problem, seed: int) -> None:
     """The smallest of two weighted CSDs, and a third one that is constrained: each with pairs on either side."""
     problem = random_problem(coarse, seed)
-    lights = problem.setup.lights
+    lights = problem.view.lights
     types = tuple("orange" if i % 3 == 2 else kind for i, kind in enumerate(lights.types))
     problem = replace(
         problem,
-        setup=replace(problem.setup, lights=replace(lights, types=types)),
+        view=replace(problem.view, lights=replace(lights, types=types)),
         objective=Objective(minimum={"csd_yellow_red": 1.0, "csd_orange_red": 1.5}),
     )
     free = agrees(problem)
@@ -267,7 +268,7 @@ def test_every_place_of_a_light_has_sides_of_its_own(coarse: Problem, tmp_path: 
     assert study.search is not None
     problem = study.problem(study.search)
     limit = agrees(problem)
-    assert len(smooth_response(problem.setup, problem.setup.base_qe[None])[0]) > 1
+    assert len(smooth_response(problem.view, problem.view.base_qe[None])[0]) > 1
     assert is_mixed(problem, limit.curve)
     assert limit.proven <= limit_of(coarse).proven * 1.001
 

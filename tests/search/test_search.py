@@ -11,15 +11,18 @@ from sweep.commands.app import main
 from sweep.designs.families.free_form import FreeForm
 from sweep.errors import BrokenProofError
 from sweep.metrics.bound import FEASIBLE, Bound, total_violation
-from sweep.metrics.evaluate import designed_quantities, smooth_response
+from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.objective import Objective
 from sweep.metrics.separation import separation
+from sweep.metrics.smooth import smooth_response
 from sweep.run import search as searching
+from sweep.search import trade_off
 from sweep.search.limit import Limit, limit_of
 from sweep.search.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
 from sweep.search.solver import search_from
 from sweep.study import Study, load_study
 
+from ..build import stopband_study
 from ..conftest import STUDIES
 
 
@@ -34,11 +37,11 @@ def test_search_beats_a_fine_grid_of_its_box(study: Study) -> None:
     rng = np.random.default_rng(7)
     x = problem.from_unit(rng.uniform(size=(20_000, problem.free.size)))
     curves = problem.family.curves(x)
-    ok = (designed_quantities(problem.setup, curves)["sensitivity"] >= 0.90) & (problem.family.violation(x) <= 0).all(
+    ok = (designed_quantities(problem.view, curves)["sensitivity"] >= 0.90) & (problem.family.violation(x) <= 0).all(
         axis=1
     )
-    members = problem.setup.members
-    csd = separation(smooth_response(problem.setup, curves[ok])[:, 0], members["yellow"], members["red"])
+    members = problem.view.members
+    csd = separation(smooth_response(problem.view, curves[ok])[:, 0], members["yellow"], members["red"])
     log = []
     for start, u in enumerate(starting_points(problem, 4, 1)):
         log += search_from(problem, start, u, "SLSQP", 125).log
@@ -64,15 +67,15 @@ def test_search_beats_a_million_designs_of_its_box(tmp_path: Path) -> None:
     space = study.search.space
     assert space.size == 1_000_000
     problem = study.problem(study.search)
-    members = problem.setup.members
+    members = problem.view.members
     best_swept = 0.0
     for start in range(0, space.size, 4000):
         x = space.points(start, start + 4000)
         curves = problem.family.curves(x)
-        amounts = designed_quantities(problem.setup, curves)
+        amounts = designed_quantities(problem.view, curves)
         ok = total_violation(amounts, problem.constraints, space.violation(x)) <= FEASIBLE
         if ok.any():
-            response = smooth_response(problem.setup, curves[ok])[:, 0]
+            response = smooth_response(problem.view, curves[ok])[:, 0]
             best_swept = max(best_swept, separation(response, members["yellow"], members["red"]).max())
     runs = [search_from(problem, i, u, "SLSQP", 125) for i, u in enumerate(starting_points(problem, 16, 1))]
     best = best_feasible([e for run in runs for e in run.log])
@@ -132,8 +135,8 @@ def test_constraint_on_another_pair_is_met(tmp_path: Path) -> None:
     ]
     best = best_feasible(log)
     assert best is not None
-    members = problem.setup.members
-    response = smooth_response(problem.setup, problem.family.curves(best.x[None]))[:, 0]
+    members = problem.view.members
+    response = smooth_response(problem.view, problem.family.curves(best.x[None]))[:, 0]
     assert separation(response, members["orange"], members["red"])[0] >= 100 * (1 - FEASIBLE)
 
 
@@ -169,8 +172,8 @@ def test_direct_algorithms_repeat(study: Study, algorithm: str) -> None:
 def test_a_filter_without_light_does_not_end_the_search(study: Study) -> None:
     assert study.search is not None
     problem = study.problem(study.search)
-    dark = replace(problem.setup, qe=problem.setup.qe * 0)
-    run = search_from(replace(problem, setup=dark), 0, np.full(problem.free.size, 0.5), "SLSQP", 20)
+    dark = replace(problem.view, qe=problem.view.qe * 0)
+    run = search_from(replace(problem, view=dark), 0, np.full(problem.free.size, 0.5), "SLSQP", 20)
     assert best_feasible(run.log) is None
     assert run.log
 
@@ -185,12 +188,12 @@ def test_a_bound_at_the_end_of_what_can_be_is_met(study: Study, constraints: dic
     assert study.search is not None
     found = study.problem(study.search)
     wave, base = study.grid.nodes_nm, np.full(study.grid.size, 0.3)
-    qe = found.setup.qe.copy()
-    qe[found.setup.modified[0]] = base
+    qe = found.view.qe.copy()
+    qe[found.view.modified[0]] = base
     family = FreeForm(wave, base, np.arange(400.0, 701.0, 20.0))
     ends = np.zeros(family.nodes_nm.size), np.ones(family.nodes_nm.size)
     problem = Problem(
-        replace(found.setup, qe=qe), family, *ends, Objective(minimum={"csd_yellow_red": 1.0}), constraints
+        replace(found.view, qe=qe), family, *ends, Objective(minimum={"csd_yellow_red": 1.0}), constraints
     )
     log = [
         e for i, u in enumerate(starting_points(problem, 4, 1)) for e in search_from(problem, i, u, "SLSQP", 100).log
@@ -199,7 +202,7 @@ def test_a_bound_at_the_end_of_what_can_be_is_met(study: Study, constraints: dic
     assert best is not None
     name, bound = next(iter(constraints.items()))
     curves = family.curves(best.x[None])
-    assert bound.violation(designed_quantities(problem.setup, curves)[name])[0] <= FEASIBLE
+    assert bound.violation(designed_quantities(problem.view, curves)[name])[0] <= FEASIBLE
     assert np.ptp(curves) <= 1e-6  # 300 steps of what counts as no slope
     assert best.objective <= limit_of(problem).proven
 
@@ -226,26 +229,14 @@ def test_rounding_is_no_violation_of_any_bound(bound: float) -> None:
         assert kind.violation(np.array([bound + sign * max(1e-6, 1e-3 * bound)]))[0] > FEASIBLE
 
 
-TINY = """\
-study: tiny
-sensor: ar0820
-lights: tl16
-cfas: [RYNCy]
-sweeps:
-  edges:
-    cfa: RYNCy
-    channel: N
-    base: Y
-    to: G
-    grid:
-      left_nm: {min: 590, max: 690, count: 5}
-      left_width_nm: [5]
-      right_nm: {min: 640, max: 690, count: 5}
-      right_width_nm: [5]
-constraints:
-  sensitivity: {min: 0.9}
-search: {starts: 2, max_evaluations: 60, front: {min: 0.85, max: 0.95, count: 3}}
-"""
+TINY = stopband_study(
+    "tiny",
+    "{left_nm: {min: 590, max: 690, count: 5}, left_width_nm: [5], right_nm: {min: 640, max: 690, count: 5}, "
+    "right_width_nm: [5]}",
+    after="constraints: {sensitivity: {min: 0.9}}\n"
+    "search: {starts: 2, max_evaluations: 60, front: {min: 0.85, max: 0.95, count: 3}}\n",
+    cfas="[RYNCy]",
+)
 
 
 @pytest.mark.parametrize(("tolerance_dn", "where"), [(1e-3, "broken proof: "), (0.02, "broken proof at a sensitivity")])
@@ -271,9 +262,11 @@ def test_a_limit_below_what_the_search_found_stops_the_run(
             main()
         return stopped.value.code
 
-    monkeypatch.setattr(searching, "search_from", counted)
+    for module in (searching, trade_off):
+        monkeypatch.setattr(module, "search_from", counted)
     with monkeypatch.context() as wrong:
-        wrong.setattr(searching, "limit_of", planted)
+        for module in (searching, trade_off):
+            wrong.setattr(module, "limit_of", planted)
         assert ended() == BrokenProofError.exit_code == 5
         said = capsys.readouterr().err.splitlines()
         assert len(said) == 1

@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sweep.camera.methods import REFERENCE
 from sweep.camera.pixel import Pixel
-from sweep.camera.scene import Scenario
-from sweep.camera.view import REFERENCE
+from sweep.camera.scenario import Scenario
 from sweep.metrics.bound import Bound
-from sweep.metrics.evaluate import designed_quantities, smooth_csd, smooth_response
+from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.objective import Objective
 from sweep.metrics.separation import separation
+from sweep.metrics.smooth import smooth_csd, smooth_response
 from sweep.search.gradients import Model
 from sweep.search.limit import limit_of, why_not
 from sweep.search.problem import Problem, SearchRun, best_feasible, starting_points
@@ -85,13 +86,13 @@ def test_derivatives_agree_with_differences(name: str, objective: Objective) -> 
 )
 @pytest.mark.parametrize("crosstalk", [0.0, 0.05])
 def test_derivatives_hold_in_scenes(scenario: dict[str, object], crosstalk: float) -> None:
-    setup = replace(
-        STOPBAND.setup,
+    view = replace(
+        STOPBAND.view,
         scenario=Scenario.model_validate(scenario),
         pixel=Pixel(crosstalk=crosstalk),
         methods=replace(REFERENCE, phase="pixel", blur="every 10 nm"),
     )
-    problem = replace(STOPBAND, setup=setup)
+    problem = replace(STOPBAND, view=view)
     u, step = np.full(problem.free.size, 0.4), 1e-5
     _, by_u = at(problem, u)
     scale = np.abs(by_u).max(axis=1) + 1e-9
@@ -102,11 +103,11 @@ def test_derivatives_hold_in_scenes(scenario: dict[str, object], crosstalk: floa
 
 def test_a_search_in_a_far_scene_stays_below_its_limit() -> None:
     far = {"target": {"distance_m": 250, "fov_deg": 30}, "optics": {"f_number": 2.0}}
-    setup = replace(STOPBAND.setup, scenario=Scenario.model_validate(far))
-    problem = replace(STOPBAND, setup=setup)
+    view = replace(STOPBAND.view, scenario=Scenario.model_validate(far))
+    problem = replace(STOPBAND, view=view)
     limit = limit_of(problem)
     assert limit.curve is not None
-    assert smooth_csd(setup, limit.curve[None, None], ("yellow", "red"))[0] == pytest.approx(limit.attained, rel=1e-12)
+    assert smooth_csd(view, limit.curve[None, None], ("yellow", "red"))[0] == pytest.approx(limit.attained, rel=1e-12)
     log = [
         e for i, u in enumerate(starting_points(problem, 4, 1)) for e in search_from(problem, i, u, "SLSQP", 125).log
     ]
@@ -114,7 +115,7 @@ def test_a_search_in_a_far_scene_stays_below_its_limit() -> None:
     assert best is not None
     assert 0.7 * limit.proven < best.objective <= limit.proven
     assert limit.proven < limit_of(STOPBAND).proven  # blur takes separation away from every filter
-    mixed = replace(problem, setup=replace(setup, pixel=Pixel(crosstalk=0.01)))
+    mixed = replace(problem, view=replace(view, pixel=Pixel(crosstalk=0.01)))
     assert why_not(mixed) == "crosstalk mixes the modified channel into others"
 
 
@@ -127,9 +128,9 @@ def test_worst_case_is_the_smallest_over_the_shifts() -> None:
     moved = np.repeat(best.x[None], 401, axis=0)
     moved[:, [0, 2]] += np.linspace(-4, 4, 401)[:, None]
     curves = problem.family.curves(moved)
-    members = problem.setup.members
-    csd = separation(smooth_response(problem.setup, curves)[:, 0], members["yellow"], members["red"])
-    sensitivity = designed_quantities(problem.setup, curves)["sensitivity"]
+    members = problem.view.members
+    csd = separation(smooth_response(problem.view, curves)[:, 0], members["yellow"], members["red"])
+    sensitivity = designed_quantities(problem.view, curves)["sensitivity"]
     assert best.objective == pytest.approx(csd[::100].min(), rel=1e-12)
     # Between the five places that are looked at, nothing is much worse.
     assert csd.min() >= best.objective * 0.99
@@ -141,7 +142,7 @@ def test_worst_case_is_the_smallest_over_the_shifts() -> None:
 
 
 @pytest.mark.parametrize("objective", OBJECTIVES[1:], ids=str)
-@pytest.mark.parametrize("algorithm", ["SLSQP", "COBYLA"])
+@pytest.mark.parametrize("algorithm", ["SLSQP", pytest.param("COBYLA", marks=pytest.mark.slow)])
 def test_combined_objectives_improve_on_their_starts(objective: Objective, algorithm: str) -> None:
     problem = replace(STOPBAND, objective=objective, edge_shift_nm=1.0)
     rng = np.random.default_rng(8)
@@ -181,16 +182,16 @@ def test_best_reachable_is_the_extreme_of_a_quantity_alone() -> None:
     }
     problem = replace(STOPBAND, constraints=impossible)
     found = {name: best_reachable(problem, name, starts, 200) for name in impossible}
-    base = STOPBAND.setup.base_qe
+    base = STOPBAND.view.base_qe
     u = np.random.default_rng(5).uniform(size=(20_000, problem.free.size))
     x = problem.from_unit(u)
     x = x[(problem.family.violation(x) <= 0).all(axis=1)]
-    tried = designed_quantities(problem.setup, problem.family.curves(x))["sensitivity"]
+    tried = designed_quantities(problem.view, problem.family.curves(x))["sensitivity"]
     assert tried.max() <= found["sensitivity"] < 1
     # No stopband is flatter than its base where it leaves it alone.
     assert found["slope_per_nm"] >= np.abs(np.diff(base[0])).max() * (1 - 1e-9)
     assert found["slope_per_nm"] < 0.06
     assert found["band_width_nm"] == pytest.approx(problem.high[2] - problem.low[0], rel=1e-6)
-    members = problem.setup.members
-    response = smooth_response(problem.setup, problem.family.curves(x))[:, 0]
+    members = problem.view.members
+    response = smooth_response(problem.view, problem.family.curves(x))[:, 0]
     assert separation(response, members["yellow"], members["red"]).max() <= found["csd_yellow_red"] < 4000

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import csv
-import subprocess
-import sys
 import warnings
 from collections import Counter
 from dataclasses import replace
@@ -17,13 +15,14 @@ import pytest
 from ruamel.yaml import YAML
 from scipy.io import loadmat, savemat
 
-from sweep.commands.describe import describe
+from sweep.commands.describe import described
 from sweep.curves.files import read_curves
 from sweep.errors import MOST_FAULTS, SweepError
 from sweep.run.rows import rules_of, run_job
 from sweep.run.sweep import Sweep
 from sweep.study import Study, load_study
 
+from ..commanded import commanded
 from ..conftest import STUDIES
 from ..mutations import EXTREMES, changed, one_of, torn, written
 from ..watchdog import within
@@ -72,7 +71,7 @@ def first_rows(study: Study, scenario: str) -> set[str]:
     planned = replace(study, plans={scenario: study.plan(scenario)}, scenarios={scenario: study.scenarios[scenario]})
     rules, found = rules_of(planned), set()
     for job in jobs(planned):
-        made = run_job(replace(job, stop=min(job.stop, job.start + 2)), planned.setup(job.space, scenario), rules)
+        made = run_job(replace(job, stop=min(job.stop, job.start + 2)), planned.view(job.space, scenario), rules)
         found |= set(made["status"].to_pylist())
     return found
 
@@ -144,12 +143,12 @@ def test_changed_studies_through_the_command(studies: list[dict[str, Any]], tmp_
     for index in range(20):
         tree = one_of(rng, studies)
         path.write_bytes(written(changed(rng, tree)) if index % 2 else torn(rng, written(tree)))
-        command = [sys.executable, "-m", "sweep", "check", str(path)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=HANG_S)
-        assert done.returncode in (0, 2), done.stderr
-        assert "Traceback" not in done.stderr
-        assert "Warning" not in done.stderr
-        assert done.returncode == 0 or all(line.startswith("sweep: ") for line in done.stderr.splitlines())
+        with within(HANG_S):
+            code, _, said = commanded("check", path)
+        assert code in (0, 2), said
+        assert "Traceback" not in said
+        assert "Warning" not in said
+        assert code == 0 or all(line.startswith("sweep: ") for line in said.splitlines())
 
 
 def cells(rng: np.random.Generator, content: bytes) -> bytes:
@@ -190,7 +189,7 @@ def curves_tried(path: Path, content: bytes, folder: Path | None) -> bool:
         with warnings.catch_warnings(), within(HANG_S):
             warnings.simplefilter("error")
             if folder is not None:
-                describe(path, folder)
+                described(path, folder)
             found = read_curves(path)
     except SweepError as error:
         told(error)

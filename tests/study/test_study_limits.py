@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 from collections.abc import Callable
 from io import StringIO
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
@@ -24,6 +22,7 @@ from sweep.study.document import Document
 from sweep.study.editors import study_schema
 from sweep.study.yaml_tree import MOST_DEPTH, Tree
 
+from ..commanded import commanded
 from ..watchdog import within
 
 SMALL = "study: a\nsensor: ar0820\nlights: tl16\ncfas: [RGGB]\n"
@@ -187,14 +186,17 @@ values = st.recursive(
 
 
 @given(values)
+@example({"": None, ":0": None})
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_what_the_library_writes_is_read_as_it_reads_it(value: object) -> None:
     yaml, text = YAML(typ="safe", pure=True), StringIO()
     yaml.dump({"top": value}, text)
     try:
         expected = yaml.load(text.getvalue())
-    except YAMLError:  # it does not read all that it writes: {:0: null}
-        with pytest.raises(StudyError, match="not valid YAML"):
+    except YAMLError:
+        # It does not read all that it writes: it takes a word that begins with a colon in braces, {:0: null}, for the
+        # value of an empty key, and stops behind it. Where such a key was there before, that is the first fault.
+        with pytest.raises(StudyError, match=r"not valid YAML|found duplicate key ''"):
             Tree(text.getvalue(), "a.yaml", 10_000)
         return
     assert Tree(text.getvalue(), "a.yaml", 10_000).root == expected
@@ -276,8 +278,8 @@ def test_a_data_folder_that_cannot_be_is_one_line(tmp_path: Path) -> None:
 
 def test_a_bomb_ends_the_command_with_one_line(tmp_path: Path) -> None:
     (tmp_path / "a.yaml").write_text(bomb())
-    command = [sys.executable, "-m", "sweep", "check", str(tmp_path / "a.yaml")]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith(f"sweep: {tmp_path}/a.yaml:9: a4: more keys and values than a study has")
-    assert len(done.stderr.splitlines()) == 1
+    with within(HANG_S):
+        code, out, said = commanded("check", tmp_path / "a.yaml")
+    assert (code, out) == (2, "")
+    assert said.startswith(f"sweep: {tmp_path}/a.yaml:9: a4: more keys and values than a study has")
+    assert len(said.splitlines()) == 1

@@ -10,36 +10,34 @@ ISETCam's, is that of tan = 1 / 2N; they differ by 0.8 % at f/4). OTF with defoc
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
 from scipy.sparse import csr_matrix
 from scipy.special import j0, j1
 
+from ...cache import Cache
 from ...types import FloatArray
 from ..pixel import Pixel
-from ..scene import Scenario
-from ..view import Setup
+from ..scene import Scene
+from ..shot import Shot
+from .base import Change, Chosen, Designs, KernelChange, KernelEffect, Load, Part, Stage
 
-METHODS = ("skip", "every 10 nm", "every 5 nm", "every 2 nm", "every wavelength")
 COARSE = "every 10 nm"
 """The interpolated method on whose wavelengths kernels are compared when a plan is made."""
 _SPACING_NM = {"every 10 nm": 10.0, "every 5 nm": 5.0, "every 2 nm": 2.0}
 _SHORTEST_UM = 0.4
+IMAGE, WHOLE_IMAGE = 1e5, 2e5
+"""Multiplications that a wavelength of the image is taken to cost: for each pixel, and for the mean over a readout
+without pixels; `tests/bench_work.py` measures them."""
 _PANEL_NODES = 32
 _CYCLES_PER_PANEL = 4.0
 _SPLINE_PER_CYCLE = 24
 """Nodes of the table of h(r) per period of the highest frequency."""
 
 
-def skip_is_exact(setup: Setup) -> str | None:
-    """Why leaving blur out changes nothing; None when it does."""
-    return "a patch that fills the field" if setup.scenario.target is None else None
-
-
-def defocus_um(scenario: Scenario, pitch_um: float) -> float:
+def defocus_um(scenario: Scene, pitch_um: float) -> float:
     """W20, the wavefront's defocus at the edge of the pupil, micrometers: image shift / (8 N^2)."""
     target, focus_m = scenario.target, scenario.optics.focus_m
     if target is None or focus_m is None:
@@ -53,7 +51,7 @@ _MOST_PX = 128.0
 _MOST_PERIODS = 400.0
 
 
-def too_much(scenario: Scenario, pixel: Pixel) -> tuple[tuple[str, ...], str, str, str] | None:
+def too_much(scenario: Scene, pixel: Pixel) -> tuple[tuple[str, ...], str, str, str] | None:
     """Why a target's image is not computed: where it is set, problem, value, what is allowed; None when it is."""
     target, optics = scenario.target, scenario.optics
     if target is None:
@@ -115,6 +113,8 @@ class Profile:
     def __init__(
         self, radius_um: float, reach_um: float, wavelength_um: FloatArray, f_number: float, w20_um: float
     ) -> None:
+        from scipy.interpolate import make_interp_spline  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
         nu, weight = _frequencies(radius_um + reach_um, wavelength_um, f_number)
         step = 1 / (_SPLINE_PER_CYCLE * nu[-1])
         r = np.linspace(0.0, reach_um + step, max(8, 2 + int(reach_um / step)))
@@ -139,6 +139,8 @@ class Profile:
 
         The weights go to the spline's coefficients first, so that no more is done at each wavelength than one product.
         """
+        from scipy.interpolate import BSpline  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
         n, size = len(r_um), len(self._spline.c)
         # Four values for each radius. SciPy looks for radii outside number by number, if it is not told to extrapolate.
         basis = BSpline.design_matrix(r_um.ravel(), self._spline.t, 3, extrapolate=True)
@@ -160,12 +162,17 @@ class Profile:
         return np.asarray(self._spline.derivative()(self.r_um), dtype=float)
 
 
-@lru_cache(maxsize=8)
+_Sizes = tuple[float, float, tuple[float, ...], float, float]
+PROFILES: Cache[_Sizes, Profile] = Cache(8)
+"""The latest profiles: CFAs with tiles of one size share theirs."""
+
+
 def profile(
     radius_um: float, reach_um: float, wavelengths_um: tuple[float, ...], f_number: float, w20_um: float
 ) -> Profile:
-    """A profile; the latest ones are kept, since CFAs with tiles of one size share theirs."""
-    return Profile(radius_um, reach_um, np.array(wavelengths_um), f_number, w20_um)
+    """A profile, kept."""
+    key = (radius_um, reach_um, wavelengths_um, f_number, w20_um)
+    return PROFILES.get(key, lambda: Profile(radius_um, reach_um, np.array(wavelengths_um), f_number, w20_um))
 
 
 def mean_over_disc(
@@ -227,3 +234,34 @@ def knots(wavelength_nm: FloatArray, method: str) -> FloatArray:
         return wavelength_nm
     inner = np.arange(wavelength_nm[0], wavelength_nm[-1], spacing)
     return np.append(inner, wavelength_nm[-1])
+
+
+class Blur(KernelEffect):
+    """An image that is not sharp."""
+
+    name = "blur"
+    methods = ("skip", *_SPACING_NM, "every wavelength")
+    stage = Stage.OPTICS
+    order = 0
+    part = Part.LIGHT
+
+    def exact(self, shot: Shot) -> str | None:
+        """Without an edge nothing is blurred."""
+        return "a patch that fills the field" if shot.scenario.target is None else None
+
+    def kernel_method(self, method: str) -> str:
+        """Kernels are compared at given wavelengths, where all methods but one are the same."""
+        return method if method == self.off else self.reference
+
+    def change(self, shot: Shot, before: str, after: str, designs: Designs, *, straight: bool) -> Change:
+        """A sharp image, or what the kernel is between its wavelengths."""
+        return KernelChange(self.part, knots=None if after == self.off else after)
+
+    def work(self, shot: Shot, methods: Chosen, load: Load) -> Load:
+        """An image at every wavelength of the method."""
+        if shot.scenario.target is None or methods.blur == "skip":
+            return load
+        n_knots = knots(shot.grid.nodes_nm, methods.blur).size
+        if methods.sampling == "skip":
+            return replace(load, kernel=load.kernel + WHOLE_IMAGE * n_knots)
+        return replace(load, knots=n_knots, image=IMAGE)

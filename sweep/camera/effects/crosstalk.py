@@ -5,14 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...types import FloatArray
-from ..view import Setup
-
-METHODS = ("skip", "neighbors")
-
-
-def skip_is_exact(setup: Setup) -> str | None:
-    """Why leaving crosstalk out changes nothing; None when it does."""
-    return "no crosstalk" if setup.pixel.crosstalk == 0 else None
+from ..shot import Shot
+from .base import KernelEffect, Part, Stage
 
 
 def mixed(light: FloatArray, share: float, *, periodic: bool = False) -> FloatArray:
@@ -30,3 +24,22 @@ def mixed(light: FloatArray, share: float, *, periodic: bool = False) -> FloatAr
                 moved[tuple(edge)] = 0.0
             found += share / 4 * moved
     return np.asarray(found, dtype=float)
+
+
+def share(shot: Shot, method: str) -> float:
+    """Share of a pixel's light that comes through the filters of its neighbors."""
+    return 0.0 if method == "skip" else shot.pixel.crosstalk
+
+
+class Crosstalk(KernelEffect):
+    """Light through the filters of the neighbors."""
+
+    name = "crosstalk"
+    methods = ("skip", "neighbors")
+    stage = Stage.OPTICS
+    order = 1
+    part = Part.LIGHT
+
+    def exact(self, shot: Shot) -> str | None:
+        """Pixels may be apart."""
+        return "no crosstalk" if shot.pixel.crosstalk == 0 else None

@@ -6,18 +6,9 @@ import numpy as np
 
 from ...types import FloatArray
 from ..mosaic import Mosaic
-from ..view import Setup
+from ..shot import Shot
+from .base import KernelEffect, Part, Stage
 from .sampling import Window
-
-METHODS = ("skip", "tent")
-
-
-def skip_is_exact(setup: Setup) -> str | None:
-    """Why leaving demosaicking out changes nothing; None when it does."""
-    target = setup.scenario.target
-    if target is None:
-        return "a patch that fills the field"
-    return "the raw pixels are averaged" if target.readout == "mean" else None
 
 
 def center_weights(seen: Window, home: FloatArray, method: str, mosaic: Mosaic) -> FloatArray:
@@ -40,3 +31,20 @@ def center_weights(seen: Window, home: FloatArray, method: str, mosaic: Mosaic) 
             values = (values >= values.max(axis=1, keepdims=True) - 1e-9).astype(float)
         weights[:, own] = values / values.sum(axis=1, keepdims=True)
     return np.asarray(weights, dtype=float)
+
+
+class Demosaic(KernelEffect):
+    """Which pixels the readout at one pixel is made of."""
+
+    name = "demosaic"
+    methods = ("skip", "tent")
+    stage = Stage.SAMPLING
+    order = 3
+    part = Part.WEIGHTS
+
+    def exact(self, shot: Shot) -> str | None:
+        """Only a readout at the center is demosaicked."""
+        target = shot.scenario.target
+        if target is None:
+            return "a patch that fills the field"
+        return "the raw pixels are averaged" if target.readout == "mean" else None

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...types import FloatArray
 from ..scene import Drive
-from ..view import Setup
+from ..shot import Shot
+from .base import Change, Chosen, Designs, LinearEffect, Load, ShareChange, Stage
 
-METHODS = ("skip", "ends", "fine")
 _FINE = 9
-
-
-def skip_is_exact(setup: Setup) -> str | None:
-    """Why leaving it out changes nothing; None when it does."""
-    drive = setup.scenario.drive
-    return "direct current" if drive is None or drive.duty == 1 else None
 
 
 def extremes(drive: Drive, exposure_s: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -51,9 +47,9 @@ def largest(drive: Drive, shortest_s: float, longest_s: float) -> float:
     return float(extremes(drive, np.array([shortest_s, longest_s, *inside]))[1].max())
 
 
-def scales(setup: Setup, method: str, exposure_s: FloatArray) -> FloatArray:
+def scales(shot: Shot, method: str, exposure_s: FloatArray) -> FloatArray:
     """Light relative to the mean in the cases that are looked at, ndarray[n_designs, n_cases]."""
-    drive = setup.scenario.drive
+    drive = shot.scenario.drive
     if method == "skip" or drive is None:
         return np.ones((len(exposure_s), 1))
     least, most = extremes(drive, exposure_s)
@@ -67,3 +63,26 @@ def missed(method: str, least: float, most: float, *, straight: bool) -> float:
     if method == "ends":
         return 0.0 if straight else (below + above) / 2 / most
     return (below if straight else max(below, above)) / most
+
+
+class Flicker(LinearEffect):
+    """A pulse's share of the exposure, of each signal alike."""
+
+    name = "flicker"
+    methods = ("skip", "ends", "fine")
+    stage = Stage.OPTICS
+    order = 4
+
+    def exact(self, shot: Shot) -> str | None:
+        """Only a pulsed light flickers."""
+        drive = shot.scenario.drive
+        return "direct current" if drive is None or drive.duty == 1 else None
+
+    def change(self, shot: Shot, before: str, after: str, designs: Designs, *, straight: bool) -> Change:
+        """What the moments that are left out would have shown of the light."""
+        lost = missed(after, designs.least_light, designs.most_light, straight=straight)
+        return ShareChange(lost, of_background=False)
+
+    def work(self, shot: Shot, methods: Chosen, load: Load) -> Load:
+        """Every moment is read."""
+        return replace(load, scales=scales(shot, methods.flicker, np.ones(1)).shape[1])

@@ -1,26 +1,26 @@
 """Photon, read and dark noise and PRNU: what they change in a mean, and Monte Carlo draws.
 
 The CSD is the distance of mean values. Noise moves a mean only where the readout is not straight: at the full well, at
-the ends of the ADC and at the steps of its quantization. Mean and variance are exact sums (`readout`).
+the ends of the ADC and at the steps of its quantization. Mean and variance are exact sums (`moments`).
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...types import FloatArray
+from ..noisy import gaussian, moments
 from ..pixel import Pixel
-from ..view import Setup
-from . import gaussian, readout, saturation
+from ..shot import Shot
+from .base import Chosen, Load, ReadoutEffect
+from .saturation import top_e
 
-METHODS = ("skip", "expected")
+LOOKED_UP = 150.0
+"""Pixels that are clipped while one is looked up in the table of noise, about; `tests/bench_work.py` measures it."""
 _MOST_POISSON_E = 1e18
 """NumPy's Poisson generator takes no larger mean."""
-
-
-def skip_is_exact(setup: Setup) -> str | None:
-    """Why leaving it out changes nothing; None when it may."""
-    return None if setup.scenario.noise is not None else "no noise asked for"
 
 
 def draws_dn(electrons: FloatArray, pixel: Pixel, rng: np.random.Generator) -> FloatArray:
@@ -31,18 +31,35 @@ def draws_dn(electrons: FloatArray, pixel: Pixel, rng: np.random.Generator) -> F
     return np.clip(np.floor(dn + 0.5), 0, pixel.full_scale_dn)
 
 
-def promise(setup: Setup, brightest_e: float) -> float:
-    """Range of what leaving noise out changes in one coordinate's mean, DN: up to a pixel that expects `brightest_e`.
+class NoisyMean(ReadoutEffect):
+    """The mean of noisy readouts in place of the readout of the mean."""
 
-    The mean is that of the hard readout, less what the full well and the bright end take, plus what the dark end adds.
-    The dark end adds most in the dark. The others' loss grows with the signal up to the first of them, since no
-    electron more is worth more than the gain, and falls beyond, where the hard readout stands still. So both extremes
-    are single numbers.
-    """
-    pixel = setup.pixel
-    gain, read_dn = pixel.dn_per_e, pixel.dn_per_e * pixel.read_noise_e
-    at_e = min(brightest_e, saturation.top_e(pixel))
-    mean = readout.moments(np.array([at_e]), pixel)[readout.UNROUNDED, 0]
-    added = read_dn * float(gaussian.ramp(np.array(-pixel.offset_dn / read_dn))) if read_dn else 0.0
-    lost = gain * at_e + pixel.offset_dn - mean
-    return min(float(added + max(lost + added, 0.0)), float(pixel.full_scale_dn))
+    name = "noise"
+    methods = ("skip", "expected")
+    order = 0
+    without = "moves no mean where nothing clips"
+
+    def exact(self, shot: Shot) -> str | None:
+        """A scene says whether there is noise."""
+        return None if shot.scenario.noise is not None else "no noise asked for"
+
+    def range_dn(self, shot: Shot, brightest_dn: float, methods: Chosen) -> float:
+        """See `ReadoutEffect`.
+
+        The mean is that of the hard readout, less what the full well and the bright end take, plus what the dark end
+        adds. The dark end adds most in the dark. The others' loss grows with the signal up to the first of them, since
+        no electron more is worth more than the gain, and falls beyond, where the hard readout stands still. So both
+        extremes are single numbers.
+        """
+        pixel = shot.pixel
+        gain, read_dn = pixel.dn_per_e, pixel.dn_per_e * pixel.read_noise_e
+        at_e = min(brightest_dn / gain, top_e(pixel))
+        mean = moments.moments(np.array([at_e]), pixel)[moments.UNROUNDED, 0]
+        added = read_dn * float(gaussian.ramp(np.array(-pixel.offset_dn / read_dn))) if read_dn else 0.0
+        lost = gain * at_e + pixel.offset_dn - mean
+        return min(float(added + max(lost + added, 0.0)), float(pixel.full_scale_dn))
+
+    def work(self, shot: Shot, methods: Chosen, load: Load) -> Load:
+        """What clips is looked up in a table, which costs more than to clip."""
+        noisy = shot.scenario.noise is not None and methods.noise != "skip"
+        return replace(load, clip=load.clip * LOOKED_UP) if noisy else load

@@ -24,41 +24,15 @@ import math
 import numpy as np
 
 from ..pixel import Pixel
-from ..view import Methods, Setup
+from ..shot import Shot
+from .base import Chosen, ReadoutEffect
 from .saturation import JUST_ABOVE
 
-METHODS = ("skip", "add")
 _MOST_E = 1e30
 """More electrons than this are as many as this."""
 _TERMS = 50
 _LEAST_SIGMA_DN = 0.05
 """With less noise the series is not summed: its terms fall too slowly."""
-
-
-def skip_is_exact(setup: Setup) -> str | None:
-    """Why leaving it out changes nothing; None when it may."""
-    return "no pedestal" if setup.pixel.offset_dn == 0 else None
-
-
-def promise(setup: Setup, brightest_dn: float, methods: Methods) -> float:
-    """Range of what leaving it out changes in one coordinate, DN.
-
-    `methods`: those of the rest of the readout, which is switched before. `brightest_dn`: of any pixel, unclipped.
-    """
-    pixel, noisy = setup.pixel, setup.scenario.noise is not None
-    offset, full = pixel.offset_dn, pixel.full_scale_dn
-    rounds, clips = methods.quantization == "round", methods.saturation == "clip"
-    held_dn = min(brightest_dn, pixel.well_e * pixel.dn_per_e) if clips else brightest_dn
-    if rounds and not noisy:
-        shortest = full - math.floor(min(held_dn * JUST_ABOVE, full) + 0.5)
-        return float(math.ceil(offset) - min(math.floor(offset), shortest))
-    found = _dithered_steps(pixel) if rounds else 0.0
-    bottom, top = _tails(pixel, brightest_dn, rounds=rounds)
-    if noisy and clips and methods.noise == "expected":
-        return min(found + bottom + top, float(math.ceil(offset)) if rounds else offset)
-    if rounds:  # the shift by rounding knows the ends, with the pedestal and without
-        found += bottom + min(1.0, 2 * top)
-    return found + (min(offset, max(0.0, min(held_dn, full) + offset - full)) if clips else 0.0)
 
 
 def _dithered_steps(pixel: Pixel) -> float:
@@ -93,3 +67,33 @@ def _tails(pixel: Pixel, brightest_dn: float, *, rounds: bool) -> tuple[float, f
     end_e = (pixel.full_scale_dn - pixel.offset_dn - 0.5 * rounds) / gain
     top = min(_most_cut(brightest_e, spread_e, end_e), _most_cut(pixel.well_e, read_e, end_e))
     return gain * bottom, gain * top
+
+
+class Pedestal(ReadoutEffect):
+    """The offset that a dark pixel reads."""
+
+    name = "pedestal"
+    methods = ("skip", "add")
+    order = 3
+    without = "cancels in every difference"
+
+    def exact(self, shot: Shot) -> str | None:
+        """There may be none."""
+        return "no pedestal" if shot.pixel.offset_dn == 0 else None
+
+    def range_dn(self, shot: Shot, brightest_dn: float, methods: Chosen) -> float:
+        """See `ReadoutEffect`, and the head of this file."""
+        pixel, noisy = shot.pixel, shot.scenario.noise is not None
+        offset, full = pixel.offset_dn, pixel.full_scale_dn
+        rounds, clips = methods.quantization == "round", methods.saturation == "clip"
+        held_dn = min(brightest_dn, pixel.well_e * pixel.dn_per_e) if clips else brightest_dn
+        if rounds and not noisy:
+            shortest = full - math.floor(min(held_dn * JUST_ABOVE, full) + 0.5)
+            return float(math.ceil(offset) - min(math.floor(offset), shortest))
+        found = _dithered_steps(pixel) if rounds else 0.0
+        bottom, top = _tails(pixel, brightest_dn, rounds=rounds)
+        if noisy and clips and methods.noise == "expected":
+            return min(found + bottom + top, float(math.ceil(offset)) if rounds else offset)
+        if rounds:  # the shift by rounding knows the ends, with the pedestal and without
+            found += bottom + min(1.0, 2 * top)
+        return found + (min(offset, max(0.0, min(held_dn, full) + offset - full)) if clips else 0.0)

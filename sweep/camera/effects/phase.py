@@ -7,13 +7,14 @@ starts from the lattice of quarter pixels and divides its cells until no place b
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...types import BoolArray, FloatArray, IndexArray
 from ..mosaic import Mosaic
-from ..view import Setup
+from ..shot import Shot
+from .base import Chosen, KernelEffect, Load, Part, Stage
 
 LATTICES = ("one", "pixel", "half pixel", "quarter pixel")
 _WITHIN_DN = {
@@ -23,11 +24,13 @@ _WITHIN_DN = {
     "within 0.01 DN": 0.01,
     "within 0.0001 DN": 1e-4,
 }
-METHODS = (*LATTICES, *_WITHIN_DN)
 MOST = 1024
 """Places of a lattice on a tile, at most."""
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
 """A cell's corners from its center (column, row), in units of its half width."""
+PER_DECADE = 3
+"""Places of a search for each decade of its limit below 100 DN, in those of the lattice, about; `tests/bench_work.py`
+counts them."""
 PER_PIXEL = 4
 """Places per pixel, along a row and a column, of the finest lattice."""
 _PER_PIXEL = {"one": 0, "pixel": 1, "half pixel": 2, "quarter pixel": PER_PIXEL} | dict.fromkeys(_WITHIN_DN, PER_PIXEL)
@@ -53,18 +56,31 @@ def within_dn(method: str) -> float | None:
     return _WITHIN_DN.get(method)
 
 
-def skip_is_exact(setup: Setup) -> str | None:
+def one_is_enough(shot: Shot) -> str | None:
     """Why one place is enough; None when the scene asks for all."""
-    target = setup.scenario.target
+    target = shot.scenario.target
     if target is None:
         return "a patch that fills the field"
     return None if target.phase_px == "any" else "the scene names the place"
 
 
-def places_px(setup: Setup, method: str) -> FloatArray:
+def all_count(shot: Shot, methods: Chosen) -> bool:
+    """Whether every real place counts: where any is asked for, and the method is not a lattice's."""
+    return one_is_enough(shot) is None and methods.sampling != "skip" and methods.phase not in LATTICES
+
+
+def n_places(shot: Shot, method: str) -> float:
+    """About how many places a method looks at: a search divides most where its limit is tight."""
+    lattice, within = len(places_px(shot, method)), within_dn(method)
+    if within is None or one_is_enough(shot) is not None:
+        return lattice
+    return lattice * (1 + PER_DECADE * (2 - math.log10(within)))
+
+
+def places_px(shot: Shot, method: str) -> FloatArray:
     """Centers of the light, ndarray[n_cases, 2] as (column, row): all of a grid over the tile, or the scene's one."""
-    target = setup.scenario.target
-    rows, columns = setup.mosaic.indices.shape
+    target = shot.scenario.target
+    rows, columns = shot.mosaic.indices.shape
     if target is None:
         return np.zeros((1, 2))
     if target.phase_px != "any":
@@ -100,12 +116,12 @@ class Cells:
         places = (self.centers[:, None] + self.half * CORNERS).reshape(-1, 2)
         return Cases(places, np.repeat(self.homes, len(CORNERS), axis=0))
 
-    def shared_corners(self, setup: Setup) -> tuple[Cases, IndexArray]:
+    def shared_corners(self, shot: Shot) -> tuple[Cases, IndexArray]:
         """The corners, each once, and those of each cell, ndarray[n_cells, n_corners].
 
         Of a mean over the disc it does not matter which pixel is the nearest.
         """
-        target, every = setup.scenario.target, self.corners
+        target, every = shot.scenario.target, self.corners
         keys = every.places_px
         if target is not None and target.readout == "center":
             keys = np.concatenate([every.places_px, every.home_px], axis=1)
@@ -123,22 +139,9 @@ def whole(mosaic: Mosaic) -> Cells:
     return Cells(centers, np.floor(centers + 0.5), half)
 
 
-def all_count(setup: Setup) -> bool:
-    """Whether every real place counts: where any is asked for, and the method is not a lattice's."""
-    return skip_is_exact(setup) is None and setup.methods.sampling != "skip" and setup.methods.phase not in LATTICES
-
-
-def n_places(setup: Setup, method: str) -> float:
-    """About how many places a method looks at: a search divides most where its limit is tight (measured)."""
-    lattice, within = len(places_px(setup, method)), within_dn(method)
-    if within is None or skip_is_exact(setup) is not None:
-        return lattice
-    return lattice * (1 + 3 * (2 - math.log10(within)))
-
-
-def cases(setup: Setup, method: str) -> Cases:
+def cases(shot: Shot, method: str) -> Cases:
     """The places of a method; halfway between two pixels the one before is read out."""
-    places = places_px(setup, method)
+    places = places_px(shot, method)
     return Cases(places, np.ceil(places - 0.5))
 
 
@@ -156,10 +159,35 @@ def domain_px(mosaic: Mosaic) -> FloatArray:
     return np.array(ends).T
 
 
-def nearest(setup: Setup, of: FloatArray, among: FloatArray) -> IndexArray:
+def nearest_places(shot: Shot, of: FloatArray, among: FloatArray) -> IndexArray:
     """For each place of `of` the index of the nearest one of `among`, on the torus of the tile."""
-    rows, columns = setup.mosaic.indices.shape
+    rows, columns = shot.mosaic.indices.shape
     size = np.array([columns, rows])
     apart = np.abs(of[:, None] - among[None]) % size
     apart = np.minimum(apart, size - apart)
     return np.asarray((apart**2).sum(axis=2).argmin(axis=1))
+
+
+class Phase(KernelEffect):
+    """Every place of the light is the limit of more and more places."""
+
+    name = "phase"
+    methods = (*LATTICES, *_WITHIN_DN)
+    stage = Stage.SAMPLING
+    order = 2
+    off = "one"
+    part = Part.PLACES
+    is_limit = True
+
+    def exact(self, shot: Shot) -> str | None:
+        """A scene may name the place."""
+        return one_is_enough(shot)
+
+    def limit_dn(self, method: str) -> float | None:
+        """A lattice knows no limit."""
+        return within_dn(method)
+
+    def work(self, shot: Shot, methods: Chosen, load: Load) -> Load:
+        """All is done at every place."""
+        placed = shot.scenario.target is not None and methods.sampling != "skip"
+        return replace(load, cases=float(n_places(shot, methods.phase))) if placed else load

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from ...curves.hats import hats
 from ...types import FloatArray, IndexArray
-from ..view import Setup
+from ..shot import Shot
+from .base import Change, Chosen, CurveChange, Designs, LinearEffect, Load, Stage
 
-METHODS = ("every 10th", "every 5th", "every 2nd", "grid")
 _STEP = {"every 10th": 10, "every 5th": 5, "every 2nd": 2, "grid": 1}
 
 
@@ -17,20 +20,38 @@ def nodes(n_wavelengths: int, method: str) -> IndexArray:
     return kept if kept[-1] == n_wavelengths - 1 else np.append(kept, n_wavelengths - 1)
 
 
-def hats(n_wavelengths: int, kept: IndexArray) -> FloatArray:
-    """Weights of the nodes at every wavelength, ndarray[n_nodes, n_wavelengths]: QE is about QE[nodes] @ hats."""
-    at = np.arange(n_wavelengths)
-    return np.stack([np.interp(at, kept, unit) for unit in np.eye(kept.size)])
+def between_nodes(n_wavelengths: int, kept: IndexArray) -> FloatArray:
+    """QE is about QE[nodes] times this, ndarray[n_nodes, n_wavelengths]."""
+    return hats(np.arange(n_wavelengths, dtype=float), kept.astype(float))
 
 
 def deviation(low: FloatArray, high: FloatArray, kept: IndexArray) -> tuple[FloatArray, FloatArray]:
     """QE between `low` and `high` minus its interpolation: middle and half width, ndarray[..., n_wavelengths] each."""
-    between = hats(low.shape[-1], kept)
+    between = between_nodes(low.shape[-1], kept)
     below, above = low - high[..., kept] @ between, high - low[..., kept] @ between
     below[..., kept] = above[..., kept] = 0.0
     return (below + above) / 2, (above - below) / 2
 
 
-def skip_is_exact(setup: Setup) -> str | None:
-    """Fewer nodes never are exact for all curves, unless the grid has hardly any."""
-    return "a grid of two nodes" if setup.grid.size <= 2 else None
+class Quadrature(LinearEffect):
+    """At which wavelengths QE curves are looked at."""
+
+    name = "quadrature"
+    methods = tuple(_STEP)
+    stage = Stage.SAMPLING
+    order = 0
+    off = None
+
+    def exact(self, shot: Shot) -> str | None:
+        """Fewer nodes never are exact for all curves, unless the grid has hardly any."""
+        return "a grid of two nodes" if shot.grid.size <= 2 else None
+
+    def change(self, shot: Shot, before: str, after: str, designs: Designs, *, straight: bool) -> Change:
+        """What the curves are between their nodes."""
+        kept = nodes(shot.grid.size, after)
+        middle, half = deviation(designs.qe_low, designs.qe_high, kept)
+        return CurveChange(middle - half, middle + half)
+
+    def work(self, shot: Shot, methods: Chosen, load: Load) -> Load:
+        """A product at every node."""
+        return replace(load, nodes=nodes(shot.grid.size, methods.quadrature).size)

@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
 from ...types import FloatArray
 from ..compiled import poisson_means
+from ..noisy import gaussian, moments
 from ..pixel import Pixel
-from ..view import Setup
-from . import gaussian, readout
+from ..shot import Shot
+from .base import Chosen, Load, ReadoutEffect
 
-METHODS = ("skip", "round")
+ROUNDED = 25.0
+"""Multiplications that rounding a value is taken to cost; `tests/bench_work.py` measures it."""
 _CURVATURE = 4 * math.e
 """Second derivative of a Poisson mean in the root of the electrons, at most, for values between -1 and 1.
 
 The mean at s + iy is at most exp(2 y^2), since a Poisson probability there grows by |exp(|z| - z)|, z = (s + iy)^2; on
 a circle of radius 1 / sqrt(2) Cauchy's estimate of the derivative is 2 e / (1 / 2).
 """
-
-
-def skip_is_exact(_: Setup) -> str | None:
-    """Rounding always changes something."""
-    return None
 
 
 def rounded(dn: FloatArray, pixel: Pixel) -> FloatArray:
@@ -34,21 +32,16 @@ def rounded(dn: FloatArray, pixel: Pixel) -> FloatArray:
     without a whole pedestal differ by exactly that.
     """
     whole = math.floor(pixel.offset_dn)
-    steps = np.floor(dn + (pixel.offset_dn - whole) + 0.5) + whole
-    return np.asarray(np.clip(steps, 0, pixel.full_scale_dn), dtype=float)
+    steps = np.asarray(dn + (pixel.offset_dn - whole), dtype=float)
+    steps += 0.5
+    np.floor(steps, out=steps)
+    steps += whole
+    return np.clip(steps, 0.0, pixel.full_scale_dn, out=steps)
 
 
-def promise(setup: Setup, brightest_e: float) -> float:
-    """Range of what leaving it out changes in one coordinate, DN: up to a pixel that expects `brightest_e`.
-
-    1 at most; under noise the range of the mean's shift.
-    """
-    return 1.0 if setup.scenario.noise is None else min(1.0, _under_noise(setup.pixel, brightest_e)[0])
-
-
-def steepness(setup: Setup) -> float:
+def steepness(pixel: Pixel) -> float:
     """Largest slope of the mean rounded value under noise, relative to that of the readout before it."""
-    return 1 + _under_noise(setup.pixel, math.inf)[1]
+    return 1 + _under_noise(pixel, math.inf)[1]
 
 
 @lru_cache(maxsize=64)
@@ -58,21 +51,43 @@ def _under_noise(pixel: Pixel, brightest_e: float) -> tuple[float, float]:
     Shifts at a table's nodes, with what they may miss in between; from the last counted electron on those of a
     Gaussian. The slope of a Poisson mean is the mean of the steps from count to count. PRNU averages over both.
     """
-    even, most_e = readout.without_prnu(pixel), brightest_e * (1 + readout.DRAWN * pixel.prnu)
-    electrons = readout.nodes(even) ** 2
+    even, most_e = moments.without_prnu(pixel), brightest_e * (1 + moments.DRAWN * pixel.prnu)
+    electrons = moments.table_nodes(even) ** 2
     electrons = electrons[: 1 + int(np.searchsorted(electrons, most_e))]
     gain, low, high, steepest = even.dn_per_e, 0.0, 0.0, 0.0
-    for run, first, each in readout.runs(electrons, even):
-        shift = each[readout.ROUNDED] - each[readout.UNROUNDED]
+    for run, first, each in moments.runs(electrons, even):
+        shift = each[moments.ROUNDED] - each[moments.UNROUNDED]
         slope = np.append(np.diff(shift), 0.0) / gain
         found = poisson_means(electrons[run], first, np.stack([shift, slope]))
-        missed = _CURVATURE * np.diff(np.sqrt(electrons[run])).max(initial=readout.STEP) ** 2 / 8
+        missed = _CURVATURE * np.diff(np.sqrt(electrons[run])).max(initial=moments.STEP) ** 2 / 8
         low = min(low, found[0].min() - missed * np.abs(shift).max())
         high = max(high, found[0].max() + missed * np.abs(shift).max())
         steepest = max(steepest, np.abs(found[1]).max() + missed * np.abs(slope).max())
-    sigma = gain * math.hypot(math.sqrt(readout.COUNTED_E), even.read_noise_e)
-    if electrons[-1] > readout.COUNTED_E and sigma < gaussian.SMOOTH_DN:
+    sigma = gain * math.hypot(math.sqrt(moments.COUNTED_E), even.read_noise_e)
+    if electrons[-1] > moments.COUNTED_E and sigma < gaussian.SMOOTH_DN:
         terms = [math.exp(-2 * (math.pi * k * sigma) ** 2) for k in range(1, 2 + math.ceil(3 / sigma))]
         most = min(0.5, sum(term / (math.pi * k) for k, term in enumerate(terms, 1)))
         low, high, steepest = min(low, -most), max(high, most), max(steepest, 2 * sum(terms))
     return float(high - low), float(steepest)
+
+
+class Quantization(ReadoutEffect):
+    """Whole digital numbers."""
+
+    name = "quantization"
+    methods = ("skip", "round")
+    order = 1
+    bends = True
+
+    def exact(self, shot: Shot) -> str | None:
+        """Rounding always changes something."""
+        return None
+
+    def range_dn(self, shot: Shot, brightest_dn: float, methods: Chosen) -> float:
+        """See `ReadoutEffect`: 1 at most; under noise the range of the mean's shift."""
+        pixel = shot.pixel
+        return 1.0 if shot.scenario.noise is None else min(1.0, _under_noise(pixel, brightest_dn / pixel.dn_per_e)[0])
+
+    def work(self, shot: Shot, methods: Chosen, load: Load) -> Load:
+        """Every value is rounded."""
+        return load if methods.quantization == "skip" else replace(load, rounding=ROUNDED)

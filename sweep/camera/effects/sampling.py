@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...types import BoolArray, FloatArray, IndexArray
 from ..mosaic import Mosaic
 from ..scene import Target
-from ..view import Setup
+from ..shot import Shot
+from .base import Chosen, KernelEffect, Load, Part, Stage
 from .blur import Profile
 
-METHODS = ("skip", "pixels")
 _AT_ONCE = 200
-
-
-def skip_is_exact(setup: Setup) -> str | None:
-    """Why leaving sampling out changes nothing; None when it does."""
-    return "every pixel of a channel sees the same" if setup.scenario.target is None else None
 
 
 def covered(x: FloatArray, y: FloatArray, half: float, radius: float) -> FloatArray:
@@ -59,18 +54,18 @@ class Window:
     dy: FloatArray
 
 
-def radii_px(setup: Setup, target: Target) -> tuple[float, float]:
+def radii_px(shot: Shot, target: Target) -> tuple[float, float]:
     """Radius of the light and of the readout, in pixels; a readout reaches a pixel of every channel."""
     radius = target.object_resolution_px / 2
-    rows, columns = setup.mosaic.indices.shape
+    rows, columns = shot.mosaic.indices.shape
     return radius, max(radius, math.hypot(rows, columns) / 2)
 
 
-def reach_px(setup: Setup, target: Target) -> float:
+def reach_px(shot: Shot, target: Target) -> float:
     """How far from the light's center a pixel may have a weight in the readout, along a row or column."""
     if target.readout == "mean":
-        return radii_px(setup, target)[1] + 0.5
-    return float(max(setup.mosaic.indices.shape))
+        return radii_px(shot, target)[1] + 0.5
+    return float(max(shot.mosaic.indices.shape))
 
 
 def window(mosaic: Mosaic, phases_px: FloatArray, reach_px: float) -> Window:
@@ -161,3 +156,32 @@ def _means(apart: FloatArray, half: float, profile: Profile, pitch_um: float) ->
         r = np.hypot(x[:, None] + u, y[:, None] + v) * pitch_um
         values[start : start + _AT_ONCE] = profile.sums(r, both)
     return values
+
+
+class Sampling(KernelEffect):
+    """Pixels, one by one, in place of the mean over the whole readout."""
+
+    name = "sampling"
+    methods = ("skip", "pixels")
+    stage = Stage.SAMPLING
+    order = 1
+    needed_for_noise = True
+    part = Part.PIXELS
+
+    def exact(self, shot: Shot) -> str | None:
+        """A light that fills the field needs no pixels."""
+        return "every pixel of a channel sees the same" if shot.scenario.target is None else None
+
+    def allowed(self, shot: Shot, methods: Chosen) -> bool:
+        """Without pixels nothing saturates or is rounded one by one."""
+        return methods.sampling != "skip" or methods.straight
+
+    def work(self, shot: Shot, methods: Chosen, load: Load) -> Load:
+        """The light of every pixel at every place, and what reads it."""
+        target = shot.scenario.target
+        if target is None or methods.sampling == "skip":
+            return load
+        across = 2 * radii_px(shot, target)[1] + 1
+        pixels = max(across, 2.0 * max(shot.mosaic.indices.shape)) ** 2
+        kernel = load.cases * pixels * len(shot.mosaic.channels) * load.knots + load.image * pixels * load.knots
+        return replace(load, units=load.units if methods.straight else pixels, kernel=kernel)

@@ -9,14 +9,15 @@ there, a distance changes by at most what both of its points move (`pixelwise`).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
+from ...curves.hats import hats
 from ...curves.lights import class_pairs
 from ...types import FloatArray, IndexArray
 from ..effects import blur, flicker
-from ..view import Setup, background_irradiance, exposure_times, per_photon, signal_irradiance, white_irradiance
+from ..exposure import exposure_times, white_irradiance
+from ..view import View, background_irradiance, per_photon, signal_irradiance
 from .compiled import largest_change
 
 
@@ -24,7 +25,7 @@ from .compiled import largest_change
 class Box:
     """Designs of a scene: every channel's QE lies between `low` and `high`, ndarray[n_channels, n_wavelengths]."""
 
-    setup: Setup
+    view: View
     low: FloatArray
     high: FloatArray
     n_designs: int
@@ -45,18 +46,6 @@ class Amounts:
     largest: FloatArray
     most: FloatArray
     most_each: FloatArray
-
-
-class Step(NamedTuple):
-    """What a step changes, as `Reach.largest_change` takes it; the share of the kernel, and of the light off axis."""
-
-    changed: Amounts
-    change: FloatArray
-    remainder: float
-    base: Amounts
-    left: FloatArray
-    scale: float
-    falls: float
 
 
 _AT_ONCE = 4_000_000
@@ -89,25 +78,35 @@ class Reach:
     """The responses that the designs of a box can have, on the knots at which kernels are compared."""
 
     def __init__(self, box: Box) -> None:
-        setup = box.setup
+        view = box.view
         self.box = box
-        wave = setup.grid.nodes_nm
+        wave = view.grid.nodes_nm
         self.knots_nm = blur.knots(wave, blur.COARSE)
-        self._hats = np.stack([np.interp(wave, self.knots_nm, unit) for unit in np.eye(self.knots_nm.size)])
+        self._hats = hats(wave, self.knots_nm)
         self.shortest_s, self.longest_s = self._exposures()
-        drive = setup.scenario.drive
+        drive = view.scenario.drive
         self.least_light = 1.0 if drive is None else flicker.smallest(drive, self.shortest_s, self.longest_s)
         self.most_light = 1.0 if drive is None else flicker.largest(drive, self.shortest_s, self.longest_s)
-        dn = per_photon(setup) * self.longest_s * self.most_light * setup.pixel.dn_per_e
-        self._signals = signal_irradiance(setup) * dn
-        self.first, self.second, self._ends = _pairs(setup.members)
+        dn = per_photon(view) * self.longest_s * self.most_light * view.pixel.dn_per_e
+        self._signals = signal_irradiance(view) * dn
+        self.first, self.second, self._ends = _pairs(view.members)
 
     def _exposures(self) -> tuple[float, float]:
-        setup = self.box.setup
-        modified = list(setup.modified)
-        white = white_irradiance(setup) * per_photon(setup)
-        ends = [exposure_times(setup, (qe[modified] @ white)[None])[0] for qe in (self.box.high, self.box.low)]
+        view = self.box.view
+        modified = list(view.modified)
+        white = white_irradiance(view) * per_photon(view)
+        ends = [exposure_times(view, (qe[modified] @ white)[None])[0] for qe in (self.box.high, self.box.low)]
         return float(ends[0]), float(ends[1])
+
+    @property
+    def qe_low(self) -> FloatArray:
+        """No channel of any design is below this, ndarray[n_channels, n_wavelengths]."""
+        return self.box.low
+
+    @property
+    def qe_high(self) -> FloatArray:
+        """No channel of any design is above this, ndarray[n_channels, n_wavelengths]."""
+        return self.box.high
 
     @property
     def brightest_dn(self) -> FloatArray:
@@ -115,23 +114,28 @@ class Reach:
         return np.asarray((self._signals @ self.box.high.T).max(axis=0), dtype=float)
 
     @property
-    def background_dn(self) -> FloatArray:
-        """Largest response of each channel to the background, DN, ndarray[n_channels]."""
-        setup = self.box.setup
-        dn = per_photon(setup) * self.longest_s * setup.pixel.dn_per_e
-        return np.asarray(self.box.high @ background_irradiance(setup) * dn, dtype=float)
+    def brightest_pixels_dn(self) -> FloatArray:
+        """The same with background, dark current and the filters of the neighbors, DN, ndarray[n_channels]."""
+        view = self.box.view
+        pixel, dn = view.pixel, per_photon(view) * self.longest_s * view.pixel.dn_per_e
+        background_dn = self.box.high @ background_irradiance(view) * dn
+        found = self.brightest_dn + (pixel.dark_e_per_s * self.longest_s * pixel.dn_per_e + background_dn)
+        return np.full(found.size, found.max()) if pixel.crosstalk else np.asarray(found, dtype=float)
 
-    @property
-    def background(self) -> tuple[FloatArray, FloatArray]:
-        """Response of each channel to the background, DN: middle value and half width, ndarray[n_channels] each."""
-        irradiance = background_irradiance(self.box.setup)
-        dn = per_photon(self.box.setup) * self.longest_s * self.box.setup.pixel.dn_per_e
+    def background(self, factor: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Response of each channel to the background behind a factor, ndarray[n_wavelengths], that may be negative.
+
+        DN: middle value and half width, ndarray[n_channels] each.
+        """
+        irradiance = background_irradiance(self.box.view) * factor
+        dn = per_photon(self.box.view) * self.longest_s * self.box.view.pixel.dn_per_e
         ends = [qe @ irradiance * dn for qe in (self.box.low, self.box.high)]
-        return np.asarray((ends[0] + ends[1]) / 2), np.asarray((ends[1] - ends[0]) / 2)
+        sizes = [qe @ np.abs(irradiance) * dn for qe in (self.box.low, self.box.high)]
+        return np.asarray((ends[0] + ends[1]) / 2), np.asarray((sizes[1] - sizes[0]) / 2)
 
     def span_dn(self, *, rounds: bool) -> float:
         """Between which two values, so far apart, DN, every channel's value is where the readout clips, or `rounds`."""
-        pixel = self.box.setup.pixel
+        pixel = self.box.view.pixel
         full = float(pixel.full_scale_dn)
         return full if rounds else min(full, pixel.well_e * pixel.dn_per_e)
 

@@ -33,15 +33,15 @@ def _lengths(
         out[p] = scale * np.sqrt(out[p])
 
 
-Values = tuple[FloatArray, FloatArray, FloatArray]
+Parts = tuple[FloatArray, FloatArray, FloatArray]
 """What each signal is, ndarray[n_cases, n_values, n_signals]; by how much the difference of each pair may be off,
 ndarray[n_cases, n_values, n_pairs]; and by how much more in a cell of places, ndarray[n_cells, n_values, n_pairs]."""
 
 
 @njit(cache=True, nogil=True)
 def largest_change(
-    change: Values,
-    after: Values,
+    change: Parts,
+    after: Parts,
     corners: IndexArray,
     first: IndexArray,
     second: IndexArray,

@@ -24,8 +24,10 @@ import numpy as np
 
 from ...types import FloatArray
 from ..effects import phase, quantization
-from ..kernel import Kernel, make_kernel, pixels_per_place, readout_of
-from ..view import Methods, Setup
+from ..effects.base import Change, KernelChange, LightChange, Part, ShareChange
+from ..kernel import Kernel, make_kernel, pixels_of_tile, pixels_per_place, readout_of
+from ..methods import Methods
+from ..view import View
 from .bounds import Amounts, Reach
 
 _AT_ONCE = 4_000_000
@@ -35,27 +37,30 @@ _AT_ONCE = 4_000_000
 class Moves:
     """What a step of the optics moves in a scene, remembered."""
 
-    def __init__(self, setup: Setup, reach: Reach) -> None:
-        self._setup, self._reach = setup, reach
+    def __init__(self, view: View, reach: Reach) -> None:
+        self._view, self._reach = view, reach
         self._found: dict[tuple[object, ...], FloatArray] = {}
 
-    def of(self, effect: str, before: Methods, after: Methods, light: Amounts, falls: float) -> FloatArray:
+    def of(
+        self, what: Change, before: Methods, after: Methods, light: Amounts, background: tuple[FloatArray, FloatArray]
+    ) -> FloatArray:
         """Bound on the change of each channel's value, DN, ndarray[n_cases, n_signals, n_channels].
 
-        `light`: what changes of the signals, where the step changes them and not the kernel. `falls`: the share of the
-        light that comes so far off the axis; of a background, too. What the kernel is between the knots comes on top.
+        `light`, `background`: what changes of them, where the step changes them and not the kernel; see `Step`. What
+        the kernel is between the knots comes on top.
         """
-        digest = hashlib.sha256(light.middle.tobytes() + light.half_each.tobytes()).digest()
-        key = (effect, before, after, falls, digest)
+        numbers = [light.middle, light.half_each, *background]
+        digest = hashlib.sha256(b"".join(values.tobytes() for values in numbers)).digest()
+        kind = what.part if isinstance(what, KernelChange) else type(what)
+        key = (kind, _moves_background(what), before, after, digest)
         if key not in self._found:
-            setup = self._setup
-            cases = phase.cases(setup, before.phase)
-            n_channels = len(setup.mosaic.channels)
+            view = self._view
+            cases = phase.cases(view, before.phase)
+            n_channels = len(view.mosaic.channels)
             per_pixel = max(n_channels * self._reach.knots_nm.size, len(light.middle))
-            step = max(1, _AT_ONCE // (pixels_per_place(setup) * per_pixel))
+            step = max(1, _AT_ONCE // (pixels_per_place(view) * per_pixel))
             blocks = [cases.some(slice(at, at + step)) for at in range(0, len(cases.places_px), step)]
-            background = [falls * part for part in self._reach.background]
-            parts = [self._of_block(effect, before, after, light, background, block) for block in blocks]
+            parts = [self._of_block(what, before, after, light, background, block) for block in blocks]
             self._found[key] = np.concatenate(parts)
         return self._found[key]
 
@@ -66,7 +71,7 @@ class Moves:
         before it by s = `quantization.steepness` - 1 at most. So where nothing clips, s times what the pixels move
         comes on top of a straight readout's change. What clips has no values outside its range.
         """
-        steep = quantization.steepness(self._setup) if rounds else 1.0
+        steep = quantization.steepness(self._view.pixel) if rounds else 1.0
         if not clips:
             return every + (steep - 1) * self._reach.largest_move(moved)
         return self._reach.largest_move(np.minimum(moved * steep, self._reach.span_dn(rounds=rounds)))
@@ -74,38 +79,36 @@ class Moves:
     def _kernel(self, methods: Methods, cases: phase.Cases) -> Kernel:
         """Pixel by pixel, at all knots."""
         nodes = self._reach.knots_nm
-        made = make_kernel(self._setup, methods, nodes, by_pixel=True, work=Counter(), cases=cases)
-        if self._setup.scenario.target is None and made.light.shape[1] == len(self._setup.mosaic.channels):
-            channel = self._setup.mosaic.indices.ravel()  # without crosstalk one pixel of a channel stands for all
-            own = np.eye(made.light.shape[1])[channel] / self._setup.mosaic.counts
-            made = Kernel(made.light[:, channel], made.uniform[:, channel], own[None], own[None] ** 2)
+        made = make_kernel(self._view, methods, nodes, by_pixel=True, work=Counter(), cases=cases)
+        if made.by_channel:  # without crosstalk one pixel of a channel stands for all
+            made = pixels_of_tile(made, self._view.mosaic)
         return replace(made, light=np.broadcast_to(made.light, (*made.light.shape[:3], nodes.size)))
 
     def _of_block(
         self,
-        effect: str,
+        what: Change,
         before: Methods,
         after: Methods,
         light: Amounts,
-        background: list[FloatArray],
+        background: tuple[FloatArray, FloatArray],
         cases: phase.Cases,
     ) -> FloatArray:
         now = self._kernel(before, cases)
-        if effect == "demosaic":
-            other = readout_of(self._setup, after, cases, like=before)
-            return self._of_weights(now, other, light, background)
-        change, uniform = now.light, np.zeros_like(now.uniform)
-        if effect in ("blur", "crosstalk") and before == after:  # compared at the knots, where both are the same
-            change = np.zeros_like(now.light)
-        elif effect in ("blur", "crosstalk"):
-            then = self._kernel(after, cases)
+        if isinstance(what, KernelChange):
+            if what.part is Part.WEIGHTS:
+                other = readout_of(self._view, after, cases, like=before)
+                return self._of_weights(now, other, light, background)
+            # Compared at the knots, where both may be the same.
+            then = now if before == after else self._kernel(after, cases)
             change, uniform = now.light - then.light, now.uniform - then.uniform
-        elif effect == "illumination":
-            uniform = now.uniform
+        else:
+            change, uniform = now.light, now.uniform if _moves_background(what) else np.zeros_like(now.uniform)
         return _summed(now.readout, change, uniform, light, background)
 
     @staticmethod
-    def _of_weights(now: Kernel, other: FloatArray, light: Amounts, background: list[FloatArray]) -> FloatArray:
+    def _of_weights(
+        now: Kernel, other: FloatArray, light: Amounts, background: tuple[FloatArray, FloatArray]
+    ) -> FloatArray:
         """Of weights that change to `other`."""
         found = []
         for channel in range(other.shape[2]):
@@ -117,8 +120,17 @@ class Moves:
         return np.concatenate(found, axis=2)
 
 
+def _moves_background(what: Change) -> bool:
+    """Whether a change that is none of the kernel changes the background, too."""
+    return isinstance(what, LightChange | ShareChange) and what.of_background
+
+
 def _summed(
-    weights: FloatArray, change: FloatArray, uniform: FloatArray, light: Amounts, background: list[FloatArray]
+    weights: FloatArray,
+    change: FloatArray,
+    uniform: FloatArray,
+    light: Amounts,
+    background: tuple[FloatArray, FloatArray],
 ) -> FloatArray:
     """Weights times absolute changes of the pixels' signals, ndarray[n_cases, n_signals, n_values].
 

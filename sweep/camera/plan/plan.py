@@ -8,20 +8,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 
-from ..effects.phase import LATTICES
-from ..view import REFERENCE, Methods
+from ..effects.base import Effect, Stage
+from ..methods import REFERENCE, Methods
+from ..registry import EFFECTS
 from .bounds import Box
-from .promises import EFFECTS, READOUT, Promises
+from .promises import Promises
 
 _NOTHING_DN = 1e-9
-_NOTHING = {
-    "noise": "moves no mean where nothing clips",
-    "saturation": "no signal reaches it",
-    "pedestal": "cancels in every difference",
-}
-"""Why an effect that could matter in other scenes changes less than this here."""
-_OF_NOISE = (*READOUT, "sampling")
-"""What metrics of noise ask for."""
+_LIMITS = tuple(name for name, effect in EFFECTS.items() if effect.is_limit)
 
 
 @dataclass(frozen=True)
@@ -52,7 +46,7 @@ class Plan:
 
     @property
     def methods(self) -> Methods:
-        """The methods, as a setup takes them."""
+        """The methods, as a view takes them."""
         return Methods(**{choice.effect: choice.method for choice in self.choices})
 
     @property
@@ -73,7 +67,7 @@ class Plan:
     @property
     def computed(self) -> tuple[str, ...]:
         """Effects that are not skipped."""
-        return tuple(c.effect for c in self.choices if c.method not in ("skip", "one"))
+        return tuple(c.effect for c in self.choices if c.method != EFFECTS[c.effect].off)
 
 
 class Planner:
@@ -83,20 +77,12 @@ class Planner:
         """`for_noise`: metrics of noise are asked for, which need every pixel and what the readout does to it."""
         self._for_noise = for_noise
         self._scenes = [Promises(box) for box in boxes]
-        self._exact = {effect: self._why_exact(effect) for effect in EFFECTS}
+        self._exact = {name: self._why_exact(effect) for name, effect in EFFECTS.items()}
 
-    def _why_exact(self, effect: str) -> str | None:
+    def _why_exact(self, effect: Effect) -> str | None:
         """The reason when skipping an effect changes nothing in any box."""
-        if effect == "saturation":
-            # Rounding ends at the ADC's range, too: only where that is left out, all of the excess shows.
-            before = replace(REFERENCE, quantization="skip")
-            if any(scene.promise(effect, before, replace(before, saturation="skip")) for scene in self._scenes):
-                return None
-            if self._noisy:
-                return None
-            top = max(float(scene.reach.brightest_dn.max()) for scene in self._scenes)
-            return f"the brightest signal has at most {top:.0f} DN"
-        reasons = [EFFECTS[effect].skip_is_exact(scene.setup) for scene in self._scenes]
+        signals_dn = max((float(scene.reach.brightest_dn.max()) for scene in self._scenes), default=0.0)
+        reasons = [scene.why_exact(effect, signals_dn) for scene in self._scenes]
         return None if None in reasons else str(reasons[0])
 
     def promise(self, effect: str, before: Methods, after: Methods) -> float:
@@ -125,11 +111,11 @@ class Planner:
     @property
     def _start(self) -> Methods:
         """Everything on but what changes nothing."""
-        return replace(REFERENCE, **{e: EFFECTS[e].METHODS[0] for e in EFFECTS if self._exact[e] is not None})
+        return replace(REFERENCE, **{e: EFFECTS[e].methods[0] for e in EFFECTS if self._exact[e] is not None})
 
     def _left_over(self, methods: Methods) -> float:
-        """What no method of `phase` takes away: over all places everything on is a limit."""
-        return self.promise("phase", methods, replace(methods, phase=REFERENCE.phase))
+        """What no method takes away of effects whose reference is a limit, as all places of a light are."""
+        return sum(self.promise(e, methods, replace(methods, **{e: EFFECTS[e].reference})) for e in _LIMITS)
 
     def _cheapest(
         self, tolerance_dn: float, tried: dict[tuple[str, str], float], *, besides: bool = False
@@ -145,55 +131,52 @@ class Planner:
 
         def deeper(at: int, methods: Methods, promises: dict[str, float]) -> None:
             # Every further effect at its cheapest: no completion of these methods costs less.
-            least = self._work(replace(methods, **{e: EFFECTS[e].METHODS[0] for e in active[at:]}))
+            least = self._work(replace(methods, **{e: EFFECTS[e].methods[0] for e in active[at:]}))
             if best and least >= best[0][0]:
                 return
             if at == len(active):
                 best[:] = [(least, methods, promises)]
                 return
-            effect = active[at]
-            for method in EFFECTS[effect].METHODS:
-                after = replace(methods, **{effect: method})
-                if not self._allowed(effect, after) or (besides and effect == "phase" and method in LATTICES):
+            name, effect = active[at], EFFECTS[active[at]]
+            for method in effect.methods:
+                after = replace(methods, **{name: method})
+                endless = besides and effect.is_limit and effect.limit_dn(method) is None
+                if endless or not self._allowed(name, after):
                     continue
-                promised = self.promise(effect, methods, after)
-                tried[effect, method] = min(promised, tried.get((effect, method), promised))
+                promised = self.promise(name, methods, after)
+                tried[name, method] = min(promised, tried.get((name, method), promised))
                 # Behind a rounded readout, an error however small may move a value by a whole step.
                 rounded = after.quantization == "round" and not self._noisy
-                exactly = rounded and effect not in (*READOUT, "phase")
-                allowed = promises.get("phase", 0.0) if exactly else tolerance_dn
-                if besides and not exactly and ("phase" in promises or effect == "phase"):
+                exactly = rounded and effect.stage is not Stage.READOUT and not effect.is_limit
+                allowed = sum(promises.get(e, 0.0) for e in _LIMITS) if exactly else tolerance_dn
+                if besides and not exactly and (effect.is_limit or any(e in promises for e in _LIMITS)):
                     allowed += self._left_over(after)
                 if sum(promises.values()) + promised <= allowed:
-                    deeper(at + 1, after, promises | {effect: promised})
+                    deeper(at + 1, after, promises | {name: promised})
 
         deeper(0, start, {})
         return best[0][1:] if best else None
 
     @property
     def _noisy(self) -> bool:
-        return any(scene.setup.scenario.noise is not None for scene in self._scenes)
+        return any(scene.view.scenario.noise is not None for scene in self._scenes)
 
-    def _allowed(self, effect: str, methods: Methods) -> bool:
-        """Without pixels nothing saturates or is rounded one by one; noise moves a mean only where something clips, and
-        rounding clips, too.
-        """
-        if self._for_noise and effect in _OF_NOISE:
-            return bool(getattr(methods, effect) == getattr(REFERENCE, effect))
-        if effect == "saturation" and methods.saturation == "skip":
-            quiet = self._exact["noise"] is not None or methods.noise == "skip"
-            return quiet and methods.quantization == "skip"
-        return effect != "sampling" or methods.sampling != "skip" or methods.straight
+    def _allowed(self, name: str, methods: Methods) -> bool:
+        """Whether the method of an effect goes together with the others, and with what is asked of the scene."""
+        effect = EFFECTS[name]
+        if self._for_noise and effect.needed_for_noise:
+            return bool(getattr(methods, name) == effect.reference)
+        return all(effect.allowed(scene.view, methods) for scene in self._scenes)
 
     def _reason(self, effect: str, method: str, promised: float, tried: Mapping[tuple[str, str], float]) -> str:
         exact = self._exact[effect]
         if exact is not None:
             return exact
-        if self._for_noise and effect in _OF_NOISE:
+        if self._for_noise and EFFECTS[effect].needed_for_noise:
             return "the noise metrics ask for it"
-        methods = EFFECTS[effect].METHODS
+        methods = EFFECTS[effect].methods
         if method == methods[0] and promised < _NOTHING_DN:
-            return _NOTHING.get(effect, "changes nothing here")
+            return EFFECTS[effect].without
         if promised > 0:
             return f"changes a CSD by at most {promised:.2g} DN"
         cheaper = {m: tried[effect, m] for m in methods[: methods.index(method)] if (effect, m) in tried}

@@ -11,66 +11,67 @@ import numpy as np
 from ...types import FloatArray, IndexArray
 from ..between import Between, Deviation
 from ..effects import phase
+from ..effects.base import Change, KernelChange, KernelEffect, Part
 from ..kernel import make_kernel
-from ..view import REFERENCE, Methods, Setup
+from ..methods import REFERENCE, Methods
+from ..registry import EFFECTS, WHOLE_LIGHT
+from ..view import View
 from .bounds import Spread
-
-_KEPT = ("sampling", "phase", "demosaic", "crosstalk")
-"""Effects whose methods change the kernel; blur is either on or off."""
 
 
 class SceneKernels:
     """Kernels of a scene's methods at some wavelengths, remembered."""
 
-    def __init__(self, setup: Setup, knots_nm: FloatArray) -> None:
-        self._setup, self._knots_nm = setup, knots_nm
+    def __init__(self, view: View, knots_nm: FloatArray) -> None:
+        self._view, self._knots_nm = view, knots_nm
         self._kernels: dict[Methods, FloatArray] = {}
         self._deviations: dict[Methods, Deviation] = {}
 
     def anywhere(self, methods: Methods) -> bool:
         """Whether the light may fall anywhere, and more than a lattice of places is looked at."""
-        return phase.all_count(replace(self._setup, methods=methods))
+        return phase.all_count(self._view, methods)
 
     @cached_property
     def _cells(self) -> phase.Cells:
         """Cells of places; their corners stand for all places, with what may lie between them."""
-        return phase.whole(self._setup.mosaic)
+        return phase.whole(self._view.mosaic)
 
     @cached_property
     def corners(self) -> tuple[phase.Cases, IndexArray]:
         """The corners of the cells, each once, and those of each cell."""
-        return self._cells.shared_corners(self._setup)
+        return self._cells.shared_corners(self._view)
 
     def wanted(self, methods: Methods) -> Methods:
-        """What the kernel depends on, with no extinction."""
-        on = "skip" if methods.blur == "skip" else REFERENCE.blur
-        kept = {effect: getattr(methods, effect) for effect in _KEPT}
-        wanted = replace(REFERENCE, **kept, extinction="skip", illumination="skip", blur=on)
+        """What the kernel depends on, all light being left."""
+        kept = {
+            name: e.kernel_method(getattr(methods, name)) for name, e in EFFECTS.items() if isinstance(e, KernelEffect)
+        }
+        wanted = replace(REFERENCE, **kept, **WHOLE_LIGHT)
         return replace(wanted, phase=REFERENCE.phase) if self.anywhere(wanted) else wanted
 
     def of(self, methods: Methods) -> FloatArray:
-        """The kernel at the knots, without extinction: [cases, channels, channels, knots].
+        """The kernel at the knots, of all light: [cases, channels, channels, knots].
 
         The cases are the places of the lattice, or the corners of cells where the light may fall anywhere.
         """
         wanted, nodes = self.wanted(methods), self._knots_nm
         if wanted not in self._kernels:
             cases = self.corners[0] if self.anywhere(wanted) else None
-            light = make_kernel(self._setup, wanted, nodes, by_pixel=False, work=Counter(), cases=cases).light
+            light = make_kernel(self._view, wanted, nodes, by_pixel=False, work=Counter(), cases=cases).light
             self._kernels[wanted] = np.ascontiguousarray(np.broadcast_to(light, (*light.shape[:3], nodes.size)))
         return self._kernels[wanted]
 
     def nearest(self, methods: Methods) -> FloatArray:
         """The kernel at the place of a lattice that is nearest to the center of each cell."""
-        lattice = phase.places_px(self._setup, methods.phase)
-        return self.of(methods)[phase.nearest(self._setup, self._cells.centers, lattice)]
+        lattice = phase.places_px(self._view, methods.phase)
+        return self.of(methods)[phase.nearest_places(self._view, self._cells.centers, lattice)]
 
     def _deviation(self, methods: Methods) -> Deviation:
         """How far the kernel in cells may be from a mean of that at the corners: [cells, channels, channels, 1]."""
         wanted = self.wanted(methods)
         if wanted not in self._deviations:
             kernel, cells = self.of(wanted), self._cells
-            between = Between(self._setup, wanted, self._knots_nm)
+            between = Between(self._view, wanted, self._knots_nm)
             found = between.of_cells(cells.centers, cells.half, cells.homes, kernel[self.corners[1]])
             # At any wavelength: that of the middle one, and what differs from it.
             largest = found.kernel[..., :1] + found.kernel[..., 1:].max(axis=3, initial=0.0, keepdims=True)
@@ -78,7 +79,7 @@ class SceneKernels:
         return self._deviations[wanted]
 
     def spread(
-        self, effect: str, before: Methods, after: Methods, change: FloatArray, left: FloatArray, scale: float
+        self, what: Change, before: Methods, after: Methods, change: FloatArray, left: FloatArray, scale: float
     ) -> Spread | None:
         """What lies between the corners of the cells, of a change of the kernel and what is left; None for a lattice.
 
@@ -90,10 +91,11 @@ class SceneKernels:
         nothing = Deviation(np.zeros_like(here.kernel), here.tilt)
         there = self._deviation(after) if self.anywhere(after) else nothing
         sizes = here.kernel * scale
-        if effect in ("demosaic", "crosstalk", "blur"):
+        part = what.part if isinstance(what, KernelChange) else None
+        if part in (Part.WEIGHTS, Part.LIGHT):
             sizes = (here.kernel + there.kernel) * bool(change.any())
         corners = self.corners[1]
-        if effect == "phase":  # what is left is that of another place in each cell
+        if part is Part.PLACES:  # what is left is that of another place in each cell
             corners = np.arange(len(change)).reshape(corners.shape)
         changes, lefts = change[corners], left[corners]  # [cells, corners, ...]
         tilt, wide = here.tilt[:, :, None] / 2, np.ptp(lefts, axis=1)

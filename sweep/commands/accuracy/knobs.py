@@ -13,8 +13,10 @@ import numpy as np
 
 from ...camera.effects import blur, noise, phase
 from ...camera.imager import Imager
-from ...camera.plan.promises import EFFECTS
-from ...camera.view import REFERENCE, Methods, Setup
+from ...camera.linear import LinearImager
+from ...camera.methods import REFERENCE, Methods
+from ...camera.registry import EFFECTS
+from ...camera.view import View
 from ...errors import SweepError
 from ...metrics.separation import separations
 from ...study import Study
@@ -50,7 +52,7 @@ def knob_measurements(study: Study, regridded: Regridded, most_designs: int) -> 
     """
     names = list(study.scenarios)
     targets = [name for name in names if study.scenarios[name].target is not None]
-    anywhere = [name for name in targets if not phase.skip_is_exact(_one(study, name)[0])]
+    anywhere = [name for name in targets if not phase.one_is_enough(_one(study, name)[0])]
     noisy = [name for name in targets or names if study.scenarios[name].noise is not None]
     found: list[Callable[[], Iterator[Setting]]] = [
         partial(_wavelength_step, study, names[0], regridded, most_designs),
@@ -65,10 +67,10 @@ def knob_measurements(study: Study, regridded: Regridded, most_designs: int) -> 
     return found
 
 
-def _one(study: Study, scenario: str) -> tuple[Setup, FloatArray]:
-    """Setup and curves of one design: the first of the study's last space."""
+def _one(study: Study, scenario: str) -> tuple[View, FloatArray]:
+    """View and curves of one design: the first of the study's last space."""
     space = [space for space in study.spaces if space.size][-1]
-    return study.setup(space, scenario), space.curves(space.points(0, 1), study.grid.size)
+    return study.view(space, scenario), space.curves(space.points(0, 1), study.grid.size)
 
 
 def _distances(response: FloatArray, members: dict[str, IndexArray]) -> FloatArray:
@@ -80,13 +82,13 @@ def _distances(response: FloatArray, members: dict[str, IndexArray]) -> FloatArr
 def _csds(study: Study, scenario: str, methods: Methods, most_designs: int, **how: Any) -> tuple[FloatArray, float]:
     """CSDs of the smooth response of all spaces' first designs, and the time, kernels included."""
     spaces = [space for space in study.spaces if space.size]
-    blur.profile.cache_clear()
+    blur.PROFILES.clear()
     started = time.perf_counter()
     found = []
     for space in spaces:
-        setup = replace(study.setup(space, scenario), methods=methods)
+        view = replace(study.view(space, scenario), methods=methods)
         curves = space.curves(space.points(0, min(space.size, most_designs)), study.grid.size)
-        found.append(_distances(Imager(setup, Counter(), **how).smooth(curves), setup.members))
+        found.append(_distances(LinearImager(view, Counter(), **how).smooth(curves), view.members))
     return np.concatenate(found, axis=1), time.perf_counter() - started
 
 
@@ -107,28 +109,28 @@ def _wavelength_step(study: Study, scenario: str, regridded: Regridded, most_des
 
 def _methods(study: Study, scenario: str, effect: str, knob: str, most_designs: int) -> Iterator[Setting]:
     exact, _ = _csds(study, scenario, _SMOOTH, most_designs)
-    for method in EFFECTS[effect].METHODS:
+    for method in EFFECTS[effect].methods:
         found, seconds = _csds(study, scenario, replace(_SMOOTH, **{effect: method}), most_designs)
-        yield Setting(knob, scenario, method, float(np.abs(found - exact).max()), seconds, EFFECTS[effect].METHODS[-1])
+        yield Setting(knob, scenario, method, float(np.abs(found - exact).max()), seconds, EFFECTS[effect].reference)
 
 
 def _places(study: Study, scenario: str) -> Iterator[Setting]:
     """Places of the light on the mosaic, of one design, against a grid twice as fine as the finest."""
-    setup, curves = _one(study, scenario)
-    setup, members = replace(setup, methods=_SMOOTH), setup.members
-    target = setup.scenario.target
+    view, curves = _one(study, scenario)
+    view, members = replace(view, methods=_SMOOTH), view.members
+    target = view.scenario.target
     assert target is not None
-    rows, columns = setup.mosaic.indices.shape
+    rows, columns = view.mosaic.indices.shape
     exact: FloatArray = np.array(np.inf)
     for y in range(rows * _PLACES_PER_PIXEL):
         for x in range(columns * _PLACES_PER_PIXEL):
             at = target.model_copy(update={"phase_px": (x / _PLACES_PER_PIXEL, y / _PLACES_PER_PIXEL)})
-            there = replace(setup, scenario=setup.scenario.model_copy(update={"target": at}))
-            exact = np.minimum(exact, _distances(Imager(there).smooth(curves), members))
+            there = replace(view, scenario=view.scenario.model_copy(update={"target": at}))
+            exact = np.minimum(exact, _distances(LinearImager(there).smooth(curves), members))
     for method in phase.LATTICES:
-        blur.profile.cache_clear()
+        blur.PROFILES.clear()
         started = time.perf_counter()
-        imager = Imager(replace(setup, methods=replace(_SMOOTH, phase=method)))
+        imager = LinearImager(replace(view, methods=replace(_SMOOTH, phase=method)))
         found = _distances(imager.smooth(curves), members)
         seconds = time.perf_counter() - started
         oracle = f"every 1/{_PLACES_PER_PIXEL} pixel"
@@ -137,10 +139,10 @@ def _places(study: Study, scenario: str) -> Iterator[Setting]:
 
 def _draws(study: Study, scenario: str) -> Iterator[Setting]:
     """The mean of Monte Carlo readouts of every pixel against the closed form, for one design and place."""
-    setup, curves = _one(study, scenario)
-    imager = Imager(replace(setup, methods=REFERENCE))
+    view, curves = _one(study, scenario)
+    imager = Imager(replace(view, methods=REFERENCE))
     started = time.perf_counter()
-    exact = _distances(imager.read_with_noise(curves).mean[:, :1], setup.members)
+    exact = _distances(imager.read_with_noise(curves).mean[:, :1], view.members)
     closed_s = time.perf_counter() - started
     electrons = imager.pixel_electrons(curves)[0, 0]
     for draws in _DRAWS:
@@ -150,7 +152,7 @@ def _draws(study: Study, scenario: str) -> Iterator[Setting]:
         for _ in range(_REPEATS):
             drawn = noise.draws_dn(np.broadcast_to(electrons, (draws, *electrons.shape)), imager.readout.pixel, rng)
             channels = imager.readout.channels_of(drawn.mean(axis=0), 0)
-            errors.append(np.abs(_distances(channels[None, None], setup.members) - exact).max())
+            errors.append(np.abs(_distances(channels[None, None], view.members) - exact).max())
         seconds = (time.perf_counter() - started) / _REPEATS
         error = float(np.sqrt(np.mean(np.square(errors))))
         yield Setting("Monte Carlo draws", scenario, f"{draws} draws", error, seconds, "closed form")

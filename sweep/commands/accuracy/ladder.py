@@ -15,11 +15,13 @@ import pyarrow as pa
 
 from ...camera.effects import blur
 from ...camera.imager import Imager
+from ...camera.methods import REFERENCE
 from ...camera.places import forget_geometries
 from ...camera.plan.plan import Plan
-from ...camera.view import REFERENCE, Setup
+from ...camera.view import View
+from ...curves.lights import class_pairs
 from ...metrics.evaluate import evaluate
-from ...metrics.separation import CSD
+from ...metrics.separation import csd_name
 from ...report.figures import rendered
 from ...report.series import draw_knobs, draw_work_precision
 from ...results.tables import write_bytes, write_table
@@ -37,7 +39,7 @@ _SHORT_S = 3.0
 """A measurement shorter than this is repeated; the median counts."""
 
 
-def accuracy(
+def measure_accuracy(
     study: Study, regridded: Regridded, output: Path, progress: Progress, most_designs: int = 200
 ) -> list[str]:
     """Measure the ladder for all scenarios, and every knob; write tables, figures and a report, and say what was found.
@@ -102,27 +104,27 @@ def _ladder(study: Study, progress: Progress, most_designs: int) -> Iterator[dic
 
 def _timed(study: Study, scenario: str, most_designs: int) -> tuple[FloatArray, float, int]:
     """CSDs of the scenario's designs, the time they take with their kernels, and the operations counted."""
-    setups = [(space, study.setup(space, scenario)) for space in study.spaces if space.size]
+    views = [(space, study.view(space, scenario)) for space in study.spaces if space.size]
     if scenario not in study.plans:
-        setups = [(space, replace(setup, methods=REFERENCE)) for space, setup in setups]
+        views = [(space, replace(view, methods=REFERENCE)) for space, view in views]
     times = []
     while True:
-        blur.profile.cache_clear()
+        blur.PROFILES.clear()
         forget_geometries()
         started = time.perf_counter()
         found, work = [], Counter[str]()
-        for space, setup in setups:
+        for space, view in views:
             points = space.points(0, min(space.size, most_designs))
-            found.append(_csds(setup, space.curves(points, study.grid.size), work))
+            found.append(_csds(view, space.curves(points, study.grid.size), work))
         times.append(time.perf_counter() - started)
         if len(times) == _REPEATS or sum(times) > _SHORT_S:
             return np.concatenate(found, axis=1), float(np.median(times)), sum(work.values())
 
 
-def _csds(setup: Setup, curves: FloatArray, work: Counter[str]) -> FloatArray:
+def _csds(view: View, curves: FloatArray, work: Counter[str]) -> FloatArray:
     """All CSDs, ndarray[n_pairs, n_designs]."""
-    columns = evaluate(Imager(setup, work), curves)
-    return np.stack([values for name, values in columns.items() if name.startswith(CSD)])
+    columns = evaluate(Imager(view, work), curves)
+    return np.stack([columns[csd_name(pair)] for pair in class_pairs(view.lights.classes)])
 
 
 def _computed(plan: Plan) -> str:

@@ -1,5 +1,5 @@
 """Fit the built-in surrogate curves to published figures, and say how well and how surely."""
 
-from .run import Calibration, calibrate
+from .run import Calibration, fit_surrogate
 
-__all__ = ["Calibration", "calibrate"]
+__all__ = ["Calibration", "fit_surrogate"]

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from ...curves.builtin.surrogate import SurrogateParameters
 from ...types import FloatArray
-from .model import Figures, color_violations, crossed_edges, figures
+from .model import DISTANCES, Figures, color_violations, crossed_edges, figures
 from .parameters import Free, Path, checked, free_parameters, with_values
 
 CSD_RELATIVE = 0.005
@@ -81,7 +81,7 @@ class _Residuals:
                 for (_, quantity), value in zip(self.keys, self.printed, strict=True)
             ]
         )
-        self.ordered = [(row, a, b) for row, values in task.targets.items() for a, b in ranking(values)]
+        self.ordered = [(row, a, b) for row, values in task.targets.items() for a, b in printed_order(values)]
 
     def __call__(self, x: FloatArray) -> FloatArray:
         parameters = checked(with_values(self.task.prior, self.free, x, self.task.tied))
@@ -96,9 +96,9 @@ class _Residuals:
         return np.concatenate([data, (x - self.mean) / self.sigma, bend, color, order, crossed])
 
 
-def ranking(values: Mapping[str, float]) -> list[tuple[str, str]]:
+def printed_order(values: Mapping[str, float]) -> list[tuple[str, str]]:
     """Neighbors of the printed ranking of a row's CSDs, smaller first; ties are left out."""
-    names = sorted((name for name in values if name.startswith("csd_")), key=lambda name: values[name])
+    names = sorted((name for name in values if name in DISTANCES), key=lambda name: values[name])
     return [(a, b) for a, b in itertools.pairwise(names) if values[a] < values[b]]
 
 

@@ -8,21 +8,25 @@ import numpy as np
 
 from ...camera.mosaic import Mosaic
 from ...camera.pixel import Pixel
-from ...camera.scene import Scenario
+from ...camera.scenario import Scenario
 from ...camera.sensor import SensorCurves, ar0820_sensor
-from ...camera.view import Setup
+from ...camera.view import View
 from ...curves.builtin.surrogate import StopbandParameters, SurrogateParameters
-from ...curves.builtin.tl16 import tl16
+from ...curves.builtin.tl16 import SIGNAL_TYPES, tl16
 from ...curves.color import REGIONS, chromaticity
-from ...curves.lights import Lights
+from ...curves.lights import Lights, class_pairs
 from ...curves.spectrum import WavelengthGrid
 from ...designs.families.stopband import Stopband
-from ...metrics.evaluate import designed_quantities, smooth_response
+from ...metrics.columns.sensitivity import SENSITIVITY
+from ...metrics.evaluate import designed_quantities
 from ...metrics.separation import csd_name, separations
+from ...metrics.smooth import smooth_response
 from ...types import FloatArray
 
 GRID = WavelengthGrid()
 MODIFIED_CFA = "RYNCy"
+DISTANCES = {csd_name(pair): "/".join(pair) for pair in class_pairs(SIGNAL_TYPES)}
+"""Columns of CSDs, with their pairs in words."""
 Figures = dict[str, dict[str, float]]
 """Row (a CFA or a stopband filter) -> quantity -> value."""
 
@@ -38,28 +42,28 @@ def figures(parameters: SurrogateParameters, rows: Sequence[str]) -> Figures:
     return {row: found[row] for row in rows}
 
 
-def _setup(mosaic: Mosaic, sensor: SensorCurves, lights: Lights, base: Mapping[str, str]) -> Setup:
+def _view(mosaic: Mosaic, sensor: SensorCurves, lights: Lights, base: Mapping[str, str]) -> View:
     modified = tuple(mosaic.channels.index(channel) for channel in base)
     qe = sensor.mosaic_qe(mosaic, base)
-    return Setup(GRID, mosaic, qe, modified, sensor.qe["C"], lights, Pixel(), Scenario())
+    return View(GRID, mosaic, qe, modified, sensor.qe["C"], lights, Pixel(), Scenario())
 
 
 def _plain(cfa: str, sensor: SensorCurves, lights: Lights) -> dict[str, float]:
-    setup = _setup(Mosaic.from_name(cfa), sensor, lights, {})
-    response = smooth_response(setup, np.empty((1, 0, GRID.size)))[:, 0]
+    view = _view(Mosaic.from_name(cfa), sensor, lights, {})
+    response = smooth_response(view, np.empty((1, 0, GRID.size)))[:, 0]
     return {csd_name(pair): float(v[0]) for pair, v in separations(response, lights.members).items()}
 
 
 def _filtered(rows: Sequence[str], parameters: SurrogateParameters, sensor: SensorCurves, lights: Lights) -> Figures:
     if not rows:
         return {}
-    setup = _setup(Mosaic.from_name(MODIFIED_CFA), sensor, lights, {"N": "Y"})
+    view = _view(Mosaic.from_name(MODIFIED_CFA), sensor, lights, {"N": "Y"})
     x = np.array([[*stopband_values(parameters.stopbands[row]), 1.0] for row in rows])
     curves = Stopband(GRID.nodes_nm, sensor.qe["Y"], sensor.qe["G"]).curves(x)
-    distances = separations(smooth_response(setup, curves)[:, 0], lights.members)
-    sensitivity = designed_quantities(setup, curves)["sensitivity"]
+    distances = separations(smooth_response(view, curves)[:, 0], lights.members)
+    sensitivity = designed_quantities(view, curves)[SENSITIVITY]
     return {
-        row: {csd_name(pair): float(v[i]) for pair, v in distances.items()} | {"sensitivity": float(sensitivity[i])}
+        row: {csd_name(pair): float(v[i]) for pair, v in distances.items()} | {SENSITIVITY: float(sensitivity[i])}
         for i, row in enumerate(rows)
     }
 

@@ -12,8 +12,8 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from ...results.tables import write_json, write_text
-from .fit import Fit, ranking
-from .model import Figures
+from .fit import Fit, printed_order
+from .model import DISTANCES, Figures
 from .run import Calibration
 
 _HEADER = """\
@@ -81,13 +81,13 @@ def worst(found: Figures, printed: Figures) -> float:
         for row, values in printed.items()
         if row in found
         for name, value in values.items()
-        if name.startswith("csd_")
+        if name in DISTANCES
     )
 
 
 def wrong_ranks(found: Figures, printed: Figures) -> list[str]:
     """Rows whose CSDs do not rank as printed."""
-    return [row for row in found if any(found[row][a] >= found[row][b] for a, b in ranking(printed[row]))]
+    return [row for row in found if any(found[row][a] >= found[row][b] for a, b in printed_order(printed[row]))]
 
 
 def record(calibration: Calibration) -> dict[str, Any]:
@@ -140,7 +140,7 @@ def _fit_line(name: str, fit: Fit, found: Figures, printed: Figures) -> str:
 
 def _errors(found: Mapping[str, float], printed: Mapping[str, float]) -> str:
     return ", ".join(
-        f"{name.removeprefix('csd_')} {100 * (found[name] / printed[name] - 1):+.1f} %" for name in printed
+        f"{DISTANCES.get(name, name)} {100 * (found[name] / printed[name] - 1):+.1f} %" for name in printed
     )
 
 

@@ -6,14 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import joblib
 import numpy as np
 from scipy.optimize import least_squares
 
 from ...curves.builtin.surrogate import parameter_tree
 from ...run.stop import Stop
 from ...run.workers import Workers, workers
-from ...types import Progress
+from ...types import Progress, delayed
 from .fit import Fit, Task, best_of, fit_from
 from .model import Figures, figures
 from .parameters import Path as Tree
@@ -47,7 +46,7 @@ class Calibration:
     left_out: Figures
 
 
-def calibrate(printed: Figures, seed: int, starts: int, n_jobs: int, progress: Progress) -> Calibration:
+def fit_surrogate(printed: Figures, seed: int, starts: int, n_jobs: int, progress: Progress) -> Calibration:
     """Fit the surrogate to `printed` (row -> quantity -> value; rows are CFAs and the stopband filters of the prior).
 
     The validation fit sees the plain CFAs and the first filter; the last filter's band is then set by its sensitivity
@@ -67,7 +66,7 @@ def calibrate(printed: Figures, seed: int, starts: int, n_jobs: int, progress: P
         tasks["without " + group[-1]] = _task(prior, printed, rows, filters)
     jobs = [(name, start) for name in tasks for start in range(starts if name in ("validation", "final") else 1)]
     with workers(Workers(n_jobs, Stop())) as crew:
-        found = crew(joblib.delayed(fit_from)(tasks[name], seed, start) for name, start in jobs)
+        found = crew(delayed(fit_from, tasks[name], seed, start) for name, start in jobs)
         fits: dict[str, list[Fit]] = {name: [] for name in tasks}
         for index, ((name, _), fit) in enumerate(zip(jobs, found, strict=True)):
             fits[name].append(fit)

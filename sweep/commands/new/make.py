@@ -13,8 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...curves.facts import Curve, Facts, Quantity, condensed, facts_of, qe_scale
+from ...curves.facts import Curve, Facts, condensed, facts_of, qe_scale
 from ...curves.files import scan_curves
+from ...curves.light_unit import LightUnit
 from ...curves.spectrum import WavelengthGrid
 from ...errors import DataError, Fault, OutputError, StudyError, SweepError
 from ...results.tables import atomic, write_text
@@ -30,7 +31,7 @@ _MOST_LETTERS = 100
 _BUILT_IN_CFAS = ("RGGB", "RCCC", "RCCB", "RYYCy")
 
 
-def new_study(name: str, folder: Path, qe: Path | None, lights: Path | None, quantity: Quantity) -> list[str]:
+def new_study(name: str, folder: Path, qe: Path | None, lights: Path | None, quantity: LightUnit) -> list[str]:
     """Write `folder`/<name>.yaml, and the schema that editors complete it with where the folder has none.
 
     `qe`, `lights`: files of curves, which stay where they are; None takes what is built in. Returns lines to print.
@@ -122,7 +123,7 @@ def _built_in_lights() -> LightsText:
     return LightsText({kind: {} for kind in TYPICAL_NM})
 
 
-def _lights(path: Path, folder: Path, quantity: Quantity, start_nm: float, stop_nm: float) -> LightsText:
+def _lights(path: Path, folder: Path, quantity: LightUnit, start_nm: float, stop_nm: float) -> LightsText:
     curves = _curves(path)
     colors = dict(zip(curves, Facts(tuple(curves.values()), "").colors(quantity).values(), strict=True))
     signals = {name: None if color is None else color.signal for name, color in colors.items()}

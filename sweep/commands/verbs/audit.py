@@ -6,9 +6,9 @@ import typer
 
 from ...errors import BrokenPromiseError
 from ..options import DataFolder, RunFolder
-from ..panels import RESULTS
+from ..panels import OF_RESULTS
 
-PANEL = RESULTS
+PANEL = OF_RESULTS
 
 
 def audit(folder: RunFolder, data: DataFolder = None) -> None:

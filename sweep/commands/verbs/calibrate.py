@@ -10,9 +10,9 @@ import typer
 
 from ...errors import StudyError
 from ..options import StudyPath
-from ..panels import TOOL
+from ..panels import OF_TOOL
 
-PANEL = TOOL
+PANEL = OF_TOOL
 
 
 def calibrate(
@@ -24,7 +24,7 @@ def calibrate(
 ) -> None:
     """Fit the built-in surrogate curves to the figures that STUDY publishes."""
     from ...study import load_study
-    from ..calibrate import calibrate as fit
+    from ..calibrate import fit_surrogate
     from ..calibrate.output import write
     from ..progress import ProgressDisplay
 
@@ -34,6 +34,6 @@ def calibrate(
     if not printed:
         raise StudyError(f"{study}: the study has no `published` figures to fit to")
     with ProgressDisplay() as display:
-        found = fit(printed, seed, starts, jobs or os.cpu_count() or 1, display.update)
+        found = fit_surrogate(printed, seed, starts, jobs or os.cpu_count() or 1, display.update)
     for line in write(found, output):
         typer.echo(line)

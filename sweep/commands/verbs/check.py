@@ -5,9 +5,9 @@ from __future__ import annotations
 import typer
 
 from ..options import DataFolder, StudyPath
-from ..panels import STUDIES
+from ..panels import OF_STUDIES
 
-PANEL = STUDIES
+PANEL = OF_STUDIES
 
 
 def check(study: StudyPath, data: DataFolder = None) -> None:

@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from ..completion import run_folders
-from ..panels import RESULTS
+from ..panels import OF_RESULTS
 
-PANEL = RESULTS
+PANEL = OF_RESULTS
 
 
 def compare(

@@ -7,22 +7,23 @@ from typing import Annotated
 
 import typer
 
+from ...curves.light_unit import LightUnit
 from ...errors import DataError
-from ..options import Quantity
-from ..panels import CURVES
+from ..panels import OF_CURVES
 
-PANEL = CURVES
+PANEL = OF_CURVES
 
 
 def describe(
     file: Annotated[Path, typer.Argument(help="A file of curves, .csv or .mat.", show_default=False)],
     output: Annotated[Path, typer.Option(help="Folder for the picture.")] = Path("outputs/describe"),
     quantity: Annotated[
-        Quantity | None, typer.Option(help="Of light spectra; without it, lights or QE is guessed.", show_default=False)
+        LightUnit | None,
+        typer.Option(help="Of light spectra; without it, lights or QE is guessed.", show_default=False),
     ] = None,
 ) -> None:
     """Plot and check a file of curves: what it holds, what is wrong with it, which colors its lights have."""
-    from ..describe import describe as described
+    from ..describe import described
 
     found = described(file, output, quantity)
     for line in found.lines:

@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from ..options import DataFolder, Outputs
-from ..panels import STUDIES
+from ..panels import OF_STUDIES
 
-PANEL = STUDIES
+PANEL = OF_STUDIES
 
 
 def list_(

@@ -7,17 +7,17 @@ from typing import Annotated
 
 import typer
 
-from ..options import Quantity
-from ..panels import STUDIES
+from ...curves.light_unit import LightUnit
+from ..panels import OF_STUDIES
 
-PANEL = STUDIES
+PANEL = OF_STUDIES
 
 
 def new(
     name: Annotated[str, typer.Argument(help="Name of the study and of its file.", show_default=False)],
     qe: Annotated[Path | None, typer.Option(help="QE curves of a sensor, .csv or .mat.", show_default=False)] = None,
     lights: Annotated[Path | None, typer.Option(help="Spectra of lights, .csv or .mat.", show_default=False)] = None,
-    quantity: Annotated[Quantity, typer.Option(help="What the lights' numbers are.")] = "energy",
+    quantity: Annotated[LightUnit, typer.Option(help="What the lights' numbers are.")] = "energy",
     folder: Annotated[Path, typer.Option(help="Folder of the studies.")] = Path("studies"),
 ) -> None:
     """Write a commented study that runs as it is, for the built-in curves or for files of your own."""

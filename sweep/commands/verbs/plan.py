@@ -10,9 +10,9 @@ import typer
 
 from ...errors import StudyError
 from ..options import DataFolder, StudyPath
-from ..panels import STUDIES
+from ..panels import OF_STUDIES
 
-PANEL = STUDIES
+PANEL = OF_STUDIES
 
 
 def plan(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from ..finish import finish
 from ..options import RunFolder
-from ..panels import RESULTS
+from ..panels import OF_RESULTS
 
-PANEL = RESULTS
+PANEL = OF_RESULTS
 
 
 def report(folder: RunFolder) -> None:

@@ -13,9 +13,9 @@ from ...errors import Fault, InterruptedRunError, SweepError
 from ..endings import end_now
 from ..finish import finish
 from ..options import DataFolder, Outputs, StudyPath
-from ..panels import STUDIES
+from ..panels import OF_STUDIES
 
-PANEL = STUDIES
+PANEL = OF_STUDIES
 
 
 def run(

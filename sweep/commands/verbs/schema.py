@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from ..panels import STUDIES
+from ..panels import OF_STUDIES
 
-PANEL = STUDIES
+PANEL = OF_STUDIES
 
 
 def schema(

@@ -7,9 +7,9 @@ from typing import Annotated
 import typer
 
 from ..options import RunFolder
-from ..panels import RESULTS
+from ..panels import OF_RESULTS
 
-PANEL = RESULTS
+PANEL = OF_RESULTS
 
 
 def status(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+from numpy.typing import ArrayLike
 
 from ...types import FloatArray
 from ..spectrum import Curves, WavelengthGrid
@@ -19,9 +19,16 @@ _LOGISTIC_PER_WIDTH = 2 * math.log(9)
 """A logistic rises from 0.1 to 0.9 within 2 ln 9 of its scale."""
 
 
+def _monotone(nodes_nm: ArrayLike, values: ArrayLike, wavelength_nm: FloatArray) -> FloatArray:
+    """The monotone cubic through some nodes."""
+    from scipy.interpolate import PchipInterpolator  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
+    return np.asarray(PchipInterpolator(nodes_nm, values)(wavelength_nm), dtype=float)
+
+
 def clear_qe(wavelength_nm: FloatArray, clear: ClearPixel) -> FloatArray:
     """QE of the unfiltered pixel, ndarray[n_wavelengths]."""
-    return np.asarray(PchipInterpolator(clear.wavelength_nm, clear.qe)(wavelength_nm), dtype=float)
+    return _monotone(clear.wavelength_nm, clear.qe, wavelength_nm)
 
 
 def transmission(wavelength_nm: FloatArray, parameters: FilterParameters) -> FloatArray:
@@ -31,7 +38,7 @@ def transmission(wavelength_nm: FloatArray, parameters: FilterParameters) -> Flo
         sign = 1 if edge.passes == "above" else -1
         offset = sign * (wavelength_nm - edge.center_nm) / edge.width_nm
         opened = opened * _logistic(offset)
-    leak = np.asarray(PchipInterpolator(LEAK_NODES_NM, parameters.leak)(wavelength_nm), dtype=float)
+    leak = _monotone(LEAK_NODES_NM, parameters.leak, wavelength_nm)
     return leak + (parameters.peak - leak) * opened
 
 

@@ -15,14 +15,14 @@ from .surrogate import SurrogateParameters
 
 LAMPS = {"us": 11, "germany": 5}
 ORANGE_LAMPS = {"us": 3}
-_COLORS = ("green", "yellow", "orange", "red")
+SIGNAL_TYPES = ("green", "yellow", "orange", "red")
 
 
 def tl16(grid: WavelengthGrid, parameters: SurrogateParameters) -> Lights:
     """The 51 signals on the grid; the lamps of a region spread evenly over peak +- spread of each color."""
     wave = grid.nodes_nm
     signals = []
-    for color in _COLORS:
+    for color in SIGNAL_TYPES:
         for region, lamps in (ORANGE_LAMPS if color == "orange" else LAMPS).items():
             led = parameters.lights[region][color]
             for lamp, place in enumerate(np.linspace(-1.0, 1.0, lamps)):

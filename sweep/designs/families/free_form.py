@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from pydantic import model_validator
 
+from ...curves.hats import hats
 from ...errors import Fault, SweepError
 from ...types import FloatArray, Positive, Section
 from ..family import Parameter
@@ -58,8 +59,7 @@ class FreeForm:
         self._made_of = wavelength_nm, base
         nominal_nm = wavelength_nm - shift_nm
         inside = (nominal_nm >= nodes_nm[0]) & (nominal_nm <= nodes_nm[-1])
-        hats = [np.interp(nominal_nm, nodes_nm, unit) for unit in np.eye(nodes_nm.size)]
-        self._hats = np.stack(hats) * (base * inside)
+        self._hats = hats(nominal_nm, nodes_nm) * (base * inside)
         self._fixed = np.where(inside, 0.0, base)
 
     @classmethod

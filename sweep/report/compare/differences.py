@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ...results.curves import KeptCurves
+from ...results.facts import Provenance
 from .. import Output
 
 _SHOWN = 48
@@ -26,7 +28,7 @@ _ABSENT = _Absent()
 
 def study_differences(runs: Mapping[str, Output]) -> pd.DataFrame:
     """Columns `key` and a run each, a row for every key of the resolved studies that is not the same in all."""
-    return _table(runs, [output.study for output in runs.values()])
+    return _table(runs, [output.resolved for output in runs.values()])
 
 
 def origin_differences(runs: Mapping[str, Output]) -> pd.DataFrame:
@@ -34,13 +36,13 @@ def origin_differences(runs: Mapping[str, Output]) -> pd.DataFrame:
     return _table(runs, [_origin(output.provenance) for output in runs.values()])
 
 
-def _origin(provenance: Mapping[str, Any]) -> dict[str, Any]:
-    kept = ("sensor", "lights", "model_version", "data_sha256", "versions", "designs")
+def _origin(provenance: Provenance) -> dict[str, Any]:
+    kept = {"sensor", "lights", "model_version", "data_sha256", "versions", "designs"}
     simulated = {
-        name: {"tolerance_dn": plan["tolerance_dn"]} | {e["effect"]: e["method"] for e in plan["effects"]}
-        for name, plan in provenance["plans"].items()
+        name: {"tolerance_dn": plan.tolerance_dn} | {each.effect: each.method for each in plan.effects}
+        for name, plan in provenance.plans.items()
     }
-    return {key: provenance[key] for key in kept if key in provenance} | {"simulated": simulated}
+    return provenance.model_dump(mode="json", include=kept) | {"simulated": simulated}
 
 
 def _table(runs: Mapping[str, Output], trees: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
@@ -83,7 +85,7 @@ def _text(value: Any) -> str:
 
 def scene_notes(runs: Mapping[str, Output]) -> list[str]:
     """A sentence for each scenario of one name that is not the same in all runs that have it, and for the pixel."""
-    studies = {run: output.study for run, output in runs.items()}
+    studies = {run: output.resolved for run, output in runs.items()}
     names = dict.fromkeys(name for study in studies.values() for name in study["scenarios"])
     parts = {
         f"scenario {' '.join(name.split())}": {
@@ -112,10 +114,10 @@ def curve_notes(runs: Mapping[str, Output]) -> list[str]:
     return notes
 
 
-def _other_curves(first: pd.DataFrame, second: pd.DataFrame) -> str:
-    if not np.array_equal(first["wavelength_nm"], second["wavelength_nm"]):
+def _other_curves(first: KeptCurves, second: KeptCurves) -> str:
+    if not np.array_equal(first.wavelength_nm, second.wavelength_nm):
         return "on another wavelength grid"
-    sensor, lights = ([_named(table, prefix) for table in (first, second)] for prefix in ("qe:", "light:"))
+    sensor, lights = (first.sensor, second.sensor), (first.lights, second.lights)
     found = []
     common = [name for name in sensor[0] if name in sensor[1]]
     differing = [name for name in common if not np.array_equal(sensor[0][name], sensor[1][name])]
@@ -130,8 +132,3 @@ def _other_curves(first: pd.DataFrame, second: pd.DataFrame) -> str:
     if other:
         found.append(f"lights: {len(other)} of {len(every)}")
     return "; ".join(found)
-
-
-def _named(table: pd.DataFrame, prefix: str) -> dict[str, Any]:
-    columns = [str(name) for name in table.columns]
-    return {name.removeprefix(prefix): table[name].to_numpy() for name in columns if name.startswith(prefix)}

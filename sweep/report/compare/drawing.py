@@ -21,7 +21,7 @@ _MARKS_PER_LINE = 12
 
 
 @dataclass(frozen=True)
-class Line:
+class FrontLine:
     """A front: its run's place among the runs, x and y, ndarray[n] each; `traced` ones get hollow marks."""
 
     name: str
@@ -48,7 +48,7 @@ class FrontsFigure:
     title: str
     x_label: str
     y_label: str
-    lines: Sequence[Line]
+    lines: Sequence[FrontLine]
     best: Sequence[Mark]
 
 

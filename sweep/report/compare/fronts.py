@@ -9,21 +9,19 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from ...camera.pixel import Pixel
-from ...metrics.evaluate import WORST
-from ...metrics.objective import COMBINED, Objective
+from ...metrics.objective import COMBINED
 from ...metrics.pareto import hypervolume
-from ...metrics.separation import CSD
+from ...metrics.quantity import DN
+from ...results.tables import FOUND
 from ...types import FloatArray
 from .. import Output
-from ..names import readable
 
 _STEP = 0.01
 _BELOW = 1e-9
 
 
 @dataclass(frozen=True)
-class Front:
+class ComparedFront:
     """The trade-off of a CFA in a scenario of a run.
 
     `traced`: by the search, before quantization; else designs of the result table. `points`: ndarray[n, 2],
@@ -43,7 +41,7 @@ class Front:
 
 
 @dataclass(frozen=True)
-class Box:
+class Region:
     """Where hypervolumes are taken: above `reference`, ndarray[2]; `top`: the largest that any front reaches."""
 
     reference: FloatArray
@@ -71,40 +69,45 @@ def on_the_same_axes(runs: Mapping[str, Output]) -> tuple[dict[str, Output], lis
 
 def dn_of(output: Output) -> str:
     """What a DN of a run is: only of the same full scale and pedestal do they compare."""
-    pixel = Pixel.model_validate(output.study.get("pixel", {}))
+    pixel = output.study.pixel
     return f"DN of {pixel.bits} bits" + (f", pedestal {pixel.offset_dn:g} DN" if pixel.offset_dn else "")
 
 
 def _meaning(output: Output) -> tuple[str, ...]:
     """What the two axes are; of a combined objective, of a worst case, of DN with all that it depends on."""
-    shift = output.study.get("production", {}).get("edge_shift_nm", 0.0)
+    shift = output.study.production.edge_shift_nm
+    shifted = any(output.columns[name].extreme == "worst edges" for name in output.objective.weights)
     words = []
     for axis in output.trade_off:
-        text = str(Objective.model_validate(output.study["objective"])) if axis == COMBINED else readable(axis)
-        dependent = f" (edges {shift:g} nm off)" if WORST in axis or (axis == COMBINED and WORST in text) else ""
-        words.append(f"{text}{dependent}" + (f" in {dn_of(output)}" if CSD in axis or axis == COMBINED else ""))
+        combined = axis.name == COMBINED
+        text = str(output.objective) if combined else axis.words
+        off = axis.extreme == "worst edges" or (combined and shifted)
+        dependent = f" (edges {shift:g} nm off)" if off else ""
+        words.append(f"{text}{dependent}" + (f" in {dn_of(output)}" if axis.unit == DN or combined else ""))
     return tuple(words)
 
 
 def common_scenarios(runs: Mapping[str, Output]) -> list[str]:
     """Scenarios of this name in every run, in the order of the first."""
     (first, *others) = runs.values()
-    return [str(name) for name in first.study["scenarios"] if all(name in other.study["scenarios"] for other in others)]
+    return [name for name in first.scenarios if all(name in other.scenarios for other in others)]
 
 
-def fronts(runs: Mapping[str, Output], scenario: str) -> list[Front]:
+def fronts(runs: Mapping[str, Output], scenario: str) -> list[ComparedFront]:
     """All fronts of a scenario: of designs, which meet every constraint but those on the axes, and of the search."""
     found = []
     for label, output in runs.items():
         table = output.table
         rows = table[table["pareto"] & (table["scenario"] == scenario)]
         for cfa, own in rows.groupby("cfa", observed=True, sort=False):
-            found.append(Front(label, str(cfa), scenario, False, _sorted(own[list(output.trade_off)])))
-        search = output.provenance.get("search")
-        if output.front is not None and search and search["scenario"] == scenario:
+            found.append(
+                ComparedFront(label, str(cfa), scenario, False, _sorted(own[list(output.provenance.trade_off)]))
+            )
+        search = output.provenance.search
+        if output.front is not None and search and search.scenario == scenario:
             traced = _sorted(output.front[["objective", "sensitivity"]].dropna())
             if len(traced):
-                found.append(Front(label, str(output.kind("search")["cfa"].iloc[0]), scenario, True, traced))
+                found.append(ComparedFront(label, str(output.kind(FOUND)["cfa"].iloc[0]), scenario, True, traced))
     return found
 
 
@@ -113,14 +116,14 @@ def _sorted(values: pd.DataFrame) -> FloatArray:
     return points[np.argsort(points[:, 1], kind="stable")]
 
 
-def box_of(found: list[Front]) -> Box:
+def box_of(found: list[ComparedFront]) -> Region:
     """The box of all fronts: from no separation, and the hundredth below the lowest sensitivity of any."""
     points = np.concatenate([front.points for front in found])
     lowest = math.floor((points[:, 1].min() - _BELOW) / _STEP) * _STEP
-    return Box(np.array([min(0.0, points[:, 0].min()), round(lowest, 2)]), points.max(axis=0))
+    return Region(np.array([min(0.0, points[:, 0].min()), round(lowest, 2)]), points.max(axis=0))
 
 
-def hypervolumes(found: list[Front], box: Box) -> pd.DataFrame:
+def hypervolumes(found: list[ComparedFront], box: Region) -> pd.DataFrame:
     """A row per front: its ends, the area that it dominates in the box, and that as a share of the box."""
     rows = []
     for front in found:

@@ -15,12 +15,11 @@ from ...errors import Fault, OutputError, SweepError
 from ...results.tables import write_bytes, write_csv, write_text
 from ...study import folder_name
 from .. import Output, read_output
-from ..names import axis_label, readable
 from ..pages import inlined, page, rows
-from .best import best_rows, parameters_of, plain_differences, ranking, side_by_side
+from .best import best_of_runs, parameters_of, plain_differences, quantities_in, ranking, side_by_side
 from .differences import curve_notes, origin_differences, scene_notes, study_differences
-from .drawing import FrontsFigure, Line, Mark, pictures
-from .fronts import Box, Front, box_of, common_scenarios, fronts, hypervolumes, on_the_same_axes
+from .drawing import FrontLine, FrontsFigure, Mark, pictures
+from .fronts import ComparedFront, Region, box_of, common_scenarios, fronts, hypervolumes, on_the_same_axes
 
 PAGE, PICTURE, TABLE = "compare.html", "fronts", "compare.csv"
 _KINDS = ("png", "svg")
@@ -39,7 +38,7 @@ class Areas:
     """What the fronts of a scenario dominate in a box; `table` as `fronts.hypervolumes` gives it."""
 
     scenario: str
-    box: Box
+    box: Region
     table: pd.DataFrame
 
     def __str__(self) -> str:
@@ -72,12 +71,12 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> list[str]:
     target = to or Path("outputs") / _folder_of(folders)
     _refuse_other(target)
     outputs = [read_output(folder) for folder in folders]
-    runs = {f"{letter} {_one_line(o.study['study'])}": o for letter, o in zip(_LETTERS, outputs, strict=False)}
+    runs = {f"{letter} {_one_line(o.study.study)}": o for letter, o in zip(_LETTERS, outputs, strict=False)}
     compared = compare_fronts(runs)
     answer = [*ranking(runs), *_largest(compared)]
     notes = [*_same_folders(runs), *curve_notes(runs), *scene_notes(runs), *_constraint_note(runs), *compared.notes]
-    best = best_rows(runs)
-    shown, left_out = side_by_side(best, _MOST_PARAMETERS, parameters_of(runs))
+    best = best_of_runs(runs)
+    shown, left_out = side_by_side(best, _MOST_PARAMETERS, parameters_of(runs), quantities_in(runs))
     plain, same = plain_differences(runs)
     studies, origins = study_differences(runs), origin_differences(runs)
     drawn = {} if compared.figure is None else pictures(compared.figure)
@@ -121,7 +120,7 @@ def compare_fronts(runs: Mapping[str, Output]) -> Fronts:
     if not group:
         return Fronts([], None, notes)
     scenarios = common_scenarios(group)
-    every = {name for output in group.values() for name in output.study["scenarios"]}
+    every = {name for output in group.values() for name in output.scenarios}
     if not scenarios:
         return Fronts([], None, [*notes, "The runs have no scenario of the same name, so no fronts are compared."])
     if len(every) > len(scenarios):
@@ -144,22 +143,26 @@ def _largest(compared: Fronts) -> list[str]:
     return [f"Largest hypervolume in {areas.scenario}: {most['run']}, {most['CFA']} ({most['front']}): {share}."]
 
 
-def _figure(group: Mapping[str, Output], order: Sequence[str], scenario: str, found: Sequence[Front]) -> FrontsFigure:
+def _figure(
+    group: Mapping[str, Output], order: Sequence[str], scenario: str, found: Sequence[ComparedFront]
+) -> FrontsFigure:
     separation, sensitivity = next(iter(group.values())).trade_off
-    lines = [Line(f.name, order.index(f.run), f.points[:, 1], f.points[:, 0], f.traced) for f in found]
+    lines = [FrontLine(f.name, order.index(f.run), f.points[:, 1], f.points[:, 0], f.traced) for f in found]
     marks = []
     for run, output in group.items():
         best = output.best[output.best["scenario"] == scenario]
         if len(best):
             row = best.iloc[0]
-            marks.append(Mark(run.partition(" ")[0], order.index(run), float(row[sensitivity]), float(row[separation])))
+            marks.append(
+                Mark(run.partition(" ")[0], order.index(run), float(row[sensitivity.name]), float(row[separation.name]))
+            )
     title = (
         f"{', '.join(group)}: fronts in {scenario}" if len(group) <= 3 else f"Fronts of {len(group)} runs in {scenario}"
     )
-    return FrontsFigure(title, readable(sensitivity), axis_label(separation), lines, marks)
+    return FrontsFigure(title, sensitivity.words, separation.axis, lines, marks)
 
 
-def _cfa_note(found: Sequence[Front]) -> list[str]:
+def _cfa_note(found: Sequence[ComparedFront]) -> list[str]:
     by_run: dict[str, list[str]] = {}
     for front in found:
         by_run.setdefault(front.run, []).append(front.cfa)

@@ -11,14 +11,17 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from ...types import BoolArray, FloatArray
 from ..compiled import poisson_means
 from ..pixel import Pixel
 from . import gaussian
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 UNROUNDED, ROUNDED, VARIANCE = range(3)
 """Rows of what `moments` gives: mean before rounding and after (DN), variance after (DN^2)."""
@@ -45,7 +48,9 @@ def of_count(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     """The same given the number of electrons, which then has no noise of its own."""
     top, sigma = float(pixel.full_scale_dn), pixel.dn_per_e * pixel.read_noise_e
     mean = pixel.dn_per_e * np.minimum(electrons, pixel.well_e) + pixel.offset_dn
-    return np.stack([gaussian.clipped(mean, sigma, 0.0, top)[0], *gaussian.clipped_and_rounded(mean, sigma, top)])
+    return np.stack(
+        [gaussian.clipped_gaussian(mean, sigma, 0.0, top)[0], *gaussian.clipped_and_rounded(mean, sigma, top)]
+    )
 
 
 @dataclass(frozen=True)
@@ -117,7 +122,7 @@ def counts_of(electrons: FloatArray, pixel: Pixel) -> tuple[int, int]:
     return min(first, full), max(min(most, full), min(first, full))
 
 
-def nodes(pixel: Pixel) -> FloatArray:
+def table_nodes(pixel: Pixel) -> FloatArray:
     """Roots of the electrons at which a table without PRNU knows `counted`, ascending from 0 to the end."""
     ends = Ends.of(pixel)
     last = math.sqrt(_least_exceeding(ends.full_e))
@@ -136,7 +141,9 @@ def nodes(pixel: Pixel) -> FloatArray:
 @lru_cache(maxsize=8)
 def table_without_prnu(pixel: Pixel) -> CubicSpline:
     """`counted` over the root of the electrons."""
-    roots = nodes(pixel)
+    from scipy.interpolate import CubicSpline  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
+    roots = table_nodes(pixel)
     return CubicSpline(roots, counted(roots**2, pixel), axis=1)
 
 

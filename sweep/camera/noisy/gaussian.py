@@ -29,7 +29,7 @@ def ramp(z: FloatArray) -> FloatArray:
     return np.asarray(z * ndtr(z) + density(z), dtype=float)
 
 
-def clipped(mean: FloatArray, sigma: float, low: float, high: float) -> tuple[FloatArray, FloatArray]:
+def clipped_gaussian(mean: FloatArray, sigma: float, low: float, high: float) -> tuple[FloatArray, FloatArray]:
     """Mean and variance of a Gaussian that is clipped to low..high; `mean`: ndarray of any shape."""
     if sigma == 0:
         return np.clip(mean, low, high), np.zeros_like(mean)
@@ -55,7 +55,7 @@ def clipped_and_rounded(mean: FloatArray, sigma: float, top: float) -> tuple[Flo
         out = np.empty((2, mean.size))
         rounded_gaussian(np.ascontiguousarray(mean), sigma, top, out)
         return out[0], out[1]
-    held, variance = clipped(mean, sigma, 0.0, top)
+    held, variance = clipped_gaussian(mean, sigma, 0.0, top)
     first, second = np.zeros_like(mean), np.zeros_like(mean)
     for end, sign in ((0.0, 1.0), (top, -1.0)):
         z = (end - mean) / sigma

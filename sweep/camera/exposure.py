@@ -1,0 +1,67 @@
+"""How long each design is exposed: as long as it is told, or until its brightest channel sees white well."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..types import FloatArray
+from .pixel import irradiance_factor
+from .scene import WhitePatchExposure
+from .view import View, per_photon
+
+
+def white_irradiance(view: View) -> FloatArray:
+    """Photon irradiance of the white patch, flat in photons, ndarray[n_wavelengths]."""
+    scenario, grid = view.scenario, view.grid
+    ratio = view.lights.photon_ratio
+    if isinstance(scenario.exposure, WhitePatchExposure) and scenario.exposure.photon_ratio is not None:
+        ratio = scenario.exposure.photon_ratio
+    radiance = scenario.photon_radiance * irradiance_factor(scenario.optics)
+    return np.full(grid.size, radiance / (ratio * grid.size * grid.step_nm))
+
+
+def _fixed_white(view: View) -> float:
+    """Electrons/s on the white patch of the brightest channel that no design modifies."""
+    rates = view.qe[list(view.fixed)] @ white_irradiance(view) * per_photon(view)
+    return float(rates.max(initial=0.0))
+
+
+def exposure_times(view: View, modified_white: FloatArray) -> FloatArray:
+    """Exposure of each design, s, ndarray[n_designs]; infinite where a white-patch exposure sees no light.
+
+    `modified_white`: electrons/s of the modified channels on the white patch, ndarray[n_designs, n_modified].
+    """
+    exposure = view.scenario.exposure
+    if not isinstance(exposure, WhitePatchExposure):
+        return np.full(len(modified_white), exposure.exposure_s)
+    brightest = np.maximum(modified_white.max(axis=1, initial=0.0), _fixed_white(view))
+    full_e = exposure.level * view.pixel.full_scale_dn / view.pixel.dn_per_e
+    found = np.full(len(brightest), np.inf)
+    return np.asarray(np.divide(full_e, brightest, out=found, where=brightest > 0), dtype=float)
+
+
+def may_set_exposure(view: View) -> bool:
+    """Whether a modified channel up to its base curve may be the one that is exposed for: the brightest on white.
+
+    The white patch is flat in photons, so sums of the curves say it, the same for equal curves.
+    """
+    rates = view.qe.sum(axis=1)
+    kept, modified = rates[list(view.fixed)], rates[list(view.modified)]
+    of_white = isinstance(view.scenario.exposure, WhitePatchExposure)
+    return of_white and not (kept.size and kept.max() >= modified.max(initial=0.0))
+
+
+def relative_slope(view: View, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
+    """Derivative of one design's exposure over that exposure, ndarray[n_parameters].
+
+    `curves`: QE of the modified channels, ndarray[n_modified, n_wavelengths]; `curves_gradient`: its derivative,
+    ndarray[n_parameters, n_modified, n_wavelengths].
+    """
+    white = white_irradiance(view) * per_photon(view)
+    # By the same products: a filter that leaves its base as it is, beside a pixel of that curve, sets nothing.
+    rates, kept = curves @ white, view.qe[list(view.fixed)] @ white
+    of_white = isinstance(view.scenario.exposure, WhitePatchExposure)
+    if not of_white or not rates.size or not rates.max() > kept.max(initial=0.0):
+        return np.zeros(len(curves_gradient))
+    top = int(np.argmax(rates))
+    return np.asarray(-(curves_gradient[:, top] @ white) / rates[top], dtype=float)

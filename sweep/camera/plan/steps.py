@@ -1,0 +1,125 @@
+"""What switching one effect of the sampling or the optics changes, as the bounds take it."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...types import FloatArray
+from ..effects import blur, phase, sampling
+from ..effects.base import Change, CurveChange, KernelChange, LightChange, LinearEffect, Part, ShareChange
+from ..methods import Methods
+from ..registry import factor_of_light
+from ..view import View
+from .bounds import Amounts, Reach
+from .scene_kernels import SceneKernels
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step. `what`: of the effect itself.
+
+    `change`: ndarray[n_cases, n_values, n_channels, n_knots], of the kernel that multiplies `changed`, exact up to
+    `remainder` between the knots; `base`, `left`: the responses and the kernel after it. `scale`: the share of the
+    kernel that `change` is. `background`: what the kernel's change multiplies of the background, DN, middle and half
+    width, ndarray[n_channels] each; of a change that is none of the kernel, by how much the background changes.
+    """
+
+    what: Change
+    changed: Amounts
+    change: FloatArray
+    remainder: float
+    base: Amounts
+    left: FloatArray
+    scale: float
+    background: tuple[FloatArray, FloatArray]
+
+
+class Steps:
+    """The steps of one box of designs; sums and gaps are remembered."""
+
+    def __init__(self, view: View, reach: Reach, kernels: SceneKernels) -> None:
+        self._view, self._reach, self._kernels = view, reach, kernels
+        self._amounts: dict[bytes, Amounts] = {}
+        self._gaps: dict[tuple[str, float], float] = {}
+
+    def step(self, effect: LinearEffect, before: Methods, after: Methods, *, straight: bool) -> Step:
+        """What switching an effect changes; `straight`: as seen by a straight readout."""
+        reach, (own, other) = self._reach, (getattr(methods, effect.name) for methods in (before, after))
+        what = effect.change(self._view, own, other, reach, straight=straight)
+        light, dimmed = self._factors(before)
+        base = changed = self._sums(light, reach.qe_low, reach.qe_high)
+        now, remainder = self._kernels.of(before), self._between_knots(before)
+        change, left, scale = now, now, 1.0
+        match what:
+            case KernelChange():
+                now, left = self._kernels_of(what, before, after)
+                change = now - left
+                remainder = self._remainder(what, before, after, changes=bool(change.any()))
+            case ShareChange():
+                scale = abs(what.lost)
+                change, remainder = now * what.lost, remainder * scale
+            case LightChange():
+                rest, rest_dimmed = self._factors(replace(before, **{effect.name: effect.off}))
+                lost = what.before - what.after
+                changed = self._sums(lost * rest, reach.qe_low, reach.qe_high)
+                base = self._sums(what.after * rest, reach.qe_low, reach.qe_high)
+                dimmed = lost * rest_dimmed
+            case CurveChange():
+                changed = self._sums(light, what.low, what.high)
+        left = np.broadcast_to(left, change.shape)
+        return Step(what, changed, change, remainder, base, left, scale, reach.background(dimmed))
+
+    def _factors(self, methods: Methods) -> tuple[FloatArray, FloatArray]:
+        """What is left of a signal's light and of the background at every wavelength, ndarray[n_wavelengths] each."""
+        nodes = self._view.grid.nodes_nm
+        light, background = (factor_of_light(self._view, methods, nodes, background=b) for b in (False, True))
+        return light, background
+
+    def _kernels_of(self, what: KernelChange, before: Methods, after: Methods) -> tuple[FloatArray, FloatArray]:
+        """The kernels before and after."""
+        now = self._kernels.of(before)
+        if what.part is not Part.PLACES:
+            return now, self._kernels.of(after)
+        # The places that are nearest to those in a cell are compared at all of its corners.
+        return now[self._kernels.corners[1].ravel()], np.repeat(
+            self._kernels.nearest(after), len(phase.CORNERS), axis=0
+        )
+
+    def _remainder(self, what: KernelChange, before: Methods, after: Methods, *, changes: bool) -> float:
+        """How far the change may be from its interpolation between the knots of the comparison."""
+        if what.knots is not None:
+            return self._gap(after, what.knots)
+        # What is interpolated in both kernels; nothing where they are the same.
+        return (self._between_knots(before) + self._between_knots(after)) * changes
+
+    def _gap(self, methods: Methods, method: str) -> float:
+        """How far a kernel may be from its interpolation between the wavelengths of a method of blur."""
+        view, target = self._view, self._view.scenario.target
+        knots_nm = blur.knots(view.grid.nodes_nm, method)
+        if target is None or knots_nm.size == view.grid.size:
+            return 0.0
+        aperture = 0.0 if methods.sampling == "skip" else view.pixel.fill_factor**0.5 * view.pixel.pitch_um
+        if (method, aperture) not in self._gaps:
+            radius = sampling.radii_px(view, target)[0] * view.pixel.pitch_um
+            w20_um = blur.defocus_um(view.scenario, view.pixel.pitch_um)
+            f_number = view.scenario.optics.f_number
+            bound = blur.interpolation_bound(radius, aperture, knots_nm * 1e-3, f_number, w20_um)
+            self._gaps[method, aperture] = bound
+        return self._gaps[method, aperture]
+
+    def _between_knots(self, methods: Methods) -> float:
+        """How far the kernel of some methods may be from its interpolation between the knots of the comparison."""
+        if methods.blur in ("skip", blur.COARSE):
+            return 0.0
+        return self._gap(methods, blur.COARSE) + self._gap(methods, methods.blur)
+
+    def _sums(self, factor: FloatArray, low: FloatArray, high: FloatArray) -> Amounts:
+        """`Reach.amounts`, remembered."""
+        key = factor.tobytes() + low.tobytes() + high.tobytes()
+        digest = hashlib.sha256(key).digest()
+        if digest not in self._amounts:
+            self._amounts[digest] = self._reach.amounts(factor, low, high)
+        return self._amounts[digest]

@@ -1,0 +1,15 @@
+"""Every traffic light data set that a study can name, found in `data_sets`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ...found import files_in
+from ..lights import Lights
+from ..spectrum import WavelengthGrid
+from . import data_sets
+
+BUILT_IN_LIGHTS: dict[str, Callable[[WavelengthGrid], Lights]] = {
+    file.__name__.rpartition(".")[2]: file.lights for file in files_in(data_sets)
+}
+"""Data sets by their names; each is a function of the wavelength grid."""

@@ -1,0 +1,1 @@
+"""Every column of the result table: a file is a metric."""

@@ -1,0 +1,68 @@
+"""Color separation distance: how far two signal types are apart in the digital numbers of a CFA."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+
+from ...curves.lights import class_pairs
+from ...types import FloatArray, IndexArray
+from ..quantity import BEST_PLACE, DN, Asked, Columns, Quantity, ReadoutMetric
+from ..separation import csd_name, separations
+from ..smooth import Rows, SmoothDesign
+
+
+class ColorSeparation(ReadoutMetric):
+    """The CSD of each pair of signal types; over all places of the light the best one, too."""
+
+    order = 0
+
+    def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
+        """`csd_<a>_<b>`, and `best_place_csd_<a>_<b>` where a scene asks for any place."""
+        nearest = [
+            Quantity(
+                name=csd_name(pair),
+                metric="csd",
+                meaning="color separation distance (CSD) of two signal types: the smallest distance between a point of "
+                "one and a point of the other, over the CFA's distinct channels",
+                unit=DN,
+                label=f"{pair[0]}/{pair[1]} CSD",
+                digits=1,
+                wanted="more",
+                role="separation",
+                ends=("min",),
+                goal=True,
+                promised=True,
+                pair=pair,
+                squared=True,
+                smooth=partial(_squared, pair=pair),
+            )
+            for pair in class_pairs(asked.classes)
+        ]
+        best = [
+            replace(
+                each,
+                name=BEST_PLACE + each.name,
+                metric="best_place_csd",
+                meaning="where a scene asks for `any` place of the light on the mosaic: the largest CSD over all real "
+                "places, each at its worst moment of a pulsed light; `csd_<a>_<b>` is then the smallest",
+                label=f"{each.words} at its best place",
+                extreme="best place",
+                of=each.name,
+                ends=(),
+                goal=False,
+                squared=False,
+                smooth=None,
+            )
+            for each in nearest
+        ]
+        return (*nearest, *best) if asked.any_place else tuple(nearest)
+
+    def of_readout(self, response: FloatArray, members: Mapping[str, IndexArray]) -> Columns:
+        """See `separation.separations`."""
+        return {csd_name(pair): distances for pair, distances in separations(response, members).items()}
+
+
+def _squared(design: SmoothDesign, *, pair: tuple[str, str]) -> Rows:
+    return design.squared_distances(pair)

@@ -1,0 +1,112 @@
+"""How noise confuses signal types: contrast to noise, d', errors and their bounds, for each pair of states."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from ...camera.imager import Imager
+from ...camera.noisy_readout import NoisyReadout
+from ...curves.lights import Pair, class_pairs, pair_name
+from ...types import FloatArray, IndexArray
+from .. import confusion
+from ..discrimination import (
+    NoiseShape,
+    contrast_to_noise,
+    detectability,
+    error_bound,
+    pairwise_error,
+    state_error_bound,
+)
+from ..quantity import Asked, Columns, NoiseMetric, Quantity
+
+CNR, D_PRIME, ERROR, ERROR_BOUND = "cnr", "dprime", "error", "error_bound"
+STATE_ERROR, STATE_ERROR_BOUND = "state_error", "state_error_bound"
+_MEANINGS = {
+    CNR: "CSD over the noise along the line of the nearest pair",
+    D_PRIME: "smallest distance in units of the noise (d') over the pairs of two types",
+    ERROR: "largest probability that noise turns a signal of one of two types into one of the other, pair by pair",
+    ERROR_BOUND: "bound on how often the best rule takes a signal of one of two types for the other, for the worst "
+    "signal",
+    STATE_ERROR: "largest pairwise error over all pairs of states",
+    STATE_ERROR_BOUND: "bound on how often the best rule tells the wrong state, for the worst signal",
+}
+_ByPair = dict[Pair, FloatArray]
+_LESS = (ERROR, ERROR_BOUND, STATE_ERROR, STATE_ERROR_BOUND)
+
+
+class Confusion(NoiseMetric):
+    """The worst over the places of the light and the moments of its pulses."""
+
+    order = 5
+
+    def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
+        """Four columns for each pair of states, and two for all."""
+        if not asked.states:
+            return ()
+        each = [
+            _quantity(metric, pair_name(metric, pair), pair)
+            for pair in class_pairs(asked.states)
+            for metric in (CNR, D_PRIME, ERROR, ERROR_BOUND)
+        ]
+        return (*each, *(_quantity(metric, metric) for metric in (STATE_ERROR, STATE_ERROR_BOUND)))
+
+    def of_noise(
+        self, imager: Imager, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
+    ) -> Columns:
+        """Errors of a few pixels are exact sums over their digital numbers, those of many are Gaussian or bounds."""
+        cases = [(read.mean[:, case], read.variance[:, case]) for case in range(read.mean.shape[1])]
+        error, bound, state_bound = _errors(imager, curves, read, cases, members)
+        found: Columns = {}
+        for pair in class_pairs(list(members)):
+            both = members[pair[0]], members[pair[1]]
+            for metric, quantity in ((CNR, contrast_to_noise), (D_PRIME, detectability)):
+                found[pair_name(metric, pair)] = np.min([quantity(*case, *both) for case in cases], axis=0)
+            found[pair_name(ERROR, pair)] = error[pair]
+            found[pair_name(ERROR_BOUND, pair)] = bound[pair]
+        found[STATE_ERROR] = np.max(list(error.values()), axis=0)
+        found[STATE_ERROR_BOUND] = state_bound
+        return found
+
+
+def _quantity(metric: str, name: str, pair: Pair | None = None) -> Quantity:
+    less = metric in _LESS
+    return Quantity(
+        name=name,
+        metric=metric,
+        meaning=_MEANINGS[metric],
+        pair=pair,
+        wanted="less" if less else "more",
+        ends=("max",) if less else ("min",),
+        infinite=True,  # a signal without noise is told apart for certain
+    )
+
+
+def _errors(
+    imager: Imager,
+    curves: FloatArray,
+    read: NoisyReadout,
+    cases: list[tuple[FloatArray, FloatArray]],
+    members: Mapping[str, IndexArray],
+) -> tuple[_ByPair, _ByPair, FloatArray]:
+    """Error and bound of each pair, and the bound of all states, the largest over the cases."""
+    few, pairs = imager.readout.few_pixels, class_pairs(list(members))
+    if few is not None:
+        electrons = imager.pixel_electrons(curves)
+        exact = [confusion.errors(electrons[:, case], few, imager.readout.pixel, members) for case in range(len(cases))]
+        return (
+            {pair: np.max([each.error[pair] for each in exact], axis=0) for pair in pairs},
+            {pair: np.max([each.bound[pair] for each in exact], axis=0) for pair in pairs},
+            np.max([each.state_bound for each in exact], axis=0),
+        )
+    shapes = [NoiseShape(read.gaussian[:, case], read.reach_dn[:, case]) for case in range(len(cases))]
+
+    def largest(quantity: Callable[..., FloatArray], *of: Any) -> FloatArray:
+        found = [quantity(*case, *of, shape) for case, shape in zip(cases, shapes, strict=True)]
+        return np.asarray(np.max(found, axis=0), dtype=float)
+
+    error = {(a, b): largest(pairwise_error, members[a], members[b]) for a, b in pairs}
+    bound = {(a, b): largest(error_bound, members[a], members[b]) for a, b in pairs}
+    return error, bound, largest(state_error_bound, members)

@@ -1,0 +1,53 @@
+"""Lengths of a family's design that a producer asks for."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from ...designs.family import Family
+from ...designs.products import row_products
+from ...types import FloatArray
+from ..quantity import Asked, Columns, FamilyMetric, Quantity
+from ..smooth import Rows, SmoothDesign
+
+_MEANINGS = {
+    "edge_width_nm": "narrowest edge of a filter of edges (10 to 90 %)",
+    "band_width_nm": "narrowest band of a filter of bands, between the middles of its edges",
+}
+
+
+class Lengths(FamilyMetric):
+    """The narrowest edge and band."""
+
+    order = 4
+
+    def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
+        """A column for each length."""
+        del asked
+        return tuple(
+            Quantity(
+                name=name,
+                metric=name,
+                meaning=_MEANINGS[name],
+                unit="nm",
+                digits=2,
+                wanted="more",
+                ends=("min",),
+                needs="family",
+                smooth=partial(_rows, name=name),
+            )
+            for name in _MEANINGS
+        )
+
+    def of_parameters(self, family: Family | None, points: FloatArray) -> Columns:
+        """NaN for what the family does not have, nm."""
+        rows = {} if family is None else family.dimensions
+        nothing = np.full((len(points), 1), np.nan)
+        lengths = {name: row_products(points, rows[name].T) if name in rows else nothing for name in _MEANINGS}
+        return {name: values.min(axis=1) for name, values in lengths.items()}
+
+
+def _rows(design: SmoothDesign, *, name: str) -> Rows:
+    return design.linear(design.family.dimensions[name])

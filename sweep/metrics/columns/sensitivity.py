@@ -1,0 +1,97 @@
+"""Sensitivity: how much light a design's filters let through."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from ...camera.view import View
+from ...designs.block import Block, CurveBlock
+from ...types import FloatArray
+from ..quantity import Asked, Columns, DesignMetric, LinearRows, Quantity
+from ..separation import cfa_sensitivity
+from ..smooth import Rows, SmoothDesign
+
+SENSITIVITY, CFA_SENSITIVITY = "sensitivity", "cfa_sensitivity"
+
+
+class Sensitivity(DesignMetric):
+    """Total QE of the modified channels over that of the curves that they replace; that of the CFA over a clear one."""
+
+    order = 1
+
+    def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
+        """`sensitivity` and `cfa_sensitivity`."""
+        del asked
+        own = Quantity(
+            name=SENSITIVITY,
+            metric=SENSITIVITY,
+            meaning="sensitivity of the modified channel (1 = the channel it replaces)",
+            wanted="more",
+            role="light",
+            ends=("min", "max"),
+            goal=True,
+            needs="modified",
+            most=1.0,
+            smooth=partial(_row, name=SENSITIVITY),
+            linear=_own_share,
+        )
+        whole = Quantity(
+            name=CFA_SENSITIVITY,
+            metric=CFA_SENSITIVITY,
+            meaning="sensitivity of the CFA (1 = a sensor without color filters)",
+            label="CFA sensitivity",
+            wanted="more",
+            role="light",
+            ends=("min", "max"),
+            goal=True,
+            smooth=partial(_row, name=CFA_SENSITIVITY),
+            linear=_whole_share,
+        )
+        return own, whole
+
+    def of_designs(self, view: View, block: Block) -> Columns:
+        """The paper's sensitivity of N, with Y as the reference (NaN without a modified channel); see `separation`."""
+        modified, counts = list(view.modified), view.mosaic.counts
+        each = np.repeat(np.eye(len(modified)), view.grid.size, axis=0)  # the sum over wavelengths of each channel
+        totals = block.product(each, np.arange(view.grid.size)) if modified else np.empty((len(block), 0))
+        every = np.empty((len(block), len(counts)))
+        every[:] = view.qe.sum(axis=1, dtype=float)
+        every[:, modified] = totals
+        base_qe = np.asarray(view.base_qe, dtype=float)
+        own = totals.sum(axis=1) / base_qe.sum() if modified else np.full(len(block), np.nan)
+        return {SENSITIVITY: own, CFA_SENSITIVITY: cfa_sensitivity(every, counts, view.clear_qe)}
+
+
+def sensitivities_gradient(view: View, curves_gradient: FloatArray) -> Columns:
+    """Exact derivatives of `sensitivity` and `cfa_sensitivity`, ndarray[n_parameters].
+
+    `curves_gradient`: ndarray[n_parameters, n_modified, n_wavelengths].
+    """
+    total = curves_gradient.sum(axis=-1)
+    counts = view.mosaic.counts
+    return {
+        SENSITIVITY: total.sum(axis=1) / view.base_qe.sum(),
+        CFA_SENSITIVITY: total @ counts[list(view.modified)] / (counts.sum() * view.clear_qe.sum()),
+    }
+
+
+def _row(design: SmoothDesign, *, name: str) -> Rows:
+    value = Sensitivity().of_designs(design.view, CurveBlock(design.curves[None]))[name]
+    return Rows(value, sensitivities_gradient(design.view, design.by_u)[name][None])
+
+
+def _own_share(view: View) -> LinearRows:
+    """Of a filter in the only modified channel."""
+    base = view.base_qe[0]
+    return LinearRows(csr_matrix(np.full((1, base.size), 1 / base.sum())))
+
+
+def _whole_share(view: View) -> LinearRows:
+    """The same for the CFA: the other channels' part is constant."""
+    counts, modified = view.mosaic.counts, view.modified[0]
+    whole = counts.sum() * view.clear_qe.sum()
+    others = float(np.delete(view.qe.sum(axis=1) * counts, modified).sum())
+    return LinearRows(csr_matrix(np.full((1, view.grid.size), counts[modified] / whole)), others / whole)

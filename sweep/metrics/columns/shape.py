@@ -1,0 +1,76 @@
+"""Shape of a filter: how steep it is, and the least of its base that it lets through."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import csr_matrix, diags_array, vstack
+
+from ...camera.view import View
+from ...designs.block import Block
+from ..quantity import Asked, Columns, DesignMetric, LinearRows, Quantity
+from ..smooth import Rows, SmoothDesign
+
+_SLOPE, _LEAST = "slope_per_nm", "min_transmission"
+
+
+class Shape(DesignMetric):
+    """What a producer of filters asks of their curves."""
+
+    order = 2
+
+    def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
+        """`slope_per_nm` and `min_transmission`."""
+        del asked
+        slope = Quantity(
+            name=_SLOPE,
+            metric=_SLOPE,
+            meaning="steepest slope of a modified channel's QE, per nm",
+            unit="1/nm",
+            wanted="less",
+            ends=("max",),
+            needs="modified",
+            smooth=_slopes,
+            linear=_steps,
+        )
+        least = Quantity(
+            name=_LEAST,
+            metric=_LEAST,
+            meaning="smallest ratio of a modified channel to the curve it replaces",
+            wanted="more",
+            ends=("min",),
+            needs="modified",
+            most=1.0,
+            share=True,
+            smooth=_ratios,
+        )
+        return slope, least
+
+    def of_designs(self, view: View, block: Block) -> Columns:
+        """The steepest slope and the smallest ratio over the wavelengths; NaN without a modified channel."""
+        if not view.modified:
+            return dict.fromkeys((_SLOPE, _LEAST), np.full(len(block), np.nan))
+        steepest, lowest = block.shapes(np.asarray(view.base_qe, dtype=float))
+        return {_SLOPE: steepest / view.grid.step_nm, _LEAST: lowest}
+
+
+def _slopes(design: SmoothDesign) -> Rows:
+    """Up and down slopes at every wavelength, 1/nm."""
+    step = design.view.grid.step_nm
+    steep = np.diff(design.curves, axis=-1).ravel() / step
+    by_u = np.diff(design.by_u, axis=-1).reshape(len(design.by_u), -1).T / step
+    return Rows(np.concatenate([steep, -steep]), np.vstack([by_u, -by_u]))
+
+
+def _ratios(design: SmoothDesign) -> Rows:
+    """Curve over base at every wavelength where there is a base."""
+    base = design.view.base_qe.ravel()
+    some = base > 0
+    by_u = design.by_u.reshape(len(design.by_u), -1).T
+    return Rows(design.curves.ravel()[some] / base[some], by_u[some] / base[some, None])
+
+
+def _steps(view: View) -> LinearRows:
+    """Differences of neighboring wavelengths, down and up."""
+    size = view.grid.size
+    up = csr_matrix(diags_array([-1.0, 1.0], offsets=[0, 1], shape=(size - 1, size)))
+    return LinearRows(vstack([-up, up]).tocsr(), scale=view.grid.step_nm)

@@ -1,0 +1,194 @@
+"""What a column of the result table is: everything that the other rooms need to know of a quantity."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import ClassVar, Literal
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from ..camera.imager import Imager
+from ..camera.noisy_readout import NoisyReadout
+from ..camera.view import View
+from ..curves.lights import Pair
+from ..designs.block import Block
+from ..designs.family import Family
+from ..types import FloatArray, IndexArray
+from .smooth import Rows, SmoothDesign
+
+WORST = "worst_"
+"""How the name of a quantity's worst case over the shifts of the edges in production begins."""
+BEST_PLACE = "best_place_"
+"""How the name of a CSD's largest value over the places where the light may fall on the mosaic begins, each at its
+worst moment of a pulsed light."""
+DN = "DN"
+"""Unit of what is measured in digital numbers."""
+Columns = dict[str, FloatArray]
+End = Literal["min", "max"]
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column in words and facts, as a run keeps them.
+
+    `metric`: what is measured, the same for all pairs of signal types. `unit`: empty for a ratio. `role`: `separation`
+    (how well colors are told apart) or `light` (what that costs). `extreme`: of which kind of extreme over what, if
+    any, of the quantity named `of`. `wanted`: whether more of it is better, or less. `pair`: of signal types.
+    """
+
+    name: str
+    metric: str
+    meaning: str
+    unit: str = ""
+    label: str = ""
+    digits: int = 4
+    wanted: Literal["more", "less", ""] = ""
+    role: Literal["separation", "light", ""] = ""
+    extreme: Literal["worst edges", "best place", ""] = ""
+    of: str = ""
+    pair: Pair | None = None
+
+    @property
+    def words(self) -> str:
+        """Its name as people write it."""
+        return self.label or self.name
+
+    @property
+    def axis(self) -> str:
+        """Its name with its unit, if it has one."""
+        return f"{self.words} / {self.unit}" if self.unit else self.words
+
+    def amount(self, value: float, digits: int | None = None) -> str:
+        """A value with its unit, with `digits` after the point instead of its own; a ratio always has its own."""
+        own = self.digits if digits is None else digits
+        return f"{value:.{own}f} {self.unit}" if self.unit else f"{value:.{self.digits}f}"
+
+
+@dataclass(frozen=True)
+class LinearRows:
+    """A quantity as rows of the curve N of one modified channel: rows @ N + constant is `scale` times each of them.
+
+    The smallest is the quantity where more of it is wanted, else the largest. `rows`: [n, n_wavelengths].
+    """
+
+    rows: csr_matrix
+    constant: float = 0.0
+    scale: float = 1.0
+
+
+@dataclass(frozen=True)
+class Quantity(Column):
+    """A column that is computed, with what constraints, search and limit need.
+
+    `ends`: ends of a constraint on it. `goal`: it may be maximized, and has a worst case over edge shifts. `needs`: it
+    exists only with a modified channel, or in a family that has it. `infinite`: it may be so. `promised`: a plan's
+    promise holds for it. `squared`: it is a distance, whose squares are the smooth rows. `most`: no filter reaches
+    more. `share`: it is the smallest ratio of N to the curve that N replaces.
+    """
+
+    ends: tuple[End, ...] = ()
+    goal: bool = False
+    needs: Literal["modified", "family", ""] = ""
+    infinite: bool = False
+    promised: bool = False
+    squared: bool = False
+    most: float = np.inf
+    share: bool = False
+    smooth: Callable[[SmoothDesign], Rows] | None = field(default=None, repr=False)
+    linear: Callable[[View], LinearRows] | None = field(default=None, repr=False)
+
+    @property
+    def has_limit(self) -> bool:
+        """Whether the limit of any filter knows it."""
+        return self.squared or self.share or self.linear is not None
+
+    @property
+    def column(self) -> Column:
+        """What a run keeps of it."""
+        return Column(**{each.name: getattr(self, each.name) for each in fields(Column)})
+
+    def worst(self) -> Quantity:
+        """Its worst case over edges that come out up to a shift off."""
+        meaning = f"the worst case of `{self.name}` over edges that production shifts"
+        label = f"worst-case {self.words}"
+        return replace(
+            self, name=WORST + self.name, meaning=meaning, label=label, extreme="worst edges", of=self.name, goal=True
+        )
+
+    def value(self, rows: Rows) -> float:
+        """The quantity from its smooth rows."""
+        if self.wanted == "less":
+            return float(rows.values.max())
+        least = float(rows.values.min())
+        return float(np.sqrt(least)) if self.squared else least
+
+    def worse(self, values: FloatArray | Sequence[FloatArray]) -> FloatArray:
+        """The worst of several cases, ndarray[n_designs]."""
+        return np.asarray(np.max(values, axis=0) if self.wanted == "less" else np.min(values, axis=0), dtype=float)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a study asks for: signal types, states that noise may confuse, any place of the light, shifts of edges."""
+
+    classes: tuple[str, ...]
+    states: tuple[str, ...] = ()
+    any_place: bool = False
+    edge_shift: bool = False
+
+
+class Metric(ABC):
+    """Columns that are computed together. A file in `metrics/columns/` holds a class of one of the kinds below.
+
+    `order`: where its columns stand among those of the others.
+    """
+
+    order: ClassVar[int]
+
+    @abstractmethod
+    def quantities(self, asked: Asked) -> Sequence[Quantity]:
+        """Its columns in a study; none where they are not asked for."""
+
+
+class DesignMetric(Metric):
+    """What designs give without any light."""
+
+    @abstractmethod
+    def of_designs(self, view: View, block: Block) -> Columns:
+        """Each column, ndarray[n_designs]."""
+
+
+class ReadoutMetric(Metric):
+    """What the digital numbers of a scene give."""
+
+    @abstractmethod
+    def of_readout(self, response: FloatArray, members: Mapping[str, IndexArray]) -> Columns:
+        """Each column at one place and moment of the light, ndarray[n_designs]; the worst one of all counts.
+
+        `response`: ndarray[n_designs, n_signals, n_channels], DN; `members`: signal type -> indices of its signals.
+        """
+
+
+class NoiseMetric(Metric):
+    """What mean and variance of a noisy scene give."""
+
+    @abstractmethod
+    def of_noise(
+        self, imager: Imager, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
+    ) -> Columns:
+        """Each column, the worst over all places and moments, ndarray[n_designs].
+
+        `read`: what the camera reads of `curves`, ndarray[n_designs, n_modified, n_wavelengths]; `members`: state ->
+        indices of its signals.
+        """
+
+
+class FamilyMetric(Metric):
+    """What parameters of a family say."""
+
+    @abstractmethod
+    def of_parameters(self, family: Family | None, points: FloatArray) -> Columns:
+        """Each column, ndarray[n_designs], NaN where a design has none; `points`: ndarray[n_designs, n_parameters]."""

@@ -1,0 +1,32 @@
+"""How several weighted quantities become one number that a search maximizes."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import ClassVar
+
+from ..types import FloatArray
+
+
+class Rule(ABC):
+    """A rule that falls in none of its terms. A file in `metrics/rules/` holds one.
+
+    `name`: its key in a study. `smallest`: whether it is the smallest of the terms, which a search bounds from below
+    by one number, and a limit can be proven of.
+    """
+
+    name: ClassVar[str]
+    smallest: ClassVar[bool] = False
+
+    @abstractmethod
+    def of(self, terms: FloatArray) -> FloatArray:
+        """The objective, ndarray[...]; `terms`: weight times quantity, >= 0, ndarray[n_terms, ...]."""
+
+    @abstractmethod
+    def gradient(self, terms: FloatArray) -> FloatArray:
+        """Its derivative by each term, ndarray[n_terms], >= 0; `terms`: ndarray[n_terms]."""
+
+    @abstractmethod
+    def words(self, terms: Sequence[str]) -> str:
+        """The objective in words, of terms in words; two or more."""

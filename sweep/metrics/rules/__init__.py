@@ -1,0 +1,1 @@
+"""Every rule of an objective: a file is a rule."""

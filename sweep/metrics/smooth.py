@@ -1,0 +1,98 @@
+"""Smooth rows of a design: what a search with exact derivatives sees of a quantity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..camera.linear import LinearImager, smooth_imager
+from ..camera.view import View
+from ..curves.lights import Pair
+from ..designs.family import Family
+from ..types import FloatArray, IndexArray
+from .separation import separation
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Smooth functions at a point, ndarray[n], with their derivatives by the free parameters, ndarray[n, n_free]."""
+
+    values: FloatArray
+    by_u: FloatArray
+
+    def scaled(self, factor: float, offset: float = 0.0) -> Rows:
+        """factor x rows + offset."""
+        return Rows(factor * self.values + offset, factor * self.by_u)
+
+    @staticmethod
+    def joined(parts: list[Rows]) -> Rows:
+        """All rows, in order."""
+        return Rows(np.concatenate([p.values for p in parts]), np.concatenate([p.by_u for p in parts]))
+
+    @property
+    def finite(self) -> bool:
+        """Whether all of it is numbers."""
+        return bool(np.isfinite(self.values).all() and np.isfinite(self.by_u).all())
+
+    def cleaned(self) -> Rows:
+        """Zeros for what is not a number."""
+        return Rows(*(np.nan_to_num(v, posinf=0, neginf=0) for v in (self.values, self.by_u)))
+
+
+class SmoothDesign:
+    """One design of a family in a straight scene, with derivatives by the free parameters of a box.
+
+    `x`: its parameters, ndarray[n_parameters]; `span`: length of the box along each free one, `free`: their indices.
+    `curves`: ndarray[n_modified, n_wavelengths]; `by_u`: ndarray[n_free, n_modified, n_wavelengths].
+    """
+
+    def __init__(self, imager: LinearImager, family: Family, x: FloatArray, free: IndexArray, span: FloatArray) -> None:
+        self.view: View = imager.view
+        self.family, self.x = family, x
+        self.curves = family.curves(x[None])[0]
+        self.by_u = family.gradient(x)[free] * span[:, None, None]
+        self._imager, self._free, self._span = imager, free, span
+
+    @cached_property
+    def _response(self) -> tuple[FloatArray, FloatArray]:
+        return self._imager.smooth(self.curves[None])[0], self._imager.gradient(self.curves, self.by_u)
+
+    @property
+    def response(self) -> FloatArray:
+        """Unclipped, unrounded response, DN, ndarray[n_cases, n_signals, n_channels]."""
+        return self._response[0]
+
+    @property
+    def response_by_u(self) -> FloatArray:
+        """Its derivative, ndarray[n_free, n_cases, n_signals, n_channels]."""
+        return self._response[1]
+
+    def linear(self, matrix: FloatArray) -> Rows:
+        """Rows of sums over the parameters; `matrix`: ndarray[n, n_parameters]."""
+        return Rows(matrix @ self.x, matrix[:, self._free] * self._span)
+
+    def squared_distances(self, pair: Pair) -> Rows:
+        """Squared distances of all pairs of signals of two types, in every case, DN^2."""
+        first, second = (self.view.members[name] for name in pair)
+        response, by_u = self._response
+        apart = (response[:, first, None] - response[:, None, second]).reshape(-1, response.shape[-1])
+        apart_by_u = (by_u[:, :, first, None] - by_u[:, :, None, second]).reshape(len(by_u), *apart.shape)
+        return Rows((apart**2).sum(axis=1), 2 * (apart_by_u * apart).sum(axis=2).T)
+
+
+def smooth_response(view: View, curves: FloatArray) -> FloatArray:
+    """Unquantized, unclipped response, DN: ndarray[n_designs, n_cases, n_signals, n_channels].
+
+    `curves`: ndarray[n_designs, n_modified, n_wavelengths].
+    """
+    return smooth_imager(view).smooth(curves)
+
+
+def smooth_csd(view: View, curves: FloatArray, pair: Pair) -> FloatArray:
+    """CSD of the smooth response, the smallest over the cases, DN, ndarray[n_designs]."""
+    response = smooth_response(view, curves)
+    first, second = (view.members[name] for name in pair)
+    over = [separation(response[:, case], first, second) for case in range(response.shape[1])]
+    return np.asarray(np.min(over, axis=0), dtype=float)

@@ -1,0 +1,28 @@
+"""From a row of the result table back to its design."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..designs.space import Space
+from ..study import Study
+
+
+def row_space(study: Study, row: Mapping[Any, Any]) -> Space:
+    """The space that a row belongs to."""
+    if row["kind"] == "search":
+        assert study.search is not None
+        return study.search.space
+    within = row["design_id"] % sum(space.size for space in study.spaces)  # ids run through the spaces of each scenario
+    ends = np.cumsum([space.size for space in study.spaces])
+    return study.spaces[int(np.searchsorted(ends, within, side="right"))]
+
+
+def row_curves(study: Study, row: Mapping[Any, Any]) -> tuple[Space, Any]:
+    """The space that a row belongs to and its filters' curves, ndarray[1, n_modified, n_wavelengths]."""
+    space = row_space(study, row)
+    point = np.array([[row[name] for name in space.parameters]], dtype=float)
+    return space, space.curves(point, study.grid.size)

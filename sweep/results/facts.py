@@ -1,0 +1,118 @@
+"""What `provenance.json` says of a run, as typed objects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from ..metrics.quantity import Column
+
+
+class _Facts(BaseModel):
+    """Facts that a run wrote; more of them, from a later version, are no fault."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore", ser_json_inf_nan="constants")
+
+
+class Origin(_Facts):
+    """Where curves come from."""
+
+    name: str
+    source: str
+    surrogate: bool
+
+
+class EffectFacts(_Facts):
+    """How an effect was computed, what that changes in a CSD at most (DN), and why."""
+
+    effect: str
+    method: str
+    promised_dn: float
+    reason: str
+
+    @property
+    def is_computed(self) -> bool:
+        """Whether it was more than left out."""
+        return self.method not in ("skip", "one")
+
+
+class PlanFacts(_Facts):
+    """How a scene was simulated; `work`: estimated operations, `reference_work`: with every effect on."""
+
+    key: str
+    tolerance_dn: float
+    promised_dn: float
+    work: float
+    reference_work: float
+    effects: tuple[EffectFacts, ...]
+
+    @property
+    def computed(self) -> list[str]:
+        """Effects that were computed."""
+        return [each.effect for each in self.effects if each.is_computed]
+
+
+class SearchFacts(_Facts):
+    """A search in figures; see `search.limit.Limit` for those of the limit."""
+
+    algorithm: str
+    scenario: str
+    space: str
+    starts: int
+    evaluations: int
+    endings: tuple[str, ...]
+    objective: str
+    best_smooth_objective: float
+    best_sensitivity: float
+    limit_attained: float | None
+    limit_proven: float | None
+    limit_left_out: tuple[str, ...]
+    limit_programs: int | None
+    limit_open_parts: int | None
+    front_limits_open: int
+    gap: float | None
+    no_limit: str | None
+    front_evaluations: int
+
+
+class Provenance(_Facts):
+    """Everything needed to run a study again, what the machine was, and what its columns mean."""
+
+    command: tuple[str, ...]
+    duration_s: float
+    seed: int
+    fingerprint: str
+    model_version: str
+    data_sha256: dict[str, str]
+    sensor: Origin
+    lights: Origin
+    versions: dict[str, str]
+    platform: str
+    byte_order: str
+    cores: int | None
+    backend: str
+    scheduler: str | None
+    workers: int
+    threads_per_worker: int
+    designs: int
+    failed: int
+    plans: dict[str, PlanFacts]
+    trade_off: tuple[str, str]
+    parameters: tuple[str, ...]
+    quantities: tuple[Column, ...]
+    detours: tuple[dict[str, Any], ...]
+    warnings: tuple[str, ...]
+    search: SearchFacts | None = None
+    hypervolume: dict[str, float] | None = None
+    hypervolume_least_sensitivity: float | None = None
+
+
+def lacking(kind: type[BaseModel], facts: Mapping[str, Any]) -> list[str]:
+    """What an object of this kind must have and these facts do not, or not as it is said."""
+    try:
+        kind.model_validate(facts)
+    except ValidationError as error:
+        return list(dict.fromkeys(".".join(map(str, fault["loc"])) for fault in error.errors()))
+    return []

@@ -1,0 +1,111 @@
+"""The trade-off that a search traces: the best design at each level of sensitivity, and the limit there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+
+from ..errors import BrokenProofError, Fault
+from ..metrics.bound import Bound
+from ..metrics.columns.sensitivity import SENSITIVITY
+from ..types import FloatArray, Parallel, Progress, delayed
+from .limit import Limit, limit_of, why_not
+from .problem import Evaluation, Problem, SearchRun, best_feasible
+from .solver import search_from
+
+_FRONT_STARTS = 2
+_FRONT_LIMIT_DN = 0.02
+_FRONT_PROGRAMS = 1000
+"""Linear programs for the limit at each level; a level of the built-in studies takes about ten."""
+_PROOF_TOLERANCE = 1e-9
+"""A design may exceed a proven limit by this share, which is rounding, and no more."""
+_NO_LIMIT = 0.05
+"""A limit of no more than this is no more than its own accuracy."""
+
+
+@dataclass(frozen=True)
+class FrontPoint:
+    """The best design with at least `level` of sensitivity (None: none was found), and the limit there."""
+
+    level: float
+    best: Evaluation | None
+    runs: tuple[SearchRun, ...]
+    limit: Limit | None
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How a problem is searched: nlopt's algorithm, starting points in units of the box, ndarray[n_starts, n_free],
+    evaluations of each start, and the seed of algorithms that draw.
+    """
+
+    algorithm: str
+    starts: FloatArray
+    evaluations: int
+    seed: int
+
+
+def check_proof(best: Evaluation | None, limit: Limit | None, where: str = "") -> None:
+    """Raise BrokenProofError where a design that the search found is better than what is proven to be out of reach."""
+    if best is None or limit is None or best.objective <= limit.proven + _PROOF_TOLERANCE * max(1.0, limit.proven):
+        return
+    raise BrokenProofError(
+        Fault(
+            f"broken proof{where}: the search found {best.objective:.9g}, but the limit says that no filter has more "
+            f"than {limit.proven:.9g}; what is finished is kept; this is a fault of the program, not of the study"
+        )
+    )
+
+
+def gap_of(best: Evaluation, limit: Limit) -> float | None:
+    """How far an answer is below the limit, relative; none where the limit itself is no more than its own accuracy."""
+    return None if limit.proven <= _NO_LIMIT else max(0.0, 1 - best.objective / limit.proven)
+
+
+def trade_off(
+    problem: Problem, levels: Sequence[float], effort: Effort, parallel: Parallel, progress: Progress
+) -> tuple[FrontPoint, ...]:
+    """The same search with at least each level of sensitivity: from a few points, then from what its neighbors found.
+
+    `parallel` runs calls over the cores. Raises BrokenProofError, see `check_proof`.
+    """
+    at_level = [replace(problem, constraints=_with_sensitivity(problem, level)) for level in levels]
+    limits: list[Limit | None] = [None] * len(at_level)
+    if why_not(problem) is None:
+        limits = list(parallel(delayed(limit_of, p, _FRONT_LIMIT_DN, _FRONT_PROGRAMS) for p in at_level))
+    runs: list[list[SearchRun]] = [[] for _ in at_level]
+    done, total = 0, 2 * len(at_level)
+
+    def searched(points: Sequence[Sequence[FloatArray]]) -> None:
+        nonlocal done
+        found = parallel(
+            [
+                delayed(
+                    search_from, at_level[k], len(runs[k]) + i, u, effort.algorithm, effort.evaluations, effort.seed
+                )
+                for k, own in enumerate(points)
+                for i, u in enumerate(own)
+            ]
+        )
+        for k, own in enumerate(points):
+            runs[k] += islice(found, len(own))
+            done += 1
+            progress("front levels", done, total)
+
+    def best(k: int) -> Evaluation | None:
+        return best_feasible([e for run in runs[k] for e in run.log]) if 0 <= k < len(runs) else None
+
+    searched([[*effort.starts[:_FRONT_STARTS]]] * len(at_level))
+    found = [(best(k - 1), best(k + 1)) for k in range(len(at_level))]
+    searched([[problem.to_unit(e.x) for e in both if e is not None] for both in found])
+    points = tuple(FrontPoint(level, best(k), tuple(runs[k]), limits[k]) for k, level in enumerate(levels))
+    for point in points:
+        check_proof(point.best, point.limit, f" at a sensitivity of {point.level:g} and more")
+    return points
+
+
+def _with_sensitivity(problem: Problem, level: float) -> dict[str, Bound]:
+    given = problem.constraints.get(SENSITIVITY)
+    top = None if given is None or given.max is None or given.max < level else given.max
+    return {**problem.constraints, SENSITIVITY: Bound(min=level, max=top)}

@@ -1,0 +1,240 @@
+"""Every registered quantity against a definition of its own, written here; one without a definition is found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.spatial.distance import cdist
+from scipy.stats import norm
+
+from sweep.camera.imager import Imager
+from sweep.camera.linear import smooth_imager
+from sweep.camera.methods import Methods
+from sweep.camera.view import View
+from sweep.metrics.evaluate import evaluate, family_quantities
+from sweep.metrics.quantity import Asked, Quantity
+from sweep.metrics.registry import quantities_of
+from sweep.metrics.smooth import Rows, SmoothDesign
+
+from ..hard.scenes import FAMILY, scene, target
+
+X = np.array([[600.0, 8.0, 640.0, 9.0, 0.8], [585.0, 12.0, 655.0, 7.0, 1.0], [612.0, 6.0, 630.0, 20.0, 0.4]])
+FREE = np.arange(5)
+SPAN = np.array([30.0, 10.0, 30.0, 10.0, 0.5])
+
+
+class Made:
+    """Designs of a scene, computed."""
+
+    def __init__(self, view: View, states: tuple[str, ...] = ()) -> None:
+        self.view, self.family, self.states = view, FAMILY, states
+        self.curves = FAMILY.curves(X)
+        imager = Imager(view)
+        self.found = evaluate(imager, self.curves, states) | family_quantities(FAMILY, X)
+        self.read, self.exposure_s = imager.read(self.curves)
+        self.noisy = imager.read_with_noise(self.curves) if states else None
+
+    def pairs(self, a: str, b: str) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+        """Of every design, the first and only case: means and variances of both types."""
+        assert self.noisy is not None
+        members = self.view.members
+        for mean, variance in zip(self.noisy.mean[:, 0], self.noisy.variance[:, 0], strict=True):
+            yield mean[members[a]], variance[members[a]], mean[members[b]], variance[members[b]]
+
+
+def csd(made: Made, quantity: Quantity) -> list[float]:
+    first, second = (made.view.members[name] for name in quantity.pair or ())
+    return [min(cdist(case[first], case[second]).min() for case in design) for design in made.read]
+
+
+def best_place(made: Made, quantity: Quantity) -> list[float]:
+    first, second = (made.view.members[name] for name in quantity.pair or ())
+    return [max(cdist(case[first], case[second]).min() for case in design) for design in made.read]
+
+
+def sensitivity(made: Made, _: Quantity) -> list[float]:
+    base = made.view.qe[made.view.modified[0]]
+    return [curve[0].sum() / base.sum() for curve in made.curves]
+
+
+def cfa_sensitivity(made: Made, _: Quantity) -> list[float]:
+    tile = made.view.mosaic.indices.ravel()
+    found = []
+    for curve in made.curves:
+        qe = made.view.qe.copy()
+        qe[made.view.modified[0]] = curve[0]
+        found.append(np.mean([qe[channel].sum() for channel in tile]) / made.view.clear_qe.sum())
+    return found
+
+
+def slope(made: Made, _: Quantity) -> list[float]:
+    step = made.view.grid.step_nm
+    return [max(abs(b - a) / step for a, b in pairwise(curve[0])) for curve in made.curves]
+
+
+def least(made: Made, _: Quantity) -> list[float]:
+    base = made.view.qe[made.view.modified[0]]
+    return [float((curve[0][base > 0] / base[base > 0]).min()) for curve in made.curves]
+
+
+def exposure(made: Made, _: Quantity) -> list[float]:
+    return list(made.exposure_s)
+
+
+def narrowest_edge(_: Made, __: Quantity) -> list[float]:
+    return [min(x[1], x[3]) for x in X]
+
+
+def narrowest_band(_: Made, __: Quantity) -> list[float]:
+    return [x[2] - x[0] for x in X]
+
+
+def contrast(made: Made, quantity: Quantity) -> list[float]:
+    found = []
+    for m, v, n, w in made.pairs(*(quantity.pair or ("", ""))):
+        i, j = np.unravel_index(np.argmin(cdist(m, n)), (len(m), len(n)))
+        u = (m[i] - n[j]) / np.linalg.norm(m[i] - n[j])
+        found.append(np.linalg.norm(m[i] - n[j]) / np.sqrt(u @ np.diag((v[i] + w[j]) / 2) @ u))
+    return found
+
+
+def detectability(made: Made, quantity: Quantity) -> list[float]:
+    found = []
+    for m, v, n, w in made.pairs(*(quantity.pair or ("", ""))):
+        each = [
+            (a - b) @ np.linalg.inv(np.diag((s + t) / 2)) @ (a - b)
+            for a, s in zip(m, v, strict=True)
+            for b, t in zip(n, w, strict=True)
+        ]
+        found.append(np.sqrt(min(each)))
+    return found
+
+
+def gaussian_error(made: Made, quantity: Quantity) -> list[float]:
+    """The plane between two Gaussians at which both err equally often: Q(D' S^-1 D / (s_a + s_b))."""
+    found = []
+    for m, v, n, w in made.pairs(*(quantity.pair or ("", ""))):
+        each = []
+        for a, s in zip(m, v, strict=True):
+            for b, t in zip(n, w, strict=True):
+                normal = (a - b) / ((s + t) / 2)
+                each.append(norm.sf(normal @ (a - b) / (np.sqrt(normal**2 @ s) + np.sqrt(normal**2 @ t))))
+        found.append(max(each))
+    return found
+
+
+def each_error(made: Made, metric: str) -> np.ndarray:
+    return np.array([made.found[q.name] for q in QUANTITIES.values() if q.metric == metric])
+
+
+def largest_error(made: Made, _: Quantity) -> list[float]:
+    return list(each_error(made, "error").max(axis=0))
+
+
+def at_least_its_error(made: Made, quantity: Quantity) -> list[float]:
+    """A bound is above what it bounds, and below a coin's."""
+    error, bound = (made.found[name] for name in (quantity.name.replace("error_bound", "error"), quantity.name))
+    assert (error <= bound).all()
+    assert (bound <= 1).all()
+    return list(bound)
+
+
+DEFINITIONS: dict[str, tuple[Callable[[Made, Quantity], list[float]], float]] = {
+    "csd": (csd, 1e-12),
+    "best_place_csd": (best_place, 1e-12),
+    "sensitivity": (sensitivity, 1e-12),
+    "cfa_sensitivity": (cfa_sensitivity, 1e-12),
+    "slope_per_nm": (slope, 1e-12),
+    "min_transmission": (least, 1e-12),
+    "exposure_s": (exposure, 1e-12),
+    "edge_width_nm": (narrowest_edge, 1e-12),
+    "band_width_nm": (narrowest_band, 1e-12),
+    "cnr": (contrast, 1e-9),
+    "dprime": (detectability, 1e-9),
+    "error": (gaussian_error, 0.1),  # exact sums over digital numbers: `test_confusion`
+    "error_bound": (at_least_its_error, 1e-12),
+    "state_error": (largest_error, 1e-12),
+    "state_error_bound": (at_least_its_error, 1e-12),
+}
+"""Metric -> what it is, written from its definition; and the relative difference that is allowed."""
+NOISY = {"noise": True, "photon_radiance": 2e14, "exposure": {"kind": "fixed", "exposure_s": 2e-3}}
+MADE = {
+    "lattice": Made(
+        replace(
+            scene("lattice", "RYNCy", {"target": target(100, 60, phase_px="any"), "optics": {"f_number": 4.0}}).view,
+            methods=Methods(phase="half pixel"),
+        )
+    ),
+    "noise": Made(scene("noise", "RYNCy", NOISY).view, ("yellow", "red")),
+}
+ASKED = Asked(MADE["noise"].view.lights.classes, ("yellow", "red"), any_place=True)
+QUANTITIES = quantities_of(ASKED)
+NAMES = [name for name in QUANTITIES if "green" not in name and "orange" not in name]
+
+
+def undefined(known: dict[str, Quantity]) -> set[str]:
+    """Metrics without a definition here."""
+    return {quantity.metric for quantity in known.values()} - DEFINITIONS.keys()
+
+
+def test_every_quantity_has_a_definition() -> None:
+    assert undefined(dict(QUANTITIES)) == set()
+
+
+def test_a_quantity_without_a_definition_is_found() -> None:
+    planted = Quantity("grayness", "grayness", "how gray a design is")
+    assert undefined({**QUANTITIES, "grayness": planted}) == {"grayness"}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_quantity_is_what_it_says(name: str) -> None:
+    quantity = QUANTITIES[name]
+    definition, allowed = DEFINITIONS[quantity.metric]
+    seen = [made for made in MADE.values() if name in made.found]
+    assert seen, "no scene has it"
+    for made in seen:
+        np.testing.assert_allclose(made.found[name], definition(made, quantity), rtol=allowed)
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if QUANTITIES[name].smooth is not None])
+def test_smooth_rows_are_the_quantity_with_its_derivative(name: str) -> None:
+    quantity, view = QUANTITIES[name], MADE["lattice"].view
+    straight = smooth_imager(view)
+
+    def rows(x: np.ndarray) -> Rows:
+        assert quantity.smooth is not None
+        return quantity.smooth(SmoothDesign(straight, FAMILY, x, FREE, SPAN))
+
+    for x in X:
+        found = evaluate(Imager(straight.view), FAMILY.curves(x[None])) | family_quantities(FAMILY, x[None])
+        assert quantity.value(rows(x)) == pytest.approx(found[name][0], rel=1e-12)
+        for at, span in enumerate(SPAN):
+            step = np.eye(5)[at] * span * 1e-5
+            slope_ = (rows(x + step).values - rows(x - step).values) / 2e-5
+            np.testing.assert_allclose(rows(x).by_u[:, at], slope_, rtol=1e-5, atol=1e-5 * np.abs(slope_).max() + 1e-9)
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if QUANTITIES[name].linear is not None])
+def test_linear_rows_are_the_quantity(name: str) -> None:
+    quantity, made = QUANTITIES[name], MADE["lattice"]
+    assert quantity.linear is not None
+    linear = quantity.linear(made.view)
+    for curve, value in zip(made.curves, made.found[name], strict=True):
+        rows = (linear.rows @ curve[0] + linear.constant) / linear.scale
+        assert (rows.max() if quantity.wanted == "less" else rows.min()) == pytest.approx(value, rel=1e-12)
+
+
+def test_what_a_search_may_maximize_has_a_worst_case() -> None:
+    shifted = quantities_of(replace(ASKED, edge_shift=True))
+    goals = {name for name, quantity in QUANTITIES.items() if quantity.goal}
+    assert goals == {quantity.of for quantity in shifted.values() if quantity.extreme == "worst edges"}
+    assert all(QUANTITIES[name].smooth is not None and QUANTITIES[name].wanted == "more" for name in goals)
+
+
+def test_labels_differ() -> None:
+    words = [quantity.words for quantity in quantities_of(replace(ASKED, edge_shift=True)).values()]
+    assert len(words) == len(set(words))
