@@ -55,8 +55,11 @@ def history_of(output: Output) -> History | None:
     levels = log["sensitivity_min"].dropna()
     least = float(min(levels)) if len(levels) else bound.min or 0.0
     reference = np.array([0.0, least - 1e-6])
-    volume = [hypervolume(pairs[:n][feasible[:n]], reference) for n in at] if output.goal.role == "separation" else None
-    return History(starts, at, best[at - 1], None if volume is None else np.array(volume), least)
+    volume = None
+    if output.goal.role == "separation":
+        # It cannot shrink as designs are added; the last bit of a sum in another order can.
+        volume = np.maximum.accumulate([hypervolume(pairs[:n][feasible[:n]], reference) for n in at])
+    return History(starts, at, best[at - 1], volume, least)
 
 
 def _best_so_far(rows: pd.DataFrame) -> FloatArray:
