@@ -25,6 +25,8 @@ def _counts(electrons: float, prnu: float, most: int) -> tuple[int, FloatArray]:
     high = electrons * spread
     low = electrons * max(2.0 - spread, 0.0)
     start = min(max(int(low - 14 * math.sqrt(low) - 2), 0), most)
+    if start == most:
+        return most, np.ones(1)
     last = min(int(high + 14 * math.sqrt(high) + 110), most)
     shares = np.zeros(max(last, start) - start + 1)
     if prnu == 0:

@@ -1,4 +1,4 @@
-"""How often digital numbers confuse two signal types: exact sums over the numbers that occur, for a few pixels.
+"""How often digital numbers confuse two signal types: exact sums over the numbers that occur, where they are few.
 
 Each channel's value is the sum of a few independent pixels that read Poisson electrons, full well, read noise, pedestal
 and ADC range, rounded. `electrons`, ndarray[n_designs, n_signals, n_pixels], are what each pixel expects.
@@ -19,10 +19,18 @@ from . import compiled as kernels
 
 FLOOR = 1e-18
 """What tails that are left out may add to an error or to its bound."""
+_FAR = 14.0
+"""Standard deviations beyond which what a pixel reads is left out."""
+_LEAST_BINS = 1e-4
+"""Read noise below this, in bins, moves nothing into another bin."""
 _NATS = 0.25
 """A step of the log-likelihood ratio is this over the number of channels: errors are exact within exp(1/16)."""
 _AT_ONCE = 4096
 """Signals of designs whose digital numbers are held at once."""
+_MOST_SUMS = 3e8
+"""Additions that a signal's digital numbers may take: a fifth of a second. Sensors of 16 bit and 10^6 e stay below."""
+_MOST_BINS = 1_000_000
+"""Of one pixel: those of 51 signals in four channels take 1.6 GiB."""
 
 
 @dataclass(frozen=True)
@@ -60,23 +68,50 @@ class _Numbers:
         )
 
 
+@dataclass(frozen=True)
+class _Grid:
+    """How a pixel's digital numbers are taken together: in bins of `wide` numbers."""
+
+    wide: int
+    sigma: float
+    n_bins: int
+
+    @classmethod
+    def of(cls, pixel: Pixel) -> _Grid:
+        """Bins of a quarter of the noise that every count has, or of an electron."""
+        wide = max(1, int(max(pixel.read_noise_e, 1.0) * min(pixel.dn_per_e, pixel.full_scale_dn) / 4))
+        return cls(wide, pixel.read_noise_e * pixel.dn_per_e / wide, pixel.full_scale_dn // wide + 1)
+
+
+def affordable(pixel: Pixel, channels: Sequence[IndexArray]) -> bool:
+    """Whether the digital numbers of any signal take at most `_MOST_SUMS` additions, and `_MOST_BINS` bins.
+
+    Counted for the brightest signal whose numbers differ: more electrons fill the well for certain.
+    """
+    grid, prnu = _Grid.of(pixel), pixel.prnu
+    most = math.ceil(pixel.well_e)
+    electrons = min(most / max(1 - _FAR * prnu, 0.01), 100 * pixel.well_e + 1e5)
+    each = 2 * _FAR * math.sqrt(electrons) + 125  # counts of one gain
+    gains = 2 * _FAR * 1.3 * math.sqrt(1 + prnu**2 * electrons) + 3 if prnu else 1
+    counts = min(most, 2 * _FAR * prnu * electrons + each) + 1
+    reach = 2 * _FAR * grid.sigma + 3
+    bins = min(grid.n_bins, counts * pixel.dn_per_e / grid.wide + reach)
+    pixels = max(len(own) for own in channels)
+    sums = 10 * gains * each + counts * reach + (64 / grid.sigma * reach if grid.sigma > _LEAST_BINS else 0)
+    return bins * pixels <= _MOST_BINS and sums + (bins * (pixels - 1)) ** 2 <= _MOST_SUMS
+
+
 def _numbers(electrons: FloatArray, pixel: Pixel) -> _Numbers:
     """Of a channel whose pixels expect `electrons`, ndarray[n_designs, n_signals, n_pixels]."""
     flat = np.ascontiguousarray(np.sort(electrons, axis=-1).reshape(-1, electrons.shape[-1]))
     distinct, rows = np.unique(flat, axis=0, return_inverse=True)
-    # Numbers are taken together in bins of a quarter of the noise that every count has, or of an electron.
-    wide = max(1, int(max(pixel.read_noise_e, 1.0) * min(pixel.dn_per_e, pixel.full_scale_dn) / 4))
-    sigma = pixel.read_noise_e * pixel.dn_per_e / wide
-    table = kernels.bin_shares(sigma) if sigma > _LEAST_BINS else np.empty((0, 0))
-    line = pixel.dn_per_e / wide, (pixel.offset_dn + 0.5) / wide
-    most, n_bins = math.ceil(pixel.well_e), pixel.full_scale_dn // wide + 1
+    grid = _Grid.of(pixel)
+    table = kernels.bin_shares(grid.sigma) if grid.sigma > _LEAST_BINS else np.empty((0, 0))
+    line = pixel.dn_per_e / grid.wide, (pixel.offset_dn + 0.5) / grid.wide
     firsts, starts, shares = kernels.channel_numbers(
-        distinct, most, pixel.well_e, pixel.prnu, pixel.read_noise_e, line, n_bins, table
+        distinct, math.ceil(pixel.well_e), pixel.well_e, pixel.prnu, pixel.read_noise_e, line, grid.n_bins, table
     )
     return _Numbers(firsts, starts, np.sqrt(shares), rows.reshape(electrons.shape[:2]).astype(np.intp))
-
-
-_LEAST_BINS = 1e-4
 
 
 def errors(

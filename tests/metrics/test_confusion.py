@@ -201,3 +201,48 @@ def test_what_is_not_a_number_stays_alone() -> None:
     found = confusion.errors(electrons, [np.array([0])], Pixel(read_noise_e=2.0), {"a": ONE, "b": OTHER})
     assert np.isnan(found.error["a", "b"]).tolist() == [False, True, False]
     assert found.error["a", "b"][2] <= 1e-17
+
+
+def test_sums_that_take_too_long_are_left_to_other_rules() -> None:
+    """Pixels over all that a study may say: the sums of those that are affordable stay within what was counted."""
+    rng, affordable = np.random.default_rng(31), 0
+    for _ in range(60):
+        pixel = Pixel(
+            bits=int(rng.integers(1, 25)),
+            well_e=float(10 ** rng.uniform(-3, 7)),
+            gain_dn_per_e=float(10 ** rng.uniform(-6, 9)) if rng.random() < 0.5 else None,
+            read_noise_e=float(10 ** rng.uniform(-3, 4)) if rng.random() < 0.7 else 0.0,
+            prnu=float(rng.choice([0.0, 0.001, 0.02, 0.1])),
+        )
+        if not confusion.affordable(pixel, [ONE, ONE]):
+            continue
+        affordable += 1
+        for electrons in (0.0, 0.5 * pixel.well_e, pixel.well_e, 1.4 * pixel.well_e, 100 * pixel.well_e):
+            numbers = confusion._numbers(np.full((1, 1, 1), electrons), pixel)
+            assert numbers.roots.size <= confusion._MOST_BINS
+            assert (numbers.roots**2).sum() == pytest.approx(1, rel=1e-9)
+    assert 20 < affordable < 55
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_where_exact_sums_are_too_many_the_noise_is_gaussian(tmp_path: Path, seed: int) -> None:
+    rng = np.random.default_rng([seed, 37])
+    pixel = {"bits": 12, "well_e": 2e6, "prnu": float(rng.uniform(0.04, 0.08)), "read_noise_e": 1e4}
+    path = tmp_path / "deep.yaml"
+    path.write_text(
+        "study: deep\nseed: 1\nsensor: ar0820\nlights: tl16\ncfas: [RYYCy]\nrecognition: {states: [yellow, red]}\n"
+        f"pixel: {pixel}\nscenarios: {{dim: {{noise: true, exposure: {{kind: white_patch, level: 0.3}}}}}}\n"
+    )
+    study = load_study(path)
+    imager = Imager(study.view(study.spaces[0], "dim"))
+    curves = np.empty((1, 0, study.grid.size))
+    own = imager.readout.few_pixels
+    assert own is not None
+    assert not confusion.affordable(imager.readout.pixel, own)
+    found = evaluate(imager, curves, ["yellow", "red"])
+    members = {name: imager.view.members[name] for name in ("yellow", "red")}
+    summed_up = confusion.errors(imager.pixel_electrons(curves)[:, 0], own, imager.readout.pixel, members)
+    error = summed_up.error["yellow", "red"]
+    assert error > 1e-9, error
+    assert error / _FACTOR <= found["error_yellow_red"] <= 2 * error
+    assert found["error_bound_yellow_red"] >= error

@@ -240,7 +240,7 @@ def test_each_limit_is_where_the_schema_has_it() -> None:
 @pytest.mark.slow
 def test_many_figures_at_their_limits_together(tmp_path: Path) -> None:
     rng, computed = np.random.default_rng(2), 0
-    for _ in range(8):
+    for _ in range(12):
         tree = beyond_hardware(rng)
         try:
             study = loaded(tmp_path, tree)

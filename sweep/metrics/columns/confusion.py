@@ -56,7 +56,7 @@ class Confusion(NoiseMetric):
     def of_noise(
         self, imager: Imager, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
     ) -> Columns:
-        """Errors of a few pixels are exact sums over their digital numbers, those of many are Gaussian or bounds."""
+        """Errors of a few pixels are exact sums over their digital numbers; where these are too many, Gaussian or bounds."""
         cases = [(read.mean[:, case], read.variance[:, case]) for case in range(read.mean.shape[1])]
         error, bound, state_bound = _errors(imager, curves, read, cases, members)
         found: Columns = {}
@@ -93,7 +93,7 @@ def _errors(
 ) -> tuple[_ByPair, _ByPair, FloatArray]:
     """Error and bound of each pair, and the bound of all states, the largest over the cases."""
     few, pairs = imager.readout.few_pixels, class_pairs(list(members))
-    if few is not None:
+    if few is not None and confusion.affordable(imager.readout.pixel, few):
         electrons = imager.pixel_electrons(curves)
         exact = [confusion.errors(electrons[:, case], few, imager.readout.pixel, members) for case in range(len(cases))]
         return (
