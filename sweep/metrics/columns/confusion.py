@@ -56,7 +56,7 @@ class Confusion(NoiseMetric):
     def of_noise(
         self, imager: Imager, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
     ) -> Columns:
-        """Errors of a few pixels are exact sums over their digital numbers; where these are too many, Gaussian or bounds."""
+        """Exact sums over the digital numbers of a few pixels; where these are too many, Gaussian errors or bounds."""
         cases = [(read.mean[:, case], read.variance[:, case]) for case in range(read.mean.shape[1])]
         error, bound, state_bound = _errors(imager, curves, read, cases, members)
         found: Columns = {}
