@@ -21,8 +21,11 @@ from sweep.camera.mosaic import Mosaic
 from sweep.camera.noisy import table
 from sweep.camera.pixel import Optics, Pixel
 from sweep.camera.places import AnyPlace, forget_geometries
+from sweep.camera.plan import work
+from sweep.camera.plan.bounds import Box
+from sweep.camera.plan.plan import Planner
 from sweep.camera.scenario import Scenario
-from sweep.camera.scene import FixedExposure, Target
+from sweep.camera.scene import FixedExposure, Noise, Target
 from sweep.camera.sensor import BUILT_IN_SENSORS
 from sweep.camera.view import View, per_photon, signal_irradiance
 from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
@@ -91,6 +94,15 @@ def image_s() -> tuple[float, float]:
     return more_s / (across**2 * load.knots), whole_s / GRID.size
 
 
+def planning_s() -> tuple[float, float]:
+    """A plan of one CFA on a patch, and before a light at one place."""
+    far = view(Target(distance_m=100, fov_deg=60, phase_px=(0.0, 0.0)))
+    patch = replace(far, scenario=Scenario(noise=Noise()))
+    boxes = (Box(replace(made, pixel=PIXEL), made.qe, made.qe, 1) for made in (patch, far))
+    times = [shortest_s(lambda box=box: Planner([box]).plan("", 1.0)) for box in boxes]
+    return times[0], times[1]
+
+
 def places_per_decade() -> list[float]:
     """What a search adds for each decade below 100 DN, in places of the lattice, for some limits."""
     made = view(Target(distance_m=300, fov_deg=60, phase_px="any"))
@@ -118,6 +130,11 @@ def main() -> None:
         ("a wavelength of the mean over a readout, in multiplications", blur.WHOLE_IMAGE, whole_s / unit_s),
     ]
     per_decade = places_per_decade()
+    planned_s = planning_s()
+    rows += [
+        ("a plan of a patch, in multiplications", work.PLANNED_PATCH, planned_s[0] / unit_s),
+        ("a plan before a light at a distance, in multiplications", work.PLANNED_TARGET, planned_s[1] / unit_s),
+    ]
     rows += [(f"places per decade of {m}", phase.PER_DECADE, n) for m, n in zip(LIMITS, per_decade, strict=True)]
     print(f"a multiplication takes {unit_s * 1e9:.3g} ns")
     for name, constant, measured in rows:

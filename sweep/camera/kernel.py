@@ -45,6 +45,12 @@ class Kernel:
     by_channel: bool
 
 
+def colorless(view: View) -> View:
+    """What kernels depend on: the view without filters, which is the same for all CFAs whose tiles are alike."""
+    nothing = np.zeros_like(view.qe)
+    return replace(view, mosaic=view.mosaic.colorless, modified=(), qe=nothing, clear_qe=np.zeros_like(view.clear_qe))
+
+
 def make_kernel(
     view: View,
     methods: Methods,

@@ -53,6 +53,11 @@ class Mosaic:
         return cls.from_rows(name, [tokens[:2], tokens[2:]])
 
     @property
+    def colorless(self) -> Mosaic:
+        """The same tile with numbers for colors: all that the light of a pixel depends on before its filter."""
+        return Mosaic("", tuple(str(at) for at in range(len(self.channels))), self.tile)
+
+    @property
     def indices(self) -> IndexArray:
         """The tile as ndarray[rows, columns] of channel indices."""
         return np.asarray(self.tile, dtype=np.intp)

@@ -22,7 +22,7 @@ from ..types import FloatArray, IndexArray
 from .between import Between, Deviation
 from .effects import blur, phase
 from .effects.base import KernelEffect
-from .kernel import make_kernel
+from .kernel import colorless, make_kernel
 from .methods import REFERENCE
 from .registry import EFFECTS, WHOLE_LIGHT, factor_of_light
 from .view import View
@@ -117,7 +117,7 @@ def _geometry_of(view: View) -> _Geometry:
     own = [name for name, effect in EFFECTS.items() if isinstance(effect, KernelEffect) and not effect.is_limit]
     kept = {name: getattr(view.methods, name) for name in own}
     methods = replace(REFERENCE, **kept, **WHOLE_LIGHT)
-    bare = replace(view, methods=methods, modified=(), qe=np.zeros_like(view.qe), clear_qe=np.zeros_like(view.clear_qe))
+    bare = replace(colorless(view), methods=methods)
     return _geometries.get(hashlib.sha256(pickle.dumps(bare)).digest(), lambda: _Geometry(bare))
 
 

@@ -157,13 +157,16 @@ class Study:
     def plan(self, scenario: str, tolerance_dn: float | None = None) -> Plan:
         """The cheapest plan of a scenario that holds for all designs of the study.
 
+        Where everything on takes less time than to find one, that is the plan.
+
         Raises StudyError for numbers that are allowed one by one, but that no float can hold together.
         """
         tolerance = self.section.tolerance_dn if tolerance_dn is None else tolerance_dn
         try:
             boxes = [self.box(space, scenario) for space in self.spaces]
             used = [box for box in boxes if box.n_designs]
-            return Planner(used or boxes, for_noise=bool(self.states)).plan(scenario, tolerance)
+            planner = Planner(used or boxes, for_noise=bool(self.states))
+            return planner.plan(scenario, tolerance) if planner.pays else planner.everything(scenario, tolerance)
         except ArithmeticError:
             problem = "the numbers of this scene, or of the pixel, are too large or too small to compute with"
             raise StudyError(Fault(problem, key=f"scenarios.{scenario}")) from None

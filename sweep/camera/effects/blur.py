@@ -28,7 +28,7 @@ COARSE = "every 10 nm"
 """The interpolated method on whose wavelengths kernels are compared when a plan is made."""
 _SPACING_NM = {"every 10 nm": 10.0, "every 5 nm": 5.0, "every 2 nm": 2.0}
 _SHORTEST_UM = 0.4
-IMAGE, WHOLE_IMAGE = 1e5, 2e5
+IMAGE, WHOLE_IMAGE = 3e4, 1.2e5
 """Multiplications that a wavelength of the image is taken to cost: for each pixel, and for the mean over a readout
 without pixels; `tests/bench_work.py` measures them."""
 _PANEL_NODES = 32

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 
 from ..effects.base import Effect, Stage
+from ..kernel import colorless
 from ..methods import REFERENCE, Methods
 from ..registry import EFFECTS
 from .bounds import Box
 from .promises import Promises
+from .scene_kernels import SceneKernels
+from .work import PLANNED_PATCH, PLANNED_TARGET
 
 _NOTHING_DN = 1e-9
+_AT_ONCE = "to find out whether it matters takes longer"
 _LIMITS = tuple(name for name, effect in EFFECTS.items() if effect.is_limit)
 
 
@@ -76,7 +81,8 @@ class Planner:
     def __init__(self, boxes: Sequence[Box], *, for_noise: bool = False) -> None:
         """`for_noise`: metrics of noise are asked for, which need every pixel and what the readout does to it."""
         self._for_noise = for_noise
-        self._scenes = [Promises(box) for box in boxes]
+        self._scenes = _promises(boxes)
+        self._asked = list(self._scenes)
         self._exact = {name: self._why_exact(effect) for name, effect in EFFECTS.items()}
 
     def _why_exact(self, effect: Effect) -> str | None:
@@ -85,9 +91,15 @@ class Planner:
         reasons = [scene.why_exact(effect, signals_dn) for scene in self._scenes]
         return None if None in reasons else str(reasons[0])
 
-    def promise(self, effect: str, before: Methods, after: Methods) -> float:
-        """What switching an effect changes in any CSD of any box, DN."""
-        return max((scene.promise(effect, before, after) for scene in self._scenes), default=0.0)
+    def promise(self, effect: str, before: Methods, after: Methods, enough_dn: float = math.inf) -> float:
+        """What switching an effect changes in any CSD of any box, DN; above `enough_dn`, in some of them at least."""
+        found = 0.0
+        for at, scene in enumerate(self._asked):
+            found = max(found, scene.promise(effect, before, after))
+            if found > enough_dn:
+                self._asked.insert(0, self._asked.pop(at))  # it may well be too much for what comes next, too
+                break
+        return found
 
     def plan(self, scenario: str, tolerance_dn: float) -> Plan:
         """The cheapest plan whose promises sum to at most `tolerance_dn`; of equally cheap ones, what skips more.
@@ -106,7 +118,31 @@ class Planner:
         return Plan(scenario, tolerance_dn, choices, self._work(methods), self._work(REFERENCE), rejected)
 
     def _work(self, methods: Methods) -> float:
-        return sum(scene.work_of(methods) for scene in self._scenes)
+        return sum(scene.work_of(methods).of(scene.box.n_designs) for scene in self._scenes)
+
+    @property
+    def pays(self) -> bool:
+        """Whether all that matters may take longer than to look for what can be left out, by what both count.
+
+        Over all places of a light, it does.
+        """
+        methods = self._start
+        if any(scene.is_anywhere(methods) for scene in self._scenes):
+            return True
+        works = [scene.work_of(methods) for scene in self._scenes]
+        once = max((work.kernel for work in works), default=0.0)
+        every = sum(work.each * scene.box.n_designs for work, scene in zip(works, self._scenes, strict=True))
+        is_patch = all(scene.view.scenario.target is None for scene in self._scenes)
+        return once + every > len(works) * (PLANNED_PATCH if is_patch else PLANNED_TARGET)
+
+    def everything(self, scenario: str, tolerance_dn: float) -> Plan:
+        """Everything on that matters, at once: nothing is promised but what no method reaches."""
+        methods = self._start
+        choices = tuple(
+            Choice(e, method, 0.0, _AT_ONCE if (exact := self._exact[e]) is None else exact)
+            for e, method in asdict(methods).items()
+        )
+        return Plan(scenario, tolerance_dn, choices, self._work(methods), self._work(REFERENCE))
 
     @property
     def _start(self) -> Methods:
@@ -120,7 +156,9 @@ class Planner:
     def _cheapest(
         self, tolerance_dn: float, tried: dict[tuple[str, str], float], *, besides: bool = False
     ) -> tuple[Methods, dict[str, float]] | None:
-        """Branch and bound over the effects, cheapest methods first; `tried` takes each method's smallest promise.
+        """Branch and bound over the effects, cheapest methods first.
+
+        `tried` takes what each method changes where it is tried first, or less.
 
         None where no plan keeps the tolerance; `besides`: what no method takes away does not count, so that all places
         are looked at, however little can be promised of them.
@@ -143,14 +181,17 @@ class Planner:
                 endless = besides and effect.is_limit and effect.limit_dn(method) is None
                 if endless or not self._allowed(name, after):
                     continue
-                promised = self.promise(name, methods, after)
-                tried[name, method] = min(promised, tried.get((name, method), promised))
                 # Behind a rounded readout, an error however small may move a value by a whole step.
                 rounded = after.quantization == "round" and not self._noisy
                 exactly = rounded and effect.stage is not Stage.READOUT and not effect.is_limit
                 allowed = sum(promises.get(e, 0.0) for e in _LIMITS) if exactly else tolerance_dn
                 if besides and not exactly and (effect.is_limit or any(e in promises for e in _LIMITS)):
                     allowed += self._left_over(after)
+                left_dn = allowed - sum(promises.values())
+                known = (name, method) in tried
+                promised = self.promise(name, methods, after, left_dn if known else math.inf)
+                if not known or promised <= left_dn:
+                    tried[name, method] = min(promised, tried.get((name, method), promised))
                 if sum(promises.values()) + promised <= allowed:
                     deeper(at + 1, after, promises | {name: promised})
 
@@ -184,3 +225,12 @@ class Planner:
             return "what else is chosen needs it"
         nearest = min(cheaper, key=lambda m: cheaper[m])
         return f"else ({nearest}) a CSD changes by up to {cheaper[nearest]:.2g} DN"
+
+
+def _promises(boxes: Sequence[Box]) -> list[Promises]:
+    """Those of each box; boxes whose CFAs have the same tile share their kernels."""
+    kernels: dict[tuple[tuple[int, ...], ...], SceneKernels] = {}
+    for box in boxes:
+        if (tile := box.view.mosaic.tile) not in kernels:
+            kernels[tile] = SceneKernels(colorless(box.view))
+    return [Promises(box, kernels[box.view.mosaic.tile]) for box in boxes]

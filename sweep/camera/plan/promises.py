@@ -22,19 +22,24 @@ from .bounds import Box, Reach
 from .pixelwise import Moves
 from .scene_kernels import SceneKernels
 from .steps import Step, Steps
-from .work import estimated_work
+from .work import Work, estimated_work
+
+_OF_READOUT = tuple(name for name, effect in EFFECTS.items() if effect.stage is Stage.READOUT)
 
 
 class Promises:
     """One box of designs: what each step changes in it, remembered."""
 
-    def __init__(self, box: Box) -> None:
+    def __init__(self, box: Box, kernels: SceneKernels) -> None:
+        """`kernels`: of the box's view."""
         self.box = box
         self.view = box.view
         self.reach = Reach(box)
-        self._kernels = SceneKernels(self.view, self.reach.knots_nm)
+        self._kernels = kernels
         self._steps = Steps(self.view, self.reach, self._kernels)
         self._promises: dict[tuple[str, Methods, Methods], float] = {}
+        self._ranges: dict[tuple[str, ...], float] = {}
+        self._readouts: dict[tuple[str, ...], float] = {}
         self._moves = Moves(self.view, self.reach)
 
     def promise(self, name: str, before: Methods, after: Methods) -> float:
@@ -65,8 +70,11 @@ class Promises:
 
     def _readout_promise(self, effect: ReadoutEffect, after: Methods) -> float:
         """Ranges of the change in each channel, put together over the channels."""
-        each = [effect.range_dn(self.view, float(top), after) for top in self.reach.brightest_pixels_dn]
-        return float(np.linalg.norm(each))
+        key = (effect.name, *(getattr(after, name) for name in _OF_READOUT))
+        if key not in self._ranges:
+            each = [effect.range_dn(self.view, float(top), after) for top in self.reach.brightest_pixels_dn]
+            self._ranges[key] = float(np.linalg.norm(each))
+        return self._ranges[key]
 
     def why_exact(self, effect: Effect, signals_dn: float) -> str | None:
         """Why an effect's cheapest method changes nothing; `signals_dn`: the brightest signal of all boxes."""
@@ -79,6 +87,13 @@ class Promises:
         The extremes over all places are looked for in the straight response, and read out where they are. Its smallest
         distance is off by this much, and so is the readout there.
         """
+        key = tuple(getattr(methods, name) for name in _OF_READOUT)
+        if key not in self._readouts:
+            self._readouts[key] = self._readout_promises(methods)
+        return self._readouts[key]
+
+    def _readout_promises(self, methods: Methods) -> float:
+        """Of all that a straight readout leaves out."""
         promised = 0.0
         for name, effect in EFFECTS.items():
             after = replace(methods, **{name: effect.methods[0]})
@@ -133,6 +148,10 @@ class Promises:
             every = self.reach.largest_change(*changes, every=True)
         return min(as_read, self._moves.promise(every, moved, clips=clips, rounds=rounds))
 
-    def work_of(self, methods: Methods) -> float:
-        """Estimated operations of a run of all designs."""
-        return estimated_work(self.view, self.box.n_designs, methods)
+    def is_anywhere(self, methods: Methods) -> bool:
+        """Whether the light may fall anywhere, and more than a lattice of places is looked at."""
+        return self._kernels.anywhere(methods)
+
+    def work_of(self, methods: Methods) -> Work:
+        """Estimated operations."""
+        return estimated_work(self.view, methods)

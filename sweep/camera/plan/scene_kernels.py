@@ -10,7 +10,7 @@ import numpy as np
 
 from ...types import FloatArray, IndexArray
 from ..between import Between, Deviation
-from ..effects import phase
+from ..effects import blur, phase, sampling
 from ..effects.base import Change, KernelChange, KernelEffect, Part
 from ..kernel import make_kernel
 from ..methods import REFERENCE, Methods
@@ -20,12 +20,14 @@ from .bounds import Spread
 
 
 class SceneKernels:
-    """Kernels of a scene's methods at some wavelengths, remembered."""
+    """Kernels of a scene's methods at the wavelengths at which plans compare them, remembered."""
 
-    def __init__(self, view: View, knots_nm: FloatArray) -> None:
-        self._view, self._knots_nm = view, knots_nm
+    def __init__(self, view: View) -> None:
+        """`view`: `colorless`."""
+        self._view, self._knots_nm = view, blur.knots(view.grid.nodes_nm, blur.COARSE)
         self._kernels: dict[Methods, FloatArray] = {}
         self._deviations: dict[Methods, Deviation] = {}
+        self._gaps: dict[tuple[str, float], float] = {}
 
     def anywhere(self, methods: Methods) -> bool:
         """Whether the light may fall anywhere, and more than a lattice of places is looked at."""
@@ -77,6 +79,21 @@ class SceneKernels:
             largest = found.kernel[..., :1] + found.kernel[..., 1:].max(axis=3, initial=0.0, keepdims=True)
             self._deviations[wanted] = Deviation(largest, found.tilt)
         return self._deviations[wanted]
+
+    def gap(self, methods: Methods, method: str) -> float:
+        """How far a kernel may be from its interpolation between the wavelengths of a method of blur."""
+        view, target = self._view, self._view.scenario.target
+        knots_nm = blur.knots(view.grid.nodes_nm, method)
+        if target is None or knots_nm.size == view.grid.size:
+            return 0.0
+        aperture = 0.0 if methods.sampling == "skip" else view.pixel.fill_factor**0.5 * view.pixel.pitch_um
+        if (method, aperture) not in self._gaps:
+            radius = sampling.radii_px(view, target)[0] * view.pixel.pitch_um
+            w20_um = blur.defocus_um(view.scenario, view.pixel.pitch_um)
+            f_number = view.scenario.optics.f_number
+            bound = blur.interpolation_bound(radius, aperture, knots_nm * 1e-3, f_number, w20_um)
+            self._gaps[method, aperture] = bound
+        return self._gaps[method, aperture]
 
     def spread(
         self, what: Change, before: Methods, after: Methods, change: FloatArray, left: FloatArray, scale: float

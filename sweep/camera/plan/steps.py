@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...types import FloatArray
-from ..effects import blur, phase, sampling
+from ..effects import blur, phase
 from ..effects.base import Change, CurveChange, KernelChange, LightChange, LinearEffect, Part, ShareChange
 from ..methods import Methods
 from ..registry import factor_of_light
@@ -38,12 +38,11 @@ class Step:
 
 
 class Steps:
-    """The steps of one box of designs; sums and gaps are remembered."""
+    """The steps of one box of designs; sums are remembered."""
 
     def __init__(self, view: View, reach: Reach, kernels: SceneKernels) -> None:
         self._view, self._reach, self._kernels = view, reach, kernels
         self._amounts: dict[bytes, Amounts] = {}
-        self._gaps: dict[tuple[str, float], float] = {}
 
     def step(self, effect: LinearEffect, before: Methods, after: Methods, *, straight: bool) -> Step:
         """What switching an effect changes; `straight`: as seen by a straight readout."""
@@ -91,30 +90,15 @@ class Steps:
     def _remainder(self, what: KernelChange, before: Methods, after: Methods, *, changes: bool) -> float:
         """How far the change may be from its interpolation between the knots of the comparison."""
         if what.knots is not None:
-            return self._gap(after, what.knots)
+            return self._kernels.gap(after, what.knots)
         # What is interpolated in both kernels; nothing where they are the same.
         return (self._between_knots(before) + self._between_knots(after)) * changes
-
-    def _gap(self, methods: Methods, method: str) -> float:
-        """How far a kernel may be from its interpolation between the wavelengths of a method of blur."""
-        view, target = self._view, self._view.scenario.target
-        knots_nm = blur.knots(view.grid.nodes_nm, method)
-        if target is None or knots_nm.size == view.grid.size:
-            return 0.0
-        aperture = 0.0 if methods.sampling == "skip" else view.pixel.fill_factor**0.5 * view.pixel.pitch_um
-        if (method, aperture) not in self._gaps:
-            radius = sampling.radii_px(view, target)[0] * view.pixel.pitch_um
-            w20_um = blur.defocus_um(view.scenario, view.pixel.pitch_um)
-            f_number = view.scenario.optics.f_number
-            bound = blur.interpolation_bound(radius, aperture, knots_nm * 1e-3, f_number, w20_um)
-            self._gaps[method, aperture] = bound
-        return self._gaps[method, aperture]
 
     def _between_knots(self, methods: Methods) -> float:
         """How far the kernel of some methods may be from its interpolation between the knots of the comparison."""
         if methods.blur in ("skip", blur.COARSE):
             return 0.0
-        return self._gap(methods, blur.COARSE) + self._gap(methods, methods.blur)
+        return self._kernels.gap(methods, blur.COARSE) + self._kernels.gap(methods, methods.blur)
 
     def _sums(self, factor: FloatArray, low: FloatArray, high: FloatArray) -> Amounts:
         """`Reach.amounts`, remembered."""
