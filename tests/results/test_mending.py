@@ -79,11 +79,7 @@ def a_link(path: Path) -> None:
 DAMAGES = (deleted, cut, flipped, garbled, a_folder, a_link)
 FEW = {
     ("results.parquet", flipped),
-    ("curves.parquet", garbled),
     ("provenance.json", deleted),
-    ("search.parquet", cut),
-    ("audit.parquet", flipped),
-    ("run.json", flipped),
     ("SHA256SUMS", a_link),
 }
 

@@ -233,6 +233,7 @@ def test_dask_needs_a_scheduler_that_answers() -> None:
             pass
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_a_cluster_gives_the_same_rows_with_a_worker_killed(tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")

@@ -124,7 +124,7 @@ def assert_continues(folder: Path, undisturbed: Path) -> None:
 @pytest.mark.parametrize(
     ("phase", "jobs", "number"),
     [
-        pytest.param(phase, jobs, number, marks=[] if (phase, jobs) == ("sweep", 2) else pytest.mark.slow)
+        pytest.param(phase, jobs, number, marks=pytest.mark.slow)
         for phase in PHASES
         for jobs, number in ((1, signal.SIGTERM), (2, signal.SIGINT))
     ],
