@@ -13,8 +13,8 @@ from ..hard.random_scenes import columns, random_scene
 
 _ARITHMETIC_DN = 1e-9
 """Rounding of double precision itself."""
-_MANY = 1030
-_FEW = 30
+_MANY = 1040
+_FEW = 20
 
 
 def keep_a_plan(seed: int) -> tuple[int, float, float, float, str]:

@@ -375,6 +375,7 @@ def test_an_objective_rule_is_one_new_file(tmp_path: Path) -> None:
     assert "geometric mean of csd_yellow_red, csd_green_yellow" in (folder / "report.html").read_text()
 
 
+@pytest.mark.slow
 def test_a_data_set_is_one_new_file(tmp_path: Path) -> None:
     study = "study: lamps\nsensor: ar0820\nlights: lamps\ncfas: [RGGB]\n"
     folder = run_with(tmp_path, "sweep.curves.builtin.data_sets", "lamps.py", LAMPS, study)

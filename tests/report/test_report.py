@@ -115,6 +115,7 @@ def test_the_history_ends_at_the_answer(finished: Finished) -> None:
     assert history.volume[-1] == pytest.approx(area, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_every_scene_is_told_once_with_its_largest_promise(finished: Finished) -> None:
     output = read_output(finished("fog"))
     groups = scene_groups(output)
