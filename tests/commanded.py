@@ -10,6 +10,15 @@ from unittest import mock
 
 from sweep.commands.app import main
 
+UNDRAWN = """\
+import sys
+import sweep.report.page
+from sweep.commands.app import main
+sweep.report.page._drawings = lambda _: ()
+main()
+"""
+"""The command, whose reports have no pictures: for tests of processes, in which pictures would take half of the time."""
+
 
 def commanded(*arguments: object) -> tuple[int, str, str]:
     """Exit code, standard output and standard error of a command."""

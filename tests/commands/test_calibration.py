@@ -24,15 +24,23 @@ PRINTED = {row: values for table in ("Table 2", "Table 3") for row, values in ST
 
 
 @pytest.fixture(scope="module")
-def comparison(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
-    from sweep.report import make_report, read_output
-
+def paper(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("paper")
     run_study(STUDY, folder, 1, lambda *_: None)
-    make_report(read_output(folder))
-    found = pd.read_parquet(folder / "paper_comparison.parquet")
-    pd.testing.assert_frame_equal(found, pd.read_csv(folder / "paper_comparison.csv"), check_dtype=False)
-    assert {path.name for path in (folder / "figures").glob("*.png")} == {
+    return folder
+
+
+@pytest.fixture(scope="module")
+def comparison(paper: Path) -> pd.DataFrame:
+    """The comparison that the report of the paper's study holds, whose pictures are drawn and not encoded."""
+    from sweep.report import make_report, read_output
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sweep.report.page.rendered", lambda _, kind: kind.encode())
+        make_report(read_output(paper))
+    found = pd.read_parquet(paper / "paper_comparison.parquet")
+    pd.testing.assert_frame_equal(found, pd.read_csv(paper / "paper_comparison.csv"), check_dtype=False)
+    assert {path.name for path in (paper / "figures").glob("*.png")} == {
         *("sensor.png", "signals.png", "chart.png", "filters-1.png", "clouds-cfas.png", "clouds-designs.png")
     }
     return found
@@ -83,9 +91,8 @@ def test_shipped_parameters_stay_inside_the_bounds_of_the_calibration() -> None:
         assert free.low <= value <= free.high, free.name
 
 
-def test_figures_are_what_the_evaluation_gives(tmp_path: Path) -> None:
-    run_study(STUDY, tmp_path, 1, lambda *_: None)
-    frame = pd.read_parquet(tmp_path / "results.parquet").set_index("name")
+def test_figures_are_what_the_evaluation_gives(paper: Path) -> None:
+    frame = pd.read_parquet(paper / "results.parquet").set_index("name")
     for row, values in figures(surrogate_parameters(), list(PRINTED)).items():
         for quantity, value in values.items():
             limit = 1e-12 if quantity == "sensitivity" else np.sqrt(4)  # quantization: the square root of m_p

@@ -19,7 +19,7 @@ from sweep.curves.signal_color import VISIBLE, dominant_ranges_nm, light_color, 
 from sweep.errors import DataError, OutputError
 from sweep.study.editors import schema_text
 
-from ..commanded import sweep
+from ..commanded import commanded
 from ..conftest import SHARED, needs_measured
 from ..curve_texts import WAVE, bell, csv
 
@@ -185,11 +185,11 @@ def test_mat_of_isetcam_is_described(tmp_path: Path) -> None:
 
 def test_the_command_ends_with_the_picture_or_exit_2(tmp_path: Path) -> None:
     path = csv(tmp_path, "wavelength_nm,R", WAVE, bell(600, 50) - 0.01)
-    done = sweep("describe", str(path), "--output", str(tmp_path / "out"))
-    assert done.returncode == 2
-    assert done.stdout.splitlines()[-1] == f"Picture: {tmp_path / 'out' / 'curves.png'}"
-    assert len(done.stderr.splitlines()) == 1
-    assert "negative value, and " in done.stderr
+    code, out, said = commanded("describe", path, "--output", tmp_path / "out")
+    assert code == 2
+    assert out.splitlines()[-1] == f"Picture: {tmp_path / 'out' / 'curves.png'}"
+    assert len(said.splitlines()) == 1
+    assert "negative value, and " in said
 
 
 @needs_measured

@@ -20,7 +20,7 @@ from sweep.errors import OutputError, SweepError
 from sweep.study import load_study
 
 from ..build import ran, stopband_study, study_file
-from ..commanded import commanded, sweep
+from ..commanded import commanded
 from ..tampering import listed_anew
 
 FILES = stopband_study(
@@ -203,8 +203,8 @@ def test_unknown_keys_are_one_line(tiny: Path, tmp_path: Path) -> None:
 
 
 def test_by_default_files_go_beside_the_run(tiny: Path) -> None:
-    done = sweep("export", str(tiny), "--design", "best of edges")
-    assert done.returncode == 0, done.stderr
+    code, _, said = commanded("export", tiny, "--design", "best of edges")
+    assert code == 0, said
     assert {path.name for path in (tiny / "export").iterdir()} == {"best_of_edges.csv", "best_of_edges.mat"}
 
 

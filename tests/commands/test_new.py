@@ -17,7 +17,7 @@ from sweep.study import load_study
 from sweep.study.document import Document
 
 from ..build import made
-from ..commanded import commanded, sweep
+from ..commanded import commanded
 from ..conftest import SHARED, needs_measured
 from ..curve_texts import WAVE, bell, csv
 
@@ -213,9 +213,9 @@ def test_any_column_name_survives_yaml(tmp_path: Path, text: str) -> None:
 def test_measured_files_lead_to_a_report_without_editing(tmp_path: Path) -> None:
     data, path = SHARED / "data", tmp_path / "studies" / "mine.yaml"
     files = ("--qe", str(data / "qe_ar0132at_rgbw.csv"), "--lights", str(data / "led_luxeon.csv"))
-    done = sweep("new", "mine", "--folder", str(path.parent), *files)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.splitlines()[-1] == f"Next: sweep run {path}"
+    code, out, said = commanded("new", "mine", "--folder", path.parent, *files)
+    assert code == 0, said
+    assert out.splitlines()[-1] == f"Next: sweep run {path}"
     (lights,) = load_study(path).section.lights.files
     assert lights.signals["green"] == ["cyan_504", "green_528"]
     assert lights.signals["yellow"] == ["amber_592"]

@@ -18,6 +18,8 @@ from sweep.camera.sensor import BUILT_IN_SENSORS
 from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
 from sweep.curves.spectrum import WavelengthGrid
 
+from ..commanded import commanded
+
 GRAY = '''\
 """A filter that takes the same share of all light."""
 
@@ -290,11 +292,9 @@ def test_a_family_is_one_new_file(tmp_path: Path) -> None:
     assert best["family"] == "gray"
     assert best["csd_yellow_red"] >= front["csd_yellow_red"].max() - 1
     assert (tmp_path / "out" / "gray" / "report.html").is_file()
-    without = subprocess.run(
-        [sys.executable, "-m", "sweep", "check", study], capture_output=True, text=True, check=False
-    )
-    assert without.returncode == 2
-    assert "unknown family (got 'gray')" in without.stderr
+    code, _, without = commanded("check", study)
+    assert code == 2
+    assert "unknown family (got 'gray')" in without
 
 
 def test_a_new_effect_promises_what_it_changes(tmp_path: Path) -> None:
@@ -328,6 +328,7 @@ def run_with(tmp_path: Path, package: str, file: str, program: str, study: str, 
     return folder
 
 
+@pytest.mark.slow
 def test_a_metric_is_one_new_file(tmp_path: Path) -> None:
     (tmp_path / "more").mkdir()
     (tmp_path / "more" / "darkest.py").write_text(DARKEST)
@@ -358,6 +359,7 @@ def test_a_metric_is_one_new_file(tmp_path: Path) -> None:
     assert "share of red" in (folder / "report.html").read_text()
 
 
+@pytest.mark.slow
 def test_an_objective_rule_is_one_new_file(tmp_path: Path) -> None:
     study = WITH_METRICS.replace(
         "constraints: {red_share: {min: 0.8}}",
@@ -373,6 +375,7 @@ def test_an_objective_rule_is_one_new_file(tmp_path: Path) -> None:
     assert "geometric mean of csd_yellow_red, csd_green_yellow" in (folder / "report.html").read_text()
 
 
+@pytest.mark.slow
 def test_a_data_set_is_one_new_file(tmp_path: Path) -> None:
     study = "study: lamps\nsensor: ar0820\nlights: lamps\ncfas: [RGGB]\n"
     folder = run_with(tmp_path, "sweep.curves.builtin.data_sets", "lamps.py", LAMPS, study)
@@ -399,6 +402,7 @@ def distance_dn(tint: float) -> float:
     return float(cdist(read[lights.members["yellow"]], read[lights.members["red"]]).min())
 
 
+@pytest.mark.slow
 def test_an_effect_is_one_new_file(tmp_path: Path) -> None:
     file, study = tmp_path / "more" / "windshield.py", tmp_path / "driven.yaml"
     file.parent.mkdir()
@@ -424,8 +428,6 @@ def test_an_effect_is_one_new_file(tmp_path: Path) -> None:
     left_out, own, promised_dn = found["far"]
     assert own["behind"]["method"] == "skip"
     assert 0 < abs(left_out["behind"] - rows["behind"]) <= promised_dn
-    without = subprocess.run(
-        [sys.executable, "-m", "sweep", "check", study], capture_output=True, text=True, check=False
-    )
-    assert without.returncode == 2
-    assert "windshield_transmittance" in without.stderr
+    code, _, without = commanded("check", study)
+    assert code == 2
+    assert "windshield_transmittance" in without

@@ -22,7 +22,7 @@ from sweep.report.compare.fronts import ComparedFront, box_of, hypervolumes
 from sweep.study import load_study
 
 from ..build import STUDY, ran
-from ..commanded import sweep
+from ..commanded import commanded
 from ..tampering import listed_anew
 
 SWEEP = STUDY.replace("COUNT", "3").split("search:")[0]
@@ -251,8 +251,8 @@ def test_what_cannot_be_compared_is_one_line(runs: dict[str, Path], tmp_path: Pa
     with pytest.raises(OutputError):
         compare_runs([runs["chart"]] * 2, runs["chart"] / "run.json")
     assert not (tmp_path / "to").exists()
-    done = sweep("compare", str(runs["chart"]), str(tmp_path))
-    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    code, _, said = commanded("compare", runs["chart"], tmp_path)
+    assert (code, len(said.splitlines())) == (2, 1)
 
 
 def test_by_default_a_folder_of_both_names(

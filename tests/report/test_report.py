@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from shutil import copytree
 
 import numpy as np
 import pandas as pd
@@ -19,7 +20,6 @@ from sweep.report.history import history_of
 from sweep.report.page_data import payload
 from sweep.report.scenes import scene_groups
 from sweep.results.identity import CHUNK
-from sweep.results.output import Output
 from sweep.results.profiles import ParameterProfile, Profiles
 from sweep.run.rows import Job, jobs_of, rules_of, run_job
 from sweep.study import Study, load_study
@@ -115,6 +115,7 @@ def test_the_history_ends_at_the_answer(finished: Finished) -> None:
     assert history.volume[-1] == pytest.approx(area, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_every_scene_is_told_once_with_its_largest_promise(finished: Finished) -> None:
     output = read_output(finished("fog"))
     groups = scene_groups(output)
@@ -125,19 +126,6 @@ def test_every_scene_is_told_once_with_its_largest_promise(finished: Finished) -
         assert group.realized_dn is None
     rows = pd.DataFrame({"scenario": [groups[0].scenarios[0]] * 2, "realized_dn": [0.01, 0.03]})
     assert scene_groups(replace(output, audited=rows))[0].realized_dn == 0.03
-
-
-def test_a_long_table_keeps_its_front_in_a_small_page(tmp_path: Path) -> None:
-    """A table of 250,000 rows is thinned; the page's data does not grow with it, but for the front."""
-    folder = tmp_path / "out"
-    ran(load_study(large(tmp_path, 5)), folder, 1)
-    output: Output = read_output(folder)
-    drawn = payload(output)
-    table = pd.read_parquet(folder / "results.parquet")
-    front = table[table["pareto"] & table["feasible"] & (table["kind"] == "sweep")]
-    assert {row[0] for row in drawn["front"]["rows"]} == set(front["design_id"])
-    assert len(json.dumps(drawn)) < 3_000_000
-    assert output.counts.rows == len(table) > 250_000
 
 
 def test_a_job_of_several_chunks_has_their_rows(tmp_path: Path) -> None:
@@ -193,10 +181,17 @@ def test_a_csv_has_every_digit_whatever_numpy_prints(tmp_path: Path) -> None:
     assert found["b"][0] == "x,y"
 
 
+@pytest.fixture(scope="module")
+def tiny(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("tiny")
+    ran(load_study(study_file(folder, 2)), folder / "out", 1)
+    return folder / "out"
+
+
 @pytest.mark.parametrize("column", ["feasible", "status", "promised_dn", "csd_yellow_red", "sensitivity", "scenario"])
-def test_a_table_that_lacks_a_column_is_one_line(tmp_path: Path, column: str) -> None:
+def test_a_table_that_lacks_a_column_is_one_line(tiny: Path, tmp_path: Path, column: str) -> None:
     folder = tmp_path / "out"
-    ran(load_study(study_file(tmp_path, 2)), folder, 1)
+    copytree(tiny, folder)
     path = folder / "results.parquet"
     pq.write_table(pq.read_table(path).drop_columns([column]), path)
     listed_anew(folder)
@@ -204,6 +199,7 @@ def test_a_table_that_lacks_a_column_is_one_line(tmp_path: Path, column: str) ->
         read_output(folder)
 
 
+@pytest.mark.usefixtures("plain_pictures")
 def test_a_study_whose_designs_all_failed_says_why(tmp_path: Path) -> None:
     from sweep.report import make_report, summary_lines
 

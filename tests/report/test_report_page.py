@@ -110,11 +110,15 @@ def agrees(printed: str, value: float) -> bool:
     return abs(float(printed) - value) <= 0.5 * 10**-digits + abs(value) * 2**-23
 
 
+LONGER = (("stopband", 400), ("fog", 1280), ("fog", 400), ("paper", 1280), ("paper", 400))
+"""Pages and their widths for the long tests."""
+
+
 @pytest.mark.parametrize(
     ("name", "width"),
     [
-        *(("stopband", 1280), ("stopband", 400), ("fog", 1280)),
-        *(pytest.param(*page, marks=pytest.mark.slow) for page in (("fog", 400), ("paper", 1280), ("paper", 400))),
+        ("stopband", 1280),
+        *(pytest.param(name, width, marks=pytest.mark.slow) for name, width in LONGER),
     ],
 )
 def test_a_report_opens_without_an_error_or_a_request(finished: Finished, opened: Any, name: str, width: int) -> None:
@@ -128,7 +132,10 @@ def test_a_report_opens_without_an_error_or_a_request(finished: Finished, opened
 
 @pytest.mark.parametrize(
     ("name", "trace"),
-    [("stopband", "Pareto front"), ("fog", "RYN_4Cy"), pytest.param("paper", "RYN_2Cy", marks=pytest.mark.slow)],
+    [
+        ("stopband", "Pareto front"),
+        *(pytest.param(*page, marks=pytest.mark.slow) for page in (("fog", "RYN_4Cy"), ("paper", "RYN_2Cy"))),
+    ],
 )
 def test_pointing_and_clicking_tell_of_a_design(finished: Finished, opened: Any, name: str, trace: str) -> None:
     seen = opened(finished(name))
@@ -201,6 +208,7 @@ def test_the_saved_front_has_every_digit(finished: Finished, opened: Any) -> Non
             assert float(row[column]) == front.loc[int(row["design_id"]), column]
 
 
+@pytest.mark.slow
 def test_brushing_an_axis_counts_what_is_left(finished: Finished, opened: Any) -> None:
     seen = opened(finished("stopband"))
     through(seen)
@@ -213,6 +221,7 @@ def test_brushing_an_axis_counts_what_is_left(finished: Finished, opened: Any) -
     assert 0 < kept < drawn == len(dimension)
 
 
+@pytest.mark.slow
 def test_another_scenario_is_drawn_when_it_is_chosen(finished: Finished, opened: Any) -> None:
     folder = finished("fog")
     seen = opened(folder)

@@ -127,7 +127,7 @@ def test_damaged_shards_are_computed_again_and_named(plain: Study, whole: pd.Dat
     assert not (tmp_path / SHARDS).exists()
 
 
-@pytest.mark.parametrize("cut", [1, 20, 200])
+@pytest.mark.parametrize("cut", [1, 20, pytest.param(200, marks=pytest.mark.slow)])
 def test_a_torn_journal_costs_its_last_line_alone(plain: Study, whole: pd.DataFrame, tmp_path: Path, cut: int) -> None:
     known = len(half_done(plain, tmp_path).entries)
     path = tmp_path / SHARDS / "_journal.jsonl"

@@ -186,14 +186,14 @@ def test_a_journal_that_is_a_link_is_not_written_through(plain: Study, whole: pd
     pd.testing.assert_frame_equal(rows(folder), whole)
 
 
-def test_names_that_reports_give_are_known(finished: Finished) -> None:
+@pytest.mark.parametrize("study", ["stopband", pytest.param("fog", marks=pytest.mark.slow)])
+def test_names_that_reports_give_are_known(finished: Finished, study: str) -> None:
     """A picture of a new name is to be added to the names of a run's files."""
-    for study in ("stopband", "fog"):
-        folder = finished(study)
-        drawn = [path for path in folder.rglob("*") if path.suffix in (".png", ".svg", ".html")]
-        assert len(drawn) > 10
-        assert all(is_drawn(path.relative_to(folder).as_posix()) for path in drawn)
-        assert all(map(is_own, Inventory(folder).files))
+    folder = finished(study)
+    drawn = [path for path in folder.rglob("*") if path.suffix in (".png", ".svg", ".html")]
+    assert len(drawn) > 10
+    assert all(is_drawn(path.relative_to(folder).as_posix()) for path in drawn)
+    assert all(map(is_own, Inventory(folder).files))
 
 
 @pytest.mark.usefixtures("plain_pictures")

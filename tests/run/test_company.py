@@ -43,7 +43,7 @@ def assert_same(found: dict[str, Any], which: Any, alone: dict[str, Any]) -> Non
         np.testing.assert_array_equal(found[name][which], values, err_msg=name)
 
 
-LONG = [("pulsed", False)]
+LONG = [("pulsed", False), ("pulsed", True)]
 """Blocks that take seconds as a whole: for the long tests alone."""
 
 

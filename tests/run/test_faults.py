@@ -152,7 +152,7 @@ def test_status_of_a_run(plain: Study, tmp_path: Path) -> None:
 
 
 def test_dry_run_counts_what_is_finished(plain: Study, tmp_path: Path) -> None:
-    found = estimate(plain, tmp_path / "out", 2, lambda *_: None)
+    found = estimate(plain, tmp_path / "out", 1, lambda *_: None)
     assert (found.designs, found.kept) == (plain.n_designs, 0)
     assert not (tmp_path / "out").exists()
     half_done(plain, tmp_path / "out")
@@ -165,7 +165,7 @@ def test_dry_run_counts_what_is_finished(plain: Study, tmp_path: Path) -> None:
     ran(plain, tmp_path / "out", 1)
     bytes_per_row = (tmp_path / "out" / "results.parquet").stat().st_size / plain.n_designs
     assert found.disk_bytes / 2 / (plain.n_designs - kept) == pytest.approx(bytes_per_row, rel=1.0)
-    found = estimate(plain, tmp_path / "out", 2, lambda *_: None)
+    found = estimate(plain, tmp_path / "out", 1, lambda *_: None)
     assert (
         estimate_lines(found, tmp_path)[0]
         == f"{found.designs:,} designs: {found.designs:,} finished, 0 in 0 chunks to compute."
@@ -233,6 +233,7 @@ def test_dask_needs_a_scheduler_that_answers() -> None:
             pass
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_a_cluster_gives_the_same_rows_with_a_worker_killed(tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -13,6 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from sweep.report import read_output, summary_lines
+from sweep.report.page_data import payload
 from sweep.results.thinning import MOST_ROWS
 from sweep.run.rows import job_key, jobs_of
 from sweep.study import Study, load_study
@@ -45,6 +47,11 @@ def test_a_long_table_is_drawn_thinned_but_with_its_whole_front(tmp_path: Path) 
     best = whole[whole["feasible"] & (whole["kind"] == "sweep")].nlargest(20, "csd_yellow_red")["csd_yellow_red"]
     assert list(output.best["csd_yellow_red"].head(20)) == list(best)
     assert f"leaves out {counts.left_out:,}" in "\n".join(summary_lines(output))
+    # The page's data does not grow with the table, but for the front.
+    drawn = payload(output)
+    front = whole[whole["pareto"] & whole["feasible"] & (whole["kind"] == "sweep")]
+    assert {row[0] for row in drawn["front"]["rows"]} == set(front["design_id"])
+    assert len(json.dumps(drawn)) < 3_000_000
 
 
 def peak_bytes(path: Path, output: Path) -> float:

@@ -69,7 +69,7 @@ def digests(folder: Path, jobs: int, threads: int) -> dict[str, str]:
 @pytest.mark.parametrize(
     "ways",
     [
-        pytest.param(((1, 1), (1, 4)), id="threads"),
+        pytest.param(((1, 1), (1, 4)), id="threads", marks=pytest.mark.slow),
         pytest.param(((1, 1), (1, 2), (2, 1), (2, 4)), id="threads and workers", marks=pytest.mark.slow),
     ],
 )

@@ -239,7 +239,7 @@ def test_two_hundred_limits_are_those_of_a_milp(coarse: Problem) -> None:
     assert mixed >= 20
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 6))])
 def test_several_csds_have_sides_of_their_own(coarse: Problem, seed: int) -> None:
     """The smallest of two weighted CSDs, and a third one that is constrained: each with pairs on either side."""
     problem = random_problem(coarse, seed)

@@ -239,7 +239,10 @@ TINY = stopband_study(
 )
 
 
-@pytest.mark.parametrize(("tolerance_dn", "where"), [(1e-3, "broken proof: "), (0.02, "broken proof at a sensitivity")])
+@pytest.mark.parametrize(
+    ("tolerance_dn", "where"),
+    [pytest.param(1e-3, "broken proof: ", marks=pytest.mark.slow), (0.02, "broken proof at a sensitivity")],
+)
 def test_a_limit_below_what_the_search_found_stops_the_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tolerance_dn: float, where: str
 ) -> None:

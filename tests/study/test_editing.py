@@ -18,7 +18,7 @@ from sweep.study.document import Document
 from sweep.study.editors import SCHEMA_FILE, schema_text, study_schema
 
 from ..build import made, study_file
-from ..commanded import sweep
+from ..commanded import commanded
 from ..conftest import STUDIES
 
 FILES = sorted(STUDIES.glob("*.yaml"))
@@ -31,8 +31,7 @@ def errors(data: Any) -> list[str]:
 
 
 def test_the_schema_beside_the_studies_is_what_the_command_makes(tmp_path: Path) -> None:
-    done = sweep("schema", "--output", str(tmp_path / SCHEMA_FILE))
-    assert done.returncode == 0
+    assert commanded("schema", "--output", tmp_path / SCHEMA_FILE)[0] == 0
     assert (tmp_path / SCHEMA_FILE).read_text(encoding="utf-8") == (STUDIES / SCHEMA_FILE).read_text(encoding="utf-8")
     assert json.loads(schema_text()) == study_schema()
 
@@ -117,7 +116,7 @@ def test_studies_are_listed_with_the_broken_ones(tmp_path: Path) -> None:
 
 
 def test_a_missing_or_empty_folder_is_told(tmp_path: Path) -> None:
-    assert sweep("list", str(tmp_path / "none")).returncode == 2
+    assert commanded("list", tmp_path / "none")[0] == 2
     assert "No studies" in list_lines(tmp_path, tmp_path)[0]
 
 
