@@ -15,14 +15,15 @@ def mixed(light: FloatArray, share: float, *, periodic: bool = False) -> FloatAr
     Beyond the border is nothing, or, for the tile of a uniform field, the other side.
     """
     found = (1 - share) * light
+    given = share / 4 * light
     for axis in (1, 2):
-        for step in (1, -1):
-            moved = np.roll(light, step, axis=axis)
-            if not periodic:
-                edge: list[slice | int] = [slice(None)] * light.ndim
-                edge[axis] = 0 if step == 1 else -1
-                moved[tuple(edge)] = 0.0
-            found += share / 4 * moved
+        if periodic:
+            found += np.roll(given, 1, axis=axis)
+            found += np.roll(given, -1, axis=axis)
+            continue
+        to, of = np.moveaxis(found, axis, 0), np.moveaxis(given, axis, 0)
+        to[1:] += of[:-1]
+        to[:-1] += of[1:]
     return np.asarray(found, dtype=float)
 
 
