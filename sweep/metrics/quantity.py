@@ -66,6 +66,10 @@ class Column:
         own = self.digits if digits is None else digits
         return f"{value:.{own}f} {self.unit}" if self.unit else f"{value:.{self.digits}f}"
 
+    def told(self, value: float) -> str:
+        """A value as sentences, plots and large numbers say it: in DN whole from 10 on."""
+        return self.amount(value, 0 if self.unit == DN and abs(value) >= 10 else None)
+
 
 @dataclass(frozen=True)
 class LinearRows:

@@ -25,8 +25,8 @@ def _allowed(output: Output) -> float | None:
 
 
 def all_series(output: Output) -> list[SeriesFigure]:
-    """Every figure of a quantity over scenarios: separations, then errors and accuracies."""
-    return [*series_figures(output), *noise_figures(output)]
+    """Every figure of a quantity over scenarios: errors and accuracies, if asked for, then separations."""
+    return [*noise_figures(output), *series_figures(output)]
 
 
 def noise_figures(output: Output) -> Iterator[SeriesFigure]:

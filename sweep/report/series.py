@@ -6,8 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pandas as pd
 
+from ..metrics.quantity import DN
 from ..types import FloatArray
 from .figures import CURVE_CYCLE, canvas, canvas_grid
 
@@ -16,6 +18,8 @@ if TYPE_CHECKING:
 
 _WIDE = 15.0
 _LEAST_DN = 1e-6
+_LEAST_LEAD = 1.0
+"""DN; who separates less is not said to lead."""
 _LABELS = {
     "distance_m": "distance / m",
     "exposure_s": "exposure / s",
@@ -58,6 +62,67 @@ class SeriesFigure:
     def log_x(self) -> bool:
         """Whether the numbers span more than a decade."""
         return bool(self.x.min() > 0 and self.x.max() / self.x.min() > _WIDE)
+
+
+def lead_sentence(series: SeriesFigure) -> str:
+    """Which design leads from where to where, each with its rival's value where the lead changes."""
+    name, _, unit = series.x_label.partition(" / ")
+    what, _, dn = series.y_label.partition(" / ")
+    values = {design: np.nan_to_num(line.y, nan=-np.inf) for design, line in series.lines.items()}
+    ends = _leads(values, least=_LEAST_LEAD if dn == DN else 0.0)
+
+    def at(place: int) -> str:
+        return f"{series.x[place]:g}{f' {unit}' if unit else ''}"
+
+    def against(place: int, first: str, second: str | None) -> str:
+        figures = [
+            f"{values[design][place]:.{_digits(values[design][place])}f}" for design in (first, second) if design
+        ]
+        return " against ".join(figures) + f" {dn}".rstrip()
+
+    parts = []
+    for number, (leader, start, stop) in enumerate(ends):
+        last = number == len(ends) - 1
+        rival = None if last else ends[number + 1][0]
+        rival = rival or _second(values, leader, stop)
+        span = f"at {at(start)}" if start == stop else f"from {at(start)} to {at(stop)}"
+        if leader is None:
+            parts.append(f"nobody has {_LEAST_LEAD:g} {dn} {span}")
+        else:
+            beside = f", {rival} is next" if rival and (last or number == 0) else ""
+            parts.append(f"{leader} leads {span} ({against(stop, leader, rival)} at {at(stop)}{beside})")
+    return f"{what[:1].upper()}{what[1:]} over {name}: {'; '.join(parts)}."
+
+
+def _digits(value: float) -> int:
+    return 0 if abs(value) >= 10 else 1
+
+
+def _second(values: Mapping[str, FloatArray], leader: str | None, place: int) -> str | None:
+    others = {design: own[place] for design, own in values.items() if design != leader}
+    return max(others, key=lambda design: others[design]) if others and leader is not None else None
+
+
+def _leads(values: Mapping[str, FloatArray], least: float) -> list[tuple[str | None, int, int]]:
+    """(leader, its first place, its last place) in order; None where nobody has `least`.
+
+    Who led at the last place leads as long as nobody has more.
+    """
+    found: list[tuple[str | None, int, int]] = []
+    for place in range(len(next(iter(values.values())))):
+        most = max(own[place] for own in values.values())
+        before = found[-1][0] if found else None
+        if not most >= least or most == -np.inf:
+            leader = None
+        elif before is not None and values[before][place] == most:
+            leader = before
+        else:
+            leader = next(design for design, own in values.items() if own[place] == most)
+        if found and found[-1][0] == leader:
+            found[-1] = (leader, found[-1][1], place)
+        else:
+            found.append((leader, place, place))
+    return found
 
 
 def draw_series(series: SeriesFigure) -> Figure:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import re
 
-from .tables import AUDIT, CURVES, FRONT, POINTS, PROVENANCE, RECOGNITION, RESOLVED, RESULTS, SEARCH_LOG
+from .tables import AUDIT, CURVES, FRONT, LIMITED_BY, POINTS, PROVENANCE, RECOGNITION, RESOLVED, RESULTS, SEARCH_LOG
 
 RUN, SUMS = "run.json", "SHA256SUMS"
 REPORT, FIGURES = "report.html", "figures"
-TABLES = (RESULTS, SEARCH_LOG, FRONT, CURVES, POINTS, RECOGNITION)
+TABLES = (RESULTS, SEARCH_LOG, FRONT, CURVES, POINTS, LIMITED_BY, RECOGNITION)
 MADE_BY_RUN = frozenset((*TABLES, RESOLVED, PROVENANCE))
 """What a run itself writes beside its list; the report draws from it, `sweep audit` adds a table."""
 _DRAWN = re.compile(
-    r"report\.html|pareto(-\d+)?\.(png|svg)|paper_comparison\.(csv|parquet)"
+    r"report\.html|cfas\.(png|svg)|pareto(-\d+)?\.(png|svg)|paper_comparison\.(csv|parquet)"
     r"|figures/((filters|series)-\d+|sensor|signals|chart|clouds-(cfas|designs))\.(png|svg)"
 )
 

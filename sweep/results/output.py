@@ -34,6 +34,7 @@ from .tables import (
     FEW,
     FOUND,
     FRONT,
+    LIMITED_BY,
     NAMED,
     PLAIN,
     POINTS,
@@ -44,6 +45,7 @@ from .tables import (
     ROW_COLUMNS,
     SEARCH_LOG,
     SWEPT,
+    front_schema,
     read_table,
 )
 from .thinning import Counts, thinned
@@ -177,7 +179,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
     optional = [name for name in (FRONT, RECOGNITION, SEARCH_LOG, AUDIT) if name in inventory.files]
     if not audited and AUDIT in optional:
         optional.remove(AUDIT)
-    inventory.require([RESULTS, CURVES, POINTS, RESOLVED, PROVENANCE, *optional])
+    inventory.require([RESULTS, CURVES, POINTS, LIMITED_BY, RESOLVED, PROVENANCE, *optional])
     resolved = _mapping(folder / RESOLVED, lambda text: YAML(typ="safe").load(text))
     if lacks := [key for key in _ALWAYS_WRITTEN if key not in resolved]:
         raise _lacking(folder / RESOLVED, lacks)
@@ -185,12 +187,14 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
     provenance = _checked(folder / PROVENANCE, Provenance, _mapping(folder / PROVENANCE, json.loads))
     objective = study.objective.column
     _check_columns(folder / RESULTS, [*ROW_COLUMNS, *provenance.parameters, *(c.name for c in provenance.quantities)])
-    _check_columns(folder / POINTS, ["design_id", "signal_type", "channel", "dn"])
+    _check_columns(folder / LIMITED_BY, ["design_id"])
+    _check_columns(folder / POINTS, ["design_id", "signal_type", "signal", "channel", "dn"])
     if FRONT in optional:
-        _check_columns(folder / FRONT, ["sensitivity_min", "objective", "sensitivity", "limit"])
+        _check_columns(folder / FRONT, front_schema(()).names)
     profiles = Profiles(objective, next(iter(study.scenarios)), provenance.parameters)
-    table, counts = thinned(folder / RESULTS, [objective, *provenance.trade_off], profiles.add)
+    table, counts = thinned(folder / RESULTS, [objective, *provenance.trade_off], provenance.trade_off[0], profiles.add)
     points = read_table(folder / POINTS).to_pandas()
+    limited = read_table(folder / LIMITED_BY).to_pandas()
     front, recognition, searched, audit = (
         read_table(folder / name).to_pandas() if name in optional else None
         for name in (FRONT, RECOGNITION, SEARCH_LOG, AUDIT)
@@ -200,7 +204,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         study=study,
         resolved=resolved,
         provenance=provenance,
-        table=table,
+        table=table.merge(limited, on="design_id", how="left"),
         counts=counts,
         curves=_kept_curves(folder / CURVES),
         points=points,

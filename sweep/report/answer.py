@@ -1,0 +1,173 @@
+"""The answer to a study's question: sentences that can be said in a meeting, and three numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..metrics.bound import FEASIBLE
+from ..metrics.columns.sensitivity import CFA_SENSITIVITY
+from ..metrics.limiting import limited_by_name
+from ..results.output import Output
+from ..results.tables import FOUND, PLAIN, SWEPT
+from ..results.thinning import per_light
+from .leaders import Leaders, Row, leaders_of
+from .names import full_name
+from .noise import usable_lines
+from .series import lead_sentence
+from .values import series_figures
+
+_OF_CLEAR = "of a clear sensor's light"
+
+
+@dataclass(frozen=True)
+class Number:
+    """A large number of the first screen: `value` with its unit, what it is, and what it compares with."""
+
+    value: str
+    name: str
+    comparison: str
+
+
+def answer_sentences(output: Output) -> list[str]:
+    """Over scenarios that differ in one number who leads where; else who is best, and what limits it."""
+    searched = output.kind(SWEPT, FOUND)
+    if len(searched) and output.best.empty:
+        failed = searched[searched["status"] != "ok"]
+        if len(failed) == len(searched):
+            return [f"Every design failed: {failed['status'].iloc[0]}."]
+        return [f"No design is feasible{_under(output)}.", *_others(output, leaders_of(output))]
+    series = [*usable_lines(output), *map(lead_sentence, series_figures(output))]
+    if series and output.best.empty:
+        return series
+    leaders = leaders_of(output)
+    return [*_best(output, leaders), *_others(output, leaders), *series]
+
+
+def _under(output: Output) -> str:
+    limits = " and ".join(f"{output.words(q)} {bound}" for q, bound in output.constraints.items())
+    return f" with {limits}" if limits else ""
+
+
+def said_separation(output: Output, row: Row) -> str:
+    """How far a row separates the pair of signal types of the trade-off, and at which light."""
+    separation = output.trade_off[0]
+    told = separation.told(row[separation.name])
+    light = f"at {row[CFA_SENSITIVITY]:.3f} {_OF_CLEAR}"
+    if separation.pair is None:
+        return f"reaches {separation.words} {told} {light}"
+    worst = " in the worst case of production" if separation.extreme else ""
+    return f"separates {' from '.join(separation.pair)} by {told}{worst} {light}"
+
+
+def _best(output: Output, leaders: Leaders) -> Iterator[str]:
+    """Who is best under the constraints, beside the plain CFA that separates most; and what limits it."""
+    best, plain, separation = leaders.chosen, leaders.plain, output.trade_off[0]
+    if best is None:
+        return
+    under = _under(output).removeprefix(" with ")
+    text = f"Under {under}, {full_name(best)}" if under else _capital(full_name(best))
+    if output.goal.name not in (separation.name, separation.of):
+        text += f" has the best {output.goal.words}, {output.goal.amount(best[output.goal.name])}, and"
+    text += f" {said_separation(output, best)}"
+    if len(output.scenarios) > 1:
+        text += f" in {leaders.scenario}"
+    if plain is not None and plain["design_id"] != best["design_id"]:
+        text += _times(output, best, plain)
+    yield f"{text}."
+    lights = best.get(limited_by_name(separation.pair)) if separation.pair else None
+    search = output.provenance.search
+    proven = None if search is None or best["kind"] not in (SWEPT, FOUND) else search.limit_proven
+    if proven is not None and output.goal.name == separation.name:
+        yield f"No filter in its place exceeds {separation.told(proven)} (proven, before quantization)."
+    if isinstance(lights, str):
+        yield f"Its limit is set by two lights: {lights}."
+
+
+def _times(output: Output, best: Row, plain: Row) -> str:
+    """The separation and the light of a row as multiples of those of a plain CFA."""
+    separation = output.trade_off[0]
+    of, light = float(plain[separation.name]), float(plain[CFA_SENSITIVITY])
+    if not of > 0:
+        return f" ({plain['name']} by {separation.told(of)} at {light:.3f})"
+    return (
+        f": {best[separation.name] / of:.2f} times the separation of {plain['name']} ({separation.told(of)}) "
+        f"and {best[CFA_SENSITIVITY] / light:.2f} times its light ({light:.3f})"
+    )
+
+
+def _others(output: Output, leaders: Leaders) -> Iterator[str]:
+    """Who separates most and who does so per light, where that is somebody else."""
+    best, most, rate = leaders.chosen, leaders.separates, leaders.per_light
+    separation = output.trade_off[0]
+    more = most is not None and (best is None or most[separation.name] > best[separation.name])
+    if most is not None and more:
+        yield f"{_capital(full_name(most))} separates most of all: {_figures(output, most)}{_missed(output, most)}."
+    if rate is None:
+        return
+    measure = per_light(separation.name)
+    same = more and most is not None and most["design_id"] == rate["design_id"]
+    who = "It" if same else _capital(full_name(rate))
+    text = f"{who} separates most per light{', too' if same else ''}: "
+    text += f"{rate[measure]:.1f} {separation.unit} per ms of exposure"
+    rivals = [r for r in (best, leaders.plain) if r is not None and r["design_id"] != rate["design_id"]]
+    against = ", ".join(f"{full_name(r)} {r[measure]:.1f}" for r in {r["design_id"]: r for r in rivals}.values())
+    yield text + (f" ({against})" if against else "") + ("" if same else _missed(output, rate)) + "."
+
+
+def _figures(output: Output, row: Row) -> str:
+    separation = output.trade_off[0]
+    return f"{separation.told(row[separation.name])} at {row[CFA_SENSITIVITY]:.3f} {_OF_CLEAR}"
+
+
+def _missed(output: Output, row: Row) -> str:
+    """Constraints that a row does not meet, in words."""
+    missed = [
+        f"{output.words(name)} {bound}"
+        for name, bound in output.constraints.items()
+        if bound.violation(np.array([row[name]], dtype=float))[0] > FEASIBLE
+    ]
+    return f", but it does not meet {' and '.join(missed)}" if missed and row["kind"] != PLAIN else ""
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def large_numbers(output: Output) -> list[Number]:
+    """Separation, light and distance to the limit of the best one, or what it separates per light without a limit."""
+    leaders = leaders_of(output)
+    best, plain, separation = leaders.chosen, leaders.plain, output.trade_off[0]
+    if best is None:
+        return []
+    other = None if plain is None or plain["design_id"] == best["design_id"] else plain
+    value, measure = float(best[separation.name]), per_light(separation.name)
+    numbers = [
+        Number(separation.told(value), separation.words, _beside(other, separation.name, value, separation.told)),
+        Number(
+            f"{best[CFA_SENSITIVITY]:.3f}",
+            _OF_CLEAR,
+            _beside(other, CFA_SENSITIVITY, float(best[CFA_SENSITIVITY]), "{:.3f}".format),
+        ),
+    ]
+    search = output.provenance.search
+    if search is not None and search.limit_proven is not None and output.goal.name == separation.name:
+        left = separation.told(max(0.0, search.limit_proven - value))
+        limit = f"{separation.told(search.limit_proven)}: no filter exceeds it"
+        numbers.append(Number(left, "below the limit of any filter", limit))
+    elif best[measure] == best[measure]:
+        rate = float(best[measure])
+        text = f"{separation.unit}/ms"
+        numbers.append(
+            Number(f"{rate:.1f} {text}", "per light (ms of exposure)", _beside(other, measure, rate, "{:.1f}".format))
+        )
+    return numbers
+
+
+def _beside(other: Row | None, column: str, value: float, told: Callable[[float], str]) -> str:
+    """A value as a multiple of that of a plain CFA."""
+    if other is None or not float(other[column]) > 0:
+        return ""
+    return f"{value / float(other[column]):.2f} times {other['name']} ({told(float(other[column]))})"
