@@ -107,7 +107,7 @@ def even(size: int, most: int) -> IndexArray:
 
 
 def draw_pareto(figure: ParetoFigure) -> Figure:
-    """Draw the trade-off; infeasible and feasible designs, front, optimum and named designs each have their marker."""
+    """Draw the trade-off; infeasible and feasible designs, front, best and named designs each have their marker."""
     figure_, axes = canvas(8.0, 5.0)
     styles: dict[str, dict[str, Any]] = {
         "infeasible": {"marker": "x", "s": 9, "alpha": 0.45, "linewidths": 0.6, "zorder": 1},

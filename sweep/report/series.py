@@ -27,7 +27,7 @@ _LABELS = {
     "intensity_cd": "luminous intensity / cd",
     "read_noise_e": "read noise / e",
     "dark_e_per_s": "dark current / (e/s)",
-    "level": "exposure: brightest channel on white / full scale",
+    "level": "exposure of the brightest channel on white / full scale",
 }
 
 
@@ -59,43 +59,46 @@ class SeriesFigure:
         return _LABELS.get(self.key, self.key)
 
     @property
+    def quantity(self) -> tuple[str, str]:
+        """Name and unit of the scenarios' number; the unit may be empty."""
+        name, _, unit = self.x_label.partition(" / ")
+        return name, unit.strip("()")
+
+    @property
     def log_x(self) -> bool:
         """Whether the numbers span more than a decade."""
         return bool(self.x.min() > 0 and self.x.max() / self.x.min() > _WIDE)
 
 
 def lead_sentence(series: SeriesFigure) -> str:
-    """Which design leads from where to where, each with its rival's value where the lead changes."""
-    name, _, unit = series.x_label.partition(" / ")
+    """Which design leads from where to where, with its value and its rival's where that ends."""
+    name, unit = series.quantity
     what, _, dn = series.y_label.partition(" / ")
     values = {design: np.nan_to_num(line.y, nan=-np.inf) for design, line in series.lines.items()}
-    ends = _leads(values, least=_LEAST_LEAD if dn == DN else 0.0)
+    leads = _leads(values, least=_LEAST_LEAD if dn == DN else 0.0)
 
     def at(place: int) -> str:
-        return f"{series.x[place]:g}{f' {unit}' if unit else ''}"
-
-    def against(place: int, first: str, second: str | None) -> str:
-        figures = [
-            f"{values[design][place]:.{_digits(values[design][place])}f}" for design in (first, second) if design
-        ]
-        return " against ".join(figures) + f" {dn}".rstrip()
+        return f"{series.x[place]:g} {unit}".rstrip()
 
     parts = []
-    for number, (leader, start, stop) in enumerate(ends):
-        last = number == len(ends) - 1
-        rival = None if last else ends[number + 1][0]
-        rival = rival or _second(values, leader, stop)
+    for number, (leader, start, stop) in enumerate(leads):
+        first, last = start == 0, stop == len(series.x) - 1
         span = f"at {at(start)}" if start == stop else f"from {at(start)} to {at(stop)}"
+        span = "everywhere" if first and last and start != stop else span
         if leader is None:
-            parts.append(f"nobody has {_LEAST_LEAD:g} {dn} {span}")
-        else:
-            beside = f", {rival} is next" if rival and (last or number == 0) else ""
-            parts.append(f"{leader} leads {span} ({against(stop, leader, rival)} at {at(stop)}{beside})")
+            parts.append(f"{span} nobody has {_LEAST_LEAD:g} {dn}")
+            continue
+        following = None if last else leads[number + 1][0]
+        rival = following or _second(values, leader, stop)
+        parts.append(
+            f"{span} {leader} leads ({_told(values[leader][stop], dn)}{'' if start == stop else f' at {at(stop)}'}"
+        )
+        parts[-1] += f", {rival} {_told(values[rival][stop], dn)})" if rival else ")"
     return f"{what[:1].upper()}{what[1:]} over {name}: {'; '.join(parts)}."
 
 
-def _digits(value: float) -> int:
-    return 0 if abs(value) >= 10 else 1
+def _told(value: float, unit: str) -> str:
+    return f"{value:.{0 if abs(value) >= 10 else 1}f} {unit}".rstrip()
 
 
 def _second(values: Mapping[str, FloatArray], leader: str | None, place: int) -> str | None:

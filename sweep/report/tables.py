@@ -5,33 +5,44 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from ..metrics.columns.sensitivity import CFA_SENSITIVITY
+from ..metrics.limiting import limited_by_name
 from ..results.output import Output
 
+_MOST_PARAMETERS = 10
 _DIGITS = 4
 """Of columns that are no quantities."""
 
 
 def comparison_table(output: Output) -> pd.DataFrame:
-    """Plain CFAs, named designs and the search's answer with all CSDs and sensitivities."""
-    columns = ["name", "scenario", *output.distances, *output.light, *output.further, "feasible"]
+    """Plain CFAs, named designs and the search's answer with all CSDs, sensitivities and the lights that limit them."""
+    columns = ["name", "scenario", *_first(output), *_rest(output), "feasible", *_limits(output)]
     return _shown(output, output.few, columns)
 
 
 def best_table(output: Output, most: int = 12) -> pd.DataFrame:
-    """The best feasible designs with their parameters."""
+    """The best feasible designs with their parameters, the first ones of very many."""
     ranked = output.best.head(most)
-    columns = [
-        "design_id",
-        "kind",
-        "cfa",
-        "scenario",
-        *output.parameters,
-        *output.distances,
-        *output.light,
-        *output.further,
-        "pareto",
-    ]
+    used = [name for name in output.parameters if ranked[name].nunique() > 1 or len(ranked) == 1]
+    keys = ["design_id", "kind", "cfa", "scenario"]
+    columns = [*keys, *_first(output), *used[:_MOST_PARAMETERS], *_rest(output), "pareto", *_limits(output)]
     return _shown(output, ranked, columns)
+
+
+def _first(output: Output) -> list[str]:
+    """The separation of the trade-off and the light of the CFA."""
+    return [output.trade_off[0].name, CFA_SENSITIVITY]
+
+
+def _rest(output: Output) -> list[str]:
+    """All other CSDs and sensitivities, and what constraints and objective name."""
+    return [n for n in (*output.light, *output.further, *output.distances) if n not in _first(output)]
+
+
+def _limits(output: Output) -> list[str]:
+    """The column of the two lights that limit the separation of the trade-off."""
+    pair = output.trade_off[0].pair
+    return [] if pair is None else [limited_by_name(pair)]
 
 
 def geometry_table(output: Output) -> pd.DataFrame:
@@ -55,4 +66,5 @@ def _shown(output: Output, rows: pd.DataFrame, columns: list[str]) -> pd.DataFra
             own = output.columns.get(column)
             shown[column] = shown[column].round(_DIGITS if own is None else own.digits)
     several = rows["scenario"].nunique() > 1
-    return shown if several else shown.drop(columns="scenario")
+    shown = shown if several else shown.drop(columns="scenario")
+    return shown.rename(columns={name: output.words(name).replace("_", " ") for name in columns})

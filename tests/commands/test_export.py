@@ -203,7 +203,7 @@ def test_unknown_keys_are_one_line(tiny: Path, tmp_path: Path) -> None:
 
 
 def test_by_default_files_go_beside_the_run(tiny: Path) -> None:
-    done = sweep("export", str(tiny), "--design", "best of edges")
+    done = sweep("export", str(tiny), "--design", "best stopband")
     assert done.returncode == 0, done.stderr
     assert {path.name for path in (tiny / "export").iterdir()} == {"best_of_edges.csv", "best_of_edges.mat"}
 
