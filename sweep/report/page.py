@@ -30,12 +30,13 @@ from .scenes import effect_table, scene_groups, scene_table
 from .series import draw_series
 from .signal_figures import draw_chart, draw_clouds
 from .summary import counts_line, summary_lines
+from .tiles import draw_tiles, tiles_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-_PICTURES = ("sensor", "signals", "chart")
+_PICTURES = ("tiles", "sensor", "signals", "chart")
 """Figures that the page shows as pictures; it draws all others itself."""
 
 
@@ -132,6 +133,7 @@ def _drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
         yield f"filters-{number + 1}", f"Filters of {cfa}", draw_curves(content.filters_figure(output, cfa))
     for number, series in enumerate(all_series(output)):
         yield f"series-{number + 1}", series.title, draw_series(series)
+    yield "tiles", "Tiles of the CFAs; a hatched pixel is modified", draw_tiles(tiles_figure(output))
     yield "sensor", "Quantum efficiency of the sensor", draw_curves(content.sensor_figure(output))
     yield "signals", "Spectra of the signals", draw_curves(content.lights_figure(output))
     yield "chart", "The color checker chart", draw_chart(content.chart_figure(output))

@@ -253,11 +253,16 @@ def end_curves(output: Output, cfa: str) -> list[str]:
     return [name for name in output.curves.sensor if name in ends]
 
 
+def mosaic_of(output: Output, cfa: str) -> Mosaic:
+    """The tile of a CFA of the study."""
+    tile = output.study.cfas[cfa].tile
+    return Mosaic.from_name(cfa) if tile is None else Mosaic.from_rows(cfa, tile)
+
+
 def channel_curves(output: Output, cfa: str) -> list[str]:
     """Names of the sensor's curves that a CFA's channels have; a modified channel has none."""
-    section = output.study.cfas[cfa]
-    tile = Mosaic.from_name(cfa) if section.tile is None else Mosaic.from_rows(cfa, section.tile)
-    names = (section.curves.get(channel, channel) for channel in tile.channels)
+    renamed = output.study.cfas[cfa].curves
+    names = (renamed.get(channel, channel) for channel in mosaic_of(output, cfa).channels)
     return [name for name in dict.fromkeys(names) if name in output.curves.sensor]
 
 
