@@ -10,6 +10,7 @@ import numpy as np
 from ..metrics.bound import FEASIBLE
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.limiting import limited_by_name
+from ..metrics.quantity import HELD_OUT
 from ..results.output import Output
 from ..results.tables import FOUND, PLAIN, SWEPT
 from ..results.thinning import per_light
@@ -23,7 +24,7 @@ _OF_CLEAR = "of a clear sensor's light"
 
 
 @dataclass(frozen=True)
-class Number:
+class LargeNumber:
     """A large number of the first screen: `value` with its unit, what it is, and what it compares with."""
 
     value: str
@@ -84,6 +85,19 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
         yield f"No filter in its place exceeds {separation.told(proven)} (proven, before quantization)."
     if isinstance(lights, str):
         yield f"Its limit is set by two lights: {lights}."
+    yield from _unseen(output, best)
+
+
+def _unseen(output: Output, best: Row) -> Iterator[str]:
+    """How the best one does on lights that its search did not see."""
+    separation = output.trade_off[0]
+    held_out = float(best.get(HELD_OUT + (separation.of or separation.name), np.nan))
+    if np.isfinite(held_out):
+        own = separation.told(best[separation.name])
+        yield f"On lights that it has not seen it has {separation.told(held_out)} (on its own lights {own})."
+    if output.left_out is not None and output.left_out["fall"].notna().any():
+        worst = output.left_out.nlargest(1, "fall").iloc[0]
+        yield f"Left out of the search, {worst['signal']} costs its optimum most: {separation.told(worst['fall'])}."
 
 
 def _times(output: Output, best: Row, plain: Row) -> str:
@@ -136,7 +150,7 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def large_numbers(output: Output) -> list[Number]:
+def large_numbers(output: Output) -> list[LargeNumber]:
     """Separation, light and distance to the limit of the best one, or what it separates per light without a limit."""
     leaders = leaders_of(output)
     best, plain, separation = leaders.chosen, leaders.plain, output.trade_off[0]
@@ -145,8 +159,8 @@ def large_numbers(output: Output) -> list[Number]:
     other = None if plain is None or plain["design_id"] == best["design_id"] else plain
     value, measure = float(best[separation.name]), per_light(separation.name)
     numbers = [
-        Number(separation.told(value), separation.words, _beside(other, separation.name, value, separation.told)),
-        Number(
+        LargeNumber(separation.told(value), separation.words, _beside(other, separation.name, value, separation.told)),
+        LargeNumber(
             f"{best[CFA_SENSITIVITY]:.3f}",
             _OF_CLEAR,
             _beside(other, CFA_SENSITIVITY, float(best[CFA_SENSITIVITY]), "{:.3f}".format),
@@ -156,12 +170,14 @@ def large_numbers(output: Output) -> list[Number]:
     if search is not None and search.limit_proven is not None and output.goal.name == separation.name:
         left = separation.told(max(0.0, search.limit_proven - value))
         limit = f"{separation.told(search.limit_proven)}: no filter exceeds it"
-        numbers.append(Number(left, "below the limit of any filter", limit))
+        numbers.append(LargeNumber(left, "below the limit of any filter", limit))
     elif best[measure] == best[measure]:
         rate = float(best[measure])
         text = f"{separation.unit}/ms"
         numbers.append(
-            Number(f"{rate:.1f} {text}", "per light (ms of exposure)", _beside(other, measure, rate, "{:.1f}".format))
+            LargeNumber(
+                f"{rate:.1f} {text}", "per light (ms of exposure)", _beside(other, measure, rate, "{:.1f}".format)
+            )
         )
     return numbers
 

@@ -62,6 +62,11 @@ def summary_lines(output: Output) -> list[str]:
         least = output.provenance.hypervolume_least_sensitivity
         lines.append(f"Hypervolume (DN x sensitivity, above 0 and a sensitivity of {least:g}): {both}.")
     lines += [f"Note: {warning}." for warning in output.provenance.warnings]
+    ratio = output.study.lights.photon_ratio
+    if ratio is not None:
+        lines.append(
+            f"A light has {ratio:.4g} of the photons of the white patch (photon_ratio in study.resolved.yaml)."
+        )
     if output.provenance.sensor.surrogate or output.provenance.lights.surrogate:
         lines.append("Note: built-in curves are surrogates, modeled from stated parameters, not measured.")
     lines.append(f"Took {output.provenance.duration_s:.1f} s with {output.provenance.workers} workers.")

@@ -7,6 +7,7 @@ import pandas as pd
 
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.limiting import limited_by_name
+from ..metrics.quantity import HELD_OUT
 from ..results.output import Output
 
 _MOST_PARAMETERS = 10
@@ -16,7 +17,7 @@ _DIGITS = 4
 
 def comparison_table(output: Output) -> pd.DataFrame:
     """Plain CFAs, named designs and the search's answer with all CSDs, sensitivities and the lights that limit them."""
-    columns = ["name", "scenario", *_first(output), *_rest(output), "feasible", *_limits(output)]
+    columns = ["name", "scenario", *_first(output), *_held_out(output), *_rest(output), "feasible", *_limits(output)]
     return _shown(output, output.few, columns)
 
 
@@ -25,7 +26,15 @@ def best_table(output: Output, most: int = 12) -> pd.DataFrame:
     ranked = output.best.head(most)
     used = [name for name in output.parameters if ranked[name].nunique() > 1 or len(ranked) == 1]
     keys = ["design_id", "kind", "cfa", "scenario"]
-    columns = [*keys, *_first(output), *used[:_MOST_PARAMETERS], *_rest(output), "pareto", *_limits(output)]
+    columns = [
+        *keys,
+        *_first(output),
+        *_held_out(output),
+        *used[:_MOST_PARAMETERS],
+        *_rest(output),
+        "pareto",
+        *_limits(output),
+    ]
     return _shown(output, ranked, columns)
 
 
@@ -43,6 +52,18 @@ def _limits(output: Output) -> list[str]:
     """The column of the two lights that limit the separation of the trade-off."""
     pair = output.trade_off[0].pair
     return [] if pair is None else [limited_by_name(pair)]
+
+
+def _held_out(output: Output) -> list[str]:
+    """Columns of the CSDs of other lights, of those that the study asks for."""
+    return [name for each in output.distances if (name := HELD_OUT + each) in output.table]
+
+
+def left_out_table(output: Output, most: int = 10) -> pd.DataFrame:
+    """The lights whose absence from the search costs most."""
+    if output.left_out is None:
+        return pd.DataFrame()
+    return output.left_out.nlargest(most, "fall").round(1)
 
 
 def geometry_table(output: Output) -> pd.DataFrame:

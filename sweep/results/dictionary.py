@@ -10,6 +10,7 @@ from .tables import (
     AUDIT,
     CURVES,
     FRONT,
+    LEFT_OUT,
     LIMITED_BY,
     POINTS,
     PROVENANCE,
@@ -17,6 +18,7 @@ from .tables import (
     RESOLVED,
     RESULTS,
     SEARCH_LOG,
+    VALIDATED,
     front_schema,
     search_schema,
 )
@@ -70,6 +72,9 @@ FILES = {
     RESULTS: "a row per design and scenario; its columns are below",
     LIMITED_BY: "the two lights that limit each CSD of the designs that the report can show: `design_id`, "
     "`limited_by_<a>_<b>` (of a light at any place, at the worst one of the lattice that was computed)",
+    VALIDATED: "where a study validates on other lights: `design_id` and `held_out_csd_<a>_<b>`, their CSDs, DN",
+    LEFT_OUT: "where each light is left out of a search in turn: signal_type, signal, the optimum that was "
+    "`seen`, the same design `with_it`, and the `fall`",
     SEARCH_LOG: "every evaluation of the search and of its front: " + ", ".join(search_schema(["<parameters>"]).names),
     FRONT: "what the search found at each level of sensitivity, and the limit there: "
     + ", ".join(front_schema(["<parameters>"]).names),

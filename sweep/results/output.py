@@ -34,6 +34,7 @@ from .tables import (
     FEW,
     FOUND,
     FRONT,
+    LEFT_OUT,
     LIMITED_BY,
     NAMED,
     PLAIN,
@@ -45,6 +46,7 @@ from .tables import (
     ROW_COLUMNS,
     SEARCH_LOG,
     SWEPT,
+    VALIDATED,
     front_schema,
     read_table,
 )
@@ -64,7 +66,7 @@ class Output:
     """What a run left in its folder; of a long result table, `table` holds what a report shows.
 
     `study`: the study that was run, and `resolved` its file. `profiles`: over the whole table, per CFA. `searched`: the
-    search's evaluations. `audited`: rows of `sweep audit`.
+    search's evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per light that was left out of a search.
     """
 
     folder: Path
@@ -79,6 +81,7 @@ class Output:
     recognition: pd.DataFrame | None
     searched: pd.DataFrame | None
     audited: pd.DataFrame | None
+    left_out: pd.DataFrame | None
     profiles: Mapping[str, Sequence[ParameterProfile]]
 
     @property
@@ -176,7 +179,9 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         raise no_run(folder)
     if PROVENANCE not in inventory.files:
         raise OutputError(Fault("no finished run here", str(folder), allowed="a folder that `sweep run` finished"))
-    optional = [name for name in (FRONT, RECOGNITION, SEARCH_LOG, AUDIT) if name in inventory.files]
+    optional = [
+        name for name in (FRONT, RECOGNITION, SEARCH_LOG, AUDIT, VALIDATED, LEFT_OUT) if name in inventory.files
+    ]
     if not audited and AUDIT in optional:
         optional.remove(AUDIT)
     inventory.require([RESULTS, CURVES, POINTS, LIMITED_BY, RESOLVED, PROVENANCE, *optional])
@@ -195,16 +200,16 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
     table, counts = thinned(folder / RESULTS, [objective, *provenance.trade_off], provenance.trade_off[0], profiles.add)
     points = read_table(folder / POINTS).to_pandas()
     limited = read_table(folder / LIMITED_BY).to_pandas()
-    front, recognition, searched, audit = (
+    front, recognition, searched, audit, validated, left_out = (
         read_table(folder / name).to_pandas() if name in optional else None
-        for name in (FRONT, RECOGNITION, SEARCH_LOG, AUDIT)
+        for name in (FRONT, RECOGNITION, SEARCH_LOG, AUDIT, VALIDATED, LEFT_OUT)
     )
     return Output(
         folder=folder,
         study=study,
         resolved=resolved,
         provenance=provenance,
-        table=table.merge(limited, on="design_id", how="left"),
+        table=_joined(table, limited, validated),
         counts=counts,
         curves=_kept_curves(folder / CURVES),
         points=points,
@@ -212,8 +217,16 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         recognition=recognition,
         searched=searched,
         audited=audit,
+        left_out=left_out,
         profiles=profiles.found,
     )
+
+
+def _joined(table: pd.DataFrame, *others: pd.DataFrame | None) -> pd.DataFrame:
+    """The table with what other tables say of its designs."""
+    for other in others:
+        table = table if other is None else table.merge(other, on="design_id", how="left")
+    return table
 
 
 def _kept_curves(path: Path) -> KeptCurves:
