@@ -17,7 +17,7 @@ from ..results.thinning import per_light
 from .leaders import Leaders, Row, leaders_of
 from .names import full_name
 from .noise import usable_lines
-from .series import lead_sentence
+from .series import SeriesFigure, lead_sentence, leads_of
 from .values import series_figures
 
 _OF_CLEAR = "of a clear sensor's light"
@@ -40,7 +40,9 @@ def answer_sentences(output: Output) -> list[str]:
         if len(failed) == len(searched):
             return [f"Every design failed: {failed['status'].iloc[0]}."]
         return [f"No design is feasible{_under(output)}.", *_others(output, leaders_of(output))]
-    series = [*usable_lines(output), *map(lead_sentence, series_figures(output))]
+    usable = list(usable_lines(output))
+    # Where the question is of noise, separations matter where another CFA begins to lead.
+    series = usable + [lead_sentence(s) for s in series_figures(output) if not usable or len(leads_of(s)) > 1]
     if series and output.best.empty:
         return series
     leaders = leaders_of(output)
@@ -151,7 +153,13 @@ def _capital(text: str) -> str:
 
 
 def large_numbers(output: Output) -> list[LargeNumber]:
-    """Separation, light and distance to the limit of the best one, or what it separates per light without a limit."""
+    """Separation, light and distance to the limit of the best one, or what it separates per light without a limit.
+
+    Over scenarios that differ in one number: who leads first, its light, and up to where.
+    """
+    figures = sorted(series_figures(output), key=lambda series: len(leads_of(series)) < 2)
+    if figures and output.best.empty:
+        return list(_numbers_over(output, figures[0]))
     leaders = leaders_of(output)
     best, plain, separation = leaders.chosen, leaders.plain, output.trade_off[0]
     if best is None:
@@ -180,6 +188,30 @@ def large_numbers(output: Output) -> list[LargeNumber]:
             )
         )
     return numbers
+
+
+def _numbers_over(output: Output, series: SeriesFigure) -> Iterator[LargeNumber]:
+    """Of the first one that leads in a series: separation, light, and where its lead ends."""
+    separation, (_, unit) = output.trade_off[0], series.quantity
+    leads = leads_of(series)
+    name, start, stop = next((lead for lead in leads if lead[0] is not None), (None, 0, 0))
+    if name is None:
+        return
+    others = {other: line.y for other, line in series.lines.items() if other != name}
+
+    def at(place: int) -> str:
+        return f"{series.x[place]:g} {unit}".rstrip()
+
+    def rival(place: int) -> str:
+        ranked = sorted(others, key=lambda other: -np.nan_to_num(others[other][place], nan=-np.inf))
+        return "" if not ranked else f"{ranked[0]} {separation.told(others[ranked[0]][place])}"
+
+    own = series.lines[name].y
+    yield LargeNumber(separation.told(own[start]), f"{name} at {at(start)}", rival(start))
+    rows = output.few[output.few["name"] == name]
+    yield LargeNumber(f"{rows[CFA_SENSITIVITY].iloc[0]:.3f}", _OF_CLEAR, name)
+    figures = ", ".join(part for part in (f"{separation.told(own[stop])}", rival(stop)) if part)
+    yield LargeNumber(at(stop), f"{name} leads up to here" if leads[-1][2] != stop else "and still leads here", figures)
 
 
 def _beside(other: Row | None, column: str, value: float, told: Callable[[float], str]) -> str:

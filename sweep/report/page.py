@@ -86,7 +86,7 @@ def _html(output: Output, images: Sequence[tuple[str, str]], published: pd.DataF
         folder=output.folder.as_posix(),
         quoted=shlex.quote(output.folder.as_posix()),
         objective=_objective(output),
-        numbers_in="" if len(output.scenarios) == 1 else f"in {leaders_of(output).scenario}",
+        numbers_in="" if len(output.scenarios) == 1 or output.best.empty else f"in {leaders_of(output).scenario}",
         series_first=bool(drawn["series"]) and output.best.empty,
         objective_words=output.goal.words,
         answer=answer_sentences(output),

@@ -75,7 +75,7 @@ def lead_sentence(series: SeriesFigure) -> str:
     name, unit = series.quantity
     what, _, dn = series.y_label.partition(" / ")
     values = {design: np.nan_to_num(line.y, nan=-np.inf) for design, line in series.lines.items()}
-    leads = _leads(values, least=_LEAST_LEAD if dn == DN else 0.0)
+    leads = leads_of(series)
 
     def at(place: int) -> str:
         return f"{series.x[place]:g} {unit}".rstrip()
@@ -83,8 +83,8 @@ def lead_sentence(series: SeriesFigure) -> str:
     parts = []
     for number, (leader, start, stop) in enumerate(leads):
         first, last = start == 0, stop == len(series.x) - 1
-        span = f"at {at(start)}" if start == stop else f"from {at(start)} to {at(stop)}"
-        span = "everywhere" if first and last and start != stop else span
+        span = f"at {at(start)}" if start == stop else f"from {at(start)}{' on' if last else f' to {at(stop)}'}"
+        span = ("everywhere" if last else f"up to {at(stop)}") if first and start != stop else span
         if leader is None:
             parts.append(f"{span} nobody has {_LEAST_LEAD:g} {dn}")
             continue
@@ -106,11 +106,13 @@ def _second(values: Mapping[str, FloatArray], leader: str | None, place: int) ->
     return max(others, key=lambda design: others[design]) if others and leader is not None else None
 
 
-def _leads(values: Mapping[str, FloatArray], least: float) -> list[tuple[str | None, int, int]]:
-    """(leader, its first place, its last place) in order; None where nobody has `least`.
+def leads_of(series: SeriesFigure) -> list[tuple[str | None, int, int]]:
+    """(leader, its first place, its last place) in order; None where nobody has a DN.
 
     Who led at the last place leads as long as nobody has more.
     """
+    values = {design: np.nan_to_num(line.y, nan=-np.inf) for design, line in series.lines.items()}
+    least = _LEAST_LEAD if series.y_label.endswith(f" / {DN}") else 0.0
     found: list[tuple[str | None, int, int]] = []
     for place in range(len(next(iter(values.values())))):
         most = max(own[place] for own in values.values())
