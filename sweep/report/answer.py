@@ -77,7 +77,7 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     text += f" {said_separation(output, best)}"
     if len(output.scenarios) > 1:
         text += f" in {leaders.scenario}"
-    if plain is not None and plain["design_id"] != best["design_id"]:
+    if plain is not None:
         text += _times(output, best, plain)
     yield f"{text}."
     lights = best.get(limited_by_name(separation.pair)) if separation.pair else None
@@ -114,10 +114,17 @@ def _times(output: Output, best: Row, plain: Row) -> str:
     )
 
 
+def who_else(output: Output) -> list[str]:
+    """Who separates most, and most per light, where that is not the best one under the constraints."""
+    return list(_others(output, leaders_of(output)))
+
+
 def _others(output: Output, leaders: Leaders) -> Iterator[str]:
     """Who separates most and who does so per light, where that is somebody else."""
     best, most, rate = leaders.chosen, leaders.separates, leaders.per_light
     separation = output.trade_off[0]
+    if most is not None and best is not None and most["design_id"] == best["design_id"]:
+        yield "Nothing else in this run separates more."
     more = most is not None and (best is None or most[separation.name] > best[separation.name])
     if most is not None and more:
         yield f"{_capital(full_name(most))} separates most of all: {_figures(output, most)}{_missed(output, most)}."
@@ -127,9 +134,11 @@ def _others(output: Output, leaders: Leaders) -> Iterator[str]:
     same = more and most is not None and most["design_id"] == rate["design_id"]
     who = "It" if same else _capital(full_name(rate))
     text = f"{who} separates most per light{', too' if same else ''}: "
-    text += f"{rate[measure]:.1f} {separation.unit} per ms of exposure"
+    text += f"{_rate_told(rate[measure])} {separation.unit} per ms of exposure"
     rivals = [r for r in (best, leaders.plain) if r is not None and r["design_id"] != rate["design_id"]]
-    against = ", ".join(f"{full_name(r)} {r[measure]:.1f}" for r in {r["design_id"]: r for r in rivals}.values())
+    against = ", ".join(
+        f"{full_name(r)} {_rate_told(r[measure])}" for r in {r["design_id"]: r for r in rivals}.values()
+    )
     yield text + (f" ({against})" if against else "") + ("" if same else _missed(output, rate)) + "."
 
 
@@ -148,6 +157,11 @@ def _missed(output: Output, row: Row) -> str:
     return f", but it does not meet {' and '.join(missed)}" if missed and row["kind"] != PLAIN else ""
 
 
+def _rate_told(rate: float) -> str:
+    """A separation per light, DN/ms."""
+    return f"{rate:.{0 if rate >= 100 else 1}f}"
+
+
 def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
@@ -164,14 +178,13 @@ def large_numbers(output: Output) -> list[LargeNumber]:
     best, plain, separation = leaders.chosen, leaders.plain, output.trade_off[0]
     if best is None:
         return []
-    other = None if plain is None or plain["design_id"] == best["design_id"] else plain
     value, measure = float(best[separation.name]), per_light(separation.name)
     numbers = [
-        LargeNumber(separation.told(value), separation.words, _beside(other, separation.name, value, separation.told)),
+        LargeNumber(separation.told(value), separation.words, _beside(plain, separation.name, value, separation.told)),
         LargeNumber(
             f"{best[CFA_SENSITIVITY]:.3f}",
             _OF_CLEAR,
-            _beside(other, CFA_SENSITIVITY, float(best[CFA_SENSITIVITY]), "{:.3f}".format),
+            _beside(plain, CFA_SENSITIVITY, float(best[CFA_SENSITIVITY]), "{:.3f}".format),
         ),
     ]
     search = output.provenance.search
@@ -181,12 +194,8 @@ def large_numbers(output: Output) -> list[LargeNumber]:
         numbers.append(LargeNumber(left, "below the limit of any filter", limit))
     elif best[measure] == best[measure]:
         rate = float(best[measure])
-        text = f"{separation.unit}/ms"
-        numbers.append(
-            LargeNumber(
-                f"{rate:.1f} {text}", "per light (ms of exposure)", _beside(other, measure, rate, "{:.1f}".format)
-            )
-        )
+        beside = _beside(plain, measure, rate, _rate_told)
+        numbers.append(LargeNumber(f"{_rate_told(rate)} {separation.unit}/ms", "per light (ms of exposure)", beside))
     return numbers
 
 

@@ -21,8 +21,8 @@ class Leaders:
 
     `chosen`: the best design that the study swept or searched and that meets all constraints; without such designs the
     CFA or named design that does and separates most; None where none does. `separates`, `per_light`: who separates
-    most of all rows, and most for each millisecond of exposure, whatever the constraints. `plain`: the plain CFA that
-    separates most, with which the others are compared.
+    most of all rows, and most for each millisecond of exposure, whatever the constraints. `plain`: the other
+    plain CFA that separates most, with which the chosen one is compared.
     """
 
     scenario: str
@@ -40,13 +40,15 @@ def leaders_of(output: Output, scenario: str | None = None) -> Leaders:
         scenario = str(best.iloc[0]["scenario"]) if len(best) else output.scenarios[0]
     rows = output.table[(output.table["scenario"] == scenario) & (output.table["status"] == "ok")]
     made = rows["kind"].isin([SWEPT, FOUND])
-    chosen = best[best["scenario"] == scenario] if made.any() else rows[rows["feasible"]]
+    own = best[best["scenario"] == scenario]
+    chosen = _first(own) if made.any() else _most(rows[rows["feasible"]], separation)
+    others = rows if chosen is None else rows[rows["design_id"] != chosen["design_id"]]
     return Leaders(
         scenario,
-        _first(chosen) if made.any() else _most(chosen, separation),
+        chosen,
         _most(rows, separation),
         _most(rows, per_light(separation)),
-        _most(rows[rows["kind"] == PLAIN], separation),
+        _most(others[others["kind"] == PLAIN], separation),
     )
 
 

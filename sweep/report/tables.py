@@ -88,4 +88,8 @@ def _shown(output: Output, rows: pd.DataFrame, columns: list[str]) -> pd.DataFra
             shown[column] = shown[column].round(_DIGITS if own is None else own.digits)
     several = rows["scenario"].nunique() > 1
     shown = shown if several else shown.drop(columns="scenario")
-    return shown.rename(columns={name: output.words(name).replace("_", " ") for name in columns})
+    words = {name: output.words(name).replace("_", " ") for name in columns}
+    separation = output.trade_off[0]
+    words |= dict.fromkeys(_limits(output), f"{separation.words} limited by")
+    words |= {name: f"{output.words(name.removeprefix(HELD_OUT))}, other lights" for name in _held_out(output)}
+    return shown.rename(columns=words)
