@@ -39,14 +39,13 @@ def answer_sentences(output: Output) -> list[str]:
         failed = searched[searched["status"] != "ok"]
         if len(failed) == len(searched):
             return [f"Every design failed: {failed['status'].iloc[0]}."]
-        return [f"No design is feasible{_under(output)}.", *_others(output, leaders_of(output))]
+        return [f"No design is feasible{_under(output)}.", *who_else(output)]
     usable = list(usable_lines(output))
     # Where the question is of noise, separations matter where another CFA begins to lead.
     series = usable + [lead_sentence(s) for s in series_figures(output) if not usable or len(leads_of(s)) > 1]
     if series and output.best.empty:
         return series
-    leaders = leaders_of(output)
-    return [*_best(output, leaders), *_others(output, leaders), *series]
+    return [*_best(output, leaders_of(output)), *who_else(output), *series]
 
 
 def _under(output: Output) -> str:
@@ -83,10 +82,13 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     lights = best.get(limited_by_name(separation.pair)) if separation.pair else None
     search = output.provenance.search
     proven = None if search is None or best["kind"] not in (SWEPT, FOUND) else search.limit_proven
+    parts = []
     if proven is not None and output.goal.name == separation.name:
-        yield f"No filter in its place exceeds {separation.told(proven)} (proven, before quantization)."
+        parts.append(f"No filter in its place exceeds {separation.told(proven)} (proven, before quantization).")
     if isinstance(lights, str):
-        yield f"Its limit is set by two lights: {lights}."
+        parts.append(f"The two lights that limit it are {lights}.")
+    if parts:
+        yield " ".join(parts)
     yield from _unseen(output, best)
 
 
@@ -116,7 +118,8 @@ def _times(output: Output, best: Row, plain: Row) -> str:
 
 def who_else(output: Output) -> list[str]:
     """Who separates most, and most per light, where that is not the best one under the constraints."""
-    return list(_others(output, leaders_of(output)))
+    found = " ".join(_others(output, leaders_of(output)))
+    return [found] if found else []
 
 
 def _others(output: Output, leaders: Leaders) -> Iterator[str]:

@@ -105,7 +105,7 @@ def _html(output: Output, images: Sequence[tuple[str, str]], published: pd.DataF
         comparison=rows(tables.comparison_table(output)),
         best=rows(tables.best_table(output)),
         recognition=rows(told_apart_table(output)),
-        left_out=rows(tables.left_out_table(output)),
+        left_out=rows(tables.worst_left_out(output)),
         geometry=rows(tables.geometry_table(output)),
         published=rows(published),
         constraints=[f"{output.words(name)} {bound}" for name, bound in output.constraints.items()],

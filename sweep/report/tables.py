@@ -59,7 +59,7 @@ def _held_out(output: Output) -> list[str]:
     return [name for each in output.distances if (name := HELD_OUT + each) in output.table]
 
 
-def left_out_table(output: Output, most: int = 10) -> pd.DataFrame:
+def worst_left_out(output: Output, most: int = 10) -> pd.DataFrame:
     """The lights whose absence from the search costs most."""
     if output.left_out is None:
         return pd.DataFrame()

@@ -33,7 +33,15 @@ def comparison(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
     found = pd.read_parquet(folder / "paper_comparison.parquet")
     pd.testing.assert_frame_equal(found, pd.read_csv(folder / "paper_comparison.csv"), check_dtype=False)
     assert {path.name for path in (folder / "figures").glob("*.png")} == {
-        *("sensor.png", "signals.png", "chart.png", "filters-1.png", "clouds-cfas.png", "clouds-designs.png")
+        *(
+            "sensor.png",
+            "signals.png",
+            "chart.png",
+            "tiles.png",
+            "filters-1.png",
+            "clouds-cfas.png",
+            "clouds-designs.png",
+        )
     }
     return found
 

@@ -64,8 +64,9 @@ def test_nobody_beats_the_best_without_being_named(finished: Finished, name: str
     assert leaders.chosen is not None
     rows = table[(table["scenario"] == leaders.scenario) & (table[separation] > leaders.chosen[separation])]
     if len(rows):
-        best = rows.sort_values(separation).iloc[-1]
-        assert (best["name"] if isinstance(best["name"], str) else f"esign {best['design_id']}") in text
+        best = rows[rows[separation] == rows[separation].max()]
+        names = best["name"].astype(object).where(best["name"].notna(), "esign " + best["design_id"].astype(str))
+        assert any(name in text for name in names)
 
 
 def test_the_large_numbers_compare_with_the_plain_cfa_that_separates_most(finished: Finished) -> None:
@@ -181,4 +182,4 @@ def test_a_plain_cfa_that_is_better_is_named_first(tmp_path: Path) -> None:
     ratio = re.search(r"([\d.]+) times the separation of RGGB", said[0])
     assert ratio is not None
     assert float(ratio[1]) < 1
-    assert any(line.startswith("RGGB separates most of all: 139 DN") for line in said)
+    assert "RGGB separates most of all: 139 DN" in " ".join(said)
