@@ -22,16 +22,17 @@ def comparison_table(output: Output) -> pd.DataFrame:
 
 
 def best_table(output: Output, most: int = 12) -> pd.DataFrame:
-    """The best feasible designs with their parameters, the first ones of very many."""
+    """The best feasible designs with their parameters, the first ones of very many, and what the study asks for."""
     ranked = output.best.head(most)
     used = [name for name in output.parameters if ranked[name].nunique() > 1 or len(ranked) == 1]
     keys = ["design_id", "kind", "cfa", "scenario"]
+    asked = [name for name in (*output.light, *output.further) if name not in _first(output)]
     columns = [
         *keys,
         *_first(output),
         *_held_out(output),
         *used[:_MOST_PARAMETERS],
-        *_rest(output),
+        *asked,
         "pareto",
         *_limits(output),
     ]

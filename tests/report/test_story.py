@@ -133,7 +133,7 @@ def series(**lines: list[float]) -> SeriesFigure:
     [
         (
             series(A=[90, 81, 61], B=[80, 77, 68]),
-            "Yellow/red CSD over distance: from 100 m to 200 m A leads (81 DN at 200 m, B 77 DN); "
+            "Yellow/red CSD over distance: up to 200 m A leads (81 DN at 200 m, B 77 DN); "
             "at 300 m B leads (68 DN, A 61 DN).",
         ),
         (
@@ -142,7 +142,7 @@ def series(**lines: list[float]) -> SeriesFigure:
         ),
         (
             series(A=[0.2, 9, 8], B=[0.1, 2, 8]),
-            "Yellow/red CSD over distance: at 100 m nobody has 1 DN; from 200 m to 300 m A leads (8.0 DN at 300 m, B 8.0 DN).",
+            "Yellow/red CSD over distance: at 100 m nobody has 1 DN; from 200 m on A leads (8.0 DN at 300 m, B 8.0 DN).",
         ),
         (series(A=[5, 5, 5]), "Yellow/red CSD over distance: everywhere A leads (5.0 DN at 300 m)."),
     ],
