@@ -192,7 +192,9 @@ def large_numbers(output: Output) -> list[LargeNumber]:
     ]
     search = output.provenance.search
     if search is not None and search.limit_proven is not None and output.goal.name == separation.name:
-        left = separation.told(max(0.0, search.limit_proven - value))
+        # Of the numbers as they stand beside each other, so that a reader's own difference is the same.
+        digits = 0 if value >= 10 else separation.digits
+        left = separation.told(max(0.0, round(search.limit_proven, digits) - round(value, digits)))
         limit = f"{separation.told(search.limit_proven)}: no filter exceeds it"
         numbers.append(LargeNumber(left, "below the limit of any filter", limit))
     elif best[measure] == best[measure]:

@@ -10,7 +10,7 @@ from ..metrics.limiting import limited_by_name
 from ..metrics.quantity import HELD_OUT
 from ..results.output import Output
 
-_MOST_PARAMETERS = 10
+_MOST_PARAMETERS = 7
 _DIGITS = 4
 """Of columns that are no quantities."""
 
