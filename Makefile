@@ -4,6 +4,7 @@
 # make slow                  run the tests that take minutes
 # make check                 ruff, mypy --strict
 # make accuracy              run the hard cases, measure what accuracy costs in time, outputs/accuracy/accuracy.html
+# make documents           print the tables of studies/README.md and outputs/README.md anew
 # make bench                 measure speed, JSON in outputs/bench
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
   $$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
@@ -14,7 +15,7 @@ ARGS ?=
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 TESTS := $(ONE_THREAD) $(BIN)/python -m pytest -n logical --dist
 
-.PHONY: study report test slow accuracy check bench clean
+.PHONY: study report test slow accuracy check documents bench clean
 .DELETE_ON_ERROR:
 
 study: $(VENV)/.ready
@@ -37,6 +38,9 @@ check: $(VENV)/.ready-dev
 	$(BIN)/ruff check sweep tests
 	$(BIN)/ruff format --check sweep tests
 	$(BIN)/mypy
+
+documents: $(VENV)/.ready-dev
+	$(BIN)/python -m tests.printed
 
 bench: $(VENV)/.ready-bench
 	$(ONE_THREAD) $(BIN)/python tests/bench.py $(ARGS)

@@ -24,6 +24,9 @@ _MOST_DRAWN = 200
 _MOST_POINTS = 4000
 _TICKS_NM = (460, 480, 490, 500, 510, 520, 540, 560, 580, 600, 620, 700)
 _CORNER_X, _CORNER_Y = (0.53, 0.74), (0.25, 0.46)
+_LABEL_WIDTH, _LABEL_HEIGHT = 0.2, 0.028
+"""Names whose points are nearer than this, in x and y, stand one above the other."""
+_MIDDLE_X = 0.33
 _INSET = (0.49, 0.55, 0.35, 0.35)
 Paint = tuple[float, ...] | str
 
@@ -114,9 +117,14 @@ def _draw_diagram(axes: Axes, colors: Mapping[str, LightColor | None], paints: M
     if len(named) <= _MOST_NAMED:
         inside = {name: color.xy for name, color in named.items() if _in_corner(*color.xy)}
         for rank, name in enumerate(sorted(inside, key=lambda name: inside[name][1])):
-            _name(corner, name, inside[name], (0.02, 0.05 + 0.065 * rank))
-        for name in named.keys() - inside.keys():
-            _name(axes, name, named[name].xy)
+            _in_corner_of(corner, name, inside[name], (0.02, 0.05 + 0.065 * rank))
+        others = sorted(named.keys() - inside.keys(), key=lambda name: named[name].xy[1])
+        taken: list[tuple[float, float]] = []
+        for name in others:
+            x, y = named[name].xy
+            near = [at for u, at in taken if abs(u - x) < _LABEL_WIDTH and abs(at - y) < _LABEL_HEIGHT]
+            taken.append((x, max(near, default=y - _LABEL_HEIGHT) + _LABEL_HEIGHT))
+            _beside(axes, name, named[name].xy, taken[-1][1])
     for tick in _TICKS_NM:
         x, y = spectral_locus()[int(tick - VISIBLE.start_nm)]
         axes.plot(x, y, ".", color="#555555", markersize=4)
@@ -141,13 +149,16 @@ def _in_corner(x: float, y: float) -> bool:
     return _CORNER_X[0] <= x <= _CORNER_X[1] and _CORNER_Y[0] <= y <= _CORNER_Y[1]
 
 
-def _name(axes: Axes, name: str, xy: tuple[float, float], place: tuple[float, float] | None = None) -> None:
-    """Write a light's name beside its point, or at a place of the panel (0..1) with a line to the point."""
-    if place is None:
-        text = axes.annotate(_short(name), xy, (-5, 0), textcoords="offset points", fontsize=7, ha="right", va="center")
-    else:
-        line = {"arrowstyle": "-", "color": "#999999", "linewidth": 0.5}
-        text = axes.annotate(
-            _short(name), xy, place, textcoords="axes fraction", fontsize=7, va="center", arrowprops=line
-        )
+def _beside(axes: Axes, name: str, xy: tuple[float, float], height: float) -> None:
+    """Write a light's name beside its point, on the side where the diagram has room, at a height of the diagram."""
+    right = xy[0] < _MIDDLE_X
+    at = (xy[0] + (0.012 if right else -0.012), height)
+    side = "left" if right else "right"
+    axes.annotate(_short(name), at, fontsize=7, ha=side, va="center", parse_math=False, zorder=6)
+
+
+def _in_corner_of(axes: Axes, name: str, xy: tuple[float, float], place: tuple[float, float]) -> None:
+    """Write a light's name at a place of the panel (0..1), with a line to its point."""
+    line = {"arrowstyle": "-", "color": "#999999", "linewidth": 0.5}
+    text = axes.annotate(_short(name), xy, place, textcoords="axes fraction", fontsize=7, va="center", arrowprops=line)
     text.set_parse_math(False)

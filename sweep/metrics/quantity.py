@@ -24,6 +24,8 @@ WORST = "worst_"
 BEST_PLACE = "best_place_"
 """How the name of a CSD's largest value over the places where the light may fall on the mosaic begins, each at its
 worst moment of a pulsed light."""
+HELD_OUT = "held_out_"
+"""How the name of a CSD of lights that the study does not optimize for begins."""
 DN = "DN"
 """Unit of what is measured in digital numbers."""
 Columns = dict[str, FloatArray]
@@ -65,6 +67,10 @@ class Column:
         """A value with its unit, with `digits` after the point instead of its own; a ratio always has its own."""
         own = self.digits if digits is None else digits
         return f"{value:.{own}f} {self.unit}" if self.unit else f"{value:.{self.digits}f}"
+
+    def told(self, value: float) -> str:
+        """A value as sentences, plots and large numbers say it: in DN whole from 10 on."""
+        return self.amount(value, 0 if self.unit == DN and abs(value) >= 10 else None)
 
 
 @dataclass(frozen=True)

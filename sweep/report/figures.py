@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import itertools
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,7 +15,6 @@ from ..types import FloatArray, IndexArray
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.patches import Rectangle
 
 COLORS = {
     "infeasible": "#b8b8b8",
@@ -25,6 +23,7 @@ COLORS = {
     "best": "#d55e00",
     "named": "#000000",
     "reference": "#7a7a7a",
+    "limit": "#009e73",
 }
 """Okabe and Ito's palette, which the color-blind can tell apart; every group has a marker of its own, too."""
 CURVE_COLORS = {
@@ -36,9 +35,8 @@ CURVE_COLORS = {
     "Cy": "#17a2a2",
     "C": "#555555",
 }
-LINE_COLORS = {"front of the search": "#d55e00", "limit of any filter, unquantized": "#009e73"}
-LINE_STEPS = {"front of the search": "steps-pre", "limit of any filter, unquantized": "steps-post"}
-"""Between two levels of sensitivity holds what was found at the next one, and what was proven at the last one."""
+TRACED_NAME, LIMIT_NAME = "found by the search", "limit of any filter, unquantized"
+"""What a search found at levels of sensitivity, and what is proven there."""
 TYPE_COLORS = {"green": "#009e73", "yellow": "#c9a800", "orange": "#e66100", "red": "#b2182b"}
 CURVE_CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 _LABEL_BOX = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0}
@@ -58,13 +56,18 @@ class Points:
 
 @dataclass(frozen=True)
 class ParetoFigure:
-    """CSD against sensitivity. `levels` are CFAs without a modified channel: name -> CSD. `lines` are trade-offs."""
+    """CSD against the sensitivity of the modified channel.
+
+    `levels`: CFAs without a modified channel, name -> CSD. `traced`: what the search found at each level of
+    sensitivity; `limit`: what no filter exceeds there.
+    """
 
     title: str
     x_label: str
     y_label: str
     groups: Mapping[str, Points]
-    lines: Mapping[str, Points]
+    traced: Points | None
+    limit: Points | None
     levels: Mapping[str, float]
     bound: float | None
     bound_text: str = ""
@@ -74,7 +77,8 @@ class ParetoFigure:
 class CurvesFigure:
     """Curves over wavelength: name -> ndarray[n_wavelengths], or ndarray[n, n_wavelengths] for a bundle of one name.
 
-    `dashed` names those drawn dashed; `colors` overrides the usual colors.
+    `dashed` names those drawn dashed; `colors` overrides the usual colors. `shades`: spectra of lights with a peak of 1
+    by signal type, which stand behind the curves.
     """
 
     title: str
@@ -83,24 +87,7 @@ class CurvesFigure:
     curves: Mapping[str, FloatArray]
     dashed: Sequence[str] = ()
     colors: Mapping[str, str] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Cloud:
-    """Signals of one design in the plane of two channels: signal type -> x and y, DN, each ndarray[n]."""
-
-    title: str
-    x_label: str
-    y_label: str
-    types: Mapping[str, tuple[FloatArray, FloatArray]]
-
-
-@dataclass(frozen=True)
-class ChartFigure:
-    """The color checker chart: signal type -> sRGB colors of its patches, ndarray[n, 3]."""
-
-    title: str
-    patches: Mapping[str, FloatArray]
+    shades: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
 def thin(points: Points, most: int = _DRAWN_POINTS) -> Points:
@@ -120,7 +107,7 @@ def even(size: int, most: int) -> IndexArray:
 
 
 def draw_pareto(figure: ParetoFigure) -> Figure:
-    """Draw the trade-off; infeasible and feasible designs, front, optimum and named designs each have their marker."""
+    """Draw the trade-off; infeasible and feasible designs, front, best and named designs each have their marker."""
     figure_, axes = canvas(8.0, 5.0)
     styles: dict[str, dict[str, Any]] = {
         "infeasible": {"marker": "x", "s": 9, "alpha": 0.45, "linewidths": 0.6, "zorder": 1},
@@ -142,9 +129,13 @@ def draw_pareto(figure: ParetoFigure) -> Figure:
             )
             for x, y, label in zip(points.x, points.y, points.labels, strict=False):
                 axes.annotate(label, (x, y), textcoords="offset points", xytext=(7, 5), fontsize=9, zorder=7)
-    for (name, points), style in zip(figure.lines.items(), itertools.cycle(("-", "--"))):
-        drawn: Any = {"drawstyle": LINE_STEPS.get(name, "default"), "linewidth": 1.5, "zorder": 4}
-        axes.plot(points.x, points.y, style, color=LINE_COLORS.get(name, "black"), label=name, **drawn)
+    if figure.traced is not None:
+        axes.plot(
+            figure.traced.x, figure.traced.y, "+", color=COLORS["best"], markersize=8, label=TRACED_NAME, zorder=4
+        )
+    if figure.limit is not None:
+        style: dict[str, Any] = {"color": COLORS["limit"], "linestyle": "--", "linewidth": 1.5, "zorder": 4}
+        axes.plot(figure.limit.x, figure.limit.y, label=LIMIT_NAME, drawstyle="steps-post", **style)
     low, high = axes.get_xlim()
     heights = sorted(figure.levels.items(), key=lambda item: item[1])
     for _, level in heights:
@@ -187,6 +178,11 @@ def _level_labels(heights: Sequence[tuple[str, float]], limits: tuple[float, flo
 def draw_curves(figure: CurvesFigure) -> Figure:
     """Draw curves over wavelength."""
     figure_, axes = canvas(8.0, 4.0)
+    top = max((float(values.max(initial=0.0)) for values in figure.curves.values()), default=1.0)
+    for name, shade in figure.shades.items():
+        axes.fill_between(
+            figure.wavelength_nm, top * shade, color=TYPE_COLORS.get(name, "#777777"), alpha=0.12, linewidth=0
+        )
     spare = iter(CURVE_CYCLE * (1 + len(figure.curves) // len(CURVE_CYCLE)))
     for name, values in figure.curves.items():
         color = figure.colors.get(name) or CURVE_COLORS.get(name) or next(spare)
@@ -204,69 +200,25 @@ def draw_curves(figure: CurvesFigure) -> Figure:
     return figure_
 
 
-def draw_clouds(rows: Sequence[Sequence[Cloud]], title: str, top_dn: float) -> Figure:
-    """A row of panels per design, all with the same axes up to `top_dn`, so that distances compare by eye."""
-    most = max(len(row) for row in rows)
-    figure = _figure(3.1 * most + 1.0, 2.9 * len(rows) + 0.6)
-    panels = figure.subplots(len(rows), most, squeeze=False)
-    for line, row in zip(panels, rows, strict=True):
-        for axes in line[len(row) :]:
-            axes.set_axis_off()
-        for axes, cloud in zip(line, row, strict=False):
-            _decorate(axes)
-            for (name, (x, y)), marker in zip(cloud.types.items(), itertools.cycle("osD^vP")):
-                axes.scatter(x, y, s=13, marker=marker, color=TYPE_COLORS.get(name), label=name, linewidths=0)
-            axes.set(xlim=(0, top_dn), ylim=(0, top_dn), aspect="equal", xlabel=cloud.x_label, ylabel=cloud.y_label)
-            axes.set_title(cloud.title, fontsize=9)
-    panels[0][0].legend(fontsize=7, frameon=False)
-    figure.suptitle(title)
-    return figure
-
-
-def draw_chart(chart: ChartFigure) -> Figure:
-    """Draw the patches, a row per signal type, and the gray reference steps."""
-    figure = _figure(8.0, 0.55 * (len(chart.patches) + 1) + 0.8)
-    axes = figure.add_subplot()
-    steps = np.linspace(1.0, 0.1, 6)
-    rows = [*chart.patches.items(), ("gray reference", np.repeat(steps[:, None], 3, axis=1))]
-    for height, (_, colors) in enumerate(rows):
-        for place, color in enumerate(colors):
-            axes.add_patch(_rectangle(place, -height, color))
-    axes.set_xlim(-0.1, max(len(colors) for _, colors in rows))
-    axes.set_ylim(-len(rows) + 0.9, 1.0)
-    axes.set_yticks([0.45 - height for height in range(len(rows))], [name for name, _ in rows])
-    axes.set_xticks([])
-    axes.set_aspect("equal")
-    for side in axes.spines.values():
-        side.set_visible(False)
-    axes.set_title(chart.title)
-    return figure
-
-
-def _rectangle(x: float, y: float, color: FloatArray) -> Rectangle:
-    from matplotlib.patches import Rectangle  # noqa: PLC0415  (slow to import)
-
-    return Rectangle((x, y), 0.9, 0.9, facecolor=tuple(color))
-
-
 def canvas(width_in: float, height_in: float) -> tuple[Figure, Axes]:
     """An empty figure with one pair of axes, sizes in inches."""
-    figure = _figure(width_in, height_in)
+    figure = empty_figure(width_in, height_in)
     axes = figure.add_subplot()
-    _decorate(axes)
+    decorate(axes)
     return figure, axes
 
 
 def canvas_grid(rows: int, columns: int, width_in: float, height_in: float) -> tuple[Figure, list[Axes]]:
     """An empty figure with a grid of axes, row by row, sizes in inches."""
-    figure = _figure(width_in, height_in)
+    figure = empty_figure(width_in, height_in)
     panels = [figure.add_subplot(rows, columns, at + 1) for at in range(rows * columns)]
     for axes in panels:
-        _decorate(axes)
+        decorate(axes)
     return figure, panels
 
 
-def _figure(width_in: float, height_in: float) -> Figure:
+def empty_figure(width_in: float, height_in: float) -> Figure:
+    """A figure without axes, sizes in inches."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415  (slow to import)
     from matplotlib.figure import Figure  # noqa: PLC0415
 
@@ -275,7 +227,8 @@ def _figure(width_in: float, height_in: float) -> Figure:
     return figure
 
 
-def _decorate(axes: Axes) -> None:
+def decorate(axes: Axes) -> None:
+    """The grid and the open frame of every figure."""
     axes.grid(visible=True, color="#e4e4e4", linewidth=0.6)
     axes.set_axisbelow(True)
     for side in ("top", "right"):

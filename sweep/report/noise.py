@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pandas as pd
@@ -25,8 +25,8 @@ def _allowed(output: Output) -> float | None:
 
 
 def all_series(output: Output) -> list[SeriesFigure]:
-    """Every figure of a quantity over scenarios: separations, then errors and accuracies."""
-    return [*series_figures(output), *noise_figures(output)]
+    """Every figure of a quantity over scenarios: errors and accuracies, if asked for, then separations."""
+    return [*noise_figures(output), *series_figures(output)]
 
 
 def noise_figures(output: Output) -> Iterator[SeriesFigure]:
@@ -39,7 +39,7 @@ def noise_figures(output: Output) -> Iterator[SeriesFigure]:
         x = np.array(list(scenarios.values()))
         title = f"{output.study.study}: {base}"
         errors = {n: Line(np.maximum(y, _LEAST), None) for n, y in over_series(rows, scenarios, STATE_ERROR).items()}
-        label = f"how often the worst pair of states is confused ({_LEAST:g}: or less)"
+        label = "error of the worst pair of states"
         yield SeriesFigure(title, key, label, x, errors, "", log_y=True, level=allowed)
         for rule in CLASSIFIERS if output.recognition is not None else ():
             lines = {n: Line(y, None) for n, y in _accuracies(output, scenarios, rule).items()}
@@ -54,19 +54,27 @@ def _accuracies(output: Output, scenarios: dict[str, float], rule: str) -> dict[
 
 
 def usable_lines(output: Output) -> Iterator[str]:
-    """For each series of scenarios, the numbers at which each design is usable."""
+    """For each series of scenarios, the numbers at which each design is usable; designs with the same ones together."""
     allowed = _allowed(output)
     if allowed is None:
         return
-    rows = output.few
-    for (base, key), scenarios in scenario_series(output).items():
-        each = over_series(rows, scenarios, STATE_ERROR)
-        found = [f"{name} {_range(np.array(list(scenarios.values())), y <= allowed)}" for name, y in each.items()]
+    for series in noise_figures(output):
+        if series.level is None:
+            continue
+        name, unit = series.quantity
+        ranges: dict[str, list[str]] = {}
+        for design, line in series.lines.items():
+            ranges.setdefault(_range(series.x, line.y <= allowed, unit), []).append(design)
+        found = [f"{_listed(designs)} {where}" for where, designs in ranges.items()]
         if found:
-            yield f"{base}: states are confused at most {allowed:g} of the time at {key} " + ", ".join(found) + "."
+            yield f"Over {name}, noise confuses states at most {allowed:g} of the time: {'; '.join(found)}."
 
 
-def _range(x: FloatArray, usable: np.ndarray) -> str:
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def _range(x: FloatArray, usable: np.ndarray, unit: str) -> str:
     """Where among the numbers `x` (ascending) a design is usable, in words."""
     if usable.all():
         return "everywhere"
@@ -74,11 +82,11 @@ def _range(x: FloatArray, usable: np.ndarray) -> str:
         return "nowhere"
     ends = np.flatnonzero(np.diff(usable))
     if len(ends) == 1:
-        at = ends[0]
+        at, of = ends[0], f" {unit}".rstrip()
         if usable[0]:
-            return f"up to {x[at]:g} (not at {x[at + 1]:g})"
-        return f"from {x[at + 1]:g} (not at {x[at]:g})"
-    return "at " + " ".join(f"{v:g}" for v in x[usable])
+            return f"up to {x[at]:g}{of} (not at {x[at + 1]:g})"
+        return f"from {x[at + 1]:g}{of} (not at {x[at]:g})"
+    return f"at {' '.join(f'{v:g}' for v in x[usable])} {unit}".rstrip()
 
 
 def told_apart_table(output: Output) -> pd.DataFrame:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 import pyarrow as pa
 
+from ..metrics.objective import COMBINED
 from ..results.inventory import Inventory
 from ..results.lock import locked
 from ..results.names import FIGURES, REPORT, is_drawn
@@ -17,17 +18,26 @@ from ..results.profiles import profile_table
 from ..results.tables import FOUND, NAMED, PLAIN, csv_of, encoded
 from . import tables
 from . import values as content
-from .figures import draw_chart, draw_clouds, draw_curves, draw_pareto, rendered
+from .answer import answer_sentences, large_numbers
+from .figures import draw_curves, draw_pareto, rendered
+from .leaders import leaders_of
 from .noise import all_series, told_apart_table
+from .overview import draw_overview, overview_figure
 from .page_data import payload
 from .pages import inlined, library, page, rows, script
 from .published import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
 from .scenes import effect_table, scene_groups, scene_table
 from .series import draw_series
-from .summary import answer_sentences, counts_line, summary_lines
+from .signal_figures import draw_chart, draw_clouds
+from .summary import counts_line, summary_lines
+from .tiles import draw_tiles, tiles_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+_PICTURES = ("tiles", "sensor", "signals", "chart")
+"""Figures that the page shows as pictures; it draws all others itself."""
 
 
 def make_report(output: Output, *, mend: bool = False) -> None:
@@ -52,11 +62,11 @@ def _contents(output: Output, some: Iterable[str] | None) -> dict[str, bytes]:
     """The files of the report -> what they hold; `some` of them, or all, since the page has every picture in it."""
     images, contents = [], dict[str, bytes]()
     for name, caption, figure in _drawings(output):
-        where = name if name.startswith("pareto") else f"{FIGURES}/{name}"
+        where = name if name.startswith(("cfas", "pareto")) else f"{FIGURES}/{name}"
         for kind in ("png", "svg"):
             if some is None or {f"{where}.png", f"{where}.svg"} & {*some}:
                 contents[f"{where}.{kind}"] = rendered(figure, kind)
-        if some is None:
+        if some is None and name in _PICTURES:
             images.append((caption, inlined(contents[f"{where}.png"])))
     published = comparison_with_published(output)
     if len(published):
@@ -75,11 +85,14 @@ def _html(output: Output, images: Sequence[tuple[str, str]], published: pd.DataF
         study=output.study,
         folder=output.folder.as_posix(),
         quoted=shlex.quote(output.folder.as_posix()),
-        objective=str(output.objective),
+        objective=_objective(output),
+        numbers_in="" if len(output.scenarios) == 1 or output.best.empty else f"in {leaders_of(output).scenario}",
+        series_first=bool(drawn["series"]) and output.best.empty,
         objective_words=output.goal.words,
         answer=answer_sentences(output),
+        numbers=large_numbers(output),
         counts=counts_line(output),
-        interactive=drawn if drawn["views"] or drawn["series"] else None,
+        interactive=drawn,
         profiles={cfa: rows(profile_table(found)) for cfa, found in output.profiles.items()},
         history=drawn["history"],
         plotly=library(),
@@ -92,26 +105,36 @@ def _html(output: Output, images: Sequence[tuple[str, str]], published: pd.DataF
         comparison=rows(tables.comparison_table(output)),
         best=rows(tables.best_table(output)),
         recognition=rows(told_apart_table(output)),
+        left_out=rows(tables.worst_left_out(output)),
         geometry=rows(tables.geometry_table(output)),
         published=rows(published),
-        constraints={name: str(bound) for name, bound in output.constraints.items()},
+        constraints=[f"{output.words(name)} {bound}" for name, bound in output.constraints.items()],
         summary=summary_lines(output),
         provenance=output.provenance.model_dump(mode="json"),
         limited=output.provenance.search is not None and output.provenance.search.limit_proven is not None,
     )
 
 
+def _objective(output: Output) -> str:
+    """What the study maximizes, in words, and where it is one column, how files call it."""
+    name = output.goal.name
+    words = str(output.objective) if output.goal.words == name else f"the {output.goal.words}"
+    return words if name in (words, COMBINED) else f"{words} ({name} in the files)"
+
+
 def _drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
     """(file name, caption, figure) of everything that is drawn."""
     scenario = output.scenarios[0]
     cfas = list(dict.fromkeys(m.cfa for m in content.modifications(output)))
-    for number, cfa in enumerate(cfas or [None]):
+    yield "cfas", "All CFAs", draw_overview(overview_figure(output, scenario))
+    for number, cfa in enumerate(content.traded_cfas(output)):
         figure = draw_pareto(content.pareto_figure(output, scenario, cfa))
-        yield ("pareto" if number == 0 else f"pareto-{number + 1}"), f"Trade-off{f' of {cfa}' if cfa else ''}", figure
+        yield ("pareto" if number == 0 else f"pareto-{number + 1}"), f"Trade-off of {cfa}", figure
     for number, cfa in enumerate(cfas):
         yield f"filters-{number + 1}", f"Filters of {cfa}", draw_curves(content.filters_figure(output, cfa))
     for number, series in enumerate(all_series(output)):
         yield f"series-{number + 1}", series.title, draw_series(series)
+    yield "tiles", "Tiles of the CFAs; a hatched pixel is modified", draw_tiles(tiles_figure(output))
     yield "sensor", "Quantum efficiency of the sensor", draw_curves(content.sensor_figure(output))
     yield "signals", "Spectra of the signals", draw_curves(content.lights_figure(output))
     yield "chart", "The color checker chart", draw_chart(content.chart_figure(output))

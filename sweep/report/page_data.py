@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..metrics.columns.color_separation import CSD
+from ..metrics.limiting import limited_by_name
 from ..metrics.pareto import knee
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
@@ -17,13 +19,14 @@ from . import values as content
 from .figures import COLORS, CURVE_COLORS, TYPE_COLORS, ParetoFigure, even
 from .history import history_of
 from .noise import all_series
+from .overview import OverviewFigure, overview_figure
 from .series import SeriesFigure
 
 _MOST_POINTS = 6_000
 """Swept designs of each group, feasible or not, that the page holds; the front and the named designs are all there."""
 _BEST_ROWS = 9
 _OF_PARAMETERS, _OF_OTHERS = 2, 4
-GROUPS = ("infeasible", "feasible", "front", "named", "best")
+GROUPS = ("infeasible", "feasible", "front", "named", "best", "plain")
 _PUBLISHED = "RYN_4Cy"
 _PUBLISHED_LABEL = "our counterpart of the paper's N_4"
 
@@ -44,10 +47,12 @@ def payload(output: Output) -> dict[str, Any]:
         "scenario": _words(rows["scenario"]),
         "cfa": _words(rows["cfa"]),
         "names": {str(at): _names(output, row) for at, row in enumerate(rows.to_dict("records")) if _is_named(row)},
+        "overviews": [_overview(output, scenario) for scenario in output.scenarios],
         "views": list(_views(output, rows)),
         "curves": _curves(output),
         "clouds": _clouds(output, rows),
         "cloud_scenario": output.scenarios[0],
+        "limited": _limited(output, rows),
         "profiles": _profiles(output),
         "history": _history(output),
         "front": _front(output, rows),
@@ -70,8 +75,8 @@ def _words(values: pd.Series) -> dict[str, Any]:
 
 
 def _rows(output: Output) -> pd.DataFrame:
-    """Designs to show: all on the front, named or found, and an even share of the others."""
-    table = output.table[(output.table["status"] == "ok") & (output.table["kind"] != PLAIN)]
+    """Rows to show: all CFAs, all designs on the front, named or found, and an even share of the others."""
+    table = output.table[output.table["status"] == "ok"]
     swept = table["kind"] == SWEPT
     always = ~swept | (table["pareto"] & table["feasible"])
     parts = [table[always], output.best.head(_BEST_ROWS)]
@@ -84,7 +89,8 @@ def _rows(output: Output) -> pd.DataFrame:
 def _groups(rows: pd.DataFrame) -> np.ndarray:
     """Index into GROUPS of each row."""
     front = rows["feasible"] & rows["pareto"]
-    return np.select([rows["kind"] == FOUND, rows["kind"] == NAMED, front, rows["feasible"]], [4, 3, 2, 1], default=0)
+    kinds = [rows["kind"] == kind for kind in (PLAIN, FOUND, NAMED)]
+    return np.select([*kinds, front, rows["feasible"]], [5, 4, 3, 2, 1], default=0)
 
 
 def _is_named(row: Mapping[Any, Any]) -> bool:
@@ -125,7 +131,7 @@ def _columns(output: Output, rows: pd.DataFrame) -> dict[str, dict[str, Any]]:
 def _views(output: Output, rows: pd.DataFrame) -> Iterator[dict[str, Any]]:
     """What is drawn around the points of each scenario and CFA: lines, levels of plain CFAs, bound, knee."""
     for scenario in output.scenarios:
-        for cfa in dict.fromkeys(m.cfa for m in content.modifications(output)):
+        for cfa in content.traded_cfas(output):
             figure = content.pareto_figure(output, scenario, cfa)
             yield {
                 "scenario": scenario,
@@ -133,12 +139,41 @@ def _views(output: Output, rows: pd.DataFrame) -> Iterator[dict[str, Any]]:
                 "title": figure.title,
                 "x_label": figure.x_label,
                 "y_label": figure.y_label,
-                "lines": {n: [p.x.tolist(), p.y.tolist()] for n, p in figure.lines.items()},
+                **_lines(figure),
                 "levels": {name: float(level) for name, level in figure.levels.items() if np.isfinite(level)},
                 "bound": figure.bound,
                 "bound_text": figure.bound_text,
                 "knee": _knee(figure, output, rows[(rows["scenario"] == scenario) & (rows["cfa"] == cfa)]),
             }
+
+
+def _lines(figure: ParetoFigure | OverviewFigure) -> dict[str, Any]:
+    """What the search found and the limit, as lists of x and y."""
+    both = {"traced": figure.traced, "limit": figure.limit}
+    return {name: None if p is None else [p.x.tolist(), p.y.tolist()] for name, p in both.items()}
+
+
+def _overview(output: Output, scenario: str) -> dict[str, Any]:
+    """What is drawn around the points of all CFAs of a scenario."""
+    figure = overview_figure(output, scenario)
+    words = {"title": figure.title, "x_label": figure.x_label, "y_label": figure.y_label}
+    return {"scenario": scenario, **words, **_lines(figure)}
+
+
+def _limited(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
+    """design_id -> the two lights that limit each CSD, in words, and those of the trade-off's CSD as (type, name)."""
+    columns = {
+        limited_by_name(c.pair): f"{c.words} limited by"
+        for c in output.columns.values()
+        if c.metric == CSD and c.pair is not None
+    }
+    found = {}
+    for row in rows.to_dict("records"):
+        texts = {words: row[name] for name, words in columns.items() if isinstance(row.get(name), str)}
+        if texts:
+            near = content.nearest_lights(output, row)
+            found[str(row["design_id"])] = {"texts": texts, "nearest": None if near is None else near}
+    return found
 
 
 def _knee(figure: ParetoFigure, output: Output, rows: pd.DataFrame) -> int | None:
@@ -162,6 +197,8 @@ def _curves(output: Output) -> dict[str, Any]:
         "sensor": {name: _packed(qe, "f4") for name, qe in curves.sensor.items()},
         "limits": {cfa: _packed(qe, "f4") for cfa, qe in curves.limits.items()},
         "designs": {str(at): [_packed(qe, "f4") for qe in made.values()] for at, made in curves.designs.items()},
+        "shades": {kind: _packed(shade, "f4") for kind, shade in content.light_shades(output).items()},
+        "plain": {cfa: content.channel_curves(output, cfa) for cfa in output.study.cfas},
         "ends": {cfa: content.end_curves(output, cfa) for cfa in dict.fromkeys(output.table["cfa"].astype(str))},
     }
 
@@ -169,11 +206,12 @@ def _curves(output: Output) -> dict[str, Any]:
 def _clouds(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
     """Signals' digital numbers of the kept designs: [n_channels x n_signals] each, channel by channel."""
     points = output.points[output.points["design_id"].isin(rows["design_id"])]
-    found: dict[str, Any] = {"designs": {}, "channels": {}, "types": []}
+    found: dict[str, Any] = {"designs": {}, "channels": {}, "types": [], "names": []}
     for design, own in points.groupby("design_id", sort=False):
         channels = list(dict.fromkeys(own["channel"]))
         dn = own["dn"].to_numpy(dtype=float).reshape(-1, len(channels))
         found["types"] = found["types"] or list(own["signal_type"].to_numpy().reshape(-1, len(channels))[:, 0])
+        found["names"] = found["names"] or list(own["signal"].to_numpy().reshape(-1, len(channels))[:, 0])
         cfa = str(rows.loc[rows["design_id"] == design, "cfa"].iloc[0])
         found["channels"][cfa] = channels
         found["designs"][str(design)] = _packed(dn.T, "f4")

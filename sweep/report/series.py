@@ -6,8 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pandas as pd
 
+from ..metrics.quantity import DN
 from ..types import FloatArray
 from .figures import CURVE_CYCLE, canvas, canvas_grid
 
@@ -16,6 +18,8 @@ if TYPE_CHECKING:
 
 _WIDE = 15.0
 _LEAST_DN = 1e-6
+_LEAST_LEAD = 1.0
+"""DN; who separates less is not said to lead."""
 _LABELS = {
     "distance_m": "distance / m",
     "exposure_s": "exposure / s",
@@ -23,7 +27,7 @@ _LABELS = {
     "intensity_cd": "luminous intensity / cd",
     "read_noise_e": "read noise / e",
     "dark_e_per_s": "dark current / (e/s)",
-    "level": "exposure: brightest channel on white / full scale",
+    "level": "exposure of the brightest channel on white / full scale",
 }
 
 
@@ -55,9 +59,75 @@ class SeriesFigure:
         return _LABELS.get(self.key, self.key)
 
     @property
+    def quantity(self) -> tuple[str, str]:
+        """Name and unit of the scenarios' number; the unit may be empty."""
+        name, _, unit = self.x_label.partition(" / ")
+        return name, unit.strip("()")
+
+    @property
     def log_x(self) -> bool:
         """Whether the numbers span more than a decade."""
         return bool(self.x.min() > 0 and self.x.max() / self.x.min() > _WIDE)
+
+
+def lead_sentence(series: SeriesFigure) -> str:
+    """Which design leads from where to where, with its value and its rival's where that ends."""
+    name, unit = series.quantity
+    what, _, dn = series.y_label.partition(" / ")
+    values = {design: np.nan_to_num(line.y, nan=-np.inf) for design, line in series.lines.items()}
+    leads = leads_of(series)
+
+    def at(place: int) -> str:
+        return f"{series.x[place]:g} {unit}".rstrip()
+
+    parts = []
+    for number, (leader, start, stop) in enumerate(leads):
+        first, last = start == 0, stop == len(series.x) - 1
+        span = f"at {at(start)}" if start == stop else f"from {at(start)}{' on' if last else f' to {at(stop)}'}"
+        span = ("everywhere" if last else f"up to {at(stop)}") if first and start != stop else span
+        if leader is None:
+            parts.append(f"{span} nobody has {_LEAST_LEAD:g} {dn}")
+            continue
+        following = None if last else leads[number + 1][0]
+        rival = following or _second(values, leader, stop)
+        parts.append(
+            f"{span} {leader} leads ({_told(values[leader][stop], dn)}{'' if start == stop else f' at {at(stop)}'}"
+        )
+        parts[-1] += f", {rival} {_told(values[rival][stop], dn)})" if rival else ")"
+    return f"{what[:1].upper()}{what[1:]} over {name}: {'; '.join(parts)}."
+
+
+def _told(value: float, unit: str) -> str:
+    return f"{value:.{0 if abs(value) >= 10 else 1}f} {unit}".rstrip()
+
+
+def _second(values: Mapping[str, FloatArray], leader: str | None, place: int) -> str | None:
+    others = {design: own[place] for design, own in values.items() if design != leader}
+    return max(others, key=lambda design: others[design]) if others and leader is not None else None
+
+
+def leads_of(series: SeriesFigure) -> list[tuple[str | None, int, int]]:
+    """(leader, its first place, its last place) in order; None where nobody has a DN.
+
+    Who led at the last place leads as long as nobody has more.
+    """
+    values = {design: np.nan_to_num(line.y, nan=-np.inf) for design, line in series.lines.items()}
+    least = _LEAST_LEAD if series.y_label.endswith(f" / {DN}") else 0.0
+    found: list[tuple[str | None, int, int]] = []
+    for place in range(len(next(iter(values.values())))):
+        most = max(own[place] for own in values.values())
+        before = found[-1][0] if found else None
+        if not most >= least or most == -np.inf:
+            leader = None
+        elif before is not None and values[before][place] == most:
+            leader = before
+        else:
+            leader = next(design for design, own in values.items() if own[place] == most)
+        if found and found[-1][0] == leader:
+            found[-1] = (leader, found[-1][1], place)
+        else:
+            found.append((leader, place, place))
+    return found
 
 
 def draw_series(series: SeriesFigure) -> Figure:

@@ -2,55 +2,15 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
-import numpy as np
-
 from ..results.facts import SearchFacts
 from ..results.output import Output
-from ..results.tables import FOUND, NAMED, SWEPT
-from .noise import usable_lines
+from ..results.tables import NAMED
+from .answer import answer_sentences
 from .published import comparison_lines, comparison_with_published
-from .series import SeriesFigure
 from .tables import geometry_table
-from .values import series_figures
 
 _MOST_PARAMETERS = 10
 _MOST_SCENARIOS = 8
-
-
-def answer_sentences(output: Output) -> list[str]:
-    """The question's answer: the best feasible design, and who leads over the scenarios, or in the only one."""
-    limits = " and ".join(f"{output.words(q)} {bound}" for q, bound in output.constraints.items())
-    under = f" with {limits}" if limits else ""
-    found = []
-    searched = output.kind(SWEPT, FOUND)
-    if len(searched) and output.best.empty:
-        failed = searched[searched["status"] != "ok"]
-        every = len(failed) == len(searched)
-        found.append(f"Every design failed: {failed['status'].iloc[0]}." if every else f"No design is feasible{under}.")
-    elif not output.best.empty:
-        best = output.best.iloc[0]
-        where = f", in {best['scenario']}" if len(output.scenarios) > 1 else ""
-        found.append(
-            f"The best {output.goal.words}{under} is {output.goal.amount(best[output.goal.name], 1)} "
-            f"(sensitivity {best['sensitivity']:.4f}, {best['cfa']}, found by the {best['kind']}{where})."
-        )
-    found += [_leaders(series) for series in series_figures(output)]
-    return found + (_scene_lines(output) if len(output.scenarios) == 1 else [])
-
-
-def _leaders(series: SeriesFigure) -> str:
-    """Which design has the largest separation from where to where."""
-    names = list(series.lines)
-    first = np.argmax([np.nan_to_num(line.y, nan=-np.inf) for line in series.lines.values()], axis=0)
-    starts = [0, *(np.flatnonzero(np.diff(first)) + 1), len(first)]
-    parts = []
-    for start, stop in pairwise(starts):
-        low, high = series.x[start], series.x[stop - 1]
-        parts.append(f"{names[first[start]]} {f'at {low:g}' if start + 1 == stop else f'from {low:g} to {high:g}'}")
-    what, unit = series.y_label.split(" / ")[0], series.x_label
-    return f"The largest {what} over {unit}: {', '.join(parts)}."
 
 
 def _scene_lines(output: Output) -> list[str]:
@@ -64,7 +24,7 @@ def _scene_lines(output: Output) -> list[str]:
             lines.append(f"({len(scenarios) - 6} more scenarios in the report.)")
             continue
         each = ", ".join(
-            f"{row['name']} {shown.amount(row[shown.name], 0)}"
+            f"{row['name']} {shown.told(row[shown.name])}"
             + (f" at {row['sensitivity']:.3f}" if row["kind"] == NAMED and len(scenarios) == 1 else "")
             for row in rows[(rows["scenario"] == name) & rows[shown.name].notna()].to_dict("records")
         )
@@ -76,15 +36,13 @@ def _scene_lines(output: Output) -> list[str]:
 def summary_lines(output: Output) -> list[str]:
     """What a run found and where its files are."""
     lines = answer_sentences(output)
-    if len(output.scenarios) > 1:
-        lines += _scene_lines(output)
+    lines += _scene_lines(output)
     if not output.best.empty:
         best = output.best.iloc[0]
         own = [name for name in output.parameters if best[name] == best[name]]
         found = ", ".join(f"{name} {best[name]:.2f}" for name in own[:_MOST_PARAMETERS])
         more = f" and {len(own) - _MOST_PARAMETERS} more" if len(own) > _MOST_PARAMETERS else ""
         lines.append(f"Parameters: {found}{more}.")
-    lines += usable_lines(output)
     for row in geometry_table(output).to_dict("records"):
         lines.append(
             f"{row['scenario']}: {row['distance_m']:g} m, {row['fov_deg']:g} deg: "
@@ -104,6 +62,11 @@ def summary_lines(output: Output) -> list[str]:
         least = output.provenance.hypervolume_least_sensitivity
         lines.append(f"Hypervolume (DN x sensitivity, above 0 and a sensitivity of {least:g}): {both}.")
     lines += [f"Note: {warning}." for warning in output.provenance.warnings]
+    ratio = output.study.lights.photon_ratio
+    if ratio is not None:
+        lines.append(
+            f"A light has {ratio:.4g} of the photons of the white patch (photon_ratio in study.resolved.yaml)."
+        )
     if output.provenance.sensor.surrogate or output.provenance.lights.surrogate:
         lines.append("Note: built-in curves are surrogates, modeled from stated parameters, not measured.")
     lines.append(f"Took {output.provenance.duration_s:.1f} s with {output.provenance.workers} workers.")

@@ -5,33 +5,66 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from ..metrics.columns.sensitivity import CFA_SENSITIVITY
+from ..metrics.limiting import limited_by_name
+from ..metrics.quantity import HELD_OUT
 from ..results.output import Output
 
+_MOST_PARAMETERS = 7
 _DIGITS = 4
 """Of columns that are no quantities."""
 
 
 def comparison_table(output: Output) -> pd.DataFrame:
-    """Plain CFAs, named designs and the search's answer with all CSDs and sensitivities."""
-    columns = ["name", "scenario", *output.distances, *output.light, *output.further, "feasible"]
+    """Plain CFAs, named designs and the search's answer with all CSDs, sensitivities and the lights that limit them."""
+    columns = ["name", "scenario", *_first(output), *_held_out(output), *_rest(output), "feasible", *_limits(output)]
     return _shown(output, output.few, columns)
 
 
 def best_table(output: Output, most: int = 12) -> pd.DataFrame:
-    """The best feasible designs with their parameters."""
+    """The best feasible designs with their parameters, the first ones of very many, and what the study asks for."""
     ranked = output.best.head(most)
+    used = [name for name in output.parameters if ranked[name].nunique() > 1 or len(ranked) == 1]
+    keys = ["design_id", "kind", "cfa", "scenario"]
+    asked = [name for name in (*output.light, *output.further) if name not in _first(output)]
     columns = [
-        "design_id",
-        "kind",
-        "cfa",
-        "scenario",
-        *output.parameters,
-        *output.distances,
-        *output.light,
-        *output.further,
+        *keys,
+        *_first(output),
+        *_held_out(output),
+        *used[:_MOST_PARAMETERS],
+        *asked,
         "pareto",
+        *_limits(output),
     ]
     return _shown(output, ranked, columns)
+
+
+def _first(output: Output) -> list[str]:
+    """The separation of the trade-off and the light of the CFA."""
+    return [output.trade_off[0].name, CFA_SENSITIVITY]
+
+
+def _rest(output: Output) -> list[str]:
+    """All other CSDs and sensitivities, and what constraints and objective name."""
+    return [n for n in (*output.light, *output.further, *output.distances) if n not in _first(output)]
+
+
+def _limits(output: Output) -> list[str]:
+    """The column of the two lights that limit the separation of the trade-off."""
+    pair = output.trade_off[0].pair
+    return [] if pair is None else [limited_by_name(pair)]
+
+
+def _held_out(output: Output) -> list[str]:
+    """Columns of the CSDs of other lights, of those that the study asks for."""
+    return [name for each in output.distances if (name := HELD_OUT + each) in output.table]
+
+
+def worst_left_out(output: Output, most: int = 10) -> pd.DataFrame:
+    """The lights whose absence from the search costs most."""
+    if output.left_out is None:
+        return pd.DataFrame()
+    return output.left_out.nlargest(most, "fall").round(1)
 
 
 def geometry_table(output: Output) -> pd.DataFrame:
@@ -55,4 +88,9 @@ def _shown(output: Output, rows: pd.DataFrame, columns: list[str]) -> pd.DataFra
             own = output.columns.get(column)
             shown[column] = shown[column].round(_DIGITS if own is None else own.digits)
     several = rows["scenario"].nunique() > 1
-    return shown if several else shown.drop(columns="scenario")
+    shown = shown if several else shown.drop(columns="scenario")
+    words = {name: output.words(name).replace("_", " ") for name in columns}
+    separation = output.trade_off[0]
+    words |= dict.fromkeys(_limits(output), f"{separation.words} limited by")
+    words |= {name: f"{output.words(name.removeprefix(HELD_OUT))}, other lights" for name in _held_out(output)}
+    return shown.rename(columns=words)

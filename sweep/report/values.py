@@ -3,27 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from ..camera.mosaic import Mosaic
 from ..curves.color import display_colors
+from ..metrics.limiting import BETWEEN, limited_by_name
 from ..metrics.quantity import Column
 from ..results.facts import Origin
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
 from ..study.schema import Modification
-from .figures import TYPE_COLORS, ChartFigure, Cloud, CurvesFigure, ParetoFigure, Points
+from .figures import LIMIT_NAME, TYPE_COLORS, CurvesFigure, ParetoFigure, Points
 from .names import label
 from .series import Line, SeriesFigure
+from .signal_figures import ChartFigure, Cloud
 
-LIMIT_NAME = "limit of any filter, unquantized"
+Nearest = tuple[tuple[str, str], tuple[str, str], str]
+"""(type, name) of two lights, and their distance in words."""
+_LEAST_RANGE = 1e-3
+"""Designs whose sensitivities differ by less do not trade it for anything."""
 
 
-def pareto_figure(output: Output, scenario: str, cfa: str | None) -> ParetoFigure:
-    """CSD against sensitivity in a scenario, for the designs of one CFA (None: named designs of any CFA)."""
+def pareto_figure(output: Output, scenario: str, cfa: str) -> ParetoFigure:
+    """CSD against sensitivity in a scenario, for the designs of one CFA."""
     table = output.table[(output.table["scenario"] == scenario) & (output.table["status"] == "ok")]
-    designs = table if cfa is None else table[table["cfa"] == cfa]
+    designs = table[table["cfa"] == cfa]
     swept, named, found = (designs[designs["kind"] == kind] for kind in (SWEPT, NAMED, FOUND))
     references = table[table["kind"] == PLAIN]
     separation, sensitivity = output.trade_off
@@ -33,20 +40,21 @@ def pareto_figure(output: Output, scenario: str, cfa: str | None) -> ParetoFigur
         "feasible": _points(output, swept[swept["feasible"] & ~front]),
         "front": _points(output, swept[front]),
         "named": _points(output, named, list(named["name"])),
-        "best": _points(output, found, [separation.amount(v, 0) for v in found[separation.name]]),
+        "best": _points(output, found, [separation.told(v) for v in found[separation.name]]),
     }
     bound = output.constraints.get(sensitivity.name)
-    limit = None if bound is None else bound.min
-    where = "" if cfa is None else f", {cfa}"
+    least = None if bound is None else bound.min
+    traced, limit = _trade_offs(output, scenario, cfa)
     return ParetoFigure(
-        title=f"{output.study.study}{where}: what separation costs in sensitivity",
+        title=f"{output.study.study}, {cfa}: what separation costs in sensitivity",
         x_label=_whole_words(output, sensitivity),
         y_label=separation.axis,
         groups=groups,
-        lines=_trade_offs(output, scenario, cfa),
+        traced=traced,
+        limit=limit,
         levels=dict(zip(references["cfa"], references[separation.name], strict=True)),
-        bound=limit,
-        bound_text="" if limit is None else f"{sensitivity.words} >= {limit:g}",
+        bound=least,
+        bound_text="" if least is None else f"{sensitivity.words} >= {least:g}",
     )
 
 
@@ -56,19 +64,27 @@ def _whole_words(output: Output, column: Column) -> str:
     return column.words.removesuffix(plain.words) + plain.meaning
 
 
-def _trade_offs(output: Output, scenario: str, cfa: str | None) -> dict[str, Points]:
+def _trade_offs(output: Output, scenario: str, cfa: str) -> tuple[Points | None, Points | None]:
     """What the search traced, and the limit, where the search is of this CFA and scenario."""
     search = output.provenance.search
     if output.front is None or search is None or search.scenario != scenario:
-        return {}
+        return None, None
     if cfa not in set(output.kind(FOUND)["cfa"]):
-        return {}
+        return None, None
     traced = output.front.dropna(subset=["objective"])
     bounded = output.front.dropna(subset=["limit"])
-    lines = {"front of the search": Points(traced["sensitivity"].to_numpy(), traced["objective"].to_numpy())}
-    if len(bounded):
-        lines[LIMIT_NAME] = Points(bounded["sensitivity_min"].to_numpy(), bounded["limit"].to_numpy())
-    return lines
+    limit = Points(bounded["sensitivity_min"].to_numpy(), bounded["limit"].to_numpy()) if len(bounded) else None
+    return Points(traced["sensitivity"].to_numpy(), traced["objective"].to_numpy()), limit
+
+
+def trades_off(output: Output, cfa: str) -> bool:
+    """Whether designs of a CFA give sensitivity for separation: swept ones, or what a search traced."""
+    rows = output.kind(SWEPT)
+    own = rows[(rows["cfa"] == cfa) & (rows["status"] == "ok")]["sensitivity"].to_numpy(dtype=float)
+    traced = _trade_offs(output, output.scenarios[0], cfa)[0]
+    both = np.concatenate([own, np.empty(0) if traced is None else traced.x])
+    both = both[np.isfinite(both)]
+    return bool(both.size and np.ptp(both) > _LEAST_RANGE)
 
 
 def _points(output: Output, rows: pd.DataFrame, labels: Sequence[str] = ()) -> Points:
@@ -130,7 +146,7 @@ def series_figures(output: Output) -> list[SeriesFigure]:
 def sensor_figure(output: Output) -> CurvesFigure:
     """The sensor's QE curves."""
     title = f"Quantum efficiency, {_name(output.provenance.sensor)}"
-    return CurvesFigure(title, "QE", output.curves.wavelength_nm, output.curves.sensor)
+    return CurvesFigure(title, "QE", output.curves.wavelength_nm, output.curves.sensor, shades=light_shades(output))
 
 
 def lights_figure(output: Output) -> CurvesFigure:
@@ -141,6 +157,14 @@ def lights_figure(output: Output) -> CurvesFigure:
     return CurvesFigure(
         title, "photons per nm, each signal 1 photon", output.curves.wavelength_nm, bundles, colors=colors
     )
+
+
+def light_shades(output: Output) -> dict[str, np.ndarray]:
+    """Signal type -> the largest of its spectra at each wavelength, each with a peak of 1, ndarray[n_wavelengths]."""
+    return {
+        kind: np.max(photons / photons.max(axis=1, keepdims=True), axis=0)
+        for kind, photons in output.curves.bundles.items()
+    }
 
 
 def chart_figure(output: Output) -> ChartFigure:
@@ -162,16 +186,39 @@ def clouds(output: Output, *kinds: str) -> list[list[Cloud]]:
         points = output.points[output.points["design_id"] == row["design_id"]]
         first, *others = dict.fromkeys(points["channel"])
         if others:
-            found.append([_cloud(points, f"{label(row)}: {first}, {other}", first, other) for other in others])
+            near = nearest_lights(output, row)
+            found.append([_cloud(points, f"{label(row)}: {first}, {other}", first, other, near) for other in others])
     return found
 
 
-def _cloud(points: pd.DataFrame, title: str, first: str, other: str) -> Cloud:
+def nearest_lights(output: Output, row: Mapping[Any, Any]) -> Nearest | None:
+    """(type, name) of the two lights that limit a row's separation, and their distance in words."""
+    separation = output.trade_off[0]
+    if separation.pair is None:
+        return None
+    one, other = separation.pair
+    text = row.get(limited_by_name(separation.pair))
+    ones, others = ([name for kind, name in output.curves.lights if kind == each] for each in separation.pair)
+    named = {f"{a}{BETWEEN}{b}": (a, b) for a in ones for b in others}
+    if text not in named:
+        return None
+    a, b = named[str(text)]
+    return (one, a), (other, b), separation.told(row[separation.of or separation.name])
+
+
+def _cloud(points: pd.DataFrame, title: str, first: str, other: str, near: Nearest | None) -> Cloud:
     types = {}
     for kind, signals in points.groupby("signal_type", sort=False):
         by_channel = {name: values["dn"].to_numpy() for name, values in signals.groupby("channel")}
         types[str(kind)] = (by_channel[first], by_channel[other])
-    return Cloud(title, f"{first} / DN", f"{other} / DN", types)
+    nearest = None
+    if near is not None:
+        at = [points[(points["signal_type"] == kind) & (points["signal"] == name)] for kind, name in near[:2]]
+        x, y = (
+            np.array([float(own.loc[own["channel"] == name, "dn"].iloc[0]) for own in at]) for name in (first, other)
+        )
+        nearest = (x, y, near[2])
+    return Cloud(title, f"{first} / DN", f"{other} / DN", types, nearest)
 
 
 def filters_figure(output: Output, cfa: str) -> CurvesFigure:
@@ -189,7 +236,13 @@ def filters_figure(output: Output, cfa: str) -> CurvesFigure:
         curves[LIMIT_NAME] = output.curves.limits[cfa]
     dashed = (*ends, LIMIT_NAME)
     return CurvesFigure(
-        f"{cfa}: modified channel", "QE", output.curves.wavelength_nm, curves, dashed, {LIMIT_NAME: "#000000"}
+        f"{cfa}: modified channel",
+        "QE",
+        output.curves.wavelength_nm,
+        curves,
+        dashed,
+        {LIMIT_NAME: "#000000"},
+        light_shades(output),
     )
 
 
@@ -198,6 +251,24 @@ def end_curves(output: Output, cfa: str) -> list[str]:
     entries = [entry for entry in modifications(output) if entry.cfa == cfa]
     ends = {end for entry in entries for end in (entry.base, entry.to) if isinstance(end, str)} | {"G", "Y"}
     return [name for name in output.curves.sensor if name in ends]
+
+
+def mosaic_of(output: Output, cfa: str) -> Mosaic:
+    """The tile of a CFA of the study."""
+    tile = output.study.cfas[cfa].tile
+    return Mosaic.from_name(cfa) if tile is None else Mosaic.from_rows(cfa, tile)
+
+
+def channel_curves(output: Output, cfa: str) -> list[str]:
+    """Names of the sensor's curves that a CFA's channels have; a modified channel has none."""
+    renamed = output.study.cfas[cfa].curves
+    names = (renamed.get(channel, channel) for channel in mosaic_of(output, cfa).channels)
+    return [name for name in dict.fromkeys(names) if name in output.curves.sensor]
+
+
+def traded_cfas(output: Output) -> list[str]:
+    """CFAs with designs that trade sensitivity for separation."""
+    return [cfa for cfa in dict.fromkeys(m.cfa for m in modifications(output)) if trades_off(output, cfa)]
 
 
 def modifications(output: Output) -> list[Modification]:

@@ -1,9 +1,27 @@
-"""What every column of the result table means, as the documentation prints it."""
+"""What every file of a run holds and what every column means, as the documentation prints it."""
 
 from __future__ import annotations
 
 from ..metrics.quantity import Asked
 from ..metrics.registry import listed
+from .curves import SCHEMA
+from .names import FIGURES, REPORT, RUN, SUMS
+from .tables import (
+    AUDIT,
+    CURVES,
+    FRONT,
+    LEFT_OUT,
+    LIMITED_BY,
+    POINTS,
+    PROVENANCE,
+    RECOGNITION,
+    RESOLVED,
+    RESULTS,
+    SEARCH_LOG,
+    VALIDATED,
+    front_schema,
+    search_schema,
+)
 
 _KEYS = {
     (
@@ -48,6 +66,38 @@ def columns_table() -> list[str]:
     rows.append(_row(("worst_<quantity>",), "", _WORST))
     rows += [_row(names, "", meaning) for names, meaning in _VERDICTS.items()]
     return ["| column | unit | meaning |", "| --- | --- | --- |", *rows]
+
+
+FILES = {
+    RESULTS: "a row per design and scenario; its columns are below",
+    LIMITED_BY: "the two lights that limit each CSD of the designs that the report can show: `design_id`, "
+    "`limited_by_<a>_<b>` (of a light at any place, at the worst one of the lattice that was computed)",
+    VALIDATED: "where a study validates on other lights: `design_id` and `held_out_csd_<a>_<b>`, their CSDs, DN",
+    LEFT_OUT: "where each light is left out of a search in turn: signal_type, signal, the optimum that was "
+    "`seen`, the same design `with_it`, and the `fall`",
+    SEARCH_LOG: "every evaluation of the search and of its front: " + ", ".join(search_schema(["<parameters>"]).names),
+    FRONT: "what the search found at each level of sensitivity, and the limit there: "
+    + ", ".join(front_schema(["<parameters>"]).names),
+    CURVES: "a row per curve and wavelength: " + ", ".join(SCHEMA.names),
+    POINTS: "what the clouds draw: design_id, signal_type, signal, channel, dn",
+    RECOGNITION: "raw patches told apart by classifiers, where a study asks for them, with 95 % intervals",
+    AUDIT: "rows of `sweep audit`: promised and realized errors",
+    RESOLVED: "the study with every default written out; a study file itself",
+    PROVENANCE: "versions, seed, command, machine, plans of the scenes, what the columns mean",
+    REPORT: "the report: one file that you can send, without the network",
+    "cfas.png": "all CFAs: separation against the light of the whole CFA; also `.svg`",
+    "pareto.png": "the trade-off in one modified pixel, where there is one; also `.svg`",
+    f"{FIGURES}/": "all other figures as PNG and SVG",
+    "paper_comparison.csv": "published figures beside ours, where a study gives some; also `.parquet`",
+    RUN: "names and digests of these files, and how the run went",
+    SUMS: "the digests for `sha256sum -c SHA256SUMS`",
+}
+"""Every file of a run's folder, in the order in which one asks for them."""
+
+
+def files_table() -> list[str]:
+    """A table of Markdown: file, what it holds."""
+    return ["| file | what it holds |", "| --- | --- |", *(f"| `{name}` | {what} |" for name, what in FILES.items())]
 
 
 def _row(names: tuple[str, ...], unit: str, meaning: str) -> str:

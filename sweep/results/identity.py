@@ -8,7 +8,7 @@ from typing import Any
 
 from ..study import Study
 
-MODEL_VERSION = "9"
+MODEL_VERSION = "10"
 """Raised whenever the same study would give other rows; part of every shard's key."""
 CHUNK = 4096
 """Designs that are computed at once, and the least of one job."""
@@ -19,9 +19,14 @@ def identity(study: Study) -> dict[str, Any]:
     curves, lights = hashlib.sha256(), hashlib.sha256()
     for name, curve in sorted(study.sensor.qe.items()):
         curves.update(name.encode() + curve.tobytes())
+    section = study.section.model_dump(mode="json", by_alias=True, exclude={"question"})
+    if study.section.lights.builtin is None:
+        section["lights"]["photon_ratio"] = study.lights.photon_ratio  # stated, or from the spectra: the same study
+    if study.held_out is not None:
+        lights.update(study.held_out.photons.tobytes() + repr(study.held_out.types).encode())
     lights.update(study.lights.photons.tobytes() + repr((study.lights.types, study.lights.photon_ratio)).encode())
     return {
-        "study": study.section.model_dump(mode="json", by_alias=True, exclude={"question"}),
+        "study": section,
         "files": dict(study.digests),
         "curves": curves.hexdigest(),
         "lights": lights.hexdigest(),

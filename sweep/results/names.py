@@ -4,16 +4,29 @@ from __future__ import annotations
 
 import re
 
-from .tables import AUDIT, CURVES, FRONT, POINTS, PROVENANCE, RECOGNITION, RESOLVED, RESULTS, SEARCH_LOG
+from .tables import (
+    AUDIT,
+    CURVES,
+    FRONT,
+    LEFT_OUT,
+    LIMITED_BY,
+    POINTS,
+    PROVENANCE,
+    RECOGNITION,
+    RESOLVED,
+    RESULTS,
+    SEARCH_LOG,
+    VALIDATED,
+)
 
 RUN, SUMS = "run.json", "SHA256SUMS"
 REPORT, FIGURES = "report.html", "figures"
-TABLES = (RESULTS, SEARCH_LOG, FRONT, CURVES, POINTS, RECOGNITION)
+TABLES = (RESULTS, SEARCH_LOG, FRONT, CURVES, POINTS, LIMITED_BY, VALIDATED, LEFT_OUT, RECOGNITION)
 MADE_BY_RUN = frozenset((*TABLES, RESOLVED, PROVENANCE))
 """What a run itself writes beside its list; the report draws from it, `sweep audit` adds a table."""
 _DRAWN = re.compile(
-    r"report\.html|pareto(-\d+)?\.(png|svg)|paper_comparison\.(csv|parquet)"
-    r"|figures/((filters|series)-\d+|sensor|signals|chart|clouds-(cfas|designs))\.(png|svg)"
+    r"report\.html|cfas\.(png|svg)|pareto(-\d+)?\.(png|svg)|paper_comparison\.(csv|parquet)"
+    r"|figures/((filters|series)-\d+|tiles|sensor|signals|chart|clouds-(cfas|designs))\.(png|svg)"
 )
 
 

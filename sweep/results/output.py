@@ -34,6 +34,8 @@ from .tables import (
     FEW,
     FOUND,
     FRONT,
+    LEFT_OUT,
+    LIMITED_BY,
     NAMED,
     PLAIN,
     POINTS,
@@ -44,6 +46,8 @@ from .tables import (
     ROW_COLUMNS,
     SEARCH_LOG,
     SWEPT,
+    VALIDATED,
+    front_schema,
     read_table,
 )
 from .thinning import Counts, thinned
@@ -62,7 +66,7 @@ class Output:
     """What a run left in its folder; of a long result table, `table` holds what a report shows.
 
     `study`: the study that was run, and `resolved` its file. `profiles`: over the whole table, per CFA. `searched`: the
-    search's evaluations. `audited`: rows of `sweep audit`.
+    search's evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per light that was left out of a search.
     """
 
     folder: Path
@@ -77,6 +81,7 @@ class Output:
     recognition: pd.DataFrame | None
     searched: pd.DataFrame | None
     audited: pd.DataFrame | None
+    left_out: pd.DataFrame | None
     profiles: Mapping[str, Sequence[ParameterProfile]]
 
     @property
@@ -174,10 +179,12 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         raise no_run(folder)
     if PROVENANCE not in inventory.files:
         raise OutputError(Fault("no finished run here", str(folder), allowed="a folder that `sweep run` finished"))
-    optional = [name for name in (FRONT, RECOGNITION, SEARCH_LOG, AUDIT) if name in inventory.files]
+    optional = [
+        name for name in (FRONT, RECOGNITION, SEARCH_LOG, AUDIT, VALIDATED, LEFT_OUT) if name in inventory.files
+    ]
     if not audited and AUDIT in optional:
         optional.remove(AUDIT)
-    inventory.require([RESULTS, CURVES, POINTS, RESOLVED, PROVENANCE, *optional])
+    inventory.require([RESULTS, CURVES, POINTS, LIMITED_BY, RESOLVED, PROVENANCE, *optional])
     resolved = _mapping(folder / RESOLVED, lambda text: YAML(typ="safe").load(text))
     if lacks := [key for key in _ALWAYS_WRITTEN if key not in resolved]:
         raise _lacking(folder / RESOLVED, lacks)
@@ -185,22 +192,24 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
     provenance = _checked(folder / PROVENANCE, Provenance, _mapping(folder / PROVENANCE, json.loads))
     objective = study.objective.column
     _check_columns(folder / RESULTS, [*ROW_COLUMNS, *provenance.parameters, *(c.name for c in provenance.quantities)])
-    _check_columns(folder / POINTS, ["design_id", "signal_type", "channel", "dn"])
+    _check_columns(folder / LIMITED_BY, ["design_id"])
+    _check_columns(folder / POINTS, ["design_id", "signal_type", "signal", "channel", "dn"])
     if FRONT in optional:
-        _check_columns(folder / FRONT, ["sensitivity_min", "objective", "sensitivity", "limit"])
+        _check_columns(folder / FRONT, front_schema(()).names)
     profiles = Profiles(objective, next(iter(study.scenarios)), provenance.parameters)
-    table, counts = thinned(folder / RESULTS, [objective, *provenance.trade_off], profiles.add)
+    table, counts = thinned(folder / RESULTS, [objective, *provenance.trade_off], provenance.trade_off[0], profiles.add)
     points = read_table(folder / POINTS).to_pandas()
-    front, recognition, searched, audit = (
+    limited = read_table(folder / LIMITED_BY).to_pandas()
+    front, recognition, searched, audit, validated, left_out = (
         read_table(folder / name).to_pandas() if name in optional else None
-        for name in (FRONT, RECOGNITION, SEARCH_LOG, AUDIT)
+        for name in (FRONT, RECOGNITION, SEARCH_LOG, AUDIT, VALIDATED, LEFT_OUT)
     )
     return Output(
         folder=folder,
         study=study,
         resolved=resolved,
         provenance=provenance,
-        table=table,
+        table=_joined(table, limited, validated),
         counts=counts,
         curves=_kept_curves(folder / CURVES),
         points=points,
@@ -208,8 +217,16 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         recognition=recognition,
         searched=searched,
         audited=audit,
+        left_out=left_out,
         profiles=profiles.found,
     )
+
+
+def _joined(table: pd.DataFrame, *others: pd.DataFrame | None) -> pd.DataFrame:
+    """The table with what other tables say of its designs."""
+    for other in others:
+        table = table if other is None else table.merge(other, on="design_id", how="left")
+    return table
 
 
 def _kept_curves(path: Path) -> KeptCurves:

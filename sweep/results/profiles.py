@@ -103,7 +103,7 @@ def profile_table(profiles: Sequence[ParameterProfile]) -> pd.DataFrame:
                 "best at": p.values[p.best.argmax()],
                 "keeps 95 % from": p.keeps[0],
                 "to": p.keeps[1],
-                "best left at its worst value": round(float(p.best.min()), 4),
+                "best objective at its worst value": round(float(p.best.min()), 1),
             }
             for p in profiles
         ]

@@ -29,6 +29,8 @@ FRONT = "front.parquet"
 CURVES = "curves.parquet"
 POINTS = "points.parquet"
 RECOGNITION = "recognition.parquet"
+LIMITED_BY = "limited_by.parquet"
+VALIDATED, LEFT_OUT = "validated.parquet", "leave_one_out.parquet"
 AUDIT = "audit.parquet"
 PROVENANCE = "provenance.json"
 RESOLVED = "study.resolved.yaml"
@@ -79,10 +81,13 @@ def search_schema(parameters: Sequence[str]) -> pa.Schema:
 
 
 def front_schema(parameters: Sequence[str]) -> pa.Schema:
-    """Columns of the trade-off that the search traces: one row per level of sensitivity."""
+    """Columns of the trade-off that the search traces: one row per level of sensitivity.
+
+    `cfa_sensitivity_min`: the same level for the whole CFA; null where several channels are modified.
+    """
     number = pa.float64()
-    names = ("sensitivity_min", "objective", "sensitivity", "limit", "gap", *parameters)
-    fields = [pa.field(name, number) for name in names] + [pa.field("evaluations", pa.int64())]
+    names = ("sensitivity_min", "cfa_sensitivity_min", "objective", "sensitivity", "cfa_sensitivity", "limit", "gap")
+    fields = [pa.field(name, number) for name in (*names, *parameters)] + [pa.field("evaluations", pa.int64())]
     return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION})
 
 

@@ -8,14 +8,18 @@ from pathlib import Path
 
 import pandas as pd
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from ..errors import Fault, OutputError
+from ..metrics.columns.exposure import EXPOSURE
 from .tables import batches, best_rows, holds, release_memory
 
 MOST_ROWS = 150_000
 """A table of up to this many rows is kept whole."""
 _BEST = 100
+_MS = 1e3
+_RATE = "separation_over_exposure"
 
 
 @dataclass(frozen=True)
@@ -29,13 +33,19 @@ class Counts:
     left_out: int
 
 
+def per_light(separation: str) -> str:
+    """A derived column of the table to show: a separation for each millisecond of exposure."""
+    return f"{separation}_per_ms"
+
+
 def thinned(
-    path: Path, order: Sequence[str], see: Callable[[pa.Table], None] = lambda _: None
+    path: Path, order: Sequence[str], separation: str, see: Callable[[pa.Table], None] = lambda _: None
 ) -> tuple[pd.DataFrame, Counts]:
     """The table to show and the counts of the whole one; no more than a row group and what is kept are in memory.
 
     Kept are all rows that are no sweep, the whole Pareto front, the best feasible designs by `order` (columns, all
-    maximized) and of the others every n-th. `see` is handed every row group of the whole table.
+    maximized), the designs of each scenario that have most of `separation`, and most of it per light, whatever the
+    constraints, and of the others every n-th. `see` is handed every row group of the whole table.
     """
     try:
         total = int(pq.read_metadata(path).num_rows)
@@ -56,9 +66,22 @@ def thinned(
         if every > 1:
             few = table.filter(pa.array(ok & ~always))
             best = best_rows(few if best is None else pa.concat_tables([best, few]), order, _BEST)
+            kept.append(_leading(table, separation))
         release_memory()
     if best is not None:
         kept.append(best)
     frame: pd.DataFrame = pa.concat_tables(kept).unify_dictionaries().to_pandas()
     frame = frame.drop_duplicates("design_id").sort_values("design_id", ignore_index=True)
+    frame[per_light(separation)] = frame[separation] / (frame[EXPOSURE] * _MS)
     return frame, Counts(total, feasible, front, failed, total - len(frame))
+
+
+def _leading(table: pa.Table, separation: str) -> pa.Table:
+    """In each scenario the design that separates most, and the one that separates most per light."""
+    rate = pc.divide(table[separation], table[EXPOSURE])
+    rated = table.append_column(_RATE, rate)
+    found = []
+    for scenario in table["scenario"].unique().to_pylist():
+        own = rated.filter(pa.array(holds(rated, "scenario", scenario)))
+        found += [best_rows(own, [measure], 1) for measure in (separation, _RATE)]
+    return pa.concat_tables(found).drop_columns([_RATE])

@@ -22,12 +22,15 @@ from ..results.names import TABLES
 from ..results.tables import (
     CURVES,
     FRONT,
+    LEFT_OUT,
+    LIMITED_BY,
     POINTS,
     PROVENANCE,
     RECOGNITION,
     RESOLVED,
     RESULTS,
     SEARCH_LOG,
+    VALIDATED,
     holds,
     json_of,
     sliced,
@@ -39,6 +42,8 @@ from ..types import Progress
 from .answers import Kept
 from .curves import kept_curves, points_table
 from .front import Front, Gathered, few_of
+from .held_out import held_out_table, left_out_table
+from .limiting import limited_by_table
 from .provenance import plan_facts, provenance, resolved_yaml
 from .recognition import recognition_table
 from .routes import Detours, detours_in_words
@@ -50,9 +55,11 @@ from .workers import Workers
 
 def files_of(study: Study) -> set[str]:
     """Names of the files that a run of the study makes."""
-    names = {RESULTS, CURVES, POINTS, RESOLVED, PROVENANCE}
+    names = {RESULTS, CURVES, POINTS, LIMITED_BY, RESOLVED, PROVENANCE}
     if study.search is not None:
         names |= {SEARCH_LOG, FRONT} if study.search.levels else {SEARCH_LOG}
+    names |= {VALIDATED} if study.held_out is not None else set()
+    names |= {LEFT_OUT} if study.leaves_one_out else set()
     asked = study.section.recognition
     return names | ({RECOGNITION} if asked is not None and asked.patches else set())
 
@@ -86,9 +93,9 @@ class Making:
         while todo:
             if RESULTS in todo:
                 self._sweep()
-            if todo & {SEARCH_LOG, FRONT}:
+            if todo & {SEARCH_LOG, FRONT, LEFT_OUT}:
                 self._write_search(todo)
-            if todo & {CURVES, POINTS, RECOGNITION}:
+            if todo & {CURVES, POINTS, LIMITED_BY, VALIDATED, RECOGNITION}:
                 self._write_drawn(todo)
             if RESOLVED in todo:
                 self.inventory.write({RESOLVED: resolved_yaml(self.study).encode("utf-8")})
@@ -162,7 +169,10 @@ class Making:
         if SEARCH_LOG in names:
             self.inventory.write_table(SEARCH_LOG, search_log(self.answer))
         if FRONT in names:
-            self.inventory.write_table(FRONT, front_table(self.answer))
+            self.inventory.write_table(FRONT, front_table(self.study, self.answer))
+        if LEFT_OUT in names:
+            given = self.study, self.answer.search, self.answer.best, self.crew, self.progress
+            self.inventory.write_table(LEFT_OUT, left_out_table(*given))
 
     def _write_drawn(self, names: set[str]) -> None:
         rows, on_front = self.gathered.frame(), self.gathered.front_frame()
@@ -170,6 +180,12 @@ class Making:
             self.inventory.write_table(CURVES, kept_curves(self.study, rows, on_front, self._limit()).table())
         if POINTS in names:
             self.inventory.write_table(POINTS, points_table(self.study, rows, on_front))
+        if LIMITED_BY in names:
+            table = limited_by_table(self.study, rows, on_front, self.crew, self.progress)
+            self.inventory.write_table(LIMITED_BY, table)
+        if VALIDATED in names:
+            table = held_out_table(self.study, rows, on_front, self.crew, self.progress)
+            self.inventory.write_table(VALIDATED, table)
         if RECOGNITION in names:
             table = recognition_table(self.study, rows, self.crew, self.progress)
             assert table is not None

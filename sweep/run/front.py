@@ -11,7 +11,7 @@ from ..results.tables import FEW, best_rows, holds
 from ..types import BoolArray, FloatArray, IndexArray
 from .rows import Rules
 
-BEST_PER_CFA = 5
+BEST_PER_CFA = 12
 """Best feasible designs of each CFA's sweeps that the report lists and draws."""
 FRONT_ROWS = 200
 """Designs of a front, spread evenly over it, whose curves and signals a report can show."""

@@ -24,6 +24,8 @@ def resolved_yaml(study: Study) -> str:
     section = study.section.model_dump(mode="json", by_alias=True, exclude_none=True)
     for key in ("sensor", "lights"):
         section[key] = section[key].get("builtin", {k: v for k, v in section[key].items() if k != "builtin"})
+    if study.section.lights.builtin is None:
+        section["lights"]["photon_ratio"] = study.lights.photon_ratio  # another light in the file would change it
     text = StringIO()
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = False

@@ -11,6 +11,7 @@ import pyarrow as pa
 from ..designs.space import Space
 from ..errors import Fault, InfeasibleError
 from ..metrics.bound import FEASIBLE
+from ..metrics.columns.sensitivity import cfa_sensitivity_at
 from ..results.tables import front_schema, search_schema
 from ..search.limit import Limit, limit_of, why_not
 from ..search.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
@@ -88,7 +89,9 @@ def answer_row(study: Study, answer: SearchAnswer, rules: Rules, first_id: int) 
     """The search's answer as the camera reads it out, with its limit and gap."""
     space = answer.search.space
     axes = tuple((float(value),) for value in answer.best.x)
-    found = Space("search", f"best of {space.name}", space.cfa, space.filter, axes)
+    assert space.filter is not None
+    name = f"best {space.filter.family.kind.replace('_', ' ')}"
+    found = Space("search", name, space.cfa, space.filter, axes)
     job = Job(found, answer.search.scenario, 0, 1, first_id)
     row = run_job(job, study.view(found, job.scenario), rules)
     if answer.limit is not None:
@@ -145,14 +148,16 @@ def search_log(answer: SearchAnswer) -> pa.Table:
     return pa.Table.from_pylist(rows, schema=search_schema(names))
 
 
-def front_table(answer: SearchAnswer) -> pa.Table:
+def front_table(study: Study, answer: SearchAnswer) -> pa.Table:
     """A row per level of sensitivity; nulls where no design or no limit was found."""
-    names = answer.search.space.parameters
+    names, view = answer.search.space.parameters, study.view(answer.search.space, answer.search.scenario)
     rows = []
     for point in answer.front:
         row: dict[str, Any] = {"sensitivity_min": point.level, "evaluations": sum(len(run.log) for run in point.runs)}
+        row["cfa_sensitivity_min"] = cfa_sensitivity_at(view, point.level)
         if point.best is not None:
             row |= {"objective": point.best.objective, "sensitivity": point.best.sensitivity}
+            row["cfa_sensitivity"] = point.best.cfa_sensitivity
             row |= dict(zip(names, map(float, point.best.x), strict=True))
         if point.limit is not None and np.isfinite(point.limit.proven):
             row["limit"] = point.limit.proven

@@ -72,6 +72,11 @@ def search_from(
     return run
 
 
+def smooth_objective(problem: Problem, x: FloatArray) -> float:
+    """The objective of one design as the search sees it; `x`: ndarray[n_parameters]."""
+    return Model(problem, SearchRun(0), 1).at(problem.to_unit(x)).evaluation.objective
+
+
 def _epigraph(
     problem: Problem, model: Model, first: Point, u0: FloatArray, algorithm: str
 ) -> tuple[nlopt.opt, list[float]]:

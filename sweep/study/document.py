@@ -127,7 +127,9 @@ def field_names(model: type[BaseModel], path: Sequence[Key], data: Any) -> list[
         if isinstance(option, type) and issubclass(option, BaseModel):
             kinds = option.model_fields.get("kind")
             if kinds is None or not isinstance(node, dict) or node.get("kind", kinds.default) == kinds.default:
-                return [name for name, info in option.model_fields.items() if info.exclude is not True]
+                return [
+                    str(key) for key, name in _keys(option).items() if option.model_fields[name].exclude is not True
+                ]
     return []
 
 
@@ -162,7 +164,7 @@ def _accepts(annotation: Any, key: Key) -> bool:
         return True
     if get_origin(annotation) is list:
         return isinstance(key, int)
-    return isinstance(annotation, type) and issubclass(annotation, BaseModel) and key in annotation.model_fields
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel) and key in _keys(annotation)
 
 
 def _inner(annotation: Any, key: Key) -> Any:
@@ -170,7 +172,12 @@ def _inner(annotation: Any, key: Key) -> Any:
         return _unannotated(get_args(annotation)[1])
     if get_origin(annotation) is list:
         return _unannotated(get_args(annotation)[0])
-    return annotation.model_fields[str(key)].annotation
+    return annotation.model_fields[_keys(annotation)[str(key)]].annotation
+
+
+def _keys(section: type[BaseModel]) -> dict[Key, str]:
+    """Keys as files have them -> names of the section's fields."""
+    return {info.alias or name: name for name, info in section.model_fields.items()}
 
 
 def _unannotated(annotation: Any) -> Any:

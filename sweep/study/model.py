@@ -59,12 +59,19 @@ class Study:
     search: Search | None
     digests: Mapping[str, str]
     warnings: tuple[str, ...]
+    held_out: Lights | None = None
     plans: Mapping[str, Plan] = field(default_factory=dict)
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
         """Pairs of signal types, in order."""
         return class_pairs(self.lights.classes)
+
+    @property
+    def leaves_one_out(self) -> bool:
+        """Whether each light is left out of a search in turn."""
+        asked = self.section.validation
+        return asked is not None and asked.leave_one_out and self.search is not None
 
     @property
     def edge_shift_nm(self) -> float:

@@ -49,6 +49,7 @@ class _Resolver:
         mosaics = {name: mosaic for name, cfa in section.cfas.items() if (mosaic := self.mosaic(name, cfa)) is not None}
         if sensor is None or lights is None:
             raise StudyError(self.faults)
+        held_out = self.held_out(lights)
         spaces = SpaceBuilder(section, self.sources, sensor, mosaics).spaces()
         self.check_columns(lights)
         self.check_luminances(lights)
@@ -76,6 +77,7 @@ class _Resolver:
             search=search,
             digests=dict(self.sources.digests),
             warnings=tuple(self.sources.warnings),
+            held_out=held_out,
         )
         self.check_memory(study)
         if not study.n_designs and search is None:
@@ -87,6 +89,13 @@ class _Resolver:
             self.add(("sweeps",), "too many designs", f"{study.n_designs:,}", f"at most {MOST_DESIGNS:,}")
             raise StudyError(self.faults)
         return study
+
+    def held_out(self, lights: Lights) -> Lights | None:
+        """Lights to validate on; leaving one out needs a search."""
+        asked = self.section.validation
+        if asked is not None and asked.leave_one_out and self.section.search is None:
+            self.add(("validate", "leave_one_out"), "nothing is searched", None, "a study with `search`")
+        return None if asked is None or asked.lights is None else self.sources.held_out(asked.lights, lights)
 
     def asked(self, lights: Lights, *, edge_shift: bool | None = None) -> Asked:
         """What an objective or a constraint can name; `edge_shift`: as if worst cases were asked for, or not."""

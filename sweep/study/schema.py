@@ -102,6 +102,24 @@ class Recognition(Section):
         return self
 
 
+class Validation(Documented):
+    """How designs do on lights that they have not seen. The photons of a light are those of the study's own lights."""
+
+    lights: Annotated[
+        LightsSection | None,
+        BeforeValidator(builtin, json_schema_input_type=named(BUILT_IN_LIGHTS) | LightsSection),
+    ] = None
+    """Other lights, of signal types that the study has; their CSDs stand beside its own."""
+    leave_one_out: bool = False
+    """Search again without each light in turn: how far does the optimum fall on it?"""
+
+    @model_validator(mode="after")
+    def _something(self) -> Validation:
+        if self.lights is None and not self.leave_one_out:
+            raise ValueError("`lights`, `leave_one_out: true`, or both")
+        return self
+
+
 class Levels(Section):
     """Equidistant levels of sensitivity."""
 
@@ -203,5 +221,7 @@ class StudySection(Documented):
     """Quantity -> {min: ...}, {max: ...} or both."""
     search: SearchSection | None = None
     """A constrained search beside the sweep."""
+    validation: Annotated[Validation | None, Field(alias="validate")] = None
+    """How designs do on lights that they have not seen."""
     published: dict[Name, dict[Name, dict[Name, Number]]] = {}
     """Printed figures to compare with: table -> CFA, design or geometry -> quantity -> value."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -68,7 +68,7 @@ class Sources:
     def sensor(self, section: SensorSection) -> SensorCurves | None:
         """The study's sensor, or None after adding faults."""
         if section.builtin is not None:
-            return self._built_in("sensor", section.builtin, BUILT_IN_SENSORS)
+            return self._built_in(("sensor",), section.builtin, BUILT_IN_SENSORS)
         before = len(self.faults)
         if not self._fits(("sensor", "files"), "curves", sum(len(entry.columns) for entry in section.files)):
             return None
@@ -102,17 +102,33 @@ class Sources:
         index = next(i for i, entry in enumerate(section.files) if curve in entry.columns)
         return ("sensor", "files", index, "columns", curve)
 
-    def lights(self, section: LightsSection) -> Lights | None:
-        """The study's lights, or None after adding faults."""
+    def held_out(self, section: LightsSection, own: Lights) -> Lights | None:
+        """Lights that the study does not optimize for, as bright as its own, or None after adding faults.
+
+        Those of a finished run are not kept: None, too.
+        """
+        if self.kept is not None:
+            return None
+        path = ("validate", "lights")
+        lights = self.lights(section, path)
+        if lights is None:
+            return None
+        for name in lights.classes:
+            if name not in own.classes:
+                self.unknown(path, "signal type", name, list(own.classes))
+        return replace(lights, photon_ratio=own.photon_ratio)
+
+    def lights(self, section: LightsSection, at: tuple[Key, ...] = ("lights",)) -> Lights | None:
+        """The lights of the section at a place of the study, or None after adding faults."""
         if section.builtin is not None:
-            return self._built_in("lights", section.builtin, BUILT_IN_LIGHTS)
+            return self._built_in(at, section.builtin, BUILT_IN_LIGHTS)
         before = len(self.faults)
         used = [len(columns) for entry in section.files for columns in entry.signals.values()]
-        if not self._fits(("lights", "files"), "lights", sum(used)):
+        if not self._fits((*at, "files"), "lights", sum(used)):
             return None
         by_type: dict[str, list[tuple[str, str, FloatArray]]] = {}
         for index, entry in enumerate(section.files):
-            path = ("lights", "files", index)
+            path = (*at, "files", index)
             curves = self._curves(path, entry)
             for signal_type, columns in entry.signals.items():
                 for position, column in enumerate(columns):
@@ -127,10 +143,10 @@ class Sources:
         if len(self.faults) > before:
             return None
         if len(by_type) < 2:
-            self.add(("lights", "files"), "only one signal type", list(by_type), "two or more, to tell them apart")
+            self.add((*at, "files"), "only one signal type", list(by_type), "two or more, to tell them apart")
             return None
         if len(by_type) > MOST_TYPES:
-            self.add(("lights", "files"), "too many signal types", len(by_type), f"at most {MOST_TYPES}")
+            self.add((*at, "files"), "too many signal types", len(by_type), f"at most {MOST_TYPES}")
             return None
         signals = [signal for group in by_type.values() for signal in group]
         source = ", ".join(entry.file for entry in section.files)
@@ -143,11 +159,13 @@ class Sources:
             self.add(path, f"too many {what} for a grid of {self.grid.size:,} wavelengths", count, f"at most {most:,}")
         return count <= most
 
-    def _built_in(self, key: str, name: str, known: Mapping[str, Callable[[WavelengthGrid], _Made]]) -> _Made | None:
+    def _built_in(
+        self, at: tuple[Key, ...], name: str, known: Mapping[str, Callable[[WavelengthGrid], _Made]]
+    ) -> _Made | None:
         if name not in known:
             self.add(
-                (key,),
-                f"unknown built-in {key}",
+                at,
+                f"unknown built-in {at[-1]}",
                 name,
                 f"{', '.join(known)}, or a mapping with `files`",
                 nearest(name, known),

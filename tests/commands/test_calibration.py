@@ -41,7 +41,15 @@ def comparison(paper: Path) -> pd.DataFrame:
     found = pd.read_parquet(paper / "paper_comparison.parquet")
     pd.testing.assert_frame_equal(found, pd.read_csv(paper / "paper_comparison.csv"), check_dtype=False)
     assert {path.name for path in (paper / "figures").glob("*.png")} == {
-        *("sensor.png", "signals.png", "chart.png", "filters-1.png", "clouds-cfas.png", "clouds-designs.png")
+        *(
+            "sensor.png",
+            "signals.png",
+            "chart.png",
+            "tiles.png",
+            "filters-1.png",
+            "clouds-cfas.png",
+            "clouds-designs.png",
+        )
     }
     return found
 

@@ -29,6 +29,9 @@ def test_stopband_makes_its_files(stopband: tuple[Path, list[str]]) -> None:
         "search.parquet",
         "curves.parquet",
         "points.parquet",
+        "limited_by.parquet",
+        "cfas.png",
+        "cfas.svg",
         "figures",
         "front.parquet",
         "study.resolved.yaml",
@@ -47,9 +50,9 @@ def test_summary_is_true_and_short(stopband: tuple[Path, list[str]]) -> None:
     frame = pd.read_parquet(folder / "results.parquet")
     best = frame[frame["feasible"] & frame["kind"].isin(["sweep", "search"])]["csd_yellow_red"].max()
     rggb = frame[frame["cfa"] == "RGGB"]["csd_yellow_red"].iloc[0]
-    assert len(lines) <= 12
-    assert f"is {best:.1f} DN" in lines[0]
-    assert f"RGGB {rggb:.0f} DN" in lines[1]
+    assert len(lines) <= 13
+    assert f"by {best:.0f} DN" in lines[0]
+    assert f"RGGB ({rggb:.0f} DN)" in lines[0]
     assert str(folder) in lines[-1]
 
 

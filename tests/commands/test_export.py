@@ -203,9 +203,9 @@ def test_unknown_keys_are_one_line(tiny: Path, tmp_path: Path) -> None:
 
 
 def test_by_default_files_go_beside_the_run(tiny: Path) -> None:
-    code, _, said = commanded("export", tiny, "--design", "best of edges")
+    code, _, said = commanded("export", tiny, "--design", "best stopband")
     assert code == 0, said
-    assert {path.name for path in (tiny / "export").iterdir()} == {"best_of_edges.csv", "best_of_edges.mat"}
+    assert {path.name for path in (tiny / "export").iterdir()} == {"best_stopband.csv", "best_stopband.mat"}
 
 
 def test_a_transmission_where_the_base_has_no_light() -> None:

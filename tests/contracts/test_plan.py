@@ -257,7 +257,7 @@ def test_a_skipped_effect_costs_nothing() -> None:
 @pytest.mark.slow
 def test_a_tighter_tolerance_costs_more_and_is_kept() -> None:
     study = load_study(STUDIES / "distance.yaml", None, 5.0)
-    spaces = [space for space in study.spaces if space.name in ("RGGB", "optimum")]
+    spaces = [space for space in study.spaces if space.name in ("RGGB", "best stopband")]
     names = ("near", "far")
 
     def run(plans: dict[str, Plan]) -> tuple[np.ndarray, int]:

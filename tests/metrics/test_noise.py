@@ -159,7 +159,7 @@ def test_a_noisy_study_from_file_to_report(tmp_path: Path) -> None:
     output = read_output(tmp_path / "1")
     make_report(output)
     said = "\n".join(summary_lines(output))
-    assert "RGGB from 0.5 (not at 0.02)" in said
+    assert "RGGB from 0.5 full scale (not at 0.02)" in said
     page = (tmp_path / "1" / "report.html").read_text()
     assert "<h2>Noise</h2>" in page
     for rule in ("nearest centroid", "LDA", "most likely signal"):

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from sweep.results.dictionary import KEYS, columns_table
+from sweep.results.dictionary import FILES, KEYS, columns_table, files_table
+from sweep.results.names import MADE_BY_RUN
 from sweep.results.tables import ROW_COLUMNS
 
-README = Path(__file__).parent.parent.parent / "sweep" / "README.md"
+from ..conftest import ROOT
+
+README = ROOT / "outputs" / "README.md"
 
 
 def test_the_readme_has_the_table_of_columns() -> None:
     assert "\n".join(columns_table()) in README.read_text()
+
+
+def test_the_readme_has_the_table_of_files() -> None:
+    assert "\n".join(files_table()) in README.read_text()
+    assert set(FILES) >= MADE_BY_RUN
 
 
 def test_every_column_of_a_row_is_told() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import shlex
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
@@ -46,7 +46,7 @@ def new_study(name: str, folder: Path, qe: Path | None, lights: Path | None, qua
     chosen = _built_in_lights() if lights is None else _lights(lights, folder, quantity, start_nm, stop_nm)
     new_folders = [place for place in (folder, *folder.parents) if not os.path.lexists(place)]
     try:
-        made = _write(path, study_text(name, sensor, chosen))
+        made = _write(path, lambda ratio: study_text(name, sensor, replace(chosen, photon_ratio=ratio)))
     except SweepError:
         with suppress(OSError):  # one that something else is in by now stays
             for place in new_folders:
@@ -58,11 +58,16 @@ def new_study(name: str, folder: Path, qe: Path | None, lights: Path | None, qua
     return [*lines, f"Next: sweep run {shlex.quote(str(path))}"]
 
 
-def _write(path: Path, text: str) -> Study:
-    """Write a study that loads, and the schema before it, so that no study is without the one that it names."""
+def _write(path: Path, text: Callable[[float | None], str]) -> Study:
+    """Write a study that loads, and the schema before it, so that no study is without the one that it names.
+
+    `text`: from the photon ratio of its lights, which another light in the file would change.
+    """
     with atomic(path) as hidden:
-        hidden.write_text(text, encoding="utf-8")
+        hidden.write_text(text(None), encoding="utf-8")
         try:
+            made = load_study(hidden)
+            hidden.write_text(text(made.lights.photon_ratio), encoding="utf-8")
             made = load_study(hidden)
         except StudyError as error:
             raise DataError([replace(fault, file=None, line=None) for fault in error.faults]) from None

@@ -46,6 +46,7 @@ class LightsText:
     left_out: Mapping[str, str] = field(default_factory=dict)
     ends_early: bool = False
     fine: bool = False
+    photon_ratio: float | None = None
 
 
 def study_text(name: str, sensor: SensorText, lights: LightsText) -> str:
@@ -143,8 +144,12 @@ def _sensor(sensor: SensorText) -> str:
 def _lights(lights: LightsText) -> str:
     if lights.file is None:
         return "lights: tl16            # built-in surrogate; `sweep new NAME --lights FILE` takes your own\n"
-    lines = ["lights:", f"  name: {scalar(lights.name)}", "  files:"]
-    lines += [f"    - file: {scalar(lights.file)}"]
+    lines = ["lights:", f"  name: {scalar(lights.name)}"]
+    if lights.photon_ratio is not None:
+        lines.append(
+            f"  photon_ratio: {lights.photon_ratio:.6g}   # photons of a light over a white patch's, from these spectra"
+        )
+    lines += ["  files:", f"    - file: {scalar(lights.file)}"]
     other = "photons" if lights.quantity == "energy" else "energy"
     lines.append(f"      quantity: {lights.quantity}  # what the numbers are; or {other}")
     if lights.ends_early:

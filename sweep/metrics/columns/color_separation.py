@@ -12,6 +12,9 @@ from ..quantity import BEST_PLACE, DN, Asked, Columns, Quantity, ReadoutMetric
 from ..separation import csd_name, separations
 from ..smooth import Rows, SmoothDesign
 
+CSD = "csd"
+"""Metric of the separations, without those at the best place."""
+
 
 class ColorSeparation(ReadoutMetric):
     """The CSD of each pair of signal types; over all places of the light the best one, too."""
@@ -23,7 +26,7 @@ class ColorSeparation(ReadoutMetric):
         nearest = [
             Quantity(
                 name=csd_name(pair),
-                metric="csd",
+                metric=CSD,
                 meaning="color separation distance (CSD) of two signal types: the smallest distance between a point of "
                 "one and a point of the other, over the CFA's distinct channels",
                 unit=DN,

@@ -41,7 +41,7 @@ class Sensitivity(DesignMetric):
         whole = Quantity(
             name=CFA_SENSITIVITY,
             metric=CFA_SENSITIVITY,
-            meaning="sensitivity of the CFA (1 = a sensor without color filters)",
+            meaning="sensitivity of the CFA: the light of the whole tile (1 = a sensor without color filters)",
             label="CFA sensitivity",
             wanted="more",
             role="light",
@@ -76,6 +76,14 @@ def sensitivities_gradient(view: View, curves_gradient: FloatArray) -> Columns:
         SENSITIVITY: total.sum(axis=1) / view.base_qe.sum(),
         CFA_SENSITIVITY: total @ counts[list(view.modified)] / (counts.sum() * view.clear_qe.sum()),
     }
+
+
+def cfa_sensitivity_at(view: View, sensitivity: float) -> float | None:
+    """The CFA's sensitivity where that of its only modified channel is known; None where several are modified."""
+    if len(view.modified) != 1:
+        return None
+    whole = _whole_share(view)
+    return float(whole.rows.toarray()[0] @ view.base_qe[0] * sensitivity + whole.constant)
 
 
 def _row(design: SmoothDesign, *, name: str) -> Rows:

@@ -15,6 +15,7 @@ from ...errors import Fault, OutputError, SweepError
 from ...results.tables import write_bytes, write_csv, write_text
 from ...study import folder_name
 from .. import Output, read_output
+from ..answer import who_else
 from ..pages import inlined, page, rows
 from .best import best_of_runs, parameters_of, plain_differences, quantities_in, ranking, side_by_side
 from .differences import curve_notes, origin_differences, scene_notes, study_differences
@@ -74,6 +75,7 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> list[str]:
     runs = {f"{letter} {_one_line(o.study.study)}": o for letter, o in zip(_LETTERS, outputs, strict=False)}
     compared = compare_fronts(runs)
     answer = [*ranking(runs), *_largest(compared)]
+    answer += [f"{run}: {line}" for run, output in runs.items() for line in who_else(output)]
     notes = [*_same_folders(runs), *curve_notes(runs), *scene_notes(runs), *_constraint_note(runs), *compared.notes]
     best = best_of_runs(runs)
     shown, left_out = side_by_side(best, _MOST_PARAMETERS, parameters_of(runs), quantities_in(runs))

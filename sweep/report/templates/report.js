@@ -5,7 +5,6 @@ const data = JSON.parse(document.getElementById("data").textContent);
 const kinds = {u1: Uint8Array, u2: Uint16Array, f4: Float32Array, f8: Float64Array};
 const config = {responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"]};
 const grid = {gridcolor: "#e4e4e4", zeroline: false, automargin: true};
-const dashes = ["solid", "dash", "dot", "dashdot"];
 const cycle = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"];
 const byId = (id) => document.getElementById(id);
 /* One kind for all: what WebGL draws lies above what is drawn without it. */
@@ -30,17 +29,19 @@ const group = unpack(data.group), ids = unpack(data.design_id);
 const scenario = unpack(data.scenario.codes), cfa = unpack(data.cfa.codes);
 const wavelength = Array.from(unpack(data.curves.wavelength_nm));
 const G = Object.fromEntries(data.groups.map((name, i) => [name, i]));
-const x = columns[data.axes.x], y = columns[data.axes.y];
-const lineShapes = {"front of the search": "vh", "limit of any filter, unquantized": "hv"};  // what holds between two levels
-let view = data.views[0] || null;
+const x = columns[data.axes.x], y = columns[data.axes.y], light = columns.cfa_sensitivity;
+let overview = data.overviews[0], view = data.views[0] || null;
 
 const shown = (name, value) => Number.isFinite(value) ? value.toFixed(data.columns[name].digits) : "-";
 const title = (row) => data.names[row] ? data.names[row].long : `design ${ids[row]}`;
 
-function rowsOf(name) {
-  const at = data.scenario.words.indexOf(view.scenario), own = data.cfa.words.indexOf(view.cfa), found = [];
+const cfaOf = (row) => data.cfa.words[cfa[row]];
+
+function rowsOf(name, every = false) {
+  const at = data.scenario.words.indexOf(overview.scenario), found = [];
+  const own = every || !view ? -1 : data.cfa.words.indexOf(view.cfa);
   for (let i = 0; i < group.length; i++)
-    if (group[i] === G[name] && scenario[i] === at && cfa[i] === own) found.push(i);
+    if (group[i] === G[name] && scenario[i] === at && (own < 0 || cfa[i] === own)) found.push(i);
   return found;
 }
 
@@ -51,20 +52,28 @@ function described(row) {
     if (Number.isFinite(value) && !(name === "violation" && value <= 0))
       lines.push(`${data.columns[name].label}: ${shown(name, value)}`);
   }
-  return lines.slice(0, 26);
+  return [...lines, ...limitsOf(row)].slice(0, 30);
+}
+
+/* The two lights that limit each CSD of a design, where the run kept them. */
+function limitsOf(row) {
+  const own = data.limited[ids[row]];
+  return own ? Object.entries(own.texts).map(([name, lights]) => `${name} ${lights}`) : [];
 }
 
 /* The design that is meant: one of the front, or with a name, within a few pixels, else the nearest. */
-function meant(event) {
-  const row = event.points[0].customdata, {xaxis, yaxis} = byId("pareto")._fullLayout;
+function meant(event, id) {
+  const row = event.points[0].customdata, {xaxis, yaxis} = byId(id)._fullLayout;
   if (row === undefined) return undefined;
-  const far = (i) => Math.hypot(xaxis.d2p(x[i]) - xaxis.d2p(x[row]), yaxis.d2p(y[i]) - yaxis.d2p(y[row]));
-  const marked = [...rowsOf("best"), ...rowsOf("named"), ...rowsOf("front")].filter((i) => far(i) < 6);
+  const all = id === "cfas", u = all ? light : x;
+  const far = (i) => Math.hypot(xaxis.d2p(u[i]) - xaxis.d2p(u[row]), yaxis.d2p(y[i]) - yaxis.d2p(y[row]));
+  const names = all ? ["best", "named", "plain", "front"] : ["best", "named", "front"];
+  const marked = names.flatMap((name) => rowsOf(name, all)).filter((i) => far(i) < 6);
   return marked.reduce((near, i) => near === undefined || far(i) < far(near) ? i : near, undefined) ?? row;
 }
 
-function hover(event) {
-  const box = byId("hover"), row = meant(event);
+function hover(event, id) {
+  const box = byId("hover"), row = meant(event, id);
   if (row === undefined) return;
   box.replaceChildren(...described(row).map((line) => {
     const part = document.createElement("div");
@@ -84,6 +93,48 @@ function points(rows, name, marker, extra) {
   }, extra);
 }
 
+/* What the search found at its levels, and what is proven there: between two levels the limit at the lower one holds. */
+function levelTraces(drawn) {
+  const found = [];
+  if (drawn.traced) found.push({type: drawnBy, mode: "markers", name: "found by the search", x: drawn.traced[0],
+    y: drawn.traced[1], hoverinfo: "skip", marker: {symbol: "cross-thin-open", size: 9, color: data.colors.groups.best, line: {width: 2}}});
+  if (drawn.limit) found.push({type: drawnBy, mode: "lines", name: "limit of any filter, unquantized", x: drawn.limit[0],
+    y: drawn.limit[1], hoverinfo: "skip", line: {shape: "hv", color: data.colors.groups.limit, dash: "dash", width: 2}});
+  return found;
+}
+
+function drawOverview() {
+  const color = data.colors.groups, found = [], labeled = [];
+  const add = (name, text, marker, write) => {
+    const rows = rowsOf(name, true).filter((i) => Number.isFinite(y[i]));
+    if (!rows.length) return;
+    if (write) labeled.push(...rows);
+    found.push(points(rows, text, marker, {x: rows.map((i) => light[i])}));
+  };
+  add("front", "swept front", {size: 6, color: color.front});
+  found.push(...levelTraces(overview));
+  add("plain", "plain CFAs", {size: 10, symbol: "square", color: color.reference}, true);
+  add("named", "named designs", {size: 10, symbol: "diamond", color: color.named}, true);
+  add("best", "best of the search", {size: 17, symbol: "star", color: color.best, line: {color: "#000000", width: 1}}, true);
+  let top = 1, right = 1;
+  for (const i of labeled) { top = Math.max(top, y[i]); right = Math.max(right, light[i]); }
+  for (const line of [overview.traced, overview.limit]) if (line) top = Math.max(top, ...line[1]);
+  const placed = [], notes = labeled.sort((a, b) => y[a] - y[b]).map((row) => {
+    const near = placed.filter((i) => Math.abs(light[i] - light[row]) < (narrow() ? 0.3 : 0.11) && Math.abs(y[i] - y[row]) < 0.06 * top).length;
+    placed.push(row);
+    const name = data.names[row] ? data.names[row].short : cfaOf(row);
+    return {x: light[row], y: y[row], text: `${plain(name)} ${y[row] < 10 ? y[row].toFixed(1) : y[row].toFixed(0)}`, showarrow: false,
+      xanchor: light[row] > 0.85 * right ? "right" : "left", xshift: light[row] > 0.85 * right ? -8 : 8, yshift: 9 + 13 * near, font: {size: 12}};
+  });
+  Plotly.react("cfas", found, {
+    xaxis: Object.assign({title: {text: plain(overview.x_label).replace(": ", narrow() ? ":<br>" : ": ")}, range: [0, 1.03 * right]}, grid),
+    yaxis: Object.assign({title: {text: plain(overview.y_label)}, range: [0, 1.1 * top]}, grid),
+    height: narrow() ? 460 : 440, margin: {l: 60, r: 10, t: 30, b: 50}, hovermode: "closest", plot_bgcolor: "#fff", annotations: notes,
+    legend: narrow() ? {orientation: "h", y: -0.3, font: {size: 11}} : {x: 1.01, y: 1, font: {size: 12}},
+    title: {text: plain(overview.title), font: {size: narrow() ? 12 : 15}},
+  }, config);
+}
+
 function traces() {
   const color = data.colors.groups, found = [];
   const count = (rows) => rows.length.toLocaleString("en");
@@ -101,10 +152,7 @@ function traces() {
   if (good.length)
     found.push(points(good, `feasible (${count(good)} drawn)`, {size: 4, opacity: 0.6, color: color.feasible}));
   if (front.length) found.push(points(front, `Pareto front (${count(front)})`, {size: 7, color: color.front}));
-  Object.entries(view.lines).forEach(([name, [u, v]], i) => found.push({
-    type: drawnBy, mode: "lines", name, x: u, y: v, hoverinfo: "skip",
-    line: {shape: lineShapes[name] || "linear", color: i ? "#009e73" : "#d55e00", dash: dashes[i % 4], width: 2},
-  }));
+  found.push(...levelTraces(view));
   if (view.knee !== null)
     found.push(points([view.knee], "knee of the front",
       {size: 15, symbol: "hexagon-open", color: "#000000", line: {width: 2}}));
@@ -144,6 +192,7 @@ function legend() {
   return narrow() ? {orientation: "h", y: -0.28, font: {size: 11}} : {x: 1.12, y: 1, font: {size: 12}};
 }
 
+let listening = false;
 function drawPareto() {
   const layout = Object.assign({
     xaxis: Object.assign({title: {text: plain(view.x_label).replace(" (", narrow() ? "<br>(" : " (")}}, grid),
@@ -153,6 +202,8 @@ function drawPareto() {
     title: {text: plain(view.title), font: {size: narrow() ? 12 : 15}},
   }, levels());
   Plotly.react("pareto", traces(), layout, config);
+  if (!listening) listen("pareto");
+  listening = true;
 }
 
 function drawCurves(row) {
@@ -161,9 +212,15 @@ function drawCurves(row) {
     type: "scatter", mode: "lines", name: plain(name), x: wavelength, y: Array.from(unpack(packed)),
     line: {color, dash, width},
   });
-  for (const name of data.curves.ends[view.cfa] || [])
-    line(name, data.curves.sensor[name], data.colors.curves[name] || "#777777", "dot", 1.5);
-  if (data.curves.limits[view.cfa]) line("limit of any filter, unquantized", data.curves.limits[view.cfa], "#000000", "dash", 1.2);
+  const whole = group[row] === G.plain, names = (whole ? data.curves.plain : data.curves.ends)[cfaOf(row)] || [];
+  let top = 0.1;
+  for (const packed of [...names.map((name) => data.curves.sensor[name]), ...own]) top = Math.max(top, ...unpack(packed));
+  for (const [type, packed] of Object.entries(data.curves.shades)) found.push({
+    type: "scatter", mode: "lines", name: `${plain(type)} lights`, x: wavelength, y: Array.from(unpack(packed), (v) => v * top), fill: "tozeroy",
+    line: {width: 0}, fillcolor: `${data.colors.types[type] || "#777777"}22`, hoverinfo: "skip"});
+  for (const name of names)
+    line(name, data.curves.sensor[name], data.colors.curves[name] || "#777777", whole ? "solid" : "dot", whole ? 2.5 : 1.5);
+  if (!whole && data.curves.limits[cfaOf(row)]) line("limit of any filter, unquantized", data.curves.limits[cfaOf(row)], "#000000", "dash", 1.2);
   own.forEach((packed, i) => line(own.length > 1 ? `${title(row)}, ${"ab"[i]}` : title(row), packed, cycle[i], "solid", 2.5));
   Plotly.react("curves", found, {
     title: {text: `QE of ${plain(title(row))}`, font: {size: 14}}, height: 340, margin: {l: 50, r: 10, t: 36, b: 45},
@@ -173,7 +230,7 @@ function drawCurves(row) {
 }
 
 function drawClouds(row) {
-  const packed = data.clouds.designs[ids[row]], channels = data.clouds.channels[view.cfa] || [];
+  const packed = data.clouds.designs[ids[row]], channels = data.clouds.channels[cfaOf(row)] || [];
   byId("clouds").hidden = !packed || channels.length < 2;
   if (byId("clouds").hidden) return;
   const types = data.clouds.types, n = types.length, dn = unpack(packed);
@@ -197,6 +254,13 @@ function drawClouds(row) {
           color: data.colors.types[type] || cycle[k % 7]},
       });
     });
+    const near = (data.limited[ids[row]] || {}).nearest;
+    if (near) {
+      const ends = near.slice(0, 2).map(([type, name]) => types.findIndex((t, i) => t === type && data.clouds.names[i] === name));
+      found.push({type: "scatter", mode: "lines", name: `nearest lights, ${near[2]} apart`, showlegend: pair === 0, legendgroup: "nearest",
+        x: ends.map((i) => of(0)[i]), y: ends.map((i) => of(pair + 1)[i]), xaxis: `x${at}`, yaxis: `y${at}`,
+        line: {color: "#000000", width: 2}, hoverinfo: "skip"});
+    }
     layout[`xaxis${at}`] = Object.assign({title: {text: `${channels[0]} / DN`}, range: [0, 1.05 * top]}, grid);
     layout[`yaxis${at}`] = Object.assign({title: {text: `${channels[pair + 1]} / DN`}, range: [0, 1.05 * top]}, grid);
   }
@@ -214,11 +278,19 @@ function choose(row) {
     pair.append(term, text);
     list.append(pair);
   }
+  for (const text of limitsOf(row)) {
+    const part = document.createElement("div"), term = document.createElement("dt"), lights = document.createElement("dd");
+    term.textContent = text.slice(0, text.indexOf(" limited by ") + 11);
+    lights.textContent = text.slice(text.indexOf(" limited by ") + 12);
+    part.className = "limits";
+    part.append(term, lights);
+    list.append(part);
+  }
   const head = document.createElement("h3");
   head.textContent = title(row);
-  const note = document.createElement("p"), kept = ids[row] in data.curves.designs;
+  const note = document.createElement("p"), kept = group[row] === G.plain || ids[row] in data.curves.designs;
   note.textContent = (kept ? "" : "This page holds no curve of this design. ") +
-    `To keep it as CSV and for ISETCam: sweep export ${data.folder} --design ${ids[row]}` +
+    `To export it as CSV and for ISETCam: sweep export ${data.folder} --design ${ids[row]}` +
     (kept && !(ids[row] in data.clouds.designs) ? `. Its signals are kept in ${data.cloud_scenario} alone.` : "");
   box.replaceChildren(head, list, note);
   box.dataset.design = ids[row];
@@ -285,7 +357,7 @@ function drawProfiles() {
     found.push({type: "scatter", mode: "lines+markers", x: entry.values, y: entry.best, xaxis: `x${at}`, yaxis: `y${at}`,
       line: {color: "#0072b2"}, marker: {size: 4}, hovertemplate: `${plain(entry.parameter)} %{x:.4g}: %{y:.4g}<extra></extra>`});
     layout[`xaxis${at}`] = Object.assign({title: {text: plain(entry.parameter)}}, grid);
-    layout[`yaxis${at}`] = Object.assign({range: [0, 1.05 * top], title: {text: entries.indexOf(entry) % 3 ? "" : "best left"}}, grid);
+    layout[`yaxis${at}`] = Object.assign({range: [0, 1.05 * top], title: {text: entries.indexOf(entry) % 3 ? "" : plain(label)}}, grid);
   }, 210);
 }
 
@@ -306,7 +378,7 @@ function drawSeries(series, box) {
     title: {text: plain(series.title), font: {size: 14}}, height: narrow() ? 460 : 420, shapes, hovermode: "x unified",
     margin: {l: 60, r: 10, t: 36, b: 50}, legend: narrow() ? {orientation: "h", y: -0.25} : {},
     xaxis: Object.assign({title: {text: plain(series.x_label)}, type: series.log_x ? "log" : "linear"}, grid),
-    yaxis: Object.assign({title: {text: plain(series.y_label)}, type: series.log_y ? "log" : "linear",
+    yaxis: Object.assign({title: {text: plain(series.y_label)}, type: series.log_y ? "log" : "linear", exponentformat: "power",
       rangemode: series.from_zero && !series.log_y ? "tozero" : "normal"}, grid),
   }, config);
 }
@@ -355,7 +427,8 @@ function select(id, words, key) {
   }));
   box.closest("label").hidden = words.length < 2;
   box.addEventListener("change", () => {
-    const wanted = Object.assign({scenario: view.scenario, cfa: view.cfa}, {[key]: box.value});
+    const wanted = {scenario: overview.scenario, cfa: view ? view.cfa : null, [key]: box.value};
+    overview = data.overviews.find((v) => v.scenario === wanted.scenario) || overview;
     view = data.views.find((v) => v.scenario === wanted.scenario && v.cfa === wanted.cfa) || view;
     drawAll();
   });
@@ -377,30 +450,50 @@ function later(id, draw) {
 }
 
 function drawAll() {
-  drawPareto();
-  const first = [...rowsOf("best"), ...rowsOf("front").sort((a, b) => y[b] - y[a]), ...rowsOf("named"), ...rowsOf("feasible"), ...rowsOf("infeasible")][0];
+  drawOverview();
+  if (view) later("pareto", drawPareto);
+  const best = [...rowsOf("best", true), ...rowsOf("front", true).sort((a, b) => y[b] - y[a])];
+  const other = ["named", "plain", "feasible", "infeasible"].flatMap((name) => rowsOf(name, true)).sort((a, b) => y[b] - y[a]);
+  const first = [...best, ...other].find((row) => Number.isFinite(y[row]));
   if (first !== undefined) choose(first);
+  if (!view) return;
   later("parallel-section", drawParallel);
   later("profiles-section", drawProfiles);
 }
 
+/* Pointing and clicking at the designs of a plot, once it is drawn. */
+function listen(id) {
+  byId(id).on("plotly_hover", (event) => hover(event, id));
+  byId(id).on("plotly_unhover", () => { byId("hover").hidden = true; });
+  byId(id).on("plotly_click", (event) => {
+    const row = meant(event, id);
+    if (row === undefined) return;
+    choose(row);
+    hover(event, id);  // after a quick click Plotly does not say again what is pointed at
+  });
+}
+
+select("scenario", data.overviews.map((v) => v.scenario), "scenario");
 if (view) {
-  select("scenario", [...new Set(data.views.map((v) => v.scenario))], "scenario");
   select("cfa", [...new Set(data.views.map((v) => v.cfa))], "cfa");
   byId("infeasible").addEventListener("change", drawPareto);
   byId("save").addEventListener("click", saveFront);
   byId("save").disabled = data.front.rows.length === 0;
-  drawAll();
-  byId("pareto").on("plotly_hover", hover);
-  byId("pareto").on("plotly_unhover", () => { byId("hover").hidden = true; });
-  byId("pareto").on("plotly_click", (event) => {
-    const row = meant(event);
-    if (row === undefined) return;
-    choose(row);
-    hover(event);  // after a quick click Plotly does not say again what is pointed at
-  });
 }
+drawAll();
+listen("cfas");
 later("history", drawHistory);
 data.series.forEach((series, i) => later(`series-${i}`, () => drawSeries(series, byId(`series-${i}`))));
+/* A page that is printed has every figure, as wide as the paper. */
+function print() {
+  for (const [box, draw] of drawers) {
+    near.unobserve(box);
+    draw();
+  }
+  document.querySelectorAll(".js-plotly-plot").forEach((box) => Plotly.relayout(box, {width: 960}));
+}
+window.addEventListener("beforeprint", print);
+window.addEventListener("afterprint", () => document.querySelectorAll(".js-plotly-plot").forEach((box) =>
+  Plotly.relayout(box, {width: null, autosize: true})));
 document.body.dataset.readyMs = Math.round(performance.now());
 })();

@@ -1,0 +1,235 @@
+"""The answer to a study's question: sentences that can be said in a meeting, and three numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..metrics.bound import FEASIBLE
+from ..metrics.columns.sensitivity import CFA_SENSITIVITY
+from ..metrics.limiting import limited_by_name
+from ..metrics.quantity import HELD_OUT
+from ..results.output import Output
+from ..results.tables import FOUND, PLAIN, SWEPT
+from ..results.thinning import per_light
+from .leaders import Leaders, Row, leaders_of
+from .names import full_name
+from .noise import usable_lines
+from .series import SeriesFigure, lead_sentence, leads_of
+from .values import series_figures
+
+_OF_CLEAR = "of a clear sensor's light"
+
+
+@dataclass(frozen=True)
+class LargeNumber:
+    """A large number of the first screen: `value` with its unit, what it is, and what it compares with."""
+
+    value: str
+    name: str
+    comparison: str
+
+
+def answer_sentences(output: Output) -> list[str]:
+    """Over scenarios that differ in one number who leads where; else who is best, and what limits it."""
+    searched = output.kind(SWEPT, FOUND)
+    if len(searched) and output.best.empty:
+        failed = searched[searched["status"] != "ok"]
+        if len(failed) == len(searched):
+            return [f"Every design failed: {failed['status'].iloc[0]}."]
+        return [f"No design is feasible{_under(output)}.", *who_else(output)]
+    usable = list(usable_lines(output))
+    # Where the question is of noise, separations matter where another CFA begins to lead.
+    series = usable + [lead_sentence(s) for s in series_figures(output) if not usable or len(leads_of(s)) > 1]
+    if series and output.best.empty:
+        return series
+    return [*_best(output, leaders_of(output)), *who_else(output), *series]
+
+
+def _under(output: Output) -> str:
+    limits = " and ".join(f"{output.words(q)} {bound}" for q, bound in output.constraints.items())
+    return f" with {limits}" if limits else ""
+
+
+def said_separation(output: Output, row: Row) -> str:
+    """How far a row separates the pair of signal types of the trade-off, and at which light."""
+    separation = output.trade_off[0]
+    told = separation.told(row[separation.name])
+    light = f"at {row[CFA_SENSITIVITY]:.3f} {_OF_CLEAR}"
+    if separation.pair is None:
+        return f"reaches {separation.words} {told} {light}"
+    worst = " in the worst case of production" if separation.extreme else ""
+    return f"separates {' from '.join(separation.pair)} by {told}{worst} {light}"
+
+
+def _best(output: Output, leaders: Leaders) -> Iterator[str]:
+    """Who is best under the constraints, beside the plain CFA that separates most; and what limits it."""
+    best, plain, separation = leaders.chosen, leaders.plain, output.trade_off[0]
+    if best is None:
+        return
+    under = _under(output).removeprefix(" with ")
+    text = f"Under {under}, {full_name(best)}" if under else _capital(full_name(best))
+    if output.goal.name not in (separation.name, separation.of):
+        text += f" has the best {output.goal.words}, {output.goal.amount(best[output.goal.name])}, and"
+    text += f" {said_separation(output, best)}"
+    if len(output.scenarios) > 1:
+        text += f" in {leaders.scenario}"
+    if plain is not None:
+        text += _times(output, best, plain)
+    yield f"{text}."
+    lights = best.get(limited_by_name(separation.pair)) if separation.pair else None
+    search = output.provenance.search
+    proven = None if search is None or best["kind"] not in (SWEPT, FOUND) else search.limit_proven
+    parts = []
+    if proven is not None and output.goal.name == separation.name:
+        parts.append(f"No filter in its place exceeds {separation.told(proven)} (proven, before quantization).")
+    if isinstance(lights, str):
+        parts.append(f"The two lights that limit it are {lights}.")
+    if parts:
+        yield " ".join(parts)
+    yield from _unseen(output, best)
+
+
+def _unseen(output: Output, best: Row) -> Iterator[str]:
+    """How the best one does on lights that its search did not see."""
+    separation = output.trade_off[0]
+    held_out = float(best.get(HELD_OUT + (separation.of or separation.name), np.nan))
+    if np.isfinite(held_out):
+        own = separation.told(best[separation.name])
+        yield f"On lights that it has not seen it has {separation.told(held_out)} (on its own lights {own})."
+    if output.left_out is not None and output.left_out["fall"].notna().any():
+        worst = output.left_out.nlargest(1, "fall").iloc[0]
+        yield f"Left out of the search, {worst['signal']} costs its optimum most: {separation.told(worst['fall'])}."
+
+
+def _times(output: Output, best: Row, plain: Row) -> str:
+    """The separation and the light of a row as multiples of those of a plain CFA."""
+    separation = output.trade_off[0]
+    of, light = float(plain[separation.name]), float(plain[CFA_SENSITIVITY])
+    if not of > 0:
+        return f" ({plain['name']} by {separation.told(of)} at {light:.3f})"
+    return (
+        f": {best[separation.name] / of:.2f} times the separation of {plain['name']} ({separation.told(of)}) "
+        f"and {best[CFA_SENSITIVITY] / light:.2f} times its light ({light:.3f})"
+    )
+
+
+def who_else(output: Output) -> list[str]:
+    """Who separates most, and most per light, where that is not the best one under the constraints."""
+    found = " ".join(_others(output, leaders_of(output)))
+    return [found] if found else []
+
+
+def _others(output: Output, leaders: Leaders) -> Iterator[str]:
+    """Who separates most and who does so per light, where that is somebody else."""
+    best, most, rate = leaders.chosen, leaders.separates, leaders.per_light
+    separation = output.trade_off[0]
+    if most is not None and best is not None and most["design_id"] == best["design_id"]:
+        yield "Nothing else in this run separates more."
+    more = most is not None and (best is None or most[separation.name] > best[separation.name])
+    if most is not None and more:
+        yield f"{_capital(full_name(most))} separates most of all: {_figures(output, most)}{_missed(output, most)}."
+    if rate is None:
+        return
+    measure = per_light(separation.name)
+    same = more and most is not None and most["design_id"] == rate["design_id"]
+    who = "It" if same else _capital(full_name(rate))
+    text = f"{who} separates most per light{', too' if same else ''}: "
+    text += f"{_rate_told(rate[measure])} {separation.unit} per ms of exposure"
+    rivals = [r for r in (best, leaders.plain) if r is not None and r["design_id"] != rate["design_id"]]
+    against = ", ".join(
+        f"{full_name(r)} {_rate_told(r[measure])}" for r in {r["design_id"]: r for r in rivals}.values()
+    )
+    yield text + (f" ({against})" if against else "") + ("" if same else _missed(output, rate)) + "."
+
+
+def _figures(output: Output, row: Row) -> str:
+    separation = output.trade_off[0]
+    return f"{separation.told(row[separation.name])} at {row[CFA_SENSITIVITY]:.3f} {_OF_CLEAR}"
+
+
+def _missed(output: Output, row: Row) -> str:
+    """Constraints that a row does not meet, in words."""
+    missed = [
+        f"{output.words(name)} {bound}"
+        for name, bound in output.constraints.items()
+        if bound.violation(np.array([row[name]], dtype=float))[0] > FEASIBLE
+    ]
+    return f", but it does not meet {' and '.join(missed)}" if missed and row["kind"] != PLAIN else ""
+
+
+def _rate_told(rate: float) -> str:
+    """A separation per light, DN/ms."""
+    return f"{rate:.{0 if rate >= 100 else 1}f}"
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def large_numbers(output: Output) -> list[LargeNumber]:
+    """Separation, light and distance to the limit of the best one, or what it separates per light without a limit.
+
+    Over scenarios that differ in one number: who leads first, its light, and up to where.
+    """
+    figures = sorted(series_figures(output), key=lambda series: len(leads_of(series)) < 2)
+    if figures and output.best.empty:
+        return list(_numbers_over(output, figures[0]))
+    leaders = leaders_of(output)
+    best, plain, separation = leaders.chosen, leaders.plain, output.trade_off[0]
+    if best is None:
+        return []
+    value, measure = float(best[separation.name]), per_light(separation.name)
+    numbers = [
+        LargeNumber(separation.told(value), separation.words, _beside(plain, separation.name, value, separation.told)),
+        LargeNumber(
+            f"{best[CFA_SENSITIVITY]:.3f}",
+            _OF_CLEAR,
+            _beside(plain, CFA_SENSITIVITY, float(best[CFA_SENSITIVITY]), "{:.3f}".format),
+        ),
+    ]
+    search = output.provenance.search
+    if search is not None and search.limit_proven is not None and output.goal.name == separation.name:
+        # Of the numbers as they stand beside each other, so that a reader's own difference is the same.
+        digits = 0 if value >= 10 else separation.digits
+        left = separation.told(max(0.0, round(search.limit_proven, digits) - round(value, digits)))
+        limit = f"{separation.told(search.limit_proven)}: no filter exceeds it"
+        numbers.append(LargeNumber(left, "below the limit of any filter", limit))
+    elif best[measure] == best[measure]:
+        rate = float(best[measure])
+        beside = _beside(plain, measure, rate, _rate_told)
+        numbers.append(LargeNumber(f"{_rate_told(rate)} {separation.unit}/ms", "per light (ms of exposure)", beside))
+    return numbers
+
+
+def _numbers_over(output: Output, series: SeriesFigure) -> Iterator[LargeNumber]:
+    """Of the first one that leads in a series: separation, light, and where its lead ends."""
+    separation, (_, unit) = output.trade_off[0], series.quantity
+    leads = leads_of(series)
+    name, start, stop = next((lead for lead in leads if lead[0] is not None), (None, 0, 0))
+    if name is None:
+        return
+    others = {other: line.y for other, line in series.lines.items() if other != name}
+
+    def at(place: int) -> str:
+        return f"{series.x[place]:g} {unit}".rstrip()
+
+    def rival(place: int) -> str:
+        ranked = sorted(others, key=lambda other: -np.nan_to_num(others[other][place], nan=-np.inf))
+        return "" if not ranked else f"{ranked[0]} {separation.told(others[ranked[0]][place])}"
+
+    own = series.lines[name].y
+    yield LargeNumber(separation.told(own[start]), f"{name} at {at(start)}", rival(start))
+    rows = output.few[output.few["name"] == name]
+    yield LargeNumber(f"{rows[CFA_SENSITIVITY].iloc[0]:.3f}", _OF_CLEAR, name)
+    figures = ", ".join(part for part in (f"{separation.told(own[stop])}", rival(stop)) if part)
+    yield LargeNumber(at(stop), f"{name} leads up to here" if leads[-1][2] != stop else "and still leads here", figures)
+
+
+def _beside(other: Row | None, column: str, value: float, told: Callable[[float], str]) -> str:
+    """A value as a multiple of that of a plain CFA."""
+    if other is None or not float(other[column]) > 0:
+        return ""
+    return f"{value / float(other[column]):.2f} times {other['name']} ({told(float(other[column]))})"

@@ -1,0 +1,65 @@
+"""Who leads in a scenario: under the constraints, in separation, and per light."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from ..results.output import Output
+from ..results.tables import FOUND, PLAIN, SWEPT
+from ..results.thinning import per_light
+
+Row = Mapping[Any, Any]
+
+
+@dataclass(frozen=True)
+class Leaders:
+    """Rows of a scenario.
+
+    `chosen`: the best design that the study swept or searched and that meets all constraints; without such designs the
+    CFA or named design that does and separates most; None where none does. `separates`, `per_light`: who separates
+    most of all rows, and most for each millisecond of exposure, whatever the constraints. `plain`: the other
+    plain CFA that separates most, with which the chosen one is compared.
+    """
+
+    scenario: str
+    chosen: Row | None
+    separates: Row | None
+    per_light: Row | None
+    plain: Row | None
+
+
+def leaders_of(output: Output, scenario: str | None = None) -> Leaders:
+    """Who leads in a scenario, by default in that of the best design, or in the first one."""
+    separation = output.trade_off[0].name
+    best = output.best
+    if scenario is None:
+        scenario = str(best.iloc[0]["scenario"]) if len(best) else output.scenarios[0]
+    rows = output.table[(output.table["scenario"] == scenario) & (output.table["status"] == "ok")]
+    made = rows["kind"].isin([SWEPT, FOUND])
+    own = best[best["scenario"] == scenario]
+    chosen = _first(own) if made.any() else _most(rows[rows["feasible"]], separation)
+    others = rows if chosen is None else rows[rows["design_id"] != chosen["design_id"]]
+    return Leaders(
+        scenario,
+        chosen,
+        _most(rows, separation),
+        _most(rows, per_light(separation)),
+        _most(others[others["kind"] == PLAIN], separation),
+    )
+
+
+def _first(rows: pd.DataFrame) -> Row | None:
+    return None if rows.empty else rows.iloc[0].to_dict()
+
+
+def _most(rows: pd.DataFrame, column: str) -> Row | None:
+    """The row with the largest value; of equal ones a CFA or design with a name, then the first one."""
+    kept = rows[rows[column].notna()]
+    if kept.empty:
+        return None
+    named = kept["name"].notna()
+    return _first(kept.assign(_named=named).sort_values([column, "_named"], ascending=False, kind="stable"))

@@ -1,0 +1,111 @@
+"""How designs do on lights that they have not seen: other lights, and each light that is left out of a search."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+
+from ..camera.imager import imager_of
+from ..camera.view import View
+from ..curves.lights import Lights, class_pairs
+from ..metrics.evaluate import evaluate
+from ..metrics.quantity import HELD_OUT
+from ..metrics.separation import csd_name
+from ..results.designs import row_curves
+from ..search.problem import Evaluation, Problem, best_feasible, starting_points
+from ..search.solver import search_from, smooth_objective
+from ..study import Search, Study
+from ..types import FloatArray, Parallel, Progress, delayed
+
+_STARTS = 4
+
+
+def held_out_table(
+    study: Study, rows: pd.DataFrame, on_front: pd.DataFrame, parallel: Parallel, progress: Progress
+) -> pa.Table:
+    """Columns `design_id` and `held_out_csd_<a>_<b>`, DN, of the rows to draw and of the front.
+
+    The scenes are those of the study, by the methods of their plans, with the other lights in place of its own.
+    """
+    assert study.held_out is not None
+    lights = study.held_out
+    every = pd.concat([rows, on_front]).drop_duplicates("design_id")
+    shown: list[dict[Any, Any]] = every[every["status"] == "ok"].to_dict("records")
+    calls = []
+    for row in shown:
+        space, curves = row_curves(study, row)
+        calls.append(delayed(_on_lights, replace(study.view(space, row["scenario"]), lights=lights), curves))
+    found: list[dict[str, Any]] = []
+    for row, values in zip(shown, parallel(calls), strict=True):
+        found.append({"design_id": row["design_id"], **values})
+        progress("held-out lights", len(found), len(shown))
+    names = [HELD_OUT + csd_name(pair) for pair in class_pairs(lights.classes)]
+    schema = pa.schema([("design_id", pa.int64()), *((name, pa.float64()) for name in names)])
+    return pa.Table.from_pylist(found, schema=schema)
+
+
+def _on_lights(view: View, curves: FloatArray) -> dict[str, float]:
+    columns = evaluate(imager_of(view), np.asarray(curves, dtype=float))
+    names = [csd_name(pair) for pair in class_pairs(view.lights.classes)]
+    return {HELD_OUT + name: float(columns[name][0]) for name in names}
+
+
+def left_out_table(study: Study, search: Search, best: Evaluation, parallel: Parallel, progress: Progress) -> pa.Table:
+    """A row per light of the objective: the search without it, and what its optimum falls to with it.
+
+    Columns `signal_type`, `signal`; `seen`: the objective of the optimum without the light, `with_it`: that of the
+    same design with all lights, `fall`: the difference; before quantization. Each search starts from the study's
+    answer and a few other points. A light that is alone in its type cannot be left out.
+    """
+    problem = study.problem(search)
+    asked = {name for column in problem.objective.weights for name in _types(problem, column)}
+    lights = study.lights
+    members = {name: len(own) for name, own in lights.members.items()}
+    at = [i for i, kind in enumerate(lights.types) if kind in asked and members[kind] > 1]
+    starts = [problem.to_unit(best.x), *starting_points(problem, _STARTS - 1, study.section.seed)]
+    each = max(1, search.max_evaluations // _STARTS)
+    tasks = [delayed(_without, problem, i, starts, search.algorithm, each, study.section.seed) for i in at]
+    rows: list[dict[str, Any]] = []
+    for i, answer in zip(at, parallel(tasks), strict=True):
+        key = {"signal_type": lights.types[i], "signal": lights.names[i]}
+        rows.append(key | dict(zip(("seen", "with_it", "fall"), answer or (None,) * 3, strict=True)))
+        progress("lights left out", len(rows), len(at))
+    number = pa.float64()
+    fields = [("signal_type", pa.string()), ("signal", pa.string())]
+    return pa.Table.from_pylist(
+        rows, schema=pa.schema([*fields, ("seen", number), ("with_it", number), ("fall", number)])
+    )
+
+
+def _types(problem: Problem, column: str) -> tuple[str, ...]:
+    pair = problem.quantities[column].pair
+    return () if pair is None else pair
+
+
+def _without(
+    problem: Problem, light: int, starts: Sequence[FloatArray], algorithm: str, evaluations: int, seed: int
+) -> tuple[float, float, float] | None:
+    """The optimum without a light: its objective without and with it, and the difference; None without a design."""
+    fewer = replace(problem, view=replace(problem.view, lights=_some(problem.view.lights, light)))
+    log = [e for i, u in enumerate(starts) for e in search_from(fewer, i, u, algorithm, evaluations, seed).log]
+    found = best_feasible(log)
+    if found is None:
+        return None
+    whole = smooth_objective(problem, found.x)
+    return found.objective, whole, found.objective - whole
+
+
+def _some(lights: Lights, left_out: int) -> Lights:
+    """All lights but one; the photons of the others stay as they are."""
+    kept = [i for i in range(len(lights.names)) if i != left_out]
+    return replace(
+        lights,
+        names=tuple(lights.names[i] for i in kept),
+        types=tuple(lights.types[i] for i in kept),
+        photons=lights.photons[kept],
+    )

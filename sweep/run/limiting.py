@@ -1,0 +1,53 @@
+"""The two lights that limit each separation, of the designs that a report can show."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+
+from ..camera.imager import imager_of
+from ..camera.view import View
+from ..metrics.limiting import BETWEEN, limited_by_name, limiting_lights
+from ..results.designs import row_curves
+from ..study import Study
+from ..types import FloatArray, Parallel, Progress, delayed
+
+_AT_ONCE = 64
+
+
+def limited_by_table(
+    study: Study, rows: pd.DataFrame, on_front: pd.DataFrame, parallel: Parallel, progress: Progress
+) -> pa.Table:
+    """Columns `design_id` and `limited_by_<a>_<b>`, the names of two lights, of the rows to draw and of the front."""
+    every = pd.concat([rows, on_front]).drop_duplicates("design_id")
+    groups: dict[tuple[str, str], list[tuple[int, FloatArray]]] = {}
+    views: dict[tuple[str, str], View] = {}
+    for row in every[every["status"] == "ok"].to_dict("records"):
+        space, curves = row_curves(study, row)
+        key = (str(row["scenario"]), space.cfa)
+        views.setdefault(key, study.view(space, key[0]))
+        groups.setdefault(key, []).append((int(row["design_id"]), curves))
+    calls = [
+        (views[key], own[start : start + _AT_ONCE])
+        for key, own in groups.items()
+        for start in range(0, len(own), _AT_ONCE)
+    ]
+    names = [limited_by_name(pair) for pair in study.pairs]
+    found = []
+    for answer in parallel(delayed(_limited, *call) for call in calls):
+        found += answer
+        progress("limiting lights", len(found), sum(len(own) for own in groups.values()))
+    schema = pa.schema([("design_id", pa.int64()), *((name, pa.string()) for name in names)])
+    return pa.Table.from_pylist(sorted(found, key=lambda row: row["design_id"]), schema=schema)
+
+
+def _limited(view: View, designs: list[tuple[int, FloatArray]]) -> list[dict[str, object]]:
+    """A row per design."""
+    imager = imager_of(view)
+    rows = []
+    for design_id, curves in designs:
+        pairs = limiting_lights(imager, np.asarray(curves, dtype=float))
+        named = {limited_by_name(pair): BETWEEN.join(lights) for pair, lights in pairs.items()}
+        rows.append({"design_id": design_id, **named})
+    return rows

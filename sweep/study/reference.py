@@ -1,0 +1,98 @@
+"""The language of a study as the documentation prints it: every section, key, value, default and meaning."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from .editors import Json, study_schema
+
+_REF = "#/$defs/"
+_STUDY = "A study"
+_COPY = "WithEach"
+"""Ends the names of copies that the schema holds for editors alone."""
+_TYPES = {
+    "integer": "whole number",
+    "number": "number",
+    "string": "text",
+    "boolean": "true or false",
+    "null": "nothing",
+}
+
+
+def study_reference() -> list[str]:
+    """Markdown: a table of keys for each section, the study itself first."""
+    schema = study_schema()
+    sections = {name: s for name, s in schema["$defs"].items() if not name.endswith(_COPY) and s.get("properties")}
+    lines = []
+    for name, section in {_STUDY: schema, **sections}.items():
+        lines += ["", f"### {_title(name)}", "", _text(section.get("description", "")), ""]
+        lines += ["| key | value | default | meaning |", "| --- | --- | --- | --- |"]
+        for key, prop in section["properties"].items():
+            needed = key in section.get("required", [])
+            lines.append(_row(key, prop, section, needed=needed))
+    return lines[1:]
+
+
+def _title(name: str) -> str:
+    words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name.removesuffix("Section"))
+    return words[:1].upper() + words[1:].lower()
+
+
+def _text(description: str) -> str:
+    return " ".join(description.split())
+
+
+def _row(key: str, prop: Json, section: Json, *, needed: bool) -> str:
+    own = prop.get("description", "")
+    meaning = "" if own == section.get("description") else _text(own)
+    default = "must be there" if needed else _default(prop)
+    return f"| `{key}` | {_value(prop)} | {default} | {meaning} |".replace("|  |", "| |").replace("|  |", "| |")
+
+
+def _default(prop: Json) -> str:
+    """The value where nothing is said; of a whole section its own table tells them."""
+    value = prop.get("default")
+    return "" if value is None or value == "" or isinstance(value, dict | list) else f"`{json.dumps(value)}`"
+
+
+def _value(prop: Json) -> str:
+    """What may stand there, in words."""
+    return " or ".join(dict.fromkeys(part for part in _values(prop) if part))
+
+
+def _values(prop: Any) -> Iterator[str]:
+    for part in (*prop.get("anyOf", ()), *prop.get("oneOf", ()), *prop.get("allOf", ())):
+        yield from _values(part)
+    if "$ref" in prop:
+        yield _link(prop["$ref"].removeprefix(_REF).removesuffix(_COPY))
+    elif "const" in prop:
+        yield f"`{prop['const']}`"
+    elif "enum" in prop:
+        yield ", ".join(f"`{value}`" for value in prop["enum"])
+    elif prop.get("type") == "array":
+        yield f"list of {_value(prop.get('items', {})) or 'values'}"
+    elif prop.get("type") == "object":
+        inner = prop.get("additionalProperties")
+        yield f"NAME: {_value(inner)}" if isinstance(inner, dict) and inner else "mapping"
+    elif isinstance(prop.get("type"), str) and prop["type"] != "null":
+        yield _TYPES[prop["type"]] + _range(prop)
+
+
+def _link(name: str) -> str:
+    title = _title(name)
+    return f"[{title}](#{title.lower().replace(' ', '-')})"
+
+
+def _range(prop: Json) -> str:
+    """The ends of a number."""
+    low, high = prop.get("minimum"), prop.get("maximum")
+    above, below = prop.get("exclusiveMinimum"), prop.get("exclusiveMaximum")
+    ends = [
+        f"{word} {end:.12g}"
+        for word, end in (("from", low), ("above", above), ("to", high), ("below", below))
+        if end is not None
+    ]
+    return f", {' '.join(ends)}" if ends else ""

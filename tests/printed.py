@@ -1,0 +1,31 @@
+"""The parts of the documentation that the program prints: `make documents` writes them anew."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+from sweep.results.dictionary import columns_table, files_table
+from sweep.study.reference import study_reference
+
+ROOT = Path(__file__).parent.parent
+PRINTED: dict[str, dict[str, Callable[[], list[str]]]] = {
+    "outputs/README.md": {"files": files_table, "columns": columns_table},
+    "studies/README.md": {"study": study_reference},
+}
+
+
+def with_printed(text: str, parts: dict[str, Callable[[], list[str]]]) -> str:
+    """A document with its printed parts as the program prints them now."""
+    for name, lines in parts.items():
+        block = re.compile(rf"(<!-- printed: {name} -->\n).*?(<!-- end -->)", re.DOTALL)
+        body = "\n".join(lines())
+        text, found = block.subn(lambda match, body=body: f"{match[1]}\n{body}\n\n{match[2]}", text)
+        assert found == 1, name
+    return text
+
+
+if __name__ == "__main__":
+    for file, parts in PRINTED.items():
+        (ROOT / file).write_text(with_printed((ROOT / file).read_text(), parts))

@@ -1,0 +1,196 @@
+"""What a reader sees without scrolling, and each figure that a report promises, in a browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sweep.report import make_report, read_output
+from sweep.study import load_study
+
+from ..build import ran
+from ..conftest import Finished
+from . import test_report_page as pages
+
+browser, opened, through = pages.browser, pages.opened, pages.through
+pytestmark = pages.pytestmark
+
+SCREENS = [
+    *((name, width) for name in ("stopband", "dual", "fog") for width in (1440, 400)),
+    *(pytest.param(name, width, marks=pytest.mark.slow) for name in ("distance", "noise") for width in (1440, 400)),
+]
+PLAIN = "study: plain\nsensor: ar0820\nlights: tl16\ncfas: [RGGB, RCCC, RYYCy]\n"
+
+
+@pytest.fixture(scope="module")
+def plain_cfas(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The finished run of a study of plain CFAs alone."""
+    folder = tmp_path_factory.mktemp("plain")
+    (folder / "plain.yaml").write_text(PLAIN)
+    ran(load_study(folder / "plain.yaml"), folder / "out", 1)
+    make_report(read_output(folder / "out"))
+    return folder / "out"
+
+
+def box(page: Any, selector: str) -> dict[str, float]:
+    found = page.locator(selector).first.bounding_box()
+    assert found is not None, selector
+    return dict(found)
+
+
+def first_screen(browser: Any, folder: Path, width: int) -> Any:
+    page = browser.new_page(viewport={"width": width, "height": 900})
+    page.goto((folder / "report.html").as_uri())
+    page.wait_for_selector("body[data-ready-ms]")
+    return page
+
+
+def fits(page: Any, width: int) -> None:
+    """Answer, three numbers and the first plot lie on the screen, and nothing is wider than it."""
+    first = page.locator(".screen .plot").first.get_attribute("id")
+    page.wait_for_function("(id) => document.getElementById(id).data", arg=first)
+    assert page.evaluate("document.documentElement.scrollWidth") == width
+    assert page.locator(".numbers b").count() == 3
+    answer, numbers = box(page, ".answer"), box(page, ".numbers")
+    assert answer["y"] < numbers["y"]
+    for value in page.locator(".numbers b").all():
+        shown = value.bounding_box()
+        clipped = value.evaluate("(e) => e.scrollWidth > e.clientWidth")
+        assert not clipped
+        assert shown["x"] + shown["width"] <= width
+    if width == 1440:
+        plot = box(page, f"#{first}")
+        assert plot["y"] + plot["height"] <= 900
+
+
+@pytest.mark.parametrize(("name", "width"), SCREENS)
+def test_the_answer_three_numbers_and_the_plot_are_on_one_screen(
+    finished: Finished, browser: Any, name: str, width: int
+) -> None:
+    page = first_screen(browser, finished(name), width)
+    fits(page, width)
+    page.close()
+
+
+@pytest.mark.parametrize("width", [1440, 400])
+def test_a_study_of_plain_cfas_has_the_same_screen(plain_cfas: Path, browser: Any, width: int) -> None:
+    page = first_screen(browser, plain_cfas, width)
+    fits(page, width)
+    assert page.locator("#pareto").count() == 0  # nothing trades off
+    page.close()
+
+
+def test_the_first_plot_has_every_cfa_at_its_light(finished: Finished, opened: Any) -> None:
+    folder = finished("stopband")
+    seen, table = opened(folder), pd.read_parquet(folder / "results.parquet")
+    traces = seen.page.evaluate(
+        "document.getElementById('cfas').data.map((t) => [t.name, Array.from(t.x), Array.from(t.y)])"
+    )
+    shown = {name: (np.array(x), np.array(y)) for name, x, y in traces}
+    front = pd.read_parquet(folder / "front.parquet")
+    kinds = {"plain CFAs": "reference", "named designs": "design", "best of the search": "search"}
+    for name, kind in kinds.items():
+        rows = table[table["kind"] == kind]
+        np.testing.assert_allclose(shown[name][0], rows["cfa_sensitivity"], rtol=1e-6)
+        np.testing.assert_allclose(shown[name][1], rows["csd_yellow_red"], rtol=1e-6)
+    swept = table[(table["kind"] == "sweep") & table["pareto"] & table["feasible"]]
+    assert len(shown["swept front"][0]) == len(swept)
+    bounded = front.dropna(subset=["limit"])
+    np.testing.assert_allclose(shown["limit of any filter, unquantized"][0], bounded["cfa_sensitivity_min"])
+    np.testing.assert_allclose(shown["limit of any filter, unquantized"][1], bounded["limit"])
+    modes = seen.page.evaluate("document.getElementById('cfas').data.filter((t) => t.name === 'found by the search')")
+    assert [mode["mode"] for mode in modes] == ["markers"]  # between its levels nothing is found
+
+
+def test_a_plain_cfa_is_chosen_by_a_click(finished: Finished, opened: Any) -> None:
+    seen = opened(finished("dual"))
+    place = seen.page.evaluate(
+        """() => {
+            const box = document.getElementById('cfas'), layout = box._fullLayout, at = box.getBoundingClientRect();
+            const trace = box.data.find((t) => t.name === 'plain CFAs');
+            return [at.left + layout._size.l + layout.xaxis.d2p(trace.x[0]),
+                    at.top + layout._size.t + layout.yaxis.d2p(trace.y[0])];
+        }"""
+    )
+    seen.page.mouse.move(*place)
+    seen.page.wait_for_selector("#hover", state="visible")
+    seen.page.mouse.click(*place)
+    seen.page.wait_for_function("document.querySelector('#details h3').textContent === 'RGGB'")
+    names = seen.page.evaluate("document.getElementById('curves').data.map((t) => t.name)")
+    assert {"R", "G", "B"} <= set(names)
+
+
+def test_the_limiting_lights_stand_in_hover_details_and_clouds(finished: Finished, opened: Any) -> None:
+    folder = finished("stopband")
+    seen = opened(folder)
+    design = int(seen.page.get_attribute("#details", "data-design"))
+    limited = pd.read_parquet(folder / "limited_by.parquet").set_index("design_id")
+    lights = limited.loc[design, "limited_by_yellow_red"]
+    assert seen.details()["yellow/red CSD limited by"] == lights
+    points = pd.read_parquet(folder / "points.parquet")
+    own = points[points["design_id"] == design].pivot_table(index="signal", columns="channel", values="dn")
+    segments = seen.page.evaluate(
+        "document.getElementById('clouds').data.filter((t) => t.name.startsWith('nearest lights'))"
+        ".map((t) => [t.name, Array.from(t.x), Array.from(t.y)])"
+    )
+    assert len(segments) == 3
+    for (name, x, y), channel in zip(segments, ("Y", "N", "Cy"), strict=True):
+        assert name.endswith("234 DN apart")
+        for light, u, v in zip(lights.split(" / "), x, y, strict=True):
+            assert u == pytest.approx(own.loc[light, "R"], rel=1e-6)
+            assert v == pytest.approx(own.loc[light, channel], rel=1e-6)
+
+
+def test_the_lights_stand_shaded_behind_the_qe(finished: Finished, opened: Any) -> None:
+    seen = opened(finished("stopband"))
+    shades = seen.page.evaluate(
+        "document.getElementById('curves').data.filter((t) => t.fill === 'tozeroy').map((t) => t.name)"
+    )
+    assert shades == ["green lights", "yellow lights", "orange lights", "red lights"]
+
+
+@pytest.mark.parametrize("name", ["stopband", "paper"])
+def test_no_table_is_cut_off(finished: Finished, opened: Any, name: str) -> None:
+    seen = opened(finished(name), 1440)
+    cut = seen.page.evaluate(
+        "[...document.querySelectorAll('.scroll')].filter((e) => e.offsetParent && e.querySelector('table')"
+        " && e.scrollWidth > e.clientWidth + 1).map((e) => e.innerText.slice(0, 60))"
+    )
+    assert cut == []
+
+
+def test_no_figure_is_shown_twice(finished: Finished, opened: Any) -> None:
+    seen = opened(finished("stopband"))
+    pictures = seen.page.evaluate("[...document.querySelectorAll('figure figcaption')].map((e) => e.textContent)")
+    assert len(pictures) == 4
+    assert not any("Trade-off" in text or "Filters" in text or "All CFAs" in text for text in pictures)
+
+
+@pytest.mark.parametrize("name", ["dual", "fog", "paper"])
+def test_nothing_is_drawn_as_a_trade_off_where_nothing_trades_off(finished: Finished, opened: Any, name: str) -> None:
+    assert opened(finished(name)).page.locator("#pareto").count() == 0
+    assert not (finished(name) / "pareto.png").exists()
+
+
+def test_a_printed_report_has_every_figure(finished: Finished, opened: Any, tmp_path: Path) -> None:
+    seen = opened(finished("stopband"))
+    seen.page.pdf(path=tmp_path / "report.pdf", prefer_css_page_size=True)
+    empty = seen.page.evaluate(
+        "[...document.querySelectorAll('.plot')].filter((e) => !e.hidden && !e.data).map((e) => e.id)"
+    )
+    assert empty == []
+    assert (tmp_path / "report.pdf").stat().st_size > 100_000
+
+
+@pytest.mark.slow
+def test_the_noise_report_begins_with_the_error(finished: Finished, opened: Any) -> None:
+    seen = opened(finished("noise"))
+    axis = seen.page.evaluate("document.getElementById('series-0').layout.yaxis")
+    assert axis["title"]["text"] == "error of the worst pair of states"
+    assert (axis["type"], axis["exponentformat"]) == ("log", "power")
+    ticks = seen.page.evaluate("[...document.querySelectorAll('#series-0 .ytick')].map((e) => e.textContent)")
+    assert not any("µ" in tick for tick in ticks)

@@ -1,0 +1,185 @@
+"""The first screen says the truth: who leads, what limits it, and what holds over scenarios."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sweep.camera.imager import imager_of
+from sweep.metrics.columns.sensitivity import cfa_sensitivity_at
+from sweep.metrics.limiting import limiting_lights
+from sweep.report import make_report, read_output
+from sweep.report.answer import answer_sentences, large_numbers
+from sweep.report.leaders import leaders_of
+from sweep.report.series import Line, SeriesFigure, lead_sentence
+from sweep.results.names import REPORT
+from sweep.study import load_study
+
+from ..build import ran
+from ..conftest import STUDIES, Finished
+
+FAST = ("stopband", "fog", "dual", "paper")
+SLOW = ("freeform", "producible", "rccb", "exposure", "night", "noise", "distance", "accuracy")
+EVERY = [*FAST, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)]
+
+
+def whole(folder: Path) -> pd.DataFrame:
+    """The result table as it lies on the disk, rows that were computed."""
+    table = pd.read_parquet(folder / "results.parquet")
+    return table[table["status"] == "ok"]
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_the_headline_names_the_best_of_all_rows(finished: Finished, name: str) -> None:
+    folder = finished(name)
+    output, table = read_output(folder), whole(folder)
+    leaders, separation = leaders_of(output), output.trade_off[0].name
+    rows = table[table["scenario"] == leaders.scenario]
+    made = rows[rows["kind"].isin(["sweep", "search"])]
+    allowed = made[made["feasible"]] if len(made) else rows[rows["feasible"]]
+    assert leaders.chosen is not None
+    assert leaders.chosen[output.goal.name] == allowed[output.goal.name].max()
+    assert leaders.separates is not None
+    assert leaders.separates[separation] == rows[separation].max()
+    assert leaders.per_light is not None
+    rate = rows[separation] / rows["exposure_s"]
+    assert leaders.per_light[separation] / leaders.per_light["exposure_s"] == pytest.approx(rate.max())
+    text = " ".join(answer_sentences(output))
+    if " leads" not in text:
+        assert output.trade_off[0].told(leaders.chosen[separation]) in text
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_nobody_beats_the_best_without_being_named(finished: Finished, name: str) -> None:
+    """Every plain CFA or named design that separates more than the best one is beaten by one that the answer names."""
+    folder = finished(name)
+    output, table = read_output(folder), whole(folder)
+    text, leaders, separation = " ".join(answer_sentences(output)), leaders_of(output), output.trade_off[0].name
+    if " leads" in text:
+        return  # a series has its own test
+    assert leaders.chosen is not None
+    rows = table[(table["scenario"] == leaders.scenario) & (table[separation] > leaders.chosen[separation])]
+    if len(rows):
+        best = rows[rows[separation] == rows[separation].max()]
+        names = best["name"].astype(object).where(best["name"].notna(), "esign " + best["design_id"].astype(str))
+        assert any(name in text for name in names)
+
+
+def test_the_large_numbers_compare_with_the_plain_cfa_that_separates_most(finished: Finished) -> None:
+    folder = finished("stopband")
+    table = whole(folder)
+    best = table[table["kind"] == "search"].iloc[0]
+    plain = table[table["kind"] == "reference"].sort_values("csd_yellow_red").iloc[-1]
+    numbers = large_numbers(read_output(folder))
+    assert [n.value for n in numbers[:2]] == [f"{best['csd_yellow_red']:.0f} DN", f"{best['cfa_sensitivity']:.3f}"]
+    for number, column in zip(numbers, ("csd_yellow_red", "cfa_sensitivity"), strict=False):
+        assert number.comparison.startswith(f"{best[column] / plain[column]:.2f} times {plain['name']}")
+    assert numbers[2].value == f"{best['limit'] - best['csd_yellow_red']:.0f} DN"
+
+
+def test_the_light_of_a_cfa_is_that_of_its_pixels(finished: Finished) -> None:
+    study = load_study(STUDIES / "stopband.yaml")
+    qe = {name: curve.sum() for name, curve in study.sensor.qe.items()}
+    table = whole(finished("stopband")).set_index("name")
+    for name, pixels in (("RGGB", "R G G B"), ("RYYCy", "R Y Y Cy")):
+        light = np.mean([qe[pixel] for pixel in pixels.split()]) / qe["C"]
+        assert table.loc[name, "cfa_sensitivity"] == pytest.approx(light, rel=1e-12)
+
+
+def test_a_level_of_the_pixel_is_a_level_of_the_cfa(finished: Finished) -> None:
+    study = load_study(STUDIES / "stopband.yaml")
+    assert study.search is not None
+    view = study.view(study.search.space, study.search.scenario)
+    table = whole(finished("stopband"))
+    swept = table[table["kind"] == "sweep"].iloc[::5000]
+    for own, light in zip(swept["sensitivity"], swept["cfa_sensitivity"], strict=True):
+        assert cfa_sensitivity_at(view, own) == pytest.approx(light, rel=1e-12)
+
+
+def test_the_limiting_lights_are_as_far_apart_as_the_csd(finished: Finished) -> None:
+    folder = finished("stopband")
+    table, points = whole(folder).set_index("design_id"), pd.read_parquet(folder / "points.parquet")
+    limited = pd.read_parquet(folder / "limited_by.parquet").set_index("design_id")
+    assert set(limited.index) == set(points["design_id"])
+    for design, rows in points.groupby("design_id"):
+        dn = rows.pivot_table(index="signal", columns="channel", values="dn")
+        for pair in ("green_yellow", "yellow_red", "orange_red"):
+            first, second = limited.loc[design, f"limited_by_{pair}"].split(" / ")
+            apart = np.linalg.norm(dn.loc[first] - dn.loc[second])
+            assert apart == pytest.approx(table.loc[design, f"csd_{pair}"], rel=1e-12)
+
+
+def test_lights_without_a_distance_limit_nothing() -> None:
+    study = load_study(STUDIES / "stopband.yaml")
+    space = next(space for space in study.spaces if space.filter is not None)
+    view = study.view(space, "chart")
+    nothing = np.zeros((1, 1, study.grid.size))
+    assert set(limiting_lights(imager_of(view), nothing)) == set(study.pairs)
+    assert limiting_lights(imager_of(view), nothing * np.nan) == {}
+
+
+def series(**lines: list[float]) -> SeriesFigure:
+    x = np.array([100.0, 200.0, 300.0])
+    made = {name: Line(np.array(y), None) for name, y in lines.items()}
+    return SeriesFigure("t", "distance_m", "yellow/red CSD / DN", x, made, "")
+
+
+@pytest.mark.parametrize(
+    ("figure", "said"),
+    [
+        (
+            series(A=[90, 81, 61], B=[80, 77, 68]),
+            "Yellow/red CSD over distance: up to 200 m A leads (81 DN at 200 m, B 77 DN); "
+            "at 300 m B leads (68 DN, A 61 DN).",
+        ),
+        (
+            series(A=[90, 81, 70], B=[80, 77, 68]),
+            "Yellow/red CSD over distance: everywhere A leads (70 DN at 300 m, B 68 DN).",
+        ),
+        (
+            series(A=[0.2, 9, 8], B=[0.1, 2, 8]),
+            "Yellow/red CSD over distance: at 100 m nobody has 1 DN; from 200 m on A leads (8.0 DN at 300 m, B 8.0 DN).",
+        ),
+        (series(A=[5, 5, 5]), "Yellow/red CSD over distance: everywhere A leads (5.0 DN at 300 m)."),
+    ],
+)
+def test_a_series_says_who_leads_from_where_to_where(figure: SeriesFigure, said: str) -> None:
+    assert lead_sentence(figure) == said
+
+
+def test_a_study_of_plain_cfas_has_an_answer(tmp_path: Path) -> None:
+    path = tmp_path / "plain.yaml"
+    path.write_text("study: plain\nsensor: ar0820\nlights: tl16\ncfas: [RGGB, RCCC, RYYCy]\n")
+    ran(load_study(path), tmp_path / "out", 1)
+    output = read_output(tmp_path / "out")
+    make_report(output)
+    assert answer_sentences(output)[0].startswith("RGGB separates yellow from red by 139 DN at 0.352 of a clear sensor")
+    assert (tmp_path / "out" / REPORT).is_file()
+    assert (tmp_path / "out" / "cfas.png").is_file()
+    assert not (tmp_path / "out" / "pareto.png").exists()
+
+
+BETTER = """\
+study: better
+sensor: ar0820
+lights: tl16
+cfas: [RGGB, RYNCy]
+sweeps:
+  s: {cfa: RYNCy, channel: N, base: Y, to: G, grid: {left_nm: [640, 645], left_width_nm: 20, right_nm: 660, right_width_nm: 20}}
+constraints: {sensitivity: {min: 0.9}}
+"""
+
+
+def test_a_plain_cfa_that_is_better_is_named_first(tmp_path: Path) -> None:
+    path = tmp_path / "better.yaml"
+    path.write_text(BETTER)
+    ran(load_study(path), tmp_path / "out", 1)
+    said = answer_sentences(read_output(tmp_path / "out"))
+    ratio = re.search(r"([\d.]+) times the separation of RGGB", said[0])
+    assert ratio is not None
+    assert float(ratio[1]) < 1
+    assert "RGGB separates most of all: 139 DN" in " ".join(said)

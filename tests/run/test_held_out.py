@@ -1,0 +1,136 @@
+"""Lights that a design has not seen: beside its own, and left out of the search one by one."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sweep.camera.imager import imager_of
+from sweep.report import make_report, read_output, summary_lines
+from sweep.results.identity import fingerprint
+from sweep.study import load_study
+
+from ..build import faults, load, ran
+
+FILE = "files: [{file: FILE.csv, quantity: photons, signals: {green: [g1], yellow: [y1], red: REDS}}]"
+SWEEP = """\
+study: STUDY
+sensor: ar0820
+lights: {RATIOLIGHTS}
+cfas: [RGGB, RYNCy]
+designs:
+  mine: {cfa: RYNCy, channel: N, base: Y, to: G, at: {left_nm: 606, left_width_nm: 8, right_nm: 646, right_width_nm: 7}}
+sweeps:
+  edges:
+    cfa: RYNCy
+    channel: N
+    base: Y
+    to: G
+    grid: {left_nm: [600, 610], left_width_nm: [5, 10], right_nm: [640, 650], right_width_nm: 6}
+constraints: {sensitivity: {min: 0.85}}
+"""
+
+
+def text(study: str, file: str, ratio: str = "", reds: str = "[r1, r2]", after: str = "") -> str:
+    lights = FILE.replace("FILE", file).replace("REDS", reds)
+    return SWEEP.replace("STUDY", study).replace("RATIO", ratio).replace("LIGHTS", lights) + after
+
+
+def lights(folder: Path, name: str, yellow_nm: float, red_nm: float) -> None:
+    """A file of Gaussian lights; r2 is much wider than the others."""
+    wave = np.arange(400.0, 701.0)
+
+    def bump(center: float, width: float) -> np.ndarray:
+        return np.asarray(np.exp(-0.5 * ((wave - center) / width) ** 2))
+
+    columns = {"g1": bump(505, 15), "y1": bump(yellow_nm, 8), "r1": bump(red_nm, 9), "r2": bump(red_nm + 8, 25)}
+    pd.DataFrame({"wavelength_nm": wave, **columns}).to_csv(folder / f"{name}.csv", index=False)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    lights(tmp_path, "own", 592, 632)
+    lights(tmp_path, "other", 597, 626)
+    return tmp_path
+
+
+def test_other_lights_read_as_in_a_study_of_their_own(folder: Path) -> None:
+    validated = "validate:\n  lights:\n    " + FILE.replace("FILE", "other").replace("REDS", "[r1]") + "\n"
+    study = load(folder, text("one", "own", after=validated))
+    ran(study, folder / "one", 1)
+    ratio = f"photon_ratio: {study.lights.photon_ratio!r}, "
+    ran(load(folder, text("two", "other", ratio, "[r1]")), folder / "two", 1)
+    held = pd.read_parquet(folder / "one" / "validated.parquet").set_index("design_id")
+    own = pd.read_parquet(folder / "two" / "results.parquet").set_index("design_id")
+    assert {0, 1} <= set(held.index)
+    for design, row in held.iterrows():
+        for pair in ("green_yellow", "yellow_red"):
+            assert row[f"held_out_csd_{pair}"] == own.loc[design, f"csd_{pair}"]
+    output = read_output(folder / "one")
+    make_report(output)
+    best = output.best.iloc[0]
+    said = output.trade_off[0].told(own.loc[best["design_id"], "csd_yellow_red"])
+    assert f"On lights that it has not seen it has {said}" in "\n".join(summary_lines(output))
+    assert "yellow/<wbr>red CSD, other lights" in (folder / "one" / "report.html").read_text()
+
+
+def test_a_search_without_a_light_finds_no_less(folder: Path) -> None:
+    """Fewer pairs of lights cannot lower the optimum; the same design with the light is at most the study's optimum."""
+    asked = "search: {starts: 4, max_evaluations: 400}\nvalidate: {leave_one_out: true}\n"
+    ran(load(folder, text("one", "own", after=asked)), folder / "one", 1)
+    found = pd.read_parquet(folder / "one" / "leave_one_out.parquet")
+    assert list(found["signal"]) == ["own:r1", "own:r2"]  # one yellow light alone cannot be left out
+    optimum = json.loads((folder / "one" / "provenance.json").read_text())["search"]["best_smooth_objective"]
+    assert (found["seen"] >= optimum - 1e-6).all()
+    assert (found["with_it"] <= optimum + 1e-3).all()
+    assert found["fall"].max() > 1
+    np.testing.assert_allclose(found["fall"], found["seen"] - found["with_it"])
+    output = read_output(folder / "one")
+    make_report(output)
+    assert f"Left out of the search, {found.loc[found['fall'].idxmax(), 'signal']}" in "\n".join(summary_lines(output))
+    assert "Lights that the search did not see" in (folder / "one" / "report.html").read_text()
+
+
+def test_another_light_changes_no_reading_of_a_resolved_study(folder: Path) -> None:
+    one, both = load(folder, text("one", "own", reds="[r1]")), load(folder, text("one", "own"))
+    assert one.lights.photon_ratio != both.lights.photon_ratio  # r2 is wider
+    ran(one, folder / "out", 1)
+    resolved = folder / "study.resolved.yaml"
+    kept = (folder / "out" / resolved.name).read_text()
+    resolved.write_text(kept)
+    assert fingerprint(load_study(resolved)) == fingerprint(one)
+    assert kept.count("- r1\n") == 1
+    indent = kept.split("- r1\n")[0].rpartition("\n")[2]
+    resolved.write_text(kept.replace("- r1\n", f"- r1\n{indent}- r2\n"))
+    more = load_study(resolved)
+    assert more.lights.names == ("own:g1", "own:y1", "own:r1", "own:r2")
+
+    def read(study: object) -> np.ndarray:
+        assert isinstance(study, type(more))
+        space = next(space for space in study.spaces if space.name == "RGGB")
+        return imager_of(study.view(space, "chart")).read(np.empty((1, 0, study.grid.size)))[0][0, 0]
+
+    np.testing.assert_array_equal(read(more)[:3], read(one))
+
+
+@pytest.mark.parametrize(
+    ("after", "said"),
+    [
+        ("validate: {}\n", "`lights`, `leave_one_out: true`, or both"),
+        (
+            "validate: {leave_one_out: true}\n",
+            "validate.leave_one_out: nothing is searched; allowed: a study with `search`",
+        ),
+        ("validate: {leav_one_out: true}\n", "did you mean 'leave_one_out'?"),
+        ("validat: {leave_one_out: true}\n", "did you mean 'validate'?"),
+        ("validate: {lights: tl17}\n", "validate.lights: unknown built-in lights (got 'tl17')"),
+        ("validate: {lights: tl16}\n", "unknown signal type (got 'orange')"),
+    ],
+)
+def test_a_wrong_validation_is_one_line(folder: Path, after: str, said: str) -> None:
+    found = faults(folder, text("one", "own", after=after))
+    assert any(said in fault for fault in found), found

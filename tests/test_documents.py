@@ -1,0 +1,99 @@
+"""The documentation: short sentences, tables as the program prints them, figures that a run reproduces."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import pandas as pd
+import pytest
+
+from .conftest import ROOT, Finished
+from .printed import PRINTED, with_printed
+
+README = (ROOT / "README.md").read_text()
+MOST_LINES, MEAN_WORDS, MOST_WORDS = 120, 20, 30
+
+
+def prose(text: str) -> str:
+    """The text without code, tables, pictures and headings; a link is its words."""
+    text = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+    text = re.sub(r"!\[.*?\]\(.*?\)", "", text)
+    text = re.sub(r"\[(.*?)\]\(.*?\)", r"\1", text)
+    text = re.sub(r"^(\||#).*$", "", text, flags=re.MULTILINE)
+    return text.replace("**", "")
+
+
+def sentences(text: str) -> list[str]:
+    blocks = re.split(r"\n\s*\n", prose(text))
+    lines = (" ".join(block.split()) for block in blocks)
+    return [found for line in lines for found in re.split(r"(?<=[.?!:])\s+(?=[A-Z`])", line) if found]
+
+
+def test_sentences_are_found() -> None:
+    assert sentences("# Title\n\nOne `a.b` two. Three\nfour 0.5!\n\n| a | b. |\n\n```\ncode.\n```") == [
+        "One `a.b` two.",
+        "Three four 0.5!",
+    ]
+
+
+def test_the_readme_is_short() -> None:
+    assert len(README.splitlines()) <= MOST_LINES
+    words = [len(sentence.split()) for sentence in sentences(README)]
+    assert len(words) >= 25
+    assert sum(words) / len(words) <= MEAN_WORDS
+    assert [s for s, n in zip(sentences(README), words, strict=True) if n > MOST_WORDS] == []
+
+
+@pytest.mark.parametrize("file", list(PRINTED))
+def test_printed_parts_are_as_the_program_prints_them(file: str) -> None:
+    text = (ROOT / file).read_text()
+    assert with_printed(text, PRINTED[file]) == text
+
+
+def test_every_link_leads_somewhere() -> None:
+    for document in (ROOT / "README.md", *(ROOT / file for file in PRINTED), ROOT / "tests" / "README.md"):
+        for target in re.findall(r"\]\(([^)#]+)\)", document.read_text()):
+            assert (document.parent / target).exists(), (document, target)
+
+
+def stopband(finished: Finished) -> dict[str, pd.Series]:
+    """Rows of the finished study by their names."""
+    table = pd.read_parquet(finished("stopband") / "results.parquet")
+    return {row["name"]: row for _, row in table[table["kind"] != "sweep"].iterrows()}
+
+
+FIGURES: dict[str, Callable[[dict[str, pd.Series]], str]] = {
+    "234 DN at 0.591": lambda r: (
+        f"{r['best stopband']['csd_yellow_red']:.0f} DN at {r['best stopband']['cfa_sensitivity']:.3f}"
+    ),
+    "1.68 times the separation of RGGB (139 DN)": lambda r: (
+        f"{r['best stopband']['csd_yellow_red'] / r['RGGB']['csd_yellow_red']:.2f} times the separation of RGGB "
+        f"({r['RGGB']['csd_yellow_red']:.0f} DN)"
+    ),
+    "1.68 times its light (0.352)": lambda r: (
+        f"{r['best stopband']['cfa_sensitivity'] / r['RGGB']['cfa_sensitivity']:.2f} times its light "
+        f"({r['RGGB']['cfa_sensitivity']:.3f})"
+    ),
+    "31 DN at 0.610": lambda r: f"{r['RYYCy']['csd_yellow_red']:.0f} DN at {r['RYYCy']['cfa_sensitivity']:.3f}",
+    "90 % of its sensitivity": lambda r: f"{100 * r['best stopband']['sensitivity']:.0f} % of its sensitivity",
+    "at most 0.06 per nm": lambda r: f"at most {r['best stopband']['slope_per_nm']:.2f} per nm",
+    "exceeds 274 DN": lambda r: f"exceeds {r['best stopband']['limit']:.0f} DN",
+}
+"""Figures of the README -> the same from a run of `make study NAME=stopband`."""
+NO_RESULTS = ("Python 3.11", "cos^4", "EN 12368")
+"""Numbers of the README's prose that are no results."""
+
+
+def test_every_figure_of_the_readme_has_its_command() -> None:
+    text = " ".join(prose(README).split())
+    for known in FIGURES:
+        assert known in text
+    for known in (*FIGURES, *NO_RESULTS):
+        text = text.replace(known, "")
+    assert re.findall(r"\S*\d\S*", text) == []
+
+
+@pytest.mark.parametrize("said", list(FIGURES))
+def test_a_figure_of_the_readme_is_that_of_its_command(finished: Finished, said: str) -> None:
+    assert FIGURES[said](stopband(finished)) == said
