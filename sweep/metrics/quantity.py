@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -70,7 +71,15 @@ class Column:
 
     def told(self, value: float) -> str:
         """A value as sentences, plots and large numbers say it: in DN whole from 10 on."""
-        return self.amount(value, 0 if self.unit == DN and abs(value) >= 10 else None)
+        return self.amount(value, self._digits_told(value))
+
+    def told_bound(self, value: float) -> str:
+        """What nothing exceeds, as sentences say it: rounded up, so that nothing exceeds what is said."""
+        step = 10.0 ** -self._digits_told(value)
+        return self.told(math.ceil(value / step) * step)
+
+    def _digits_told(self, value: float) -> int:
+        return 0 if self.unit == DN and abs(value) >= 10 else self.digits
 
 
 @dataclass(frozen=True)

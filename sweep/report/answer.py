@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -84,7 +85,7 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     proven = None if search is None or best["kind"] not in (SWEPT, FOUND) else search.limit_proven
     parts = []
     if proven is not None and output.goal.name == separation.name:
-        parts.append(f"No filter in its place exceeds {separation.told(proven)} (proven, before quantization).")
+        parts.append(f"No filter in its place exceeds {separation.told_bound(proven)} (proven, before quantization).")
     if isinstance(lights, str):
         parts.append(f"The two lights that limit it are {lights}.")
     if parts:
@@ -194,8 +195,9 @@ def large_numbers(output: Output) -> list[LargeNumber]:
     if search is not None and search.limit_proven is not None and output.goal.name == separation.name:
         # Of the numbers as they stand beside each other, so that a reader's own difference is the same.
         digits = 0 if value >= 10 else separation.digits
-        left = separation.told(max(0.0, round(search.limit_proven, digits) - round(value, digits)))
-        limit = f"{separation.told(search.limit_proven)}: no filter exceeds it"
+        most = math.ceil(search.limit_proven * 10**digits) / 10**digits
+        left = separation.told(max(0.0, most - round(value, digits)))
+        limit = f"{separation.told_bound(search.limit_proven)}: no filter exceeds it before quantization"
         numbers.append(LargeNumber(left, "below the limit of any filter", limit))
     elif best[measure] == best[measure]:
         rate = float(best[measure])
