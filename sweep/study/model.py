@@ -161,10 +161,10 @@ class Study:
         evaluations = self.search.max_evaluations if searched and self.search is not None else 0
         return Box(view, low, high, space.size + evaluations)
 
-    def plan(self, scenario: str, tolerance_dn: float | None = None) -> Plan:
+    def plan(self, scenario: str, tolerance_dn: float | None = None, *, always: bool = False) -> Plan:
         """The cheapest plan of a scenario that holds for all designs of the study.
 
-        Where everything on takes less time than to find one, that is the plan.
+        Where everything on takes less than to look for one, that is the plan, but if one is to be found `always`.
 
         Raises StudyError for numbers that are allowed one by one, but that no float can hold together.
         """
@@ -173,7 +173,8 @@ class Study:
             boxes = [self.box(space, scenario) for space in self.spaces]
             used = [box for box in boxes if box.n_designs]
             planner = Planner(used or boxes, for_noise=bool(self.states))
-            return planner.plan(scenario, tolerance) if planner.pays else planner.everything(scenario, tolerance)
+            find = planner.plan if always or planner.pays else planner.everything
+            return find(scenario, tolerance)
         except ArithmeticError:
             problem = "the numbers of this scene, or of the pixel, are too large or too small to compute with"
             raise StudyError(Fault(problem, key=f"scenarios.{scenario}")) from None

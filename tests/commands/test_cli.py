@@ -108,7 +108,7 @@ def test_check_counts_designs() -> None:
 
 def test_plan_says_what_a_scene_calls_for(tmp_path: Path) -> None:
     path = tmp_path / "scenes.yaml"
-    path.write_text(SCENES.replace("any", "[0.3, 0.2]").replace("[150, 250]", "[50, 250]"))
+    path.write_text(SCENES.replace("[150, 250]", "[50, 250]"))
     code, out, said = commanded("plan", path, "--explain", "--tolerance", "50")
     assert code == 0, said
     lines = out.splitlines()

@@ -82,7 +82,7 @@ def _ladder(study: Study, progress: Progress, most_designs: int) -> Iterator[dic
         progress("measurements", done, total)
         measured: dict[str, tuple[FloatArray, float, int]] = {}
         for tolerance in TOLERANCES_DN:
-            plan = study.plan(scenario, tolerance)
+            plan = study.plan(scenario, tolerance, always=True)
             if plan.key not in measured:  # the same plan is the same work
                 measured[plan.key] = _timed(replace(study, plans={scenario: plan}), scenario, most_designs)
             found, seconds, work = measured[plan.key]
