@@ -39,7 +39,7 @@ def noise_figures(output: Output) -> Iterator[SeriesFigure]:
         x = np.array(list(scenarios.values()))
         title = f"{output.study.study}: {base}"
         errors = {n: Line(np.maximum(y, _LEAST), None) for n, y in over_series(rows, scenarios, STATE_ERROR).items()}
-        label = "error of the worst pair of states"
+        label = f"error of the worst pair of states ({_LEAST:g}: or less)"
         yield SeriesFigure(title, key, label, x, errors, "", log_y=True, level=allowed)
         for rule in CLASSIFIERS if output.recognition is not None else ():
             lines = {n: Line(y, None) for n, y in _accuracies(output, scenarios, rule).items()}

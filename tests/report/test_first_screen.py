@@ -190,7 +190,7 @@ def test_a_printed_report_has_every_figure(finished: Finished, opened: Any, tmp_
 def test_the_noise_report_begins_with_the_error(finished: Finished, opened: Any) -> None:
     seen = opened(finished("noise"))
     axis = seen.page.evaluate("document.getElementById('series-0').layout.yaxis")
-    assert axis["title"]["text"] == "error of the worst pair of states"
+    assert axis["title"]["text"] == "error of the worst pair of states (1e-12: or less)"
     assert (axis["type"], axis["exponentformat"]) == ("log", "power")
     ticks = seen.page.evaluate("[...document.querySelectorAll('#series-0 .ytick')].map((e) => e.textContent)")
     assert not any("µ" in tick for tick in ticks)
