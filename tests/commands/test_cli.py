@@ -108,11 +108,11 @@ def test_check_counts_designs() -> None:
 
 def test_plan_says_what_a_scene_calls_for(tmp_path: Path) -> None:
     path = tmp_path / "scenes.yaml"
-    path.write_text(SCENES.replace("[150, 250]", "[50, 250]"))
+    path.write_text(SCENES.replace("[150, 250]", "[20, 300]"))
     code, out, said = commanded("plan", path, "--explain", "--tolerance", "50")
     assert code == 0, said
     lines = out.splitlines()
-    assert lines[0].startswith("road distance_m=50: promised ")
+    assert lines[0].startswith("road distance_m=20: promised ")
     assert " of 50 DN" in lines[0]
     for effect in ("noise", "blur", "sampling", "phase", "extinction"):
         assert sum(line.strip().startswith(f"{effect} ") for line in lines) == 2
