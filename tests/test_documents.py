@@ -79,7 +79,7 @@ FIGURES: dict[str, Callable[[dict[str, pd.Series]], str]] = {
     "31 DN at 0.610": lambda r: f"{r['RYYCy']['csd_yellow_red']:.0f} DN at {r['RYYCy']['cfa_sensitivity']:.3f}",
     "90 % of its sensitivity": lambda r: f"{100 * r['best stopband']['sensitivity']:.0f} % of its sensitivity",
     "at most 0.06 per nm": lambda r: f"at most {r['best stopband']['slope_per_nm']:.2f} per nm",
-    "exceeds 275 DN": lambda r: f"exceeds {math.ceil(r['best stopband']['limit'])} DN",
+    "exceeds 274.3 DN": lambda r: f"exceeds {math.ceil(10 * r['best stopband']['limit']) / 10} DN",
 }
 """Figures of the README -> the same from a run of `make study NAME=stopband`."""
 NO_RESULTS = ("Python 3.11", "cos^4", "EN 12368")

@@ -71,15 +71,12 @@ class Column:
 
     def told(self, value: float) -> str:
         """A value as sentences, plots and large numbers say it: in DN whole from 10 on."""
-        return self.amount(value, self._digits_told(value))
+        return self.amount(value, 0 if self.unit == DN and abs(value) >= 10 else None)
 
     def told_bound(self, value: float) -> str:
-        """What nothing exceeds, as sentences say it: rounded up, so that nothing exceeds what is said."""
-        step = 10.0 ** -self._digits_told(value)
-        return self.told(math.ceil(value / step) * step)
-
-    def _digits_told(self, value: float) -> int:
-        return 0 if self.unit == DN and abs(value) >= 10 else self.digits
+        """What nothing exceeds, as sentences say it: rounded up at the next digit, so that nothing exceeds that."""
+        digits = 1 if self.unit == DN and abs(value) >= 10 else self.digits
+        return self.amount(math.ceil(value * 10**digits) / 10**digits, digits)
 
 
 @dataclass(frozen=True)

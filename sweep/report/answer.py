@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -193,10 +192,7 @@ def large_numbers(output: Output) -> list[LargeNumber]:
     ]
     search = output.provenance.search
     if search is not None and search.limit_proven is not None and output.goal.name == separation.name:
-        # Of the numbers as they stand beside each other, so that a reader's own difference is the same.
-        digits = 0 if value >= 10 else separation.digits
-        most = math.ceil(search.limit_proven * 10**digits) / 10**digits
-        left = separation.told(max(0.0, most - round(value, digits)))
+        left = separation.told(max(0.0, search.limit_proven - value))
         limit = f"{separation.told_bound(search.limit_proven)}: no filter exceeds it before quantization"
         numbers.append(LargeNumber(left, "below the limit of any filter", limit))
     elif best[measure] == best[measure]:
