@@ -19,7 +19,7 @@ from .scene_kernels import SceneKernels
 from .work import PLANNED_PATCH, PLANNED_TARGET
 
 _NOTHING_DN = 1e-9
-_AT_ONCE = "to find out whether it matters takes longer"
+_NOT_ASKED = "to find out whether it matters takes longer"
 _LIMITS = tuple(name for name, effect in EFFECTS.items() if effect.is_limit)
 
 
@@ -122,9 +122,9 @@ class Planner:
 
     @property
     def pays(self) -> bool:
-        """Whether all that matters may take longer than to look for what can be left out, by what both count.
+        """Whether everything on takes more than to look for what can be left out, both estimated in multiplications.
 
-        Over all places of a light, it does.
+        How many places a light at any place needs is not known before, so that a plan is looked for there.
         """
         methods = self._start
         if any(scene.is_anywhere(methods) for scene in self._scenes):
@@ -136,10 +136,10 @@ class Planner:
         return once + every > len(works) * (PLANNED_PATCH if is_patch else PLANNED_TARGET)
 
     def everything(self, scenario: str, tolerance_dn: float) -> Plan:
-        """Everything on that matters, at once: nothing is promised but what no method reaches."""
+        """Everything on but what changes nothing: exact, for scenes whose light is not at any place (see `pays`)."""
         methods = self._start
         choices = tuple(
-            Choice(e, method, 0.0, _AT_ONCE if (exact := self._exact[e]) is None else exact)
+            Choice(e, method, 0.0, _NOT_ASKED if (exact := self._exact[e]) is None else exact)
             for e, method in asdict(methods).items()
         )
         return Plan(scenario, tolerance_dn, choices, self._work(methods), self._work(REFERENCE))
