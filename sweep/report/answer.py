@@ -84,7 +84,8 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     proven = None if search is None or best["kind"] not in (SWEPT, FOUND) else search.limit_proven
     parts = []
     if proven is not None and output.goal.name == separation.name:
-        parts.append(f"No filter in its place exceeds {separation.told_bound(proven)} (proven, before quantization).")
+        most = separation.told_bound(proven)
+        parts.append(f"No filter in its place that meets the same exceeds {most} (proven, before quantization).")
     if isinstance(lights, str):
         parts.append(f"The two lights that limit it are {lights}.")
     if parts:
