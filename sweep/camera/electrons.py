@@ -145,6 +145,8 @@ class Electrons:
         Needs a modified channel that no other unit looks through, and a light that does not pulse. Designs whose
         modified channel sets the exposure are left out.
         """
+        from .compiled_readout import expose  # noqa: PLC0415  (compiled: kept off the start-up path)
+
         view = self.view
         touched = np.flatnonzero((self._modified_uniform != 0).any(axis=(0, 2)))
         if len(view.modified) != 1 or self._kept is None or self._touched.size != 1:
@@ -159,11 +161,12 @@ class Electrons:
         some = block if which.all() else block.some(np.flatnonzero(which))
         unit = int(self._touched[0])
         self._work["response"] += len(some) * self._kept.size
-        part = some.product(self._kept, self._nodes).reshape(len(some), len(self.fixed), -1)
+        values = some.product(self._kept, self._nodes).reshape(len(some), len(self.fixed), -1)
+        values = values.astype(float, copy=False)
         uniform = some.product(self.background[:, None], everywhere) * self._modified_uniform[:, unit, 0]
         uniform = self._fixed_uniform[:, unit] + uniform + view.pixel.dark_e_per_s
         rest = self.fixed + (self._fixed_uniform + view.pixel.dark_e_per_s)[:, None]
-        values = (self.fixed[:, :, unit] + part + uniform[:, :, None]) * time_s[0]
+        expose(values, np.ascontiguousarray(self.fixed[:, :, unit]), uniform, float(time_s[0]))
         return Changing(rest * time_s[0], unit, values, float(time_s[0]), which)
 
     def light_dn(self, curves: FloatArray, exposure_s: float) -> FloatArray:

@@ -5,6 +5,7 @@ Only what `View.methods` names is computed. A channel is the mean over the disc,
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 
 import numpy as np
@@ -19,6 +20,8 @@ from .view import View
 
 _CERTAIN_DN2 = 1e-9
 _FEW = 16
+_MANY = 50_000
+"""Values from which on a compiled pass saves more time than it takes to load."""
 
 
 class Readout:
@@ -48,6 +51,8 @@ class Readout:
             self._work["quantization"] += electrons.size
         if soft and clips:
             return (table.mean_rounded if rounds else table.mean_unrounded)(electrons, pixel)
+        if rounds and not noisy and electrons.size > _MANY:
+            return self._whole_numbers(electrons, clips)
         held = saturation.clipped(electrons, pixel) if clips else electrons
         if not rounds:
             return unquantized(held, pixel)
@@ -55,6 +60,17 @@ class Readout:
             dn = unquantized(held, pixel)
             return dn + table.mean_rounded(electrons, pixel) - table.mean_unrounded(electrons, pixel)
         return quantization.rounded(held * pixel.dn_per_e, pixel)
+
+    def _whole_numbers(self, electrons: FloatArray, clips: bool) -> FloatArray:
+        """The same in one pass, without noise."""
+        from .compiled_readout import whole_numbers  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+        pixel, many = self.pixel, np.ascontiguousarray(electrons)
+        found = np.empty_like(many)
+        top_e = saturation.top_e(pixel) if clips else math.inf
+        line = (top_e, pixel.dn_per_e, pixel.offset_dn, float(pixel.full_scale_dn))
+        whole_numbers(many.reshape(-1), *line, found.reshape(-1))
+        return found
 
     def variance_dn(self, electrons: FloatArray) -> FloatArray:
         """Variance of the units' digital numbers, DN^2, with their rounding."""

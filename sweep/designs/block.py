@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import pickle
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -97,6 +98,13 @@ class Tables:
         default_factory=lambda: Cache(_KEPT_TABLES)
     )
 
+    @cached_property
+    def spans(self) -> tuple[IndexArray, IndexArray]:
+        """Where each edge rises, see `compiled.spans`."""
+        from .compiled import spans  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+        return spans(self.left), spans(self.right)
+
     def product(self, weights: FloatArray, nodes: IndexArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The weighted sums of the base, and of the change times each edge."""
 
@@ -149,7 +157,7 @@ class EdgeBlock:
 
         steepest, lowest = np.empty(len(self)), np.empty(len(self))
         tables = self.tables
-        edges = (tables.left, tables.right, self.at_left, self.at_right, self.depth)
+        edges = (tables.left, tables.right, *tables.spans, self.at_left, self.at_right, self.depth)
         shapes_of_edges(tables.base, tables.change, *edges, *_inverse(base_qe[0]), steepest, lowest)
         return steepest, lowest
 

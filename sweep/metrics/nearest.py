@@ -10,12 +10,15 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ..types import FloatArray, IndexArray
+from ..types import BoolArray, FloatArray, IndexArray
+from ..vectorized import larger, smaller
 
 _NUMBERS = {"nnan", "nsz"}
 """Lets the compiler take the smaller of several numbers at once; callers hand in no NaN."""
 CHANNELS = 4
 """Channels that `nearest_squared` takes; fewer are filled up with zeros."""
+LANES = 64
+"""Designs that `nearest_along_squared` takes side by side."""
 
 
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
@@ -38,49 +41,134 @@ def nearest_squared(response: FloatArray, bounds: IndexArray, out: FloatArray) -
                     for j in range(bounds[b], bounds[b + 1]):
                         x0, x1, x2, x3 = m0 - values[0, j], m1 - values[1, j], m2 - values[2, j], m3 - values[3, j]
                         squared = x0 * x0 + x1 * x1 + x2 * x2 + x3 * x3
-                        nearest = min(nearest, squared)
-                    best = min(best, nearest)
+                        nearest = smaller(nearest, squared)
+                    best = smaller(best, nearest)
                 out[d, pair] = best
                 pair += 1
 
 
+@njit(cache=True, nogil=True)
+def _lanes(
+    values: FloatArray, order: IndexArray, first: int, lanes: FloatArray, doubt: FloatArray, bad: BoolArray
+) -> None:
+    """Put the designs from `first` on side by side, ndarray[n_signals, LANES].
+
+    Lanes that are left over repeat the first. Values of a design that are not all finite become 0; `bad` says where.
+    `doubt`: ndarray[LANES], room to work in.
+    """
+    n = min(LANES, values.shape[0] - first)
+    doubt[:] = 0.0
+    for s in range(order.size):
+        signal = order[s]
+        for lane in range(n):
+            lanes[s, lane] = values[first + lane, signal]
+        for lane in range(n, LANES):
+            lanes[s, lane] = values[first, signal]
+        for lane in range(LANES):
+            doubt[lane] += 0.0 * lanes[s, lane]
+    for lane in range(LANES):
+        if doubt[lane] != 0.0:  # NaN: one of its values is not finite
+            lanes[:, lane] = 0.0
+            if lane < n:
+                bad[first + lane] = True
+
+
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
+def _ranges(lanes: FloatArray, low: FloatArray, high: FloatArray) -> None:
+    """Smallest and largest value of each signal over the lanes."""
+    for s in range(lanes.shape[0]):
+        least, most = lanes[s, 0], lanes[s, 0]
+        for lane in range(LANES):
+            least = smaller(least, lanes[s, lane])
+            most = larger(most, lanes[s, lane])
+        low[s], high[s] = least, most
+
+
+@njit(cache=True, nogil=True, fastmath=_NUMBERS)
+def _bounds(
+    fixed: FloatArray, first: IndexArray, second: IndexArray, low: FloatArray, high: FloatArray, bound: FloatArray
+) -> tuple[int, int]:
+    """Lower bound of each pair's squared distance in any lane, for as many as may be the nearest, and their number.
+
+    Second, the pair whose upper bound is smallest. `fixed` is sorted.
+    """
+    lead, least = 0, np.inf
+    for k in range(fixed.size):
+        if fixed[k] >= least:
+            return k, lead
+        i, j = first[k], second[k]
+        below, above = low[i] - high[j], low[j] - high[i]
+        gap, most = larger(larger(below, above), 0.0), -smaller(below, above)
+        bound[k] = fixed[k] + gap * gap
+        far = fixed[k] + most * most
+        if far < least:
+            least, lead = far, k
+    return fixed.size, lead
+
+
+@njit(cache=True, nogil=True, fastmath=_NUMBERS)
+def _nearest_in_lanes(
+    lanes: FloatArray, fixed: FloatArray, first: IndexArray, second: IndexArray, some: IndexArray, best: FloatArray
+) -> None:
+    """Take `some` pairs into account, four at a time; their number is a multiple of four."""
+    for at in range(0, some.size, 4):
+        a, b, c, d = some[at], some[at + 1], some[at + 2], some[at + 3]
+        fixed_a, fixed_b, fixed_c, fixed_d = fixed[a], fixed[b], fixed[c], fixed[d]
+        a1, b1, c1, d1 = first[a], first[b], first[c], first[d]
+        a2, b2, c2, d2 = second[a], second[b], second[c], second[d]
+        for lane in range(LANES):
+            x = lanes[a1, lane] - lanes[a2, lane]
+            y = lanes[b1, lane] - lanes[b2, lane]
+            z = lanes[c1, lane] - lanes[c2, lane]
+            w = lanes[d1, lane] - lanes[d2, lane]
+            x = fixed_a + x * x
+            y = fixed_b + y * y
+            z = fixed_c + z * z
+            w = fixed_d + w * w
+            best[lane] = smaller(smaller(smaller(x, y), smaller(z, w)), best[lane])
+
+
+@njit(cache=True, nogil=True)
 def nearest_along_squared(
     values: FloatArray,
-    bounds: IndexArray,
+    order: IndexArray,
     fixed: FloatArray,
     first: IndexArray,
     second: IndexArray,
     starts: IndexArray,
     out: FloatArray,
-) -> None:
-    """The same for designs that differ in one channel alone.
+    bad: BoolArray,
+) -> int:
+    """The same for designs that differ in one channel alone; how many distances were computed for all LANES designs.
 
-    `values`: ndarray[n_designs, n_signals], that channel. `fixed`: squared distances in the other channels, sorted
-    within each pair of classes; `first`, `second`: the signals of each; `starts`: where each pair of classes begins.
-    A pair of classes is done when what is left, with the gap between the classes in `values`, is no nearer.
+    `values`: ndarray[n_designs, n_signals], that channel; `order`: its signals, one class after the other. `fixed`:
+    squared distances in the other channels, sorted within each pair of classes; `first`, `second`: the signals of each,
+    unsigned places in `order`; `starts`: where each pair of classes begins. `out`: ndarray[n_pairs, n_designs]; `bad`:
+    ndarray[n_designs], set where a value is not finite: what `out` says of such a design means nothing.
+    Designs are taken side by side, so that one instruction serves several; pairs that are the nearest in none of these
+    designs, by the ranges of their values, are left out.
     """
-    classes = bounds.size - 1
-    low, high = np.empty(classes), np.empty(classes)
-    for d in range(values.shape[0]):
-        mine = values[d]
-        for c in range(classes):
-            least, most = np.inf, -np.inf
-            for s in range(bounds[c], bounds[c + 1]):
-                least = min(least, mine[s])
-                most = max(most, mine[s])
-            low[c], high[c] = least, most
-        pair = 0
-        for a in range(classes):
-            for b in range(a + 1, classes):
-                gap = max(0.0, low[a] - high[b], low[b] - high[a])
-                gap *= gap
-                best = np.inf
-                for k in range(starts[pair], starts[pair + 1]):
-                    if fixed[k] + gap >= best:
-                        break
-                    apart = mine[first[k]] - mine[second[k]]
-                    squared = fixed[k] + apart * apart
-                    best = min(best, squared)
-                out[d, pair] = best
-                pair += 1
+    lanes, best, doubt = np.zeros((order.size, LANES)), np.empty(LANES), np.empty(LANES)
+    low, high = np.empty(order.size), np.empty(order.size)
+    most = np.max(starts[1:] - starts[:-1])
+    bound, some = np.empty(most), np.empty(most + 3, np.intp)
+    computed = 0
+    for begin in range(0, values.shape[0], LANES):
+        _lanes(values, order, begin, lanes, doubt, bad)
+        _ranges(lanes, low, high)
+        for pair in range(starts.size - 1):
+            own = slice(starts[pair], starts[pair + 1])
+            count, lead = _bounds(fixed[own], first[own], second[own], low, high, bound)
+            best[:] = np.inf
+            some[:4] = lead
+            _nearest_in_lanes(lanes, fixed[own], first[own], second[own], some[:4], best)
+            enough, left = best.max(), 0
+            for k in range(count):
+                some[left] = k
+                left += bound[k] < enough
+            some[left : left + 3] = lead  # to a multiple of four
+            _nearest_in_lanes(lanes, fixed[own], first[own], second[own], some[: (left + 3) & ~3], best)
+            computed += 4 + ((left + 3) & ~3)
+            for lane in range(min(LANES, values.shape[0] - begin)):
+                out[pair, begin + lane] = best[lane]
+    return computed

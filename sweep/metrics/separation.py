@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Iterator, Mapping
+from typing import NamedTuple
 
 import numpy as np
 
+from ..cache import Cache
 from ..curves.lights import Pair, class_pairs, pair_name
 from ..types import FloatArray, IndexArray
 
@@ -96,7 +99,7 @@ def separations(response: FloatArray, members: Mapping[str, IndexArray]) -> dict
     filled[:, :n_channels] = np.moveaxis(response[:, order], 1, 2)
     squared = np.empty((n_designs, len(pairs)))
     nearest_squared(filled, bounds, squared)
-    return _distances(squared, members, lambda doubtful: response[doubtful])
+    return _distances(squared.T, members, lambda doubtful: response[doubtful])
 
 
 def separations_along(
@@ -117,27 +120,51 @@ def separations_along(
     others = np.delete(fixed, channel, axis=1)
     if not np.isfinite(others).all():
         return separations(whole(slice(None)), members)
-    bad = np.flatnonzero(~np.isfinite(values).all(axis=1))  # what is wrong with one design changes no other
-    order, bounds = _in_order(members)
-    nearest: list[tuple[FloatArray, IndexArray, IndexArray]] = []
-    for a, b in class_pairs(list(members)):
-        one, other = _all_pairs(members[a], members[b])
-        apart = ((others[one] - others[other]) ** 2).sum(axis=1)
-        rank = np.argsort(apart, kind="stable")
-        nearest.append((apart[rank], one[rank], other[rank]))
-    starts = np.cumsum([0, *(len(apart) for apart, _, _ in nearest)])
-    place = np.empty(order.max() + 1, dtype=np.intp)  # of each signal in the order of the classes
-    place[order] = np.arange(order.size)
-    apart, one, other = (np.concatenate(parts) for parts in zip(*nearest, strict=True))
-    squared = np.empty((len(values), len(nearest)))
-    ordered = np.take(values, order, axis=1)
-    ordered[bad] = 0.0
-    nearest_along_squared(ordered, bounds, apart, place[one], place[other], starts, squared)
+    apart = _pairs_apart(others, members)
+    squared = np.empty((len(apart.starts) - 1, len(values)))
+    faulty = np.zeros(len(values), dtype=bool)
+    nearest_along_squared(np.ascontiguousarray(values), *apart, squared, faulty)
     found = _distances(squared, members, whole)
+    bad = np.flatnonzero(faulty)  # what is wrong with one design changes no other
     if bad.size:
         for pair, distance in separations(whole(bad), members).items():
             found[pair][bad] = distance
     return found
+
+
+class _Apart(NamedTuple):
+    """Pairs of signals as `nearest_along_squared` takes them, sorted by their distance in the channels they share."""
+
+    order: IndexArray
+    fixed: FloatArray
+    first: IndexArray
+    second: IndexArray
+    starts: IndexArray
+
+
+_apart: Cache[bytes, _Apart] = Cache(16)
+"""The blocks of a run share their fixed channels."""
+
+
+def _pairs_apart(others: FloatArray, members: Mapping[str, IndexArray]) -> _Apart:
+    """`others`: ndarray[n_signals, n_channels], DN, the channels that the designs share."""
+
+    def made() -> _Apart:
+        order, _ = _in_order(members)
+        place = np.empty(order.max() + 1, dtype=np.uint32)  # of each signal in the order of the classes
+        place[order] = np.arange(order.size)
+        nearest: list[tuple[FloatArray, IndexArray, IndexArray]] = []
+        for a, b in class_pairs(list(members)):
+            one, other = _all_pairs(members[a], members[b])
+            apart = ((others[one] - others[other]) ** 2).sum(axis=1)
+            rank = np.argsort(apart, kind="stable")
+            nearest.append((apart[rank], place[one[rank]], place[other[rank]]))
+        starts = np.cumsum([0, *(len(apart) for apart, _, _ in nearest)])
+        apart, one, other = (np.concatenate(parts) for parts in zip(*nearest, strict=True))
+        return _Apart(order, apart, one, other, starts)
+
+    own = [np.array([len(others), *map(len, members.values())]), *members.values(), np.ascontiguousarray(others)]
+    return _apart.get(hashlib.sha256(b"".join(part.tobytes() for part in own)).digest(), made)
 
 
 def _in_order(members: Mapping[str, IndexArray]) -> tuple[IndexArray, IndexArray]:
@@ -149,10 +176,13 @@ def _in_order(members: Mapping[str, IndexArray]) -> tuple[IndexArray, IndexArray
 def _distances(
     squared: FloatArray, members: Mapping[str, IndexArray], response: Callable[[IndexArray], FloatArray]
 ) -> dict[Pair, FloatArray]:
-    """Roots; distances whose squares a float does not hold well are computed again, without squares."""
+    """Roots of `squared`, ndarray[n_pairs, n_designs].
+
+    Distances whose squares a float does not hold well are computed again, without squares.
+    """
     found = {}
-    for (a, b), column in zip(class_pairs(list(members)), squared.T, strict=True):
-        distance = np.sqrt(column)
+    for (a, b), row in zip(class_pairs(list(members)), squared, strict=True):
+        distance = np.sqrt(row)
         doubtful = np.flatnonzero((distance < _SMALLEST) | (distance > 1 / _SMALLEST))
         if doubtful.size:
             distance[doubtful] = _nearest(response(doubtful), members[a], members[b], _add_leg)

@@ -1,0 +1,35 @@
+"""Smaller and larger of two numbers in compiled loops, of which the compiler takes several at once.
+
+Python's `min` and `max` become branches there, and a loop that keeps the smallest value goes number by number.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+if TYPE_CHECKING:
+
+    def smaller(one: float, other: float) -> float:
+        """The smaller of two floats, neither of which is NaN; for compiled functions."""
+
+    def larger(one: float, other: float) -> float:
+        """The larger of two floats, neither of which is NaN; for compiled functions."""
+
+else:
+
+    def _of_llvm(name: str) -> Any:
+        def typed(_context: Any, _one: Any, _other: Any) -> tuple[Any, Any]:
+            def code(_target: Any, builder: Any, _signature: Any, args: Any) -> Any:
+                kind = ir.FunctionType(args[0].type, [args[0].type] * 2)
+                own = builder.module.declare_intrinsic(name, [args[0].type], kind)
+                return builder.call(own, args, fastmath=("nnan", "nsz"))
+
+            return types.float64(types.float64, types.float64), code
+
+        return intrinsic(typed)
+
+    smaller, larger = _of_llvm("llvm.minnum"), _of_llvm("llvm.maxnum")
