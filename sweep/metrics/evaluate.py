@@ -152,6 +152,8 @@ def _over(imager: Imager, cases: Sequence[Columns]) -> Columns:
     """The worst of all cases, and of CSDs the largest over the places of the smallest over the moments."""
     quantities = quantities_of(Asked(imager.view.lights.classes, any_place=True))
     best = {quantity.of: name for name, quantity in quantities.items() if quantity.extreme == "best place"}
+    if len(cases) == 1:
+        return {**cases[0]} | {best[name]: values.copy() for name, values in cases[0].items() if name in best}
     found: Columns = {}
     for name in cases[0]:
         each = np.stack([case[name] for case in cases])
