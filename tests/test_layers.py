@@ -13,7 +13,7 @@ PACKAGE = Path(__file__).parent.parent / "sweep"
 # From the bottom. A unit is a module or a folder of the package.
 LEVELS = [
     {"errors"},
-    {"types", "cache", "disk", "found"},
+    {"types", "cache", "disk", "found", "vectorized"},
     *({room} for room in ("curves", "designs", "camera", "metrics", "search", "study", "results", "run", "report")),
     {"commands"},
     {"__main__"},
