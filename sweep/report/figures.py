@@ -41,6 +41,7 @@ TYPE_COLORS = {"green": "#009e73", "yellow": "#c9a800", "orange": "#e66100", "re
 CURVE_CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 _LABEL_BOX = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0}
 _DRAWN_POINTS = 10_000
+_DPI = 160
 _TICK = r"$\mathdefault"
 """How Matplotlib begins the numbers of a logarithmic axis."""
 
@@ -238,15 +239,21 @@ def decorate(axes: Axes) -> None:
 def rendered(figure: Figure, kind: str) -> bytes:
     """A drawn figure as the bytes of a `png` or `svg` file; the same figure gives the same bytes."""
     import matplotlib as mpl  # noqa: PLC0415
+    from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
+    from matplotlib.backends.backend_svg import FigureCanvasSVG  # noqa: PLC0415
     from matplotlib.text import Text  # noqa: PLC0415
 
     for text in figure.findobj(Text):
         if "$" in text.get_text() and not text.get_text().startswith(_TICK):
             text.set_parse_math(False)  # a name, not a formula
     buffer = io.BytesIO()
-    metadata = {"Date": None} if kind == "svg" else {"Software": None}
     with mpl.rc_context({"svg.hashsalt": "cfa-sweep", "svg.fonttype": "path"}), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph")  # a name in a script that the font lacks
-        figure.savefig(buffer, format=kind, dpi=160, metadata=metadata)
+        figure.set_dpi(_DPI)
+        # The canvas' own functions: `savefig` would draw every figure twice.
+        if kind == "svg":
+            FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})
+        else:
+            FigureCanvasAgg(figure).print_png(buffer, metadata={"Software": None})
     figure.set_layout_engine("none")  # found once, the layout holds for the other kind, too
     return buffer.getvalue()
