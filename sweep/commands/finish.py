@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import typer
 
 
-def finish(folder: Path, *, mend: bool = False) -> None:
-    """Draw figures and report of a finished run, and say what it found; `mend`: only what is missing or damaged."""
+def finish(folder: Path, began_s: float, *, mend: bool = False) -> None:
+    """Draw figures and report of a finished run, and say what it found; `mend`: only what is missing or damaged.
+
+    `began_s`: when the command began, by the monotonic clock: a user waits for the report, too.
+    """
     from ..report import make_report, read_output, summary_lines
 
     found = read_output(folder)
     make_report(found, mend=mend)
-    for line in summary_lines(found):
+    for line in summary_lines(found, time.monotonic() - began_s):
         typer.echo(line)

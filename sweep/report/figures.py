@@ -252,8 +252,8 @@ def rendered(figure: Figure, kind: str) -> bytes:
         figure.set_dpi(_DPI)
         # The canvas' own functions: `savefig` would draw every figure twice.
         if kind == "svg":
-            FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})
+            FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})  # type: ignore[no-untyped-call]
         else:
-            FigureCanvasAgg(figure).print_png(buffer, metadata={"Software": None})
+            FigureCanvasAgg(figure).print_png(buffer, metadata={"Software": None})  # type: ignore[no-untyped-call]
     figure.set_layout_engine("none")  # found once, the layout holds for the other kind, too
     return buffer.getvalue()

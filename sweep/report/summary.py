@@ -33,8 +33,8 @@ def _scene_lines(output: Output) -> list[str]:
     return lines if len(scenarios) == 1 else [title, *lines]
 
 
-def summary_lines(output: Output) -> list[str]:
-    """What a run found and where its files are."""
+def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
+    """What a run found and where its files are; `took_s`: what the whole command took, s."""
     lines = answer_sentences(output)
     lines += _scene_lines(output)
     if not output.best.empty:
@@ -69,7 +69,9 @@ def summary_lines(output: Output) -> list[str]:
         )
     if output.provenance.sensor.surrogate or output.provenance.lights.surrogate:
         lines.append("Note: built-in curves are surrogates, modeled from stated parameters, not measured.")
-    lines.append(f"Took {output.provenance.duration_s:.1f} s with {output.provenance.workers} workers.")
+    workers = output.provenance.workers
+    computed = f"{output.provenance.duration_s:.1f} s by {workers} worker{'s' if workers > 1 else ''}"
+    lines.append(f"Computed in {computed}." if took_s is None else f"Took {took_s:.1f} s; computed in {computed}.")
     lines.append(f"Files: {output.folder}/: results.parquet, report.html, pareto.png, provenance.json.")
     return lines
 

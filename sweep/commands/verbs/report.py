@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 from ..finish import finish
 from ..options import RunFolder
 from ..panels import OF_RESULTS
@@ -11,4 +13,4 @@ PANEL = OF_RESULTS
 
 def report(folder: RunFolder) -> None:
     """Draw figures and report of a finished run again."""
-    finish(folder)
+    finish(folder, time.monotonic())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 from pathlib import Path
 from typing import Annotated
 
@@ -32,6 +33,7 @@ def run(
     """Run a study: results, figures and report go to OUTPUT/<study>. The same command continues an interrupted run,
     and makes again what is missing or damaged. Files that are not its own stay (run.json lists those that are).
     """
+    began_s = time.monotonic()
     from ... import run as runner
     from ...study import folder_name, load_study
     from ..audit import mend_audit
@@ -61,7 +63,7 @@ def run(
             if not made:
                 typer.echo(f"Note: {folder} holds this very study, finished; nothing was computed.", err=True)
             mend_audit(folder, data)
-            finish(folder, mend=True)
+            finish(folder, began_s, mend=True)
     except InterruptedRunError as error:
         if kind == "threading":  # what its threads are at cannot be broken off
             end_now(error)
