@@ -27,7 +27,14 @@ ONLY_USER = {
     "jinja2": ["report/"],
     "typer": ["commands/"],
     "sklearn": ["metrics/recognition"],
-    "numba": ["designs/compiled", "camera/compiled", "camera/plan/compiled", "metrics/compiled", "metrics/nearest"],
+    "numba": [
+        "designs/compiled",
+        "camera/compiled",
+        "camera/plan/compiled",
+        "metrics/compiled",
+        "metrics/nearest",
+        "vectorized",
+    ],
 }
 """Who alone may import a library: files, or all of a folder."""
 

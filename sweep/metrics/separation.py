@@ -120,7 +120,7 @@ def separations_along(
     others = np.delete(fixed, channel, axis=1)
     if not np.isfinite(others).all():
         return separations(whole(slice(None)), members)
-    apart = _pairs_apart(others, members)
+    apart = pairs_apart(others, members)
     squared = np.empty((len(apart.starts) - 1, len(values)))
     faulty = np.zeros(len(values), dtype=bool)
     nearest_along_squared(np.ascontiguousarray(values), *apart, squared, faulty)
@@ -132,7 +132,7 @@ def separations_along(
     return found
 
 
-class _Apart(NamedTuple):
+class Apart(NamedTuple):
     """Pairs of signals as `nearest_along_squared` takes them, sorted by their distance in the channels they share."""
 
     order: IndexArray
@@ -142,14 +142,14 @@ class _Apart(NamedTuple):
     starts: IndexArray
 
 
-_apart: Cache[bytes, _Apart] = Cache(16)
+_apart: Cache[bytes, Apart] = Cache(16)
 """The blocks of a run share their fixed channels."""
 
 
-def _pairs_apart(others: FloatArray, members: Mapping[str, IndexArray]) -> _Apart:
-    """`others`: ndarray[n_signals, n_channels], DN, the channels that the designs share."""
+def pairs_apart(others: FloatArray, members: Mapping[str, IndexArray]) -> Apart:
+    """Pairs of signals of two types; `others`: ndarray[n_signals, n_channels], DN, the channels that designs share."""
 
-    def made() -> _Apart:
+    def made() -> Apart:
         order, _ = _in_order(members)
         place = np.empty(order.max() + 1, dtype=np.uint32)  # of each signal in the order of the classes
         place[order] = np.arange(order.size)
@@ -161,7 +161,7 @@ def _pairs_apart(others: FloatArray, members: Mapping[str, IndexArray]) -> _Apar
             nearest.append((apart[rank], place[one[rank]], place[other[rank]]))
         starts = np.cumsum([0, *(len(apart) for apart, _, _ in nearest)])
         apart, one, other = (np.concatenate(parts) for parts in zip(*nearest, strict=True))
-        return _Apart(order, apart, one, other, starts)
+        return Apart(order, apart, one, other, starts)
 
     own = [np.array([len(others), *map(len, members.values())]), *members.values(), np.ascontiguousarray(others)]
     return _apart.get(hashlib.sha256(b"".join(part.tobytes() for part in own)).digest(), made)

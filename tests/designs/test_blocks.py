@@ -12,12 +12,15 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
 from sweep.camera.imager import Imager
+from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
 from sweep.designs import block as blocks
 from sweep.designs.block import CurveBlock, edges_of
 from sweep.designs.families.free_form import FreeForm
 from sweep.designs.families.stopband import MultiStopband, Stopband
 from sweep.designs.space import Filter, Space
+from sweep.metrics import separation
 from sweep.metrics.evaluate import evaluate
+from sweep.metrics.nearest import LANES, nearest_along_squared
 from sweep.metrics.separation import class_pairs, separations, separations_along
 
 from ..blocks import AXES, SPACE, VIEWS
@@ -38,6 +41,44 @@ def test_both_routes_say_the_same(name: str) -> None:
         # Two orders of the same sums over at most 301 wavelengths, of numbers up to full scale; far below 0.01 DN.
         scale = view.pixel.full_scale_dn * 8 if "csd" in column else 1.0
         assert np.abs(fast[column] - values).max() <= 301 * EPS * scale, column
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(st.floats(380, 820), min_size=1, max_size=3),
+    st.lists(st.floats(380, 820), min_size=1, max_size=3),
+    st.lists(st.sampled_from([0.0, 1.0, 7.0, 40.0, 400.0]), min_size=1, max_size=3),
+    st.lists(st.floats(0, 1), min_size=1, max_size=2),
+)
+def test_shapes_of_edges_are_those_of_their_curves(
+    left: list[float], right: list[float], width: list[float], depth: list[float]
+) -> None:
+    # Crossed, steep and wide edges, some beyond the ends of the grid.
+    grid = replace(SPACE, axes=tuple(map(tuple, (left, width, right, width, depth))))
+    edges = edges_of(grid, 0, grid.size)
+    assert edges is not None
+    base = SENSOR.qe["Y"][None]
+    curves = edges.curves()[:, 0]
+    steepest, lowest = edges.shapes(base)
+    np.testing.assert_allclose(steepest, np.abs(np.diff(curves)).max(axis=1), rtol=0, atol=4 * EPS)
+    kept = base[0] > 0
+    np.testing.assert_allclose(lowest, (curves[:, kept] / base[0, kept]).min(axis=1), rtol=1e-12, atol=4 * EPS)
+
+
+def test_pairs_that_are_never_the_nearest_are_left_out() -> None:
+    neighbors = replace(SPACE, axes=((600.0,), (20.0,), tuple(np.linspace(650, 660, 128)), (20.0,), (1.0,)))
+    edges = edges_of(neighbors, 0, neighbors.size)
+    assert edges is not None
+    view = replace(VIEWS["chart"], lights=BUILT_IN_LIGHTS["tl16"](GRID))
+    changing = Imager(view).read_changing(edges)
+    assert changing is not None
+    members = view.members
+    apart = separation.pairs_apart(np.delete(changing.fixed[0], changing.channel, axis=1), members)
+    values = np.ascontiguousarray(changing.values[:, 0])
+    room = np.empty((len(apart.starts) - 1, len(values))), np.zeros(len(values), dtype=bool)
+    computed = nearest_along_squared(values, *apart, *room)
+    every = len(apart.fixed) * -(-len(values) // LANES)
+    assert 0 < computed < every / 4
 
 
 def test_no_spectrum_is_made_by_the_separable_route(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -82,7 +123,7 @@ def test_the_separable_route_refuses_what_is_not_separable(monkeypatch: pytest.M
 @given(
     st.lists(st.integers(1, 9), min_size=2, max_size=5),
     st.integers(1, 6),
-    st.integers(1, 20),
+    st.integers(1, 150),
     st.integers(0, 2**32 - 1),
 )
 def test_pair_distances_are_the_definition(sizes: list[int], channels: int, designs: int, seed: int) -> None:
