@@ -16,6 +16,7 @@ _HOMES = {
     "make_study": "door.opening:made_study",
     "read_run": "door.opening:finished_run",
     "studies": "door.opening:studies",
+    "evaluate": "door.asked:verdict_on",
     "sensor": "door.opening:own_sensor",
     "lights": "door.opening:own_lights",
     "read_curves": "door.given:curves_table",

@@ -5,6 +5,7 @@ from .curves.spectrum import WavelengthGrid
 from .designs.families.dual import Dual
 from .designs.families.free_form import FreeForm
 from .designs.families.stopband import MultiStopband, Stopband
+from .door.asked import verdict_on as evaluate
 from .door.given import curves_table as read_curves
 from .door.objects import FinishedRun, LoadedStudy
 from .door.opening import finished_run as read_run
@@ -32,6 +33,7 @@ __all__ = [
     "Target",
     "WavelengthGrid",
     "__version__",
+    "evaluate",
     "lights",
     "load_study",
     "make_study",

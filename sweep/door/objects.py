@@ -12,17 +12,10 @@ import numpy as np
 import pandas as pd
 from pandas.arrays import BooleanArray
 
-from .. import run as runner
 from ..designs.space import Space
 from ..errors import Fault, OutputError, SweepError, nearest
 from ..metrics.bound import FEASIBLE, total_violation
 from ..metrics.quantity import Column, Quantity
-from ..report import Output, make_report, read_output, study_of, summary_lines
-from ..report.figures import CurvesFigure, draw_curves
-from ..results.names import REPORT
-from ..results.tables import NAMED, PLAIN, RESULTS, read_table
-from ..run.routes import block_of
-from ..run.rows import rules_of
 from ..search.limit import Limit
 from ..study import Study, folder_name
 from .given import CurveLike, on_grid
@@ -32,8 +25,9 @@ from .own_filters import bases_of, cfa_with, judged, table_of, verdict, with_uni
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from ..report import Output
+
 _INDEX = "wavelength_nm"
-_MOST_PLAIN = 10_000
 
 
 class LoadedStudy:
@@ -125,6 +119,10 @@ class LoadedStudy:
 
     def _own(self, cfa: str | None, scenarios: list[str]) -> pd.DataFrame:
         """The study's plain CFAs and named designs."""
+        from ..results.tables import NAMED, PLAIN
+        from ..run.routes import block_of
+        from ..run.rows import rules_of
+
         study, request = self.study, rules_of(self.study).request
         spaces = [s for s in study.spaces if s.kind in (PLAIN, NAMED) and cfa in (None, s.cfa)]
         if not spaces:
@@ -172,6 +170,8 @@ class LoadedStudy:
 
     def plot(self, **channels: CurveLike) -> Figure:
         """Draw the sensor's QE over the lights, with own curves over them: `plot(N=curve)`. A Matplotlib figure."""
+        from ..report.figures import CurvesFigure, draw_curves
+
         study = self.study
         own = {name: on_grid(name, curve, study.grid) for name, curve in channels.items()}
         members = study.lights.members
@@ -186,15 +186,20 @@ class LoadedStudy:
 
         Then `evaluate` computes by it, and `study.plans` says what it left out and why.
         """
-        return LoadedStudy(runner.with_plans(self.study, 1, _silent, tolerance_dn))
+        from ..run import with_plans
+
+        return LoadedStudy(with_plans(self.study, 1, _silent, tolerance_dn))
 
     def run(self, output: Path | str = "outputs", jobs: int | None = None) -> FinishedRun:
         """Run the study into `output`/<name>, draw its report, and give the finished run; what is finished stays.
 
         `jobs`: worker processes, all cores if left out. Raises SweepError as the command says it.
         """
-        folder, _ = runner.output_folder(Path(output) / folder_name(self.name), self.study)
-        runner.run_study(self.study, folder, jobs or os.cpu_count() or 1, _silent, ("sweep", "from Python"))
+        from ..report import make_report, read_output
+        from ..run import output_folder, run_study
+
+        folder, _ = output_folder(Path(output) / folder_name(self.name), self.study)
+        run_study(self.study, folder, jobs or os.cpu_count() or 1, _silent, ("sweep", "from Python"))
         make_report(read_output(folder), mend=True)
         return FinishedRun(folder)
 
@@ -236,6 +241,8 @@ class FinishedRun:
     """
 
     def __init__(self, folder: Path) -> None:
+        from ..report import read_output
+
         self.folder = folder
         self.output: Output = read_output(self.folder)
 
@@ -245,6 +252,8 @@ class FinishedRun:
     @cached_property
     def table(self) -> pd.DataFrame:
         """The whole result table; units and meanings of its quantities are in `attrs`."""
+        from ..results.tables import RESULTS, read_table
+
         columns: Mapping[str, Column] = self.output.columns
         return with_units(read_table(self.folder / RESULTS).to_pandas(), columns)
 
@@ -268,18 +277,24 @@ class FinishedRun:
     @cached_property
     def study(self) -> LoadedStudy:
         """The study that was run, with the very curves that the run kept."""
+        from ..report import study_of
+
         return LoadedStudy(study_of(self.output, None))
 
     @property
     def summary(self) -> str:
         """What the run found, as the command says it."""
+        from ..report import summary_lines
+
         return "\n".join(summary_lines(self.output))
 
     def report(self) -> Path:
         """Draw figures and report again; the page's path."""
+        from ..report import make_report
+        from ..results.names import REPORT
+
         make_report(self.output)
         return self.folder / REPORT
 
 
-def _silent(_phase: str, _done: int, _total: int) -> None:
-    """Nobody is told of progress."""
+def _silent(*_: object) -> None: ...

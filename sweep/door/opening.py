@@ -101,6 +101,18 @@ def own_sensor(
     transmissions times that curve. `clear`: the curve of a pixel without filter. Columns of a file are taken for
     channels by their names, or by their shapes. Raises SweepError for curves that cannot be used.
     """
+    return sensor_given(source, channels, relative_to=relative_to, name=name, clear=clear)
+
+
+def sensor_given(
+    source: Path | str | None,
+    channels: Mapping[str, CurveLike],
+    *,
+    relative_to: str | None = None,
+    name: str | None = None,
+    clear: str | None = None,
+) -> Given:
+    """The same, with the channels as a mapping."""
     keys: dict[str, Any] = {"files": []}
     if source is not None and is_file(Path(source)):
         keys = sensor_file(Path(source)).keys(str(Path(source).absolute()))

@@ -17,7 +17,7 @@ import sweep
 from ..conftest import ROOT
 
 NAMES = {
-    *("load_study", "make_study", "read_run", "read_curves", "studies", "sensor", "lights"),
+    *("load_study", "make_study", "read_run", "read_curves", "studies", "sensor", "lights", "evaluate"),
     *("LoadedStudy", "FinishedRun", "Quantity", "SweepError"),
     *("Pixel", "Optics", "Scenario", "Target", "WavelengthGrid"),
     *("Stopband", "MultiStopband", "Dual", "FreeForm"),
