@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field, WithJsonSchema, model_validator
 
-from ..curves.files import MOST_CURVES
+from ..curves.scan import MOST_CURVES
 from ..curves.spectrum import Outside, Resampling
 from ..types import Ratio, Section
 
@@ -26,7 +26,7 @@ class CurveFile(Documented):
     """QE curves from one file: `columns` maps the sensor's curve names to the file's column names."""
 
     file: FilePath
-    """Path of a .csv or .mat file, relative to the study or to the folder of --data.
+    """Path of a file of curves, relative to the study or to the folder of --data.
 
     At most 40 MB, 2,000 curves, 100,000 samples of each and 2,000,000 values; values are 0 to 1e100."""
     columns: Annotated[dict[Name, Name], Field(min_length=1)]
@@ -66,7 +66,7 @@ class LightFile(Documented):
     """Lights from one file: `signals` maps a signal type to the file's columns."""
 
     file: FilePath
-    """Path of a .csv or .mat file, relative to the study or to the folder of --data."""
+    """Path of a file of curves, relative to the study or to the folder of --data."""
     quantity: Annotated[str, Field(pattern="^(energy|photons)$"), WithJsonSchema({"enum": ["energy", "photons"]})]
     """What the file's numbers are."""
     signals: Annotated[dict[Name, FileColumns], Field(min_length=1)]

@@ -211,7 +211,8 @@ class Sources:
             self.add((*path, "file"), "no such file", entry.file, f"a path relative to {searched}", near)
             return None
         try:
-            self._read[entry.file] = read_curves(found)
+            read = self._read[entry.file] = read_curves(found)
+            self.warnings += [f"{entry.file}: {note}" for note in read.notes]
             self.digests[entry.file] = digest(found)
         except DataError as error:
             self.faults.extend(error.faults)
