@@ -14,7 +14,10 @@ PACKAGE = Path(__file__).parent.parent / "sweep"
 LEVELS = [
     {"errors"},
     {"types", "cache", "disk", "found", "vectorized"},
-    *({room} for room in ("curves", "designs", "camera", "metrics", "search", "study", "results", "run", "report")),
+    *(
+        {room}
+        for room in ("curves", "designs", "camera", "metrics", "search", "study", "results", "run", "report", "door")
+    ),
     {"commands"},
     {"__main__"},
 ]

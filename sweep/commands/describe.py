@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+import shlex
 import struct
 import warnings
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
@@ -16,11 +17,12 @@ import numpy as np
 from ..curves.facts import Facts, condensed, facts_of, notes
 from ..curves.files import scan_curves
 from ..curves.light_unit import LightUnit
+from ..curves.mending import mended
 from ..curves.signal_color import LightColor
 from ..disk import read_input
-from ..errors import Fault, OutputError
+from ..errors import DataError, Fault, OutputError
 from ..report.figures import rendered
-from ..results.tables import write_bytes
+from ..results.tables import write_bytes, write_text
 from .describe_picture import draw
 
 _MOST_NAMES = 12
@@ -61,6 +63,7 @@ def described(path: Path, folder: Path, quantity: LightUnit | None = None) -> De
     lines = [f"{path}: {len(names)} curve{'' if len(names) == 1 else 's'}{': ' if names else ''}{_some(names)}."]
     if not any(curve.values.size for curve in facts.curves):
         return Description((*lines, "Nothing in it can be drawn."), faults)
+    lines += [f"Read: {note}." for note in scan.notes]
     as_qe = facts.looks_like_qe and quantity is None
     lines += [_range(facts), _guess(facts, quantity)]
     colors = {} if as_qe else facts.colors(quantity or "energy")
@@ -70,6 +73,8 @@ def described(path: Path, folder: Path, quantity: LightUnit | None = None) -> De
     lines += [f"Note: {note}." for note in notes(facts, as_qe=as_qe)]
     if not faults:
         lines.append("Its samples are clean: a study can read it.")
+    elif mended(scan).faults == ():
+        lines.append(f"`sweep describe {shlex.quote(str(path))} --clean NEW.csv` writes a file that a study can read.")
     picture = folder / f"{path.stem}.png"
     _refuse_other(picture)
     with warnings.catch_warnings(), np.errstate(over="ignore"):
@@ -77,6 +82,22 @@ def described(path: Path, folder: Path, quantity: LightUnit | None = None) -> De
         content = rendered(draw(path.name, facts, colors), "png")
     write_bytes(content[:_HEADER_BYTES] + _MARK + content[_HEADER_BYTES:], picture)
     return Description((*lines, f"Picture: {picture}"), faults)
+
+
+def cleaned(path: Path, to: Path) -> list[str]:
+    """Write a clean CSV of a file's curves to `to`, and say what was changed.
+
+    Raises DataError for what no rule mends, OutputError where there is a file already or it cannot be written.
+    """
+    scan = scan_curves(path)
+    found = mended(scan)
+    if found.faults:
+        raise DataError(condensed([replace(fault, file=str(path)) for fault in found.faults]))
+    if os.path.lexists(to):
+        raise OutputError(Fault("is there already, and stays as it is", str(to), allowed="another --clean"))
+    write_text(found.text(path.name, scan.notes), to)
+    said = [*(f"Read: {note}." for note in scan.notes), *(f"Changed: {change}." for change in found.changes)]
+    return [*said, *([] if found.changes else ["Changed: nothing."]), f"Clean: {to}"]
 
 
 def _refuse_other(picture: Path) -> None:

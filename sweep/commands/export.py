@@ -8,19 +8,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.compute as pc
 
 from ..camera.mosaic import Mosaic
 from ..curves.isetcam import color_hints, csv_text, filter_names, isetcam_mat, unique_names
-from ..errors import Fault, OutputError, SweepError, nearest
+from ..errors import Fault, OutputError
 from ..report import Output, check_kept, read_output, study_of
+from ..results.chosen import find_row
 from ..results.designs import row_curves
-from ..results.tables import RESULTS, batches, write_bytes
+from ..results.tables import write_bytes
 from ..study import Study, folder_name
 from ..types import FloatArray
 
-BEST = "best"
 EXPORT = "export"
 _SAME_TOTAL = 1e-9
 _MOST_SHOWN = 10
@@ -93,41 +91,6 @@ def export_design(folder: Path, key: str, data: Path | None, to: Path | None) ->
     lines.append(f"Files: {csv_path} ({', '.join(unique_names(tables))}),")
     lines.append(f"       {mat_path} ({names}: QE, so set the pixel's spectral QE to 1 in ISETCam).")
     return lines
-
-
-def find_row(output: Output, key: str) -> Mapping[Any, Any]:
-    """The row of a name, of a design_id or of `best`; of a name that occurs in several scenarios the first.
-
-    Raises SweepError, with the nearest name, when there is none or when its design failed.
-    """
-    table = output.table
-    named = table[table["name"] == key]
-    if key == BEST:
-        if output.best.empty:
-            raise SweepError(Fault("the run has no feasible design that was swept or searched", str(output.folder)))
-        row: dict[Any, Any] = output.best.iloc[0].to_dict()
-    elif len(named):
-        row = named.iloc[0].to_dict()
-    elif key.isascii() and key.isdecimal() and int(key) < output.counts.rows:
-        row = _streamed(output.folder / RESULTS, int(key))
-    else:
-        names = list(dict.fromkeys(map(str, table["name"].dropna())))
-        shown = [*names[:_MOST_SHOWN], *(["..."] if len(names) > _MOST_SHOWN else [])]
-        allowed = f"{BEST}, a name ({', '.join(shown)}), or a design_id from 0 to {output.counts.rows - 1:,}"
-        near = nearest(key, [*names, BEST])
-        raise SweepError(Fault("no such design", str(output.folder), None, "--design", key, allowed, near))
-    if row["status"] != "ok":
-        raise SweepError(Fault("the design failed", str(output.folder), None, "--design", row["status"]))
-    return row
-
-
-def _streamed(path: Path, design_id: int) -> dict[str, Any]:
-    """A row by its id, a row group in memory."""
-    for table in batches(path):
-        found = table.filter(pc.equal(table["design_id"], pa.scalar(design_id)))
-        if found.num_rows:
-            return dict(found.to_pylist()[0])
-    raise OutputError(Fault("has too few rows", str(path), None, "design_id", design_id))
 
 
 def filters_of(study: Study, row: Mapping[Any, Any]) -> Filters:

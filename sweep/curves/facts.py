@@ -9,8 +9,8 @@ import numpy as np
 
 from ..errors import Fault
 from ..types import FloatArray
-from .files import Scan, distinct
 from .light_unit import LightUnit
+from .scan import Scan, distinct
 from .signal_color import VISIBLE, LightColor, light_color
 from .spectrum import WavelengthGrid, photons_from_energy, resample
 

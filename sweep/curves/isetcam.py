@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from ..types import FloatArray, IndexArray
-from .files import WAVELENGTH
+from .wavelength_names import WAVELENGTH
 
 HINTS = "rgbcymwiuxzok"
 """First letters of filter names that ISETCam has a color for (its `sensorColorOrder`)."""

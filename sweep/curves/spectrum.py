@@ -5,7 +5,7 @@ A curve that is not clean (NaN, negative, unsorted, duplicated or truncated data
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -76,13 +76,15 @@ class Curves:
     """Named curves on common wavelengths, as they came from their source.
 
     `wavelength_nm`: ndarray[n], strictly increasing. `values`: name -> ndarray[n], finite and >= 0.
-    `source` names the file or the maker; `surrogate` says that the curves are modeled, not measured.
+    `source` names the file or the maker; `surrogate` says that the curves are modeled, not measured. `notes`: how
+    a file was read.
     """
 
     wavelength_nm: FloatArray
     values: Mapping[str, FloatArray]
     source: str
     surrogate: bool = False
+    notes: tuple[str, ...] = ()
 
     def on(
         self, grid: WavelengthGrid, name: str, method: Resampling = "linear", outside: Outside = "refuse"
@@ -140,6 +142,17 @@ def check_samples(wavelength_nm: ArrayLike, values: ArrayLike) -> tuple[FloatArr
     if faults:
         raise DataError(faults)
     return wave, data
+
+
+def sample_faults(file: str, wave: FloatArray, names: Sequence[str], data: FloatArray) -> list[list[Fault]]:
+    """What `check_samples` refuses of the curves of a file, ndarray[n_samples, n_curves], a group for each curve."""
+    found = []
+    for index, name in enumerate(names):
+        try:
+            check_samples(wave, data[:, index])
+        except DataError as error:
+            found.append([Fault(f.problem, file, None, name, f.value, f.allowed) for f in error.faults])
+    return found
 
 
 def resample(

@@ -8,13 +8,11 @@ import sys
 from collections.abc import Mapping
 from dataclasses import asdict
 from importlib.metadata import version
-from io import StringIO
 from typing import Any
-
-from ruamel.yaml import YAML
 
 from ..results.identity import MODEL_VERSION, fingerprint
 from ..study import Study
+from ..study.yaml_tree import yaml_text
 
 _PACKAGES = ("cfa-sweep", "numpy", "scipy", "numba", "scikit-learn", "pandas", "pyarrow", "joblib", "nlopt", "moocore")
 
@@ -23,15 +21,11 @@ def resolved_yaml(study: Study) -> str:
     """The study with every default written out; a study file itself."""
     section = study.section.model_dump(mode="json", by_alias=True, exclude_none=True)
     for key in ("sensor", "lights"):
-        section[key] = section[key].get("builtin", {k: v for k, v in section[key].items() if k != "builtin"})
+        if not section[key]["files"]:
+            section[key] = section[key]["builtin"]
     if study.section.lights.builtin is None:
         section["lights"]["photon_ratio"] = study.lights.photon_ratio  # another light in the file would change it
-    text = StringIO()
-    yaml = YAML(typ="safe", pure=True)
-    yaml.default_flow_style = False
-    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
-    yaml.dump(section, text)
-    return text.getvalue()
+    return yaml_text(section)
 
 
 def plan_facts(study: Study) -> dict[str, Any]:

@@ -1,8 +1,8 @@
 """Study files: YAML in, frozen and fully checked objects out, before any work."""
 
-from .load import folder_name, load_study
+from .load import folder_name, load_study, study_of_keys
 from .model import Search, Study
 from .schema import StudySection
 from .sources import KeptSources
 
-__all__ = ["KeptSources", "Search", "Study", "StudySection", "folder_name", "load_study"]
+__all__ = ["KeptSources", "Search", "Study", "StudySection", "folder_name", "load_study", "study_of_keys"]

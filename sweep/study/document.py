@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 from types import UnionType
@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 
 from ..disk import NO_UTF_16, not_utf8, read_input
 from ..errors import MOST_FAULTS, Fault, StudyError, nearest
-from .yaml_tree import Key, Tree
+from .yaml_tree import Key, Tree, yaml_text
 
 _MOST = (500_000, 50_000)
 """Bytes of a study file, and keys and values in it."""
@@ -24,12 +24,17 @@ _MOST_LOOKED_AT = 2 * MOST_FAULTS
 
 
 class Document:
-    """A parsed YAML file that knows the line of each of its keys. `data`: its keys with plain values."""
+    """A parsed YAML file that knows the line of each of its keys. `data`: its keys with plain values.
 
-    def __init__(self, path: Path) -> None:
-        self.file = str(path)
-        most_bytes, most_values = _MOST_RESOLVED if path.name.endswith(_RESOLVED) else _MOST
-        self._tree = Tree(_text(path, most_bytes), self.file, most_values)
+    `source`: the file, or the keys themselves, which then have no file and no lines.
+    """
+
+    def __init__(self, source: Path | Mapping[str, Any]) -> None:
+        self.file = str(source) if isinstance(source, Path) else None
+        resolved = isinstance(source, Path) and source.name.endswith(_RESOLVED)
+        most_bytes, most_values = _MOST_RESOLVED if resolved else _MOST
+        text = _text(source, most_bytes) if isinstance(source, Path) else yaml_text(source)
+        self._tree = Tree(text, self.file, most_values)
         if not isinstance(self._tree.root, dict):
             raise StudyError(
                 Fault(
@@ -61,7 +66,8 @@ class Document:
         near: str | None = None,
     ) -> Fault:
         """A fault at `path` of this file."""
-        return Fault(problem, self.file, self.line(path), dotted(path), value, allowed, near)
+        line = None if self.file is None else self.line(path)
+        return Fault(problem, self.file, line, dotted(path), value, allowed, near)
 
     def faults(self, error: ValidationError, model: type[BaseModel]) -> list[Fault]:
         """Pydantic's errors as faults of this file."""

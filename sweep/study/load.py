@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
-from ..curves.spectrum import WavelengthGrid
+from ..curves.spectrum import Curves, WavelengthGrid
 from ..disk import is_folder
 from ..errors import Fault, StudyError
 from .document import Document
@@ -32,10 +34,7 @@ def load_study(
     key, value, what is allowed, nearest name.
     """
     document = Document(path)
-    try:
-        section = StudySection.model_validate(document.data)
-    except ValidationError as error:
-        raise StudyError(document.faults(error, StudySection)) from None
+    section = _section(document)
     if step_nm is not None:
         grid = section.wavelengths
         section = section.model_copy(
@@ -44,6 +43,24 @@ def load_study(
     if data is not None and not is_folder(data):
         raise StudyError(Fault("no such folder", None, None, "--data", str(data)))
     return resolve(document, section, [*([data] if data is not None else []), path.parent], kept)
+
+
+def study_of_keys(keys: Mapping[str, Any], folder: Path, given: Mapping[str, Curves] = {}) -> Study:
+    """Check a study that stands in no file: its keys with plain values.
+
+    Files that it names are looked for in `folder`; `given`: curves to take for files that are not on a disk, by the
+    names that the study gives these. Raises StudyError as `load_study` does, without file and line.
+    """
+    document = Document(keys)
+    return resolve(document, _section(document), [folder], None, given)
+
+
+def _section(document: Document) -> StudySection:
+    """The schema of a document; raises StudyError with every fault."""
+    try:
+        return StudySection.model_validate(document.data)
+    except ValidationError as error:
+        raise StudyError(document.faults(error, StudySection)) from None
 
 
 def folder_name(study_name: str) -> str:

@@ -128,12 +128,14 @@ class Study:
 
     def view(self, space: Space, scenario: str) -> View:
         """What the designs of `space` share in a scenario."""
-        mosaic, scene = self.mosaics[space.cfa], self.scenarios[scenario]
-        replaced = dict(self.section.cfas[space.cfa].curves)
-        modified: tuple[int, ...] = ()
-        if space.filter is not None:
-            replaced |= dict.fromkeys(space.filter.channels, space.filter.base)
-            modified = tuple(mosaic.channels.index(channel) for channel in space.filter.channels)
+        bases = {} if space.filter is None else dict.fromkeys(space.filter.channels, space.filter.base)
+        return self.view_of(space.cfa, scenario, bases)
+
+    def view_of(self, cfa: str, scenario: str, bases: Mapping[str, str]) -> View:
+        """What designs of a CFA share in a scenario; `bases`: modified channel -> the curve that it replaces."""
+        mosaic, scene = self.mosaics[cfa], self.scenarios[scenario]
+        replaced = {**self.section.cfas[cfa].curves, **bases}
+        modified = tuple(mosaic.channels.index(channel) for channel in bases)
         return View(
             grid=self.grid,
             mosaic=mosaic,

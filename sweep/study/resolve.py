@@ -11,6 +11,7 @@ from ..camera.mosaic import Mosaic
 from ..camera.scene import OBJECT_RESOLUTION, WhitePatchExposure
 from ..curves.color import VISIBLE_NM
 from ..curves.lights import Lights
+from ..curves.spectrum import Curves
 from ..designs.space import Space
 from ..errors import StudyError, SweepError
 from ..metrics.quantity import Asked, Quantity
@@ -20,6 +21,7 @@ from .axes import Axis
 from .document import Document
 from .model import Search, Study
 from .schema import CfaSection, StudySection
+from .sensors import sensor_of
 from .sources import KeptSources, Sources
 from .spaces import SpaceBuilder
 from .yaml_tree import Key
@@ -33,18 +35,23 @@ class _Resolver:
     """Turns a checked schema into a Study, collecting every fault that it finds."""
 
     def __init__(
-        self, document: Document, section: StudySection, folders: list[Path], kept: KeptSources | None
+        self,
+        document: Document,
+        section: StudySection,
+        folders: list[Path],
+        kept: KeptSources | None,
+        given: Mapping[str, Curves],
     ) -> None:
         self.document = document
         self.section = section
-        self.sources = Sources(document, section.wavelengths, folders, kept)
+        self.sources = Sources(document, section.wavelengths, folders, kept, given)
         self.faults = self.sources.faults
         self.add = self.sources.add
         self.unknown = self.sources.unknown
 
     def resolve(self) -> Study:
         section = self.section
-        sensor = self.sources.sensor(section.sensor)
+        sensor = sensor_of(self.sources, section.sensor)
         lights = self.sources.lights(section.lights)
         mosaics = {name: mosaic for name, cfa in section.cfas.items() if (mosaic := self.mosaic(name, cfa)) is not None}
         if sensor is None or lights is None:
@@ -268,9 +275,15 @@ class _Resolver:
             self.add(("search", "front"), problem, None, "an objective of CSDs")
 
 
-def resolve(document: Document, section: StudySection, folders: list[Path], kept: KeptSources | None = None) -> Study:
+def resolve(
+    document: Document,
+    section: StudySection,
+    folders: list[Path],
+    kept: KeptSources | None = None,
+    given: Mapping[str, Curves] = {},
+) -> Study:
     """Make the study; `folders` are searched in order for its files. Raises StudyError with every fault found.
 
-    `kept`: curves to take instead of those in files, see `Sources`.
+    `kept`: curves to take instead of those in files, `given`: files that are not on a disk; see `Sources`.
     """
-    return _Resolver(document, section, folders, kept).resolve()
+    return _Resolver(document, section, folders, kept, given).resolve()

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field, WithJsonSchema, model_validator
 
-from ..curves.files import MOST_CURVES
+from ..curves.scan import MOST_CURVES
 from ..curves.spectrum import Outside, Resampling
 from ..types import Ratio, Section
 
@@ -26,13 +26,17 @@ class CurveFile(Documented):
     """QE curves from one file: `columns` maps the sensor's curve names to the file's column names."""
 
     file: FilePath
-    """Path of a .csv or .mat file, relative to the study or to the folder of --data.
+    """Path of a file of curves, relative to the study or to the folder of --data.
 
     At most 40 MB, 2,000 curves, 100,000 samples of each and 2,000,000 values; values are 0 to 1e100."""
     columns: Annotated[dict[Name, Name], Field(min_length=1)]
     """Channel of the sensor -> column of the file."""
     scale: Ratio = 1.0
     """Factor on the file's values: 0.01 for percent."""
+    relative_to: Name | None = None
+    """A curve of the sensor that the file's values are relative to: they are transmissions, and are multiplied by it.
+
+    A built-in curve, or one of a file without `relative_to`."""
     resampling: Resampling = "linear"
     """`mean` over each bin keeps the integral of lines that are finer than the grid."""
     outside: Outside = "refuse"
@@ -40,18 +44,21 @@ class CurveFile(Documented):
 
 
 class SensorSection(Documented):
-    """A built-in sensor by its name, or curves from files."""
+    """A built-in sensor by its name, curves from files, or both: own curves beside the built-in ones."""
 
     builtin: str | None = None
+    """A built-in sensor; a curve of a file takes the place of its curve of the same name."""
     name: Name | None = None
     files: list[CurveFile] = []
     clear: Name | None = None
-    """The reference of the CFA's sensitivity; the curve with the largest total where it is left out."""
+    """The reference of the CFA's sensitivity. Left out, it is the built-in sensor's own, or the largest curve."""
 
     @model_validator(mode="after")
-    def _one_source(self) -> SensorSection:
-        if (self.builtin is None) == (not self.files):
-            raise ValueError("a sensor is either the name of a built-in one or a mapping with `files`")
+    def _some_source(self) -> SensorSection:
+        if self.builtin is None and not self.files:
+            raise ValueError("a sensor is the name of a built-in one, or a mapping with `builtin`, `files` or both")
+        if self.builtin is not None and not self.files and (self.name or self.clear):
+            raise ValueError("a built-in sensor alone has its own `name` and `clear`; leave these out, or add `files`")
         return self
 
 
@@ -59,7 +66,7 @@ class LightFile(Documented):
     """Lights from one file: `signals` maps a signal type to the file's columns."""
 
     file: FilePath
-    """Path of a .csv or .mat file, relative to the study or to the folder of --data."""
+    """Path of a file of curves, relative to the study or to the folder of --data."""
     quantity: Annotated[str, Field(pattern="^(energy|photons)$"), WithJsonSchema({"enum": ["energy", "photons"]})]
     """What the file's numbers are."""
     signals: Annotated[dict[Name, FileColumns], Field(min_length=1)]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
 
-from ..camera.sensor import BUILT_IN_SENSORS, SensorCurves, make_sensor
+from ..camera.sensor import SensorCurves
 from ..curves.builtin.registry import BUILT_IN_LIGHTS
 from ..curves.builtin.surrogate import BUILT_IN_RANGE_NM
 from ..curves.files import digest, read_curves
@@ -19,7 +20,7 @@ from ..errors import MOST_FAULTS, DataError, Fault, nearest
 from ..types import FloatArray
 from .document import Document
 from .schema import MOST_TYPES
-from .schema_curves import CurveFile, LightFile, LightsSection, SensorSection
+from .schema_curves import CurveFile, LightFile, LightsSection
 from .yaml_tree import Key
 
 _Made = TypeVar("_Made", SensorCurves, Lights)
@@ -44,13 +45,14 @@ class KeptSources:
 class Sources:
     """Reads the files of one study, each once; collects faults, warnings and digests.
 
-    `kept`: the curves of a finished run; no file is read then.
+    `kept`: the curves of a finished run; no file is read then. `given`: files that are not on a disk, by their names.
     """
 
     document: Document
     grid: WavelengthGrid
     folders: Sequence[Path]
     kept: KeptSources | None = None
+    given: Mapping[str, Curves] = field(default_factory=dict)
     faults: list[Fault] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     digests: dict[str, str] = field(default_factory=dict)
@@ -64,43 +66,6 @@ class Sources:
     def _near(self, value: str, known: Iterable[str]) -> str | None:
         """The nearest known name, as long as somebody is told of it."""
         return nearest(value, known) if len(self.faults) < MOST_FAULTS else None
-
-    def sensor(self, section: SensorSection) -> SensorCurves | None:
-        """The study's sensor, or None after adding faults."""
-        if section.builtin is not None:
-            return self._built_in(("sensor",), section.builtin, BUILT_IN_SENSORS)
-        before = len(self.faults)
-        if not self._fits(("sensor", "files"), "curves", sum(len(entry.columns) for entry in section.files)):
-            return None
-        qe: dict[str, FloatArray] = {}
-        for index, entry in enumerate(section.files):
-            path: tuple[Key, ...] = ("sensor", "files", index)
-            curves = self._curves(path, entry)
-            for name, column in entry.columns.items():
-                place: tuple[Key, ...] = (*path, "columns", name)
-                if name in qe:
-                    self.add(place, "the curve is defined twice", name)
-                if self.kept is not None:
-                    values = self._kept(place, self.kept.sensor, name)
-                else:
-                    values = self._column(place, curves, column, entry)
-                    values = None if values is None else values * entry.scale
-                if values is not None:
-                    qe[name] = values
-        if len(self.faults) > before:
-            return None
-        name = section.name or "sensor"
-        try:
-            return make_sensor(name, qe, ", ".join(entry.file for entry in section.files), section.clear)
-        except DataError as error:
-            for fault in error.faults:
-                path = ("sensor", "clear") if fault.key is None else self._qe_path(section, fault.key)
-                self.faults.append(self.document.fault(path, fault.problem, fault.value, fault.allowed, fault.nearest))
-            return None
-
-    def _qe_path(self, section: SensorSection, curve: str) -> tuple[Key, ...]:
-        index = next(i for i, entry in enumerate(section.files) if curve in entry.columns)
-        return ("sensor", "files", index, "columns", curve)
 
     def held_out(self, section: LightsSection, own: Lights) -> Lights | None:
         """Lights that the study does not optimize for, as bright as its own, or None after adding faults.
@@ -121,21 +86,21 @@ class Sources:
     def lights(self, section: LightsSection, at: tuple[Key, ...] = ("lights",)) -> Lights | None:
         """The lights of the section at a place of the study, or None after adding faults."""
         if section.builtin is not None:
-            return self._built_in(at, section.builtin, BUILT_IN_LIGHTS)
+            return self.built_in(at, section.builtin, BUILT_IN_LIGHTS)
         before = len(self.faults)
         used = [len(columns) for entry in section.files for columns in entry.signals.values()]
-        if not self._fits((*at, "files"), "lights", sum(used)):
+        if not self.fits((*at, "files"), "lights", sum(used)):
             return None
         by_type: dict[str, list[tuple[str, str, FloatArray]]] = {}
         for index, entry in enumerate(section.files):
             path = (*at, "files", index)
-            curves = self._curves(path, entry)
+            curves = self.curves(path, entry)
             for signal_type, columns in entry.signals.items():
                 for position, column in enumerate(columns):
                     place = (*path, "signals", signal_type, position)
                     label = f"{Path(entry.file).stem}:{column}"
                     if self.kept is not None:
-                        photons = self._kept(place, self.kept.lights, (signal_type, label))
+                        photons = self.kept_curve(place, self.kept.lights, (signal_type, label))
                     else:
                         photons = self._photons(place, curves, column, entry)
                     if photons is not None:
@@ -152,16 +117,17 @@ class Sources:
         source = ", ".join(entry.file for entry in section.files)
         return make_lights(self.grid, section.name or "lights", signals, source, photon_ratio=section.photon_ratio)
 
-    def _fits(self, path: tuple[Key, ...], what: str, count: int) -> bool:
+    def fits(self, path: tuple[Key, ...], what: str, count: int) -> bool:
         """Whether so many curves on the grid fit into memory; else adds a fault."""
         most = _MOST_VALUES // self.grid.size
         if count > most:
             self.add(path, f"too many {what} for a grid of {self.grid.size:,} wavelengths", count, f"at most {most:,}")
         return count <= most
 
-    def _built_in(
+    def built_in(
         self, at: tuple[Key, ...], name: str, known: Mapping[str, Callable[[WavelengthGrid], _Made]]
     ) -> _Made | None:
+        """A sensor or lights of the package on the grid, or None after adding faults."""
         if name not in known:
             self.add(
                 at,
@@ -186,7 +152,7 @@ class Sources:
         self, path: tuple[Key, ...], curves: Curves | None, column: str, entry: LightFile
     ) -> FloatArray | None:
         """A light's photon spectrum on the grid; says so when photons are cut off."""
-        values = self._column(path, curves, column, entry)
+        values = self.column(path, curves, column, entry)
         if values is None or curves is None:
             return None
         wave, raw = curves.wavelength_nm, curves.values[column]
@@ -204,9 +170,10 @@ class Sources:
             )
         return values
 
-    def _column(
+    def column(
         self, path: tuple[Key, ...], curves: Curves | None, column: str, entry: CurveFile | LightFile
     ) -> FloatArray | None:
+        """A column of a file on the grid, ndarray[n_wavelengths], or None after adding faults."""
         if curves is None:
             return None
         if column not in curves.values:
@@ -220,15 +187,21 @@ class Sources:
                 self.add(path, f"{entry.file}, column {column}: {fault.problem}", fault.value, fault.allowed)
             return None
 
-    def _kept(self, path: tuple[Key, ...], curves: Mapping[_Key, FloatArray], name: _Key) -> FloatArray | None:
+    def kept_curve(self, path: tuple[Key, ...], curves: Mapping[_Key, FloatArray], name: _Key) -> FloatArray | None:
+        """A curve that a finished run kept, or None after adding a fault."""
         if name not in curves:
             self.add(path, "the run kept no such curve", name)
         return curves.get(name)
 
-    def _curves(self, path: tuple[Key, ...], entry: CurveFile | LightFile) -> Curves | None:
+    def curves(self, path: tuple[Key, ...], entry: CurveFile | LightFile) -> Curves | None:
+        """All curves of a file, which is read once, or None after adding faults."""
         if self.kept is not None:
             return None
         if entry.file in self._read:
+            return self._read[entry.file]
+        if entry.file in self.given:
+            self._read[entry.file] = self.given[entry.file]
+            self.digests[entry.file] = _digest_of(self.given[entry.file])
             return self._read[entry.file]
         self._read[entry.file] = None
         found = next((folder / entry.file for folder in self.folders if is_file(folder / entry.file)), None)
@@ -238,7 +211,8 @@ class Sources:
             self.add((*path, "file"), "no such file", entry.file, f"a path relative to {searched}", near)
             return None
         try:
-            self._read[entry.file] = read_curves(found)
+            read = self._read[entry.file] = read_curves(found)
+            self.warnings += [f"{entry.file}: {note}" for note in read.notes]
             self.digests[entry.file] = digest(found)
         except DataError as error:
             self.faults.extend(error.faults)
@@ -254,6 +228,14 @@ class Sources:
     ) -> None:
         """Add a fault at `path` of the study file."""
         self.faults.append(self.document.fault(path, problem, value, allowed, near))
+
+
+def _digest_of(curves: Curves) -> str:
+    """SHA-256 of curves that have no file, hexadecimal."""
+    found = hashlib.sha256(curves.wavelength_nm.tobytes())
+    for name, values in curves.values.items():
+        found.update(name.encode() + values.tobytes())
+    return found.hexdigest()
 
 
 def _names(folders: Iterable[Path]) -> Iterator[str]:

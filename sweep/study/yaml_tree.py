@@ -6,7 +6,7 @@ The library's own loaders build everything first: a few hundred bytes of aliases
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from io import StringIO
 from typing import Any
@@ -65,7 +65,7 @@ class Tree:
     StudyError with file and line: not YAML, beyond the limits, a key twice, a tag, a second document.
     """
 
-    def __init__(self, text: str, file: str, most_values: int) -> None:
+    def __init__(self, text: str, file: str | None, most_values: int) -> None:
         self._file = file
         self._most = most_values
         self._count = 0
@@ -220,6 +220,19 @@ class Tree:
     def _refused(self, problem: str, line: int | None, value: object = None, allowed: str | None = None) -> StudyError:
         keys = [str(part.key) for part in self._open if part.key is not None]
         return StudyError(Fault(problem, self._file, line, ".".join(keys) or None, value, allowed))
+
+
+def yaml_text(data: Mapping[str, Any]) -> str:
+    """Keys with plain values as a YAML document; raises StudyError for a value that no study file can hold."""
+    text = StringIO()
+    yaml = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = False
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
+    try:
+        yaml.dump(data, text)
+    except YAMLError as error:
+        raise StudyError(Fault(f"not a value of a study: {' '.join(str(error).split())}")) from None
+    return text.getvalue()
 
 
 def _events(text: str) -> Iterator[Event]:

@@ -120,10 +120,10 @@ def test_distance_is_to_the_nearest_point_of_a_region() -> None:
     ("text", "words"),
     [
         ("wavelength_nm,R\n400,1\n410,nan\n420,-1\n430,-2\n", ["not a usable number", "negative value, and 1 more"]),
-        ("wavelength_nm,R\n410,1\n400,1\n400,1\n", ["not sorted", "occurs twice"]),
-        ("wavelength_um,R\n0.4,1\n0.7,1\n", ["wrong unit", "looks like um"]),
+        ("wavelength_nm,R\n420,1\n430,1\n400,1\n400,1\n", ["not sorted", "occurs twice"]),
+        ("wavelength_km,R\n0.4,1\n0.7,1\n", ["no column wavelength", "looks like um"]),
         ("wavelength_nm,R,G\n0.4,1,1\n0.7,1,1\n", ["R, G: wavelength unit: looks like um"]),
-        ("wavelength_nm;R\n400;0,5\n700;0,25\n", ["not separated by commas"]),
+        ("wavelength_nm;R\n400;0,5\n700;0.25\n", ["not a usable number (got '0,5')"]),
         ("wavelength_nm,R,R,\n400,1,1,x\n700,1,1,1\n", ["occurs twice", "no name", "not a usable number"]),
     ],
 )
@@ -135,7 +135,7 @@ def test_every_fault_is_one_line_and_the_rest_is_described(tmp_path: Path, text:
     assert all(word in line for word, line in zip(words, found, strict=True)), found
     lines = described(path, tmp_path / "out").lines
     assert lines[-1].startswith("Picture: ")
-    assert not any("clean" in line for line in lines)
+    assert not any("are clean" in line for line in lines)
 
 
 def test_micrometers_and_foreign_texts_are_read_as_meant(tmp_path: Path) -> None:
@@ -143,7 +143,7 @@ def test_micrometers_and_foreign_texts_are_read_as_meant(tmp_path: Path) -> None
     assert um.curves[0].peak_nm == pytest.approx(600)
     wide = csv(tmp_path, "wavelength_nm,R", WAVE, bell(600, 50), name="wide.csv", encoding="utf-16")
     assert facts_of(scan_curves(wide)).curves[0].peak_nm == 600
-    assert "UTF-8" in faults(wide)[0]
+    assert faults(wide) == []
     (tmp_path / "semi.csv").write_text("wavelength_nm;R\n400;0,5\n700;0,25\n")
     np.testing.assert_array_equal(scan_curves(tmp_path / "semi.csv").values[:, 0], [0.5, 0.25])
 
@@ -231,9 +231,8 @@ def test_what_other_programs_save_is_named(tmp_path: Path) -> None:
         scan_curves(tmp_path / "c.mat")
     (tmp_path / "d.csv").write_text('wavelength_nm,a\n400,"0,01"\n500,1\n')
     assert "a decimal comma? use a point" in faults(tmp_path / "d.csv")[0]
-    for encoding in ("utf-16", "utf-16-le"):
-        (tmp_path / "u.csv").write_text("wavelength_nm,a\n400,1\n500,1\n", encoding=encoding)
-        assert "UTF-16? save as UTF-8" in faults(tmp_path / "u.csv")[0]
+    (tmp_path / "u.csv").write_text("wavelength_nm,a\n400,1\n500,1\n", encoding="utf-16-le")  # without its mark
+    assert "UTF-16? save as UTF-8" in faults(tmp_path / "u.csv")[0]
 
 
 def test_a_schema_replaces_only_a_schema(tmp_path: Path) -> None:

@@ -38,12 +38,12 @@ def test_csv(tmp_path: Path) -> None:
         ("wavelength_nm,R\n400,0.1\n410,\n", ["FILE:3: R:", "not a usable number"]),
         ("wavelength_nm,R\n400,0.1\n410,-0.2\n", ["FILE:3: R:", "'-0.2'", ">= 0"]),
         ("wavelength_nm,R\n400,0.1\n410,x\n", ["FILE:3: R:", "'x'"]),
-        ("wavelength_nm,R\n410,0.1\n400,0.2\n", ["FILE:3: wavelength_nm:", "not sorted"]),
+        ("wavelength_nm,R\n400,0.1\n420,0.1\n410,0.2\n", ["FILE:4: wavelength_nm:", "not sorted"]),
         ("wavelength_nm,R\n400,0.1\n400,0.2\n", ["FILE:3: wavelength_nm:", "twice"]),
         ("wavelength_nm,R\n400,0.1\n410,0.2,0.3\n", ["FILE:3:", "columns", "got 3"]),
-        ("wavelength_um,R\n0.4,0.1\n0.41,0.2\n", ["FILE:1: wavelength_um:", "wrong unit", "wavelength_nm"]),
+        ("wavelength_km,R\n0.4,0.1\n0.41,0.2\n", ["FILE:1: wavelength_km:", "no column wavelength", "wavelength_nm"]),
         ("wavelength_nm,R\n0.4,0.1\n0.7,0.2\n", ["FILE: R:", "um"]),
-        ("lambda,R\n400,0.1\n", ["FILE:1:", "wavelength_nm"]),
+        ("frequency,R\n400,0.1\n", ["FILE:1:", "wavelength_nm"]),
         ("wavelength_nm,R,R\n400,0.1,0.2\n", ["FILE:1: R:", "column occurs twice"]),
         ("wavelength_nm\n400\n410\n", ["FILE:1:", "no curve"]),
         ("wavelength_nm,R\n400,1\n", ["two or more"]),
@@ -99,10 +99,10 @@ def test_damaged_files_are_faults(tmp_path: Path) -> None:
         path = tmp_path / "damaged.mat"
         path.write_bytes(content)
         assert len(faults(path)) == 1
-    (tmp_path / "latin.csv").write_bytes(b"wavelength_nm,\xe9\n")
-    assert "UTF-8" in faults(tmp_path / "latin.csv")[0]
+    (tmp_path / "latin.csv").write_bytes(b"wavelength_nm,\xe9\n400,1\n700,1\n")
+    assert read_curves(tmp_path / "latin.csv").notes == ("the text is not UTF-8, and was read as Latin-1",)
     assert "cannot be read" in faults(tmp_path / "absent.csv")[0]
-    assert ".csv, .mat" in faults(written(tmp_path, "x", "curves.txt"))[0]
+    assert ".csv, .tsv, .txt, .dat, .mat, .spdx, .json" in faults(written(tmp_path, "x", "curves.xls"))[0]
 
 
 def test_digest_is_sha256_of_the_bytes(tmp_path: Path) -> None:

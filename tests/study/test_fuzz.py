@@ -177,9 +177,15 @@ def cells(rng: np.random.Generator, content: bytes) -> bytes:
 
 def by_hand(content: bytes) -> tuple[list[str], np.ndarray]:
     """Names and numbers of a table as Python's csv and float read them."""
-    text = content.decode("utf-8-sig")
-    rows = [row for row in csv.reader(text.splitlines()) if any(map(str.strip, row)) and not row[0].startswith("#")]
-    return [name.strip() for name in rows[0]], np.array([[float(cell) for cell in row] for row in rows[1:]])
+    text = content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+    head = next(line for line in text.splitlines() if line.strip() and not line.startswith("#"))
+    mark = next(mark for mark in "\t;," if mark in head)
+    lines = [line for line in text[text.index(head) :].splitlines() if line.strip() and not line.startswith("#")]
+    rows = [row for row in csv.reader(lines, delimiter=mark) if any(map(str.strip, row))]
+    if {row[-1].strip() for row in rows[1:]} == {""}:  # a last column that is empty
+        rows = [row[:-1] if len(row) == len(rows[1]) else row for row in rows]
+    numbers = np.array([[float(cell.replace(",", ".")) for cell in row] for row in rows[1:]])
+    return [name.strip() for name in rows[0]], numbers if numbers[0, 0] < numbers[-1, 0] else numbers[::-1]
 
 
 def curves_tried(path: Path, content: bytes, folder: Path | None) -> bool:

@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-import math
 import os
 import shlex
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
-from itertools import chain
 from pathlib import Path
 
-import numpy as np
-
-from ...curves.facts import Curve, Facts, condensed, facts_of, qe_scale
-from ...curves.files import scan_curves
 from ...curves.light_unit import LightUnit
-from ...curves.spectrum import WavelengthGrid
+from ...door.channels import Layout, layout_of
+from ...door.files import lights_file, sensor_file
 from ...errors import DataError, Fault, OutputError, StudyError, SweepError
 from ...results.tables import atomic, write_text
 from ...study import Study, folder_name, load_study
 from ...study.editors import SCHEMA_FILE, schema_text
-from .channels import Layout, channels_of, layout_of
 from .template import TYPICAL_NM, LightsText, SensorText, one_line, study_text
 
-_USUAL = WavelengthGrid()
-_NEEDED_NM = (450.0, 680.0)
-"""What the sensor's curves must cover, so that every signal color is seen."""
 _MOST_LETTERS = 100
 _BUILT_IN_CFAS = ("RGGB", "RCCC", "RCCB", "RYYCy")
 
@@ -86,14 +77,6 @@ def _checked(name: str) -> str:
     raise StudyError(Fault("not the name of a study", None, None, "NAME", name, allowed, better or None))
 
 
-def _curves(path: Path) -> dict[str, Curve]:
-    """Clean curves by the names that the file has; raises DataError with all of its faults."""
-    scan = scan_curves(path)
-    if scan.faults:
-        raise DataError(condensed(list(chain.from_iterable(scan.faults))))
-    return dict(zip(scan.names, facts_of(scan).curves, strict=True))
-
-
 def _relative(file: Path, folder: Path) -> str:
     """A file's path as seen from the folder of the study."""
     try:
@@ -103,24 +86,14 @@ def _relative(file: Path, folder: Path) -> str:
 
 
 def _sensor(path: Path, folder: Path) -> SensorText:
-    curves = _curves(path)
-    channels = channels_of(curves)
-    if not channels.columns:
-        raise DataError(Fault("no curve that could be QE", str(path), allowed="values above 0 between 400 and 700 nm"))
-    wave = next(iter(curves.values())).wavelength_nm
-    if wave[0] > _NEEDED_NM[0] or wave[-1] < _NEEDED_NM[1]:
-        allowed = f"{_NEEDED_NM[0]:g} to {_NEEDED_NM[1]:g} nm or more"
-        raise DataError(
-            Fault("QE of too few wavelengths", str(path), None, None, f"{wave[0]:g} to {wave[-1]:g} nm", allowed)
-        )
-    totals = {channel: float(curves[column].values.sum()) for channel, column in channels.columns.items()}
+    taken = sensor_file(path)
     return SensorText(
-        layout=layout_of(totals),
+        layout=layout_of(taken.totals),
         file=_relative(path, folder),
-        name=path.stem[:_MOST_LETTERS],
-        channels=channels,
-        scale=qe_scale(max(curves[column].peak for column in channels.columns.values())),
-        range_nm=(max(400, math.ceil(wave[0])), min(700, math.floor(wave[-1]))),
+        name=taken.name,
+        channels=taken.channels,
+        scale=taken.scale,
+        range_nm=taken.range_nm,
     )
 
 
@@ -129,30 +102,15 @@ def _built_in_lights() -> LightsText:
 
 
 def _lights(path: Path, folder: Path, quantity: LightUnit, start_nm: float, stop_nm: float) -> LightsText:
-    curves = _curves(path)
-    colors = dict(zip(curves, Facts(tuple(curves.values()), "").colors(quantity).values(), strict=True))
-    signals = {name: None if color is None else color.signal for name, color in colors.items()}
-    types = {kind: {name: colors[name] for name in curves if signals[name] == kind} for kind in TYPICAL_NM}
-    used = {kind: columns for kind, columns in types.items() if columns}
-    left_out = {}
-    for name, color in colors.items():
-        if color is None:
-            left_out[name] = "no visible light"
-        elif signals[name] is None:
-            left_out[name] = f"xy {color.xy[0]:.3f} {color.xy[1]:.3f} is near no signal color"
-    if len(used) < 2:
-        found = "; ".join(f"{kind}: {', '.join(columns)}" for kind, columns in used.items()) or "none"
-        problem = f"lights of one signal color or none (`sweep describe {path}` shows where they lie)"
-        raise DataError(Fault(problem, str(path), None, None, found, "two of green, yellow, orange, red, or more"))
-    wave = next(iter(curves.values())).wavelength_nm
+    taken = lights_file(path, quantity, start_nm, stop_nm)
     return LightsText(
-        types=used,
+        types=taken.types,
         file=_relative(path, folder),
-        name=path.stem[:_MOST_LETTERS],
+        name=taken.name,
         quantity=quantity,
-        left_out=left_out,
-        ends_early=bool(wave[0] > start_nm or wave[-1] < stop_nm),
-        fine=bool(np.diff(wave).min() < _USUAL.step_nm),
+        left_out=taken.left_out,
+        ends_early=taken.ends_early,
+        fine=taken.fine,
     )
 
 

@@ -15,16 +15,24 @@ PANEL = OF_CURVES
 
 
 def describe(
-    file: Annotated[Path, typer.Argument(help="A file of curves, .csv or .mat.", show_default=False)],
+    file: Annotated[Path, typer.Argument(help="A file of curves.", show_default=False)],
     output: Annotated[Path, typer.Option(help="Folder for the picture.")] = Path("outputs/describe"),
     quantity: Annotated[
         LightUnit | None,
         typer.Option(help="Of light spectra; without it, lights or QE is guessed.", show_default=False),
     ] = None,
+    clean: Annotated[
+        Path | None,
+        typer.Option(help="Write clean CSV here; it says what was changed.", show_default=False),
+    ] = None,
 ) -> None:
     """Plot and check a file of curves: what it holds, what is wrong with it, which colors its lights have."""
-    from ..describe import described
+    from ..describe import cleaned, described
 
+    if clean is not None:
+        for line in cleaned(file, clean):
+            typer.echo(line)
+        return
     found = described(file, output, quantity)
     for line in found.lines:
         typer.echo(line)

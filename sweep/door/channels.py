@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...curves.facts import Curve
-from ...curves.isetcam import HINTS
+from ..curves.facts import Curve
+from ..curves.isetcam import HINTS
 
 _WORDS = {
     "red": "R",

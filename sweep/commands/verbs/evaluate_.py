@@ -1,0 +1,61 @@
+"""Judge a filter of one's own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ...curves.light_unit import LightUnit
+from ..panels import OF_CURVES
+
+PANEL = OF_CURVES
+
+
+def evaluate_(
+    source: Annotated[
+        Path, typer.Argument(help="A file with the filter's curve, or a run's folder.", show_default=False)
+    ],
+    channel: Annotated[
+        str | None, typer.Option(help="Channel of the filter.", show_default="the one without a curve")
+    ] = None,
+    cfa: Annotated[
+        str | None, typer.Option(help="CFA by its name.", show_default="RYNCy, or what the sensor allows")
+    ] = None,
+    base: Annotated[
+        str | None, typer.Option(help="Curve that it replaces.", show_default="that diagonal to it")
+    ] = None,
+    column: Annotated[
+        str | None, typer.Option(help="Column of the file.", show_default="the only one, or CHANNEL")
+    ] = None,
+    sensor: Annotated[str, typer.Option(help="A built-in sensor, or a file of QE curves.")] = "ar0820",
+    lights: Annotated[
+        str | None, typer.Option(help="tl16, or a file of spectra.", show_default="tl16, or the run's")
+    ] = None,
+    quantity: Annotated[LightUnit, typer.Option(help="What the numbers of the lights are.")] = "energy",
+    transmission: Annotated[
+        bool, typer.Option("--transmission", help="The values are a transmission in front of the clear pixel.")
+    ] = False,
+    relative_to: Annotated[
+        str | None, typer.Option(help="The values are a transmission times this curve.", show_default=False)
+    ] = None,
+    design: Annotated[str | None, typer.Option(help="Of a run: design_id, name or best.", show_default="best")] = None,
+) -> None:
+    """Judge a filter of your own, or of a run: its CSDs and its light beside RGGB's, and its gap to the limit."""
+    from ...door.asked import verdict_on
+
+    found = verdict_on(
+        source,
+        design=design,
+        channel=channel,
+        cfa=cfa,
+        base=base,
+        column=column,
+        sensor=sensor,
+        lights=lights,
+        quantity=quantity,
+        transmission=transmission,
+        relative_to=relative_to,
+    )
+    typer.echo(str(found))

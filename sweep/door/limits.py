@@ -1,0 +1,40 @@
+"""The limit of any filter for a channel of a study, also where the study does not search."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+
+from ..designs.families.stopband import Stopband
+from ..designs.family import Family
+from ..metrics.bound import Bound
+from ..search.limit import Limit, limit_of, why_not
+from ..search.problem import Problem
+from ..study import Study
+
+
+def any_filter(study: Study, cfa: str, scenario: str, bases: Mapping[str, str]) -> Problem:
+    """The problem of the best filter between nothing and the curve that it replaces, under the study's constraints."""
+    view = study.view_of(cfa, scenario, bases)
+    base = study.sensor.curve(next(iter(bases.values())))
+    # The limit asks a family only for how large and how small its filters can be.
+    family = cast(Family, Stopband(study.grid.nodes_nm, base, np.zeros_like(base)))
+    low, high = (np.array([getattr(p, end) for p in family.parameters], dtype=float) for end in ("low", "high"))
+    return Problem(view, family, low, high, study.objective, study.constraints, study.edge_shift_nm)
+
+
+def at_least(problem: Problem, quantity: str, value: float) -> Problem:
+    """The problem with a further lower end of a quantity."""
+    old = problem.constraints.get(quantity)
+    lower = value if old is None or old.min is None else max(value, old.min)
+    bound = Bound(min=lower, max=None if old is None else old.max)
+    return replace(problem, constraints={**problem.constraints, quantity: bound})
+
+
+def limit_or_reason(problem: Problem) -> tuple[Limit | None, str]:
+    """The limit, or why there is none."""
+    reason = why_not(problem)
+    return (limit_of(problem), "") if reason is None else (None, reason)

@@ -1,0 +1,111 @@
+"""Filters that no family makes, judged as a study judges its own: the same image chain, quantities and constraints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from pandas.arrays import BooleanArray
+
+from ..camera.imager import imager_of
+from ..camera.view import View
+from ..errors import DataError, Fault, nearest
+from ..metrics.bound import FEASIBLE, total_violation
+from ..metrics.evaluate import evaluate, family_quantities
+from ..metrics.objective import COMBINED
+from ..metrics.quantity import Column, Columns
+from ..study import Study
+from ..types import FloatArray
+
+_MOST_QE = 1 + 1e-9
+
+
+def with_units(table: pd.DataFrame, columns: Mapping[str, Column]) -> pd.DataFrame:
+    """The table with `units` and `meanings` of its quantities in its attributes."""
+    own = {name: column for name, column in columns.items() if name in table}
+    table.attrs["units"] = {name: column.unit for name, column in own.items()}
+    table.attrs["meanings"] = {name: column.meaning for name, column in own.items()}
+    return table
+
+
+def bases_of(study: Study, cfa: str, channels: Sequence[str], base: str | None) -> dict[str, str]:
+    """Modified channel -> the curve that it replaces: `base`, what the study says of the channel, or its own curve.
+
+    Raises DataError where nothing says it.
+    """
+    said = {
+        channel: space.filter.base
+        for space in study.spaces
+        if space.filter is not None and space.cfa == cfa
+        for channel in space.filter.channels
+    }
+    named = dict(study.section.cfas[cfa].curves)
+    found = {}
+    for channel in channels:
+        own = named.get(channel, study.sensor.curve_name(cfa, channel))
+        curve = base or said.get(channel) or (own if own in study.sensor.qe else None)
+        if curve is None:
+            known = ", ".join(study.sensor.qe)
+            raise DataError(Fault(f"which curve does {channel} of {cfa} replace?", key="base", allowed=known))
+        study.sensor.curve(curve)  # raises for a name that is none
+        found[channel] = curve
+    return found
+
+
+def cfa_with(study: Study, channels: Sequence[str]) -> str:
+    """The CFA that has these channels: the one that the study modifies in them, or the only one.
+
+    Raises DataError where there is none, or more than one.
+    """
+    own = [name for name, mosaic in study.mosaics.items() if set(channels) <= set(mosaic.channels)]
+    modified = {s.cfa for s in study.spaces if s.filter is not None and set(s.filter.channels) == set(channels)}
+    wanted = " and ".join(channels)
+    if not own:
+        known = list(dict.fromkeys(channel for mosaic in study.mosaics.values() for channel in mosaic.channels))
+        near = nearest(channels[0], known)
+        raise DataError(
+            Fault(f"no CFA of the study has a channel {wanted}", None, None, None, None, ", ".join(known), near)
+        )
+    chosen = [name for name in own if name in modified] or own
+    if len(chosen) > 1:
+        raise DataError(Fault(f"several CFAs have a channel {wanted}", key="cfa", allowed=", ".join(chosen)))
+    return chosen[0]
+
+
+def judged(study: Study, view: View, curves: FloatArray) -> Columns:
+    """Every quantity of filters in the modified channels of a view, and `violation` of the study's constraints.
+
+    `curves`: QE, ndarray[n_designs, n_modified, n_wavelengths]. What only a family's parameters say (edges, bands,
+    their shifts in production) is NaN. Raises DataError for a QE above 1.
+    """
+    if not curves.max(initial=0.0) <= _MOST_QE:
+        allowed = "0 to 1; a transmission is relative to a curve (`relative_to`), percent are divided by 100"
+        raise DataError(Fault("a QE above 1", value=round(float(curves.max()), 6), allowed=allowed))
+    found = evaluate(imager_of(view), curves, study.states)
+    found |= family_quantities(None, np.empty((len(curves), 0)))
+    lacking = np.full(len(curves), np.nan)
+    columns = {name: found.get(name, lacking) for name in study.quantities if name != COMBINED}
+    if COMBINED in study.quantities:
+        columns[COMBINED] = study.objective.of(columns)
+    own = np.zeros(len(curves))
+    return columns | {"violation": total_violation(columns, study.constraints, own)}
+
+
+def verdict(study: Study, columns: Columns) -> BooleanArray:
+    """Whether filters of one's own are feasible: unknown where a constraint is on what only a family's have."""
+    met = columns["violation"] <= FEASIBLE
+    unknown = np.zeros_like(met)
+    for name in study.constraints:
+        unknown |= np.isnan(columns[name])
+    return BooleanArray(met, met & unknown)
+
+
+def table_of(study: Study, rows: Sequence[tuple[str, str, str, Columns, BooleanArray]]) -> pd.DataFrame:
+    """A table with a row per design: (name, CFA, scenario, columns, feasible) of each block of designs."""
+    parts = []
+    for name, cfa, scenario, columns, feasible in rows:
+        labels: dict[str, Any] = {"name": name, "cfa": cfa, "scenario": scenario}
+        parts.append(pd.DataFrame(labels | columns | {"feasible": feasible}))
+    return with_units(pd.concat(parts, ignore_index=True), study.quantities)

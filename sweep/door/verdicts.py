@@ -1,0 +1,193 @@
+"""One filter judged beside RGGB, the CFA that it changes, and what any filter in its place could reach."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ..camera.mosaic import Mosaic
+from ..curves.lights import Pair, class_pairs
+from ..errors import DataError, Fault
+from ..metrics.columns.sensitivity import CFA_SENSITIVITY
+from ..metrics.quantity import Column
+from ..metrics.separation import csd_name
+from ..metrics.smooth import smooth_csd
+from ..study import Study
+from ..types import FloatArray
+from .limits import any_filter, at_least, limit_or_reason
+from .opening import Given, made_study
+from .own_filters import judged, table_of, verdict
+
+OWN = "own "
+"""How the names of the curves that are judged begin."""
+PLAIN_TILE = "RGGB"
+_FIRST = ("yellow", "red")
+_SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What is to be judged: a filter for channels of a CFA, whose curves the sensor has as `own <channel>`.
+
+    `bases`: channel -> the curve that it replaces; `types`: signal types of the lights; `named`: other channels of the
+    CFA whose curve has another name; `keys`: further keys of the study that judges; `notes`: how files were taken.
+    """
+
+    mosaic: Mosaic
+    bases: Mapping[str, str]
+    sensor: Given
+    lights: Given
+    types: tuple[str, ...]
+    named: Mapping[str, str] = field(default_factory=dict)
+    keys: Mapping[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    @property
+    def pair(self) -> Pair:
+        """The signal types that the limit is of: yellow and red where there are both."""
+        pairs = class_pairs(self.types)
+        return _FIRST if _FIRST in pairs else pairs[0]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """`table`: a row per scene and CFA, the filter's own last; `goal`: the separation that the limit is of.
+
+    `limit`: what no filter in its place with as much light exceeds in the first scene, before quantization, between 0
+    and the curve `below`; None where `no_limit` says why. `smooth`: what the filter has before quantization.
+    """
+
+    table: pd.DataFrame
+    goal: Column
+    own: str
+    smooth: float | None
+    limit: float | None
+    below: str
+    no_limit: str
+    notes: tuple[str, ...]
+    others: tuple[Column, ...] = ()
+
+    @property
+    def gap(self) -> float | None:
+        """How far the filter is below the limit, relative."""
+        if self.limit is None or self.smooth is None or not self.limit > 0:
+            return None
+        return max(0.0, 1 - self.smooth / self.limit)
+
+    def __str__(self) -> str:
+        """What a person reads of it."""
+        return "\n".join([*(f"{note}." for note in self.notes), *self._lines()])
+
+    def _lines(self) -> Iterator[str]:
+        scenes = list(dict.fromkeys(self.table["scenario"]))
+        for scene in scenes:
+            rows = self.table[self.table["scenario"] == scene]
+            yield from _aligned(rows, (self.goal, *self.others), scene if len(scenes) > 1 else "CFA")
+        if self.limit is None or self.smooth is None:
+            yield f"No limit is computed: {self.no_limit}."
+            return
+        gap = "" if self.gap is None else f", {100 * self.gap:.1f} % below"
+        bound, has = self.goal.told_bound(self.limit), self.goal.amount(self.smooth, 1)
+        yield (
+            f"{self.goal.words[:1].upper()}{self.goal.words[1:]} before quantization: no filter between 0 and "
+            f"{self.below} with as much light exceeds {bound} (proven); this one has {has}{gap}."
+        )
+
+
+def _aligned(rows: pd.DataFrame, columns: Sequence[Column], corner: str) -> Iterator[str]:
+    """A line per CFA: its separations, and the light of the whole tile (1: a sensor without filters)."""
+    head = [corner, *("/".join(column.pair or ()) for column in columns), "light"]
+    cells = [
+        [row["cfa"], *(column.amount(row[column.name], 1) for column in columns), f"{row[CFA_SENSITIVITY]:.3f}"]
+        for row in rows.to_dict("records")
+    ]
+    wide = [max(map(len, column)) for column in zip(head, *cells, strict=True)]
+    for line in (head, *cells):
+        yield "  ".join(
+            f"{cell:<{w}}" if i == 0 else f"{cell:>{w}}" for i, (cell, w) in enumerate(zip(line, wide, strict=True))
+        )
+
+
+def with_base(mosaic: Mosaic, bases: Mapping[str, str]) -> Mosaic:
+    """The CFA that a filter changes: its channels are those of the curves that it replaces."""
+    channels = [bases.get(channel, channel) for channel in mosaic.channels]
+    rows = [[channels[at] for at in row] for row in mosaic.tile]
+    return Mosaic.from_rows("".join(name for row in rows for name in row), rows)
+
+
+def judge(asked: Judged) -> Verdict:
+    """Judge a filter in every scene, by everything that the scenes call for.
+
+    Raises SweepError for curves and names that do not fit together.
+    """
+    base = with_base(asked.mosaic, asked.bases)
+    own = asked.mosaic.name if asked.mosaic.name != base.name else OWN + base.name
+    known = {*"RGB"} if "builtin" in asked.sensor.keys else set()
+    known |= {name for entry in asked.sensor.keys["files"] for name in entry["columns"]}
+    cfas: dict[str, Any] = {PLAIN_TILE: {}} if known >= {*"RGB"} else {}
+    others = {channel: name for channel, name in asked.named.items() if channel not in asked.bases}
+    cfas[base.name] = {"tile": _rows(base), "curves": others}
+    cfas[own] = {"tile": _rows(asked.mosaic), "curves": others | {c: OWN + c for c in asked.bases}}
+    keys = {"objective": csd_name(asked.pair), **asked.keys}
+    study = made_study("evaluate", sensor=asked.sensor, lights=asked.lights, cfas=cfas, **keys).study
+    curves = np.stack([study.sensor.curve(OWN + channel) for channel in asked.bases])[None]
+    nothing = np.empty((1, 0, study.grid.size))
+    rows = []
+    found = {}
+    for scene in study.scenarios:
+        for cfa in study.mosaics:
+            bases, made = (asked.bases, curves) if cfa == own else ({}, nothing)
+            columns = found[scene] = judged(study, study.view_of(cfa, scene, bases), made)
+            rows.append((cfa, cfa, scene, columns, verdict(study, columns)))
+    table = table_of(study, rows)
+    light = float(next(iter(found.values()))[CFA_SENSITIVITY][0])
+    smooth, limit, below, reason = _limit(study, own, asked, curves, light)
+    every = [study.quantities[csd_name(pair)].column for pair in study.pairs]
+    goal = next(column for column in every if column.pair == asked.pair)
+    further = tuple(column for column in every if column is not goal)
+    return Verdict(table, goal, own, smooth, limit, below, reason, (*asked.notes, *study.warnings), further)
+
+
+def _rows(mosaic: Mosaic) -> list[list[str]]:
+    return [[mosaic.channels[at] for at in row] for row in mosaic.tile]
+
+
+def _limit(
+    study: Study, own: str, asked: Judged, curves: FloatArray, light: float
+) -> tuple[float | None, float | None, str, str]:
+    """The filter before quantization, the limit, the curve below which it holds, and why there is none.
+
+    Of filters below the curve that this one replaces; where this one is not, of those below the clear pixel.
+    """
+    scenario, bases = next(iter(study.scenarios)), asked.bases
+    if len(bases) > 1:
+        return None, None, "", "more than one modified channel"
+    ((channel, base),) = bases.items()
+    for below in dict.fromkeys((base, study.sensor.clear)):
+        ceiling = study.sensor.curve(below)
+        if (curves[0, 0] <= ceiling * (1 + _SAME)).all():
+            problem = at_least(any_filter(study, own, scenario, {channel: below}), CFA_SENSITIVITY, light)
+            found, reason = limit_or_reason(problem)
+            if found is None:
+                return None, None, below, reason
+            return float(smooth_csd(problem.view, curves, asked.pair)[0]), found.proven, below, ""
+    over = study.grid.nodes_nm[np.argmax(curves[0, 0] - study.sensor.curve(study.sensor.clear))]
+    return None, None, "", f"at {over:g} nm the filter lets more through than {base} and {study.sensor.clear}"
+
+
+def opposite(mosaic: Mosaic, channel: str, known: Mapping[str, FloatArray]) -> str:
+    """The curve that a channel of a 2x2 tile replaces: that of the pixel diagonal to it, as both Y of RYYCy.
+
+    Raises DataError where that has no curve.
+    """
+    rows = _rows(mosaic)
+    at = [(r, c) for r, row in enumerate(rows) for c, name in enumerate(row) if name == channel]
+    if len(rows) == len(rows[0]) == 2 and len(at) == 1:
+        other = rows[1 - at[0][0]][1 - at[0][1]]
+        if other in known:
+            return other
+    raise DataError(Fault(f"which curve does {channel} replace?", None, None, "--base", allowed=", ".join(known)))

@@ -1,0 +1,52 @@
+"""A design of a finished run, by what people call it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from ..errors import Fault, OutputError, SweepError, nearest
+from .output import Output
+from .tables import RESULTS, batches
+
+BEST = "best"
+_MOST_SHOWN = 10
+
+
+def find_row(output: Output, key: str) -> Mapping[Any, Any]:
+    """The row of a name, of a design_id or of `best`; of a name that occurs in several scenarios the first.
+
+    Raises SweepError, with the nearest name, when there is none or when its design failed.
+    """
+    table = output.table
+    named = table[table["name"] == key]
+    if key == BEST:
+        if output.best.empty:
+            raise SweepError(Fault("the run has no feasible design that was swept or searched", str(output.folder)))
+        row: dict[Any, Any] = output.best.iloc[0].to_dict()
+    elif len(named):
+        row = named.iloc[0].to_dict()
+    elif key.isascii() and key.isdecimal() and int(key) < output.counts.rows:
+        row = _streamed(output.folder / RESULTS, int(key))
+    else:
+        names = list(dict.fromkeys(map(str, table["name"].dropna())))
+        shown = [*names[:_MOST_SHOWN], *(["..."] if len(names) > _MOST_SHOWN else [])]
+        allowed = f"{BEST}, a name ({', '.join(shown)}), or a design_id from 0 to {output.counts.rows - 1:,}"
+        near = nearest(key, [*names, BEST])
+        raise SweepError(Fault("no such design", str(output.folder), None, "--design", key, allowed, near))
+    if row["status"] != "ok":
+        raise SweepError(Fault("the design failed", str(output.folder), None, "--design", row["status"]))
+    return row
+
+
+def _streamed(path: Path, design_id: int) -> dict[str, Any]:
+    """A row by its id, a row group in memory."""
+    for table in batches(path):
+        found = table.filter(pc.equal(table["design_id"], pa.scalar(design_id)))
+        if found.num_rows:
+            return dict(found.to_pylist()[0])
+    raise OutputError(Fault("has too few rows", str(path), None, "design_id", design_id))

@@ -1,0 +1,136 @@
+"""`sweep evaluate`: one filter beside RGGB, the CFA that it changes, and the limit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import sweep
+
+from ..build import study_file
+from ..commanded import commanded
+from ..curve_texts import WAVE, bell, csv
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Path:
+    """A transmission in percent, 300 to 800 nm."""
+    nm = np.arange(300.0, 801)
+    return csv(tmp_path, "wavelength_nm,T", nm, np.where(abs(nm - 630) < 15, 20.0, 95.0), name="filter.csv")
+
+
+def rows(said: str) -> dict[str, list[str]]:
+    """Cells of the table that the command prints, by CFA."""
+    lines = [line.replace(" DN", "").split() for line in said.splitlines() if line.count(" DN  ") > 1]
+    return {cells[0]: cells[1:] for cells in lines}
+
+
+def test_a_file_is_judged_as_a_study_judges_it(own: Path) -> None:
+    code, said, _ = commanded("evaluate", own, "--relative-to", "Y")
+    assert code == 0
+    study = sweep.load_study("stopband")
+    curve = sweep.read_curves(own)["T"] / 100
+    table = study.evaluate(N=curve, relative_to="Y")
+    found = rows(said)
+    assert list(found) == ["RGGB", "RYYCy", "RYNCy"]
+    plain = study.evaluate().set_index("name")
+    for cfa, expected in (("RYNCy", table.iloc[0]), ("RGGB", plain.loc["RGGB"]), ("RYYCy", plain.loc["RYYCy"])):
+        assert float(found[cfa][0]) == pytest.approx(expected["csd_yellow_red"], abs=0.05)
+        assert float(found[cfa][-1]) == pytest.approx(expected["cfa_sensitivity"], abs=5e-4)
+    assert "T read as a transmission, times Y; values in percent; it is N of RYNCy, in place of Y" in said
+
+
+def test_the_limit_is_of_filters_with_as_much_light(own: Path) -> None:
+    """A filter that attains it has no gap; one that is darker than the limit's other end has one."""
+    study = sweep.make_study(
+        cfas=["RYYCy", "RYNCy"],
+        boxes={"any": {"cfa": "RYNCy", "channel": "N", "base": "Y", "to": 0.0}},
+        constraints={"sensitivity": {"min": 0.9}},
+    )
+    limit = study.limit()
+    assert limit.curve is not None
+    best = pd.DataFrame({"N": limit.curve}, index=pd.Index(study.wavelength_nm, name="wavelength_nm"))
+    best.to_csv(own.with_name("best.csv"))
+    found = sweep.evaluate(own.with_name("best.csv"))
+    assert found.gap is not None
+    assert found.gap < 1e-4
+    assert found.limit == pytest.approx(limit.proven, abs=0.01)
+    mine = sweep.evaluate(own, relative_to="Y")
+    assert mine.limit is not None
+    assert mine.smooth is not None
+    assert mine.gap == pytest.approx(1 - mine.smooth / mine.limit)
+    assert 0.01 < mine.gap < 1
+
+
+def test_own_sensor_and_lights(tmp_path: Path, own: Path) -> None:
+    qe = csv(
+        tmp_path,
+        "wavelength_nm,R,G,B,W",
+        WAVE,
+        *(bell(c, 40) * 0.5 for c in (620, 540, 460)),
+        bell(560, 150) * 0.8,
+        name="qe.csv",
+    )
+    leds = csv(tmp_path, "wavelength_nm,a,b,c", WAVE, *(bell(c, 12) for c in (505, 592, 636)), name="leds.csv")
+    asked = ("evaluate", own, "--transmission", "--sensor", qe, "--lights", leds)
+    code, said, err = commanded(*asked)
+    assert (code, err) == (0, "")
+    assert "times W; values in percent; it is N of RGBN, in place of W" in said
+    assert list(rows(said)) == ["RGGB", "RGBW", "RGBN"]
+    assert "No limit is computed: the modified channel could set the exposure" in said
+
+
+def test_what_exceeds_the_curve_is_measured_against_the_clear_pixel_or_has_no_limit(own: Path) -> None:
+    said = commanded("evaluate", own)[1]
+    assert "No limit is computed: at" in said
+    assert "lets more through than Y and C" in said
+
+
+@pytest.mark.usefixtures("plain_pictures")
+def test_a_design_of_a_run_has_its_own_numbers_again_and_others_under_other_lights(tmp_path: Path) -> None:
+    run = sweep.load_study(study_file(tmp_path)).run(tmp_path, jobs=1)
+    best, mine = run.best, run.table[run.table["name"] == "mine"].iloc[0]
+    for design, row in ((None, best), ("mine", mine)):
+        found = sweep.evaluate(run.folder, design=design)
+        own = found.table.iloc[-1]
+        for name in ("csd_yellow_red", "csd_green_red", "sensitivity", "cfa_sensitivity"):
+            assert own[name] == pytest.approx(row[name], rel=1e-9)
+    leds = csv(tmp_path, "wavelength_nm,a,b", WAVE, bell(592, 12), bell(636, 12), name="leds.csv")
+    other = sweep.evaluate(run.folder, lights=str(leds))
+    assert other.goal.name == "csd_yellow_red"
+    assert other.table.iloc[-1]["csd_yellow_red"] > best["csd_yellow_red"]  # two lights are farther apart than many
+    assert other.table.iloc[-1]["cfa_sensitivity"] == pytest.approx(best["cfa_sensitivity"], rel=1e-9)
+    assert commanded("evaluate", run.folder, "--design", "RGGB")[::2] == (
+        2,
+        f"sweep: {run.folder}: --design: a plain CFA has no filter to judge (got 'RGGB')\n",
+    )
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        (["nowhere.csv"], "nowhere.csv: cannot be read"),
+        (["filter.csv", "--channel", "Q"], "--channel: no such channel of RYNCy (got 'Q'); allowed: R, Y, N, Cy"),
+        (["filter.csv", "--cfa", "RYQ"], "not the name of a 2x2 CFA"),
+        (["filter.csv", "--cfa", "RQNCy"], "which channel of RQNCy is the filter?"),
+        (["filter.csv", "--base", "Yy"], "did you mean 'Y'?"),
+        (["filter.csv", "--column", "t"], "--column: no such column (got 't'); allowed: T; did you mean 'T'?"),
+        (["filter.csv", "--relative-to", "Z"], "unknown curve (got 'Z')"),
+        (["filter.csv", "--sensor", "ar0802"], "did you mean 'ar0820'?"),
+        (["filter.csv", "--lights", "t16"], "did you mean 'tl16'?"),
+        (["filter.csv", "--design", "best"], "a design is one of a run's folder"),
+        (["above.csv"], "values above 1"),
+        (["short.csv"], "the curve is truncated"),
+    ],
+)
+def test_faults_are_lines(own: Path, monkeypatch: pytest.MonkeyPatch, asked: list[str], said: str) -> None:
+    monkeypatch.chdir(own.parent)
+    csv(own.parent, "wavelength_nm,T", WAVE, np.full(WAVE.size, 1.5), name="above.csv")
+    csv(own.parent, "wavelength_nm,T", WAVE[5:], np.full(WAVE.size - 5, 0.5), name="short.csv")
+    code, out, err = commanded("evaluate", *asked)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert len(err.splitlines()) == 1

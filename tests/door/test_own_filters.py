@@ -1,0 +1,114 @@
+"""Filters of one's own through the door, beside what a run and an independent sum say of them."""
+
+from __future__ import annotations
+
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import sweep
+from sweep.errors import SweepError
+
+from ..build import study_file
+
+
+@pytest.fixture(scope="module")
+def tiny(tmp_path_factory: pytest.TempPathFactory) -> sweep.LoadedStudy:
+    return sweep.load_study(study_file(tmp_path_factory.mktemp("door")))
+
+
+def test_a_filter_gets_the_very_numbers_of_the_same_named_design(tiny: sweep.LoadedStudy) -> None:
+    named = tiny.evaluate()
+    mine = named[(named.name == "mine")].reset_index(drop=True)
+    family = sweep.Stopband(tiny.wavelength_nm, tiny.curve("Y").to_numpy(), tiny.curve("G").to_numpy())
+    curve = family.curves(np.array([[606.0, 36, 646, 7, 1]]))[0, 0]
+    found = tiny.evaluate(N=pd.Series(curve, index=tiny.wavelength_nm))
+    same = [name for name in tiny.quantities if name not in ("edge_width_nm", "band_width_nm")]
+    assert found.scenario.tolist() == ["chart", "dim"]
+    pd.testing.assert_frame_equal(found[same], mine[same], rtol=1e-12)
+
+
+def test_csd_is_the_smallest_distance_of_rounded_digital_numbers() -> None:
+    """By the equations of the white patch, in plain sums: level x full scale x K x light of a channel over the largest."""
+    study = sweep.make_study(
+        cfas=["RYYCy", "RYNCy"], boxes={"any": {"cfa": "RYNCy", "channel": "N", "base": "Y", "to": "G"}}
+    )
+    curve = study.curve("Y") * np.where(study.wavelength_nm > 615, 0.5, 1.0)
+    lights = study.lights
+    qe = np.stack([study.curve(name) for name in "RY"] + [curve, study.curve("Cy")])
+    most = qe[[0, 1, 3]].sum(axis=1).max()  # N is not brighter than Y
+    dn = np.round(0.95 * 4095 * study.study.lights.photon_ratio * 301 * (lights.to_numpy().T @ qe.T) / most)
+    kinds = lights.columns.get_level_values("type")
+    pairs = product(dn[kinds == "yellow"], dn[kinds == "red"])
+    smallest = min(float(np.linalg.norm(a - b)) for a, b in pairs)
+    assert study.evaluate(N=curve).csd_yellow_red[0] == pytest.approx(smallest, abs=1e-9)
+
+
+def test_forms_of_a_curve_are_one(tiny: sweep.LoadedStudy, tmp_path: Path) -> None:
+    curve = 0.8 * tiny.curve("Y")
+    path = tmp_path / "one.csv"
+    curve.rename("x").to_csv(path)
+    pair = (curve.index.to_numpy(), curve.to_numpy())
+    tables = [tiny.evaluate(N=form) for form in (curve, pair, curve.to_numpy(), path, str(path))]
+    tables.append(tiny.evaluate(N=np.full(301, 0.8), relative_to="Y"))
+    for table in tables[1:]:
+        pd.testing.assert_frame_equal(table, tables[0], rtol=1e-12)
+    assert tables[0].attrs["units"]["csd_yellow_red"] == "DN"
+
+
+def test_the_limit_holds_for_filters_that_meet_what_it_asks(tiny: sweep.LoadedStudy) -> None:
+    limit = tiny.limit(sensitivity=0.92)
+    assert limit.curve is not None
+    attained = tiny.evaluate(N=limit.curve, scenario="chart")
+    assert attained.feasible.isna().tolist() == [False]
+    assert attained.sensitivity[0] >= 0.92 - 1e-9
+    assert attained.csd_yellow_red[0] <= limit.proven + np.sqrt(4)  # of rounding, half a DN in each of four channels
+    assert limit.proven < tiny.limit().proven
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"Q": np.zeros(301)}, "no CFA of the study has a channel Q"),
+        ({"N": np.full(301, 1.5)}, "a QE above 1"),
+        ({"N": np.full(300, 0.5)}, "does not fit the grid"),
+        ({"N": np.full(301, -0.5)}, "N: negative value at 400 nm"),
+        ({"N": np.full(301, np.nan)}, "is not a finite number"),
+        ({"N": pd.Series([0.5, 0.5], index=[450.0, 700])}, "the curve is truncated"),
+        ({"N": pd.Series(["a", "b"], index=[400.0, 700])}, "samples are numbers"),
+        ({"N": 0.5}, "no curve over wavelength"),
+        ({"N": "nowhere.csv"}, "cannot be read"),
+        ({"N": np.full(301, 0.5), "scenario": "dimm"}, "did you mean 'dim'?"),
+        ({"N": np.full(301, 0.5), "base": "Yy"}, "did you mean 'Y'?"),
+        ({"N": np.full(301, 0.5), "cfa": "RGGB"}, "no CFA of the study with a channel N"),
+        ({"cfa": "RGGBB"}, "did you mean 'RGGB'?"),
+    ],
+)
+def test_what_cannot_be_judged_is_one_line(tiny: sweep.LoadedStudy, asked: dict[str, object], said: str) -> None:
+    with pytest.raises(SweepError) as caught:
+        tiny.evaluate(**asked)  # type: ignore[arg-type]
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_constraint_on_what_only_a_family_has_leaves_the_verdict_open() -> None:
+    box = {"cfa": "RYNCy", "channel": "N", "base": "Y", "to": "G"}
+    study = sweep.make_study(cfas=["RYYCy", "RYNCy"], boxes={"any": box}, constraints={"edge_width_nm": {"min": 5}})
+    assert study.evaluate(N=study.curve("Y")).feasible.isna().all()
+
+
+@pytest.mark.usefixtures("plain_pictures")
+def test_a_study_made_in_python_runs_and_is_read_again(tmp_path: Path) -> None:
+    nm = np.arange(400.0, 701)
+    sensor = sweep.sensor("ar0820", N=(nm, np.where(nm > 620, 0.6, 1.0)), relative_to="Y")
+    study = sweep.make_study("mine", sensor=sensor, cfas=["RYYCy", "RYNCy"])
+    run = study.run(tmp_path, jobs=1)
+    assert run.folder == tmp_path / "mine"
+    asked = ["name", "csd_yellow_red", "cfa_sensitivity"]
+    pd.testing.assert_frame_equal(run.table[asked].astype({"name": object}), study.evaluate()[asked], check_dtype=False)
+    again = sweep.read_run(run.folder)
+    pd.testing.assert_frame_equal(again.study.evaluate(), study.evaluate())
+    pd.testing.assert_series_equal(again.curves["sensor"]["N"], study.curve("N"))
