@@ -27,7 +27,16 @@ ONLY_USER = {
     "jinja2": ["report/"],
     "typer": ["commands/"],
     "sklearn": ["metrics/recognition"],
-    "numba": ["designs/compiled", "camera/compiled", "camera/plan/compiled", "metrics/compiled", "metrics/nearest"],
+    "numba": [
+        "designs/compiled",
+        "camera/compiled",
+        "camera/compiled_areas",
+        "camera/compiled_cells",
+        "camera/compiled_light",
+        "camera/plan/compiled",
+        "metrics/compiled",
+        "metrics/nearest",
+    ],
 }
 """Who alone may import a library: files, or all of a folder."""
 
