@@ -11,6 +11,7 @@ import hashlib
 import pickle
 import threading
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,11 +23,13 @@ from ..types import FloatArray, IndexArray
 from .between import Between, Deviation
 from .effects import blur, phase
 from .effects.base import KernelEffect
-from .kernel import colorless, make_kernel
+from .kernel import colorless
 from .methods import REFERENCE
+from .place_kernels import PlaceKernels
 from .registry import EFFECTS, WHOLE_LIGHT, factor_of_light
 from .view import View
 
+_Name = tuple[int, ...]
 _UNIT_PX = 2.0**-40
 """Places are told apart in this unit."""
 _MOST_CELLS = 400_000
@@ -49,6 +52,39 @@ class Extremes:
     at_largest: FloatArray
 
 
+class _Kept:
+    """Arrays of one shape by their names, row by row; all are forgotten when they take too much memory."""
+
+    def __init__(self) -> None:
+        self._at: dict[_Name, int] = {}
+        self._rows: tuple[FloatArray, ...] = ()
+
+    def __call__(
+        self, names: list[_Name], make: Callable[[IndexArray], tuple[FloatArray, ...]]
+    ) -> tuple[FloatArray, ...]:
+        """Those of some names; `make` makes those of the names, by number, that are not kept."""
+        if sum(rows.nbytes for rows in self._rows) > _KEPT_BYTES:
+            self._at, self._rows = {}, ()
+        new = {name: at for at, name in enumerate(names) if name not in self._at}
+        if new:
+            made, size = make(np.array(list(new.values()))), len(self._at)
+            if not self._rows or size + len(new) > len(self._rows[0]):
+                more = (np.empty((size + 2 * len(new), *rows.shape[1:])) for rows in made)
+                rows = self._rows or made
+                self._rows = tuple(_filled(larger, old[:size]) for larger, old in zip(more, rows, strict=True))
+            for kept, own in zip(self._rows, made, strict=True):
+                kept[size : size + len(new)] = own
+            self._at |= {name: size + at for at, name in enumerate(new)}
+        which = [self._at[name] for name in names]
+        return tuple(rows[which] for rows in self._rows)
+
+
+def _filled(larger: FloatArray, rows: FloatArray) -> FloatArray:
+    """An array whose first rows are these."""
+    larger[: len(rows)] = rows
+    return larger
+
+
 class _Geometry:
     """Kernels at places and in cells of places, kept: what designs, spaces and tolerances of one scene share."""
 
@@ -56,17 +92,36 @@ class _Geometry:
         self._view, wave = view, view.grid.nodes_nm
         self.knots_nm = wave if view.methods.blur == "skip" else blur.knots(wave, view.methods.blur)
         self.between = Between(view, view.methods, self.knots_nm)
-        self._kernels: dict[tuple[int, ...], FloatArray] = {}
-        self._deviations: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
+        self._light = PlaceKernels(view, view.methods, self.knots_nm)
+        self.functions = self._light.shares @ hats(wave, self.knots_nm)
+        self._kernels, self._deviations = _Kept(), _Kept()
         self._one_at_a_time = threading.Lock()
 
     def of_cells(self, cells: phase.Cells, work: Counter[str]) -> tuple[FloatArray, Deviation]:
-        """The kernel at the corners of cells, and how far it may be from that in them."""
-        with self._one_at_a_time:
-            kernels = self._kernels_at(cells, work)
-            return kernels, self._deviations_in(cells, kernels, work)
+        """The kernel at the corners of cells, ndarray[n_cells, 4, n_channels, n_channels, n_functions], and how far it
+        may be from that in them.
+        """
+        corners = cells.corners
+        places = self._named(corners.places_px, corners.home_px)
+        names = [(*name, int(cells.half / _UNIT_PX)) for name in self._named(cells.centers, cells.homes)]
 
-    def _named(self, places: FloatArray, homes: FloatArray) -> list[tuple[int, ...]]:
+        def at_places(new: IndexArray) -> tuple[FloatArray, ...]:
+            kernels = self._light.at(corners.some(new), work)
+            work["places"] += len(new)
+            low, high = self.between.ranges(kernels @ self._light.shares)
+            return kernels, low, high
+
+        def in_cells(new: IndexArray) -> tuple[FloatArray, ...]:
+            work["cells"] += len(new)
+            return self.between.of_cells(cells.centers[new], cells.half, cells.homes[new], ranges[:, new])
+
+        with self._one_at_a_time:
+            kernels, low, high = self._kernels(places, at_places)
+            ranges = np.stack([low, high]).reshape(2, len(names), len(phase.CORNERS), *low.shape[1:])
+            deviation = self._deviations(names, in_cells)
+        return kernels.reshape(len(names), len(phase.CORNERS), *kernels.shape[1:]), Deviation(*deviation)
+
+    def _named(self, places: FloatArray, homes: FloatArray) -> list[_Name]:
         """A name for each place (ndarray[n, 2]), with the pixel that is read out there, where one is."""
         target = self._view.scenario.target
         assert target is not None
@@ -74,34 +129,6 @@ class _Geometry:
         if target.readout == "center":
             names = np.concatenate([names, homes.astype(np.int64)], axis=1)
         return [tuple(name) for name in names.tolist()]
-
-    def _kernels_at(self, cells: phase.Cells, work: Counter[str]) -> FloatArray:
-        """Kernel at the corners of cells, ndarray[n_cells, 4, n_channels, n_channels, n_knots]."""
-        corners = cells.corners
-        names = self._named(corners.places_px, corners.home_px)
-        if sum(kernel.nbytes for kernel in self._kernels.values()) > _KEPT_BYTES:
-            self._kernels.clear()
-        new = {name: at for at, name in enumerate(names) if name not in self._kernels}
-        if new:
-            cases, methods = corners.some(np.array(list(new.values()))), self._view.methods
-            made = make_kernel(self._view, methods, self.knots_nm, by_pixel=False, work=work, cases=cases)
-            work["places"] += len(new)
-            whole = np.broadcast_to(made.light, (*made.light.shape[:3], self.knots_nm.size))
-            self._kernels |= dict(zip(new, whole, strict=True))
-        found = np.stack([self._kernels[name] for name in names])
-        return found.reshape(len(cells.centers), len(phase.CORNERS), *found.shape[1:])
-
-    def _deviations_in(self, cells: phase.Cells, kernels: FloatArray, work: Counter[str]) -> Deviation:
-        """How far the kernel may be from that at the corners."""
-        names = [(*name, int(cells.half / _UNIT_PX)) for name in self._named(cells.centers, cells.homes)]
-        if len(self._deviations) * kernels[0, 0, :, :, 0].size * self.between.n_parts * 8 > _KEPT_BYTES:
-            self._deviations.clear()
-        new = [at for at, name in enumerate(names) if name not in self._deviations]
-        if new:
-            made = self.between.of_cells(cells.centers[new], cells.half, cells.homes[new], kernels[new])
-            work["cells"] += len(new)
-            self._deviations |= {names[at]: both for at, both in zip(new, zip(*made, strict=True), strict=True)}
-        return Deviation(*(np.stack(parts) for parts in zip(*(self._deviations[n] for n in names), strict=True)))
 
 
 _geometries: Cache[bytes, _Geometry] = Cache(4)
@@ -133,13 +160,7 @@ class AnyPlace:
             raise ValueError(f"{view.methods.phase!r} looks at a lattice of places")
         self.within_dn, self.members = within_dn, view.members
         self._mosaic, self._work, self._geometry = view.mosaic, work, _geometry_of(view)
-        self._hats = hats(wave, self._geometry.knots_nm)
         self._dimmed = factor_of_light(view, view.methods, wave)
-
-    @property
-    def n_knots(self) -> int:
-        """Wavelengths of the kernels."""
-        return self._geometry.knots_nm.size
 
     def extremes(self, light_dn: FloatArray) -> dict[Pair, Extremes | None]:
         """Extremes of every pair of types; None where too many cells would be needed.
@@ -158,11 +179,11 @@ class AnyPlace:
     @property
     def values_per_cell(self) -> int:
         """Values of the kernels at a cell's corners."""
-        return len(phase.CORNERS) * len(self._mosaic.channels) ** 2 * self.n_knots
+        return len(phase.CORNERS) * len(self._mosaic.channels) ** 2 * len(self._geometry.functions)
 
-    def at_knots(self, light: FloatArray) -> FloatArray:
-        """Light on the wavelengths of the kernel, ndarray[..., n_wavelengths] -> ndarray[..., n_knots]."""
-        return np.asarray(light @ self._hats.T, dtype=float)
+    def by_function(self, light: FloatArray) -> FloatArray:
+        """Light by the functions of the kernels, ndarray[..., n_wavelengths] -> ndarray[..., n_functions]."""
+        return np.asarray(light @ self._geometry.functions.T, dtype=float)
 
     def amounts(self, light: FloatArray) -> FloatArray:
         """`Between.amounts` of a light."""
@@ -179,7 +200,7 @@ class _Search:
     def __init__(self, scene: AnyPlace, first: FloatArray, second: FloatArray) -> None:
         """`first`, `second`: light of the signals of each type, DN, ndarray[n_signals, n_channels, n_wavelengths]."""
         self._scene = scene
-        self._light = [scene.at_knots(light) for light in (first, second)]
+        self._light = [scene.by_function(light) for light in (first, second)]
         self._one, self._other = np.indices((len(first), len(second))).reshape(2, -1)
         self._amounts = np.concatenate([scene.amounts(light - second) for light in first])
 
@@ -221,9 +242,9 @@ class _Search:
         kernels, deviation = self._scene.of_cells(cells)
         flat = kernels.reshape(*kernels.shape[:3], -1)
         first, second = (
-            flat @ light.reshape(len(light), -1).T for light in self._light
-        )  # [cells, corners, c, signals]
-        apart = np.moveaxis(first[..., self._one[pairs]] - second[..., self._other[pairs]], 2, 3)
+            self._seen(flat, light, at[pairs]) for light, at in zip(self._light, (self._one, self._other), strict=True)
+        )
+        apart = np.moveaxis(first - second, 2, 3)
         rest = np.einsum("mudb,pdb->mpu", deviation.kernel, self._amounts[pairs], optimize=True)
         rest += deviation.tilt[:, None] * (apart.max(axis=1) - apart.min(axis=1)) / 2
         corners = _norm(apart)
@@ -234,6 +255,12 @@ class _Search:
         beyond = np.einsum("mjpu,mpu->mjp", apart, towards).min(axis=1)
         low = np.maximum(beyond - (np.abs(towards) * rest).sum(axis=2), 0.0)
         return low, high, corners
+
+    @staticmethod
+    def _seen(kernels: FloatArray, light: FloatArray, signals: IndexArray) -> FloatArray:
+        """What the channels see of some signals, ndarray[n_cells, corners, n_channels, n_signals]."""
+        some, which = np.unique(signals, return_inverse=True)
+        return np.asarray((kernels @ light[some].reshape(len(some), -1).T)[..., which], dtype=float)
 
 
 def _norm(vectors: FloatArray) -> FloatArray:

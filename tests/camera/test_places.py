@@ -196,7 +196,8 @@ def test_what_lies_between_the_corners_is_within_its_bound() -> None:
                 inside = rng.uniform(-1, 1, (6, 2)) * (1 / 8 - half)
                 few = phase.Cells(cells.centers[some] + inside, cells.homes[some], half)
                 corners = kernel(few.corners).reshape(6, 4, *kernel(few.corners).shape[1:])
-                bound = between.of_cells(few.centers, half, few.homes, corners)
+                ranges = between.ranges(corners.reshape(-1, *corners.shape[2:]))
+                bound = between.of_cells(few.centers, half, few.homes, ranges.reshape(2, 6, 4, *ranges.shape[2:]))
                 most = bound.kernel[..., :1] + bound.kernel[..., 1:].max(axis=3, initial=0.0, keepdims=True)
                 most = most + bound.tilt[:, :, None, None] * np.ptp(corners, axis=1) / 2
                 for _ in range(4):

@@ -108,7 +108,10 @@ def _frequencies(reach_um: float, wavelength_um: FloatArray, f_number: float) ->
 
 
 class Profile:
-    """h(r) of one disc for some wavelengths, as a table to look up."""
+    """h(r) of one disc for some wavelengths, as a table to look up.
+
+    `spectrum`: frequencies, 1/um, and the factor of J0(2 pi r nu) at each, ndarray[n_frequencies, n_wavelengths].
+    """
 
     def __init__(
         self, radius_um: float, reach_um: float, wavelength_um: FloatArray, f_number: float, w20_um: float
@@ -118,8 +121,9 @@ class Profile:
         nu, weight = _frequencies(radius_um + reach_um, wavelength_um, f_number)
         step = 1 / (_SPLINE_PER_CYCLE * nu[-1])
         r = np.linspace(0.0, reach_um + step, max(8, 2 + int(reach_um / step)))
-        spectrum = (2 * math.pi * radius_um * j1(2 * math.pi * radius_um * nu) * weight)[:, None]
-        table = j0(2 * math.pi * np.outer(r, nu)) @ (spectrum * transfer(nu, wavelength_um, f_number, w20_um))
+        disc = (2 * math.pi * radius_um * j1(2 * math.pi * radius_um * nu) * weight)[:, None]
+        self.spectrum = nu, disc * transfer(nu, wavelength_um, f_number, w20_um)
+        table = j0(2 * math.pi * np.outer(r, nu)) @ self.spectrum[1]
         self._spline = make_interp_spline(r, table, k=3, axis=0)
         self.r_um, self.values = r, table
         self._highest = float(nu[-1])

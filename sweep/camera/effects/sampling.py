@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...types import BoolArray, FloatArray, IndexArray
+from ..compiled_light import covered_by_disc, covered_shares
 from ..mosaic import Mosaic
 from ..scene import Target
 from ..shot import Shot
@@ -19,26 +20,8 @@ _AT_ONCE = 200
 
 def covered(x: FloatArray, y: FloatArray, half: float, radius: float) -> FloatArray:
     """Share of a square of half side `half` around (x, y) that lies in the disc of `radius` around 0, exact."""
-    ax, ay = np.abs(x), np.abs(y)
-    inside = np.hypot(ax + half, ay + half) <= radius
-    found = inside.astype(float)
-    rim = ~inside & (np.hypot(np.maximum(ax - half, 0.0), np.maximum(ay - half, 0.0)) < radius)
-    ends = [_area(ax[rim] + sx * half, ay[rim] + sy * half, radius) * sx * sy for sx in (1, -1) for sy in (1, -1)]
-    found[rim] = np.clip(sum(ends) / (4 * half**2), 0.0, 1.0)
-    return found
-
-
-def _area(x: FloatArray, y: FloatArray, radius: float) -> FloatArray:
-    """Signed area of the disc over the rectangle from 0 to (x, y), odd in both."""
-    sign = np.sign(x) * np.sign(y)
-    x, y = np.minimum(np.abs(x), radius), np.minimum(np.abs(y), radius)
-    corner = np.sqrt((radius - y) * (radius + y))  # from here on the circle is lower than y
-
-    def under(t: FloatArray) -> FloatArray:
-        height = np.sqrt((radius - t) * (radius + t))
-        return np.asarray(0.5 * (t * height + radius**2 * np.arctan2(t, height)), dtype=float)
-
-    return np.asarray(sign * np.where(x <= corner, x * y, corner * y + under(x) - under(corner)), dtype=float)
+    x, y = np.broadcast_arrays(x, y)
+    return covered_shares(x.ravel(), y.ravel(), half, radius).reshape(x.shape)
 
 
 @dataclass(frozen=True)
@@ -52,6 +35,16 @@ class Window:
     channel: IndexArray
     dx: FloatArray
     dy: FloatArray
+
+    @property
+    def columns(self) -> FloatArray:
+        """`dx` of each column, ndarray[n_cases, columns]."""
+        return np.ascontiguousarray(self.dx[:, 0, :])
+
+    @property
+    def rows(self) -> FloatArray:
+        """`dy` of each row, ndarray[n_cases, rows]."""
+        return np.ascontiguousarray(self.dy[:, :, 0])
 
 
 def radii_px(shot: Shot, target: Target) -> tuple[float, float]:
@@ -82,7 +75,7 @@ def window(mosaic: Mosaic, phases_px: FloatArray, reach_px: float) -> Window:
 
 def mean_weights(seen: Window, half: float, readout_px: float, n_channels: int) -> FloatArray:
     """Weight of each pixel in the mean of its channel, ndarray[n_cases, rows, columns]; each channel's sum to 1."""
-    weights = covered(seen.dx, seen.dy, half, readout_px)
+    weights = covered_by_disc(seen.columns, seen.rows, half, readout_px)
     for channel in range(n_channels):
         own = seen.channel == channel
         weights[:, own] /= weights[:, own].sum(axis=1, keepdims=True)

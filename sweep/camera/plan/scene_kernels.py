@@ -14,6 +14,7 @@ from ..effects import blur, phase, sampling
 from ..effects.base import Change, KernelChange, KernelEffect, Part
 from ..kernel import make_kernel
 from ..methods import REFERENCE, Methods
+from ..place_kernels import PlaceKernels
 from ..registry import EFFECTS, WHOLE_LIGHT
 from ..view import View
 from .bounds import Spread
@@ -58,8 +59,12 @@ class SceneKernels:
         """
         wanted, nodes = self.wanted(methods), self._knots_nm
         if wanted not in self._kernels:
-            cases = self.corners[0] if self.anywhere(wanted) else None
-            light = make_kernel(self._view, wanted, nodes, by_pixel=False, work=Counter(), cases=cases).light
+            if phase.one_is_enough(self._view) is None and wanted.sampling != "skip":
+                cases = self.corners[0] if self.anywhere(wanted) else phase.cases(self._view, wanted.phase)
+                made = PlaceKernels(self._view, wanted, nodes)
+                light = made.at(cases, Counter()) @ made.shares
+            else:
+                light = make_kernel(self._view, wanted, nodes, by_pixel=False, work=Counter()).light
             self._kernels[wanted] = np.ascontiguousarray(np.broadcast_to(light, (*light.shape[:3], nodes.size)))
         return self._kernels[wanted]
 
@@ -72,9 +77,9 @@ class SceneKernels:
         """How far the kernel in cells may be from a mean of that at the corners: [cells, channels, channels, 1]."""
         wanted = self.wanted(methods)
         if wanted not in self._deviations:
-            kernel, cells = self.of(wanted), self._cells
-            between = Between(self._view, wanted, self._knots_nm)
-            found = between.of_cells(cells.centers, cells.half, cells.homes, kernel[self.corners[1]])
+            between, cells = Between(self._view, wanted, self._knots_nm), self._cells
+            ranges = between.ranges(self.of(wanted))[:, self.corners[1]]
+            found = between.of_cells(cells.centers, cells.half, cells.homes, ranges)
             # At any wavelength: that of the middle one, and what differs from it.
             largest = found.kernel[..., :1] + found.kernel[..., 1:].max(axis=3, initial=0.0, keepdims=True)
             self._deviations[wanted] = Deviation(largest, found.tilt)

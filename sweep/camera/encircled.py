@@ -1,0 +1,55 @@
+"""The light of a blurred disc within a radius, as a table: what a pixel gets of it is a sum over the pixel's edges.
+
+With g(r) = (1 / r^2) integral_0^r h(s) s ds the field g(r) (x, y) has the divergence h. So by Gauss's theorem the mean
+of h over a pixel is that of the field over its edges: an integral along lines instead of one over an area. Of
+h(r) = integral A(nu) J0(2 pi r nu) dnu it is g(r) = integral A(nu) J1(2 pi r nu) / (2 pi r nu) dnu.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from scipy.special import j1
+
+from . import compiled_light
+from .effects.blur import Profile
+
+_RESIDUAL = 1e-12
+"""No value of the image is further from its expansion, relative to that of a uniform field."""
+_LANES = 4
+"""Functions are filled up to a multiple of so many."""
+_BEYOND = 10
+"""Nodes before and behind the table's ends, where its spline is not uniform."""
+
+
+class Encircled:
+    """g(r) of a few functions of the radius, of which the image at every wavelength is a sum.
+
+    `shares`: ndarray[n_functions, n_wavelengths], how much of each function is in each wavelength.
+    """
+
+    def __init__(self, profile: Profile, pitch_um: float) -> None:
+        self._profile, self._pitch_um = profile, pitch_um
+        _, sizes, shares = np.linalg.svd(profile.values, full_matrices=False)
+        # The rest of any row is at most the first size that is left out.
+        kept = max(1, int((sizes > _RESIDUAL).sum()))
+        self.shares = np.zeros((-(-kept // _LANES) * _LANES, shares.shape[1]))
+        self.shares[:kept] = shares[:kept]
+
+    @cached_property
+    def table(self) -> compiled_light.Table:
+        """Coefficients of a uniform spline of the fifth order."""
+        from scipy.interpolate import make_interp_spline  # noqa: PLC0415  (slow to import)
+
+        profile, r_um = self._profile, self._profile.r_um
+        step = r_um[1]
+        nodes = np.arange(r_um.size + _BEYOND) * step
+        nu, spectrum = profile.spectrum
+        phase = 2 * np.pi * np.outer(nodes, nu)
+        kernel = np.divide(j1(phase), phase, out=np.full_like(phase, 0.5), where=phase > 0)
+        values = kernel @ (spectrum @ self.shares.T)
+        mirrored = np.concatenate([values[_BEYOND:0:-1], values])  # the image is round
+        at = np.concatenate([-nodes[_BEYOND:0:-1], nodes])
+        spline = make_interp_spline(at, mirrored, k=5, axis=0)
+        return np.ascontiguousarray(spline.c[_BEYOND - 2 : -2]), self._pitch_um / step

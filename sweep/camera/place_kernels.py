@@ -1,0 +1,68 @@
+"""Kernels at many places of a light: what `kernel.make_kernel` gives for the channels, made for thousands of places.
+
+The image at every wavelength is a sum of a few functions of the radius (`encircled`), so that for each pixel much less
+than a value per wavelength is computed.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from ..types import FloatArray
+from . import compiled_light
+from .effects import crosstalk, demosaic, phase, sampling
+from .encircled import Encircled
+from .kernel import pixels_per_place, profile_of
+from .methods import Methods
+from .view import View
+
+_AT_ONCE = 4_000_000
+"""Pixels that are held at once."""
+_EDGE_LESS = 2
+"""An integral along an edge needs so many nodes less than one over a pixel, along each axis."""
+_SHARP: compiled_light.Table = (np.empty((0, 0)), 0.0)
+
+
+class PlaceKernels:
+    """Kernels at places, for one way to compute a scene's light at some wavelengths."""
+
+    def __init__(self, view: View, methods: Methods, knots_nm: FloatArray) -> None:
+        target, pixel = view.scenario.target, view.pixel
+        assert target is not None
+        self._view, self._methods, self._target = view, methods, target
+        self._half = pixel.fill_factor**0.5 / 2
+        self._radii = sampling.radii_px(view, target)
+        self._share = crosstalk.share(view, methods.crosstalk)
+        profile = profile_of(view, methods, knots_nm)
+        self._table, self._rule = _SHARP, np.polynomial.legendre.leggauss(1)
+        self.shares = np.ones((1, knots_nm.size))
+        if profile is not None:
+            encircled = Encircled(profile, pixel.pitch_um)
+            self._table, self.shares = encircled.table, encircled.shares
+            order = profile.order(2 * self._half * pixel.pitch_um) - _EDGE_LESS
+            self._rule = np.polynomial.legendre.leggauss(order)
+
+    def at(self, cases: phase.Cases, work: Counter[str]) -> FloatArray:
+        """What each channel gets through each channel's filter of each function of the light, ndarray[n_cases,
+        n_channels, n_channels, n_functions]; times `shares`, ndarray[n_functions, n_knots], at each wavelength.
+        """
+        step = max(1, _AT_ONCE // pixels_per_place(self._view))
+        starts = range(0, len(cases.places_px), step)
+        return np.concatenate([self._of_block(cases.some(slice(at, at + step)), work) for at in starts])
+
+    def _of_block(self, cases: phase.Cases, work: Counter[str]) -> FloatArray:
+        mosaic = self._view.mosaic
+        seen = sampling.window(mosaic, cases.places_px, sampling.reach_px(self._view, self._target))
+        x, y = seen.columns, seen.rows
+        if self._target.readout == "mean":
+            weights = compiled_light.covered_by_disc(x, y, self._half, self._radii[1])
+        else:
+            weights = demosaic.center_weights(seen, cases.home_px - cases.places_px, self._methods.demosaic, mosaic)
+        n = len(mosaic.channels)
+        found = np.empty((len(x), n, n, len(self.shares)))
+        sizes = (self._half, self._radii[0], self._share)
+        compiled_light.kernels(x, y, weights, seen.channel, *sizes, self._table, self._rule, found)
+        work["sampling"] += weights.size * len(self.shares)
+        return found
