@@ -149,7 +149,7 @@ def search_log(answer: SearchAnswer) -> pa.Table:
 
 
 def front_table(study: Study, answer: SearchAnswer) -> pa.Table:
-    """A row per level of sensitivity; nulls where no design or no limit was found."""
+    """A row per level of sensitivity, and of sensitivities between with the limit alone; nulls where nothing is."""
     names, view = answer.search.space.parameters, study.view(answer.search.space, answer.search.scenario)
     rows = []
     for point in answer.front:
@@ -163,4 +163,8 @@ def front_table(study: Study, answer: SearchAnswer) -> pa.Table:
             row["limit"] = point.limit.proven
             row["gap"] = None if point.best is None else gap_of(point.best, point.limit)
         rows.append(row)
+        for sensitivity, proven in point.onward:
+            if np.isfinite(proven):
+                whole = cfa_sensitivity_at(view, sensitivity)
+                rows.append({"sensitivity_min": sensitivity, "cfa_sensitivity_min": whole, "limit": proven})
     return pa.Table.from_pylist(rows, schema=front_schema(names))

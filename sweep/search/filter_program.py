@@ -17,6 +17,7 @@ from scipy.sparse import csr_matrix, hstack, vstack
 
 from ..camera.linear import smooth_imager
 from ..metrics.bound import FEASIBLE, Bound
+from ..metrics.columns.sensitivity import SENSITIVITY
 from ..types import FloatArray, IndexArray
 from .problem import Problem
 
@@ -46,17 +47,32 @@ class Sides:
 
 
 @dataclass(frozen=True)
+class Certificate:
+    """Weights y of rows and of pairs with a decided side, and V(y): they bound what filters reach at any sensitivity.
+
+    `rows`, `pairs`: those whose `row_weights` and `pair_weights` are above 0, ndarray[n] each; `most`: V(y).
+    """
+
+    rows: IndexArray
+    row_weights: FloatArray
+    pairs: IndexArray
+    pair_weights: FloatArray
+    most: float
+
+
+@dataclass(frozen=True)
 class Solved:
     """What a linear program for a t and some sides found, in the objective's unit.
 
-    `beyond`: no filter with these sides reaches more (-inf: there is none), and already those of `needs` say so.
-    `curve`: the filter with the largest `margin` above t, QE; None where no filter was found.
+    `beyond`: no filter with these sides reaches more (-inf: there is none), and already those of `needs` say so, by
+    `certificate`. `curve`: the filter with the largest `margin` above t, QE; None where no filter was found.
     """
 
     beyond: float
     margin: float = -np.inf
     curve: FloatArray | None = None
     needs: Sides = Sides()
+    certificate: Certificate | None = None
 
 
 @dataclass(frozen=True)
@@ -70,6 +86,13 @@ class _Rows:
     slack: FloatArray
     rate: FloatArray
     constant: FloatArray
+
+    def some(self, which: IndexArray, per_sensitivity: FloatArray, sensitivity: float | None) -> _Rows:
+        """Those of its rows, for another least sensitivity; `per_sensitivity`: `least` of that row over it, else 0."""
+        least = self.least[which]
+        if sensitivity is not None:
+            least = np.where(per_sensitivity[which] > 0, per_sensitivity[which] * sensitivity, least)
+        return _Rows(self.matrix, least, self.slack[which], self.rate[which], self.constant[which])
 
     def needed(self, t: float, *, relaxed: bool = False) -> FloatArray:
         """h(t), ndarray[n]; `relaxed`: for designs that only count as feasible."""
@@ -93,7 +116,7 @@ class FilterProgram:
         least = bound.min or 0.0
         self.low = self.base * least
         self._box = self.base * (least - FEASIBLE * bound.scale - ROUNDING), self.base * (1 + ROUNDING)
-        self._rows = self._fixed_rows()
+        self._rows, self._per_sensitivity = self._fixed_rows()
         self._set_pairs()
         objective = self._rows.rate > 0
         ends = (self._rows.matrix @ self._box[1] + self._rows.constant)[objective] / self._rows.rate[objective]
@@ -102,10 +125,13 @@ class FilterProgram:
         self._sizes = abs(self._rows.matrix) @ self.base, np.abs(self.apart) @ self.base
         self.solved = 0
 
-    def _fixed_rows(self) -> _Rows:
-        """Every quantity that is linear in the filter and constrained, or part of the objective."""
+    def _fixed_rows(self) -> tuple[_Rows, FloatArray]:
+        """Every quantity that is linear in the filter and constrained, or part of the objective.
+
+        Second, `least` of each row over the least sensitivity that is asked for; 0 for other rows.
+        """
         matrices: list[csr_matrix] = [csr_matrix((0, self.base.size))]
-        columns: list[FloatArray] = [np.empty((0, 4))]
+        columns: list[FloatArray] = [np.empty((0, 5))]
         for quantity in sorted(self.problem.quantities.values(), key=lambda q: q.wanted):  # steepness first
             bound = self.problem.constraints.get(quantity.name, Bound.model_construct(min=None, max=None))
             weight = self.problem.objective.weights.get(quantity.name)
@@ -117,12 +143,15 @@ class FilterProgram:
             if least > -np.inf or weight is not None:
                 rate = 0.0 if weight is None else made.scale / weight
                 matrices.append(made.rows)
-                columns.append(np.tile([least, slack, rate, made.constant], (made.rows.shape[0], 1)))
+                per_sensitivity = made.scale if quantity.name == SENSITIVITY and least > -np.inf else 0.0
+                own = [least, slack, rate, made.constant, per_sensitivity]
+                columns.append(np.tile(own, (made.rows.shape[0], 1)))
             if bound.max is not None:
                 matrices.append(-made.rows)
-                most = [-bound.max * made.scale, slack, 0.0, -made.constant]
+                most = [-bound.max * made.scale, slack, 0.0, -made.constant, 0.0]
                 columns.append(np.tile(most, (made.rows.shape[0], 1)))
-        return _Rows(vstack(matrices).tocsr(), *np.concatenate(columns).T)
+        *own_columns, per_sensitivities = np.concatenate(columns).T
+        return _Rows(vstack(matrices).tocsr(), *own_columns), per_sensitivities
 
     def _set_pairs(self) -> None:
         problem, view = self.problem, self.problem.view
@@ -184,10 +213,11 @@ class FilterProgram:
         weights[weights < _LEAST_WEIGHT * weights.max(initial=0.0)] = 0.0
         used = weights[-pairs.size :] > 0 if pairs.size else some[:0]
         needs = Sides().joined(pairs[used], signs[used])
-        beyond = self._beyond(weights, rows, pairs)
+        certificate = self._certificate(weights, rows, pairs)
+        beyond = self.beyond(certificate)
         if found is None:
-            return Solved(beyond, needs=needs)
-        return Solved(beyond, float(found[-1]), found[:-1], needs)
+            return Solved(beyond, needs=needs, certificate=certificate)
+        return Solved(beyond, float(found[-1]), found[:-1], needs, certificate)
 
     def _best_margin(
         self, rows: csr_matrix, floor: FloatArray, rate: FloatArray
@@ -207,24 +237,38 @@ class FilterProgram:
             return int(found.status), None, None
         return _SOLVED, np.maximum(0.0, -found.ineqlin.marginals), found.x
 
-    def _beyond(self, weights: FloatArray, rows: csr_matrix, pairs: IndexArray) -> float:
-        """No filter with these rows reaches more, by their weights; inf where the weights do not say."""
+    def _certificate(self, weights: FloatArray, rows: csr_matrix, pairs: IndexArray) -> Certificate:
         low, high = self._box
         summed = weights @ rows
         most = float(np.maximum(summed * low, summed * high).sum())
         most += _SUM_ROUNDING * float(weights @ np.concatenate([self._sizes[0], self._sizes[1][pairs]]))
+        n_fixed = len(weights) - pairs.size
+        used, apart = np.flatnonzero(weights[:n_fixed]), np.flatnonzero(weights[n_fixed:])
+        return Certificate(used, weights[used], pairs[apart], weights[n_fixed:][apart], most)
+
+    def beyond(
+        self, certificate: Certificate, sensitivity: float | None = None, at_least: float = 0.0, near: float = 0.0
+    ) -> float:
+        """No filter with the sides of a certificate reaches more; inf where its weights do not say.
+
+        `sensitivity`: the least one that is asked of filters, instead of the problem's. `at_least`: what less is said
+        of is not wanted; -inf is returned then. `near`: how much larger than the bound of the weights it may be.
+        """
+        rows = self._rows.some(certificate.rows, self._per_sensitivity, sensitivity)
 
         def excluded(t: float) -> bool:
-            floor = np.concatenate([self._rows.needed(t, relaxed=True), self.needed(t, relaxed=True)[pairs]])
-            with np.errstate(invalid="ignore"):
-                return float(np.where(weights > 0, weights * floor, 0.0).sum()) > most
+            apart = self.needed(t, relaxed=True)[certificate.pairs]
+            asked = certificate.row_weights @ rows.needed(t, relaxed=True) + certificate.pair_weights @ apart
+            return bool(asked > certificate.most)
 
-        if excluded(0.0):
+        if excluded(at_least):
             return -np.inf
         if not excluded(self.top):
             return np.inf
-        low_t, high_t = 0.0, self.top
+        low_t, high_t = at_least, self.top
         for _ in range(_HALVINGS):
+            if high_t - low_t <= near:
+                break
             middle = (low_t + high_t) / 2
             low_t, high_t = (low_t, middle) if excluded(middle) else (middle, high_t)
         return high_t

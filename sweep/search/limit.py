@@ -9,7 +9,7 @@ and their shifts in production) is left out: that makes the set of filters large
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,6 +41,7 @@ class Limit:
     more than `proven`. Both are -inf, and `curve` is None, when no filter meets the constraints. `left_out`: what the
     study asks for beyond the limit's own constraints. `programs`: number of linear programs solved for it;
     `open_parts`: parts of the proof that were left open, so that the bracket is wider than it was to be; 0: none.
+    `elsewhere`: what the same proof says of filters with other sensitivities at least.
     """
 
     attained: float
@@ -49,11 +50,18 @@ class Limit:
     left_out: tuple[str, ...] = ()
     programs: int = 0
     open_parts: int = 0
+    elsewhere: tuple[float, ...] = ()
 
 
-def limit_of(problem: Problem, tolerance_dn: float = 1e-3, most_programs: int = _MOST_PROGRAMS) -> Limit:
+def limit_of(
+    problem: Problem,
+    tolerance_dn: float = 1e-3,
+    most_programs: int = _MOST_PROGRAMS,
+    sensitivities: Sequence[float] = (),
+) -> Limit:
     """The limit of a problem with one modified channel, to `tolerance_dn` (1e-6 for an objective without a CSD).
 
+    `sensitivities`: where `elsewhere` is wanted, of a problem with a least sensitivity.
     At most about `most_programs` linear programs are solved for it; the bracket is wider where that is too few. Raises
     SweepError where the response would not be linear; see `why_not`.
     """
@@ -68,7 +76,8 @@ def limit_of(problem: Problem, tolerance_dn: float = 1e-3, most_programs: int = 
         return _inside(nominal, np.clip(curve, program.low, program.base), inside)
 
     proof = SideSearch(program, value, tolerance, most_programs).run()
-    return Limit(proof.attained, proof.proven, proof.curve, left_out, program.solved, proof.open_parts)
+    elsewhere = tuple(proof.proven_at(program, sensitivity) for sensitivity in sensitivities)
+    return Limit(proof.attained, proof.proven, proof.curve, left_out, program.solved, proof.open_parts, elsewhere)
 
 
 def why_not(problem: Problem) -> str | None:

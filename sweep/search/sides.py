@@ -16,10 +16,12 @@ from itertools import count
 import numpy as np
 
 from ..types import FloatArray, IndexArray
-from .filter_program import FilterProgram, Sides
+from .filter_program import Certificate, FilterProgram, Sides
 
 _DIVE_STEPS = 40
 _DIVE_PAIRS = 8
+_NEAR = 1e-4
+"""A tangent may lie this much above that of its weights, in the objective's unit."""
 _MET = 1e-7
 """Pairs that lack no more than this, DN, are met: the solver's tolerance."""
 
@@ -28,13 +30,38 @@ _MET = 1e-7
 class Proof:
     """What was found, in the objective's unit: no filter reaches more than `proven`, `curve` reaches `attained`.
 
-    `open_parts`: parts of the choice of sides that were not brought down to `attained` and the tolerance.
+    `open_parts`: parts of the choice of sides that were not brought down to `attained` and the tolerance. `parts`: all
+    that any filter belongs to, with what bounds them.
     """
 
     attained: float
     curve: FloatArray | None
     proven: float
     open_parts: int
+    parts: tuple[Part, ...] = ()
+
+    def proven_at(self, program: FilterProgram, sensitivity: float) -> float:
+        """No filter with at least this sensitivity reaches more, whatever sensitivity the proof was made for.
+
+        The weights of a linear program stay a proof where its right side changes, so this is a tangent, to `_NEAR`.
+        """
+        most = -np.inf
+        for part in self.parts:
+            reach = min(part.cap, program.top)
+            for certificate in part.certificates:
+                if reach <= most:
+                    break
+                reach = min(reach, program.beyond(certificate, sensitivity, max(most, 0.0), _NEAR))
+            most = max(most, reach)
+        return most
+
+
+@dataclass(frozen=True)
+class Part:
+    """Some choices of sides: their filters reach no more than `cap`, and than each of the `certificates` says."""
+
+    cap: float
+    certificates: tuple[Certificate, ...] = ()
 
 
 class _Conflicts:
@@ -96,6 +123,7 @@ class SideSearch:
         self._most = most_programs
         self._conflicts = _Conflicts(len(program.apart))
         self._best = self._closed = -np.inf
+        self._closed_parts: list[Part] = []
         self._curve: FloatArray | None = None
 
     def run(self) -> Proof:
@@ -106,23 +134,26 @@ class SideSearch:
         for side in (1.0, -1.0):
             self._dive(side)
         order = count()
-        parts = [(-self._program.top, next(order), Sides())]
+        parts = [(-self._program.top, next(order), Sides(), Part(self._program.top))]
         left = []
         while parts and -parts[0][0] > self._closing and self._program.solved < self._most:
-            beyond, _, sides = heappop(parts)
+            beyond, _, sides, part = heappop(parts)
             held = self._conflicts.applied(sides)
             if held is None:
                 continue
-            beyond, more = self._divided(-beyond, held)
+            beyond, part, more = self._divided(-beyond, held, part)
             if beyond <= self._closing:
                 self._closed = max(self._closed, beyond)
             elif not more:
-                left.append(beyond)
-            for bound, one in more:
-                heappush(parts, (-bound, next(order), one))
-        left += [-beyond for beyond, _, _ in parts]
-        far = sum(beyond > self._closing for beyond in left)
-        return Proof(self._best, self._curve, max([self._closed, self._best, *left]), far)
+                left.append((beyond, part))
+            for one, reach in more:
+                own = Part(min(part.cap, reach), part.certificates)
+                heappush(parts, (-min(beyond, reach), next(order), one, own))
+        left += [(-beyond, part) for beyond, _, _, part in parts]
+        far = sum(beyond > self._closing for beyond, _ in left)
+        proven = max([self._closed, self._best, *(beyond for beyond, _ in left)])
+        every = (*self._closed_parts, *(part for _, part in left))
+        return Proof(self._best, self._curve, proven, far, every)
 
     @property
     def _closing(self) -> float:
@@ -135,31 +166,38 @@ class SideSearch:
         if value > self._best:
             self._best, self._curve = value, moved
 
-    def _divided(self, beyond: float, sides: Sides) -> tuple[float, list[tuple[float, Sides]]]:
-        """What a part can reach at most, and the parts that it falls into; none where it is closed or stays open."""
+    def _divided(self, beyond: float, sides: Sides, part: Part) -> tuple[float, Part, list[tuple[Sides, float]]]:
+        """What a part can reach at most, the part with what says so, and those that it falls into with their reach.
+
+        None where it is closed or stays open.
+        """
         t = beyond
         solved = self._program.solve(t, sides)
         beyond = min(beyond, solved.beyond)
+        if solved.certificate is not None:
+            part = Part(part.cap, (*part.certificates, solved.certificate))
         if solved.curve is not None:
             self._offer(solved.curve)
         if solved.beyond <= self._closing:
             self._conflicts.add(solved.needs)
             self._closed = max(self._closed, solved.beyond)
+            self._closed_parts.append(Part(np.inf, part.certificates[-1:]))  # it closes other parts of its sides, too
         if solved.curve is None or beyond <= self._closing:
-            return beyond, []
+            return beyond, part, []
         apart = self._program.apart @ solved.curve
         lacks = self._program.needed(t, solved.margin) - np.abs(apart)
         lacks[list(sides.pairs)] = -np.inf
         pair = int(np.argmax(lacks)) if lacks.size else -1
         if pair < 0 or lacks[pair] <= _MET:
-            return beyond, [(beyond, sides)] if beyond < t else []
-        return beyond, [
-            (
-                min(beyond, float(self._program.reach[pair, int(sign < 0)])),
-                sides.joined(np.array([pair]), np.array([sign])),
-            )
-            for sign in (1.0, -1.0)
-        ]
+            return beyond, part, [(sides, np.inf)] if beyond < t else []
+        return (
+            beyond,
+            part,
+            [
+                (sides.joined(np.array([pair]), np.array([sign])), float(self._program.reach[pair, int(sign < 0)]))
+                for sign in (1.0, -1.0)
+            ],
+        )
 
     def _dive(self, side: float) -> None:
         """Look for a good filter with all pairs on one side: decide the worst ones, and lower t from above."""

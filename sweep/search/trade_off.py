@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
+from itertools import islice, pairwise
+
+import numpy as np
 
 from ..errors import BrokenProofError, Fault
 from ..metrics.bound import Bound
@@ -18,6 +20,8 @@ _FRONT_STARTS = 2
 _FRONT_LIMIT_DN = 0.02
 _FRONT_PROGRAMS = 1000
 """Linear programs for the limit at each level; a level of the built-in studies takes about ten."""
+_BETWEEN = 5
+"""Sensitivities between two levels at which the limit is told."""
 _PROOF_TOLERANCE = 1e-9
 """A design may exceed a proven limit by this share, which is rounding, and no more."""
 _NO_LIMIT = 0.05
@@ -26,12 +30,16 @@ _NO_LIMIT = 0.05
 
 @dataclass(frozen=True)
 class FrontPoint:
-    """The best design with at least `level` of sensitivity (None: none was found), and the limit there."""
+    """The best design with at least `level` of sensitivity (None: none was found), and the limit there.
+
+    `onward`: sensitivities up to the next level, and what no filter with at least that much exceeds.
+    """
 
     level: float
     best: Evaluation | None
     runs: tuple[SearchRun, ...]
     limit: Limit | None
+    onward: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -72,8 +80,11 @@ def trade_off(
     """
     at_level = [replace(problem, constraints=_with_sensitivity(problem, level)) for level in levels]
     limits: list[Limit | None] = [None] * len(at_level)
+    between = [tuple(map(float, np.linspace(a, b, _BETWEEN + 2)[1:-1])) for a, b in pairwise(levels)]
     if why_not(problem) is None:
-        limits = list(parallel(delayed(limit_of, p, _FRONT_LIMIT_DN, _FRONT_PROGRAMS) for p in at_level))
+        around = [(*before, *after) for before, after in zip([(), *between], [*between, ()], strict=True)]
+        calls = zip(at_level, around, strict=True)
+        limits = list(parallel(delayed(limit_of, p, _FRONT_LIMIT_DN, _FRONT_PROGRAMS, own) for p, own in calls))
     runs: list[list[SearchRun]] = [[] for _ in at_level]
     done, total = 0, 2 * len(at_level)
 
@@ -99,10 +110,23 @@ def trade_off(
     searched([[*effort.starts[:_FRONT_STARTS]]] * len(at_level))
     found = [(best(k - 1), best(k + 1)) for k in range(len(at_level))]
     searched([[problem.to_unit(e.x) for e in both if e is not None] for both in found])
-    points = tuple(FrontPoint(level, best(k), tuple(runs[k]), limits[k]) for k, level in enumerate(levels))
+    onward = [*_tangents(between, limits), ()]
+    points = tuple(FrontPoint(level, best(k), tuple(runs[k]), limits[k], onward[k]) for k, level in enumerate(levels))
     for point in points:
         check_proof(point.best, point.limit, f" at a sensitivity of {point.level:g} and more")
     return points
+
+
+def _tangents(
+    between: Sequence[tuple[float, ...]], limits: Sequence[Limit | None]
+) -> Iterator[tuple[tuple[float, float], ...]]:
+    """Of each two levels the smaller bound of both proofs, at the sensitivities between them."""
+    for own, (below, above) in zip(between, pairwise(limits), strict=True):
+        if below is None or above is None:
+            yield ()
+            continue
+        first, second = below.elsewhere[len(below.elsewhere) - len(own) :], above.elsewhere[: len(own)]
+        yield tuple(zip(own, map(min, first, second), strict=True))
 
 
 def _with_sensitivity(problem: Problem, level: float) -> dict[str, Bound]:
