@@ -104,7 +104,8 @@ def draw_overview(figure: OverviewFigure) -> Figure:
             figure.traced.x, figure.traced.y, "+", color=COLORS["best"], markersize=7, label=TRACED_NAME, zorder=4
         )
     if figure.limit is not None:
-        axes.plot(figure.limit.x, figure.limit.y, "_", color=COLORS["limit"], markersize=9, label=LIMIT_NAME, zorder=4)
+        style: dict[str, Any] = {"color": COLORS["limit"], "linestyle": "--", "linewidth": 1.5, "zorder": 4}
+        axes.plot(figure.limit.x, figure.limit.y, label=LIMIT_NAME, drawstyle="steps-post", **style)
     low, high = axes.get_xlim()
     axes.set_xlim(min(low, 0.25), max(high, 1.0))
     axes.set_ylim(bottom=0)

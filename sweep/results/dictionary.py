@@ -76,8 +76,8 @@ FILES = {
     LEFT_OUT: "where each light is left out of a search in turn: signal_type, signal, the optimum that was "
     "`seen`, the same design `with_it`, and the `fall`",
     SEARCH_LOG: "every evaluation of the search and of its front: " + ", ".join(search_schema(["<parameters>"]).names),
-    FRONT: "what the search found at each level of sensitivity, and the limit there: "
-    + ", ".join(front_schema(["<parameters>"]).names),
+    FRONT: "what the search found at each level of sensitivity, and the limit there; between two levels rows with the "
+    "limit alone: " + ", ".join(front_schema(["<parameters>"]).names),
     CURVES: "a row per curve and wavelength: " + ", ".join(SCHEMA.names),
     POINTS: "what the clouds draw: design_id, signal_type, signal, channel, dn",
     RECOGNITION: "raw patches told apart by classifiers, where a study asks for them, with 95 % intervals",

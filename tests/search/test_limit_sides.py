@@ -230,6 +230,20 @@ def test_the_limit_is_that_of_a_milp(coarse: Problem, seed: int) -> None:
         assert largest(problem, limit.proven) == pytest.approx(limit.proven, abs=1e-3)
 
 
+@pytest.mark.parametrize("seed", [0, 1, 3, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(20, 40))])
+def test_a_proof_bounds_filters_of_other_sensitivities(coarse: Problem, seed: int) -> None:
+    problem = random_problem(coarse, seed)
+    own = problem.constraints["sensitivity"].min
+    assert own is not None
+    levels = [own + off for off in (-0.08, -0.02, 0.0, 0.01, 0.04)]
+    limit = limit_of(problem, sensitivities=levels)
+    assert limit.elsewhere[2] == pytest.approx(limit.proven, abs=2e-4 + 1e-3)
+    assert list(limit.elsewhere) == sorted(limit.elsewhere, reverse=True)
+    for level, most in zip(levels, limit.elsewhere, strict=True):
+        there = replace(problem, constraints={**problem.constraints, "sensitivity": Bound(min=level)})
+        assert largest(there, most + 1e-3) < most + 1e-3  # by a MILP of its own, no filter exceeds it
+
+
 @pytest.mark.slow
 def test_two_hundred_limits_are_those_of_a_milp(coarse: Problem) -> None:
     mixed = 0

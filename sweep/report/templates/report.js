@@ -93,7 +93,7 @@ function points(rows, name, marker, extra) {
   }, extra);
 }
 
-/* What the search found at its levels, and what is proven there: between two levels the limit at the lower one holds. */
+/* What the search found at its levels, and what is proven there and between them: each step holds up to the next. */
 function levelTraces(drawn) {
   const found = [];
   if (drawn.traced) found.push({type: drawnBy, mode: "markers", name: "found by the search", x: drawn.traced[0],
