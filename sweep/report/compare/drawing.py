@@ -55,7 +55,8 @@ class FrontsFigure:
 def draw_fronts(figure: FrontsFigure) -> Figure:
     """Draw the fronts: a color and a dash per run, a mark per front, so that they differ in gray, too.
 
-    Of designs the front is a staircase: between two of them there is none. What the search traces is continuous.
+    Of designs the front is a staircase: between two of them there is none. What the search found are points at its
+    levels of sensitivity: between these nothing is known of it.
     """
     drawn, axes = canvas(9.0, 5.0)
     for line, marker in zip(figure.lines, itertools.cycle(_MARKERS)):
@@ -64,13 +65,13 @@ def draw_fronts(figure: FrontsFigure) -> Figure:
             line.x,
             line.y,
             color=color,
-            linestyle=_DASHES[line.run % len(_DASHES)],
+            linestyle="none" if line.traced else _DASHES[line.run % len(_DASHES)],
             linewidth=1.4,
             marker=marker,
             markersize=6,
             markerfacecolor="white" if line.traced else color,
-            markevery=np.unique(np.linspace(0, len(line.x) - 1, _MARKS_PER_LINE).round().astype(int)).tolist(),
-            drawstyle="default" if line.traced else "steps-pre",
+            markevery=1 if line.traced else _some_of(len(line.x)),
+            drawstyle="steps-pre",
             label=line.name,
         )
     for mark in figure.best:
@@ -86,6 +87,11 @@ def draw_fronts(figure: FrontsFigure) -> Figure:
         place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0}
         axes.legend(fontsize=8, frameon=False, title=title, title_fontsize=8, **place)
     return drawn
+
+
+def _some_of(n: int) -> list[int]:
+    """Points of a long line that are marked."""
+    return [int(at) for at in np.unique(np.linspace(0, n - 1, _MARKS_PER_LINE).round())]
 
 
 def pictures(figure: FrontsFigure) -> dict[str, bytes]:
