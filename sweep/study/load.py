@@ -25,15 +25,19 @@ def load_study(
     data: Path | None = None,
     step_nm: float | None = None,
     kept: KeptSources | None = None,
+    changes: Mapping[str, str] = {},
 ) -> Study:
     """Read and check a study file.
 
     Files that it names are looked for in `data`, when given, and then beside the study. `step_nm` replaces the step of
     its wavelength grid. `kept`: curves on that grid to take instead of those in files, `qe:<curve>` and
-    `light:<type>:<name>`, each ndarray[n_wavelengths]. Raises StudyError with one fault per thing wrong: file:line,
+    `light:<type>:<name>`, each ndarray[n_wavelengths]. `changes`: dotted key -> value to take instead, as a study file
+    would have it. Raises StudyError with one fault per thing wrong: file:line,
     key, value, what is allowed, nearest name.
     """
     document = Document(path)
+    for key, text in changes.items():
+        document.change(key, text)
     section = _section(document)
     if step_nm is not None:
         grid = section.wavelengths

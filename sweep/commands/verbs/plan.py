@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from ...errors import StudyError
-from ..options import DataFolder, StudyPath
+from ..options import Changes, DataFolder, StudyPath, changes_of
 from ..panels import OF_STUDIES
 
 PANEL = OF_STUDIES
@@ -19,6 +19,7 @@ def plan(
     study: StudyPath,
     data: DataFolder = None,
     tolerance: Annotated[float | None, typer.Option(help="Tolerance of a CSD, DN.", show_default="the study's")] = None,
+    changes: Changes = None,
     explain: Annotated[bool, typer.Option("--explain", help="Show the alternatives that were rejected.")] = False,
 ) -> None:
     """Say which effects each scene calls for, and why, without running it."""
@@ -29,7 +30,8 @@ def plan(
 
     if tolerance is not None and not 0 < tolerance < math.inf:
         raise StudyError(f"--tolerance {tolerance:g}: must be above 0 DN, and finite")
+    loaded = load_study(study, data, changes=changes_of(changes))
     with ProgressDisplay() as display:
-        planned = with_plans(load_study(study, data), os.cpu_count() or 1, display.update, tolerance)
+        planned = with_plans(loaded, os.cpu_count() or 1, display.update, tolerance)
     for line in plan_lines(planned, explain=explain):
         typer.echo(line)
