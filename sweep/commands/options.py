@@ -33,6 +33,8 @@ Changes = Annotated[
     typer.Option("--set", metavar="KEY=VALUE", help="A key of the study: constraints.sensitivity.min=0.92."),
 ]
 
+AllowCode = Annotated[bool, typer.Option("--allow-code", help="Run the Python files that the study names.")]
+
 
 def changes_of(given: list[str] | None) -> dict[str, str]:
     """Dotted keys and values of `--set`; raises StudyError for what is no KEY=VALUE."""

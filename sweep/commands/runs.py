@@ -32,6 +32,7 @@ class Manner:
     dry_run: bool
     wishes: runner.Wishes
     changes: dict[str, str]
+    allow_code: bool
     opens: bool
 
     @property
@@ -45,7 +46,7 @@ def run_one(path: Path, manner: Manner) -> None:
     if manner.backend not in runner.BACKENDS:
         allowed = ", ".join(runner.BACKENDS)
         raise SweepError(Fault("unknown backend", key="--backend", value=manner.backend, allowed=allowed))
-    loaded = load_study(path, manner.data, changes=manner.changes)
+    loaded = load_study(path, manner.data, changes=manner.changes, allow_code=manner.allow_code)
     folder, note = runner.output_folder(manner.output / folder_name(loaded.name), loaded)
     if note is not None:
         typer.echo(f"Note: {note}.", err=True)

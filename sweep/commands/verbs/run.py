@@ -9,7 +9,7 @@ import typer
 
 from ...errors import InterruptedRunError, SweepError
 from ..endings import say_lines
-from ..options import Changes, DataFolder, Outputs, StudyPaths, changes_of
+from ..options import AllowCode, Changes, DataFolder, Outputs, StudyPaths, changes_of
 from ..panels import OF_STUDIES
 
 PANEL = OF_STUDIES
@@ -26,6 +26,7 @@ def run(
     fail_fast: Annotated[bool, typer.Option("--fail-fast", help="Stop at the first design that fails.")] = False,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Compute failed designs again.")] = False,
     changes: Changes = None,
+    allow_code: AllowCode = False,
     opens: Annotated[bool, typer.Option("--open", help="Open the report in the browser.")] = False,
 ) -> int:
     """Run studies one after the other: results, figures and report go to OUTPUT/<study>. The same command continues an
@@ -37,7 +38,7 @@ def run(
 
     wishes = Wishes(fail_fast, retry_failed)
     changed = changes_of(changes)
-    manner = Manner(data, output, jobs, backend, scheduler, dry_run, wishes, changed, opens)
+    manner = Manner(data, output, jobs, backend, scheduler, dry_run, wishes, changed, allow_code, opens)
     if len(studies) == 1:
         run_one(studies[0], manner)
         return 0
