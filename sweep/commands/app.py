@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import typer
 
 from ..found import files_in
@@ -15,6 +17,23 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version  # noqa: PLC0415  (seldom asked for)
+
+        typer.echo(f"sweep {version('cfa-sweep')}")
+        raise typer.Exit
+
+
+_Version = Annotated[
+    bool, typer.Option("--version", callback=_version, is_eager=True, help="Say the version, and end.")
+]
+
+
+@app.callback()
+def _whole(_: _Version = False) -> None: ...
 
 
 def _add_verbs() -> None:

@@ -36,11 +36,11 @@ def ends_in_lines(command: Callable[[], object]) -> NoReturn:
             sys.stdout.flush()
         code = found if isinstance(found, int) else 0
         if code == _INTERRUPTED:
-            _say(["interrupted"])
+            say_lines(["interrupted"])
     except Exception as error:
         code = _said(error)
     except KeyboardInterrupt:
-        _say(["interrupted"])
+        say_lines(["interrupted"])
         code = _INTERRUPTED
     if code == _BROKEN_PIPE or not _flushed():
         _drop_output()
@@ -49,7 +49,7 @@ def ends_in_lines(command: Callable[[], object]) -> NoReturn:
 
 def end_now(error: SweepError) -> NoReturn:
     """Say what went wrong and leave at once, whatever other threads are at."""
-    _say(error.faults)
+    say_lines(error.faults)
     _flushed()
     os._exit(error.exit_code)
 
@@ -80,18 +80,18 @@ def _interrupt(_number: int, _frame: FrameType | None) -> None:
 def _said(error: Exception) -> int:
     """Say what went wrong; the exit code. A fault of the program is raised again."""
     if isinstance(error, SweepError):
-        _say(error.faults)
+        say_lines(error.faults)
         return error.exit_code
     if isinstance(error, BrokenPipeError):
         return _BROKEN_PIPE
     if isinstance(error, typer.Abort):
-        _say(["interrupted"])
+        say_lines(["interrupted"])
         return _INTERRUPTED
     text = _text(error)
     if text is None:
         raise error
     if text:
-        _say([text])
+        say_lines([text])
     return 2
 
 
@@ -123,7 +123,8 @@ def _usage(error: Any) -> str:
     return f"{error.format_message().rstrip('.')}{where}"
 
 
-def _say(faults: Iterable[object]) -> None:
+def say_lines(faults: Iterable[object]) -> None:
+    """A line on stderr for each."""
     with suppress(OSError, ValueError):
         for fault in faults:
             typer.echo(f"sweep: {' '.join(str(fault).split())}", err=True)

@@ -30,16 +30,18 @@ class Given:
     curves: Mapping[str, Curves] = field(default_factory=dict)
 
 
-def opened_study(name: Path | str, data: Path | str | None = None) -> LoadedStudy:
+def opened_study(name: Path | str, data: Path | str | None = None, *, allow_code: bool = False) -> LoadedStudy:
     """Load and check a study: a file, or the name of one in `studies/` or of one that comes with the package.
 
     >>> import sweep
     >>> sweep.load_study("stopband")
     <study stopband: 116,286 designs on RGGB, RCCC, RCCB, RYYCy, RYNCy>
 
-    `data`: folder that its files are looked for in first. Raises SweepError with a line for each thing that is wrong.
+    `data`: folder that its files are looked for in first. `allow_code`: Python files that the study names may run.
+    Raises SweepError with a line for each thing that is wrong.
     """
-    return LoadedStudy(load_study(study_path(Path(name)), None if data is None else Path(data)))
+    folder = None if data is None else Path(data)
+    return LoadedStudy(load_study(study_path(Path(name)), folder, allow_code=allow_code))
 
 
 def finished_run(folder: Path | str) -> FinishedRun:

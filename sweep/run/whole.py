@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..disk import read_facts
-from ..errors import InfeasibleError, StudyError
+from ..errors import Fault, InfeasibleError, StudyError
 from ..results.facts import Provenance, lacking
 from ..results.folder import begin
 from ..results.inventory import Inventory
@@ -18,6 +18,7 @@ from ..results.journal import Journal
 from ..results.lock import LOCK, locked
 from ..results.tables import PROVENANCE, RESOLVED, RESULTS
 from ..study import Study
+from ..study.reach import out_of_reach
 from ..types import Progress
 from .files import Making, files_of, fits
 from .plans import with_plans
@@ -68,6 +69,8 @@ def run_study(
     SIGTERM, which are taken here unless the caller takes them into `stop`.
     """
     started = time.monotonic()
+    if study.search is not None and (beyond := out_of_reach(study, study.search.space, study.search.scenario)):
+        raise InfeasibleError([Fault(f"{study.name}: no design can be feasible"), *beyond])
     with stop_on_signals(stop) as own, workers(Workers(n_jobs, own, backend, scheduler)) as crew, locked(output):
         inventory = Inventory(output)
         mended, wrong, how = inventory.wrong_lists(), _wrong(inventory, study), _how(inventory)

@@ -46,6 +46,27 @@ class Document:
             )
         self.data: dict[str, Any] = self._tree.root
 
+    def change(self, key: str, text: str) -> None:
+        """Set a dotted key to a value written as in a study file. Raises StudyError where it cannot stand there."""
+        said = f"--set {key}"
+        value = Tree(f"value: {text}", said, _MOST[1]).root["value"]
+        *path, last = key.split(".")
+        node: Any = self.data
+        for at, part in enumerate(path):
+            if isinstance(node, list) and part.isdecimal() and int(part) < len(node):
+                node = node[int(part)]
+            else:
+                node = node.setdefault(part, {}) if isinstance(node, dict) else None
+            if not isinstance(node, dict | list):
+                where = ".".join(path[: at + 1])
+                raise StudyError(Fault(f"`{where}` is no mapping in {self.file}", said, allowed="the whole of it"))
+        if isinstance(node, list):
+            if not last.isdecimal() or int(last) >= len(node):
+                raise StudyError(Fault("no such entry of the list", said, value=last, allowed=f"0 to {len(node) - 1}"))
+            node[int(last)] = value
+        else:
+            node[last] = value
+
     def line(self, path: Sequence[Key]) -> int:
         """Line of the deepest key of `path` that the file has, from 1."""
         node: Any = self.data

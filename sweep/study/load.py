@@ -25,15 +25,21 @@ def load_study(
     data: Path | None = None,
     step_nm: float | None = None,
     kept: KeptSources | None = None,
+    changes: Mapping[str, str] = {},
+    *,
+    allow_code: bool = False,
 ) -> Study:
     """Read and check a study file.
 
     Files that it names are looked for in `data`, when given, and then beside the study. `step_nm` replaces the step of
     its wavelength grid. `kept`: curves on that grid to take instead of those in files, `qe:<curve>` and
-    `light:<type>:<name>`, each ndarray[n_wavelengths]. Raises StudyError with one fault per thing wrong: file:line,
-    key, value, what is allowed, nearest name.
+    `light:<type>:<name>`, each ndarray[n_wavelengths]. `changes`: dotted key -> value to take instead, as a study file
+    would have it. `allow_code`: code of Python files that the study names may run. Raises StudyError with one fault per
+    thing wrong: file:line, key, value, what is allowed, nearest name.
     """
     document = Document(path)
+    for key, text in changes.items():
+        document.change(key, text)
     section = _section(document)
     if step_nm is not None:
         grid = section.wavelengths
@@ -42,7 +48,7 @@ def load_study(
         )
     if data is not None and not is_folder(data):
         raise StudyError(Fault("no such folder", None, None, "--data", str(data)))
-    return resolve(document, section, [*([data] if data is not None else []), path.parent], kept)
+    return resolve(document, section, [*([data] if data is not None else []), path.parent], kept, allow_code=allow_code)
 
 
 def study_of_keys(keys: Mapping[str, Any], folder: Path, given: Mapping[str, Curves] = {}) -> Study:

@@ -41,10 +41,11 @@ class _Resolver:
         folders: list[Path],
         kept: KeptSources | None,
         given: Mapping[str, Curves],
+        allow_code: bool,
     ) -> None:
         self.document = document
         self.section = section
-        self.sources = Sources(document, section.wavelengths, folders, kept, given)
+        self.sources = Sources(document, section.wavelengths, folders, kept, given, allow_code)
         self.faults = self.sources.faults
         self.add = self.sources.add
         self.unknown = self.sources.unknown
@@ -281,9 +282,12 @@ def resolve(
     folders: list[Path],
     kept: KeptSources | None = None,
     given: Mapping[str, Curves] = {},
+    *,
+    allow_code: bool = False,
 ) -> Study:
     """Make the study; `folders` are searched in order for its files. Raises StudyError with every fault found.
 
-    `kept`: curves to take instead of those in files, `given`: files that are not on a disk; see `Sources`.
+    `kept`: curves to take instead of those in files, `given`: files that are not on a disk; `allow_code`: Python
+    files that it names may run. See `Sources`.
     """
-    return _Resolver(document, section, folders, kept, given).resolve()
+    return _Resolver(document, section, folders, kept, given, allow_code).resolve()

@@ -47,7 +47,7 @@ class Modification(Documented):
 
     cfa: Name
     """One of `cfas`."""
-    family: Annotated[Name, Field(description=f"One of {told()}.")] = "stopband"
+    family: Annotated[Name, Field(description=f"One of {told()}; or FILE.py:CLASS of your own.")] = "stopband"
     channel: Annotated[
         list[Name], BeforeValidator(_listed, json_schema_input_type=list[Name] | Name), Field(min_length=1)
     ]

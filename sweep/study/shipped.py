@@ -9,6 +9,7 @@ from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
 from ..disk import is_file, is_folder
+from ..errors import Fault, StudyError, nearest
 
 _STUDIES, _SHARED = "studies", "share/cfa-sweep/studies"
 _KINDS = (".yaml", ".yml")
@@ -41,11 +42,17 @@ def shipped_names() -> list[str]:
 def study_path(given: Path) -> Path:
     """The file that is meant: the path itself, or, for a name alone, that study of `studies/` or of the project.
 
-    A name that is nowhere stays as it is: reading it says so.
+    Raises StudyError, with the nearest name, for a name that is nowhere.
     """
     name = given.name
     if is_file(given) or is_folder(given) or name != str(given) or given.suffix in _KINDS:
         return given
-    folders = [Path(_STUDIES), *([] if shipped_folder() is None else [shipped_folder()])]
-    found = (folder / f"{name}{kind}" for folder in folders if folder is not None for kind in _KINDS)
-    return next((path for path in found if is_file(path)), given)
+    shipped = shipped_folder()
+    folders = [Path(_STUDIES), *([] if shipped is None else [shipped])]
+    for path in (folder / f"{name}{kind}" for folder in folders for kind in _KINDS):
+        if is_file(path):
+            return path
+    own = sorted(path.stem for path in folders[0].glob("*") if path.suffix in _KINDS)
+    known = list(dict.fromkeys([*own, *shipped_names()]))
+    problem = "no such file, and no study of that name"
+    raise StudyError(Fault(problem, value=name, allowed=", ".join(known), nearest=nearest(name, known)))

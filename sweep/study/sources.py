@@ -46,6 +46,7 @@ class Sources:
     """Reads the files of one study, each once; collects faults, warnings and digests.
 
     `kept`: the curves of a finished run; no file is read then. `given`: files that are not on a disk, by their names.
+    `allow_code`: code of Python files that the study names may run.
     """
 
     document: Document
@@ -53,6 +54,7 @@ class Sources:
     folders: Sequence[Path]
     kept: KeptSources | None = None
     given: Mapping[str, Curves] = field(default_factory=dict)
+    allow_code: bool = False
     faults: list[Fault] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     digests: dict[str, str] = field(default_factory=dict)

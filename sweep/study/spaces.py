@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 from ..camera.mosaic import Mosaic
 from ..camera.sensor import SensorCurves
 from ..curves.builtin.surrogate import surrogate_parameters
-from ..designs.family import Parameter
+from ..designs.family import Family, Parameter
+from ..designs.plugin import PluginFamily, is_plugin, plugin_parts, read_plugin
 from ..designs.registry import FAMILIES, build_family
 from ..designs.space import Filter, Kind, Space
-from ..errors import SweepError, nearest
+from ..disk import is_file
+from ..errors import Fault, SweepError, nearest
+from ..types import FloatArray
 from .schema import DesignSection, Modification, StudySection
 from .sources import Sources
 from .yaml_tree import Key
@@ -88,14 +92,16 @@ class SpaceBuilder:
         for channel in entry.channel:
             if mosaic is not None and channel not in mosaic.channels:
                 self.sources.unknown((*path, "channel"), f"channel of {entry.cfa}", channel, list(mosaic.channels))
-        if entry.family not in FAMILIES:
+        own = is_plugin(entry.family)
+        if own and not self.sources.allow_code:
+            problem = "the study names a Python file, whose code would run"
+            self.sources.add((*path, "family"), problem, entry.family, "--allow-code, if you trust it")
+        elif own and self.section.production.edge_shift_nm:
+            self.sources.add((*path, "family"), "a family of one's own has no edges that production could shift")
+        elif not own and entry.family not in FAMILIES:
             self.sources.unknown((*path, "family"), "family", entry.family, list(FAMILIES))
-        elif len(entry.channel) != FAMILIES[entry.family].n_modified:
-            self.sources.add(
-                (*path, "channel"),
-                f"{entry.family} replaces {FAMILIES[entry.family].n_modified} channel(s)",
-                entry.channel,
-            )
+        elif len(entry.channel) != (n_modified := 1 if own else FAMILIES[entry.family].n_modified):
+            self.sources.add((*path, "channel"), f"{entry.family} replaces {n_modified} channel(s)", entry.channel)
         elif len(set(entry.channel)) < len(entry.channel):
             self.sources.add((*path, "channel"), "a channel is named twice", entry.channel)
 
@@ -125,7 +131,7 @@ class SpaceBuilder:
             self.sensor.curve(entry.to) if isinstance(entry.to, str) else None if entry.to is None else base * entry.to
         )
         try:
-            family = build_family(entry.family, self.section.wavelengths.nodes_nm, base, target, entry.options)
+            family = self._family(entry, base, target)
         except SweepError as error:
             for fault in error.faults:
                 self.sources.add((*path, "family"), fault.problem, fault.value, fault.allowed)
@@ -135,6 +141,27 @@ class SpaceBuilder:
             return []
         made = Filter(family, tuple(entry.channel), entry.base, "" if entry.to is None else str(entry.to))
         return [Space(kind, name, entry.cfa, made, tuple(ordered), gridded=kind != "search")]
+
+    def _family(self, entry: Modification, base: FloatArray, target: FloatArray | None) -> Family:
+        """The family over its curves; raises SweepError."""
+        nodes_nm = self.section.wavelengths.nodes_nm
+        if not is_plugin(entry.family):
+            return build_family(entry.family, nodes_nm, base, target, entry.options)
+        file, _ = plugin_parts(entry.family)
+        found = next((folder / file for folder in self.sources.folders if is_file(folder / file)), None)
+        if found is None:
+            searched = ", ".join(str(folder) for folder in self.sources.folders)
+            raise SweepError(Fault("no such file", value=file, allowed=f"a path relative to {searched}"))
+        source, self.sources.digests[file] = read_plugin(found)
+        own = PluginFamily(entry.family, source, nodes_nm, base, target)
+        bounds = f"0 and {entry.base}" if own.below_base else "0 and 1"
+        note = (
+            f"{entry.family} runs code of that file: its gradients are differences, and its filters are taken for any "
+            f"between {bounds}, which each of them is checked to be"
+        )
+        if note not in self.sources.warnings:
+            self.sources.warnings.append(note)
+        return cast(Family, own)
 
     def _axes(
         self,

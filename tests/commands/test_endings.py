@@ -32,7 +32,7 @@ SWEPT = BASE.split("constraints:", maxsplit=1)[0]
         (["run", "x.yaml", "--jobs", "many"], "--jobs"),
         (["run", "x.yaml", "--job", "2"], "No such option: --job"),
         (["chek", "x.yaml"], "No such command 'chek'"),
-        (["check", "a", "b"], "unexpected extra argument"),
+        (["check", "a.yaml", "b"], "unexpected extra argument"),
         (["check", "nowhere.yaml"], "nowhere.yaml: cannot be read: No such file or directory"),
     ],
 )

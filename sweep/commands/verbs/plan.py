@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from ...errors import StudyError
-from ..options import DataFolder, StudyPath
+from ..options import AllowCode, Changes, DataFolder, StudyPath, changes_of
 from ..panels import OF_STUDIES
 
 PANEL = OF_STUDIES
@@ -19,6 +19,8 @@ def plan(
     study: StudyPath,
     data: DataFolder = None,
     tolerance: Annotated[float | None, typer.Option(help="Tolerance of a CSD, DN.", show_default="the study's")] = None,
+    changes: Changes = None,
+    allow_code: AllowCode = False,
     explain: Annotated[bool, typer.Option("--explain", help="Show the alternatives that were rejected.")] = False,
 ) -> None:
     """Say which effects each scene calls for, and why, without running it."""
@@ -29,7 +31,10 @@ def plan(
 
     if tolerance is not None and not 0 < tolerance < math.inf:
         raise StudyError(f"--tolerance {tolerance:g}: must be above 0 DN, and finite")
+    loaded = load_study(study, data, changes=changes_of(changes), allow_code=allow_code)
     with ProgressDisplay() as display:
-        planned = with_plans(load_study(study, data), os.cpu_count() or 1, display.update, tolerance)
+        planned = with_plans(loaded, os.cpu_count() or 1, display.update, tolerance)
+    for warning in loaded.warnings:
+        typer.echo(f"Note: {warning}.")
     for line in plan_lines(planned, explain=explain):
         typer.echo(line)

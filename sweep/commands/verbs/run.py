@@ -1,26 +1,23 @@
-"""Run a study."""
+"""Run studies."""
 
 from __future__ import annotations
 
-import os
-import sys
 import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from ...errors import Fault, InterruptedRunError, SweepError
-from ..endings import end_now
-from ..finish import finish
-from ..options import DataFolder, Outputs, StudyPath
+from ...errors import InterruptedRunError, SweepError
+from ..endings import say_lines
+from ..options import AllowCode, Changes, DataFolder, Outputs, StudyPaths, changes_of
 from ..panels import OF_STUDIES
 
 PANEL = OF_STUDIES
 
 
 def run(
-    study: StudyPath,
+    studies: StudyPaths,
     data: DataFolder = None,
     output: Outputs = Path("outputs"),
     jobs: Annotated[int | None, typer.Option(min=1, help="Workers.", show_default="all cores")] = None,
@@ -29,42 +26,32 @@ def run(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what is to do and what it takes.")] = False,
     fail_fast: Annotated[bool, typer.Option("--fail-fast", help="Stop at the first design that fails.")] = False,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Compute failed designs again.")] = False,
-) -> None:
-    """Run a study: results, figures and report go to OUTPUT/<study>. The same command continues an interrupted run,
-    and makes again what is missing or damaged. Files that are not its own stay (run.json lists those that are).
+    changes: Changes = None,
+    allow_code: AllowCode = False,
+    opens: Annotated[bool, typer.Option("--open", help="Open the report in the browser.")] = False,
+) -> int:
+    """Run studies one after the other: results, figures and report go to OUTPUT/<study>. The same command continues an
+    interrupted run, and makes again what is missing or damaged. Files that are not its own stay (run.json lists those
+    that are). Of several studies, one that cannot be run does not stop the others.
     """
     began_s = time.monotonic()
-    from ... import run as runner
-    from ...study import folder_name, load_study
-    from ..audit import mend_audit
-    from ..progress import ProgressDisplay
+    from ...run import Wishes
+    from ..runs import Manner, run_one
 
-    if backend not in runner.BACKENDS:
-        allowed = ", ".join(runner.BACKENDS)
-        raise SweepError(Fault("unknown backend", key="--backend", value=backend, allowed=allowed))
-    loaded, workers = load_study(study, data), jobs or os.cpu_count() or 1
-    folder, note = runner.output_folder(output / folder_name(loaded.name), loaded)
-    if note is not None:
-        typer.echo(f"Note: {note}.", err=True)
-    if dry_run:
-        with ProgressDisplay() as display:
-            found = runner.estimate(loaded, folder, workers, display.update)
-        for line in runner.estimate_lines(found, folder):
-            typer.echo(line)
-        return
-    kind, wishes = runner.usable_backend(backend), runner.Wishes(fail_fast, retry_failed)
-    if kind != backend:
-        typer.echo(f"Note: no shared memory (/dev/shm) for worker processes; backend {kind}.", err=True)
-    try:
-        with runner.stop_on_signals(ends_process=True) as stop:
-            with ProgressDisplay() as display:
-                given = (loaded, folder, workers, display.update, sys.argv)
-                made = runner.run_study(*given, backend=kind, scheduler=scheduler, wishes=wishes, stop=stop)
-            if not made:
-                typer.echo(f"Note: {folder} holds this very study, finished; nothing was computed.", err=True)
-            mend_audit(folder, data)
-            finish(folder, began_s, mend=True)
-    except InterruptedRunError as error:
-        if kind == "threading":  # what its threads are at cannot be broken off
-            end_now(error)
-        raise
+    wishes = Wishes(fail_fast, retry_failed)
+    changed = changes_of(changes)
+    manner = Manner(data, output, jobs, backend, scheduler, dry_run, wishes, changed, allow_code, opens)
+    if len(studies) == 1:
+        run_one(studies[0], manner, began_s)
+        return 0
+    code = 0
+    for path in studies:
+        typer.echo(f"== {path} ==")
+        try:
+            run_one(path, manner, time.monotonic())
+        except InterruptedRunError:
+            raise
+        except SweepError as error:  # the others are run all the same
+            say_lines(error.faults)
+            code = max(code, error.exit_code)
+    return code

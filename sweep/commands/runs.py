@@ -1,0 +1,80 @@
+"""Run one study as the command asks, or say what it would take."""
+
+from __future__ import annotations
+
+import os
+import sys
+import webbrowser
+from dataclasses import dataclass
+from pathlib import Path
+
+import typer
+
+from .. import run as runner
+from ..errors import Fault, InterruptedRunError, SweepError
+from ..results.names import REPORT
+from ..study import folder_name, load_study
+from .audit import mend_audit
+from .endings import end_now
+from .finish import finish
+from .progress import ProgressDisplay
+
+
+@dataclass(frozen=True)
+class Manner:
+    """How studies are run; see the options of `sweep run`. `changes`: dotted key -> value instead of the file's."""
+
+    data: Path | None
+    output: Path
+    jobs: int | None
+    backend: str
+    scheduler: str | None
+    dry_run: bool
+    wishes: runner.Wishes
+    changes: dict[str, str]
+    allow_code: bool
+    opens: bool
+
+    @property
+    def workers(self) -> int:
+        """Of this machine."""
+        return self.jobs or os.cpu_count() or 1
+
+
+def run_one(path: Path, manner: Manner, began_s: float) -> None:
+    """Run a study, or continue it, and draw its report; errors as for `run_study`.
+
+    `began_s`: when the user began to wait, by the monotonic clock.
+    """
+    if manner.backend not in runner.BACKENDS:
+        allowed = ", ".join(runner.BACKENDS)
+        raise SweepError(Fault("unknown backend", key="--backend", value=manner.backend, allowed=allowed))
+    loaded = load_study(path, manner.data, changes=manner.changes, allow_code=manner.allow_code)
+    folder, note = runner.output_folder(manner.output / folder_name(loaded.name), loaded)
+    if note is not None:
+        typer.echo(f"Note: {note}.", err=True)
+    if manner.dry_run:
+        with ProgressDisplay() as display:
+            found = runner.estimate(loaded, folder, manner.workers, display.update)
+        for line in runner.estimate_lines(found, folder):
+            typer.echo(line)
+        return
+    kind = runner.usable_backend(manner.backend)
+    if kind != manner.backend:
+        typer.echo(f"Note: no shared memory (/dev/shm) for worker processes; backend {kind}.", err=True)
+    try:
+        with runner.stop_on_signals(ends_process=True) as stop:
+            with ProgressDisplay() as display:
+                given = (loaded, folder, manner.workers, display.update, sys.argv)
+                how = manner.wishes
+                made = runner.run_study(*given, backend=kind, scheduler=manner.scheduler, wishes=how, stop=stop)
+            if not made:
+                typer.echo(f"Note: {folder} holds this very study, finished; nothing was computed.", err=True)
+            mend_audit(folder, manner.data)
+            finish(folder, began_s, mend=True)
+    except InterruptedRunError as error:
+        if kind == "threading":  # what its threads are at cannot be broken off
+            end_now(error)
+        raise
+    if manner.opens and not webbrowser.open((folder / REPORT).absolute().as_uri()):
+        typer.echo(f"Note: no browser was found for {folder / REPORT}.", err=True)

@@ -1,0 +1,184 @@
+"""A family that a user wrote, in a Python file of his own; only its parameters and its curves are asked for."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from ..disk import read_input
+from ..errors import Fault, SweepError
+from ..types import FloatArray
+from .family import Parameter
+
+_MOST_BYTES = 1_000_000
+_STEP = 1e-5
+"""Half of a central difference, in units of a parameter's range."""
+_SLACK = 1e-9
+SEPARATOR = ".py:"
+
+
+def is_plugin(kind: str) -> bool:
+    """Whether a family's name is that of a class in a Python file: `my_filters.py:Gauss`."""
+    return SEPARATOR in kind
+
+
+def plugin_parts(kind: str) -> tuple[str, str]:
+    """The file and the name of the class."""
+    file, _, name = kind.partition(SEPARATOR)
+    return f"{file}.py", name
+
+
+class PluginFamily:
+    """A family by a class of a user's file, `kind`: FILE.py:CLASS.
+
+    The class has `parameters`, a list of (name, low, high) or (name, low, high, default), is made of (wavelength_nm,
+    base, target), and has `curves(x)`: ndarray[n_designs, n_parameters] -> QE, ndarray[n_designs, n_wavelengths]. It
+    may have `violation(x)`, ndarray[n_designs, n], met where <= 0, and `below_base = True`, which promises that no
+    curve of a well-formed design is above the base. Such curves are checked to be within 0 and 1, and below the base
+    where that is promised, so that these bounds hold for all of them. Gradients are central differences. A row of
+    `curves(x)` must not depend on the other rows.
+
+    `source` is the text of the file; a worker process gets it, not the file.
+    """
+
+    n_modified = 1
+    start_dimensions: int | None = None
+
+    def __init__(self, kind: str, source: str, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None):
+        self.kind = kind
+        self._given = kind, source, wavelength_nm, base, target
+        self._base = base
+        made = self._called(_class_of(kind, source), wavelength_nm, base, target)
+        self._own = made
+        self.below_base = getattr(made, "below_base", False) is True
+        self.parameters = _parameters(kind, getattr(made, "parameters", None))
+
+    def __reduce__(self) -> tuple[type[PluginFamily], tuple[Any, ...]]:
+        return PluginFamily, self._given
+
+    def _called(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """What a function of the user's returns; whatever it raises is one line."""
+        try:
+            return function(*arguments)
+        except Exception as error:  # it may raise anything
+            problem = " ".join(f"{self.kind}: {type(error).__name__}: {error}".split())
+            raise SweepError(Fault(problem[:300])) from None
+
+    def _array(self, name: str, x: FloatArray, width: int | None) -> FloatArray:
+        """What a method gives for a block of designs, ndarray[n_designs, width]; else raises SweepError."""
+        try:
+            found = np.asarray(self._called(getattr(self._own, name), x.copy()), dtype=float)
+        except (TypeError, ValueError):
+            raise SweepError(Fault(f"{self.kind}: {name} gives no array of numbers")) from None
+        if found.ndim != 2 or len(found) != len(x) or (width is not None and found.shape[1] != width):
+            allowed = f"({len(x)}, {'n' if width is None else width})"
+            raise SweepError(Fault(f"{self.kind}: {name} has another shape", value=found.shape, allowed=allowed))
+        if not np.isfinite(found).all():
+            raise SweepError(Fault(f"{self.kind}: {name} is not finite"))
+        return found
+
+    def curves(self, x: FloatArray) -> FloatArray:
+        """QE of the modified channel, ndarray[n_designs, 1, n_wavelengths]; see `Family.curves`.
+
+        Raises SweepError where that of a well-formed design is out of its bounds; others are cut off at 0 and 1.
+        """
+        found = self._array("curves", x, self._base.size)
+        well_formed = found[(self.violation(x) <= _SLACK).all(axis=1)]
+        top = self._base if self.below_base else 1.0
+        if (well_formed < -_SLACK).any() or (well_formed > top + _SLACK).any():
+            allowed = "0 to the base curve" if self.below_base else "0 to 1"
+            ends = f"{well_formed.min():.6g} to {well_formed.max():.6g}"
+            raise SweepError(Fault(f"{self.kind}: a curve is out of its bounds", value=ends, allowed=allowed))
+        return np.clip(found, 0.0, 1.0)[:, None, :]
+
+    def upper(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """The base or 1, which every well-formed curve is checked against; see `Family.upper`."""
+        assert low.shape == high.shape
+        return np.asarray((self._base if self.below_base else np.ones_like(self._base))[None], dtype=float)
+
+    def lower(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """0; see `Family.lower`."""
+        assert low.shape == high.shape
+        return np.zeros((1, self._base.size))
+
+    def hull(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """0 and 1, at which all curves are cut off; see `Family.hull`."""
+        return self.lower(low, high), np.ones((1, self._base.size))
+
+    def gradient(self, x: FloatArray) -> FloatArray:
+        """By central differences, one-sided at the ends of a parameter; see `Family.gradient`."""
+        return self._differences(x, self.curves)
+
+    def violation(self, x: FloatArray) -> FloatArray:
+        """The class's own conditions; one that is always met where it has none."""
+        return self._array("violation", x, None) if hasattr(self._own, "violation") else np.zeros((len(x), 1))
+
+    def violation_gradient(self, x: FloatArray) -> FloatArray:
+        """By differences, ndarray[n, n_parameters]."""
+        return self._differences(x, self.violation).T
+
+    def _differences(self, x: FloatArray, function: Callable[[FloatArray], FloatArray]) -> FloatArray:
+        low, high = (np.array([getattr(p, end) for p in self.parameters]) for end in ("low", "high"))
+        step = np.diag(_STEP * (high - low))
+        above, below = np.minimum(x + step, high), np.maximum(x - step, low)
+        values = function(np.concatenate([above, below]))
+        span = (above - below).diagonal().reshape(-1, *[1] * (values.ndim - 1))
+        return np.asarray((values[: x.size] - values[x.size :]) / span, dtype=float)
+
+    @property
+    def dimensions(self) -> Mapping[str, FloatArray]:
+        """None: nothing is known of its edges."""
+        return {}
+
+    def shifted(self, shift_nm: float) -> PluginFamily:
+        """The same where nothing is shifted; a study with shifts of edges does not take it."""
+        if shift_nm:
+            raise SweepError(Fault(f"{self.kind} has no edges that production could shift"))
+        return self
+
+    def start(self, points: FloatArray) -> FloatArray:
+        """Not needed: a search starts anywhere in its box."""
+        return points
+
+
+def read_plugin(path: Path) -> tuple[str, str]:
+    """The text of a Python file, and its SHA-256; nothing of it runs yet. Raises SweepError."""
+    content = read_input(path, _MOST_BYTES, SweepError)
+    try:
+        return content.decode("utf-8-sig"), hashlib.sha256(content).hexdigest()
+    except UnicodeDecodeError:
+        raise SweepError(Fault("not UTF-8 text", str(path))) from None
+
+
+def _class_of(kind: str, source: str) -> Callable[..., Any]:
+    """Run the text of a file, and give the class that is named in it."""
+    file, name = plugin_parts(kind)
+    module = ModuleType(Path(file).stem)
+    try:
+        exec(compile(source, file, "exec"), module.__dict__)  # what `--allow-code` allows
+    except Exception as error:
+        problem = " ".join(f"{type(error).__name__}: {error}".split())
+        raise SweepError(Fault(f"the code cannot be run: {problem[:300]}", file)) from None
+    found = getattr(module, name, None)
+    if not callable(found):
+        known = ", ".join(key for key, value in vars(module).items() if isinstance(value, type))
+        raise SweepError(Fault("no such class in the file", file, value=name, allowed=known or "a class"))
+    return found  # type: ignore[no-any-return]
+
+
+def _parameters(kind: str, said: Any) -> tuple[Parameter, ...]:
+    """The parameters that a class says."""
+    try:
+        found = tuple(Parameter(str(name), *map(float, numbers)) for name, *numbers in said)
+    except (TypeError, ValueError):
+        found = ()
+    names = [parameter.name for parameter in found]
+    if not found or len(set(names)) < len(names) or not all(p.low < p.high for p in found):
+        allowed = "a list of (name, low, high) with low < high, each name once"
+        raise SweepError(Fault(f"{kind}: no usable `parameters`", allowed=allowed))
+    return found

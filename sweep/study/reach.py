@@ -1,0 +1,64 @@
+"""Constraints that nothing in a box can meet, told from the box alone: no light is simulated."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..designs.space import Space
+from ..errors import Fault
+from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY
+from ..search.problem import SHIFTS
+from .model import Study
+
+_PERCENT = (2.0, 100.0)
+_SLACK = 1e-9
+
+
+def likely_percents(study: Study) -> Iterator[str]:
+    """Bounds on ratios that look like percent."""
+    for name, bound in study.constraints.items():
+        quantity = study.quantities[name]
+        for end, value in (("min", bound.min), ("max", bound.max)):
+            if quantity.role == "light" and value is not None and _PERCENT[0] < value <= _PERCENT[1]:
+                place = f"constraints.{name}.{end}"
+                yield f"{place}: {value:g} of a ratio; is it a percentage? {value:g} % are {value / 100:g}"
+
+
+def out_of_reach(study: Study, space: Space, scenario: str) -> list[Fault]:
+    """A fault for each constraint that no filter of a space can meet, whatever else it meets.
+
+    Of sensitivities by the largest curve that a filter of the box can be, of widths by the box, of CSDs by the longest
+    distance of digital numbers. What is not here may be out of reach all the same.
+    """
+    faults = []
+    most = dict(_most(study, space, scenario))
+    for name, bound in study.constraints.items():
+        plain = study.quantities[name].of or name
+        if bound.min is not None and plain in most and bound.min > most[plain] * (1 + _SLACK):
+            told = math.ceil(most[plain] * 1e4) / 1e4
+            problem = f"out of reach: {name} {bound}; no filter of {space.name} has more than {told:g}"
+            faults.append(Fault(problem, key=f"constraints.{name}"))
+    return faults
+
+
+def _most(study: Study, space: Space, scenario: str) -> Iterator[tuple[str, float]]:
+    """Quantities with the largest values that they can have in a space."""
+    view = study.view(space, scenario)
+    for name, quantity in study.quantities.items():
+        if quantity.squared and not quantity.extreme:
+            yield name, view.longest_distance_dn
+    if space.filter is None:
+        return
+    low, high = (np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max))
+    shifts = [study.edge_shift_nm * s for s in SHIFTS] if study.edge_shift_nm else [0.0]
+    top = np.max([space.filter.family.shifted(shift).hull(low, high)[1] for shift in shifts], axis=0)
+    counts, modified = view.mosaic.counts, list(view.modified)
+    qe = view.qe.copy()
+    qe[modified] = top
+    yield SENSITIVITY, float(top.sum() / view.base_qe.sum())
+    yield CFA_SENSITIVITY, float((qe.sum(axis=1) * counts).sum() / (counts.sum() * view.clear_qe.sum()))
+    for name, rows in space.filter.family.dimensions.items():
+        yield name, float(np.maximum(rows * low, rows * high).sum(axis=1).min())

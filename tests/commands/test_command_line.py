@@ -1,0 +1,126 @@
+"""Names of studies, changed keys, several studies in one call, the version, and what is told before computing."""
+
+from __future__ import annotations
+
+import webbrowser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ruamel.yaml import YAML
+
+import sweep
+from sweep.run import run_study
+from sweep.study import load_study
+from sweep.study.reach import out_of_reach
+from sweep.study.shipped import shipped_folder
+
+from ..build import BASE, load, stopband_study
+from ..commanded import commanded
+from ..conftest import STUDIES
+
+GRID = "{left_nm: [600, 610], left_width_nm: 20, right_nm: 650, right_width_nm: 10}"
+
+
+def small(folder: Path, name: str, after: str = "") -> Path:
+    path = folder / f"{name}.yaml"
+    path.write_text(stopband_study(name, GRID, after=after))
+    return path
+
+
+def test_the_version() -> None:
+    assert commanded("--version") == (0, f"sweep {sweep.__version__}\n", "")
+
+
+def test_a_name_is_a_study_of_this_folder_or_of_the_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert shipped_folder() == STUDIES
+    monkeypatch.chdir(tmp_path)
+    assert "116,286 designs" in commanded("check", "stopband")[1]
+    (tmp_path / "studies").mkdir()
+    small(tmp_path / "studies", "stopband")
+    assert ": 3 designs" in commanded("check", "stopband")[1]  # the nearer one counts
+    code, _, err = commanded("check", "stopbnd")
+    assert code == 2
+    assert "did you mean 'stopband'?" in err
+    code, _, err = commanded("check", "stopbnd.yaml")
+    assert (code, "cannot be read" in err) == (2, True)
+
+
+def test_a_changed_key_is_checked_like_the_file_and_kept(tmp_path: Path) -> None:
+    path = tmp_path / "a.yaml"
+    path.write_text(BASE)
+    changed = load_study(
+        path, changes={"constraints.sensitivity.min": "0.92", "sweeps.edges.grid.right_nm": "[640, 650]"}
+    )
+    assert changed.constraints["sensitivity"].min == 0.92
+    assert changed.n_designs == load_study(path).n_designs + 12
+    for text, said in (
+        ("constraints.sensitivity.min=x", "a.yaml:19: constraints.sensitivity.min: not allowed (got 'x')"),
+        ("constraints.sensitivty.min=0.9", "did you mean 'sensitivity'?"),
+        ("study.name=x", "--set study.name: `study` is no mapping"),
+        ("cfas.7=RGGB", "no such entry of the list (got '7')"),
+        ("seed", "not KEY=VALUE (got 'seed')"),
+        ("seed=[", "--set seed"),
+    ):
+        code, out, err = commanded("check", path, "--set", text)
+        assert (code, out, len(err.splitlines())) == (2, "", 1)
+        assert said in err
+
+
+@pytest.mark.usefixtures("plain_pictures")
+def test_several_studies_in_one_call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", lambda url: bool(opened.append(url)) or True)
+    paths = [
+        small(tmp_path, "one"),
+        small(tmp_path, "bad", "constraints: {nothing: {min: 1}}\n"),
+        small(tmp_path, "two"),
+    ]
+    out = tmp_path / "out"
+    code, said, err = commanded("run", *paths, "--output", out, "--jobs", 1, "--open", "--set", "seed=5")
+    assert code == 2
+    assert err.count("unknown quantity (got 'nothing')") == 1
+    assert [line for line in said.splitlines() if line.startswith("==")] == [f"== {path} ==" for path in paths]
+    assert opened == [(out / name / "report.html").as_uri() for name in ("one", "two")]
+    resolved = YAML(typ="safe").load((out / "two" / "study.resolved.yaml").read_text())
+    assert resolved["seed"] == 5
+
+
+def test_what_looks_like_percent_and_what_the_box_cannot_reach_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "a.yaml"
+    path.write_text(BASE.replace("sensitivity: {min: 0.9}", "sensitivity: {min: 90}"))
+    code, said, _ = commanded("check", path)
+    assert code == 0
+    assert "constraints.sensitivity.min: 90 of a ratio; is it a percentage? 90 % are 0.9" in said
+    assert "out of reach: sensitivity >= 90" in said
+    code, _, err = commanded("run", path, "--output", tmp_path / "out")
+    assert code == 3
+    assert "out of reach" in err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["sensitivity", "cfa_sensitivity", "edge_width_nm", "band_width_nm"])
+def test_nothing_of_a_box_is_beyond_what_is_said_to_be_out_of_reach(tmp_path: Path, name: str) -> None:
+    """Of 2,000 designs drawn from the box, none has more than the bound; just below its best one nothing is refused."""
+    study = load(tmp_path, BASE.replace("sensitivity: {min: 0.9}", f"{name}: {{min: 1000}}"))
+    assert study.search is not None
+    space = study.search.space
+    (fault,) = out_of_reach(study, space, "chart")
+    bound = float(str(fault).rsplit(" ", 1)[1])
+    rng = np.random.default_rng(1)
+    low, high = (np.array([end(axis) for axis in space.axes]) for end in (min, max))
+    points = low + rng.random((2000, low.size)) * (high - low)
+    assert space.filter is not None
+    if name.endswith("width_nm"):
+        values = (points @ space.filter.family.dimensions[name].T).min(axis=1)
+    else:
+        values = sweep.LoadedStudy(study).evaluate(N=space.curves(points, 301)[:, 0])[name].to_numpy()
+    assert values.max() <= bound
+    study = load(tmp_path, BASE.replace("sensitivity: {min: 0.9}", f"{name}: {{min: {values.max()}}}"))
+    assert out_of_reach(study, space, "chart") == []
+
+
+def test_a_run_from_python_refuses_it_too(tmp_path: Path) -> None:
+    study = load(tmp_path, BASE.replace("sensitivity: {min: 0.9}", "csd_yellow_red: {min: 1e6}"))
+    with pytest.raises(sweep.SweepError, match="no design can be feasible"):
+        run_study(study, tmp_path / "out", 1, lambda *_: None)

@@ -1,0 +1,181 @@
+"""A family in a user's Python file: through sweep, search, workers, resume and report, and never without being asked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import sweep
+from sweep.designs.plugin import PluginFamily
+from sweep.errors import SweepError
+from sweep.report import make_report, read_output
+from sweep.run import run_study
+from sweep.study import Study, load_study
+
+from ..build import BASE, ran
+from ..commanded import commanded
+from ..conftest import ROOT
+
+STOPBAND = """\
+import numpy as np
+
+SPAN = 1 / (1 - 2 * 0.2466364532884666)
+
+
+class Band:
+    below_base = True
+    parameters = [("left_nm", 400, 700), ("left_width_nm", 0, 100), ("right_nm", 400, 700), ("right_width_nm", 0, 100)]
+
+    def __init__(self, wavelength_nm, base, target):
+        self.wave, self.base, self.change = wavelength_nm, base, target - base
+
+    def edge(self, center, width):
+        t = np.clip((self.wave - center[:, None]) / (width[:, None] * SPAN) + 0.5, 0, 1)
+        return t**3 * (t * (6 * t - 15) + 10)
+
+    def curves(self, x):
+        return self.base + self.change * (self.edge(x[:, 0], x[:, 1]) - self.edge(x[:, 2], x[:, 3]))
+
+    def violation(self, x):
+        half = SPAN / 2
+        ends = [x[:, 0] + s * half * x[:, 1] - x[:, 2] - s * half * x[:, 3] for s in (-1, 1)]
+        return np.stack(ends, axis=1)
+"""
+BUILT_IN = BASE.replace("min: 0.9", "min: 0.8")
+OWN = BUILT_IN.replace("    cfa: RYNCy\n", "    cfa: RYNCy\n    family: filters.py:Band\n")
+
+
+def study(folder: Path, text: str = OWN, code: str = STOPBAND, *, allow: bool = True) -> Study:
+    (folder / "filters.py").write_text(code)
+    path = folder / f"{'own' if 'family' in text else 'plain'}.yaml"
+    path.write_text(text)
+    return load_study(path, allow_code=allow)
+
+
+def test_a_stopband_written_again_gives_the_same_rows_and_the_same_optimum(tmp_path: Path) -> None:
+    own, plain = study(tmp_path), study(tmp_path, BUILT_IN)
+    ran(own, tmp_path / "own", 2)
+    ran(plain, tmp_path / "plain", 1)
+    rows = [pd.read_parquet(tmp_path / name / "results.parquet") for name in ("own", "plain")]
+    for name in ("csd_yellow_red", "csd_green_red", "sensitivity", "slope_per_nm"):
+        swept = [table.loc[table["kind"] == "sweep", name].to_numpy() for table in rows]
+        np.testing.assert_allclose(swept[0], swept[1], rtol=1e-9, atol=1.5 if "csd" in name else 0)
+    best = [read_output(tmp_path / name).provenance.search for name in ("own", "plain")]
+    assert best[0] is not None
+    assert best[1] is not None
+    assert best[0].best_smooth_objective == pytest.approx(best[1].best_smooth_objective, abs=0.01)
+    assert best[0].limit_proven == pytest.approx(best[1].limit_proven, abs=0.01)
+    output = read_output(tmp_path / "own")
+    assert "filters.py" in output.provenance.data_sha256
+    assert any("gradients are differences" in warning for warning in output.provenance.warnings)
+
+
+@pytest.mark.usefixtures("plain_pictures")
+def test_it_resumes_reports_and_is_another_study_with_other_code(tmp_path: Path) -> None:
+    first = study(tmp_path)
+    assert run_study(first, tmp_path / "out", 1, lambda *_: None)
+    assert (
+        run_study(study(tmp_path), tmp_path / "out", 1, lambda *_: None) == ()
+    )  # the same code: nothing is left to do
+    make_report(read_output(tmp_path / "out"))
+    assert "filters.py:Band" in (tmp_path / "out" / "report.html").read_text()
+    with pytest.raises(SweepError, match="holds another study"):
+        run_study(study(tmp_path, code=STOPBAND + "# changed\n"), tmp_path / "out", 1, lambda *_: None)
+
+
+def test_code_runs_only_when_it_is_allowed(tmp_path: Path) -> None:
+    code = f"open({str(tmp_path / 'ran')!r}, 'w')\n{STOPBAND}"
+    with pytest.raises(SweepError, match=r"names a Python file, whose code would run.*--allow-code") as caught:
+        study(tmp_path, code=code, allow=False)
+    assert all("own.yaml:" in str(fault) for fault in caught.value.faults)
+    for command in (("check",), ("plan",), ("run",), ("run", "--dry-run")):
+        assert commanded(*command, tmp_path / "own.yaml")[0] == 2
+    assert commanded("list", tmp_path)[0] == 0
+    assert not (tmp_path / "ran").exists()
+    assert commanded("check", tmp_path / "own.yaml", "--allow-code")[0] == 0
+    assert (tmp_path / "ran").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("class Band", "class Bend", "no such class in the file (got 'Band'); allowed: Bend"),
+        ("import numpy as np\n", "import nump as np\n", "the code cannot be run: ModuleNotFoundError"),
+        ("class Band:", "class Band", "the code cannot be run: SyntaxError"),
+        ('("left_nm", 400, 700)', '("left_nm", 700, 400)', "no usable `parameters`"),
+        ("self.wave, self.base", "self.wave, self.bases", "AttributeError: 'Band' object has no attribute 'base'"),
+        ("return self.base + ", "return 2 + ", "a curve is out of its bounds"),
+        ("return self.base + ", "return np.nan * ", "curves is not finite"),
+        ("return self.base + ", "return (self.base + ", ""),
+    ],
+)
+def test_faults_of_the_code_are_lines(tmp_path: Path, old: str, new: str, said: str) -> None:
+    assert old in STOPBAND
+    with pytest.raises(SweepError) as caught:
+        run_study(study(tmp_path, code=STOPBAND.replace(old, new)), tmp_path / "out", 1, lambda *_: None)
+    assert said in str(caught.value)
+    assert all("\n" not in str(fault) for fault in caught.value.faults)
+
+
+def test_bounds_and_gradients_hold(tmp_path: Path) -> None:
+    """Bounds: of 500 filters. Gradients: beside the built-in family's exact ones."""
+    made = study(tmp_path)
+    space = next(s for s in made.spaces if s.kind == "sweep")
+    assert space.filter is not None
+    own = space.filter.family
+    assert isinstance(own, PluginFamily)
+    base = made.sensor.curve("Y")
+    exact = sweep.Stopband(made.grid.nodes_nm, base, made.sensor.curve("G"))
+    rng = np.random.default_rng(3)
+    low, high = np.array([580.0, 5, 640, 5]), np.array([620.0, 40, 680, 40])
+    points = low + rng.random((500, 4)) * (high - low)
+    points = points[(own.violation(points) <= 0).all(axis=1)]
+    assert len(points) > 100
+    curves = own.curves(points)
+    bottom, top = own.lower(low, high), own.upper(low, high)
+    assert (curves >= bottom).all()
+    assert (curves <= top).all()
+    for point in points[:20]:
+        mine, theirs = own.gradient(point), exact.gradient(np.append(point, 1.0))[:4]
+        np.testing.assert_allclose(mine, theirs, atol=2e-4 * abs(theirs).max())
+
+
+def test_edges_of_a_family_of_ones_own_are_not_shifted(tmp_path: Path) -> None:
+    with pytest.raises(SweepError, match="has no edges that production could shift"):
+        study(tmp_path, OWN + "production: {edge_shift_nm: 2}\n")
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_a_cluster_whose_workers_have_no_such_file_gives_the_same_rows(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    made = study(tmp_path)
+    (tmp_path / "filters.py").unlink()  # workers get the text
+    ran(made, tmp_path / "one", 1)
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+    ) as cluster:
+        run_study(made, tmp_path / "many", 2, lambda *_: None, backend="dask", scheduler=cluster.scheduler_address)
+    for name in ("results", "search"):
+        tables = [pd.read_parquet(tmp_path / folder / f"{name}.parquet") for folder in ("one", "many")]
+        pd.testing.assert_frame_equal(*tables, check_exact=True)
+
+
+def test_the_family_of_the_guide_runs(tmp_path: Path) -> None:
+    text = (ROOT / "studies" / "README.md").read_text()
+    code = next(part for part in text.split("```python\n") if "class Gauss:" in part).split("```")[0]
+    grid = "grid:\n      center_nm: [620, 650]\n      sigma_nm: 20\n      depth: {min: 0, max: 1, count: 3}\n"
+    body = (
+        BASE.split("grid:")[0]
+        .replace("    cfa: RYNCy\n", "    cfa: RYNCy\n    family: filters.py:Gauss\n")
+        .replace("    to: G\n", "")
+    )
+    made = study(tmp_path, f"{body}{grid}constraints:\n  sensitivity: {{min: 0.9}}\nsearch:\n  starts: 4\n", code)
+    ran(made, tmp_path / "out", 1)
+    found = sweep.read_run(tmp_path / "out")
+    assert found.best.sensitivity >= 0.9 - 1e-9
+    assert found.output.provenance.search is not None
+    assert found.output.provenance.search.limit_proven > found.best.csd_yellow_red - 2
