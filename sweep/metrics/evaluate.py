@@ -78,7 +78,7 @@ def _as_read(imager: Imager, curves: FloatArray, found: Mapping[Pair, Extremes |
     at = [case for extremes in kept for case in (extremes.at_smallest, extremes.at_largest)]
     if not at:
         return dict(found)
-    there = Imager(imager.view, imager.work, cases=Cases(*np.moveaxis(np.array(at), 1, 0)))
+    there = Imager(imager.view, imager.work, cases=Cases(*np.moveaxis(np.array(at), 1, 0)), once=True)
     response = there.read(curves)[0]
     response = response.reshape(len(at), -1, *response.shape[2:])
     read = [separations(moments, imager.view.members) for moments in response]

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -160,7 +161,7 @@ class Profile:
         rows = csr_matrix((folded, columns.ravel(), np.arange(n + 1) * width), shape=(n, size))
         return np.asarray(rows @ self._spline.c, dtype=float)
 
-    @property
+    @cached_property
     def slopes(self) -> FloatArray:
         """Derivative of h at the radii `r_um`, 1/um, ndarray[n_radii, n_wavelengths]."""
         return np.asarray(self._spline.derivative()(self.r_um), dtype=float)

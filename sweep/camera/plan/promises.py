@@ -38,6 +38,7 @@ class Promises:
         self._kernels = kernels
         self._steps = Steps(self.view, self.reach, self._kernels)
         self._promises: dict[tuple[str, Methods, Methods], float] = {}
+        self._asked: dict[tuple[str, Methods, Methods], tuple[Methods, Methods]] = {}
         self._ranges: dict[tuple[str, ...], float] = {}
         self._readouts: dict[tuple[str, ...], float] = {}
         self._moves = Moves(self.view, self.reach)
@@ -55,8 +56,11 @@ class Promises:
         if isinstance(effect, ReadoutEffect):
             return self._readout_promise(effect, after)
         assert isinstance(effect, LinearEffect)
-        others = {e.name: e.reference for e in EFFECTS.values() if e is not effect and self._is_unseen(e, after)}
-        key = (name, replace(before, **others), replace(after, **others))
+        asked = (name, before, after)
+        if asked not in self._asked:
+            others = {e.name: e.reference for e in EFFECTS.values() if e is not effect and self._is_unseen(e, after)}
+            self._asked[asked] = replace(before, **others), replace(after, **others)
+        key = (name, *self._asked[asked])
         if key not in self._promises:
             self._promises[key] = self._linear_promise(effect, *key[1:])
         return self._promises[key]
