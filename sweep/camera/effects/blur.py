@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -198,8 +198,9 @@ def _envelope(x: FloatArray) -> FloatArray:
     return np.asarray(np.minimum(np.minimum(x / 2, 0.58187), 0.8251 / np.sqrt(np.maximum(x, 1e-300))), dtype=float)
 
 
+@lru_cache(64)
 def interpolation_bound(
-    radius_um: float, aperture_um: float, knots_um: FloatArray, f_number: float, w20_um: float
+    radius_um: float, aperture_um: float, knots_um: tuple[float, ...], f_number: float, w20_um: float
 ) -> float:
     """No kernel of this disc differs by more than this from its linear interpolation between the knots.
 

@@ -38,6 +38,7 @@ class Promises:
         self._kernels = kernels
         self._steps = Steps(self.view, self.reach, self._kernels)
         self._promises: dict[tuple[str, Methods, Methods], float] = {}
+        self._works: dict[Methods, Work] = {}
         self._asked: dict[tuple[str, Methods, Methods], tuple[Methods, Methods]] = {}
         self._ranges: dict[tuple[str, ...], float] = {}
         self._readouts: dict[tuple[str, ...], float] = {}
@@ -158,4 +159,6 @@ class Promises:
 
     def work_of(self, methods: Methods) -> Work:
         """Estimated operations."""
-        return estimated_work(self.view, methods)
+        if methods not in self._works:
+            self._works[methods] = estimated_work(self.view, methods)
+        return self._works[methods]
