@@ -32,6 +32,7 @@ ONLY_USER = {
         "camera/compiled",
         "camera/compiled_areas",
         "camera/compiled_cells",
+        "camera/compiled_distances",
         "camera/compiled_light",
         "camera/plan/compiled",
         "metrics/compiled",
