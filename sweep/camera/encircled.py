@@ -16,7 +16,7 @@ from ..cache import Cache
 from ..types import FloatArray
 from .effects.blur import Profile
 
-_RESIDUAL = 1e-12
+_RESIDUAL = 1e-10
 """No value of the image is further from its expansion, relative to that of a uniform field."""
 _LANES = 4
 """Functions are filled up to a multiple of so many."""
