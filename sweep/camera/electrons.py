@@ -48,8 +48,12 @@ class Electrons:
     of what no design changes, ndarray[n_cases, n_signals, n_units].
     """
 
-    def __init__(self, view: View, kernel: Kernel, work: Counter[str], dtype: DTypeLike = np.float64) -> None:
-        """`dtype`: of the product of curves and scene, where the scene's table is small enough to be kept."""
+    def __init__(
+        self, view: View, kernel: Kernel, work: Counter[str], dtype: DTypeLike = np.float64, *, once: bool = False
+    ) -> None:
+        """`dtype`: of the product of curves and scene, where the scene's table is small enough to be kept; `once`: not
+        for a single use.
+        """
         self.view = view
         self._work = work
         self.kernel = kernel
@@ -68,7 +72,7 @@ class Electrons:
         self._touched = np.flatnonzero((kernel.light[:, :, modified] != 0).any(axis=(0, 2, 3)))
         self._modified = kernel.light[:, self._touched][:, :, modified]
         size = self._modified[..., 0].size * len(self.signals) * self._nodes.size
-        self._kept = self._table().astype(dtype) if 0 < size <= _KEPT else None
+        self._kept = self._table().astype(dtype) if 0 < size <= _KEPT * (not once) else None
 
     def _looked_at(self, qe: FloatArray) -> FloatArray:
         """QE as the quadrature sees it: itself, or linear between its nodes."""

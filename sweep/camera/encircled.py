@@ -12,10 +12,11 @@ from functools import cached_property
 import numpy as np
 from scipy.special import j1
 
-from . import compiled_light
+from ..cache import Cache
+from ..types import FloatArray
 from .effects.blur import Profile
 
-_RESIDUAL = 1e-12
+_RESIDUAL = 1e-10
 """No value of the image is further from its expansion, relative to that of a uniform field."""
 _LANES = 4
 """Functions are filled up to a multiple of so many."""
@@ -29,8 +30,8 @@ class Encircled:
     `shares`: ndarray[n_functions, n_wavelengths], how much of each function is in each wavelength.
     """
 
-    def __init__(self, profile: Profile, pitch_um: float) -> None:
-        self._profile, self._pitch_um = profile, pitch_um
+    def __init__(self, profile: Profile) -> None:
+        self._profile = profile
         _, sizes, shares = np.linalg.svd(profile.values, full_matrices=False)
         # The rest of any row is at most the first size that is left out.
         kept = max(1, int((sizes > _RESIDUAL).sum()))
@@ -38,8 +39,10 @@ class Encircled:
         self.shares[:kept] = shares[:kept]
 
     @cached_property
-    def table(self) -> compiled_light.Table:
-        """Coefficients of a uniform spline of the fifth order."""
+    def coefficients(self) -> FloatArray:
+        """Of a uniform spline of the fifth order, from the second node before a radius of nothing on; the nodes are
+        those of the profile. ndarray[n_nodes, n_functions].
+        """
         from scipy.interpolate import make_interp_spline  # noqa: PLC0415  (slow to import)
 
         profile, r_um = self._profile, self._profile.r_um
@@ -52,4 +55,12 @@ class Encircled:
         mirrored = np.concatenate([values[_BEYOND:0:-1], values])  # the image is round
         at = np.concatenate([-nodes[_BEYOND:0:-1], nodes])
         spline = make_interp_spline(at, mirrored, k=5, axis=0)
-        return np.ascontiguousarray(spline.c[_BEYOND - 2 : -2]), self._pitch_um / step
+        return np.ascontiguousarray(spline.c[_BEYOND - 2 : -2])
+
+
+_ENCIRCLED: Cache[Profile, Encircled] = Cache(8)
+
+
+def encircled(profile: Profile) -> Encircled:
+    """That of a profile, kept."""
+    return _ENCIRCLED.get(profile, lambda: Encircled(profile))

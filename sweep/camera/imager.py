@@ -44,9 +44,11 @@ class Imager:
         work: Counter[str] | None = None,
         dtype: DTypeLike = np.float64,
         cases: phase.Cases | None = None,
+        *,
+        once: bool = False,
     ) -> None:
-        """`dtype`: of the product of curves and scene, where the scene's table is small enough to be kept. `cases`:
-        places of the light instead of those of the method of `phase`.
+        """`dtype`: of the product of curves and scene, where the scene's table is small enough to be kept; `once`: not
+        for a single use. `cases`: places of the light instead of those of the method of `phase`.
         """
         self.view = view
         self.work: Counter[str] = Counter() if work is None else work
@@ -59,7 +61,7 @@ class Imager:
         kernel = make_kernel(view, methods, grid.nodes_nm, by_pixel=by_pixel, work=self.work, cases=cases)
         self.n_cases, self.n_units = kernel.light.shape[:2]
         self.n_places = self.n_cases + sum(len(block.places_px) for block in self._others)
-        self.electrons = Electrons(view, kernel, self.work, dtype)
+        self.electrons = Electrons(view, kernel, self.work, dtype, once=once)
         self.readout = Readout(view, kernel, self.work)
 
     def read_changing(self, block: Block) -> Changing | None:

@@ -245,11 +245,17 @@ def readout_of(view: View, methods: Methods, cases: phase.Cases, like: Methods) 
 def _apart(light: sampling.PixelLight, own: FloatArray, apart: FloatArray, share: float) -> Kernel:
     """The pixels one by one: those with a weight in any readout."""
     used = (apart > 0).any(axis=(0, 3))
-    split = light.by_pixel()[..., None, :] * own[None, ..., None]
-    uniform = own[None]
-    if share:
-        split, uniform = crosstalk.mixed(split, share), crosstalk.mixed(uniform, share)
+    rows, columns = np.nonzero(used)
+    taken = [((1 - share), rows, columns)]
+    if share:  # see `crosstalk.mixed`; a pixel at the border has no weight
+        steps = ((-1, 0), (1, 0), (0, -1), (0, 1))
+        taken += [(share / 4, rows + down, columns + right) for down, right in steps]
+    n = own.shape[2]
+    split = np.zeros((len(apart), rows.size, n, light.values.shape[1]))
+    uniform = np.zeros((len(apart), rows.size, n))
+    pixels, through = np.arange(rows.size), own.argmax(axis=2)
+    for part, row, column in taken:
+        split[:, pixels, through[row, column]] += part * light.values[light.place[:, row, column]]
+        uniform[:, pixels, through[row, column]] += part
     readout = apart[:, used]
-    return Kernel(
-        split[:, used], np.repeat(uniform[:, used], len(apart), axis=0), readout, readout**2, by_channel=False
-    )
+    return Kernel(split, uniform, readout, readout**2, by_channel=False)

@@ -24,8 +24,9 @@ class Methods(make_dataclass("_Methods", [(name, str) for name in EFFECTS], init
     def __init__(self, **methods: str) -> None:
         _refuse_unknown("effect", methods, EFFECTS)
         for name, effect in EFFECTS.items():
-            method = methods.get(name, effect.reference)
-            _refuse_unknown(f"method of {name}", (method,), effect.methods)
+            method = methods.get(name, effect.methods[-1])
+            if method not in effect.methods:
+                _refuse_unknown(f"method of {name}", (method,), effect.methods)
             object.__setattr__(self, name, method)
 
     @property

@@ -13,7 +13,7 @@ import numpy as np
 from ..types import FloatArray
 from . import compiled_light
 from .effects import crosstalk, demosaic, phase, sampling
-from .encircled import Encircled
+from .encircled import encircled
 from .kernel import pixels_per_place, profile_of
 from .methods import Methods
 from .view import View
@@ -39,8 +39,9 @@ class PlaceKernels:
         self._table, self._rule = _SHARP, np.polynomial.legendre.leggauss(1)
         self.shares = np.ones((1, knots_nm.size))
         if profile is not None:
-            encircled = Encircled(profile, pixel.pitch_um)
-            self._table, self.shares = encircled.table, encircled.shares
+            light = encircled(profile)
+            self._table = light.coefficients, pixel.pitch_um / float(profile.r_um[1])
+            self.shares = light.shares
             order = profile.order(2 * self._half * pixel.pitch_um) - _EDGE_LESS
             self._rule = np.polynomial.legendre.leggauss(order)
 

@@ -21,6 +21,7 @@ from ..curves.hats import hats
 from ..curves.lights import Pair, class_pairs
 from ..types import FloatArray, IndexArray
 from .between import Between, Deviation
+from .compiled_distances import distances
 from .effects import blur, phase
 from .effects.base import KernelEffect
 from .kernel import colorless
@@ -241,27 +242,14 @@ class _Search:
         """
         kernels, deviation = self._scene.of_cells(cells)
         flat = kernels.reshape(*kernels.shape[:3], -1)
-        first, second = (
+        (first, one), (second, other) = (
             self._seen(flat, light, at[pairs]) for light, at in zip(self._light, (self._one, self._other), strict=True)
         )
-        apart = np.moveaxis(first - second, 2, 3)
-        rest = np.einsum("mudb,pdb->mpu", deviation.kernel, self._amounts[pairs], optimize=True)
-        rest += deviation.tilt[:, None] * (apart.max(axis=1) - apart.min(axis=1)) / 2
-        corners = _norm(apart)
-        high = corners.max(axis=1) + _norm(rest)
-        towards = apart.mean(axis=1)
-        length = _norm(towards)[..., None]
-        towards = np.divide(towards, length, out=np.zeros_like(towards), where=length > 0)
-        beyond = np.einsum("mjpu,mpu->mjp", apart, towards).min(axis=1)
-        low = np.maximum(beyond - (np.abs(towards) * rest).sum(axis=2), 0.0)
-        return low, high, corners
+        rest = deviation.kernel.reshape(*deviation.tilt.shape, -1) @ self._amounts[pairs].reshape(len(pairs), -1).T
+        return distances(first, second, (one, other), rest, deviation.tilt)
 
     @staticmethod
-    def _seen(kernels: FloatArray, light: FloatArray, signals: IndexArray) -> FloatArray:
-        """What the channels see of some signals, ndarray[n_cells, corners, n_channels, n_signals]."""
+    def _seen(kernels: FloatArray, light: FloatArray, signals: IndexArray) -> tuple[FloatArray, IndexArray]:
+        """What the channels see of signals, each once, ndarray[n_cells, corners, n_channels, n], and where each is."""
         some, which = np.unique(signals, return_inverse=True)
-        return np.asarray((kernels @ light[some].reshape(len(some), -1).T)[..., which], dtype=float)
-
-
-def _norm(vectors: FloatArray) -> FloatArray:
-    return np.asarray(np.sqrt((vectors**2).sum(axis=-1)), dtype=float)
+        return kernels @ light[some].reshape(len(some), -1).T, which

@@ -12,4 +12,11 @@ def hats(at: FloatArray, knots: FloatArray) -> FloatArray:
 
     Any f, ndarray[..., n_knots], is f @ hats at the points `at`.
     """
-    return np.stack([np.interp(at, knots, unit) for unit in np.eye(knots.size)])
+    if knots.size == 1:
+        return np.ones((1, at.size))
+    left = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, knots.size - 2)
+    share = np.clip(1 / np.diff(knots)[left] * (at - knots[left]), 0.0, 1.0)
+    share[at >= knots[-1]] = 1.0
+    found, points = np.zeros((knots.size, at.size)), np.arange(at.size)
+    found[left, points], found[left + 1, points] = 1 - share, share
+    return found

@@ -62,8 +62,7 @@ def _over_all_places(
         if not np.isfinite(light).all():
             continue
         found = imager.anywhere.extremes(light)
-        if not imager.view.methods.straight:
-            found = _as_read(imager, curves[design : design + 1], found)
+        found = _as_read(imager, curves[design : design + 1], found)
         for pair, extremes in found.items():
             name = csd_name(pair)
             smallest, largest = (np.nan, np.nan) if extremes is None else (extremes.smallest, extremes.largest)
@@ -73,25 +72,23 @@ def _over_all_places(
 
 
 def _as_read(imager: Imager, curves: FloatArray, found: Mapping[Pair, Extremes | None]) -> dict[Pair, Extremes | None]:
-    """Extremes of one design at the places where those of the straight response are, as the camera reads them out."""
-    kept = [extremes for extremes in found.values() if extremes is not None]
-    at = [case for extremes in kept for case in (extremes.at_smallest, extremes.at_largest)]
+    """Extremes of one design at the places where those of the straight response are, as the camera reads them out.
+
+    Where the readout is not straight, another pair's place may be the better one.
+    """
+    kept = {pair: extremes for pair, extremes in found.items() if extremes is not None}
+    at = [case for extremes in kept.values() for case in (extremes.at_smallest, extremes.at_largest)]
     if not at:
         return dict(found)
-    there = Imager(imager.view, imager.work, cases=Cases(*np.moveaxis(np.array(at), 1, 0)))
+    there = Imager(imager.view, imager.work, cases=Cases(*np.moveaxis(np.array(at), 1, 0)), once=True)
     response = there.read(curves)[0]
     response = response.reshape(len(at), -1, *response.shape[2:])
     read = [separations(moments, imager.view.members) for moments in response]
-    return {
-        pair: None
-        if extremes is None
-        else replace(
-            extremes,
-            smallest=min(float(distances[pair].min()) for distances in read),
-            largest=max(float(distances[pair].min()) for distances in read),
-        )
-        for pair, extremes in found.items()
-    }
+    for number, (pair, extremes) in enumerate(kept.items()):
+        own = read[2 * number : 2 * number + 2] if imager.view.methods.straight else read
+        distances = [float(each[pair].min()) for each in own]
+        kept[pair] = replace(extremes, smallest=min(distances), largest=max(distances))
+    return {pair: kept.get(pair) for pair in found}
 
 
 def evaluate(imager: Imager, designs: FloatArray | Block, states: Sequence[str] = ()) -> Columns:

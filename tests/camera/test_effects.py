@@ -112,7 +112,7 @@ def test_interpolation_between_wavelengths_stays_within_its_bound(f_number: floa
             knots = np.arange(0.4, 0.7 + spacing / 2, spacing)
             at = [np.abs(fine - k).argmin() for k in knots]
             linear = np.stack([np.interp(fine, fine[at], row[at]) for row in exact])
-            bound = blur.interpolation_bound(radius, 0.0, knots, f_number, w20_um)
+            bound = blur.interpolation_bound(radius, 0.0, tuple(knots), f_number, w20_um)
             assert np.abs(linear - exact).max() <= bound + 1e-7
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -160,7 +161,7 @@ class Profile:
         rows = csr_matrix((folded, columns.ravel(), np.arange(n + 1) * width), shape=(n, size))
         return np.asarray(rows @ self._spline.c, dtype=float)
 
-    @property
+    @cached_property
     def slopes(self) -> FloatArray:
         """Derivative of h at the radii `r_um`, 1/um, ndarray[n_radii, n_wavelengths]."""
         return np.asarray(self._spline.derivative()(self.r_um), dtype=float)
@@ -197,8 +198,9 @@ def _envelope(x: FloatArray) -> FloatArray:
     return np.asarray(np.minimum(np.minimum(x / 2, 0.58187), 0.8251 / np.sqrt(np.maximum(x, 1e-300))), dtype=float)
 
 
+@lru_cache(64)
 def interpolation_bound(
-    radius_um: float, aperture_um: float, knots_um: FloatArray, f_number: float, w20_um: float
+    radius_um: float, aperture_um: float, knots_um: tuple[float, ...], f_number: float, w20_um: float
 ) -> float:
     """No kernel of this disc differs by more than this from its linear interpolation between the knots.
 

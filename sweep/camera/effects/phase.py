@@ -71,8 +71,10 @@ def all_count(shot: Shot, methods: Chosen) -> bool:
 
 def n_places(shot: Shot, method: str) -> float:
     """About how many places a method looks at: a search divides most where its limit is tight."""
-    lattice, within = len(places_px(shot, method)), within_dn(method)
-    if within is None or one_is_enough(shot) is not None:
+    if one_is_enough(shot) is not None:
+        return 1
+    lattice, within = max(1, _PER_PIXEL[method] ** 2 * shot.mosaic.indices.size), within_dn(method)
+    if within is None:
         return lattice
     return lattice * (1 + PER_DECADE * (2 - math.log10(within)))
 

@@ -38,6 +38,8 @@ class Promises:
         self._kernels = kernels
         self._steps = Steps(self.view, self.reach, self._kernels)
         self._promises: dict[tuple[str, Methods, Methods], float] = {}
+        self._works: dict[Methods, Work] = {}
+        self._asked: dict[tuple[str, Methods, Methods], tuple[Methods, Methods]] = {}
         self._ranges: dict[tuple[str, ...], float] = {}
         self._readouts: dict[tuple[str, ...], float] = {}
         self._moves = Moves(self.view, self.reach)
@@ -55,8 +57,11 @@ class Promises:
         if isinstance(effect, ReadoutEffect):
             return self._readout_promise(effect, after)
         assert isinstance(effect, LinearEffect)
-        others = {e.name: e.reference for e in EFFECTS.values() if e is not effect and self._is_unseen(e, after)}
-        key = (name, replace(before, **others), replace(after, **others))
+        asked = (name, before, after)
+        if asked not in self._asked:
+            others = {e.name: e.reference for e in EFFECTS.values() if e is not effect and self._is_unseen(e, after)}
+            self._asked[asked] = replace(before, **others), replace(after, **others)
+        key = (name, *self._asked[asked])
         if key not in self._promises:
             self._promises[key] = self._linear_promise(effect, *key[1:])
         return self._promises[key]
@@ -154,4 +159,6 @@ class Promises:
 
     def work_of(self, methods: Methods) -> Work:
         """Estimated operations."""
-        return estimated_work(self.view, methods)
+        if methods not in self._works:
+            self._works[methods] = estimated_work(self.view, methods)
+        return self._works[methods]

@@ -26,6 +26,7 @@ class SceneKernels:
     def __init__(self, view: View) -> None:
         """`view`: `colorless`."""
         self._view, self._knots_nm = view, blur.knots(view.grid.nodes_nm, blur.COARSE)
+        self._wanted: dict[Methods, Methods] = {}
         self._kernels: dict[Methods, FloatArray] = {}
         self._deviations: dict[Methods, Deviation] = {}
         self._gaps: dict[tuple[str, float], float] = {}
@@ -46,11 +47,12 @@ class SceneKernels:
 
     def wanted(self, methods: Methods) -> Methods:
         """What the kernel depends on, all light being left."""
-        kept = {
-            name: e.kernel_method(getattr(methods, name)) for name, e in EFFECTS.items() if isinstance(e, KernelEffect)
-        }
-        wanted = replace(REFERENCE, **kept, **WHOLE_LIGHT)
-        return replace(wanted, phase=REFERENCE.phase) if self.anywhere(wanted) else wanted
+        if methods not in self._wanted:
+            own = {name: effect for name, effect in EFFECTS.items() if isinstance(effect, KernelEffect)}
+            kept = {name: effect.kernel_method(getattr(methods, name)) for name, effect in own.items()}
+            wanted = replace(REFERENCE, **kept, **WHOLE_LIGHT)
+            self._wanted[methods] = replace(wanted, phase=REFERENCE.phase) if self.anywhere(wanted) else wanted
+        return self._wanted[methods]
 
     def of(self, methods: Methods) -> FloatArray:
         """The kernel at the knots, of all light: [cases, channels, channels, knots].
@@ -94,10 +96,8 @@ class SceneKernels:
         aperture = 0.0 if methods.sampling == "skip" else view.pixel.fill_factor**0.5 * view.pixel.pitch_um
         if (method, aperture) not in self._gaps:
             radius = sampling.radii_px(view, target)[0] * view.pixel.pitch_um
-            w20_um = blur.defocus_um(view.scenario, view.pixel.pitch_um)
-            f_number = view.scenario.optics.f_number
-            bound = blur.interpolation_bound(radius, aperture, knots_nm * 1e-3, f_number, w20_um)
-            self._gaps[method, aperture] = bound
+            optics = view.scenario.optics.f_number, blur.defocus_um(view.scenario, view.pixel.pitch_um)
+            self._gaps[method, aperture] = blur.interpolation_bound(radius, aperture, tuple(knots_nm * 1e-3), *optics)
         return self._gaps[method, aperture]
 
     def spread(
