@@ -48,7 +48,8 @@ class Kernel:
 def colorless(view: View) -> View:
     """What kernels depend on: the view without filters, which is the same for all CFAs whose tiles are alike."""
     nothing = np.zeros_like(view.qe)
-    return replace(view, mosaic=view.mosaic.colorless, modified=(), qe=nothing, clear_qe=np.zeros_like(view.clear_qe))
+    bare = replace(view, mosaic=view.mosaic.colorless, modified=(), technologies=())
+    return replace(bare, qe=nothing, clear_qe=np.zeros_like(view.clear_qe))
 
 
 def make_kernel(

@@ -23,7 +23,8 @@ def resolved_yaml(study: Study) -> str:
     """The study with every default written out; a study file itself."""
     section = study.section.model_dump(mode="json", by_alias=True, exclude_none=True)
     for key in ("sensor", "lights"):
-        section[key] = section[key].get("builtin", {k: v for k, v in section[key].items() if k != "builtin"})
+        named = "builtin" in section[key] and not section[key].get("technology")
+        section[key] = section[key]["builtin"] if named else section[key]
     if study.section.lights.builtin is None:
         section["lights"]["photon_ratio"] = study.lights.photon_ratio  # another light in the file would change it
     text = StringIO()

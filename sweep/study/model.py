@@ -134,6 +134,9 @@ class Study:
         if space.filter is not None:
             replaced |= dict.fromkeys(space.filter.channels, space.filter.base)
             modified = tuple(mosaic.channels.index(channel) for channel in space.filter.channels)
+        technologies = [self.sensor.technologies.get(name) for name in self.sensor.mosaic_curves(mosaic, replaced)]
+        for channel in modified:
+            technologies[channel] = None if space.filter is None else space.filter.technology
         return View(
             grid=self.grid,
             mosaic=mosaic,
@@ -143,6 +146,7 @@ class Study:
             lights=self.lights,
             pixel=self.pixel if scene.noise is None else scene.noise.of(self.pixel),
             scenario=scene,
+            technologies=tuple(technologies) if any(technologies) else (),
             methods=self.plans[scenario].methods if scenario in self.plans else REFERENCE,
         )
 

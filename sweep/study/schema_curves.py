@@ -9,6 +9,7 @@ from pydantic import ConfigDict, Field, WithJsonSchema, model_validator
 
 from ..curves.files import MOST_CURVES
 from ..curves.spectrum import Outside, Resampling
+from ..designs.technology import Stated
 from ..types import Ratio, Section
 
 Name = Annotated[str, Field(min_length=1, max_length=100)]
@@ -47,6 +48,9 @@ class SensorSection(Documented):
     files: list[CurveFile] = []
     clear: Name | None = None
     """The reference of the CFA's sensitivity; the curve with the largest total where it is left out."""
+    technology: dict[Name, Stated] = {}
+    """Curve -> `pigment`, or `interference: {effective_index: 1.8}`, whose transmission over the clear curve moves with
+    the angle of the light; a curve that is left out, as on axis."""
 
     @model_validator(mode="after")
     def _one_source(self) -> SensorSection:
