@@ -18,6 +18,7 @@ from ..designs.products import row_products
 from ..types import BoolArray, FloatArray
 from .effects import flicker, quadrature
 from .exposure import exposure_times, white_irradiance
+from .field import over_field
 from .kernel import Kernel
 from .registry import factor_of_light
 from .seen import SeenFilters
@@ -42,13 +43,20 @@ class Changing:
     which: BoolArray
 
 
+def _background(view: View) -> FloatArray:
+    """Electrons/s of the background for each QE, behind all that dims it, ndarray[n_wavelengths]."""
+    dimmed = factor_of_light(view, view.methods, view.grid.nodes_nm, background=True)
+    return np.asarray(background_irradiance(view) * per_photon(view) * dimmed, dtype=float)
+
+
 class Electrons:
     """What a kernel gives of designs. `work` counts the values that are computed, by effect.
 
-    `kernel`: the scene's. `seen`: the filters as the rays see them. `signals`, `white`: electrons/s for each QE of
-    light and the white patch at every wavelength, ndarray[n_signals, n_wavelengths] and ndarray[n_wavelengths];
-    `background`: for each QE of the modified channels, ndarray[n_modified, n_wavelengths]. `fixed`: electrons/s of
-    what no design changes, ndarray[n_cases, n_signals, n_units].
+    `kernel`: the scene's. `seen`: the filters as the rays see them, at each place of the field; `place`: that of each
+    case, ndarray[n_cases]. `signals`, `white`: electrons/s for each QE of light and the white patch at every
+    wavelength, ndarray[n_signals, n_wavelengths] and ndarray[n_wavelengths]; `background`: for each QE of the modified
+    channels, ndarray[n_places, n_modified, n_wavelengths]. `fixed`: electrons/s of what no design changes,
+    ndarray[n_cases, n_signals, n_units].
     """
 
     def __init__(self, view: View, kernel: Kernel, work: Counter[str], dtype: DTypeLike = np.float64) -> None:
@@ -60,14 +68,17 @@ class Electrons:
         at_all = self._nodes.size == view.grid.size
         self._hats = None if at_all else quadrature.between_nodes(view.grid.size, self._nodes)
         self.signals = signal_irradiance(view) * per_photon(view)
-        dimmed = factor_of_light(view, view.methods, view.grid.nodes_nm, background=True)
         self.white = white_irradiance(view) * per_photon(view)
         fixed, modified = list(view.fixed), list(view.modified)
-        self.seen = SeenFilters(view, view.methods.angle)
-        background = background_irradiance(view) * per_photon(view) * dimmed
-        self.background = self.seen.light(np.repeat(background[None], len(modified), axis=0), modified)
+        places = over_field(view)
+        self.seen = [SeenFilters(place, view.methods.angle) for place in places]
+        self.place = np.repeat(np.arange(len(places)), len(kernel.light) // len(places))
+        background = [_background(place) for place in places]
+        each = [np.repeat(light[None], len(modified), axis=0) for light in background]
+        self.background = np.stack([seen.light(light, modified) for seen, light in zip(self.seen, each, strict=True)])
         self.fixed = self._products(kernel.light[:, :, fixed], view.qe[None, fixed], fixed)[0]
-        self._fixed_uniform = kernel.uniform[:, :, fixed] @ (self.seen.curves(view.qe[fixed], fixed) @ background)
+        rates = [s.curves(view.qe[fixed], fixed) @ light for s, light in zip(self.seen, background, strict=True)]
+        self._fixed_uniform = np.einsum("xuc,xc->xu", kernel.uniform[:, :, fixed], np.stack(rates)[self.place])
         self._modified_uniform = kernel.uniform[:, :, modified]
         # Units that look through a filter that changes; electrons/s per QE of it, kept where the table is small.
         self._touched = np.flatnonzero((kernel.light[:, :, modified] != 0).any(axis=(0, 2, 3)))
@@ -75,20 +86,31 @@ class Electrons:
         size = self._modified[..., 0].size * len(self.signals) * self._nodes.size
         self._kept = self._table().astype(dtype) if 0 < size <= _KEPT else None
 
-    def _looked_at(self, qe: FloatArray, channels: Sequence[int]) -> FloatArray:
+    def _looked_at(self, qe: FloatArray, channels: Sequence[int], place: int = 0) -> FloatArray:
         """QE of some channels as the quadrature sees it (itself, or linear between its nodes), and then the rays."""
         nodal = qe if self._hats is None else qe[..., self._nodes] @ self._hats
-        return self.seen.curves(nodal, channels)
+        return self.seen[place].curves(nodal, channels)
+
+    def at_each_place(self, light: FloatArray, channels: Sequence[int]) -> FloatArray:
+        """Light on some channels, ndarray[n_cases, ..., n, n_wavelengths], as their filters see it at its place."""
+        return np.concatenate([seen.light(light[self.place == at], channels) for at, seen in enumerate(self.seen)])
 
     def _products(self, light: FloatArray, qe: FloatArray, of: Sequence[int]) -> FloatArray:
         """Sum over channels and wavelengths of kernel, QE and signals, [n_designs, n_cases, n_signals, n_units].
 
         `light`, `qe`: of the channels `of`.
         """
+        parts = [self._products_at(at, light[self.place == at], qe, of) for at in range(len(self.seen))]
+        return np.concatenate(parts, axis=1)
+
+    def _products_at(self, place: int, light: FloatArray, qe: FloatArray, of: Sequence[int]) -> FloatArray:
+        """Of the cases of one place of the field."""
         cases, units, channels, _ = light.shape
         size, n, n_signals = self.view.grid.size, len(qe), len(self.signals)
         weights = np.broadcast_to(light, (cases, units, channels, size)).reshape(cases * units, channels * size)
-        seen = self._looked_at(qe, of)[:, :, None] * self.signals  # [n_designs, channels, n_signals, n_wavelengths]
+        seen = (
+            self._looked_at(qe, of, place)[:, :, None] * self.signals
+        )  # [n_designs, channels, n_signals, n_wavelengths]
         moved = np.moveaxis(seen, 2, 1).reshape(n, n_signals, channels * size)
         self._work["response"] += weights.shape[0] * moved.size
         # A product for each design, so that its bits do not depend on how many there are.
@@ -97,7 +119,8 @@ class Electrons:
 
     def _table(self) -> FloatArray:
         """Signals times kernel on the quadrature's nodes, [channels x nodes, n_cases x n_signals x n_units]."""
-        product = self.seen.light(self._modified[:, None] * self.signals[:, None, None, :], self.view.modified)
+        product = self._modified[:, None] * self.signals[:, None, None, :]
+        product = self.at_each_place(product, self.view.modified)
         on_nodes = product if self._hats is None else product @ self._hats.T
         channels, nodes = on_nodes.shape[-2:]
         return np.ascontiguousarray(on_nodes.reshape(-1, channels * nodes).T)
@@ -139,17 +162,20 @@ class Electrons:
         return np.asarray(flat * exposure_s[:, None, None, None], dtype=float)
 
     def of_background(self, curves: FloatArray) -> FloatArray:
-        """Electrons/s of the background in the modified channels, ndarray[..., n_modified]; of `curves` like these."""
-        return np.asarray(np.einsum("...ml,ml->...m", curves, self.background), dtype=float)
+        """Electrons/s of the background in the modified channels, ndarray[n, n_places, n_modified].
+
+        `curves`: ndarray[n, n_modified, n_wavelengths].
+        """
+        return np.asarray(np.einsum("nml,pml->npm", curves, self.background), dtype=float)
 
     def through_filters(self, rates: FloatArray) -> FloatArray:
         """What the units get of a uniform light, ndarray[n_designs, n_cases, n_units].
 
-        `rates`: electrons/s of the modified channels, ndarray[n_designs, n_modified].
+        `rates`: electrons/s of the modified channels, ndarray[n_designs, n_places, n_modified].
         """
         found = np.zeros((len(rates), *self._modified_uniform.shape[:2]))
-        for index in range(rates.shape[1]):
-            found += self._modified_uniform[:, :, index] * rates[:, index, None, None]
+        for index in range(rates.shape[2]):
+            found += self._modified_uniform[:, :, index] * rates[:, self.place, index, None]
         return found
 
     def changing(self, block: Block) -> Changing | None:
@@ -173,7 +199,8 @@ class Electrons:
         unit = int(self._touched[0])
         self._work["response"] += len(some) * self._kept.size
         part = some.product(self._kept, self._nodes).reshape(len(some), len(self.fixed), -1)
-        uniform = some.product(self.background[0][:, None], everywhere) * self._modified_uniform[:, unit, 0]
+        uniform = some.product(np.ascontiguousarray(self.background[:, 0].T), everywhere)[:, self.place]
+        uniform = uniform * self._modified_uniform[:, unit, 0]
         uniform = self._fixed_uniform[:, unit] + uniform + view.pixel.dark_e_per_s
         rest = self.fixed + (self._fixed_uniform + view.pixel.dark_e_per_s)[:, None]
         values = (self.fixed[:, :, unit] + part + uniform[:, :, None]) * time_s[0]

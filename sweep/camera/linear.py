@@ -53,8 +53,9 @@ class LinearImager(Imager):
         exposure_s = own.exposure_s(curves[None])
         scales = own.scales(exposure_s)[0]
         light = own.kernel.light[:, None, None, :, channel] * own.signals[:, None, :]
-        light = own.seen.light(light[..., None, :], [channel])[..., 0, :]
-        uniform = own.kernel.uniform[:, None, None, :, channel, None] * own.background[modified]
+        light = own.at_each_place(light[..., None, :], [channel])[..., 0, :]
+        background = own.background[own.place, modified][:, None, None, None]
+        uniform = own.kernel.uniform[:, None, None, :, channel, None] * background
         both = light * scales[None, :, None, None, None] + uniform
         return np.asarray(both.reshape(-1, *both.shape[2:]) * (exposure_s[0] * self.view.pixel.dn_per_e), dtype=float)
 

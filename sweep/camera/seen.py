@@ -39,6 +39,11 @@ def cone_of(scene: Scene) -> Cone:
     return Cone(half_angle_rad(scene.optics.f_number), math.radians(scene.optics.cra_deg))
 
 
+def moves(shot: Shot) -> bool:
+    """Whether any filter of a shot moves with the angle of the light."""
+    return any(math.isfinite(shot.effective_index(channel)) for channel in range(len(shot.mosaic.channels)))
+
+
 class SeenFilters:
     """The filters of a shot as its rays see them by a method, and the light as the filters see it."""
 

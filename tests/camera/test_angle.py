@@ -14,11 +14,20 @@ from sweep.camera.linear import smooth_imager
 from sweep.camera.methods import REFERENCE
 from sweep.camera.plan.plan import Planner
 from sweep.camera.rays import Cone, rays
+from sweep.camera.scenario import Scenario
+from sweep.camera.scene import SensorField
 from sweep.camera.seen import METHODS, RAYS, SeenFilters, cone_of
 from sweep.curves.spectrum import WavelengthGrid
+from sweep.designs.block import edges_of
 from sweep.designs.technology import Technology
+from sweep.metrics.evaluate import evaluate
+from sweep.study import load_study
 
-from ..hard.scenes import FAR, FINE, Scene, scene
+from ..conftest import STUDIES
+from ..hard.scenes import FAR, FINE, Scene, promised_names, scene
+
+SPACE = next(space for space in load_study(STUDIES / "stopband.yaml").spaces if space.kind == "sweep")
+SPACE = replace(SPACE, axes=((600.0, 615.0), (6.0, 20.0), (650.0,), (8.0,), (0.7, 1.0)))
 
 _CONES = ((1.6, 0.0), (1.6, 7.0), (1.6, 20.0), (4.0, 20.0), (0.8, 38.0), (1.0, 30.0))
 """f-numbers and chief ray angles, degrees: within the cone, at its edge, outside it."""
@@ -163,3 +172,54 @@ def test_a_plain_curve_of_interference_moves_on_the_clear_one() -> None:
     seen = SeenFilters(view, "chief ray").curves(own[None], [channel])[0]
     expected = clear * bare(wave, own / clear, np.array([math.radians(20.0)]), 1.8)[0]
     np.testing.assert_allclose(seen, expected, rtol=1e-12)
+
+
+FIELDS: dict[str, dict[str, Any]] = {
+    "patch": {"background_cd_m2": 200.0, "off_axis_deg": 35.0},
+    "noisy target": {"target": FAR, "noise": True, "background_cd_m2": 200.0, "off_axis_deg": 35.0},
+}
+
+
+@pytest.mark.parametrize("given", FIELDS.values(), ids=FIELDS)
+def test_a_field_is_the_worst_of_its_places(given: dict[str, Any]) -> None:
+    """Chief ray angle and field angle follow one image height, and the worst place counts in every column."""
+    angles = [0.0, 8.0, 20.0]
+    view = moved(given, cra_deg=0.0).view
+    field = view.scenario.model_copy(update={"field": SensorField(cra_deg=angles)})
+    block = edges_of(SPACE, 0, SPACE.size)
+    assert block is not None
+    curves = block.curves()
+    each = []
+    for height, cra_deg in zip((0.0, 0.5, 1.0), angles, strict=True):
+        off_axis_deg = math.degrees(math.atan(height * math.tan(math.radians(35.0))))
+        own = Scenario.model_validate(
+            given | {"optics": {"f_number": 1.6, "cra_deg": cra_deg}, "off_axis_deg": off_axis_deg}
+        )
+        each.append(evaluate(Imager(replace(view, scenario=own)), curves))
+    imager = Imager(replace(view, scenario=field))
+    names = promised_names(view, any_place=False)
+    for designs in (curves, block):
+        found = evaluate(imager, designs)
+        for name in names:
+            worst = np.min([place[name] for place in each], axis=0)
+            np.testing.assert_allclose(found[name], worst, atol=1e-9)
+    assert any((np.argmin([place[name] for place in each], axis=0) == 2).any() for name in names)
+
+
+def test_derivatives_at_every_place_of_a_field() -> None:
+    fixed = {"exposure": {"kind": "fixed", "exposure_s": 1e-3}, "background_cd_m2": 200.0, "off_axis_deg": 35.0}
+    made = moved(fixed, cra_deg=0.0)
+    field = made.view.scenario.model_copy(update={"field": SensorField(cra_max_deg=20.0, places=3)})
+    imager, channel = smooth_imager(replace(made.view, scenario=field)), made.view.modified[0]
+    zero, own = imager.smooth(np.zeros_like(made.curves))[0], imager.smooth(made.curves)[0]
+    assert len(own) == 3
+    scale = np.abs(own).max()
+    np.testing.assert_allclose(imager.gradient(made.curves[0], made.curves)[0], own - zero, atol=1e-12 * scale)
+    by_wavelength = imager.per_qe(0, made.curves[0])[:, :, channel] @ made.curves[0, 0]
+    np.testing.assert_allclose(by_wavelength, (own - zero)[..., channel], atol=1e-12 * scale)
+
+
+def test_a_field_in_which_nothing_moves_is_one_place() -> None:
+    view = replace(moved({}, cra_deg=0.0).view, technologies=())
+    field = view.scenario.model_copy(update={"field": SensorField(cra_max_deg=20.0)})
+    assert Imager(replace(view, scenario=field)).n_cases == 1

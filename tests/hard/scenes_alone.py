@@ -84,6 +84,17 @@ ALONE: tuple[Scene, ...] = (
             ("at an angle, 1x3 tile", "1x3", {"target": MIDDLE}, 1.4, 40.0, 1.8, FINE, False),
         )
     ),
+    noisy(
+        "a field",
+        "RYNCy",
+        {
+            "optics": {"f_number": 1.2},
+            "field": {"cra_max_deg": 30, "places": 3},
+            "off_axis_deg": 30,
+            "background_cd_m2": 90,
+        },
+        index=1.7,
+    ),
     # Where the full well ends below the ADC's range, rounding does not end it again.
     scene(
         "well below the ADC, RGGB, a fraction of a pedestal",

@@ -86,3 +86,35 @@ def test_what_does_not_fit_is_a_fault(tmp_path: Path, old: str, new: str, expect
     if "grazes" in expected:
         text += "scenarios: {chart: {optics: {f_number: 0.8, cra_deg: 60}}}\n"
     assert any(fault.startswith(expected) for fault in faults(tmp_path, text)), faults(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("scene", "expected"),
+    [
+        ("{field: {places: 3}}", "tiny.yaml:22: scenarios.a.field: a field has either `cra_max_deg` or a list"),
+        ("{field: {cra_max_deg: 9, cra_deg: [0, 9]}}", "tiny.yaml:22: scenarios.a.field: a field has either"),
+        ("{field: {cra_deg: [0, 9], places: 2}}", "tiny.yaml:22: scenarios.a.field: `places` goes with `cra_max_deg`"),
+        ("{field: {cra_max_deg: 70}}", "tiny.yaml:22: scenarios.a.field.cra_max_deg: not allowed (got 70)"),
+        (
+            "{field: {cra_max_deg: 9}, optics: {cra_deg: 3}}",
+            "tiny.yaml:22: scenarios.a: `field` says the chief ray angle of each place: leave out optics.cra_deg",
+        ),
+        (
+            "{field: {cra_max_deg: 9}, target: {distance_m: 99, fov_deg: 60, phase_px: any}}",
+            "tiny.yaml:22: scenarios.a: `field` needs a light at a named place of the mosaic",
+        ),
+    ],
+)
+def test_a_field_says_one_profile(tmp_path: Path, scene: str, expected: str) -> None:
+    assert any(fault.startswith(expected) for fault in faults(tmp_path, BASE + f"scenarios: {{a: {scene}}}\n"))
+
+
+def test_a_field_grows_linearly_or_as_listed(tmp_path: Path) -> None:
+    scenes = "scenarios: {a: {field: {cra_max_deg: 30, places: 4}}, b: {field: {cra_deg: [0, 18, 20]}}}\n"
+    study = load(tmp_path, BASE + scenes)
+    fields = {name: scenario.field for name, scenario in study.scenarios.items()}
+    assert {name: field and field.angles_deg for name, field in fields.items()} == {
+        "a": (0.0, 10.0, 20.0, 30.0),
+        "b": (0.0, 18.0, 20.0),
+    }
+    assert load(tmp_path, resolved_yaml(study)).section == study.section

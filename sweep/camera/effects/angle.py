@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ..rays import Stretches
 from ..scene import Scene
-from ..seen import CHIEF, CONE, METHODS, RAYS, SKIP, SeenFilters, cone_of
+from ..seen import CHIEF, CONE, METHODS, RAYS, SKIP, SeenFilters, cone_of, moves
 from ..shot import Shot
 from .base import Change, Chosen, Designs, FilterChange, FilterEffect, Load, Stage
 
@@ -16,8 +16,8 @@ _STEEPEST_RAD = math.radians(85.0)
 
 def too_steep(scene: Scene) -> tuple[tuple[str, ...], str, str, str] | None:
     """Where a scene's rays graze a filter that moves with them: key, problem, value, what is allowed."""
-    cone = cone_of(scene)
-    steepest = cone.half_rad + cone.chief_rad
+    chief_deg = scene.optics.cra_deg if scene.field is None else max(scene.field.angles_deg)
+    steepest = cone_of(scene).half_rad + math.radians(chief_deg)
     if steepest <= _STEEPEST_RAD:
         return None
     problem = "the steepest ray grazes a filter whose technology is interference"
@@ -35,7 +35,7 @@ class Angle(FilterEffect):
 
     def exact(self, shot: Shot) -> str | None:
         """Only filters that are said to be of interference move."""
-        if any(math.isfinite(shot.effective_index(c)) for c in range(len(shot.mosaic.channels))):
+        if moves(shot):
             return None
         stated = any(technology is not None for technology in shot.technologies)
         return "pigments do not move with the angle" if stated else "no technology is stated: filters as on axis"
