@@ -7,6 +7,7 @@ current, a pulse's moment, the exposure. Nothing is clipped, rounded or noisy ye
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,8 +18,10 @@ from ..designs.products import row_products
 from ..types import BoolArray, FloatArray
 from .effects import flicker, quadrature
 from .exposure import exposure_times, white_irradiance
+from .field import over_field
 from .kernel import Kernel
 from .registry import factor_of_light
+from .seen import SeenFilters
 from .view import View, background_irradiance, per_photon, signal_irradiance
 
 _KEPT = 15_000_000
@@ -40,12 +43,20 @@ class Changing:
     which: BoolArray
 
 
+def _background(view: View) -> FloatArray:
+    """Electrons/s of the background for each QE, behind all that dims it, ndarray[n_wavelengths]."""
+    dimmed = factor_of_light(view, view.methods, view.grid.nodes_nm, background=True)
+    return np.asarray(background_irradiance(view) * per_photon(view) * dimmed, dtype=float)
+
+
 class Electrons:
     """What a kernel gives of designs. `work` counts the values that are computed, by effect.
 
-    `kernel`: the scene's. `signals`, `background`, `white`: electrons/s for each QE of light, background and the
-    white patch at every wavelength, ndarray[n_signals, n_wavelengths] and ndarray[n_wavelengths]. `fixed`: electrons/s
-    of what no design changes, ndarray[n_cases, n_signals, n_units].
+    `kernel`: the scene's. `seen`: the filters as the rays see them, at each place of the field; `place`: that of each
+    case, ndarray[n_cases]. `signals`, `white`: electrons/s for each QE of light and the white patch at every
+    wavelength, ndarray[n_signals, n_wavelengths] and ndarray[n_wavelengths]; `background`: for each QE of the modified
+    channels, ndarray[n_places, n_modified, n_wavelengths]. `fixed`: electrons/s of what no design changes,
+    ndarray[n_cases, n_signals, n_units].
     """
 
     def __init__(
@@ -61,12 +72,17 @@ class Electrons:
         at_all = self._nodes.size == view.grid.size
         self._hats = None if at_all else quadrature.between_nodes(view.grid.size, self._nodes)
         self.signals = signal_irradiance(view) * per_photon(view)
-        dimmed = factor_of_light(view, view.methods, view.grid.nodes_nm, background=True)
-        self.background = background_irradiance(view) * per_photon(view) * dimmed
         self.white = white_irradiance(view) * per_photon(view)
         fixed, modified = list(view.fixed), list(view.modified)
-        self.fixed = self._products(kernel.light[:, :, fixed], view.qe[None, fixed])[0]
-        self._fixed_uniform = kernel.uniform[:, :, fixed] @ (view.qe[fixed] @ self.background)
+        places = over_field(view)
+        self.seen = [SeenFilters(place, view.methods.angle) for place in places]
+        self.place = np.repeat(np.arange(len(places)), len(kernel.light) // len(places))
+        background = [_background(place) for place in places]
+        each = [np.repeat(light[None], len(modified), axis=0) for light in background]
+        self.background = np.stack([seen.light(light, modified) for seen, light in zip(self.seen, each, strict=True)])
+        self.fixed = self._products(kernel.light[:, :, fixed], view.qe[None, fixed], fixed)[0]
+        rates = [s.curves(view.qe[fixed], fixed) @ light for s, light in zip(self.seen, background, strict=True)]
+        self._fixed_uniform = np.einsum("xuc,xc->xu", kernel.uniform[:, :, fixed], np.stack(rates)[self.place])
         self._modified_uniform = kernel.uniform[:, :, modified]
         # Units that look through a filter that changes; electrons/s per QE of it, kept where the table is small.
         self._touched = np.flatnonzero((kernel.light[:, :, modified] != 0).any(axis=(0, 2, 3)))
@@ -74,16 +90,31 @@ class Electrons:
         size = self._modified[..., 0].size * len(self.signals) * self._nodes.size
         self._kept = self._table().astype(dtype) if 0 < size <= _KEPT * (not once) else None
 
-    def _looked_at(self, qe: FloatArray) -> FloatArray:
-        """QE as the quadrature sees it: itself, or linear between its nodes."""
-        return qe if self._hats is None else qe[..., self._nodes] @ self._hats
+    def _looked_at(self, qe: FloatArray, channels: Sequence[int], place: int = 0) -> FloatArray:
+        """QE of some channels as the quadrature sees it (itself, or linear between its nodes), and then the rays."""
+        nodal = qe if self._hats is None else qe[..., self._nodes] @ self._hats
+        return self.seen[place].curves(nodal, channels)
 
-    def _products(self, light: FloatArray, qe: FloatArray) -> FloatArray:
-        """Sum over channels and wavelengths of kernel, QE and signals, [n_designs, n_cases, n_signals, n_units]."""
+    def at_each_place(self, light: FloatArray, channels: Sequence[int]) -> FloatArray:
+        """Light on some channels, ndarray[n_cases, ..., n, n_wavelengths], as their filters see it at its place."""
+        return np.concatenate([seen.light(light[self.place == at], channels) for at, seen in enumerate(self.seen)])
+
+    def _products(self, light: FloatArray, qe: FloatArray, of: Sequence[int]) -> FloatArray:
+        """Sum over channels and wavelengths of kernel, QE and signals, [n_designs, n_cases, n_signals, n_units].
+
+        `light`, `qe`: of the channels `of`.
+        """
+        parts = [self._products_at(at, light[self.place == at], qe, of) for at in range(len(self.seen))]
+        return np.concatenate(parts, axis=1)
+
+    def _products_at(self, place: int, light: FloatArray, qe: FloatArray, of: Sequence[int]) -> FloatArray:
+        """Of the cases of one place of the field."""
         cases, units, channels, _ = light.shape
         size, n, n_signals = self.view.grid.size, len(qe), len(self.signals)
         weights = np.broadcast_to(light, (cases, units, channels, size)).reshape(cases * units, channels * size)
-        seen = self._looked_at(qe)[:, :, None] * self.signals  # [n_designs, channels, n_signals, n_wavelengths]
+        seen = (
+            self._looked_at(qe, of, place)[:, :, None] * self.signals
+        )  # [n_designs, channels, n_signals, n_wavelengths]
         moved = np.moveaxis(seen, 2, 1).reshape(n, n_signals, channels * size)
         self._work["response"] += weights.shape[0] * moved.size
         # A product for each design, so that its bits do not depend on how many there are.
@@ -93,6 +124,7 @@ class Electrons:
     def _table(self) -> FloatArray:
         """Signals times kernel on the quadrature's nodes, [channels x nodes, n_cases x n_signals x n_units]."""
         product = self._modified[:, None] * self.signals[:, None, None, :]
+        product = self.at_each_place(product, self.view.modified)
         on_nodes = product if self._hats is None else product @ self._hats.T
         channels, nodes = on_nodes.shape[-2:]
         return np.ascontiguousarray(on_nodes.reshape(-1, channels * nodes).T)
@@ -106,7 +138,7 @@ class Electrons:
         if not self._touched.size:
             return found
         if self._kept is None:
-            part = self._products(self._modified, curves)
+            part = self._products(self._modified, curves, self.view.modified)
         else:
             qe = curves[:, :, self._nodes].reshape(len(curves), -1).astype(self._kept.dtype)
             self._work["response"] += len(curves) * self._kept.size
@@ -127,20 +159,27 @@ class Electrons:
 
     def expected(self, curves: FloatArray, scales: FloatArray, exposure_s: FloatArray) -> FloatArray:
         """Expected electrons before the full well, ndarray[n_designs, n_cases x n_scales, n_signals, n_units]."""
-        uniform = self._fixed_uniform + self.through_filters(curves @ self.background)
+        uniform = self._fixed_uniform + self.through_filters(self.of_background(curves))
         uniform = uniform + self.view.pixel.dark_e_per_s
         both = self.rates(curves)[:, :, None] * scales[:, None, :, None, None] + uniform[:, :, None, None, :]
         flat = both.reshape(len(curves), -1, *both.shape[3:])
         return np.asarray(flat * exposure_s[:, None, None, None], dtype=float)
 
+    def of_background(self, curves: FloatArray) -> FloatArray:
+        """Electrons/s of the background in the modified channels, ndarray[n, n_places, n_modified].
+
+        `curves`: ndarray[n, n_modified, n_wavelengths].
+        """
+        return np.asarray(np.einsum("nml,pml->npm", curves, self.background), dtype=float)
+
     def through_filters(self, rates: FloatArray) -> FloatArray:
         """What the units get of a uniform light, ndarray[n_designs, n_cases, n_units].
 
-        `rates`: electrons/s of the modified channels, ndarray[n_designs, n_modified].
+        `rates`: electrons/s of the modified channels, ndarray[n_designs, n_places, n_modified].
         """
         found = np.zeros((len(rates), *self._modified_uniform.shape[:2]))
-        for index in range(rates.shape[1]):
-            found += self._modified_uniform[:, :, index] * rates[:, index, None, None]
+        for index in range(rates.shape[2]):
+            found += self._modified_uniform[:, :, index] * rates[:, self.place, index, None]
         return found
 
     def changing(self, block: Block) -> Changing | None:
@@ -167,7 +206,8 @@ class Electrons:
         self._work["response"] += len(some) * self._kept.size
         values = some.product(self._kept, self._nodes).reshape(len(some), len(self.fixed), -1)
         values = values.astype(float, copy=False)
-        uniform = some.product(self.background[:, None], everywhere) * self._modified_uniform[:, unit, 0]
+        uniform = some.product(np.ascontiguousarray(self.background[:, 0].T), everywhere)[:, self.place]
+        uniform = uniform * self._modified_uniform[:, unit, 0]
         uniform = self._fixed_uniform[:, unit] + uniform + view.pixel.dark_e_per_s
         rest = self.fixed + (self._fixed_uniform + view.pixel.dark_e_per_s)[:, None]
         expose(values, np.ascontiguousarray(self.fixed[:, :, unit]), uniform, float(time_s[0]))
@@ -181,4 +221,4 @@ class Electrons:
         qe = self.view.qe.copy()
         qe[list(self.view.modified)] = curves
         scale = self.scales(np.array([exposure_s]))[0].min() * exposure_s * self.view.pixel.dn_per_e
-        return np.asarray(self.signals[:, None] * self._looked_at(qe) * scale, dtype=float)
+        return np.asarray(self.signals[:, None] * self._looked_at(qe, range(len(qe))) * scale, dtype=float)

@@ -22,6 +22,7 @@ from ..errors import Fault, SweepError
 from ..types import FloatArray
 from .effects import phase
 from .electrons import Changing, Electrons
+from .field import over_field
 from .kernel import blocks, make_kernel
 from .noisy_readout import NoisyReadout
 from .places import AnyPlace
@@ -60,7 +61,8 @@ class Imager:
         cases = every[0] if self._others else cases
         kernel = make_kernel(view, methods, grid.nodes_nm, by_pixel=by_pixel, work=self.work, cases=cases)
         self.n_cases, self.n_units = kernel.light.shape[:2]
-        self.n_places = self.n_cases + sum(len(block.places_px) for block in self._others)
+        each = len(over_field(view))
+        self.n_places = self.n_cases + each * sum(len(block.places_px) for block in self._others)
         self.electrons = Electrons(view, kernel, self.work, dtype, once=once)
         self.readout = Readout(view, kernel, self.work)
 

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from ..curves.hats import hats
 from ..types import FloatArray
 from .effects import blur, crosstalk, demosaic, phase, sampling
+from .field import over_field
 from .methods import REFERENCE, Methods
 from .mosaic import Mosaic
 from .registry import factor_of_light
@@ -48,7 +50,8 @@ class Kernel:
 def colorless(view: View) -> View:
     """What kernels depend on: the view without filters, which is the same for all CFAs whose tiles are alike."""
     nothing = np.zeros_like(view.qe)
-    return replace(view, mosaic=view.mosaic.colorless, modified=(), qe=nothing, clear_qe=np.zeros_like(view.clear_qe))
+    bare = replace(view, mosaic=view.mosaic.colorless, modified=(), technologies=())
+    return replace(bare, qe=nothing, clear_qe=np.zeros_like(view.clear_qe))
 
 
 def make_kernel(
@@ -60,10 +63,15 @@ def make_kernel(
     work: Counter[str],
     cases: phase.Cases | None = None,
 ) -> Kernel:
-    """The kernel at some wavelengths; `by_pixel` keeps the pixels apart, for a readout that is not straight.
+    """The kernel at some wavelengths, of one place of the field after the other.
 
-    `cases`: places of the light instead of those of the method of `phase`.
+    `by_pixel` keeps the pixels apart, for a readout that is not straight. `cases`: places of the light on the mosaic
+    instead of those of the method of `phase`.
     """
+    places = over_field(replace(view, methods=methods))
+    if view.scenario.field is not None:
+        given = partial(make_kernel, by_pixel=by_pixel, work=work, cases=cases)
+        return _joined([given(place, methods, wavelength_nm) for place in places])
     if view.scenario.target is None:
         made = _uniform(view, methods, by_pixel=by_pixel)
         light = made.light
@@ -134,7 +142,7 @@ def bytes_per_place(view: View, *, by_pixel: bool) -> int:
     """About how much memory the kernel of one place of a light takes while it is made."""
     n = len(view.mosaic.channels)
     units = pixels_per_place(view) if by_pixel else n
-    return 8 * _COPIES * units * n * view.grid.size
+    return 8 * _COPIES * units * n * view.grid.size * len(over_field(view))
 
 
 def blocks(view: View, cases: phase.Cases) -> list[phase.Cases]:

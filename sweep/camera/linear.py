@@ -37,7 +37,7 @@ class LinearImager(Imager):
         scales = own.scales(exposure_s)
         whole = own.expected(one, scales, exposure_s)[0]
         light = (own.rates(curves_gradient) - own.fixed)[:, :, None] * scales[0][None, None, :, None, None]
-        uniform = own.through_filters(curves_gradient @ own.background)
+        uniform = own.through_filters(own.of_background(curves_gradient))
         slope = (light + uniform[:, :, None, None, :]).reshape(n, *whole.shape) * exposure_s
         relative = relative_slope(self.view, curves, curves_gradient)
         slope = slope + relative[:, None, None, None] * whole
@@ -53,7 +53,9 @@ class LinearImager(Imager):
         exposure_s = own.exposure_s(curves[None])
         scales = own.scales(exposure_s)[0]
         light = own.kernel.light[:, None, None, :, channel] * own.signals[:, None, :]
-        uniform = own.kernel.uniform[:, None, None, :, channel, None] * own.background
+        light = own.at_each_place(light[..., None, :], [channel])[..., 0, :]
+        background = own.background[own.place, modified][:, None, None, None]
+        uniform = own.kernel.uniform[:, None, None, :, channel, None] * background
         both = light * scales[None, :, None, None, None] + uniform
         return np.asarray(both.reshape(-1, *both.shape[2:]) * (exposure_s[0] * self.view.pixel.dn_per_e), dtype=float)
 

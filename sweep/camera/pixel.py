@@ -26,12 +26,14 @@ class Optics(Section):
     """A lens without aberrations. `transmission` holds for all wavelengths.
 
     `focus_m`: distance that is in focus; null focuses on the target. `f_number`: 0.01 (no lens is faster than 0.5) to
-    a million (a pinhole far away).
+    a million (a pinhole far away). `cra_deg`: the chief ray angle, at which the middle of the lens's cone of rays
+    falls on the pixel; interference filters move with it.
     """
 
     f_number: float = Field(default=4.0, ge=0.01, le=1e6)
     focus_m: Meters | None = None
     transmission: Share = 1.0
+    cra_deg: float = Field(default=0.0, ge=0, le=60)
 
 
 class Pixel(Section):

@@ -10,6 +10,7 @@ import numpy as np
 from ..curves.builtin.ar0820 import ar0820
 from ..curves.builtin.surrogate import SurrogateParameters, surrogate_parameters
 from ..curves.spectrum import WavelengthGrid
+from ..designs.technology import Technology
 from ..errors import DataError, Fault, nearest
 from ..types import FloatArray
 from .mosaic import Mosaic
@@ -23,7 +24,7 @@ class SensorCurves:
     """QE by curve name, each ndarray[n_wavelengths], electrons per photon (or on one common relative scale).
 
     `clear` names the reference of the CFA's sensitivity. `variants` maps a CFA's name to channels of it that use a
-    curve of another name.
+    curve of another name. `technologies`: by what the filters of curves work, where that is stated.
     """
 
     name: str
@@ -32,6 +33,7 @@ class SensorCurves:
     source: str
     surrogate: bool = False
     variants: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    technologies: Mapping[str, Technology | None] = field(default_factory=dict)
 
     def curve_name(self, cfa: str, channel: str) -> str:
         """The curve that `channel` of `cfa` uses."""
@@ -56,8 +58,12 @@ class SensorCurves:
 
         `replaced` names the curve of channels that the sensor does not have itself (a modified channel and its base).
         """
+        return np.stack([self.curve(name) for name in self.mosaic_curves(mosaic, replaced)])
+
+    def mosaic_curves(self, mosaic: Mosaic, replaced: Mapping[str, str] | None = None) -> list[str]:
+        """The names of these curves."""
         names = {**{c: self.curve_name(mosaic.name, c) for c in mosaic.channels}, **(replaced or {})}
-        return np.stack([self.curve(names[channel]) for channel in mosaic.channels])
+        return [names[channel] for channel in mosaic.channels]
 
 
 def make_sensor(name: str, qe: Mapping[str, FloatArray], source: str, clear: str | None = None) -> SensorCurves:

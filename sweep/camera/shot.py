@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..curves.lights import Lights
 from ..curves.spectrum import WavelengthGrid
+from ..designs.technology import Technology, index_of
 from ..types import FloatArray, IndexArray
 from .mosaic import Mosaic
 from .pixel import Pixel
@@ -20,7 +22,8 @@ class Shot:
 
     `qe`: ndarray[n_channels, n_wavelengths] of the mosaic's channels, electrons per photon; the rows of `modified`
     (channel indices, one per curve that a family makes) hold the base curve. `clear_qe`: the reference of the CFA's
-    sensitivity, ndarray[n_wavelengths].
+    sensitivity, ndarray[n_wavelengths]. `technologies`: by what each channel's filter works, None where that is not
+    stated; empty where it is of none.
     """
 
     grid: WavelengthGrid
@@ -31,6 +34,7 @@ class Shot:
     lights: Lights
     pixel: Pixel
     scenario: Scene
+    technologies: tuple[Technology | None, ...] = field(default=(), kw_only=True)
 
     @property
     def base_qe(self) -> FloatArray:
@@ -41,6 +45,14 @@ class Shot:
     def fixed(self) -> tuple[int, ...]:
         """Channels that no design modifies."""
         return tuple(i for i in range(len(self.mosaic.channels)) if i not in self.modified)
+
+    def effective_index(self, channel: int) -> float:
+        """That of a channel's filter; infinite for one that does not move with the angle of the light."""
+        return index_of(self.technologies[channel]) if self.technologies else math.inf
+
+    def carrier(self, channel: int) -> FloatArray:
+        """What a channel is under its filter and stays at every angle: its base, or of a plain one the clear pixel."""
+        return self.qe[channel] if channel in self.modified else self.clear_qe
 
     @property
     def longest_distance_dn(self) -> float:

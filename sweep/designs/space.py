@@ -10,18 +10,20 @@ import numpy as np
 
 from ..types import FloatArray, IndexArray
 from .family import Family
+from .technology import Technology
 
 Kind = Literal["reference", "design", "sweep", "search"]
 
 
 @dataclass(frozen=True)
 class Filter:
-    """A family bound to its curves, and which channels of which CFA it replaces."""
+    """A family bound to its curves, which channels of which CFA it replaces, and by what it works, where stated."""
 
     family: Family
     channels: tuple[str, ...]
     base: str
     target: str
+    technology: Technology | None = None
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from ..metrics.quantity import HELD_OUT
 from ..results.output import Output
 from ..results.tables import FOUND, PLAIN, SWEPT
 from ..results.thinning import per_light
+from .assumed import assumed, moves_with_light
 from .leaders import Leaders, Row, leaders_of
 from .names import full_name
 from .noise import usable_lines
@@ -79,13 +80,16 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     if plain is not None:
         text += _times(output, best, plain)
     yield f"{text}."
+    if filter_told := assumed(output, best):
+        yield filter_told
     lights = best.get(limited_by_name(separation.pair)) if separation.pair else None
     search = output.provenance.search
     proven = None if search is None or best["kind"] not in (SWEPT, FOUND) else search.limit_proven
     parts = []
     if proven is not None and output.goal.name == separation.name:
         most = separation.told_bound(proven)
-        parts.append(f"No filter in its place that meets the same exceeds {most} (proven, before quantization).")
+        alike = " and moves like it" if moves_with_light(output, best) else ""
+        parts.append(f"No filter in its place that meets the same{alike} exceeds {most} (proven, before quantization).")
     if isinstance(lights, str):
         parts.append(f"The two lights that limit it are {lights}.")
     if parts:

@@ -27,6 +27,8 @@ _LABELS = {
     "intensity_cd": "luminous intensity / cd",
     "read_noise_e": "read noise / e",
     "dark_e_per_s": "dark current / (e/s)",
+    "cra_deg": "chief ray angle / degrees",
+    "cra_max_deg": "chief ray angle in the corner / degrees",
     "level": "exposure of the brightest channel on white / full scale",
 }
 
@@ -41,7 +43,10 @@ class Line:
 
 @dataclass(frozen=True)
 class SeriesFigure:
-    """A line per design over `x` (ndarray[n]), the number `key` of the scenarios; `level` is marked."""
+    """A line per design over `x` (ndarray[n]), the number `key` of the scenarios; `level` is marked.
+
+    `among`: which scenarios they are, where there are others over the same number.
+    """
 
     title: str
     key: str
@@ -52,6 +57,7 @@ class SeriesFigure:
     log_y: bool = False
     from_zero: bool = True
     level: float | None = None
+    among: str = ""
 
     @property
     def x_label(self) -> str:
@@ -94,7 +100,7 @@ def lead_sentence(series: SeriesFigure) -> str:
             f"{span} {leader} leads ({_told(values[leader][stop], dn)}{'' if start == stop else f' at {at(stop)}'}"
         )
         parts[-1] += f", {rival} {_told(values[rival][stop], dn)})" if rival else ")"
-    return f"{what[:1].upper()}{what[1:]} over {name}: {'; '.join(parts)}."
+    return f"{what[:1].upper()}{what[1:]} over {name}{f', {series.among}' if series.among else ''}: {'; '.join(parts)}."
 
 
 def _told(value: float, unit: str) -> str:

@@ -6,6 +6,7 @@ from ..results.facts import SearchFacts
 from ..results.output import Output
 from ..results.tables import NAMED
 from .answer import answer_sentences
+from .assumed import assumed_lines
 from .published import comparison_lines, comparison_with_published
 from .tables import geometry_table
 
@@ -61,6 +62,7 @@ def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
         both = ", ".join(f"{name} {area:.3f}" for name, area in areas.items() if area > 0)
         least = output.provenance.hypervolume_least_sensitivity
         lines.append(f"Hypervolume (DN x sensitivity, above 0 and a sensitivity of {least:g}): {both}.")
+    lines += assumed_lines(output)
     lines += [f"Note: {warning}." for warning in output.provenance.warnings]
     ratio = output.study.lights.photon_ratio
     if ratio is not None:
@@ -112,8 +114,10 @@ def _limit_line(output: Output, search: SearchFacts) -> str:
         programs, parts = search.limit_programs, search.limit_open_parts
         proof += f", but the limit itself is not proven: {parts} parts are open after {programs} linear programs"
     levels = search.front_limits_open
+    technology = (output.study.sweeps | output.study.boxes)[search.space].technology
+    moved = "" if technology is None else f", as {technology.told}"
     return (
         f"Limit of any filter: {proof}; {gap}. This is for filters between the least transmission and the curve that "
-        f"they replace, under the same constraints{without}, before clipping and quantization."
+        f"they replace{moved}, under the same constraints{without}, before clipping and quantization."
         + (f" At {levels} levels of the front the line is an upper bound, not yet the limit." if levels else "")
     )

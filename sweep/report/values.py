@@ -130,8 +130,8 @@ def series_figures(output: Output) -> list[SeriesFigure]:
     best_place = next(
         (c.name for c in output.columns.values() if (c.extreme, c.of) == ("best place", separation.name)), ""
     )
-    figures = []
-    for (base, key), scenarios in scenario_series(output).items():
+    figures, series = [], scenario_series(output)
+    for (base, key), scenarios in series.items():
         upper = over_series(rows, scenarios, best_place) if best_place in rows else {}
         upper = {name: values for name, values in upper.items() if np.isfinite(values).all()}
         lines = {n: Line(y, upper.get(n)) for n, y in over_series(rows, scenarios, separation.name).items()}
@@ -139,7 +139,8 @@ def series_figures(output: Output) -> list[SeriesFigure]:
             band = "over the places on the mosaic" if upper else ""
             title = f"{output.study.study}: {base}"
             x = np.array(list(scenarios.values()))
-            figures.append(SeriesFigure(title, key, separation.axis, x, lines, band))
+            among = base if [other for _, other in series].count(key) > 1 else ""
+            figures.append(SeriesFigure(title, key, separation.axis, x, lines, band, among=among))
     return figures
 
 

@@ -21,8 +21,8 @@ def resolved_yaml(study: Study) -> str:
     """The study with every default written out; a study file itself."""
     section = study.section.model_dump(mode="json", by_alias=True, exclude_none=True)
     for key in ("sensor", "lights"):
-        if not section[key]["files"]:
-            section[key] = section[key]["builtin"]
+        named = not section[key]["files"] and not section[key].get("technology")
+        section[key] = section[key]["builtin"] if named else section[key]
     if study.section.lights.builtin is None:
         section["lights"]["photon_ratio"] = study.lights.photon_ratio  # another light in the file would change it
     return yaml_text(section)

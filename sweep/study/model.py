@@ -19,6 +19,7 @@ from ..camera.view import View
 from ..curves.lights import Lights, Pair, class_pairs
 from ..curves.spectrum import WavelengthGrid
 from ..designs.space import Space
+from ..designs.technology import Technology
 from ..errors import Fault, StudyError
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective, columns_of
@@ -129,13 +130,20 @@ class Study:
     def view(self, space: Space, scenario: str) -> View:
         """What the designs of `space` share in a scenario."""
         bases = {} if space.filter is None else dict.fromkeys(space.filter.channels, space.filter.base)
-        return self.view_of(space.cfa, scenario, bases)
+        technology = None if space.filter is None else space.filter.technology
+        return self.view_of(space.cfa, scenario, bases, technology)
 
-    def view_of(self, cfa: str, scenario: str, bases: Mapping[str, str]) -> View:
-        """What designs of a CFA share in a scenario; `bases`: modified channel -> the curve that it replaces."""
+    def view_of(self, cfa: str, scenario: str, bases: Mapping[str, str], technology: Technology | None = None) -> View:
+        """What designs of a CFA share in a scenario; `bases`: modified channel -> the curve that it replaces.
+
+        `technology`: that of the modified channels' filters.
+        """
         mosaic, scene = self.mosaics[cfa], self.scenarios[scenario]
         replaced = {**self.section.cfas[cfa].curves, **bases}
         modified = tuple(mosaic.channels.index(channel) for channel in bases)
+        technologies = [self.sensor.technologies.get(name) for name in self.sensor.mosaic_curves(mosaic, replaced)]
+        for channel in modified:
+            technologies[channel] = technology
         return View(
             grid=self.grid,
             mosaic=mosaic,
@@ -145,6 +153,7 @@ class Study:
             lights=self.lights,
             pixel=self.pixel if scene.noise is None else scene.noise.of(self.pixel),
             scenario=scene,
+            technologies=tuple(technologies) if any(technologies) else (),
             methods=self.plans[scenario].methods if scenario in self.plans else REFERENCE,
         )
 

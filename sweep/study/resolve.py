@@ -24,6 +24,7 @@ from .schema import CfaSection, StudySection
 from .sensors import sensor_of
 from .sources import KeptSources, Sources
 from .spaces import SpaceBuilder
+from .technologies import check_lenses, with_technologies
 from .yaml_tree import Key
 
 MOST_DESIGNS = 10**9
@@ -57,11 +58,13 @@ class _Resolver:
         mosaics = {name: mosaic for name, cfa in section.cfas.items() if (mosaic := self.mosaic(name, cfa)) is not None}
         if sensor is None or lights is None:
             raise StudyError(self.faults)
+        sensor = with_technologies(sensor, section, self.sources)
         held_out = self.held_out(lights)
         spaces = SpaceBuilder(section, self.sources, sensor, mosaics).spaces()
         self.check_columns(lights)
         self.check_luminances(lights)
         self.check_images()
+        check_lenses(section, sensor, spaces, self.sources)
         self.check_recognition(lights)
         self.check_objective(lights)
         self.check_constraints(lights)

@@ -13,6 +13,7 @@ from ..camera.sensor import BUILT_IN_SENSORS
 from ..curves.builtin.registry import BUILT_IN_LIGHTS
 from ..curves.spectrum import WavelengthGrid
 from ..designs.registry import FamilyOptions, told
+from ..designs.technology import Stated
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective
 from ..types import Number, Section
@@ -57,6 +58,9 @@ class Modification(Documented):
     to: Name | Annotated[float, Field(ge=0, le=1)] | None = None
     """The curve that it follows inside the band; a number is a floor, that share of the base."""
     options: FamilyOptions = FamilyOptions()
+    technology: Stated = None
+    """`pigment`, or `interference: {effective_index: 1.8}`, which moves with the angle of the light; left out, as on
+    axis."""
 
 
 class DesignSection(Modification):

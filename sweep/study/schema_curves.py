@@ -9,6 +9,7 @@ from pydantic import ConfigDict, Field, WithJsonSchema, model_validator
 
 from ..curves.scan import MOST_CURVES
 from ..curves.spectrum import Outside, Resampling
+from ..designs.technology import Stated
 from ..types import Ratio, Section
 
 Name = Annotated[str, Field(min_length=1, max_length=100)]
@@ -52,6 +53,9 @@ class SensorSection(Documented):
     files: list[CurveFile] = []
     clear: Name | None = None
     """The reference of the CFA's sensitivity. Left out, it is the built-in sensor's own, or the largest curve."""
+    technology: dict[Name, Stated] = {}
+    """Curve -> `pigment`, or `interference: {effective_index: 1.8}`, whose transmission over the clear curve moves with
+    the angle of the light; a curve that is left out, as on axis."""
 
     @model_validator(mode="after")
     def _some_source(self) -> SensorSection:

@@ -18,6 +18,7 @@ from ..errors import Fault, SweepError, nearest
 from ..types import FloatArray
 from .schema import DesignSection, Modification, StudySection
 from .sources import Sources
+from .technologies import check_filter
 from .yaml_tree import Key
 
 _MOST_POINTS = 2_000_000
@@ -139,8 +140,11 @@ class SpaceBuilder:
         ordered = self._axes(axes, axes_path, family.parameters, open_ended=kind == "search")
         if len(self.sources.faults) > before:
             return []
-        made = Filter(family, tuple(entry.channel), entry.base, "" if entry.to is None else str(entry.to))
-        return [Space(kind, name, entry.cfa, made, tuple(ordered), gridded=kind != "search")]
+        target_name = "" if entry.to is None else str(entry.to)
+        made = Filter(family, tuple(entry.channel), entry.base, target_name, entry.technology)
+        space = Space(kind, name, entry.cfa, made, tuple(ordered), gridded=kind != "search")
+        check_filter(space, path, self.sensor, self.sources)
+        return [space]
 
     def _family(self, entry: Modification, base: FloatArray, target: FloatArray | None) -> Family:
         """The family over its curves; raises SweepError."""

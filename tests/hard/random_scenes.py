@@ -19,12 +19,13 @@ from sweep.curves.lights import class_pairs
 from sweep.designs.families.dual import Dual
 from sweep.designs.families.stopband import MultiStopband
 from sweep.designs.family import Family
+from sweep.designs.technology import Technology
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.quantity import WORST
 from sweep.metrics.separation import csd_name
 from sweep.search.problem import SHIFTS
 
-from .scenes import FAMILY, GRID, SENSOR, TILES, lights, promised_names, target
+from .scenes import FAMILY, GRID, SENSOR, TILES, lights, moving, promised_names, target
 
 _DUAL = Dual(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["C"])
 _TWO_BANDS = MultiStopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"], 2)
@@ -33,6 +34,8 @@ _DESIGNS = 4
 _SHIFT_NM = 3.0
 _ANY_PLACE_PX = 6.0
 """Larger lights at any place take too long."""
+_MOVED_EVERY = 3
+"""In scenes of some seeds filters move with the angle of the light."""
 _ANY_PLACE_EVERY = 11
 """Any place is asked for only in scenes of some seeds: the reference then takes a hundred times as long."""
 
@@ -62,6 +65,7 @@ def random_scene(seed: int) -> RandomScene:
     """The scene of a seed, always the same."""
     rng = np.random.default_rng([seed, 17])
     given = _scenario(rng, may_be_anywhere=seed % _ANY_PLACE_EVERY == 0)
+    given["optics"]["cra_deg"] = float(np.random.default_rng([seed, 19]).uniform(0, 35))
     pixel = _pixel(rng, noisy=given["noise"] is not False)
     cfa = str(rng.choice([*TILES, "two"]))
     mosaic = _TWO if cfa == "two" else TILES[cfa]
@@ -76,6 +80,7 @@ def random_scene(seed: int) -> RandomScene:
         lights=lights(),
         pixel=Pixel(**pixel) if scenario.noise is None else scenario.noise.of(Pixel(**pixel)),
         scenario=scenario,
+        technologies=_technologies(seed, mosaic),
     )
     low, high = view.qe.copy(), view.qe.copy()
     curves: tuple[np.ndarray, ...] = (np.empty((1, 0, GRID.size)),)
@@ -84,6 +89,13 @@ def random_scene(seed: int) -> RandomScene:
         low[list(modified)], high[list(modified)] = lower, upper
     tolerance = float(10 ** rng.uniform(-2, 2.5))
     return RandomScene(f"random {seed}", view, curves, Box(view, low, high, 1000), tolerance)
+
+
+def _technologies(seed: int, mosaic: Mosaic) -> tuple[Technology, ...]:
+    """In a third of the scenes the modified channels move with the angle of the light, where they do not exceed it."""
+    if seed % _MOVED_EVERY or "M" in mosaic.channels:
+        return ()
+    return moving(mosaic, float(np.random.default_rng([seed, 20]).uniform(1.4, 2.2)))
 
 
 def columns(made: RandomScene, methods: Methods) -> dict[str, np.ndarray]:

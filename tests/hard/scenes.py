@@ -20,6 +20,7 @@ from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.families.stopband import Stopband
+from sweep.designs.technology import Interference, Technology
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.quantity import Asked
 from sweep.metrics.registry import quantities_of
@@ -50,6 +51,12 @@ def lights(grid: WavelengthGrid = GRID) -> Lights:
     return Lights("few", names, types, whole.photons[kept], whole.photon_ratio, "", True)
 
 
+def moving(mosaic: Mosaic, index: float) -> tuple[Technology, ...]:
+    """N and M of interference, all others of pigment."""
+    made = Technology(interference=Interference(effective_index=index))
+    return tuple(made if channel in ("N", "M") else Technology() for channel in mosaic.channels)
+
+
 @dataclass(frozen=True)
 class Scene:
     """A scene with one design, and the box of designs that the plan is for."""
@@ -68,8 +75,9 @@ def scene(
     wide: bool = False,
     seed: int = 1,
     grid: WavelengthGrid = GRID,
+    index: float | None = None,
 ) -> Scene:
-    """`wide`: plan for a box of filters; else for the one design."""
+    """`wide`: plan for a box of filters; else for the one design. `index`: N moves with the angle of the light."""
     mosaic = TILES[cfa]
     sensor = SENSOR if grid is GRID else BUILT_IN_SENSORS["ar0820"](grid)
     family = FAMILY if grid is GRID else Stopband(grid.nodes_nm, sensor.qe["Y"], sensor.qe["G"])
@@ -83,6 +91,7 @@ def scene(
         lights(grid),
         Pixel(**(pixel or {})),
         Scenario.model_validate(scenario),
+        technologies=() if index is None else moving(mosaic, index),
     )
     x = LOW + (HIGH - LOW) * np.random.default_rng(seed).uniform(size=5)
     curves = family.curves(x[None]) if modified else np.empty((1, 0, grid.size))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .scenes import DARK, F2, F4, FAR, FINE, FIXED, MIDDLE, TINY, Scene, scene
+from .scenes import DARK, F2, F4, FAR, FINE, FIXED, GRID, MIDDLE, TINY, Scene, scene
 
 
 def noisy(name: str, cfa: str, given: dict[str, Any], pixel: dict[str, Any] = DARK, **more: Any) -> Scene:
@@ -74,6 +74,26 @@ ALONE: tuple[Scene, ...] = (
         "RYNCy",
         {"target": FAR | {"phase_px": [0.5, 0.5]}} | lit(800, 0.1) | {"optics": {"f_number": 64.0}},
         grid=FINE,
+    ),
+    *(
+        noisy(name, cfa, given | {"optics": {"f_number": f, "cra_deg": cra}}, grid=grid, wide=wide, index=index)
+        for name, cfa, given, f, cra, index, grid, wide in (
+            ("at an angle", "RYNCy", {}, 1.0, 30.0, 1.5, FINE, False),
+            ("at an angle, box", "RYNCy", {"background_cd_m2": 300}, 1.2, 25.0, 1.6, GRID, True),
+            ("at an angle, far", "RYNCy", {"target": FAR} | lit(800, 5e-5), 0.8, 20.0, 1.4, FINE, False),
+            ("at an angle, 1x3 tile", "1x3", {"target": MIDDLE}, 1.4, 40.0, 1.8, FINE, False),
+        )
+    ),
+    noisy(
+        "a field",
+        "RYNCy",
+        {
+            "optics": {"f_number": 1.2},
+            "field": {"cra_max_deg": 30, "places": 3},
+            "off_axis_deg": 30,
+            "background_cd_m2": 90,
+        },
+        index=1.7,
     ),
     # Where the full well ends below the ADC's range, rounding does not end it again.
     scene(

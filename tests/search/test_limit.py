@@ -223,7 +223,7 @@ def _with_base(curve: np.ndarray) -> View:
 
 def test_words_say_what_is_proven() -> None:
     """A finished proof, one that was cut short, and levels that were."""
-    output: Any = SimpleNamespace(goal=PROBLEM.quantities["csd_yellow_red"])
+    output: Any = SimpleNamespace(goal=PROBLEM.quantities["csd_yellow_red"], study=STUDY.section)
     done = SearchFacts(
         algorithm="SLSQP",
         scenario="chart",

@@ -30,7 +30,7 @@ PATCH = """\
 photon_radiance: 2.0e+18
 off_axis_deg: 5.0
 exposure: {kind: white_patch, level: 0.95, photon_ratio: 0.08}
-optics: {f_number: 4.0, transmission: 0.9}
+optics: {f_number: 4.0, transmission: 0.9, cra_deg: 12.0}
 noise: {read_noise_e: 3.0, dark_e_per_s: 2.0, prnu: 0.02}
 """
 ROAD = """\
@@ -199,6 +199,7 @@ LIMITS: dict[str, tuple[float, float]] = {
     **{
         "photon_ratio": (1e-30, 1e30),
         "f_number": (0.01, 1e6),
+        "cra_deg": (0, 60),
         "transmission": (1e-9, 1),
         "intensity_cd": (1e-12, 1e15),
     },

@@ -5,11 +5,15 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from enum import Enum, IntEnum
-from typing import ClassVar, Protocol, Self
+from typing import TYPE_CHECKING, ClassVar, Protocol, Self
 
 from ...types import FloatArray, Section
 from ..scene import Scene
+from ..seen import SeenFilters
 from ..shot import Shot
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 
 class SceneOptions(Section):
@@ -106,7 +110,23 @@ class CurveChange:
     high: FloatArray
 
 
-Change = KernelChange | ShareChange | LightChange | CurveChange
+@dataclass(frozen=True)
+class FilterChange:
+    """Filters as other rays see them, of the light and of its background."""
+
+    before: SeenFilters
+    after: SeenFilters
+
+    @property
+    def matrices(self) -> dict[int, csr_matrix]:
+        """Of each channel that moves, [n_wavelengths, n_wavelengths]: matrix @ curve is what was seen less what is."""
+        return {
+            channel: self.before.matrix(channel) - self.after.matrix(channel)
+            for channel in {*self.before.matrices, *self.after.matrices}
+        }
+
+
+Change = KernelChange | ShareChange | LightChange | CurveChange | FilterChange
 
 
 @dataclass(frozen=True)
@@ -226,6 +246,10 @@ class KernelEffect(LinearEffect):
     def change(self, shot: Shot, before: str, after: str, designs: Designs, *, straight: bool) -> Change:
         """Another kernel."""
         return KernelChange(self.part)
+
+
+class FilterEffect(LinearEffect):
+    """An effect on what the rays of the light see of the filters."""
 
 
 class LightEffect(LinearEffect):

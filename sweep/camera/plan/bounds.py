@@ -9,6 +9,7 @@ there, a distance changes by at most what both of its points move (`pixelwise`).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from ...curves.lights import class_pairs
 from ...types import FloatArray, IndexArray
 from ..effects import blur, flicker
 from ..exposure import exposure_times, white_irradiance
+from ..seen import METHODS, SeenFilters
 from ..view import View, background_irradiance, per_photon, signal_irradiance
 from .compiled import largest_change
 
@@ -75,21 +77,26 @@ class Spread:
 
 
 class Reach:
-    """The responses that the designs of a box can have, on the knots at which kernels are compared."""
+    """The responses that the designs of a box can have, on the knots at which kernels are compared.
+
+    `signals_dn`: DN for each QE of the signals at every wavelength, ndarray[n_signals, n_wavelengths]; `hats`: what
+    of a wavelength counts at each knot, ndarray[n_knots, n_wavelengths].
+    """
 
     def __init__(self, box: Box) -> None:
         view = box.view
         self.box = box
         wave = view.grid.nodes_nm
         self.knots_nm = blur.knots(wave, blur.COARSE)
-        self._hats = hats(wave, self.knots_nm)
+        self.hats = hats(wave, self.knots_nm)
         self.shortest_s, self.longest_s = self._exposures()
         drive = view.scenario.drive
         self.least_light = 1.0 if drive is None else flicker.smallest(drive, self.shortest_s, self.longest_s)
         self.most_light = 1.0 if drive is None else flicker.largest(drive, self.shortest_s, self.longest_s)
         dn = per_photon(view) * self.longest_s * self.most_light * view.pixel.dn_per_e
-        self._signals = signal_irradiance(view) * dn
+        self.signals_dn = signal_irradiance(view) * dn
         self.first, self.second, self._ends = _pairs(view.members)
+        self._seen: dict[str, SeenFilters] = {}
 
     def _exposures(self) -> tuple[float, float]:
         view = self.box.view
@@ -108,29 +115,50 @@ class Reach:
         """No channel of any design is above this, ndarray[n_channels, n_wavelengths]."""
         return self.box.high
 
-    @property
+    def seen(self, method: str) -> tuple[FloatArray, FloatArray]:
+        """`as_seen` of the box."""
+        return self.as_seen(method, self.box.low, self.box.high)
+
+    def as_seen(self, method: str, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Between which curves the rays see, by a method of `angle`, what lies between two.
+
+        ndarray[n_channels, n_wavelengths] each: what the rays see is a sum of the curve's values, none of which counts
+        less than 0 times.
+        """
+        if method not in self._seen:
+            self._seen[method] = SeenFilters(self.box.view, method)
+        seen, every = self._seen[method], range(len(low))
+        return seen.curves(low, every), seen.curves(high, every)
+
+    @cached_property
+    def _highest(self) -> FloatArray:
+        """No channel of any design is above this by any method, ndarray[n_channels, n_wavelengths]."""
+        return np.asarray(np.max([self.seen(method)[1] for method in METHODS], axis=0), dtype=float)
+
+    @cached_property
     def brightest_dn(self) -> FloatArray:
         """Largest response of each channel to any signal whose image is whole, DN, ndarray[n_channels]."""
-        return np.asarray((self._signals @ self.box.high.T).max(axis=0), dtype=float)
+        return np.asarray((self.signals_dn @ self._highest.T).max(axis=0), dtype=float)
 
     @property
     def brightest_pixels_dn(self) -> FloatArray:
         """The same with background, dark current and the filters of the neighbors, DN, ndarray[n_channels]."""
         view = self.box.view
         pixel, dn = view.pixel, per_photon(view) * self.longest_s * view.pixel.dn_per_e
-        background_dn = self.box.high @ background_irradiance(view) * dn
+        background_dn = self._highest @ background_irradiance(view) * dn
         found = self.brightest_dn + (pixel.dark_e_per_s * self.longest_s * pixel.dn_per_e + background_dn)
         return np.full(found.size, found.max()) if pixel.crosstalk else np.asarray(found, dtype=float)
 
-    def background(self, factor: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def background(self, factor: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Response of each channel to the background behind a factor, ndarray[n_wavelengths], that may be negative.
 
-        DN: middle value and half width, ndarray[n_channels] each.
+        For curves between `low` and `high`, ndarray[n_channels, n_wavelengths]. DN: middle value and half width,
+        ndarray[n_channels] each.
         """
         irradiance = background_irradiance(self.box.view) * factor
         dn = per_photon(self.box.view) * self.longest_s * self.box.view.pixel.dn_per_e
-        ends = [qe @ irradiance * dn for qe in (self.box.low, self.box.high)]
-        sizes = [qe @ np.abs(irradiance) * dn for qe in (self.box.low, self.box.high)]
+        ends = [qe @ irradiance * dn for qe in (low, high)]
+        sizes = [qe @ np.abs(irradiance) * dn for qe in (low, high)]
         return np.asarray((ends[0] + ends[1]) / 2), np.asarray((sizes[1] - sizes[0]) / 2)
 
     def span_dn(self, *, rounds: bool) -> float:
@@ -143,14 +171,14 @@ class Reach:
         """Sums for QE between `low` and `high` (ndarray[n_channels, n_wavelengths]) and a factor per wavelength."""
         middle, half = (low + high) / 2, (high - low) / 2
         most = np.maximum(np.abs(low), np.abs(high))
-        light = self._signals * factor
+        light = self.signals_dn * factor
         apart = np.abs(light[self.first] - light[self.second])
-        centers = np.einsum("sl,cl,kl->sck", light, middle, self._hats, optimize=True)
-        halves = np.einsum("pl,cl,kl->pck", apart, half, self._hats, optimize=True)
+        centers = np.einsum("sl,cl,kl->sck", light, middle, self.hats, optimize=True)
+        halves = np.einsum("pl,cl,kl->pck", apart, half, self.hats, optimize=True)
         return Amounts(
             middle=centers,
             half=halves,
-            half_each=np.einsum("sl,cl,kl->sck", np.abs(light), half, self._hats, optimize=True),
+            half_each=np.einsum("sl,cl,kl->sck", np.abs(light), half, self.hats, optimize=True),
             largest=np.abs(centers[self.first] - centers[self.second]) + halves,
             most=apart @ most.T,
             most_each=np.abs(light) @ most.T,

@@ -24,7 +24,7 @@ import numpy as np
 
 from ...types import FloatArray
 from ..effects import phase, quantization
-from ..effects.base import Change, KernelChange, LightChange, Part, ShareChange
+from ..effects.base import Change, FilterChange, KernelChange, LightChange, Part, ShareChange
 from ..kernel import Kernel, make_kernel, pixels_of_tile, pixels_per_place, readout_of
 from ..methods import Methods
 from ..view import View
@@ -122,6 +122,8 @@ class Moves:
 
 def _moves_background(what: Change) -> bool:
     """Whether a change that is none of the kernel changes the background, too."""
+    if isinstance(what, FilterChange):
+        return True
     return isinstance(what, LightChange | ShareChange) and what.of_background
 
 

@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 
 from ..effects.base import Effect, Stage
+from ..field import over_field
 from ..kernel import colorless
 from ..methods import REFERENCE, Methods
 from ..registry import EFFECTS
@@ -232,5 +233,10 @@ def _promises(boxes: Sequence[Box]) -> list[Promises]:
     kernels: dict[tuple[tuple[int, ...], ...], SceneKernels] = {}
     for box in boxes:
         if (tile := box.view.mosaic.tile) not in kernels:
-            kernels[tile] = SceneKernels(colorless(box.view))
-    return [Promises(box, kernels[box.view.mosaic.tile]) for box in boxes]
+            kernels[tile] = SceneKernels(colorless(over_field(box.view)[0]))
+    # Each place of the field sees a scene of its own; the worst of them changes by no more than any of them.
+    return [
+        Promises(replace(box, view=place), kernels[box.view.mosaic.tile])
+        for box in boxes
+        for place in over_field(box.view)
+    ]

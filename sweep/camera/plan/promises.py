@@ -15,7 +15,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..effects.base import Effect, KernelChange, KernelEffect, LightEffect, LinearEffect, Part, ReadoutEffect, Stage
+from ..effects.base import (
+    Effect,
+    FilterEffect,
+    KernelChange,
+    KernelEffect,
+    LightEffect,
+    LinearEffect,
+    Part,
+    ReadoutEffect,
+    Stage,
+)
 from ..methods import Methods
 from ..registry import EFFECTS
 from .bounds import Box, Reach
@@ -71,7 +81,7 @@ class Promises:
         """Whether what the optics change does not depend on the method of an effect."""
         if effect.stage is Stage.READOUT:
             return methods.straight and not effect.bends
-        return not isinstance(effect, KernelEffect | LightEffect)
+        return not isinstance(effect, KernelEffect | LightEffect | FilterEffect)
 
     def _readout_promise(self, effect: ReadoutEffect, after: Methods) -> float:
         """Ranges of the change in each channel, put together over the channels."""

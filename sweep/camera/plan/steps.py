@@ -9,11 +9,12 @@ import numpy as np
 
 from ...types import FloatArray
 from ..effects import blur, phase
-from ..effects.base import Change, CurveChange, KernelChange, LightChange, LinearEffect, Part, ShareChange
+from ..effects.base import Change, CurveChange, FilterChange, KernelChange, LightChange, LinearEffect, Part, ShareChange
 from ..methods import Methods
 from ..registry import factor_of_light
 from ..view import View
 from .bounds import Amounts, Reach
+from .filters import amounts_of_filters, background_of_filters
 from .scene_kernels import SceneKernels
 
 
@@ -49,7 +50,9 @@ class Steps:
         reach, (own, other) = self._reach, (getattr(methods, effect.name) for methods in (before, after))
         what = effect.change(self._view, own, other, reach, straight=straight)
         light, dimmed = self._factors(before)
-        base = changed = self._sums(light, reach.qe_low, reach.qe_high)
+        low, high = reach.seen(before.angle)
+        base = changed = self._sums(light, low, high)
+        background = reach.background(dimmed, low, high)
         now, remainder = self._kernels.of(before), self._between_knots(before)
         change, left, scale = now, now, 1.0
         match what:
@@ -63,13 +66,17 @@ class Steps:
             case LightChange():
                 rest, rest_dimmed = self._factors(replace(before, **{effect.name: effect.off}))
                 lost = what.before - what.after
-                changed = self._sums(lost * rest, reach.qe_low, reach.qe_high)
-                base = self._sums(what.after * rest, reach.qe_low, reach.qe_high)
-                dimmed = lost * rest_dimmed
+                changed = self._sums(lost * rest, low, high)
+                base = self._sums(what.after * rest, low, high)
+                background = reach.background(lost * rest_dimmed, low, high)
             case CurveChange():
-                changed = self._sums(light, what.low, what.high)
+                changed = self._sums(light, *reach.as_seen(before.angle, what.low, what.high))
+            case FilterChange():
+                changed = amounts_of_filters(reach, light, what)
+                base = self._sums(light, *reach.seen(after.angle))
+                background = background_of_filters(reach, dimmed, what)
         left = np.broadcast_to(left, change.shape)
-        return Step(what, changed, change, remainder, base, left, scale, reach.background(dimmed))
+        return Step(what, changed, change, remainder, base, left, scale, background)
 
     def _factors(self, methods: Methods) -> tuple[FloatArray, FloatArray]:
         """What is left of a signal's light and of the background at every wavelength, ndarray[n_wavelengths] each."""

@@ -1,0 +1,59 @@
+"""By what technology filters are taken to work, and in which light, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..camera.scene import Scene
+from ..designs.technology import Technology
+from ..results.output import Output
+from ..results.tables import FOUND, NAMED, PLAIN
+from .leaders import Row
+
+NOT_STATED = "Note: no technology is stated of the filters; they are taken as in light on axis, by parallel rays."
+
+
+def technologies_of(output: Output, row: Row) -> list[Technology | None]:
+    """What the study states of the filter of a row: one, or of a sweep's design each that it may be of."""
+    study, search = output.study, output.provenance.search
+    swept = study.sweeps | study.boxes
+    if row["kind"] == PLAIN:
+        return []
+    if row["kind"] == NAMED:
+        return [study.designs[row["name"]].technology]
+    if row["kind"] == FOUND and search is not None:
+        return [swept[search.space].technology]
+    return list({repr(made.technology): made.technology for made in study.sweeps.values()}.values())
+
+
+def assumed(output: Output, row: Row) -> str:
+    """Of what technology a row's filter is, and of a filter that moves the light that it is in; empty if not stated."""
+    stated = technologies_of(output, row)
+    if len(stated) != 1 or stated[0] is None:
+        return ""
+    if stated[0].interference is None:
+        return "Its filter is a pigment, which does not move with the angle of the light."
+    return f"Its filter works by {stated[0].told}, {told_light(output.study.scenarios[row['scenario']])}."
+
+
+def moves_with_light(output: Output, row: Row) -> bool:
+    """Whether a row's filter is said to move with the angle of the light."""
+    return any(t is not None and t.interference is not None for t in technologies_of(output, row))
+
+
+def told_light(scene: Scene) -> str:
+    """The rays of a scene in words."""
+    lens = f"behind f/{scene.optics.f_number:g}"
+    if scene.field is None:
+        return f"{lens} at a chief ray angle of {scene.optics.cra_deg:g} degrees"
+    angles = scene.field.angles_deg
+    ends = f"{min(angles):g} to {max(angles):g}"
+    return f"{lens} at chief ray angles of {ends} degrees, the worst of {len(angles)} places of the sensor"
+
+
+def assumed_lines(output: Output) -> Iterator[str]:
+    """A note where a study does not say of what technology its filters are."""
+    study = output.study
+    made = [*study.designs.values(), *study.sweeps.values(), *study.boxes.values()]
+    if any(modification.technology is None for modification in made):
+        yield NOT_STATED

@@ -1,0 +1,225 @@
+"""Light at an angle against sums over rays that share no code with it; what no technology moves stays as it is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sweep.camera.imager import Imager
+from sweep.camera.linear import smooth_imager
+from sweep.camera.methods import REFERENCE
+from sweep.camera.plan.plan import Planner
+from sweep.camera.rays import Cone, rays
+from sweep.camera.scenario import Scenario
+from sweep.camera.scene import SensorField
+from sweep.camera.seen import METHODS, RAYS, SeenFilters, cone_of
+from sweep.curves.spectrum import WavelengthGrid
+from sweep.designs.block import edges_of
+from sweep.designs.technology import Technology
+from sweep.metrics.evaluate import evaluate
+from sweep.study import load_study
+
+from ..conftest import STUDIES
+from ..hard.scenes import FAR, FINE, Scene, promised_names, scene
+
+SPACE = next(space for space in load_study(STUDIES / "stopband.yaml").spaces if space.kind == "sweep")
+SPACE = replace(SPACE, axes=((600.0, 615.0), (6.0, 20.0), (650.0,), (8.0,), (0.7, 1.0)))
+
+_CONES = ((1.6, 0.0), (1.6, 7.0), (1.6, 20.0), (4.0, 20.0), (0.8, 38.0), (1.0, 30.0))
+"""f-numbers and chief ray angles, degrees: within the cone, at its edge, outside it."""
+
+
+def bare(wavelength_nm: np.ndarray, transmission: np.ndarray, angle_rad: np.ndarray, index: float) -> np.ndarray:
+    """T(l / k) by Smith's formula, linear between the wavelengths; angles along the first axis."""
+    k = np.sqrt(1 - (np.sin(angle_rad) / index) ** 2)
+    return np.interp(wavelength_nm / k[..., None], wavelength_nm, transmission)
+
+
+def over_pupil(wave: float, knots: np.ndarray, values: np.ndarray, half: float, chief: float, index: float) -> float:
+    """Mean of T at one wavelength over the pupil as the sensor sees it, an ellipse.
+
+    Along the radius of each azimuth, with Gauss-Legendre points between the radii at which the ray meets a knot of T.
+    """
+    node, weight = np.polynomial.legendre.leggauss(12)
+    across, along, middle = math.sin(half), math.sin(half) * math.cos(chief), math.cos(half) * math.sin(chief)
+    total, n = 0.0, 2000
+    met = (1 - (wave / knots[knots > wave]) ** 2) * index**2  # squared sines at which the ray meets a knot
+    for azimuth in (np.arange(n) + 0.5) * math.pi / n:
+        # (middle + along r cos)^2 + (across r sin)^2 = met
+        c, s = along * math.cos(azimuth), across * math.sin(azimuth)
+        a, b = c * c + s * s, 2 * middle * c
+        inside = b * b - 4 * a * (middle**2 - met)
+        root = np.sqrt(inside[inside > 0])
+        radii = np.concatenate([(-b - root) / (2 * a), (-b + root) / (2 * a)])
+        edges = np.unique(np.concatenate([[0.0, 1.0], radii[(radii > 0) & (radii < 1)]]))
+        width = np.diff(edges)[:, None] / 2
+        r = edges[:-1, None] + width * (1 + node)
+        k = np.sqrt(1 - ((middle + c * r) ** 2 + (s * r) ** 2) / index**2)
+        total += float((np.interp(wave / k, knots, values) * 2 * r * weight * width).sum()) / n
+    return total
+
+
+@pytest.mark.parametrize(("f_number", "cra_deg"), _CONES)
+def test_the_mean_over_a_cone_is_that_over_the_pupil(f_number: float, cra_deg: float) -> None:
+    grid = WavelengthGrid(start_nm=500, stop_nm=700, step_nm=10)
+    made = scene("cone", "RYNCy", {"optics": {"f_number": f_number, "cra_deg": cra_deg}}, grid=grid, index=1.7)
+    channel, wave = made.view.modified[0], grid.nodes_nm
+    base = made.view.base_qe[0]
+    transmission = np.random.default_rng(3).uniform(size=wave.size)
+    seen = SeenFilters(made.view, "cone").curves((base * transmission)[None], [channel])[0] / base
+    half = math.asin(0.5 / f_number)
+    for at in (2, 11):
+        exact = over_pupil(wave[at], wave, transmission, half, math.radians(cra_deg), 1.7)
+        assert seen[at] == pytest.approx(exact, abs=1e-9)
+
+
+@pytest.mark.parametrize(("f_number", "cra_deg"), _CONES)
+def test_few_rays_stand_for_the_cone(f_number: float, cra_deg: float) -> None:
+    """Moments of the squared sine, which a Gauss rule has exactly, against rays spread evenly over the pupil."""
+    cone = cone_of(scene("cone", "RYNCy", {"optics": {"f_number": f_number, "cra_deg": cra_deg}}).view.scenario)
+    half, chief = cone.half_rad, cone.chief_rad
+    radius, azimuth = np.meshgrid((np.arange(4000) + 0.5) / 4000, (np.arange(64) + 0.5) * math.pi / 32)
+    p = math.cos(half) * math.sin(chief) + math.sin(half) * math.cos(chief) * radius * np.cos(azimuth)
+    sine_squared = p**2 + (math.sin(half) * radius * np.sin(azimuth)) ** 2
+    for count in RAYS.values():
+        at, weight = rays(cone, count)
+        assert at.size == count
+        assert weight.min() > 0
+        for power in range(5):
+            exact = float((sine_squared**power * radius).sum() / radius.sum())
+            assert float(weight @ at**power) == pytest.approx(exact, rel=1e-6)
+
+
+def test_a_ray_of_no_cone_is_the_chief_ray() -> None:
+    at, weight = rays(Cone(1e-9, 0.3), 4)
+    np.testing.assert_allclose(at, math.sin(0.3) ** 2, rtol=1e-8)
+    assert weight.sum() == pytest.approx(1.0)
+
+
+def moved(given: dict[str, Any], f_number: float = 1.6, cra_deg: float = 20.0) -> Scene:
+    optics = {"optics": {"f_number": f_number, "cra_deg": cra_deg}}
+    return scene("angle", "RYNCy", given | optics, {"dark_e_per_s": 50.0}, grid=FINE, index=1.8)
+
+
+GIVEN: dict[str, dict[str, Any]] = {
+    "patch": {"background_cd_m2": 200.0},
+    "target": {"target": FAR, "background_cd_m2": 200.0, "visibility_m": 900.0, "off_axis_deg": 20.0},
+}
+
+
+@pytest.mark.parametrize("given", GIVEN.values(), ids=GIVEN)
+@pytest.mark.parametrize("method", ["chief ray", "4 rays", "16 rays"])
+def test_digital_numbers_are_means_over_rays(given: dict[str, Any], method: str) -> None:
+    """Each ray's filter put in as a design that does not move: digital numbers are the weighted sum."""
+    made = moved(given)
+    view, cone = replace(made.view, methods=replace(REFERENCE, angle=method)), cone_of(made.view.scenario)
+    single = np.array([math.sin(cone.chief_rad) ** 2]), np.ones(1)
+    sine_squared, weights = rays(cone, RAYS[method]) if method in RAYS else single
+    base, wave = view.base_qe[0], view.grid.nodes_nm
+    filters = bare(wave, made.curves[0, 0] / base, np.arcsin(np.sqrt(sine_squared)), 1.8) * base
+    still = smooth_imager(replace(view, technologies=()))
+    expected = np.einsum("r,rxsc->xsc", weights, still.smooth(filters[:, None]))
+    np.testing.assert_allclose(smooth_imager(view).smooth(made.curves)[0], expected, rtol=1e-13, atol=1e-9)
+
+
+@pytest.mark.parametrize("given", GIVEN.values(), ids=GIVEN)
+def test_derivatives_see_what_the_rays_see(given: dict[str, Any]) -> None:
+    """The response is affine in N: its derivative, and the weights of each wavelength, give it again."""
+    made = moved(given | {"exposure": {"kind": "fixed", "exposure_s": 1e-3}})
+    imager, channel = smooth_imager(made.view), made.view.modified[0]
+    zero, own = imager.smooth(np.zeros_like(made.curves))[0], imager.smooth(made.curves)[0]
+    scale = np.abs(own).max()
+    by_curve = imager.gradient(made.curves[0], made.curves)[0]
+    np.testing.assert_allclose(by_curve, own - zero, atol=1e-12 * scale)
+    by_wavelength = imager.per_qe(0, made.curves[0])[:, :, channel] @ made.curves[0, 0]
+    np.testing.assert_allclose(by_wavelength, (own - zero)[..., channel], atol=1e-12 * scale)
+
+
+def test_only_what_is_said_to_be_of_interference_moves() -> None:
+    made = moved({})
+    pigment = replace(made.view, technologies=(Technology(),) * len(made.view.mosaic.channels))
+    unsaid = replace(made.view, technologies=())
+    for view in (pigment, unsaid):
+        plans = [Planner([replace(made.box, view=view)]).plan("", tolerance) for tolerance in (1e-9, 10.0)]
+        assert {plan.methods.angle for plan in plans} == {"skip"}
+        for method in METHODS:
+            found = Imager(replace(view, methods=replace(REFERENCE, angle=method))).read(made.curves)[0]
+            np.testing.assert_array_equal(found, Imager(unsaid).read(made.curves)[0])
+    reasons = {Planner([replace(made.box, view=view)])._exact["angle"] for view in (pigment, unsaid)}
+    assert reasons == {"pigments do not move with the angle", "no technology is stated: filters as on axis"}
+
+
+def test_a_plan_computes_no_more_of_the_cone_than_it_must() -> None:
+    """A slow lens on axis needs nothing, a fast one off axis a few rays."""
+    found = {}
+    for f_number, cra_deg in ((22.0, 0.0), (1.6, 20.0)):
+        made = moved({"exposure": {"kind": "fixed", "exposure_s": 1e-3}, "noise": True}, f_number, cra_deg)
+        found[f_number] = Planner([made.box]).plan("", 0.5).methods.angle
+    assert found == {22.0: "skip", 1.6: "4 rays"}
+
+
+def test_a_plain_curve_of_interference_moves_on_the_clear_one() -> None:
+    made = moved({})
+    clear, wave = made.view.clear_qe, made.view.grid.nodes_nm
+    moving = tuple(made.view.technologies[made.view.modified[0]] for _ in made.view.mosaic.channels)
+    view = replace(made.view, technologies=moving, methods=replace(REFERENCE, angle="chief ray"))
+    channel = view.fixed[0]
+    own = np.minimum(view.qe[channel], clear)
+    seen = SeenFilters(view, "chief ray").curves(own[None], [channel])[0]
+    expected = clear * bare(wave, own / clear, np.array([math.radians(20.0)]), 1.8)[0]
+    np.testing.assert_allclose(seen, expected, rtol=1e-12)
+
+
+FIELDS: dict[str, dict[str, Any]] = {
+    "patch": {"background_cd_m2": 200.0, "off_axis_deg": 35.0},
+    "noisy target": {"target": FAR, "noise": True, "background_cd_m2": 200.0, "off_axis_deg": 35.0},
+}
+
+
+@pytest.mark.parametrize("given", FIELDS.values(), ids=FIELDS)
+def test_a_field_is_the_worst_of_its_places(given: dict[str, Any]) -> None:
+    """Chief ray angle and field angle follow one image height, and the worst place counts in every column."""
+    angles = [0.0, 8.0, 20.0]
+    view = moved(given, cra_deg=0.0).view
+    field = view.scenario.model_copy(update={"field": SensorField(cra_deg=angles)})
+    block = edges_of(SPACE, 0, SPACE.size)
+    assert block is not None
+    curves = block.curves()
+    each = []
+    for height, cra_deg in zip((0.0, 0.5, 1.0), angles, strict=True):
+        off_axis_deg = math.degrees(math.atan(height * math.tan(math.radians(35.0))))
+        own = Scenario.model_validate(
+            given | {"optics": {"f_number": 1.6, "cra_deg": cra_deg}, "off_axis_deg": off_axis_deg}
+        )
+        each.append(evaluate(Imager(replace(view, scenario=own)), curves))
+    imager = Imager(replace(view, scenario=field))
+    names = promised_names(view, any_place=False)
+    for designs in (curves, block):
+        found = evaluate(imager, designs)
+        for name in names:
+            worst = np.min([place[name] for place in each], axis=0)
+            np.testing.assert_allclose(found[name], worst, atol=1e-9)
+    assert any((np.argmin([place[name] for place in each], axis=0) == 2).any() for name in names)
+
+
+def test_derivatives_at_every_place_of_a_field() -> None:
+    fixed = {"exposure": {"kind": "fixed", "exposure_s": 1e-3}, "background_cd_m2": 200.0, "off_axis_deg": 35.0}
+    made = moved(fixed, cra_deg=0.0)
+    field = made.view.scenario.model_copy(update={"field": SensorField(cra_max_deg=20.0, places=3)})
+    imager, channel = smooth_imager(replace(made.view, scenario=field)), made.view.modified[0]
+    zero, own = imager.smooth(np.zeros_like(made.curves))[0], imager.smooth(made.curves)[0]
+    assert len(own) == 3
+    scale = np.abs(own).max()
+    np.testing.assert_allclose(imager.gradient(made.curves[0], made.curves)[0], own - zero, atol=1e-12 * scale)
+    by_wavelength = imager.per_qe(0, made.curves[0])[:, :, channel] @ made.curves[0, 0]
+    np.testing.assert_allclose(by_wavelength, (own - zero)[..., channel], atol=1e-12 * scale)
+
+
+def test_a_field_in_which_nothing_moves_is_one_place() -> None:
+    view = replace(moved({}, cra_deg=0.0).view, technologies=())
+    field = view.scenario.model_copy(update={"field": SensorField(cra_max_deg=20.0)})
+    assert Imager(replace(view, scenario=field)).n_cases == 1

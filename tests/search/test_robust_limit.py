@@ -1,0 +1,149 @@
+"""The limit over the places of a sensor, where filters move with the angle of the light: a program of its own agrees."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from sweep.camera.scene import SensorField
+from sweep.metrics.evaluate import designed_quantities
+from sweep.metrics.smooth import smooth_csd
+from sweep.search.limit import Limit, limit_of, why_not
+from sweep.search.problem import Problem
+from sweep.study import load_study
+
+from ..conftest import STUDIES
+from .test_limit import random_filters
+
+STUDY = load_study(STUDIES / "angle.yaml")
+assert STUDY.search is not None
+PLACES_DEG = (0.0, 10.0, 20.0)
+INDEX, F_NUMBER = 1.8, 1.6
+YELLOW_RED = ("yellow", "red")
+
+
+@cache
+def problem() -> Problem:
+    assert STUDY.search is not None
+    given = STUDY.problem(STUDY.search)
+    scene = given.view.scenario.model_copy(update={"field": SensorField(cra_deg=list(PLACES_DEG))})
+    return replace(given, view=replace(given.view, scenario=scene))
+
+
+@cache
+def limit() -> Limit:
+    assert why_not(problem()) is None
+    return limit_of(problem())
+
+
+def test_its_filter_has_it_at_the_worst_place_and_more_at_the_others() -> None:
+    found, view = limit(), problem().view
+    assert found.curve is not None
+    assert 0 <= found.proven - found.attained <= 2e-3
+    each = []
+    for cra_deg in PLACES_DEG:
+        optics = view.scenario.optics.model_copy(update={"cra_deg": cra_deg})
+        place = replace(view, scenario=view.scenario.model_copy(update={"field": None, "optics": optics}))
+        each.append(float(smooth_csd(place, found.curve[None, None], YELLOW_RED)[0]))
+    assert min(each) == pytest.approx(found.attained, rel=1e-12)
+
+
+def weights(cra_deg: float) -> np.ndarray:
+    """Of the filter's transmission in the mean over a pupil's rays, [wavelength that the light has, that T has]."""
+    half, chief = math.asin(0.5 / F_NUMBER), math.radians(cra_deg)
+    radius, azimuth = np.meshgrid((np.arange(600) + 0.5) / 600, (np.arange(160) + 0.5) * math.pi / 160)
+    p = math.cos(half) * math.sin(chief) + math.sin(half) * math.cos(chief) * radius * np.cos(azimuth)
+    k = np.sqrt(1 - (p**2 + (math.sin(half) * radius * np.sin(azimuth)) ** 2) / INDEX**2).ravel()
+    wave, share = STUDY.grid.nodes_nm, (radius / radius.sum()).ravel()
+    found = np.zeros((wave.size, wave.size))
+    for row, seen in enumerate(wave):
+        at = np.minimum(seen / k - wave[0], wave.size - 1.0)  # a grid of 1 nm
+        low = np.minimum(at.astype(int), wave.size - 2)
+        found[row] = np.bincount(low, share * (1 - at + low), wave.size)
+        found[row] += np.bincount(low + 1, share * (at - low), wave.size)
+    return found
+
+
+@cache
+def pairs() -> tuple[np.ndarray, np.ndarray]:
+    """Of each yellow/red pair at each place: DN per QE of N, and the squared distance in the other channels."""
+    qe, lights, grid = STUDY.sensor.qe, STUDY.lights, STUDY.grid
+    brightest = max(qe[name].sum() for name in ("R", "Y", "Cy"))
+    dn = 0.95 * 4095 * lights.photon_ratio * grid.size * grid.step_nm / brightest
+    yellow, red = (lights.photons[lights.members[name]] for name in YELLOW_RED)
+    apart = (yellow[:, None] - red[None]).reshape(-1, grid.size) * dn
+    others = sum((apart @ qe[name]) ** 2 for name in ("R", "Y", "Cy"))
+    by_qe = [(apart * qe["Y"]) @ weights(cra_deg) / qe["Y"] for cra_deg in PLACES_DEG]
+    return np.concatenate(by_qe), np.tile(others, len(PLACES_DEG))
+
+
+@cache
+def fixed_rows() -> tuple[np.ndarray, np.ndarray]:
+    """Sensitivity and slope: rows @ N >= least."""
+    base = STUDY.sensor.qe["Y"]
+    step = np.diff(np.eye(base.size), axis=0)
+    rows = np.concatenate([np.ones((1, base.size)), step, -step])
+    return rows, np.append(0.9 * base.sum(), np.full(2 * len(step), -0.06))
+
+
+def margin(t: float, sign: float) -> float:
+    """By how much all pairs can be further apart in N than t asks, with one color brighter in all of them; DN."""
+    (by_qe, others), (rows, least), base = pairs(), fixed_rows(), STUDY.sensor.qe["Y"]
+    needed = np.sqrt(np.maximum(0.0, t**2 - others))
+    some = needed > 0
+    matrix = np.concatenate(
+        [np.column_stack([-sign * by_qe[some], np.ones(some.sum())]), np.pad(-rows, ((0, 0), (0, 1)))]
+    )
+    ends = [*zip(np.zeros(base.size), base, strict=True), (None, None)]
+    found = linprog(np.append(np.zeros(base.size), -1.0), matrix, np.append(-needed[some], -least), bounds=ends)
+    return float(found.x[-1]) if found.status == 0 else -np.inf
+
+
+@pytest.mark.slow
+def test_a_program_of_its_own_agrees() -> None:
+    """One color brighter in all pairs at every place: just below the limit there is such a filter, just above none."""
+    assert max(margin(limit().attained - 1e-3, sign) for sign in (1.0, -1.0)) >= 0
+    assert max(margin(limit().proven + 1e-3, sign) for sign in (1.0, -1.0)) < 0
+
+
+@pytest.mark.slow
+def test_no_random_feasible_filter_beats_the_robust_limit() -> None:
+    base, tried, best = problem().view.base_qe, 0, 0.0
+    rng = np.random.default_rng(12)
+    while tried < 100_000:
+        curves = np.concatenate(
+            [random_filters(kind, 4000, rng) for kind in ("stopband", "multi_stopband", "free_form")]
+        )
+        lost = 1 - designed_quantities(problem().view, curves)["sensitivity"]
+        curves = base + np.minimum(1.0, 0.1 / np.maximum(lost, 1e-12))[:, None, None] * (curves - base)
+        found = designed_quantities(problem().view, curves)
+        curves = curves[(found["sensitivity"] >= 0.9) & (found["slope_per_nm"] <= 0.06)]
+        tried += len(curves)
+        best = max(best, float(smooth_csd(problem().view, curves, YELLOW_RED).max()))
+    assert 0.5 * limit().proven < best <= limit().proven
+
+
+def test_the_table_of_the_documentation() -> None:
+    """Each figure in `studies/README.md`: where nothing moves, on axis, at the worst of all places."""
+    text = (STUDIES / "README.md").read_text(encoding="utf-8")
+    rows = [
+        line.strip("|").split("|") for line in text.split("worst over CRA 0 to 20 degrees, f/1.6 |")[1].splitlines()[2:]
+    ]
+    printed = {row[0].strip(): [cell.strip() for cell in row[1:]] for row in rows[: [len(r) for r in rows].index(1)]}
+    found = {}
+    for space in STUDY.spaces:
+        if space.filter is None or space.gridded:
+            views = STUDY.view(space, "field"), STUDY.view(space, "f/1.6 cra_deg=0"), STUDY.view(space, "field")
+            views = (replace(views[0], technologies=()), *views[1:])
+            curves = space.curves(space.points(0, 1), STUDY.grid.size)
+            found[space.name] = [f"{smooth_csd(view, curves, YELLOW_RED)[0]:.0f}" for view in views]
+    assert STUDY.search is not None
+    still = STUDY.problem(STUDY.search)
+    limits = limit_of(replace(still, view=replace(still.view, technologies=()))), limit_of(still)
+    found["limit"] = [f"{limits[0].proven:.0f}", "", f"{limits[1].proven:.0f}"]
+    assert printed == found
