@@ -38,7 +38,7 @@ class Proof:
     curve: FloatArray | None
     proven: float
     open_parts: int
-    parts: tuple[Part, ...] = ()
+    parts: tuple[Covered, ...] = ()
 
     def proven_at(self, program: FilterProgram, sensitivity: float) -> float:
         """No filter with at least this sensitivity reaches more, whatever sensitivity the proof was made for.
@@ -57,8 +57,8 @@ class Proof:
 
 
 @dataclass(frozen=True)
-class Part:
-    """Some choices of sides: their filters reach no more than `cap`, and than each of the `certificates` says."""
+class Covered:
+    """Some choices of sides, covered by a proof: their filters reach no more than `cap`, and than each of the `certificates` says."""
 
     cap: float
     certificates: tuple[Certificate, ...] = ()
@@ -123,7 +123,7 @@ class SideSearch:
         self._most = most_programs
         self._conflicts = _Conflicts(len(program.apart))
         self._best = self._closed = -np.inf
-        self._closed_parts: list[Part] = []
+        self._closed_parts: list[Covered] = []
         self._curve: FloatArray | None = None
 
     def run(self) -> Proof:
@@ -134,7 +134,7 @@ class SideSearch:
         for side in (1.0, -1.0):
             self._dive(side)
         order = count()
-        parts = [(-self._program.top, next(order), Sides(), Part(self._program.top))]
+        parts = [(-self._program.top, next(order), Sides(), Covered(self._program.top))]
         left = []
         while parts and -parts[0][0] > self._closing and self._program.solved < self._most:
             beyond, _, sides, part = heappop(parts)
@@ -147,7 +147,7 @@ class SideSearch:
             elif not more:
                 left.append((beyond, part))
             for one, reach in more:
-                own = Part(min(part.cap, reach), part.certificates)
+                own = Covered(min(part.cap, reach), part.certificates)
                 heappush(parts, (-min(beyond, reach), next(order), one, own))
         left += [(-beyond, part) for beyond, _, _, part in parts]
         far = sum(beyond > self._closing for beyond, _ in left)
@@ -166,7 +166,7 @@ class SideSearch:
         if value > self._best:
             self._best, self._curve = value, moved
 
-    def _divided(self, beyond: float, sides: Sides, part: Part) -> tuple[float, Part, list[tuple[Sides, float]]]:
+    def _divided(self, beyond: float, sides: Sides, part: Covered) -> tuple[float, Covered, list[tuple[Sides, float]]]:
         """What a part can reach at most, the part with what says so, and those that it falls into with their reach.
 
         None where it is closed or stays open.
@@ -175,13 +175,15 @@ class SideSearch:
         solved = self._program.solve(t, sides)
         beyond = min(beyond, solved.beyond)
         if solved.certificate is not None:
-            part = Part(part.cap, (*part.certificates, solved.certificate))
+            part = Covered(part.cap, (*part.certificates, solved.certificate))
         if solved.curve is not None:
             self._offer(solved.curve)
         if solved.beyond <= self._closing:
             self._conflicts.add(solved.needs)
             self._closed = max(self._closed, solved.beyond)
-            self._closed_parts.append(Part(np.inf, part.certificates[-1:]))  # it closes other parts of its sides, too
+            self._closed_parts.append(
+                Covered(np.inf, part.certificates[-1:])
+            )  # it closes other parts of its sides, too
         if solved.curve is None or beyond <= self._closing:
             return beyond, part, []
         apart = self._program.apart @ solved.curve
