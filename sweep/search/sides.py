@@ -58,7 +58,7 @@ class Proof:
 
 @dataclass(frozen=True)
 class Covered:
-    """Some choices of sides, covered by a proof: their filters reach no more than `cap`, and than each of the `certificates` says."""
+    """Some choices of sides: filters there reach no more than `cap`, and than each of the `certificates` says."""
 
     cap: float
     certificates: tuple[Certificate, ...] = ()
