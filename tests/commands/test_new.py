@@ -208,6 +208,7 @@ def test_any_column_name_survives_yaml(tmp_path: Path, text: str) -> None:
     assert scalar(text).isprintable()
 
 
+@pytest.mark.slow
 @needs_measured
 @pytest.mark.usefixtures("plain_pictures")
 def test_measured_files_lead_to_a_report_without_editing(tmp_path: Path) -> None:

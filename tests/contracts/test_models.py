@@ -143,6 +143,7 @@ def exact_edge(wavelength: mpmath.mpf, center: mpmath.mpf, width: mpmath.mpf) ->
     return 30 * mpmath.quad(lambda s: s**2 * (1 - s) ** 2, [0, t])
 
 
+@pytest.mark.slow
 def test_edge_and_its_gradient_in_50_digits() -> None:
     with mpmath.workdps(50):
         for wave, center, width in ((600, 601, 10), (595, 601, 10), (606.5, 601, 10), (640, 601, 30), (560, 601, 30)):

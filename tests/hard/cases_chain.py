@@ -112,6 +112,7 @@ PAIR = ("yellow", "red")
     "metamers under a filter that changes elsewhere",
     oracle="exactly 0 for every stopband away from both lines",
     why="the filter is exactly its base outside the band",
+    slow=True,
 )
 def metamers_beside_a_band() -> Result:
     qe = random_qe(2, 4)

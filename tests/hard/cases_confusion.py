@@ -155,6 +155,7 @@ def unlike_variances() -> Result:
     "Bhattacharyya coefficient from near 1 to 1e-300",
     oracle="integral of sqrt(p q), 50 digits",
     why="the coefficient is exp(-d): 16 eps of d, one rounding of exp",
+    slow=True,
 )
 def bhattacharyya() -> Result:
     rng = np.random.default_rng(5)

@@ -144,6 +144,7 @@ def chain(pixel: Pixel) -> Imager:
     "one signal far brighter than the others",
     oracle="sum over counts and steps, 25 digits",
     why="cubic table at 1/32 of a deviation: 5/384 / 32^4 x 16 x 0.8 of a deviation; of rounding, 177 x 0.5 DN for 12.8",
+    slow=True,
 )
 def a_blinding_signal() -> Result:
     electrons, results = np.array([1e-3, 10.0, 10_100.0]), []

@@ -58,7 +58,9 @@ def small_discs() -> Result:
     return share_result([(x, y, 0.5, r) for x, y in places for r in (1e-6, 0.01, 0.05, 0.3, 0.5)])
 
 
-@hard_case("discs that just touch a pixel's edge", oracle="integral of the common height, 50 digits", why=AREAS)
+@hard_case(
+    "discs that just touch a pixel's edge", oracle="integral of the common height, 50 digits", why=AREAS, slow=True
+)
 def touching_discs() -> Result:
     radii = [0.5, 1.5, 2.5, math.sqrt(0.5), math.sqrt(4.5), 10.5]
     near = [float(v) for r in radii for v in (np.nextafter(r, 0), r, np.nextafter(r, 99), r * (1 + 1e-12))]

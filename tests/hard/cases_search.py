@@ -64,6 +64,7 @@ HAIR = BACK_OFF + FEASIBLE
     "the optimum lies on the least sensitivity",
     oracle="closed form: all the light that may be given up is taken from the red line",
     why="the answer keeps 1e-8 of the bound inside (1e-9 outside is feasible), where the solver stops adds 1e-9 of the box",
+    slow=True,
 )
 def on_the_sensitivity() -> Result:
     results = []
@@ -173,6 +174,7 @@ def limit_of_two_lines() -> Result:
     "the best value of a constraint that is out of reach",
     oracle="closed form at the corner of the box",
     why="linear in depth, or growing with it, so the solver ends on the box's side: 1e-9 of the box and 16 roundings",
+    slow=True,
 )
 def best_values() -> Result:
     shallow = replace(depth_problem({}), low=np.array([602.5, 0.0, 662.5, 0.0, 0.3]))

@@ -123,7 +123,11 @@ recognition: {{states: [green, yellow, red]}}
 
 
 @pytest.mark.parametrize(
-    ("bits", "well", "level"), [(8, 10_000.0, 0.10), (8, 10_000.0, 0.20), (10, 1e5, 0.05), (8, 1e5, 0.03)]
+    ("bits", "well", "level"),
+    [
+        (8, 10_000.0, 0.20),
+        *(pytest.param(*own, marks=pytest.mark.slow) for own in ((8, 10_000.0, 0.10), (10, 1e5, 0.05), (8, 1e5, 0.03))),
+    ],
 )
 def test_coarse_digital_numbers_are_not_told_apart_better_than_they_can_be(
     tmp_path: Path, bits: int, well: float, level: float
@@ -224,7 +228,7 @@ def test_sums_that_take_too_long_are_left_to_other_rules() -> None:
     assert 20 < affordable < 55
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 4))])
 def test_where_exact_sums_are_too_many_the_noise_is_gaussian(tmp_path: Path, seed: int) -> None:
     rng = np.random.default_rng([seed, 37])
     pixel = {"bits": 12, "well_e": 2e6, "prnu": float(rng.uniform(0.04, 0.08)), "read_noise_e": 1e4}

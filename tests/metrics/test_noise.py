@@ -135,6 +135,7 @@ constraints: {error_yellow_red: {max: 0.5}, dprime_yellow_red: {min: 0.1}}
 """
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("plain_pictures")
 def test_a_noisy_study_from_file_to_report(tmp_path: Path) -> None:
     path = tmp_path / "noisy.yaml"

@@ -20,8 +20,12 @@ browser, opened, through = pages.browser, pages.opened, pages.through
 pytestmark = pages.pytestmark
 
 SCREENS = [
-    *((name, width) for name in ("stopband", "dual", "fog") for width in (1440, 400)),
-    *(pytest.param(name, width, marks=pytest.mark.slow) for name in ("distance", "noise") for width in (1440, 400)),
+    *((name, width) for name in ("stopband", "fog") for width in (1440, 400)),
+    *(
+        pytest.param(name, width, marks=pytest.mark.slow)
+        for name in ("dual", "distance", "noise")
+        for width in (1440, 400)
+    ),
 ]
 PLAIN = "study: plain\nsensor: ar0820\nlights: tl16\ncfas: [RGGB, RCCC, RYYCy]\n"
 
@@ -106,6 +110,7 @@ def test_the_first_plot_has_every_cfa_at_its_light(finished: Finished, opened: A
     assert [mode["mode"] for mode in modes] == ["markers"]  # between its levels nothing is found
 
 
+@pytest.mark.slow
 def test_a_plain_cfa_is_chosen_by_a_click(finished: Finished, opened: Any) -> None:
     seen = opened(finished("dual"))
     place = seen.page.evaluate(
@@ -153,7 +158,7 @@ def test_the_lights_stand_shaded_behind_the_qe(finished: Finished, opened: Any) 
     assert shades == ["green lights", "yellow lights", "orange lights", "red lights"]
 
 
-@pytest.mark.parametrize("name", ["stopband", "paper"])
+@pytest.mark.parametrize("name", ["stopband", pytest.param("paper", marks=pytest.mark.slow)])
 def test_no_table_is_cut_off(finished: Finished, opened: Any, name: str) -> None:
     seen = opened(finished(name), 1440)
     cut = seen.page.evaluate(
@@ -170,12 +175,13 @@ def test_no_figure_is_shown_twice(finished: Finished, opened: Any) -> None:
     assert not any("Trade-off" in text or "Filters" in text or "All CFAs" in text for text in pictures)
 
 
-@pytest.mark.parametrize("name", ["dual", "fog", "paper"])
+@pytest.mark.parametrize("name", ["fog", *(pytest.param(n, marks=pytest.mark.slow) for n in ("dual", "paper"))])
 def test_nothing_is_drawn_as_a_trade_off_where_nothing_trades_off(finished: Finished, opened: Any, name: str) -> None:
     assert opened(finished(name)).page.locator("#pareto").count() == 0
     assert not (finished(name) / "pareto.png").exists()
 
 
+@pytest.mark.slow
 def test_a_printed_report_has_every_figure(finished: Finished, opened: Any, tmp_path: Path) -> None:
     seen = opened(finished("stopband"))
     seen.page.pdf(path=tmp_path / "report.pdf", prefer_css_page_size=True)

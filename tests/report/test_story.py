@@ -22,8 +22,8 @@ from sweep.study import load_study
 from ..build import ran
 from ..conftest import STUDIES, Finished
 
-FAST = ("stopband", "fog", "dual", "paper")
-SLOW = ("freeform", "producible", "rccb", "exposure", "night", "noise", "distance", "accuracy")
+FAST = ("stopband", "fog")
+SLOW = ("dual", "paper", "freeform", "producible", "rccb", "exposure", "night", "noise", "distance", "accuracy")
 EVERY = [*FAST, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)]
 
 

@@ -175,6 +175,7 @@ def test_the_folder_itself_may_be_a_link(few: Study, expected: pd.DataFrame, tmp
     pd.testing.assert_frame_equal(rows(tmp_path / "disk"), expected)
 
 
+@pytest.mark.slow
 def test_a_journal_that_is_a_link_is_not_written_through(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
     target, folder = outside(tmp_path), tmp_path / "out"
     half_done(plain, folder)
@@ -248,6 +249,7 @@ def test_wherever_the_disk_refuses_nothing_finished_is_lost(
         assert status_lines(folder, verify=True)[-1].startswith("ok")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("plain_pictures")
 def test_a_report_that_the_disk_refuses_loses_no_result(
     few: Study, expected: pd.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

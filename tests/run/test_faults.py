@@ -56,6 +56,7 @@ def test_a_worker_that_is_killed_once_costs_nothing(fewer: Study, unharmed: pd.D
     pd.testing.assert_frame_equal(rows(tmp_path / "out"), unharmed)
 
 
+@pytest.mark.slow
 def test_a_design_that_kills_its_worker_is_a_row(plain: Study, tmp_path: Path) -> None:
     wish = tmp_path / "wish"
     wish.write_text("kill 1000000 ")

@@ -141,7 +141,14 @@ def test_constraint_on_another_pair_is_met(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("algorithm", "share"), [("MMA", 0.99), ("COBYLA", 0.95), ("ISRES", 0.5), ("ORIG_DIRECT_L", 0.6), ("AGS", 0.5)]
+    ("algorithm", "share"),
+    [
+        ("COBYLA", 0.95),
+        *(
+            pytest.param(*own, marks=pytest.mark.slow)
+            for own in (("MMA", 0.99), ("ISRES", 0.5), ("ORIG_DIRECT_L", 0.6), ("AGS", 0.5))
+        ),
+    ],
 )
 def test_every_algorithm_finds_feasible_designs_within_its_budget(study: Study, algorithm: str, share: float) -> None:
     """The gradient algorithms find the optimum; the others come near it in 400 simulations, as their kind does."""

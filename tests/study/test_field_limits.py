@@ -150,6 +150,7 @@ def check_refused(tmp_path: Path, path: tuple[Any, ...], value: object) -> None:
     assert len({line.split(": ")[0] for line in lines}) <= 2, lines  # in one place, though of two types
 
 
+@pytest.mark.slow
 def test_what_is_no_number_of_this_world_is_one_line(tmp_path: Path) -> None:
     """Each field with one such value, the next field with the next."""
     for index, path in enumerate(NUMBERS):
@@ -173,6 +174,7 @@ def small_or_none(tmp_path: Path, path: tuple[Any, ...], value: float) -> Study 
         return None
 
 
+@pytest.mark.slow
 def test_the_smallest_numbers_are_refused_or_loaded(tmp_path: Path) -> None:
     refused = [path for path in NUMBERS if small_or_none(tmp_path, path, 5e-324) is None]
     assert ("pixel", "well_e") in refused

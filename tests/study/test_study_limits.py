@@ -213,6 +213,7 @@ def test_aliases_may_be_used_up_to_the_limit(tmp_path: Path) -> None:
         Tree(text, "a", 15)
 
 
+@pytest.mark.slow
 def test_a_file_of_a_run_may_be_larger(tmp_path: Path) -> None:
     assert RESOLVED.endswith(".resolved.yaml")
     text = SMALL + "x: [" + "1, " * 60_000 + "]\n"
