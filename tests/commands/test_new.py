@@ -227,3 +227,32 @@ def test_measured_files_lead_to_a_report_without_editing(tmp_path: Path) -> None
     assert "RGBN" in out.splitlines()[0]
     assert "finished, search found" in list_lines(path.parent, tmp_path / "out")[0]
     assert np.all([(tmp_path / "out" / "mine" / name).is_file() for name in ("report.html", "pareto.png")])
+
+
+def test_a_study_and_its_curves_can_be_moved(tmp_path: Path) -> None:
+    qe = csv(tmp_path, "wavelength_nm,R,G,B", WAVE, bell(620, 40), bell(540, 40), bell(460, 40), name="qe.csv")
+    assert commanded("new", "mine", "--qe", qe, "--copy", "--folder", tmp_path / "a")[0] == 0
+    qe.unlink()
+    (tmp_path / "a").rename(tmp_path / "b")
+    assert load_study(tmp_path / "b" / "mine.yaml").sensor.name == "qe"
+    bad = csv(tmp_path, "wavelength_nm,R", WAVE, -bell(620, 40), name="bad.csv")
+    assert commanded("new", "other", "--qe", bad, "--copy", "--folder", tmp_path / "b")[0] == 2
+    assert not (tmp_path / "b" / "bad.csv").exists()
+    (tmp_path / "b" / "bad.csv").write_text("mine")
+    code, _, err = commanded("new", "other", "--qe", bad, "--copy", "--folder", tmp_path / "b")
+    assert (code, "holds something else already" in err) == (2, True)
+
+
+def test_a_study_begins_with_a_shipped_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, said, _ = commanded("new", "mine", "--from", "stopband")
+    assert (code, "116,286 designs" in said) == (0, True)
+    made = load_study(tmp_path / "studies" / "mine.yaml")
+    assert made.name == "mine"
+    assert "# full factorial" in (tmp_path / "studies" / "mine.yaml").read_text()
+    for asked, expected in (
+        (("mine", "--from", "stopband"), "stays as it is"),
+        (("x", "--from", "stopbnd"), "did you mean"),
+    ):
+        code, _, err = commanded("new", *asked)
+        assert (code, expected in err) == (2, True)

@@ -29,7 +29,7 @@ def new_study(name: str, folder: Path, qe: Path | None, lights: Path | None, qua
     Raises StudyError for a bad name, OutputError where the file exists or cannot be written, DataError for curves that
     a study cannot use.
     """
-    path = folder / f"{_checked(name)}.yaml"
+    path = folder / f"{checked_name(name)}.yaml"
     if os.path.lexists(path):
         raise OutputError(Fault("is there already, and stays as it is", str(path), allowed="another name"))
     sensor = SensorText(Layout(_BUILT_IN_CFAS, "RYNCy", "Y", "G")) if qe is None else _sensor(qe, folder)
@@ -67,7 +67,7 @@ def _write(path: Path, text: Callable[[float | None], str]) -> Study:
     return made
 
 
-def _checked(name: str) -> str:
+def checked_name(name: str) -> str:
     """The name of a study that can be a file's, too."""
     stem = name.removesuffix(".yaml").removesuffix(".yml")
     if name and name == folder_name(name) == stem and name[0].isalnum() and len(name) <= _MOST_LETTERS:

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from ...curves.light_unit import LightUnit
+from ...errors import Fault, StudyError
 from ..panels import OF_STUDIES
 
 PANEL = OF_STUDIES
@@ -15,13 +16,30 @@ PANEL = OF_STUDIES
 
 def new(
     name: Annotated[str, typer.Argument(help="Name of the study and of its file.", show_default=False)],
-    qe: Annotated[Path | None, typer.Option(help="QE curves of a sensor, .csv or .mat.", show_default=False)] = None,
-    lights: Annotated[Path | None, typer.Option(help="Spectra of lights, .csv or .mat.", show_default=False)] = None,
+    qe: Annotated[Path | None, typer.Option(help="A file of QE curves of a sensor.", show_default=False)] = None,
+    lights: Annotated[Path | None, typer.Option(help="A file of spectra of lights.", show_default=False)] = None,
     quantity: Annotated[LightUnit, typer.Option(help="What the lights' numbers are.")] = "energy",
     folder: Annotated[Path, typer.Option(help="Folder of the studies.")] = Path("studies"),
+    source: Annotated[
+        str | None, typer.Option("--from", help="A study, or the name of one, to begin with.", show_default=False)
+    ] = None,
+    copy: Annotated[
+        bool, typer.Option("--copy", help="Copy the files beside the study, so that both can be moved.")
+    ] = False,
 ) -> None:
     """Write a commented study that runs as it is, for the built-in curves or for files of your own."""
+    from ...study.shipped import study_path
     from ..new import new_study
+    from ..new.begin import beside, study_from
 
-    for line in new_study(name, folder, qe, lights, quantity):
+    if source is not None:
+        if qe or lights or copy:
+            raise StudyError(Fault("a study that is copied has its own curves", key="--from", value=source))
+        lines = study_from(name, folder, study_path(Path(source)))
+    elif copy:
+        with beside(folder, qe, lights) as (own_qe, own_lights):
+            lines = new_study(name, folder, own_qe, own_lights, quantity)
+    else:
+        lines = new_study(name, folder, qe, lights, quantity)
+    for line in lines:
         typer.echo(line)
