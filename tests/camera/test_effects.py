@@ -116,7 +116,7 @@ def test_interpolation_between_wavelengths_stays_within_its_bound(f_number: floa
             assert np.abs(linear - exact).max() <= bound + 1e-7
 
 
-@settings(max_examples=60)
+@settings(max_examples=60, deadline=None)  # the first one compiles
 @given(st.floats(0.2, 8), st.floats(-1, 1), st.floats(-1, 1), st.floats(0.1, 0.5))
 def test_covered_pixels_add_up_to_the_disc(radius: float, x0: float, y0: float, half: float) -> None:
     """Squares that touch each other cover all of the disc."""

@@ -20,6 +20,7 @@ from sweep.camera.effects import phase
 from sweep.camera.imager import Imager
 from sweep.camera.kernel import make_kernel
 from sweep.camera.methods import REFERENCE, Methods
+from sweep.camera.place_kernels import PlaceKernels
 from sweep.camera.plan.plan import Plan, Planner
 from sweep.camera.view import View
 from sweep.metrics.evaluate import evaluate
@@ -173,6 +174,45 @@ def test_a_plan_that_cannot_keep_the_tolerance_says_so() -> None:
 def kernel_at(view: View, methods: Methods, nodes_nm: np.ndarray, cases: phase.Cases) -> np.ndarray:
     light = make_kernel(view, methods, nodes_nm, by_pixel=False, work=Counter(), cases=cases).light
     return np.broadcast_to(light, (*light.shape[:3], nodes_nm.size))
+
+
+@pytest.mark.parametrize("blurred", ["every wavelength", "skip"])
+def test_kernels_by_the_edges_of_pixels_are_those_by_their_areas(blurred: str) -> None:
+    """Two ways to the light of a pixel: Gauss's theorem with few functions, and a rule over its area per wavelength."""
+    rng, nodes = np.random.default_rng(3), np.linspace(400, 700, 61)
+    for made in (
+        scene("a", "RGGB", SMALL, {"crosstalk": 0.1}),
+        scene("b", "3x3", SMALL | {"optics": F2 | {"focus_m": 3.0}}, {"fill_factor": 0.5}),
+        scene("c", "quad", {"target": FAR | {"phase_px": "any", "readout": "center"}, "optics": F2}),
+        scene("d", "1x3", {"target": NEAR | {"phase_px": "any"}, "optics": F2}, {"crosstalk": 0.02}),
+    ):
+        places = rng.uniform(-1, 3, (5, 2))
+        cases, methods = phase.Cases(places, np.floor(places + 0.5)), replace(REFERENCE, blur=blurred)
+        quick = PlaceKernels(made.view, methods, nodes)
+        found = quick.at(cases, Counter()) @ quick.shares
+        # The area's rule reads a cubic spline, which is off by 1e-7 of a uniform field.
+        np.testing.assert_allclose(found, kernel_at(made.view, methods, nodes, cases), rtol=0, atol=3e-8)
+        assert len(quick.shares) < nodes.size
+        # A light that moves by a tile sees the same.
+        size = np.array(made.view.mosaic.indices.shape[::-1])
+        moved = phase.Cases(cases.places_px + 3 * size, cases.home_px + 3 * size)
+        np.testing.assert_allclose(quick.at(moved, Counter()) @ quick.shares, found, rtol=0, atol=1e-10)
+
+
+def test_a_straight_extreme_is_that_of_a_light_at_its_place() -> None:
+    made = scene("straight", "RYNCy", SMALL | {"optics": F2}, DARK | {"crosstalk": 0.05})
+    methods = replace(REFERENCE, quantization="skip", saturation="skip", noise="skip", phase="within 0.1 DN")
+    imager = Imager(replace(made.view, methods=methods))
+    row = evaluate(imager, made.curves)
+    assert imager.anywhere is not None
+    exposure_s = float(imager.electrons.exposure_s(made.curves)[0])
+    found = imager.anywhere.extremes(imager.electrons.light_dn(made.curves[0], exposure_s))
+    for (one, other), extremes in found.items():
+        name = f"csd_{one}_{other}"
+        assert extremes is not None
+        there = at_place(made, *extremes.at_smallest[0], methods)[name]
+        assert row[name][0] == pytest.approx(there, abs=1e-9)
+        assert extremes.smallest == pytest.approx(there, abs=1e-4)
 
 
 def test_what_lies_between_the_corners_is_within_its_bound() -> None:

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from sweep.curves.hats import hats
 from sweep.curves.spectrum import (
     WavelengthGrid,
     check_samples,
@@ -104,3 +105,11 @@ def test_equal_photons() -> None:
     np.testing.assert_allclose(GRID.integrate(equal_photons(GRID, shapes)), 1, rtol=1e-14)
     with pytest.raises(DataError, match="no photons"):
         equal_photons(GRID, np.zeros((1, 301)))
+
+
+def test_hats_interpolate_as_lines_do() -> None:
+    rng = np.random.default_rng(2)
+    for n in (1, 2, 7, 40):
+        knots, values = np.cumsum(rng.uniform(0.1, 2, n)), rng.uniform(-1, 1, n)
+        at = np.concatenate([rng.uniform(knots[0] - 1, knots[-1] + 1, 50), knots])
+        np.testing.assert_allclose(values @ hats(at, knots), np.interp(at, knots, values), rtol=0, atol=1e-14)
