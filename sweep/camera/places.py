@@ -31,6 +31,8 @@ from .registry import EFFECTS, WHOLE_LIGHT, factor_of_light
 from .view import View
 
 _Name = tuple[int, ...]
+_OWN_DN = 1e-5
+"""What a search leaves of its tolerance for its own kernels; they were seen 2e-6 DN from those of a readout."""
 _UNIT_PX = 2.0**-40
 """Places are told apart in this unit."""
 _MOST_CELLS = 400_000
@@ -159,7 +161,7 @@ class AnyPlace:
         within_dn, wave = phase.within_dn(view.methods.phase), view.grid.nodes_nm
         if within_dn is None:
             raise ValueError(f"{view.methods.phase!r} looks at a lattice of places")
-        self.within_dn, self.members = within_dn, view.members
+        self.within_dn, self.members = within_dn - _OWN_DN, view.members
         self._mosaic, self._work, self._geometry = view.mosaic, work, _geometry_of(view)
         self._dimmed = factor_of_light(view, view.methods, wave)
 
