@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from ..camera.scene import Scene
 from ..designs.technology import Technology
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN
 from .leaders import Row
 
-NOT_STATED = "Note: no technology is stated of the filters; they are taken as in light on axis, by parallel rays."
+NOT_STATED = "No technology is stated of the filters: they are taken as in light on axis, by parallel rays."
 
 
 def technologies_of(output: Output, row: Row) -> list[Technology | None]:
@@ -51,9 +49,12 @@ def told_light(scene: Scene) -> str:
     return f"{lens} at chief ray angles of {ends} degrees, the worst of {len(angles)} places of the sensor"
 
 
-def assumed_lines(output: Output) -> Iterator[str]:
-    """A note where a study does not say of what technology its filters are."""
-    study = output.study
+def assumed_line(output: Output) -> str:
+    """A note of what is not as measured or stated: surrogate curves, filters without a technology; else empty."""
+    study, found = output.study, []
+    if output.provenance.sensor.surrogate or output.provenance.lights.surrogate:
+        found.append("Built-in curves are surrogates, modeled from stated parameters, not measured.")
     made = [*study.designs.values(), *study.sweeps.values(), *study.boxes.values()]
     if any(modification.technology is None for modification in made):
-        yield NOT_STATED
+        found.append(NOT_STATED)
+    return f"Note: {' '.join(found)}" if found else ""

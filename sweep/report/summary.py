@@ -6,7 +6,7 @@ from ..results.facts import SearchFacts
 from ..results.output import Output
 from ..results.tables import NAMED
 from .answer import answer_sentences
-from .assumed import assumed_lines
+from .assumed import assumed_line
 from .published import comparison_lines, comparison_with_published
 from .tables import geometry_table
 
@@ -62,15 +62,15 @@ def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
         both = ", ".join(f"{name} {area:.3f}" for name, area in areas.items() if area > 0)
         least = output.provenance.hypervolume_least_sensitivity
         lines.append(f"Hypervolume (DN x sensitivity, above 0 and a sensitivity of {least:g}): {both}.")
-    lines += assumed_lines(output)
     lines += [f"Note: {warning}." for warning in output.provenance.warnings]
     ratio = output.study.lights.photon_ratio
     if ratio is not None:
         lines.append(
             f"A light has {ratio:.4g} of the photons of the white patch (photon_ratio in study.resolved.yaml)."
         )
-    if output.provenance.sensor.surrogate or output.provenance.lights.surrogate:
-        lines.append("Note: built-in curves are surrogates, modeled from stated parameters, not measured.")
+    note = assumed_line(output)
+    if note:
+        lines.append(note)
     workers = output.provenance.workers
     computed = f"{output.provenance.duration_s:.1f} s by {workers} worker{'s' if workers > 1 else ''}"
     lines.append(f"Computed in {computed}." if took_s is None else f"Took {took_s:.1f} s; computed in {computed}.")
