@@ -14,11 +14,12 @@ from ..metrics.bound import Bound
 from ..search.limit import Limit, limit_of, why_not
 from ..search.problem import Problem
 from ..study import Study
+from .own_filters import view_with
 
 
 def any_filter(study: Study, cfa: str, scenario: str, bases: Mapping[str, str]) -> Problem:
     """The problem of the best filter between nothing and the curve that it replaces, under the study's constraints."""
-    view = study.view_of(cfa, scenario, bases)
+    view = view_with(study, cfa, scenario, bases)
     base = study.sensor.curve(next(iter(bases.values())))
     # The limit asks a family only for how large and how small its filters can be.
     family = cast(Family, Stopband(study.grid.nodes_nm, base, np.zeros_like(base)))

@@ -20,7 +20,7 @@ from ..search.limit import Limit
 from ..study import Study, folder_name
 from .given import CurveLike, on_grid
 from .limits import any_filter, at_least, limit_or_reason
-from .own_filters import bases_of, cfa_with, judged, table_of, verdict, with_units
+from .own_filters import bases_of, cfa_with, judged, table_of, verdict, view_with, with_units
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -97,10 +97,10 @@ class LoadedStudy:
         """Every quantity of own filters, given by channel: `evaluate(N=curve)`, or rows of curves for many filters.
 
         Without a channel: of the plain CFAs and named designs. The values are QE, or, with `relative_to`, transmissions
-        times that curve of the sensor. `base`: the curve that the filter replaces, where the study does not say it.
-        A row per scene and filter; units and meanings are in `attrs`. All effects of the scene are computed. What only
-        a family's parameters say is NaN, and a constraint on that leaves `feasible` unknown (NA). Raises SweepError for
-        curves that are not clean, names that are unknown, and a QE above 1.
+        times that curve of the sensor. `base`: the curve that the filter replaces, where the study does not say it. Its
+        technology is that of the study's own filters. A row per scene and filter; units and meanings are in `attrs`.
+        All effects are computed. What only a family's parameters say is NaN, and a constraint on it leaves `feasible`
+        unknown (NA). Raises SweepError for curves that are not clean, names that are unknown, and a QE above 1.
         """
         study = self.study
         scenarios = [self._scenario(scenario)] if scenario is not None else list(study.scenarios)
@@ -113,7 +113,7 @@ class LoadedStudy:
         chosen = cfa_with(study, list(channels)) if cfa is None else self._cfa(cfa, list(channels))
         bases = bases_of(study, chosen, list(channels), base)
         curves = np.stack([*rows.values()], axis=1)
-        views = {name: study.view_of(chosen, name, bases) for name in scenarios}
+        views = {name: view_with(study, chosen, name, bases) for name in scenarios}
         found = {name: judged(study, view, curves) for name, view in views.items()}
         return table_of(study, [("own", chosen, n, columns, verdict(study, columns)) for n, columns in found.items()])
 

@@ -54,6 +54,19 @@ def bases_of(study: Study, cfa: str, channels: Sequence[str], base: str | None) 
     return found
 
 
+def view_with(study: Study, cfa: str, scenario: str, bases: Mapping[str, str]) -> View:
+    """A scene for own filters: of the technology that the study states for its own ones in these channels.
+
+    Raises DataError where it states several.
+    """
+    own = [s.filter for s in study.spaces if s.filter is not None and s.cfa == cfa]
+    stated = {repr(f.technology): f.technology for f in own if bases.keys() & set(f.channels)}
+    if len(stated) > 1:
+        several = ", ".join("none" if made is None else made.told for made in stated.values())
+        raise DataError(Fault(f"several technologies are stated for {' and '.join(bases)} of {cfa}", value=several))
+    return study.view_of(cfa, scenario, bases, next(iter(stated.values()), None))
+
+
 def cfa_with(study: Study, channels: Sequence[str]) -> str:
     """The CFA that has these channels: the one that the study modifies in them, or the only one.
 

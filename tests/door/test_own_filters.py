@@ -112,3 +112,11 @@ def test_a_study_made_in_python_runs_and_is_read_again(tmp_path: Path) -> None:
     again = sweep.read_run(run.folder)
     pd.testing.assert_frame_equal(again.study.evaluate(), study.evaluate())
     pd.testing.assert_series_equal(again.curves["sensor"]["N"], study.curve("N"))
+
+
+def test_an_own_filter_moves_as_the_study_says_of_its_own() -> None:
+    study = sweep.load_study("angle")
+    named = study.evaluate(scenario="f/1.6 cra_deg=20")
+    family = sweep.Stopband(study.wavelength_nm, study.curve("Y").to_numpy(), study.curve("G").to_numpy())
+    own = study.evaluate(N=family.curves(np.array([[613.0, 6, 651.2, 6.3, 1]]))[0, 0], scenario="f/1.6 cra_deg=20")
+    assert own.csd_yellow_red.item() == named.csd_yellow_red[named.name == "nominal"].item()
