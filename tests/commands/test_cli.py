@@ -74,7 +74,8 @@ def test_report_command_makes_it_again(stopband: tuple[Path, list[str]]) -> None
     before, made_ns = page.read_bytes(), page.stat().st_mtime_ns
     done = sweep("report", str(folder))
     assert done.returncode == 0
-    assert done.stdout.splitlines() == lines
+    said = done.stdout.splitlines()
+    assert [line for line in said if not line.startswith("Took ")] == [x for x in lines if not x.startswith("Took ")]
     assert page.stat().st_mtime_ns > made_ns
     assert page.read_bytes() == before
 

@@ -29,7 +29,7 @@ from ..commanded import commanded
 SLOWED = Path(__file__).parent.parent / "slowed"
 SAID = "sweep: interrupted; finished chunks are kept, the same command continues\n"
 PHASES = {
-    "planning": ("sweep.camera.plan.plan:Planner.plan", 2),
+    "planning": ("sweep.study.model:Study.plan", 2),
     "search": ("sweep.search.solver:search_from", 3),
     "sweep": ("sweep.metrics.evaluate:evaluate", 6),
     "recognition": ("sweep.metrics.recognition:recognize", 2),
