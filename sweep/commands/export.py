@@ -62,12 +62,11 @@ class Filters:
 def export_design(folder: Path, key: str, data: Path | None, to: Path | None, also: Collection[Also] = ()) -> list[str]:
     """Write `<key>.csv` and `<key>.mat` of a design of a finished run to `to` (FOLDER/export), and say what it is.
 
-    `also`: files of other programs beside them.
-
     `key`: a name, a design_id, or `best`. The filter is computed again, from the study's files in `data`, or, without
-    it, from the sensor's curves that the run kept, and compared with what the run kept of it. Raises SweepError for an
-    unknown key, for a design that failed and for a sensor without what `also` needs; OutputError for a folder without a finished run, for curves that are not
-    those of the run, and where a file of other content would be overwritten.
+    it, from the sensor's curves that the run kept, and compared with what the run kept of it. `also`: files of other
+    programs beside them. Raises SweepError for an unknown key, for a design that failed, and for a sensor without what
+    `also` needs; OutputError for a folder without a finished run, for curves that are not those of the run, and where
+    a file of other content would be overwritten.
     """
     output = read_output(folder)
     row = find_row(output, key)

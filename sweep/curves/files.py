@@ -1,4 +1,4 @@
-"""Read files of curves: tables of text, ISETCam's `.mat`, IES TM-27's `.spdx`, rawtoaces' JSON and Speos' `.spectrum`."""
+"""Read files of curves: tables of text, ISETCam's `.mat`, IES TM-27's `.spdx`, rawtoaces' JSON, Speos' `.spectrum`."""
 
 from __future__ import annotations
 

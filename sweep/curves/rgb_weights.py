@@ -18,8 +18,8 @@ class RgbWeights:
 
     `weights`: ndarray[n_channels, 3], of any sign. `residual`: ndarray[n_channels], root mean square of what the fit
     leaves over that of the channel's curve: 0 where the sum is the channel, 1 where it has nothing of it.
-    `light_error`: ndarray[n_channels], the largest error of a channel's electrons over the lights, as a share of those of
-    its brightest light; infinite where it sees none of them.
+    `light_error`: ndarray[n_channels], the largest error of a channel's electrons over the lights, as a share of those
+    of its brightest light; infinite where it sees none of them.
     """
 
     channels: tuple[str, ...]
@@ -44,10 +44,10 @@ def rgb_weights(qe: Mapping[str, FloatArray], rgb: FloatArray, photons: FloatArr
     `photons`: ndarray[n_lights, n_wavelengths]. A channel whose curve is 0 has weights and a residual of 0.
     """
     curves = np.stack(list(qe.values()))
-    weights = np.linalg.lstsq(rgb.T, curves.T, rcond=None)[0].T
+    weights = np.asarray(np.linalg.lstsq(rgb.T, curves.T, rcond=None)[0].T, dtype=float)
     fit = weights @ rgb
-    left, whole = (np.sqrt((part**2).mean(axis=1)) for part in (curves - fit, curves))
+    left, whole = (np.asarray(np.sqrt((part**2).mean(axis=1)), dtype=float) for part in (curves - fit, curves))
     brightest, off = (curves @ photons.T).max(axis=1), np.abs((fit - curves) @ photons.T).max(axis=1)
     errors = np.divide(off, brightest, out=np.full_like(off, np.inf), where=brightest > 0)
     residual = np.divide(left, whole, out=np.zeros_like(left), where=whole > 0)
-    return RgbWeights(tuple(qe), weights, np.asarray(residual, dtype=float), errors)
+    return RgbWeights(tuple(qe), weights, residual, errors)

@@ -154,7 +154,7 @@ def test_speos_and_rgb_weights_come_back_as_they_left(tiny: Path, tmp_path: Path
 
 
 def test_rgb_weights_need_the_sensor_s_rgb(from_files: Path, tmp_path: Path) -> None:
-    with pytest.raises(SweepError, match="no such curve .got 'B'"):
+    with pytest.raises(SweepError, match=r"no such curve .got 'B'"):
         export_design(from_files, "best", None, tmp_path / "to", [Also.RGB])
     assert not (tmp_path / "to").exists()
 
