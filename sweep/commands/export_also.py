@@ -53,7 +53,8 @@ def _said(found: RgbWeights) -> list[str]:
     for channel, weights, residual, error in zip(
         found.channels, found.weights, found.residual, found.light_error, strict=True
     ):
-        terms = " ".join(f"{weight + 0.0:+.4f} {name}" for weight, name in zip(weights, _RGB, strict=True))
+        shown = [round(float(weight), 4) + 0.0 for weight in weights]  # no -0.0000
+        terms = " ".join(f"{weight:+.4f} {name}" for weight, name in zip(shown, _RGB, strict=True))
         lines.append(
             f"       {channel} = {terms}; the sum misses {residual:.2%} of the curve (root mean square), and "
             f"of each of the study's lights at most {error:.2%} of the brightest one's electrons."

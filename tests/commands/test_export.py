@@ -151,6 +151,7 @@ def test_speos_and_rgb_weights_come_back_as_they_left(tiny: Path, tmp_path: Path
         assert row["largest_error_of_a_light"] == pytest.approx(share, abs=1e-9)
         assert f"misses {row['residual']:.2%} of the curve" in said
     assert weights.loc["N", "residual"] > 0.01
+    assert "R = +1.0000 R +0.0000 G +0.0000 B" in said
 
 
 def test_rgb_weights_need_the_sensor_s_rgb(from_files: Path, tmp_path: Path) -> None:
