@@ -1,8 +1,8 @@
-"""A filter out of a finished run: as CSV for who makes it, as ISETCam's color filters for who simulates with it."""
+"""A filter out of a finished run: as CSV for who makes it, as other programs' files for who simulates with it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,8 @@ from ..results.designs import row_curves
 from ..results.tables import write_bytes
 from ..study import Study, folder_name
 from ..types import FloatArray
+from .export_also import other_files
+from .options import Also
 
 EXPORT = "export"
 _SAME_TOTAL = 1e-9
@@ -57,13 +59,14 @@ class Filters:
         return found
 
 
-def export_design(folder: Path, key: str, data: Path | None, to: Path | None) -> list[str]:
+def export_design(folder: Path, key: str, data: Path | None, to: Path | None, also: Collection[Also] = ()) -> list[str]:
     """Write `<key>.csv` and `<key>.mat` of a design of a finished run to `to` (FOLDER/export), and say what it is.
 
     `key`: a name, a design_id, or `best`. The filter is computed again, from the study's files in `data`, or, without
-    it, from the sensor's curves that the run kept, and compared with what the run kept of it. Raises SweepError for an
-    unknown key and for a design that failed; OutputError for a folder without a finished run, for curves that are not
-    those of the run, and where a file of other content would be overwritten.
+    it, from the sensor's curves that the run kept, and compared with what the run kept of it. `also`: files of other
+    programs beside them. Raises SweepError for an unknown key, for a design that failed, and for a sensor without what
+    `also` needs; OutputError for a folder without a finished run, for curves that are not those of the run, and where
+    a file of other content would be overwritten.
     """
     output = read_output(folder)
     row = find_row(output, key)
@@ -81,16 +84,17 @@ def export_design(folder: Path, key: str, data: Path | None, to: Path | None) ->
         base.with_name(base.name + ".csv"): csv_text(filters.wavelength_nm, tables).encode("utf-8"),
         base.with_name(base.name + ".mat"): isetcam_mat(filters.wavelength_nm, filters.curves, hints, tile, comment),
     }
-    for path, content in contents.items():
+    others, said = other_files(also, base, filters.wavelength_nm, filters.curves, study, _design(output, row))
+    for path, content in (contents | others).items():
         _refuse_other(path, content)
-    for path, content in contents.items():
+    for path, content in (contents | others).items():
         write_bytes(content, path)
     lines = [*_lines(output, row, filters), *_remarks(filters, transmissions)]
     csv_path, mat_path = contents
     names = ", ".join(filter_names(hints, filters.curves))
     lines.append(f"Files: {csv_path} ({', '.join(unique_names(tables))}),")
     lines.append(f"       {mat_path} ({names}: QE, so set the pixel's spectral QE to 1 in ISETCam).")
-    return lines
+    return lines + said
 
 
 def filters_of(study: Study, row: Mapping[Any, Any]) -> Filters:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -9,6 +10,13 @@ import typer
 
 from ..errors import Fault, StudyError
 from .completion import run_folders, study_files
+
+
+class Also(StrEnum):
+    """Files of other programs that an export can write, too."""
+
+    SPEOS = "speos"
+    RGB = "rgb"
 
 
 def _found(path: Path) -> Path:

@@ -1,4 +1,4 @@
-"""Read files of curves: tables of text, ISETCam's `.mat`, IES TM-27's `.spdx` and rawtoaces' JSON."""
+"""Read files of curves: tables of text, ISETCam's `.mat`, IES TM-27's `.spdx`, rawtoaces' JSON, Speos' `.spectrum`."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from .instrument_files import scan_json, scan_spdx
 from .mat_files import DamagedError, read_variables
 from .scan import MOST_BYTES, Scan, check_size
 from .spectrum import Curves, sample_faults
+from .speos import scan_speos
 from .text_tables import scan_text
 
 _MAT_VARIABLES = ("wavelength", "data", "filterNames")
@@ -94,5 +95,6 @@ _KINDS: dict[str, Callable[[Path], Scan]] = {
     ".mat": _scan_mat,
     ".spdx": scan_spdx,
     ".json": scan_json,
+    ".spectrum": scan_speos,
 }
 """Readers by the ending of a file's name."""

@@ -18,18 +18,23 @@ _NO_ENTITIES = (b"<!DOCTYPE", b"<!ENTITY")
 """What makes a small XML file a large one."""
 
 
+def read_xml(path: Path, what: str) -> ElementTree.Element:
+    """The root of an XML file that should be `what`; raises DataError for no XML, or XML with entities of its own."""
+    file, content = str(path), read_input(path, MOST_BYTES, DataError)
+    if any(part in content for part in _NO_ENTITIES):
+        raise DataError(Fault(f"not {what}", file, allowed="XML without entities of its own"))
+    try:
+        return ElementTree.fromstring(content)
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise DataError(Fault(f"not readable XML: {error}", file)) from None
+
+
 def scan_spdx(path: Path) -> Scan:
     """A spectrum of IES TM-27-14: `SpectralData` elements with the wavelength as attribute, nm.
 
     Raises DataError where the file is no such XML.
     """
-    file, content = str(path), read_input(path, MOST_BYTES, DataError)
-    if any(part in content for part in _NO_ENTITIES):
-        raise DataError(Fault("not a spectrum of IES TM-27", file, allowed="XML without entities of its own"))
-    try:
-        root = ElementTree.fromstring(content)
-    except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise DataError(Fault(f"not readable XML: {error}", file)) from None
+    file, root = str(path), read_xml(path, "a spectrum of IES TM-27")
     rows = [(part.get("wavelength", ""), part.text or "") for part in root.iter() if _local(part.tag) == "SpectralData"]
     if not rows:
         raise DataError(Fault("not a spectrum of IES TM-27", file, allowed="elements SpectralData with a wavelength"))

@@ -11,6 +11,7 @@ import numpy as np
 from ..types import FloatArray, IndexArray
 from .family import Family
 from .technology import Technology
+from .ungridded import Axes, Ungridded
 
 Kind = Literal["reference", "design", "sweep", "search"]
 
@@ -28,22 +29,25 @@ class Filter:
 
 @dataclass(frozen=True)
 class Space:
-    """A full-factorial set of designs on one CFA.
+    """A set of designs on one CFA: a full-factorial grid, `rows`, or a box that is searched but not swept.
 
-    `axes`: the values of each parameter of the family; the last one runs fastest. A plain CFA has no filter, no axes
-    and one design.
+    `axes`: the values of each parameter of the family; in a grid the last one runs fastest. A plain CFA has no filter,
+    no axes and one design.
     """
 
     kind: Kind
     name: str
     cfa: str
     filter: Filter | None = None
-    axes: tuple[tuple[float, ...], ...] = ()
+    axes: Axes = ()
     gridded: bool = True
+    rows: Ungridded | None = None
 
     @property
     def size(self) -> int:
         """Number of designs; 0 for a box that is searched but not swept."""
+        if self.rows is not None:
+            return self.rows.size
         return math.prod(len(axis) for axis in self.axes) if self.gridded else 0
 
     @property
@@ -52,7 +56,7 @@ class Space:
         return () if self.filter is None else tuple(p.name for p in self.filter.family.parameters)
 
     def digits(self, start: int, stop: int) -> list[IndexArray]:
-        """For each axis the index of its value in designs start..stop-1, ndarray[stop - start]."""
+        """For each axis of a grid the index of its value in designs start..stop-1, ndarray[stop - start]."""
         rest = np.arange(start, stop)
         found = []
         for axis in reversed(self.axes):  # mixed radix: NumPy's own unravel_index stops at 64 axes
@@ -62,6 +66,8 @@ class Space:
 
     def points(self, start: int, stop: int) -> FloatArray:
         """Parameters of designs start..stop-1: ndarray[stop - start, n_parameters]."""
+        if self.rows is not None:
+            return self.rows.points(self.axes, start, stop)
         digits = zip(self.axes, self.digits(start, stop), strict=True)
         columns = [np.asarray(axis, dtype=float)[digit] for axis, digit in digits]
         return np.stack(columns, axis=1) if columns else np.empty((stop - start, 0))

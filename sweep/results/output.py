@@ -65,8 +65,9 @@ _Model = TypeVar("_Model", bound=BaseModel)
 class Output:
     """What a run left in its folder; of a long result table, `table` holds what a report shows.
 
-    `study`: the study that was run, and `resolved` its file. `profiles`: over the whole table, per CFA. `searched`: the
-    search's evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per light that was left out of a search.
+    `study`: the study that was run, and `resolved` its file. `profiles`: over the whole table, per CFA; none where a
+    sweep is no grid. `searched`: the search's evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per
+    light that was left out of a search.
     """
 
     folder: Path
@@ -218,7 +219,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         searched=searched,
         audited=audit,
         left_out=left_out,
-        profiles=profiles.found,
+        profiles=profiles.found if all(made.grid is not None for made in study.sweeps.values()) else {},
     )
 
 

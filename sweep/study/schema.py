@@ -22,6 +22,7 @@ from .schema_curves import Documented, LightsSection, Name, SensorSection, built
 
 _FEWEST_PATCHES = 10
 _MOST_ROWS = 64
+_MOST_DRAWN = 1_000_000
 MOST_TYPES = 40
 """Signal types of a study; 780 pairs of them have columns of their own."""
 
@@ -70,9 +71,47 @@ class DesignSection(Modification):
 
 
 class SweepSection(Modification):
-    """A full-factorial grid over the family's parameters."""
+    """Filters over the family's parameters: one of `grid`, `sobol`, `lhs`, `zip` and `list`.
 
-    grid: dict[Name, Values]
+    What `sobol` and `lhs` draw depends on the study's `seed`.
+    """
+
+    grid: dict[Name, Values] | None = None
+    """Every combination of the values."""
+    sobol: Annotated[int, Field(ge=1, le=_MOST_DRAWN)] | None = None
+    """So many designs of a scrambled Sobol sequence in `box`; powers of 2 fill it most evenly."""
+    lhs: Annotated[int, Field(ge=1, le=_MOST_DRAWN)] | None = None
+    """So many designs of a Latin hypercube in `box`."""
+    box: dict[Name, Span] | None = None
+    """For `sobol` and `lhs`; a parameter that is not named has its default, or may take all its family's values."""
+    paired: Annotated[dict[Name, Values] | None, Field(alias="zip", min_length=1)] = None
+    """The first values of all parameters, then the second ones; a single number holds for all."""
+    listed: Annotated[list[Annotated[dict[Name, Number], Field(min_length=1)]] | None, Field(alias="list")] = None
+    """Designs one by one, each with the same parameters."""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> SweepSection:
+        ways = {"grid": self.grid, "sobol": self.sobol, "lhs": self.lhs, "zip": self.paired, "list": self.listed}
+        given = [name for name, way in ways.items() if way is not None]
+        if len(given) != 1:
+            raise ValueError(f"one of `{'`, `'.join(ways)}`; there is {' and '.join(given) or 'none of them'}")
+        if (self.box is not None) != self.drawn:
+            raise ValueError("`box` goes with `sobol` and `lhs`, which draw from it")
+        sizes = {name: axis.size for name, axis in (self.paired or {}).items()}
+        if len(set(sizes.values()) - {1}) > 1:
+            told = ", ".join(f"{name} {size}" for name, size in sizes.items())
+            raise ValueError(f"zip: as many values of each parameter, or a single one; there are: {told}")
+        if self.listed is not None and not self.listed:
+            raise ValueError("list: one design or more")
+        for number, design in enumerate(self.listed or (), 1):
+            if self.listed and set(design) != set(self.listed[0]):
+                raise ValueError(f"list: design {number} names other parameters than the first one")
+        return self
+
+    @property
+    def drawn(self) -> bool:
+        """Whether its designs are drawn from a box."""
+        return self.sobol is not None or self.lhs is not None
 
 
 class BoxSection(Modification):
@@ -141,7 +180,7 @@ class Levels(Section):
 
 
 class SearchSection(Documented):
-    """A search in a box, or in that of a sweep's grid (from the smallest to the largest value of each axis).
+    """A search in a box, or in that of a sweep (from the smallest to the largest value of each parameter).
 
     `front`: repeat the search over these levels of the least sensitivity.
     """
@@ -212,7 +251,7 @@ class StudySection(Documented):
     designs: Annotated[dict[Name, DesignSection], Field(max_length=10_000)] = {}
     """Single filters to compare with, by name."""
     sweeps: Annotated[dict[Name, SweepSection], Field(max_length=1000)] = {}
-    """Full-factorial grids of filters, by name."""
+    """Sets of filters, by name: grids, samples of a box, lists."""
     boxes: Annotated[dict[Name, BoxSection], Field(max_length=1000)] = {}
     """Ranges of filters that are searched but not swept, by name."""
     production: Production = Production()

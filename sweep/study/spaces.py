@@ -13,15 +13,18 @@ from ..designs.family import Family, Parameter
 from ..designs.plugin import PluginFamily, is_plugin, plugin_parts, read_plugin
 from ..designs.registry import FAMILIES, build_family
 from ..designs.space import Filter, Kind, Space
+from ..designs.ungridded import Ungridded
 from ..disk import is_file
 from ..errors import Fault, SweepError, nearest
 from ..types import FloatArray
 from .schema import DesignSection, Modification, StudySection
 from .sources import Sources
+from .sweep_axes import sweep_axes
 from .technologies import check_filter
 from .yaml_tree import Key
 
 _MOST_POINTS = 2_000_000
+_MOST_DRAWN = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -60,8 +63,8 @@ class SpaceBuilder:
             axes: dict[str, tuple[float, ...]] = {key: (value,) for key, value in self._built_in(name, design).items()}
             spaces += self._filtered("design", name, design, axes, ("designs", name, "at"))
         for name, sweep in section.sweeps.items():
-            axes = {key: axis.points() for key, axis in sweep.grid.items()}
-            spaces += self._filtered("sweep", name, sweep, axes, ("sweeps", name, "grid"))
+            way, axes, rows = sweep_axes(sweep, section.seed)
+            spaces += self._filtered("sweep", name, sweep, axes, ("sweeps", name, way), rows)
         for name, box in section.boxes.items():
             axes = {key: axis.points() for key, axis in box.box.items()}
             spaces += self._filtered("search", name, box, axes, ("boxes", name, "box"))
@@ -69,10 +72,9 @@ class SpaceBuilder:
 
     def _fits(self) -> bool:
         """Whether the axes of all grids and boxes can be written out; else adds a fault."""
-        grids = [sweep.grid for sweep in self.section.sweeps.values()]
-        total = sum(
-            axis.size for axes in (*grids, *(b.box for b in self.section.boxes.values())) for axis in axes.values()
-        )
+        sweeps, boxes = self.section.sweeps.values(), self.section.boxes.values()
+        told = [*(sweep.grid or sweep.box or sweep.paired or {} for sweep in sweeps), *(box.box for box in boxes)]
+        total = sum(axis.size for axes in told for axis in axes.values())
         if total > _MOST_POINTS:
             allowed = f"at most {_MOST_POINTS:,} in all axes together"
             self.sources.add(("sweeps",), "too many values of parameters", f"{total:,}", allowed)
@@ -113,6 +115,7 @@ class SpaceBuilder:
         entry: Modification,
         axes: Mapping[str, tuple[float, ...]],
         axes_path: tuple[Key, ...],
+        rows: Ungridded | None = None,
     ) -> list[Space]:
         before = len(self.sources.faults)
         path = axes_path[:-1]
@@ -137,12 +140,15 @@ class SpaceBuilder:
             for fault in error.faults:
                 self.sources.add((*path, "family"), fault.problem, fault.value, fault.allowed)
             return []
-        ordered = self._axes(axes, axes_path, family.parameters, open_ended=kind == "search")
+        ordered = self._axes(axes, axes_path, family.parameters, open_ended=axes_path[-1] == "box")
+        if rows is not None and rows.size * len(ordered) > _MOST_DRAWN:
+            allowed = f"at most {_MOST_DRAWN // len(ordered):,} designs of {len(ordered)} parameters"
+            self.sources.add(path, "too many designs that are no grid", f"{rows.size:,}", allowed)
         if len(self.sources.faults) > before:
             return []
         target_name = "" if entry.to is None else str(entry.to)
         made = Filter(family, tuple(entry.channel), entry.base, target_name, entry.technology)
-        space = Space(kind, name, entry.cfa, made, tuple(ordered), gridded=kind != "search")
+        space = Space(kind, name, entry.cfa, made, tuple(ordered), kind != "search" and rows is None, rows)
         check_filter(space, path, self.sensor, self.sources)
         return [space]
 

@@ -152,6 +152,12 @@ def test_a_spectrum_of_tm_27(tmp_path: Path) -> None:
         ("a.spdx", "<a/>", "elements SpectralData"),
         ("a.json", rawtoaces().replace('"R", ', ""), "not as many values as names"),
         ("a.json", "[" * 100_000, "rawtoaces"),
+        ("a.spectrum", "400\t1\n", "a first line 'OPTIS - Spectrum file v1.0'"),
+        ("a.spectrum", "OPTIS - Spectrum file v2.0\n\0\1", "encrypted"),
+        ("a.spectrum", "OPTIS - Spectrum file v1.0\nx\n400\t1\n", "a.spectrum:3: no number of samples"),
+        ("a.spectrum", "OPTIS - Spectrum file v1.0\nx\n3\n400\t1\n500\t2\n", "not as many samples"),
+        ("a.spectrum", "OPTIS - Spectrum file v1.0\nx\n2\n400\t1\n500\t2,5\n", "a.spectrum:5: not two numbers"),
+        ("a.spectrum", "OPTIS - Spectrum file v1.0\nx\n2\n400\t1\n400\t2\n", "twice"),
         ("a.xlsx", "x", "unknown kind of curve file"),
     ],
 )

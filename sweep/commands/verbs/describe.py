@@ -15,7 +15,7 @@ PANEL = OF_CURVES
 
 
 def describe(
-    file: Annotated[Path, typer.Argument(help="A file of curves.", show_default=False)],
+    file: Annotated[Path, typer.Argument(help="A file of curves, or EMVA 1288 results (.xml).", show_default=False)],
     output: Annotated[Path, typer.Option(help="Folder for the picture.")] = Path("outputs/describe"),
     quantity: Annotated[
         LightUnit | None,
@@ -27,6 +27,12 @@ def describe(
     ] = None,
 ) -> None:
     """Plot and check a file of curves: what it holds, what is wrong with it, which colors its lights have."""
+    if file.suffix.casefold() == ".xml" and clean is None and quantity is None:
+        from ...camera.emva1288 import pixel_lines
+
+        for line in pixel_lines(file):
+            typer.echo(line)
+        return
     from ..describe import cleaned, described
 
     if clean is not None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..options import RunFolder
+from ..options import Also, RunFolder
 from ..panels import OF_RESULTS
 
 PANEL = OF_RESULTS
@@ -19,10 +19,14 @@ def export(
     data: Annotated[
         Path | None, typer.Option(help="Folder with the run's curve files, which are then read again and compared.")
     ] = None,
+    also: Annotated[
+        list[Also] | None,
+        typer.Option(help="Another file, too: .spectrum of Speos, or weights of the sensor's R, G and B."),
+    ] = None,
     to: Annotated[Path | None, typer.Option(help="Folder for the files.", show_default="FOLDER/export")] = None,
 ) -> None:
-    """Write a filter of a finished run as CSV and as ISETCam color filters (.mat)."""
+    """Write a filter of a finished run as CSV and as ISETCam color filters (.mat), and for other programs."""
     from ..export import export_design
 
-    for line in export_design(folder, design, data, to):
+    for line in export_design(folder, design, data, to, also or ()):
         typer.echo(line)
