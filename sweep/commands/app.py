@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Annotated
 
 import typer
@@ -33,7 +34,8 @@ _Version = Annotated[
 
 
 @app.callback()
-def _whole(_: _Version = False) -> None: ...
+def _whole(context: typer.Context, _: _Version = False) -> None:
+    context.obj = time.monotonic()  # when the command began, for those that say what they took
 
 
 def _add_verbs() -> None:

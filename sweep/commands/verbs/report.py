@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+import typer
 
 from ..finish import finish
 from ..options import RunFolder
@@ -11,6 +11,6 @@ from ..panels import OF_RESULTS
 PANEL = OF_RESULTS
 
 
-def report(folder: RunFolder) -> None:
+def report(context: typer.Context, folder: RunFolder) -> None:
     """Draw figures and report of a finished run again."""
-    finish(folder, time.monotonic())
+    finish(folder, context.find_root().obj)

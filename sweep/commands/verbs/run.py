@@ -17,6 +17,7 @@ PANEL = OF_STUDIES
 
 
 def run(
+    context: typer.Context,
     studies: StudyPaths,
     data: DataFolder = None,
     output: Outputs = Path("outputs"),
@@ -34,7 +35,6 @@ def run(
     interrupted run, and makes again what is missing or damaged. Files that are not its own stay (run.json lists those
     that are). Of several studies, one that cannot be run does not stop the others.
     """
-    began_s = time.monotonic()
     from ...run import Wishes
     from ..runs import Manner, run_one
 
@@ -42,7 +42,7 @@ def run(
     changed = changes_of(changes)
     manner = Manner(data, output, jobs, backend, scheduler, dry_run, wishes, changed, allow_code, opens)
     if len(studies) == 1:
-        run_one(studies[0], manner, began_s)
+        run_one(studies[0], manner, context.find_root().obj)
         return 0
     code = 0
     for path in studies:
