@@ -17,6 +17,7 @@ from sweep.metrics.separation import separation
 from sweep.metrics.smooth import smooth_response
 from sweep.search.limit import Limit, limit_of
 from sweep.search.problem import Problem, best_feasible, starting_points
+from sweep.search.sides import _NEAR
 from sweep.search.solver import search_from
 from sweep.study import Study, load_study
 
@@ -237,8 +238,8 @@ def test_a_proof_bounds_filters_of_other_sensitivities(coarse: Problem, seed: in
     assert own is not None
     levels = [own + off for off in (-0.08, -0.02, 0.0, 0.01, 0.04)]
     limit = limit_of(problem, sensitivities=levels)
-    assert limit.elsewhere[2] == pytest.approx(limit.proven, abs=2e-4 + 1e-3)
-    assert list(limit.elsewhere) == sorted(limit.elsewhere, reverse=True)
+    assert limit.elsewhere[2] == pytest.approx(limit.proven, abs=_NEAR + 1e-3)
+    assert (np.diff(limit.elsewhere) <= _NEAR).all()  # each may be that much above the bound of its weights
     for level, most in zip(levels, limit.elsewhere, strict=True):
         there = replace(problem, constraints={**problem.constraints, "sensitivity": Bound(min=level)})
         assert largest(there, most + 1e-3) < most + 1e-3  # by a MILP of its own, no filter exceeds it
