@@ -120,7 +120,8 @@ def filter_of_run(folder: Path, design: str | None, wishes: AskedFor) -> Judged:
     nodes_nm = study.grid.nodes_nm
     own = {OWN + channel: curve for channel, curve in zip(space.filter.channels, curves[0], strict=True)}
     series = {name: pd.Series(curve, index=nodes_nm) for name, curve in {**study.sensor.qe, **own}.items()}
-    sensor = sensor_given(None, series, name=study.sensor.name, clear=study.sensor.clear)
+    given = sensor_given(None, series, name=study.sensor.name, clear=study.sensor.clear)
+    sensor = Given({**given.keys, "technology": study.sensor.technologies}, given.curves)
     mosaic = study.mosaics[space.cfa]
     named = _other_names(study.sensor, space.cfa, mosaic) | dict(study.section.cfas[space.cfa].curves)
     if wishes.lights is None:
@@ -133,7 +134,7 @@ def filter_of_run(folder: Path, design: str | None, wishes: AskedFor) -> Judged:
     keys = {"pixel": study.section.pixel, "scenarios": scene, "wavelengths": study.grid}
     note = f"{folder}: {row['name'] or design} of {space.cfa}, in scenario {row['scenario']}"
     bases = dict.fromkeys(space.filter.channels, space.filter.base)
-    return Judged(mosaic, bases, sensor, lights, types, named, keys, (note,))
+    return Judged(mosaic, bases, sensor, lights, types, named, keys, (note,), space.filter.technology)
 
 
 def _curves_of(sensor: Given, keys: Mapping[str, Any]) -> SensorCurves:

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import cast
 
 import numpy as np
 
+from ..camera.view import View
 from ..designs.families.stopband import Stopband
 from ..designs.family import Family
 from ..metrics.bound import Bound
 from ..search.limit import Limit, limit_of, why_not
 from ..search.problem import Problem
 from ..study import Study
-from .own_filters import view_with
 
 
-def any_filter(study: Study, cfa: str, scenario: str, bases: Mapping[str, str]) -> Problem:
+def any_filter(study: Study, view: View) -> Problem:
     """The problem of the best filter between nothing and the curve that it replaces, under the study's constraints."""
-    view = view_with(study, cfa, scenario, bases)
-    base = study.sensor.curve(next(iter(bases.values())))
+    base = view.base_qe[0]
     # The limit asks a family only for how large and how small its filters can be.
     family = cast(Family, Stopband(study.grid.nodes_nm, base, np.zeros_like(base)))
     low, high = (np.array([getattr(p, end) for p in family.parameters], dtype=float) for end in ("low", "high"))

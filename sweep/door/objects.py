@@ -159,8 +159,7 @@ class LoadedStudy:
         space = self._modified(cfa, channel)
         assert space.filter is not None
         scene = next(iter(self.study.scenarios)) if scenario is None else self._scenario(scenario)
-        bases = dict.fromkeys(space.filter.channels, space.filter.base)
-        problem = any_filter(self.study, space.cfa, scene, bases)
+        problem = any_filter(self.study, self.study.view(space, scene))
         if sensitivity is not None:
             problem = at_least(problem, "sensitivity", sensitivity)
         found, reason = limit_or_reason(problem)

@@ -11,6 +11,7 @@ import pandas as pd
 
 from ..camera.mosaic import Mosaic
 from ..curves.lights import Pair, class_pairs
+from ..designs.technology import Technology
 from ..errors import DataError, Fault
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.quantity import Column
@@ -34,7 +35,8 @@ class Judged:
     """What is to be judged: a filter for channels of a CFA, whose curves the sensor has as `own <channel>`.
 
     `bases`: channel -> the curve that it replaces; `types`: signal types of the lights; `named`: other channels of the
-    CFA whose curve has another name; `keys`: further keys of the study that judges; `notes`: how files were taken.
+    CFA whose curve has another name; `keys`: further keys of the study that judges; `notes`: how files were taken;
+    `technology`: by what the filter works, where that is stated.
     """
 
     mosaic: Mosaic
@@ -45,6 +47,7 @@ class Judged:
     named: Mapping[str, str] = field(default_factory=dict)
     keys: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    technology: Technology | None = None
 
     @property
     def pair(self) -> Pair:
@@ -58,7 +61,8 @@ class Verdict:
     """`table`: a row per scene and CFA, the filter's own last; `goal`: the separation that the limit is of.
 
     `limit`: what no filter in its place with as much light exceeds in the first scene, before quantization, between 0
-    and the curve `below`; None where `no_limit` says why. `smooth`: what the filter has before quantization.
+    and the curve `below`; None where `no_limit` says why. `smooth`: what the filter has before quantization. The limit
+    is of filters of the same `technology`, where that is stated.
     """
 
     table: pd.DataFrame
@@ -70,6 +74,7 @@ class Verdict:
     no_limit: str
     notes: tuple[str, ...]
     others: tuple[Column, ...] = ()
+    technology: Technology | None = None
 
     @property
     def gap(self) -> float | None:
@@ -92,9 +97,10 @@ class Verdict:
             return
         gap = "" if self.gap is None else f", {100 * self.gap:.1f} % below"
         bound, has = self.goal.told_bound(self.limit), self.goal.amount(self.smooth, 1)
+        alike = "" if self.technology is None else f" that works by {self.technology.told}"
         yield (
             f"{self.goal.words[:1].upper()}{self.goal.words[1:]} before quantization: no filter between 0 and "
-            f"{self.below} with as much light exceeds {bound} (proven); this one has {has}{gap}."
+            f"{self.below} with as much light{alike} exceeds {bound} (proven); this one has {has}{gap}."
         )
 
 
@@ -141,7 +147,7 @@ def judge(asked: Judged) -> Verdict:
     for scene in study.scenarios:
         for cfa in study.mosaics:
             bases, made = (asked.bases, curves) if cfa == own else ({}, nothing)
-            columns = found[scene] = judged(study, study.view_of(cfa, scene, bases), made)
+            columns = found[scene] = judged(study, study.view_of(cfa, scene, bases, asked.technology), made)
             rows.append((cfa, cfa, scene, columns, verdict(study, columns)))
     table = table_of(study, rows)
     light = float(next(iter(found.values()))[CFA_SENSITIVITY][0])
@@ -149,7 +155,8 @@ def judge(asked: Judged) -> Verdict:
     every = [study.quantities[csd_name(pair)].column for pair in study.pairs]
     goal = next(column for column in every if column.pair == asked.pair)
     further = tuple(column for column in every if column is not goal)
-    return Verdict(table, goal, own, smooth, limit, below, reason, (*asked.notes, *study.warnings), further)
+    notes = (*asked.notes, *study.warnings)
+    return Verdict(table, goal, own, smooth, limit, below, reason, notes, further, asked.technology)
 
 
 def _rows(mosaic: Mosaic) -> list[list[str]]:
@@ -170,7 +177,8 @@ def _limit(
     for below in dict.fromkeys((base, study.sensor.clear)):
         ceiling = study.sensor.curve(below)
         if (curves[0, 0] <= ceiling * (1 + _SAME)).all():
-            problem = at_least(any_filter(study, own, scenario, {channel: below}), CFA_SENSITIVITY, light)
+            view = study.view_of(own, scenario, {channel: below}, asked.technology)
+            problem = at_least(any_filter(study, view), CFA_SENSITIVITY, light)
             found, reason = limit_or_reason(problem)
             if found is None:
                 return None, None, below, reason

@@ -132,7 +132,8 @@ def test_the_table_of_the_documentation() -> None:
     """Each figure in `studies/README.md`: where nothing moves, on axis, at the worst of all places."""
     text = (STUDIES / "README.md").read_text(encoding="utf-8")
     rows = [
-        line.strip("|").split("|") for line in text.split("worst over CRA 0 to 20 degrees, f/1.6 |")[1].splitlines()[2:]
+        line.strip("|").split("|")
+        for line in text.split("worst of nine places, CRA 0 to 20 degrees, f/1.6 |")[1].splitlines()[2:]
     ]
     printed = {row[0].strip(): [cell.strip() for cell in row[1:]] for row in rows[: [len(r) for r in rows].index(1)]}
     found = {}
