@@ -13,7 +13,7 @@ PACKAGE = Path(__file__).parent.parent / "sweep"
 # From the bottom. A unit is a module or a folder of the package.
 LEVELS = [
     {"errors"},
-    {"types", "cache", "disk", "found", "vectorized"},
+    {"types", "cache", "disk", "found"},
     *(
         {room}
         for room in ("curves", "designs", "camera", "metrics", "search", "study", "results", "run", "report", "door")
@@ -36,7 +36,7 @@ ONLY_USER = {
         "camera/plan/compiled",
         "metrics/compiled",
         "metrics/nearest",
-        "vectorized",
+        "designs/vectorized",
     ],
 }
 """Who alone may import a library: files, or all of a folder."""

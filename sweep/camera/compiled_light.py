@@ -113,21 +113,17 @@ def _blurred(
                 continue
             own = light[row, column]
             for side in (-1, 1):
-                # Through the edges to the left and right, then through those below and above.
-                beside = column + side
-                shared = touch and 0 <= beside < columns and wanted[row, beside]
-                if not shared or side > 0:
-                    _along_edge(x[column] + side * half, y[row], half, table, rule, flow)
+                for turned in (False, True):  # the edges to the left and right, then those below and above
+                    along, across = (y[row], x[column]) if turned else (x[column], y[row])
+                    to_row, to_column = (row + side, column) if turned else (row, column + side)
+                    inside = 0 <= to_row < rows and 0 <= to_column < columns
+                    shared = touch and inside and wanted[to_row, to_column]
+                    if shared and side < 0:
+                        continue
+                    _along_edge(along + side * half, across, half, table, rule, flow)
                     add(own, side * scale, flow)
                     if shared:
-                        add(light[row, beside], -scale, flow)
-                beside = row + side
-                shared = touch and 0 <= beside < rows and wanted[beside, column]
-                if not shared or side > 0:
-                    _along_edge(y[row] + side * half, x[column], half, table, rule, flow)
-                    add(own, side * scale, flow)
-                    if shared:
-                        add(light[beside, column], -scale, flow)
+                        add(light[to_row, to_column], -scale, flow)
 
 
 @njit(cache=True, nogil=True)

@@ -62,8 +62,8 @@ class Electrons:
     def __init__(
         self, view: View, kernel: Kernel, work: Counter[str], dtype: DTypeLike = np.float64, *, once: bool = False
     ) -> None:
-        """`dtype`: of the product of curves and scene, where the scene's table is small enough to be kept; `once`: not
-        for a single use.
+        """`dtype`: of the product of curves and scene, where the scene's table is small enough to be kept. `once`: for
+        a single use, so that no table is made.
         """
         self.view = view
         self._work = work
@@ -88,7 +88,7 @@ class Electrons:
         self._touched = np.flatnonzero((kernel.light[:, :, modified] != 0).any(axis=(0, 2, 3)))
         self._modified = kernel.light[:, self._touched][:, :, modified]
         size = self._modified[..., 0].size * len(self.signals) * self._nodes.size
-        self._kept = self._table().astype(dtype) if 0 < size <= _KEPT * (not once) else None
+        self._kept = self._table().astype(dtype) if 0 < size <= _KEPT and not once else None
 
     def _looked_at(self, qe: FloatArray, channels: Sequence[int], place: int = 0) -> FloatArray:
         """QE of some channels as the quadrature sees it (itself, or linear between its nodes), and then the rays."""
@@ -112,9 +112,8 @@ class Electrons:
         cases, units, channels, _ = light.shape
         size, n, n_signals = self.view.grid.size, len(qe), len(self.signals)
         weights = np.broadcast_to(light, (cases, units, channels, size)).reshape(cases * units, channels * size)
-        seen = (
-            self._looked_at(qe, of, place)[:, :, None] * self.signals
-        )  # [n_designs, channels, n_signals, n_wavelengths]
+        # [n_designs, channels, n_signals, n_wavelengths]
+        seen = self._looked_at(qe, of, place)[:, :, None] * self.signals
         moved = np.moveaxis(seen, 2, 1).reshape(n, n_signals, channels * size)
         self._work["response"] += weights.shape[0] * moved.size
         # A product for each design, so that its bits do not depend on how many there are.

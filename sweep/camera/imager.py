@@ -48,8 +48,8 @@ class Imager:
         *,
         once: bool = False,
     ) -> None:
-        """`dtype`: of the product of curves and scene, where the scene's table is small enough to be kept; `once`: not
-        for a single use. `cases`: places of the light instead of those of the method of `phase`.
+        """`dtype`: of the product of curves and scene, where the scene's table is small enough to be kept. `once`: for
+        a single use, so that no table is made. `cases`: places of the light instead of those of the method of `phase`.
         """
         self.view = view
         self.work: Counter[str] = Counter() if work is None else work

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from ..types import FloatArray, IndexArray
-from ..vectorized import larger, smaller
+from .vectorized import larger, smaller
 
 _NUMBERS = {"nnan", "nsz"}
 """Lets the compiler take the smaller of several numbers at once; callers hand in no NaN."""

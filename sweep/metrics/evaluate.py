@@ -150,7 +150,7 @@ def _over(imager: Imager, cases: Sequence[Columns]) -> Columns:
     quantities = quantities_of(Asked(imager.view.lights.classes, any_place=True))
     best = {quantity.of: name for name, quantity in quantities.items() if quantity.extreme == "best place"}
     if len(cases) == 1:
-        return {**cases[0]} | {best[name]: values.copy() for name, values in cases[0].items() if name in best}
+        return cases[0] | {best[name]: values.copy() for name, values in cases[0].items() if name in best}
     found: Columns = {}
     for name in cases[0]:
         each = np.stack([case[name] for case in cases])

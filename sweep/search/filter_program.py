@@ -10,7 +10,7 @@ tight (Neumaier and Shcherbina, "Safe bounds in linear and mixed-integer linear 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_matrix, hstack, vstack
@@ -86,13 +86,6 @@ class _Rows:
     slack: FloatArray
     rate: FloatArray
     constant: FloatArray
-
-    def some(self, which: IndexArray, per_sensitivity: FloatArray, sensitivity: float | None) -> _Rows:
-        """Those of its rows, for another least sensitivity; `per_sensitivity`: `least` of that row over it, else 0."""
-        least = self.least[which]
-        if sensitivity is not None:
-            least = np.where(per_sensitivity[which] > 0, per_sensitivity[which] * sensitivity, least)
-        return _Rows(self.matrix, least, self.slack[which], self.rate[which], self.constant[which])
 
     def needed(self, t: float, *, relaxed: bool = False) -> FloatArray:
         """h(t), ndarray[n]; `relaxed`: for designs that only count as feasible."""
@@ -254,11 +247,14 @@ class FilterProgram:
         `sensitivity`: the least one that is asked of filters, instead of the problem's. `at_least`: what less is said
         of is not wanted; -inf is returned then. `near`: how much larger than the bound of the weights it may be.
         """
-        rows = self._rows.some(certificate.rows, self._per_sensitivity, sensitivity)
+        rows, per = self._rows, self._per_sensitivity
+        if sensitivity is not None:
+            rows = replace(rows, least=np.where(per > 0, per * sensitivity, rows.least))
 
         def excluded(t: float) -> bool:
-            apart = self.needed(t, relaxed=True)[certificate.pairs]
-            asked = certificate.row_weights @ rows.needed(t, relaxed=True) + certificate.pair_weights @ apart
+            floor, apart = rows.needed(t, relaxed=True), self.needed(t, relaxed=True)
+            asked = certificate.row_weights @ floor[certificate.rows]
+            asked += certificate.pair_weights @ apart[certificate.pairs]
             return bool(asked > certificate.most)
 
         if excluded(at_least):
