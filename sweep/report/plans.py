@@ -44,5 +44,5 @@ def _lines(plans: list[Plan], *, explain: bool) -> Iterator[str]:
         yield f"  {choice.effect:<{width}}  {choice.method:<16}  {choice.promised_dn:>8.2g} DN  {choice.reason}"
     if explain:
         for effect, method, promised in plans[0].rejected:
-            yield f"  rejected: {effect} = {method}, which changes a CSD by up to {promised:.3g} DN"
+            yield f"  rejected: {effect} = {method}, by which a CSD may change by {promised:.3g} DN or more"
     yield ""

@@ -20,7 +20,7 @@ from ..effects import blur, flicker
 from ..exposure import exposure_times, white_irradiance
 from ..seen import METHODS, SeenFilters
 from ..view import View, background_irradiance, per_photon, signal_irradiance
-from .compiled import largest_change
+from .compiled import largest_change, longest_moves
 
 
 @dataclass(frozen=True)
@@ -173,16 +173,23 @@ class Reach:
         most = np.maximum(np.abs(low), np.abs(high))
         light = self.signals_dn * factor
         apart = np.abs(light[self.first] - light[self.second])
-        centers = np.einsum("sl,cl,kl->sck", light, middle, self.hats, optimize=True)
-        halves = np.einsum("pl,cl,kl->pck", apart, half, self.hats, optimize=True)
+        centers, halves = self._on_hats(light, middle), self._on_hats(apart, half)
         return Amounts(
             middle=centers,
             half=halves,
-            half_each=np.einsum("sl,cl,kl->sck", np.abs(light), half, self.hats, optimize=True),
+            half_each=self._on_hats(np.abs(light), half),
             largest=np.abs(centers[self.first] - centers[self.second]) + halves,
             most=apart @ most.T,
             most_each=np.abs(light) @ most.T,
         )
+
+    def _on_hats(self, light: FloatArray, qe: FloatArray) -> FloatArray:
+        """Sums of lights times QE on each hat, ndarray[n_lights, n_channels, n_knots]."""
+        found = np.zeros((len(light), len(qe), len(self.hats)))
+        used = qe.any(axis=1)
+        seen = (qe[used, None] * self.hats).reshape(-1, light.shape[1])
+        found[:, used] = (light @ seen.T).reshape(len(light), -1, len(self.hats))
+        return found
 
     def largest_change(
         self,
@@ -236,27 +243,43 @@ class Reach:
         every: bool,
         between: Spread | None,
     ) -> float:
-        """`largest_change` of some cases."""
+        """`largest_change` of some cases.
+
+        Cells whose pairs move most come first: one whose pairs all move less than the largest change so far cannot
+        raise it, so that what is left is looked at only in the few before.
+        """
         nothing = np.zeros((len(change), change.shape[1], len(self.first)))
         corners, more = np.arange(len(change))[:, None], nothing
         if between is not None:
             corners, more = between.corners, between.change @ changed.most.T
         off = self._in(np.abs(change), changed.half) + remainder * changed.most.sum(axis=1)
-        moved = left = (self._in(change, changed.middle), off, more)
-        if not every:
-            off, more = self._in(np.abs(after), base.half) + remainder * base.most.sum(axis=1), nothing
+        moved = longest_moves((self._in(change, changed.middle), off, more), corners, self.first, self.second)
+        most = moved.max(axis=1, initial=0.0)
+        worst = float(most.max(initial=0.0))
+        if every or worst == 0:
+            return worst
+        shortened, worst = self.shortest_s / self.longest_s * self.least_light / self.most_light, 0.0
+        order, start, size = np.argsort(-most, kind="stable"), 0, 1
+        while start < len(order) and most[order[start]] > worst:
+            some = order[start : start + size]
+            cases, numbered = np.unique(corners[some], return_inverse=True)
+            kernel, at = after[cases], numbered.reshape(corners[some].shape)
+            off = self._in(np.abs(kernel), base.half) + remainder * base.most.sum(axis=1)
+            more = np.zeros((len(some), *off.shape[1:]))
             if between is not None:
-                more = self._in(between.after, base.largest) + between.left @ base.most.T
-            left = (self._in(after, base.middle), off, more)
-        shortened = self.shortest_s / self.longest_s * self.least_light / self.most_light
-        return float(largest_change(moved, left, corners, self.first, self.second, self._ends, shortened, every))
+                more = self._in(between.after[some], base.largest) + between.left[some] @ base.most.T
+            left = (self._in(kernel, base.middle), off, more)
+            changes = largest_change(moved[some], left, at, self.first, self.second, self._ends, shortened, worst)
+            start, size, worst = start + size, size * 4, float(changes)
+        return worst
 
     @staticmethod
     def _in(kernel: FloatArray, amounts: FloatArray) -> FloatArray:
         """Amounts (ndarray[n, n_channels, n_knots]) behind a kernel (ndarray[n_cases, n_values, ...]); [..., n]."""
         flat = amounts.reshape(len(amounts), -1)
         used = flat.any(axis=0)
-        return np.asarray(kernel.reshape(*kernel.shape[:2], -1)[..., used] @ flat[:, used].T, dtype=float)
+        rows = kernel.reshape(-1, flat.shape[1])[:, used]
+        return np.asarray(rows @ flat[:, used].T, dtype=float).reshape(*kernel.shape[:2], len(flat))
 
 
 def _norms(vectors: FloatArray) -> FloatArray:

@@ -39,34 +39,42 @@ ndarray[n_cases, n_values, n_pairs]; and by how much more in a cell of places, n
 
 
 @njit(cache=True, nogil=True)
+def longest_moves(change: Parts, corners: IndexArray, first: IndexArray, second: IndexArray) -> FloatArray:
+    """How far the difference of each pair moves at most in each cell of places, ndarray[n_cells, n_pairs].
+
+    `change`: what changes. `corners`: the cases at the corners of each cell, ndarray[n_cells, n_corners]. `first`,
+    `second`: the signals of each pair.
+    """
+    one = np.empty(first.size)
+    far = np.zeros((corners.shape[0], first.size))
+    for cell in range(corners.shape[0]):
+        for case in corners[cell]:
+            _lengths(change[0][case], first, second, change[1][case], change[2][cell], 1.0, 1.0, one)
+            for p in range(first.size):
+                far[cell, p] = max(far[cell, p], one[p])
+    return far
+
+
+@njit(cache=True, nogil=True)
 def largest_change(
-    change: Parts,
+    moves: FloatArray,
     after: Parts,
     corners: IndexArray,
     first: IndexArray,
     second: IndexArray,
     ends: IndexArray,
     shortened: float,
-    every: bool,
+    least: float,
 ) -> float:
-    """Largest change of the smallest distance of any group of pairs, in any cell of places.
+    """Largest change of the smallest distance of any group of pairs, in any cell of places; `least` where it is less.
 
-    `change`: what changes, `after`: what is left. `corners`: the cases at the corners of each cell, ndarray[n_cells,
-    n_corners]. `first`, `second`: the signals of each pair; `ends`: where each group of pairs begins, and the end.
-    `shortened`: how much shorter the smallest possible distance is. `every`: all pairs count, not those alone that can
-    be the nearest of their group.
+    `moves`: of `longest_moves`; `after`: what is left. `ends`: where each group of pairs begins, and the end.
+    `shortened`: how much shorter the smallest possible distance is.
     """
-    far, one, low, high = np.zeros((4, first.size))
-    worst = 0.0
+    low, high = np.zeros((2, first.size))
+    worst = least
     for cell in range(corners.shape[0]):
-        far[:] = 0.0
-        for case in corners[cell]:
-            _lengths(change[0][case], first, second, change[1][case], change[2][cell], 1.0, 1.0, one)
-            for p in range(first.size):
-                far[p] = max(far[p], one[p])
-        if every:
-            worst = max(worst, far.max())
-            continue
+        far = moves[cell]
         for case in corners[cell]:
             _lengths(after[0][case], first, second, after[1][case], after[2][cell], -1.0, shortened, low)
             _lengths(after[0][case], first, second, after[1][case], after[2][cell], 1.0, 1.0, high)

@@ -159,7 +159,8 @@ class Planner:
     ) -> tuple[Methods, dict[str, float]] | None:
         """Branch and bound over the effects, cheapest methods first.
 
-        `tried` takes what each method changes where it is tried first, or less.
+        `tried` takes what each method may change where it is tried first, or less; of one that is too much, for a CFA
+        for which it is.
 
         None where no plan keeps the tolerance; `besides`: what no method takes away does not count, so that all places
         are looked at, however little can be promised of them.
@@ -190,7 +191,7 @@ class Planner:
                     allowed += self._left_over(after)
                 left_dn = allowed - sum(promises.values())
                 known = (name, method) in tried
-                promised = self.promise(name, methods, after, left_dn if known else math.inf)
+                promised = self.promise(name, methods, after, left_dn)
                 if not known or promised <= left_dn:
                     tried[name, method] = min(promised, tried.get((name, method), promised))
                 if sum(promises.values()) + promised <= allowed:
@@ -225,7 +226,7 @@ class Planner:
         if not cheaper:
             return "what else is chosen needs it"
         nearest = min(cheaper, key=lambda m: cheaper[m])
-        return f"else ({nearest}) a CSD changes by up to {cheaper[nearest]:.2g} DN"
+        return f"else ({nearest}) a CSD may change by {cheaper[nearest]:.2g} DN or more"
 
 
 def _promises(boxes: Sequence[Box]) -> list[Promises]:

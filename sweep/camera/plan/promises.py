@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -32,9 +33,23 @@ from .bounds import Box, Reach
 from .pixelwise import Moves
 from .scene_kernels import SceneKernels
 from .steps import Step, Steps
-from .work import Work, estimated_work
+from .work import Work
 
 _OF_READOUT = tuple(name for name, effect in EFFECTS.items() if effect.stage is Stage.READOUT)
+
+
+@lru_cache(maxsize=4096)
+def _seen(name: str, before: Methods, after: Methods) -> tuple[Methods, Methods]:
+    """The methods before and after the change of a linear effect, those without influence on it as in the reference."""
+    others = {e.name: e.reference for e in EFFECTS.values() if e.name != name and _is_unseen(e, after)}
+    return replace(before, **others), replace(after, **others)
+
+
+def _is_unseen(effect: Effect, methods: Methods) -> bool:
+    """Whether what the optics change does not depend on the method of an effect."""
+    if effect.stage is Stage.READOUT:
+        return methods.straight and not effect.bends
+    return not isinstance(effect, KernelEffect | LightEffect | FilterEffect)
 
 
 class Promises:
@@ -48,8 +63,6 @@ class Promises:
         self._kernels = kernels
         self._steps = Steps(self.view, self.reach, self._kernels)
         self._promises: dict[tuple[str, Methods, Methods], float] = {}
-        self._works: dict[Methods, Work] = {}
-        self._asked: dict[tuple[str, Methods, Methods], tuple[Methods, Methods]] = {}
         self._ranges: dict[tuple[str, ...], float] = {}
         self._readouts: dict[tuple[str, ...], float] = {}
         self._moves = Moves(self.view, self.reach)
@@ -67,21 +80,10 @@ class Promises:
         if isinstance(effect, ReadoutEffect):
             return self._readout_promise(effect, after)
         assert isinstance(effect, LinearEffect)
-        asked = (name, before, after)
-        if asked not in self._asked:
-            others = {e.name: e.reference for e in EFFECTS.values() if e is not effect and self._is_unseen(e, after)}
-            self._asked[asked] = replace(before, **others), replace(after, **others)
-        key = (name, *self._asked[asked])
+        key = (name, *_seen(name, before, after))
         if key not in self._promises:
             self._promises[key] = self._linear_promise(effect, *key[1:])
         return self._promises[key]
-
-    @staticmethod
-    def _is_unseen(effect: Effect, methods: Methods) -> bool:
-        """Whether what the optics change does not depend on the method of an effect."""
-        if effect.stage is Stage.READOUT:
-            return methods.straight and not effect.bends
-        return not isinstance(effect, KernelEffect | LightEffect | FilterEffect)
 
     def _readout_promise(self, effect: ReadoutEffect, after: Methods) -> float:
         """Ranges of the change in each channel, put together over the channels."""
@@ -169,6 +171,4 @@ class Promises:
 
     def work_of(self, methods: Methods) -> Work:
         """Estimated operations."""
-        if methods not in self._works:
-            self._works[methods] = estimated_work(self.view, methods)
-        return self._works[methods]
+        return self._kernels.work(self.view, methods)
