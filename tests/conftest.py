@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -48,6 +49,12 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     path, rows = session.config.getoption("--hard-cases"), session.config.stash.get(ROWS, [])
     if path and rows:
         write_table(Path(path), rows)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def kept_plans(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Plans are kept in a folder of this session, not in the user's."""
+    os.environ["SWEEP_CACHE"] = str(tmp_path_factory.getbasetemp() / "kept")
 
 
 @pytest.fixture

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
+from ..camera.plan.plan import Plan
+from ..results.kept_plans import KeptPlans, plan_key
 from ..study import Study
 from ..types import Progress, delayed
 from .stop import Stop
@@ -15,15 +18,27 @@ def with_plans(
 ) -> Study:
     """The study with a plan for each of its scenarios; `tolerance_dn` instead of the study's own.
 
-    A scene whose worker dies is planned again. Raises InterruptedRunError after `stop` was asked for.
+    Plans that were found before, for a scene with the same designs, are taken from the cache. A scene whose worker dies
+    is planned again. Raises InterruptedRunError after `stop` was asked for.
     """
-    names = list(study.scenarios)
-    calls = (delayed(study.plan, name, tolerance_dn) for name in names)
-    plans = {}
+    kept = KeptPlans()
+    keys = {name: plan_key(study, name, tolerance_dn) for name in study.scenarios}
+    plans = {name: plan for name, key in keys.items() if (plan := kept.of(key)) is not None}
+    missing = [name for name in keys if name not in plans]
+    for name, plan in zip(missing, _found(study, missing, n_jobs, tolerance_dn, stop), strict=True):
+        kept.keep(keys[name], plan)
+        plans[name] = plan
+        progress("scenes planned", len(plans), len(keys))
+    return replace(study, plans={name: plans[name] for name in keys})
+
+
+def _found(
+    study: Study, names: list[str], n_jobs: int, tolerance_dn: float | None, stop: Stop | None
+) -> Iterator[Plan]:
+    """Plans of some scenes, in order, over the cores."""
+    if not names:
+        return
     # One scene is planned faster than workers are started.
     how = Workers(min(n_jobs, len(names)), Stop() if stop is None else stop)
     with workers(how) as crew:
-        for name, plan in zip(names, crew(calls), strict=True):
-            plans[name] = plan
-            progress("scenes planned", len(plans), len(names))
-    return replace(study, plans=plans)
+        yield from crew(delayed(study.plan, name, tolerance_dn) for name in names)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -172,23 +173,31 @@ class Study:
         evaluations = self.search.max_evaluations if searched and self.search is not None else 0
         return Box(view, low, high, space.size + evaluations)
 
+    def boxes(self, scenario: str) -> list[Box]:
+        """What the designs of all spaces can be; spaces without a design count where there are no others.
+
+        Raises StudyError for numbers that are allowed one by one, but that no float can hold together.
+        """
+        with _holding(scenario):
+            boxes = [self.box(space, scenario) for space in self.spaces]
+        return [box for box in boxes if box.n_designs] or boxes
+
+    def tolerance_dn(self, wanted_dn: float | None = None) -> float:
+        """How far a plan may be from everything on, DN: as wanted, or else as the study says."""
+        return self.section.tolerance_dn if wanted_dn is None else wanted_dn
+
     def plan(self, scenario: str, tolerance_dn: float | None = None, *, always: bool = False) -> Plan:
         """The cheapest plan of a scenario that holds for all designs of the study.
 
         Where everything on takes less than to look for one, that is the plan, but if one is to be found `always`.
 
-        Raises StudyError for numbers that are allowed one by one, but that no float can hold together.
+        Raises StudyError as `boxes` does.
         """
-        tolerance = self.section.tolerance_dn if tolerance_dn is None else tolerance_dn
-        try:
-            boxes = [self.box(space, scenario) for space in self.spaces]
-            used = [box for box in boxes if box.n_designs]
-            planner = Planner(used or boxes, for_noise=bool(self.states))
+        boxes = self.boxes(scenario)
+        with _holding(scenario):
+            planner = Planner(boxes, for_noise=bool(self.states))
             find = planner.plan if always or planner.pays else planner.everything
-            return find(scenario, tolerance)
-        except ArithmeticError:
-            problem = "the numbers of this scene, or of the pixel, are too large or too small to compute with"
-            raise StudyError(Fault(problem, key=f"scenarios.{scenario}")) from None
+            return find(scenario, self.tolerance_dn(tolerance_dn))
 
     def problem(self, search: Search) -> Problem:
         """The search as a mathematical problem."""
@@ -202,3 +211,13 @@ class Study:
             constraints=self.constraints,
             edge_shift_nm=self.edge_shift_nm,
         )
+
+
+@contextmanager
+def _holding(scenario: str) -> Iterator[None]:
+    """Raise StudyError where numbers of a scene are larger or smaller than a float can hold."""
+    try:
+        yield
+    except ArithmeticError:
+        problem = "the numbers of this scene, or of the pixel, are too large or too small to compute with"
+        raise StudyError(Fault(problem, key=f"scenarios.{scenario}")) from None
