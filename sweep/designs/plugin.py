@@ -33,6 +33,11 @@ def plugin_parts(kind: str) -> tuple[str, str]:
     return f"{file}.py", name
 
 
+def kind_in_words(kind: str) -> str:
+    """A family's name as sentences say it; of one in a Python file that of its class."""
+    return plugin_parts(kind)[1] if is_plugin(kind) else kind.replace("_", " ")
+
+
 class PluginFamily:
     """A family by a class of a user's file, `kind`: FILE.py:CLASS.
 

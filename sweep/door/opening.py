@@ -82,14 +82,14 @@ def made_study(study: str = "python", *, sensor: Any = "ar0820", lights: Any = "
 
 
 def own_sensor(
-    source: Path | str | None = None,
+    source: Path | str | pd.DataFrame | None = None,
     *,
     relative_to: str | None = None,
     name: str | None = None,
     clear: str | None = None,
     **channels: CurveLike,
 ) -> Given:
-    """A sensor for `make_study`: a built-in one or a file of QE curves, with own curves beside it, or these alone.
+    """A sensor for `make_study`: built in, a file of QE curves or a table of them, with own curves beside it or alone.
 
     >>> import sweep
     >>> import numpy as np
@@ -101,8 +101,12 @@ def own_sensor(
 
     `channels`: curve's name -> series over nm, (nm, values), or a file with one curve; QE, or with `relative_to`
     transmissions times that curve. `clear`: the curve of a pixel without filter. Columns of a file are taken for
-    channels by their names, or by their shapes. Raises SweepError for curves that cannot be used.
+    channels by their names, or by their shapes; a table has a column per curve and nm as its index. Raises SweepError
+    for curves that cannot be used.
     """
+    if isinstance(source, pd.DataFrame):
+        columns = {str(channel): column for channel, column in source.items()}
+        return sensor_given(None, columns | channels, relative_to=relative_to, name=name, clear=clear)
     return sensor_given(source, channels, relative_to=relative_to, name=name, clear=clear)
 
 
@@ -116,6 +120,9 @@ def sensor_given(
 ) -> Given:
     """The same, with the channels as a mapping."""
     keys: dict[str, Any] = {"files": []}
+    if source is not None and not isinstance(source, Path | str):
+        allowed = "a built-in sensor, a file, or a table with nm as its index"
+        raise DataError(Fault("no sensor", value=type(source).__name__, allowed=allowed))
     if source is not None and is_file(Path(source)):
         keys = sensor_file(Path(source)).keys(str(Path(source).absolute()))
     elif source is not None:
@@ -151,6 +158,9 @@ def own_lights(
         signals = {kind: list(columns) for kind, columns in types.items()}
         entry = {"file": "lights given", "quantity": quantity, "signals": signals}
         return Given({"files": [entry]}, {"lights given": curves_of_table(source)})
+    if not isinstance(source, Path | str):
+        allowed = "built-in lights, a file, or a table with nm as its index"
+        raise DataError(Fault("no lights", value=type(source).__name__, allowed=allowed))
     if not is_file(Path(source)):
         return Given({"builtin": str(source)})
     path = Path(source)

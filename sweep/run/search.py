@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from ..designs.plugin import kind_in_words
 from ..designs.space import Space
 from ..errors import Fault, InfeasibleError
 from ..metrics.bound import FEASIBLE
@@ -90,7 +91,7 @@ def answer_row(study: Study, answer: SearchAnswer, rules: Rules, first_id: int) 
     space = answer.search.space
     axes = tuple((float(value),) for value in answer.best.x)
     assert space.filter is not None
-    name = f"best {space.filter.family.kind.replace('_', ' ')}"
+    name = f"best {kind_in_words(space.filter.family.kind)}"
     found = Space("search", name, space.cfa, space.filter, axes)
     job = Job(found, answer.search.scenario, 0, 1, first_id)
     row = run_job(job, study.view(found, job.scenario), rules)

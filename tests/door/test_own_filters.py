@@ -120,3 +120,18 @@ def test_an_own_filter_moves_as_the_study_says_of_its_own() -> None:
     family = sweep.Stopband(study.wavelength_nm, study.curve("Y").to_numpy(), study.curve("G").to_numpy())
     own = study.evaluate(N=family.curves(np.array([[613.0, 6, 651.2, 6.3, 1]]))[0, 0], scenario="f/1.6 cra_deg=20")
     assert own.csd_yellow_red.item() == named.csd_yellow_red[named.name == "nominal"].item()
+
+
+def test_a_table_is_a_sensor_as_its_columns_are() -> None:
+    nm = np.arange(400, 701, 5)
+    table = pd.DataFrame({name: np.exp(-(((nm - at) / 60) ** 2)) for name, at in (("R", 620), ("C", 550))}, index=nm)
+    ways = (sweep.sensor(table, clear="C"), sweep.sensor(clear="C", R=table["R"], C=table["C"]))
+    found = [sweep.make_study(sensor=way, cfas={"RC": {"tile": [["R", "C"]]}}).evaluate() for way in ways]
+    pd.testing.assert_frame_equal(*found)
+    assert found[0].csd_yellow_red[0] > 0
+
+
+@pytest.mark.parametrize("made", [sweep.sensor, sweep.lights])
+def test_what_is_no_source_is_one_line(made: type) -> None:
+    with pytest.raises(SweepError, match=r"no (sensor|lights) \(got 'list'\)"):
+        made(["R", "G"])

@@ -69,6 +69,7 @@ def test_a_stopband_written_again_gives_the_same_rows_and_the_same_optimum(tmp_p
     assert best[0].best_smooth_objective == pytest.approx(best[1].best_smooth_objective, abs=0.01)
     assert best[0].limit_proven == pytest.approx(best[1].limit_proven, abs=0.01)
     output = read_output(tmp_path / "own")
+    assert "best Band" in set(output.table["name"])
     assert "filters.py" in output.provenance.data_sha256
     assert any("gradients are differences" in warning for warning in output.provenance.warnings)
 
