@@ -6,11 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 from scipy.stats import qmc
 
 from sweep.errors import StudyError
 from sweep.report import read_output
+from sweep.results.journal import Journal
+from sweep.run import run_study
 from sweep.study import load_study
 
 from ..build import ran, stopband_study
@@ -82,6 +85,25 @@ def test_a_run_of_drawn_designs_is_the_same_with_two_workers(tmp_path: Path) -> 
     again = load_study(next((tmp_path / "1").glob("*.resolved.yaml")))
     np.testing.assert_array_equal(again.spaces[-1].points(0, 300), space.points(0, 300))
     assert read_output(tmp_path / "1").profiles == {}  # no value of a parameter is held while the others vary
+
+
+@pytest.mark.parametrize("method", ["sobol", pytest.param("lhs", marks=pytest.mark.slow)])
+def test_a_run_of_drawn_designs_that_is_broken_off_is_continued(tmp_path: Path, method: str) -> None:
+    study = load_study(written(tmp_path, f"{method}: 4200\n    box: {BOX}"))
+
+    def broken_off(what: str, done: int, of: int) -> None:
+        if what == "designs" and 4096 <= done < of:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_study(study, tmp_path / "out", 1, broken_off)
+    kept = len(Journal(tmp_path / "out").entries)
+    assert kept > 0
+    seen = ran(study, tmp_path / "out", 2)
+    assert next(call for call in seen if call[0] == "designs")[1] >= 4096  # what was finished is not computed again
+    ran(study, tmp_path / "whole", 1)
+    tables = [pq.read_table(tmp_path / name / "results.parquet") for name in ("out", "whole")]
+    assert tables[0].equals(tables[1])
 
 
 @pytest.mark.parametrize(
