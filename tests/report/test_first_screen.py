@@ -16,7 +16,7 @@ from ..build import ran
 from ..conftest import Finished
 from . import test_report_page as pages
 
-browser, opened, through = pages.browser, pages.opened, pages.through
+browser, opened, standing = pages.browser, pages.opened, pages.standing
 pytestmark = pages.pytestmark
 
 SCREENS = [
@@ -88,9 +88,9 @@ def test_a_study_of_plain_cfas_has_the_same_screen(plain_cfas: Path, browser: An
     page.close()
 
 
-def test_the_first_plot_has_every_cfa_at_its_light(finished: Finished, opened: Any) -> None:
+def test_the_first_plot_has_every_cfa_at_its_light(finished: Finished, standing: Any) -> None:
     folder = finished("stopband")
-    seen, table = opened(folder), pd.read_parquet(folder / "results.parquet")
+    seen, table = standing(folder, 1440), pd.read_parquet(folder / "results.parquet")
     traces = seen.page.evaluate(
         "document.getElementById('cfas').data.map((t) => [t.name, Array.from(t.x), Array.from(t.y)])"
     )
@@ -129,9 +129,9 @@ def test_a_plain_cfa_is_chosen_by_a_click(finished: Finished, opened: Any) -> No
     assert {"R", "G", "B"} <= set(names)
 
 
-def test_the_limiting_lights_stand_in_hover_details_and_clouds(finished: Finished, opened: Any) -> None:
+def test_the_limiting_lights_stand_in_hover_details_and_clouds(finished: Finished, standing: Any) -> None:
     folder = finished("stopband")
-    seen = opened(folder)
+    seen = standing(folder, 1440)
     design = int(seen.page.get_attribute("#details", "data-design"))
     limited = pd.read_parquet(folder / "limited_by.parquet").set_index("design_id")
     lights = limited.loc[design, "limited_by_yellow_red"]
@@ -150,8 +150,8 @@ def test_the_limiting_lights_stand_in_hover_details_and_clouds(finished: Finishe
             assert v == pytest.approx(own.loc[light, channel], rel=1e-6)
 
 
-def test_the_lights_stand_shaded_behind_the_qe(finished: Finished, opened: Any) -> None:
-    seen = opened(finished("stopband"))
+def test_the_lights_stand_shaded_behind_the_qe(finished: Finished, standing: Any) -> None:
+    seen = standing(finished("stopband"), 1440)
     shades = seen.page.evaluate(
         "document.getElementById('curves').data.filter((t) => t.fill === 'tozeroy').map((t) => t.name)"
     )
@@ -159,8 +159,8 @@ def test_the_lights_stand_shaded_behind_the_qe(finished: Finished, opened: Any) 
 
 
 @pytest.mark.parametrize("name", ["stopband", pytest.param("paper", marks=pytest.mark.slow)])
-def test_no_table_is_cut_off(finished: Finished, opened: Any, name: str) -> None:
-    seen = opened(finished(name), 1440)
+def test_no_table_is_cut_off(finished: Finished, standing: Any, name: str) -> None:
+    seen = standing(finished(name), 1440)
     cut = seen.page.evaluate(
         "[...document.querySelectorAll('.scroll')].filter((e) => e.offsetParent && e.querySelector('table')"
         " && e.scrollWidth > e.clientWidth + 1).map((e) => e.innerText.slice(0, 60))"
@@ -168,8 +168,8 @@ def test_no_table_is_cut_off(finished: Finished, opened: Any, name: str) -> None
     assert cut == []
 
 
-def test_no_figure_is_shown_twice(finished: Finished, opened: Any) -> None:
-    seen = opened(finished("stopband"))
+def test_no_figure_is_shown_twice(finished: Finished, standing: Any) -> None:
+    seen = standing(finished("stopband"), 1440)
     pictures = seen.page.evaluate("[...document.querySelectorAll('figure figcaption')].map((e) => e.textContent)")
     assert len(pictures) == 4
     assert not any("Trade-off" in text or "Filters" in text or "All CFAs" in text for text in pictures)

@@ -69,28 +69,48 @@ def browser() -> Iterator[Any]:
         found.close()
 
 
+def open_report(browser: Any, folder: Path, width: int) -> Opened:
+    page = browser.new_page(viewport={"width": width, "height": 1000})
+    seen = Opened(page)
+    page.on("console", lambda m: seen.errors.append(m.text) if m.type == "error" else None)
+    page.on("pageerror", lambda error: seen.errors.append(str(error)))
+    page.on("dialog", lambda dialog: seen.errors.append(f"dialog {dialog.message}") or dialog.dismiss())
+    page.on("request", lambda request: seen.requests.append(request.url))
+    page.goto((folder / "report.html").as_uri())
+    page.wait_for_selector("body[data-ready-ms]")
+    if page.locator("#pareto").count():
+        page.evaluate("document.getElementById('pareto').scrollIntoView()")
+        page.wait_for_function("document.getElementById('pareto').data")
+    return seen
+
+
 @pytest.fixture
 def opened(browser: Any) -> Iterator[Any]:
-    pages = []
+    """Opens a report for a test that clicks, or wants to see it from its first moment."""
+    pages: list[Opened] = []
 
-    def open_report(folder: Path, width: int = 1280) -> Opened:
-        page = browser.new_page(viewport={"width": width, "height": 1000})
-        pages.append(page)
-        seen = Opened(page)
-        page.on("console", lambda m: seen.errors.append(m.text) if m.type == "error" else None)
-        page.on("pageerror", lambda error: seen.errors.append(str(error)))
-        page.on("dialog", lambda dialog: seen.errors.append(f"dialog {dialog.message}") or dialog.dismiss())
-        page.on("request", lambda request: seen.requests.append(request.url))
-        page.goto((folder / "report.html").as_uri())
-        page.wait_for_selector("body[data-ready-ms]")
-        if page.locator("#pareto").count():
-            page.evaluate("document.getElementById('pareto').scrollIntoView()")
-            page.wait_for_function("document.getElementById('pareto').data")
-        return seen
+    def one(folder: Path, width: int = 1280) -> Opened:
+        pages.append(open_report(browser, folder, width))
+        return pages[-1]
 
-    yield open_report
-    for page in pages:
-        page.close()
+    yield one
+    for seen in pages:
+        seen.page.close()
+
+
+@pytest.fixture(scope="module")
+def standing(browser: Any) -> Iterator[Any]:
+    """A report for tests that only look, or leave all as it was: opened once for all of them."""
+    pages: dict[tuple[Path, int], Opened] = {}
+
+    def one(folder: Path, width: int = 1280) -> Opened:
+        if (folder, width) not in pages:
+            pages[folder, width] = open_report(browser, folder, width)
+        return pages[folder, width]
+
+    yield one
+    for seen in pages.values():
+        seen.page.close()
 
 
 def through(seen: Opened) -> None:
@@ -171,8 +191,8 @@ def test_pointing_and_clicking_tell_of_a_design(finished: Finished, opened: Any,
     assert chosen.name == pointed_at.name or (chosen["kind"] != "sweep" and near)
 
 
-def test_the_box_leaves_out_what_is_not_feasible(finished: Finished, opened: Any) -> None:
-    seen = opened(finished("stopband"))
+def test_the_box_leaves_out_what_is_not_feasible(finished: Finished, standing: Any) -> None:
+    seen = standing(finished("stopband"))
     before = seen.number_of_points()
     seen.page.uncheck("#infeasible")
     after = seen.number_of_points()
@@ -183,11 +203,11 @@ def test_the_box_leaves_out_what_is_not_feasible(finished: Finished, opened: Any
     assert seen.number_of_points() == before
 
 
-def test_the_best_design_is_that_of_the_table(finished: Finished, opened: Any) -> None:
+def test_the_best_design_is_that_of_the_table(finished: Finished, standing: Any) -> None:
     folder = finished("stopband")
     table = pd.read_parquet(folder / "results.parquet")
     best = table[table["feasible"] & table["kind"].isin(["sweep", "search"])].sort_values("csd_yellow_red").iloc[-1]
-    seen = opened(folder)
+    seen = standing(folder)
     assert f"{best['csd_yellow_red']:.0f} DN" in seen.page.inner_text(".answer")
     assert int(seen.page.get_attribute("#details", "data-design")) == best["design_id"]
     said = seen.details()
@@ -201,9 +221,9 @@ def test_the_best_design_is_that_of_the_table(finished: Finished, opened: Any) -
     assert {"left_nm", "right_width_nm", "sensitivity", "yellow/red CSD"} <= set(said)
 
 
-def test_the_saved_front_has_every_digit(finished: Finished, opened: Any) -> None:
+def test_the_saved_front_has_every_digit(finished: Finished, standing: Any) -> None:
     folder = finished("stopband")
-    seen = opened(folder)
+    seen = standing(folder)
     with seen.page.expect_download() as waiting:
         seen.page.click("#save")
     text = Path(waiting.value.path()).read_text()
