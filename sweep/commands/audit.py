@@ -16,12 +16,13 @@ from ..camera.methods import REFERENCE
 from ..designs.space import Space
 from ..errors import Fault
 from ..metrics.evaluate import evaluate
+from ..metrics.quantity import WORST_CASE
 from ..report import read_output, study_of
 from ..results.designs import row_space
 from ..results.inventory import Inventory
 from ..results.lock import locked
 from ..results.tables import AUDIT, RESULTS, batches
-from ..search.problem import SHIFTS
+from ..run.routes import worst_cases
 from ..study import Study
 from ..types import FloatArray, Progress
 
@@ -152,10 +153,8 @@ def _compared(
 def _exact(study: Study, space: Space, scenario: str, points: FloatArray) -> dict[str, FloatArray]:
     """The promised columns with every effect on, ndarray[n_designs] each."""
     imager = imager_of(replace(study.view(space, scenario), methods=REFERENCE))
-    shifts = [study.edge_shift_nm * s for s in SHIFTS if s] if study.edge_shift_nm and space.filter is not None else []
-    cases = [evaluate(imager, space.curves(points, study.grid.size), study.states)]
-    cases += [evaluate(imager, space.curves(points, study.grid.size, shift)) for shift in shifts]
+    nominal = evaluate(imager, space.curves(points, study.grid.size), study.states)
     promised = [quantity for quantity in study.quantities.values() if quantity.promised]
-    worst = [quantity for quantity in promised if quantity.extreme == "worst edges"]
-    found = {quantity.name: cases[0][quantity.name] for quantity in promised if quantity not in worst}
-    return found | {quantity.name: quantity.worse([case[quantity.of] for case in cases]) for quantity in worst}
+    worst = [quantity for quantity in promised if quantity.extreme == WORST_CASE]
+    found = {quantity.name: nominal[quantity.name] for quantity in promised if quantity not in worst}
+    return found | (worst_cases(space, imager, points, nominal, worst, study.edge_shift_nm) if worst else {})

@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from ..types import FloatArray, IndexArray
+from .population import Population
 from .spectrum import WavelengthGrid, equal_photons
 
 Pair = tuple[str, str]
@@ -30,7 +31,8 @@ class Lights:
     """Signals with equal photon counts.
 
     `photons`: ndarray[n_signals, n_wavelengths], each integrates to 1. `types`: signal type of each, grouped in the
-    order of `classes`. `photon_ratio`: K, the photons of a signal patch over those of the white patch.
+    order of `classes`. `photon_ratio`: K, the photons of a signal patch over those of the white patch. `population`:
+    the lamps that they stand for, where a study asks for worst cases over these.
     """
 
     name: str
@@ -40,6 +42,7 @@ class Lights:
     photon_ratio: float
     source: str
     surrogate: bool
+    population: Population | None = None
 
     @property
     def classes(self) -> tuple[str, ...]:

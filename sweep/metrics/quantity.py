@@ -21,7 +21,9 @@ from ..types import FloatArray, IndexArray
 from .smooth import Rows, SmoothDesign
 
 WORST = "worst_"
-"""How the name of a quantity's worst case over the shifts of the edges in production begins."""
+"""How the name of a quantity's worst case begins: over shifts of the edges in production, and over the population of
+the lights."""
+WORST_CASE: Literal["worst case"] = "worst case"
 BEST_PLACE = "best_place_"
 """How the name of a CSD's largest value over the places where the light may fall on the mosaic begins, each at its
 worst moment of a pulsed light."""
@@ -50,7 +52,7 @@ class Column:
     digits: int = 4
     wanted: Literal["more", "less", ""] = ""
     role: Literal["separation", "light", ""] = ""
-    extreme: Literal["worst edges", "best place", ""] = ""
+    extreme: Literal["worst case", "best place", ""] = ""
     of: str = ""
     pair: Pair | None = None
 
@@ -95,10 +97,11 @@ class LinearRows:
 class Quantity(Column):
     """A column that is computed, with what constraints, search and limit need.
 
-    `ends`: ends of a constraint on it. `goal`: it may be maximized, and has a worst case over edge shifts. `needs`: it
+    `ends`: ends of a constraint on it. `goal`: it may be maximized, and has a worst case. `needs`: it
     exists only with a modified channel, or in a family that has it. `infinite`: it may be so. `promised`: a plan's
     promise holds for it. `squared`: it is a distance, whose squares are the smooth rows. `most`: no filter reaches
     more. `share`: it is the smallest ratio of N to the curve that N replaces.
+    `smooth_members`: its smooth rows over the population of the lights.
     """
 
     ends: tuple[End, ...] = ()
@@ -110,6 +113,7 @@ class Quantity(Column):
     most: float = np.inf
     share: bool = False
     smooth: Callable[[SmoothDesign], Rows] | None = field(default=None, repr=False)
+    smooth_members: Callable[[SmoothDesign], Rows] | None = field(default=None, repr=False)
     linear: Callable[[View], LinearRows] | None = field(default=None, repr=False)
 
     @property
@@ -122,12 +126,12 @@ class Quantity(Column):
         """What a run keeps of it."""
         return Column(**{each.name: getattr(self, each.name) for each in fields(Column)})
 
-    def worst(self) -> Quantity:
-        """Its worst case over edges that come out up to a shift off."""
-        meaning = f"the worst case of `{self.name}` over edges that production shifts"
+    def worst(self, over: Sequence[str]) -> Quantity:
+        """Its worst case `over` all of something."""
+        meaning = f"the worst case of `{self.name}` over {' and '.join(over)}"
         label = f"worst-case {self.words}"
         return replace(
-            self, name=WORST + self.name, meaning=meaning, label=label, extreme="worst edges", of=self.name, goal=True
+            self, name=WORST + self.name, meaning=meaning, label=label, extreme=WORST_CASE, of=self.name, goal=True
         )
 
     def value(self, rows: Rows) -> float:
@@ -144,12 +148,15 @@ class Quantity(Column):
 
 @dataclass(frozen=True)
 class Asked:
-    """What a study asks for: signal types, states that noise may confuse, any place of the light, shifts of edges."""
+    """What a study asks for: signal types, states that noise may confuse, any place of the light, shifts of edges, a
+    population of its lights.
+    """
 
     classes: tuple[str, ...]
     states: tuple[str, ...] = ()
     any_place: bool = False
     edge_shift: bool = False
+    population: bool = False
 
 
 class Metric(ABC):

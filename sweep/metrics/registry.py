@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 from ..found import made_in
 from . import columns
 from .quantity import Asked, Metric, Quantity
+
+EDGES = "edges that production shifts"
+POPULATION = "the population of the lights, before clipping and rounding"
 
 METRICS = tuple(sorted(made_in(columns, Metric), key=lambda metric: metric.order))
 """All metrics in the order of their columns."""
@@ -15,7 +19,18 @@ METRICS = tuple(sorted(made_in(columns, Metric), key=lambda metric: metric.order
 def listed(asked: Asked) -> list[Quantity]:
     """The columns of a study in order, worst cases last; names of pairs may coincide."""
     found = [quantity for metric in METRICS for quantity in metric.quantities(asked)]
-    return found + [quantity.worst() for quantity in found if asked.edge_shift and quantity.goal]
+    return found + [worst for quantity in found if (worst := _worst(quantity, asked)) is not None]
+
+
+def _worst(quantity: Quantity, asked: Asked) -> Quantity | None:
+    """The worst case of a quantity that may be maximized: over the edges, and of lights over their population."""
+    over = [EDGES] if asked.edge_shift else []
+    seen = quantity.smooth_members if asked.population else None
+    if seen is not None:
+        over.append(POPULATION)
+    if not quantity.goal or not over:
+        return None
+    return replace(quantity.worst(over), smooth=quantity.smooth if seen is None else seen)
 
 
 @lru_cache(maxsize=64)

@@ -12,6 +12,7 @@ from ..camera.view import View
 from ..curves.lights import Pair
 from ..designs.family import Family
 from ..types import FloatArray, IndexArray
+from .members import PARTS, PopulationImager
 from .separation import separation
 
 
@@ -48,8 +49,18 @@ class SmoothDesign:
     `curves`: ndarray[n_modified, n_wavelengths]; `by_u`: ndarray[n_free, n_modified, n_wavelengths].
     """
 
-    def __init__(self, imager: LinearImager, family: Family, x: FloatArray, free: IndexArray, span: FloatArray) -> None:
+    def __init__(
+        self,
+        imager: LinearImager,
+        family: Family,
+        x: FloatArray,
+        free: IndexArray,
+        span: FloatArray,
+        members: PopulationImager | None = None,
+    ) -> None:
+        """`members`: the scene with the population of its lights, where quantities over it are asked for."""
         self.view: View = imager.view
+        self._members = members
         self.family, self.x = family, x
         self.curves = family.curves(x[None])[0]
         self.by_u = family.gradient(x)[free] * span[:, None, None]
@@ -80,6 +91,29 @@ class SmoothDesign:
         apart = (response[:, first, None] - response[:, None, second]).reshape(-1, response.shape[-1])
         apart_by_u = (by_u[:, :, first, None] - by_u[:, :, None, second]).reshape(len(by_u), *apart.shape)
         return Rows((apart**2).sum(axis=1), 2 * (apart_by_u * apart).sum(axis=2).T)
+
+    def squared_distances_of_members(self, pair: Pair) -> Rows:
+        """Squared distances of the nearest members of each two lights, in every case and part of their shifts, DN^2.
+
+        The nearest members change with the design; where they do not jump, that adds nothing to the derivative.
+        """
+        assert self._members is not None
+        response, by_u = self._response_of_members
+        values, slopes = [], []
+        for case in range(len(response)):
+            near = self._members.nearest(response[case], pair, parts=PARTS)
+            apart = near.of(response[case], 0) - near.of(response[case], 1)
+            slope = near.of(by_u[:, case], 0) - near.of(by_u[:, case], 1)
+            some = np.isfinite(near.squared)
+            values.append(near.squared[some])
+            slopes.append(2 * (slope * apart).sum(axis=-1)[:, some])
+        return Rows(np.concatenate(values), np.concatenate(slopes, axis=1).T)
+
+    @cached_property
+    def _response_of_members(self) -> tuple[FloatArray, FloatArray]:
+        assert self._members is not None
+        imager = self._members.imager
+        return imager.smooth(self.curves[None])[0], imager.gradient(self.curves, self.by_u)
 
 
 def smooth_response(view: View, curves: FloatArray) -> FloatArray:

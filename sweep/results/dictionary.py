@@ -51,7 +51,9 @@ _VERDICTS = {
     ("status",): "`ok`, or what failed",
 }
 _WORST = (
-    "the worst case of a CSD or sensitivity over edges that production shifts (five places from one end to the other)"
+    "the worst case of a CSD or sensitivity over edges that production shifts (five places from one end to the other), "
+    "and of a CSD over the population of the lights: then that of the response before clipping and rounding, with "
+    "everything on, over all members exactly"
 )
 KEYS = tuple(name for names in (*_KEYS, *_VERDICTS) for name in names)
 """Columns that are no quantities of a metric."""

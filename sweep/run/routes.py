@@ -6,18 +6,19 @@ Where a route fails the next one is taken, and how many designs took it is hande
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..camera.imager import imager_of
+from ..camera.imager import Imager, imager_of
 from ..camera.view import View
 from ..designs.block import Block, CurveBlock, EdgeBlock, edges_of
 from ..designs.space import Space
 from ..metrics.evaluate import evaluate, family_quantities
+from ..metrics.members import population_imager
 from ..metrics.objective import COMBINED, Objective, columns_of
-from ..metrics.quantity import Asked, Columns, Quantity
+from ..metrics.quantity import WORST_CASE, Asked, Columns, Quantity
 from ..search.problem import SHIFTS
 from ..types import FloatArray
 
@@ -87,14 +88,29 @@ def _columns(space: Space, view: View, points: FloatArray, request: Request, blo
     designs = CurveBlock(space.curves(points, size)) if block is None else block
     columns = evaluate(imager, designs, request.asked.states)
     columns |= family_quantities(None if space.filter is None else space.filter.family, points)
-    if request.edge_shift_nm:
-        shifts = [request.edge_shift_nm * s for s in SHIFTS if s] if space.filter is not None else []
-        cases = [columns, *(evaluate(imager, space.curves(points, size, shift)) for shift in shifts)]
-        worst = [quantity for quantity in request.quantities.values() if quantity.extreme == "worst edges"]
-        columns |= {quantity.name: quantity.worse([case[quantity.of] for case in cases]) for quantity in worst}
+    worst = [quantity for quantity in request.quantities.values() if quantity.extreme == WORST_CASE]
+    if worst:
+        columns |= worst_cases(space, imager, points, columns, worst, request.edge_shift_nm)
     if request.objective.column == COMBINED:
         columns[COMBINED] = request.objective.of(columns)
     return columns
+
+
+def worst_cases(
+    space: Space, imager: Imager, points: FloatArray, nominal: Columns, worst: Sequence[Quantity], edge_shift_nm: float
+) -> Columns:
+    """Worst cases of designs over shifts of their edges, and of CSDs over the population of the lights.
+
+    `nominal`: what `evaluate` gives of them; `worst`: the quantities that are asked for.
+    """
+    view = imager.view
+    shifts = [edge_shift_nm * s for s in SHIFTS if s] if edge_shift_nm and space.filter is not None else []
+    curves = [space.curves(points, view.grid.size, shift) for shift in (0.0, *shifts)]
+    cases = [nominal, *(evaluate(imager, shifted) for shifted in curves[1:])]
+    if view.lights.population is not None:
+        members = population_imager(view)
+        cases = [case | members.worst(shifted) for case, shifted in zip(cases, curves, strict=True)]
+    return {quantity.name: quantity.worse([case[quantity.of] for case in cases]) for quantity in worst}
 
 
 def _one_by_one(

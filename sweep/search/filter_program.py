@@ -10,6 +10,7 @@ tight (Neumaier and Shcherbina, "Safe bounds in linear and mixed-integer linear 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +20,7 @@ from ..camera.linear import smooth_imager
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
 from ..types import FloatArray, IndexArray
+from .member_pairs import MemberPairs
 from .problem import Problem
 
 ROUNDING = 1e-9
@@ -94,16 +96,18 @@ class _Rows:
 
 
 class FilterProgram:
-    """The filters of a problem without worst cases, and every pair of signals that may come too near.
+    """The filters of a problem without edge shifts, and every pair of signals that may come too near.
 
     `apart`: ndarray[n_pairs, n_wavelengths], DN per QE, the difference of each pair in the modified channel; a pair is
-    that of two signals in one place of the light. `reach`: ndarray[n_pairs, 2]: no filter with the first signal above
-    the other, or below it, reaches more. `top`: no filter at all reaches more (-inf: there is none).
-    `solved` counts the linear programs.
+    that of two signals, or known members of their population, in one place of the light. `reach`: ndarray[n_pairs, 2]:
+    no filter with the first signal above the other, or below it, reaches more. `top`: no filter at all reaches more
+    (-inf: there is none). `solved` counts the linear programs.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, members: MemberPairs | None = None) -> None:
+        """`members`: those of worst cases over a population."""
         self.problem = problem
+        self._members = members
         self.base = problem.view.base_qe[0]
         bound = problem.constraints.get("min_transmission", Bound(min=0.0))
         least = bound.min or 0.0
@@ -146,20 +150,29 @@ class FilterProgram:
         *own_columns, per_sensitivities = np.concatenate(columns).T
         return _Rows(vstack(matrices).tocsr(), *own_columns), per_sensitivities
 
-    def _set_pairs(self) -> None:
-        problem, view = self.problem, self.problem.view
+    def _distances(self) -> Iterator[tuple[str, FloatArray, FloatArray]]:
+        """Each distance's name; of its pairs the difference in the modified channel, and the squared one in others."""
+        view = self.problem.view
         imager, channel = smooth_imager(view), view.modified[0]
         # Exposure does not depend on N, so the response to a filter is linear, plus what does not depend on it.
         gain = imager.per_qe(0, self.base[None])[:, :, channel]
         fixed = np.delete(imager.smooth(self.base[None, None])[0], channel, axis=2)
+        for name, (a, b) in self.problem.pairs.items():
+            first, second = view.members[a], view.members[b]
+            apart = (gain[:, first, None] - gain[:, None, second]).reshape(-1, self.base.size)
+            yield name, apart, ((fixed[:, first, None] - fixed[:, None, second]) ** 2).sum(axis=3).ravel()
+        if self._members is not None:
+            for name in self._members.names:
+                yield name, *self._members.rows(name)
+
+    def _set_pairs(self) -> None:
+        problem = self.problem
         apart, columns = [np.empty((0, self.base.size))], [np.empty((0, 4))]
-        for name, (a, b) in problem.pairs.items():
+        for name, difference, squared in self._distances():
             bound, weight = problem.constraints.get(name), problem.objective.weights.get(name)
             if weight is None and (bound is None or bound.min is None):
                 continue
-            first, second = view.members[a], view.members[b]
-            apart.append((gain[:, first, None] - gain[:, None, second]).reshape(-1, self.base.size))
-            squared = ((fixed[:, first, None] - fixed[:, None, second]) ** 2).sum(axis=3).ravel()
+            apart.append(difference)
             least, slack = (0.0, 0.0) if bound is None else (bound.min or 0.0, FEASIBLE * bound.scale)
             own = [least, slack, 0.0 if weight is None else 1 / weight]
             columns.append(np.column_stack([squared, np.tile(own, (squared.size, 1))]))

@@ -15,6 +15,7 @@ from ..camera.linear import smooth_imager
 from ..designs.block import CurveBlock
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY, Sensitivity
+from ..metrics.members import population_imager
 from ..metrics.quantity import Quantity
 from ..metrics.smooth import Rows, SmoothDesign
 from ..types import FloatArray, IndexArray
@@ -75,6 +76,8 @@ class Model:
         wanted = (*problem.objective.weights, *problem.constraints)
         shifts = dict.fromkeys((0.0, *(shift for name in wanted for shift in problem.shifts_nm(name))))
         self._families = {s: problem.family.shifted(s) if s else problem.family for s in shifts}
+        over = any(problem.over_population(name) for name in wanted)
+        self._members = population_imager(problem.view) if over else None
         self._back_off = {name: _back_off(problem, name, bound) for name, bound in problem.constraints.items()}
         self._seen: dict[bytes, Point] = {}
 
@@ -98,7 +101,8 @@ class Model:
         problem, free = self._problem, self._problem.free
         x = problem.from_unit(u)
         made = {
-            shift: SmoothDesign(self._imager, family, x, free, self._span) for shift, family in self._families.items()
+            shift: SmoothDesign(self._imager, family, x, free, self._span, self._members)
+            for shift, family in self._families.items()
         }
         terms, objective = self._terms(made)
         own = problem.family.violation(x[None])[0]

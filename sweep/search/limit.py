@@ -9,7 +9,7 @@ and their shifts in production) is left out: that makes the set of filters large
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,8 +24,9 @@ from ..metrics.objective import Objective
 from ..metrics.smooth import smooth_csd, smooth_response
 from ..types import FloatArray
 from .filter_program import ROUNDING, FilterProgram
+from .member_pairs import MemberPairs
 from .problem import Problem
-from .sides import SideSearch
+from .sides import Proof, SideSearch
 
 _SENSITIVITY_TOLERANCE = 1e-6
 _MOST_PROGRAMS = 5000
@@ -68,16 +69,31 @@ def limit_of(
     refused = why_not(problem)
     if refused is not None:
         raise SweepError(Fault(f"no limit: {refused}"))
-    nominal, left_out = _relaxed(problem)
-    program = FilterProgram(nominal)
-    tolerance = tolerance_dn if set(nominal.pairs) & set(nominal.objective.weights) else _SENSITIVITY_TOLERANCE
+    relaxed, left_out = _relaxed(problem)
+    distances = any(relaxed.quantities[name].squared for name in relaxed.objective.weights)
+    tolerance = tolerance_dn if distances else _SENSITIVITY_TOLERANCE
+    over = [n for n in dict.fromkeys((*relaxed.objective.weights, *relaxed.constraints)) if relaxed.over_population(n)]
+    members, solved = MemberPairs(relaxed, over) if over else None, 0
+    while True:
+        program = FilterProgram(relaxed, members)
+        proof = _proof(program, members, tolerance, most_programs - solved)
+        solved += program.solved
+        if members is None or proof.curve is None or solved >= most_programs or not members.more(proof.curve):
+            break
+    attained = proof.attained
+    if members is not None and proof.curve is not None:
+        attained = _attained(relaxed, proof.curve, {name: members.least(name, proof.curve) for name in over})
+    elsewhere = tuple(proof.proven_at(program, sensitivity) for sensitivity in sensitivities)
+    return Limit(attained, proof.proven, proof.curve, left_out, solved, proof.open_parts, elsewhere)
+
+
+def _proof(program: FilterProgram, members: MemberPairs | None, tolerance: float, most_programs: int) -> Proof:
+    """What no filter of a program exceeds."""
 
     def value(curve: FloatArray, inside: FloatArray | None) -> tuple[float, FloatArray]:
-        return _inside(nominal, np.clip(curve, program.low, program.base), inside)
+        return _inside(program.problem, np.clip(curve, program.low, program.base), inside, members)
 
-    proof = SideSearch(program, value, tolerance, most_programs).run()
-    elsewhere = tuple(proof.proven_at(program, sensitivity) for sensitivity in sensitivities)
-    return Limit(proof.attained, proof.proven, proof.curve, left_out, program.solved, proof.open_parts, elsewhere)
+    return SideSearch(program, value, tolerance, most_programs).run()
 
 
 def why_not(problem: Problem) -> str | None:
@@ -104,9 +120,13 @@ def why_not(problem: Problem) -> str | None:
 
 
 def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
-    """The problem without what only families of edges have, worst cases as nominal ones; and what was left out."""
+    """The problem without what only families of edges have, and what was left out.
+
+    Worst cases over a population stay; others become nominal ones.
+    """
     quantities = problem.quantities
-    plains = {name: quantities[name].of or name for name in (*problem.constraints, *problem.objective.weights)}
+    asked = (*problem.constraints, *problem.objective.weights)
+    plains = {name: name if problem.over_population(name) else quantities[name].of or name for name in asked}
     known = {name for name, plain in plains.items() if quantities[plain].has_limit}
     left_out = [name for name in problem.constraints if name not in known]
     kept: dict[str, Bound] = {}
@@ -120,9 +140,10 @@ def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
     for name, weight in problem.objective.weights.items():
         plain = plains[name]
         weights[plain] = min(weight, weights.get(plain, weight))
-    if any(name != plain for name, plain in plains.items()):
+    if any(quantities[name].extreme for name in asked) and problem.edge_shift_nm:
         left_out.append("edge shifts")
-    return replace(problem, objective=Objective(minimum=weights), constraints=kept), tuple(left_out)
+    plain_problem = replace(problem, objective=Objective(minimum=weights), constraints=kept, edge_shift_nm=0.0)
+    return plain_problem, tuple(left_out)
 
 
 def _top(problem: Problem) -> FloatArray:
@@ -138,22 +159,31 @@ def _clips(problem: Problem) -> bool:
     return bool((smooth > top_dn).any())
 
 
-def _inside(problem: Problem, curve: FloatArray, inside: FloatArray | None) -> tuple[float, FloatArray]:
-    """A solver's filter, moved by its tolerance toward the base curve or one that is `inside`; and what it attains."""
+def _inside(
+    problem: Problem, curve: FloatArray, inside: FloatArray | None, members: MemberPairs | None
+) -> tuple[float, FloatArray]:
+    """A solver's filter, moved by its tolerance toward the base curve or one that is `inside`; and what it attains.
+
+    Of worst cases over a population by the members that are known.
+    """
     base = problem.view.base_qe[0]
     for end in (base,) if inside is None else (base, inside):
         for share in _SHARES:
             moved = np.asarray(curve + share * (end - curve), dtype=float)
-            attained = _attained(problem, moved)
+            over = {} if members is None else {name: members.least_known(name, moved) for name in members.names}
+            attained = _attained(problem, moved, over)
             if attained > -np.inf:
                 return attained, moved
     return -np.inf, curve
 
 
-def _attained(problem: Problem, curve: FloatArray) -> float:
-    """The objective for a filter as the search evaluates it; -inf when it does not meet the constraints."""
+def _attained(problem: Problem, curve: FloatArray, over: Mapping[str, float]) -> float:
+    """The objective for a filter as the search evaluates it; -inf when it does not meet the constraints.
+
+    `over`: worst cases over a population.
+    """
     curves = curve[None, None]
-    found = designed_quantities(problem.view, curves)
+    found = designed_quantities(problem.view, curves) | {name: np.array([value]) for name, value in over.items()}
     for name in {*problem.objective.weights, *problem.constraints} & problem.pairs.keys():
         found[name] = smooth_csd(problem.view, curves, problem.pairs[name])
     for name, bound in problem.constraints.items():

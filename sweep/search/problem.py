@@ -12,7 +12,7 @@ from ..curves.lights import Pair
 from ..designs.family import Family
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.objective import Objective
-from ..metrics.quantity import Asked, Quantity
+from ..metrics.quantity import WORST_CASE, Asked, Quantity
 from ..metrics.registry import quantities_of
 from ..types import FloatArray, IndexArray
 
@@ -25,7 +25,7 @@ class Problem:
     """Maximize `objective` over the box `low`..`high` (ndarray[n_parameters]) under `constraints`.
 
     Quantities are those of `metrics.registry` with smooth rows; the worst ones are over edges that come out up to
-    `edge_shift_nm` off.
+    `edge_shift_nm` off, and over the population of the view's lights.
     """
 
     view: View
@@ -39,7 +39,17 @@ class Problem:
     @property
     def quantities(self) -> Mapping[str, Quantity]:
         """What objective and constraints may name."""
-        return quantities_of(Asked(self.view.lights.classes, edge_shift=True))
+        return quantities_of(Asked(self.view.lights.classes, edge_shift=True, population=self.population))
+
+    @property
+    def population(self) -> bool:
+        """Whether worst cases are over a population of the lights, too."""
+        return self.view.lights.population is not None
+
+    def over_population(self, quantity: str) -> bool:
+        """Whether a quantity is a worst case over the population of the lights."""
+        asked = self.quantities[quantity]
+        return self.population and asked.extreme == WORST_CASE and asked.squared
 
     @property
     def pairs(self) -> dict[str, Pair]:
@@ -54,7 +64,7 @@ class Problem:
 
     def shifts_nm(self, quantity: str) -> tuple[float, ...]:
         """Edge shifts over which a quantity is the smallest."""
-        worst = self.quantities[quantity].extreme == "worst edges"
+        worst = self.quantities[quantity].extreme == WORST_CASE and self.edge_shift_nm > 0
         return tuple(self.edge_shift_nm * s for s in SHIFTS) if worst else (0.0,)
 
     def from_unit(self, u: FloatArray) -> FloatArray:

@@ -14,12 +14,13 @@ from ..curves.lights import Lights
 from ..curves.spectrum import Curves
 from ..designs.space import Space
 from ..errors import StudyError, SweepError
-from ..metrics.quantity import Asked, Quantity
+from ..metrics.quantity import WORST_CASE, Asked, Quantity
 from ..metrics.registry import listed, quantities_of
 from ..search.solver import ALGORITHMS
 from .axes import Axis
 from .document import Document
 from .model import Search, Study
+from .populations import check_range, with_population
 from .schema import CfaSection, StudySection
 from .sensors import sensor_of
 from .sources import KeptSources, Sources
@@ -60,6 +61,7 @@ class _Resolver:
             raise StudyError(self.faults)
         sensor = with_technologies(sensor, section, self.sources)
         held_out = self.held_out(lights)
+        lights = with_population(lights, section, self.sources)
         spaces = SpaceBuilder(section, self.sources, sensor, mosaics).spaces()
         self.check_columns(lights)
         self.check_luminances(lights)
@@ -91,6 +93,7 @@ class _Resolver:
             held_out=held_out,
         )
         self.check_memory(study)
+        check_range(study, self.sources)
         if not study.n_designs and search is None:
             self.add(
                 ("cfas",), "no designs", None, "a CFA with a curve for each channel, a design, a sweep or a search"
@@ -113,7 +116,7 @@ class _Resolver:
         recognition = self.section.recognition
         states = () if recognition is None else tuple(recognition.states or lights.classes)
         shifts = self.section.production.edge_shift_nm > 0 if edge_shift is None else edge_shift
-        return Asked(lights.classes, states, edge_shift=shifts)
+        return Asked(lights.classes, states, edge_shift=shifts, population=self.section.population is not None)
 
     def check_columns(self, lights: Lights) -> None:
         """Every pair of signal types has columns of its own."""
@@ -202,8 +205,9 @@ class _Resolver:
         if name in known:
             return True
         shifted = quantities_of(self.asked(lights, edge_shift=True)).get(name)
-        if shifted is not None and shifted.extreme == "worst edges" and not self.section.production.edge_shift_nm:
-            self.add(path, f"{name} needs `production.edge_shift_nm`", None, "a shift above 0")
+        if shifted is not None and shifted.extreme == WORST_CASE and not self.section.production.edge_shift_nm:
+            needed = "`production.edge_shift_nm`" + (" or `population`" if shifted.squared else "")
+            self.add(path, f"{name} needs {needed}", None, "a shift above 0")
         else:
             self.unknown(path, what, name, known)
         return False

@@ -11,6 +11,7 @@ from ..camera.scenario import Scenario
 from ..camera.scene import Geometry
 from ..camera.sensor import BUILT_IN_SENSORS
 from ..curves.builtin.registry import BUILT_IN_LIGHTS
+from ..curves.population import Population
 from ..curves.spectrum import WavelengthGrid
 from ..designs.registry import FamilyOptions, told
 from ..designs.technology import Stated
@@ -256,6 +257,8 @@ class StudySection(Documented):
     """Ranges of filters that are searched but not swept, by name."""
     production: Production = Production()
     """What production does to a filter; then worst_... quantities exist."""
+    population: Population | None = None
+    """The lamps that the lights stand for: temperature, binning, ageing; then worst_csd_... quantities exist."""
     recognition: Recognition | None = None
     """How often noise confuses signal types; needs noise in every scenario."""
     objective: Objective = Objective(minimum={"csd_yellow_red": 1.0})

@@ -16,7 +16,7 @@ from sweep.camera.linear import smooth_imager
 from sweep.camera.methods import Methods
 from sweep.camera.view import View
 from sweep.metrics.evaluate import evaluate, family_quantities
-from sweep.metrics.quantity import Asked, Quantity
+from sweep.metrics.quantity import WORST_CASE, Asked, Quantity
 from sweep.metrics.registry import quantities_of
 from sweep.metrics.smooth import Rows, SmoothDesign
 
@@ -231,7 +231,7 @@ def test_linear_rows_are_the_quantity(name: str) -> None:
 def test_what_a_search_may_maximize_has_a_worst_case() -> None:
     shifted = quantities_of(replace(ASKED, edge_shift=True))
     goals = {name for name, quantity in QUANTITIES.items() if quantity.goal}
-    assert goals == {quantity.of for quantity in shifted.values() if quantity.extreme == "worst edges"}
+    assert goals == {quantity.of for quantity in shifted.values() if quantity.extreme == WORST_CASE}
     assert all(QUANTITIES[name].smooth is not None and QUANTITIES[name].wanted == "more" for name in goals)
 
 

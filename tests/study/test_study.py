@@ -69,7 +69,7 @@ def test_the_measured_study_loads() -> None:
             "search:\n",
             "serach:\n",
             "tiny.yaml:20: serach: unknown key; allowed: study, question, seed, wavelengths, sensor, pixel, lights, "
-            "scenarios, tolerance_dn, geometry, cfas, designs, sweeps, boxes, production, recognition, objective, constraints, search, validate, published; did you mean 'search'?",
+            "scenarios, tolerance_dn, geometry, cfas, designs, sweeps, boxes, production, population, recognition, objective, constraints, search, validate, published; did you mean 'search'?",
         ),
         (
             "min: 590, max: 610",
@@ -160,7 +160,7 @@ def test_the_measured_study_loads() -> None:
         (
             "constraints:\n",
             "objective: worst_csd_yellow_red\nconstraints:\n",
-            "tiny.yaml:18: objective: worst_csd_yellow_red needs `production.edge_shift_nm`; allowed: a shift above 0",
+            "tiny.yaml:18: objective: worst_csd_yellow_red needs `production.edge_shift_nm` or `population`; allowed: a shift above 0",
         ),
         (
             "constraints:\n",

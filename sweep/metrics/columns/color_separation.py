@@ -40,6 +40,7 @@ class ColorSeparation(ReadoutMetric):
                 pair=pair,
                 squared=True,
                 smooth=partial(_squared, pair=pair),
+                smooth_members=partial(_squared_of_members, pair=pair),
             )
             for pair in class_pairs(asked.classes)
         ]
@@ -57,6 +58,7 @@ class ColorSeparation(ReadoutMetric):
                 goal=False,
                 squared=False,
                 smooth=None,
+                smooth_members=None,
             )
             for each in nearest
         ]
@@ -69,3 +71,7 @@ class ColorSeparation(ReadoutMetric):
 
 def _squared(design: SmoothDesign, *, pair: tuple[str, str]) -> Rows:
     return design.squared_distances(pair)
+
+
+def _squared_of_members(design: SmoothDesign, *, pair: tuple[str, str]) -> Rows:
+    return design.squared_distances_of_members(pair)

@@ -11,7 +11,7 @@ import pandas as pd
 
 from ...metrics.objective import COMBINED
 from ...metrics.pareto import hypervolume
-from ...metrics.quantity import DN
+from ...metrics.quantity import DN, WORST_CASE
 from ...results.tables import FOUND
 from ...types import FloatArray
 from .. import Output
@@ -75,14 +75,16 @@ def dn_of(output: Output) -> str:
 
 def _meaning(output: Output) -> tuple[str, ...]:
     """What the two axes are; of a combined objective, of a worst case, of DN with all that it depends on."""
-    shift = output.study.production.edge_shift_nm
-    shifted = any(output.columns[name].extreme == "worst edges" for name in output.objective.weights)
+    shift, population = output.study.production.edge_shift_nm, output.study.population
+    over = [f"edges {shift:g} nm off"] if shift else []
+    over += [] if population is None else [population.told]
+    shifted = any(output.columns[name].extreme == WORST_CASE for name in output.objective.weights)
     words = []
     for axis in output.trade_off:
         combined = axis.name == COMBINED
         text = str(output.objective) if combined else axis.words
-        off = axis.extreme == "worst edges" or (combined and shifted)
-        dependent = f" (edges {shift:g} nm off)" if off else ""
+        off = axis.extreme == WORST_CASE or (combined and shifted)
+        dependent = f" ({', '.join(over)})" if off else ""
         words.append(f"{text}{dependent}" + (f" in {dn_of(output)}" if axis.unit == DN or combined else ""))
     return tuple(words)
 

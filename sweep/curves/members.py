@@ -1,0 +1,228 @@
+"""The members of a population of lights: shifted spectra, and which shifts of two lights occur together.
+
+A spectrum is linear between the nodes of the wavelength grid, and what lies at the nodes is what counts. So a spectrum
+that is shifted by part of a step is a mean of the two that are shifted by whole steps, and every response that is
+linear in light is linear in the shift between whole steps: nothing between them has to be sampled. Photons that are
+shifted out of the grid are lost, as behind an IR cut filter.
+
+The shifts (x, y) of two lights that occur together fill a convex polygon: a line of temperatures, widened by what each
+light has of its own. Cut along whole steps of x and y it falls into pieces, each of triangles, on which the difference
+of two responses is linear.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from ..types import FloatArray, IndexArray
+from .lights import Lights, Pair
+from .population import Population
+from .spectrum import WavelengthGrid
+
+_DIGITS, _TINY = 9, 1e-9
+"""Shifts are known to this share of a step: rounding."""
+_Point = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class ShiftRegion:
+    """The triangles of the shifts of two lights that occur together, in steps of the grid from the first shift.
+
+    `cells`: ndarray[n, 2], the whole step below each triangle's x and y; `shares`: ndarray[n, 3, 2], what its corners
+    are above that, 0 to 1; `along`: ndarray[n], where a triangle lies along the region's length, 0 to 1.
+    """
+
+    cells: IndexArray
+    shares: FloatArray
+    along: FloatArray
+
+
+class Members:
+    """The spectra of the lights of a population on a wavelength grid.
+
+    `lights`: one after the other, each width of each signal, shifted by every whole step: `n_steps` spectra for each.
+    """
+
+    def __init__(self, lights: Lights, grid: WavelengthGrid) -> None:
+        assert lights.population is not None
+        self._lights, self._step_nm, self._population = lights, grid.step_nm, lights.population
+        spans = spans_nm(lights, lights.population)
+        self._first = int(np.floor(min(low for low, _ in spans) / grid.step_nm + _TINY))
+        last = int(np.ceil(max(high for _, high in spans) / grid.step_nm - _TINY))
+        self.n_steps = max(last - self._first, 1) + 1
+        widths = self._population.width
+        photons = [stretched(grid, spectrum, factor) for spectrum in lights.photons for factor in widths]
+        steps = range(self._first, self._first + self.n_steps)
+        made = np.stack([moved(spectrum, step) for spectrum in photons for step in steps])
+        each = len(widths) * self.n_steps
+        names = tuple(name for name in lights.names for _ in range(each))
+        types = tuple(kind for kind in lights.types for _ in range(each))
+        self.lights = replace(lights, names=names, types=types, photons=made, population=None)
+        self._regions: dict[tuple[float, ...], ShiftRegion] = {}
+
+    @cached_property
+    def rows(self) -> dict[str, IndexArray]:
+        """Signal type -> where the spectra of each of its signals and widths begin in `lights`."""
+        own = {name: rows[:: self.n_steps] for name, rows in self.lights.members.items()}
+        return {name: np.asarray(rows, dtype=np.intp) for name, rows in own.items()}
+
+    def signal(self, row: int) -> int:
+        """The signal whose spectra begin at a row."""
+        return row // (len(self._population.width) * self.n_steps)
+
+    def shift_nm(self, cell: int, share: float) -> float:
+        """By how much a spectrum is shifted so many steps after the first shift."""
+        return (self._first + cell + share) * self._step_nm
+
+    def _of(self, signal: int) -> tuple[float, tuple[float, float]]:
+        return _drift_and_own(self._lights, self._population, signal)
+
+    def regions(self, pair: Pair) -> tuple[list[ShiftRegion], IndexArray]:
+        """The different regions of two types, and that of each two signals and widths, ndarray[n_first, n_second]."""
+        first, second = (self.rows[name] for name in pair)
+        known: dict[int, int] = {}
+        found: list[ShiftRegion] = []
+        which = np.empty((first.size, second.size), dtype=np.intp)
+        for one, row in enumerate(first):
+            for other, column in enumerate(second):
+                region = self.region(self.signal(int(row)), self.signal(int(column)))
+                if id(region) not in known:
+                    known[id(region)] = len(found)
+                    found.append(region)
+                which[one, other] = known[id(region)]
+        return found, which
+
+    def region(self, one: int, other: int) -> ShiftRegion:
+        """The shifts of two signals that occur together."""
+        (a, own_a), (b, own_b) = self._of(one), self._of(other)
+        key = (a, *own_a, b, *own_b)
+        if key not in self._regions:
+            corners = _corners(self._population, (a, b), (own_a, own_b))
+            self._regions[key] = _region(
+                [(x / self._step_nm - self._first, y / self._step_nm - self._first) for x, y in corners]
+            )
+        return self._regions[key]
+
+
+def spans_nm(lights: Lights, population: Population) -> list[tuple[float, float]]:
+    """From and to where each signal is shifted."""
+    found = []
+    for signal in range(len(lights.names)):
+        drift, (low, high) = _drift_and_own(lights, population, signal)
+        ends = [drift * warmer for warmer in population.warmer_k]
+        found.append((min(ends) + low, max(ends) + high))
+    return found
+
+
+def _drift_and_own(lights: Lights, population: Population, signal: int) -> tuple[float, tuple[float, float]]:
+    """nm/K of a signal, and the shifts that are its own."""
+    kind, name = lights.types[signal], lights.names[signal]
+    drift = population.drift(kind, name)
+    assert drift is not None
+    return drift, population.own_nm(kind, name)
+
+
+def moved(photons: FloatArray, steps: int) -> FloatArray:
+    """A spectrum shifted by whole steps toward the red, ndarray[n_wavelengths]."""
+    found = np.zeros_like(photons)
+    size = photons.size
+    if abs(steps) < size:
+        found[max(steps, 0) : size + min(steps, 0)] = photons[max(-steps, 0) : size - max(steps, 0)]
+    return found
+
+
+def stretched(grid: WavelengthGrid, photons: FloatArray, factor: float) -> FloatArray:
+    """A spectrum stretched by a factor about its mean wavelength, with as many photons, ndarray[n_wavelengths]."""
+    if factor == 1:
+        return photons
+    wave = grid.nodes_nm
+    middle = float((wave * photons).sum() / photons.sum())
+    found = np.interp(middle + (wave - middle) / factor, wave, photons, left=0.0, right=0.0)
+    return np.asarray(found * (photons.sum() / found.sum()), dtype=float)
+
+
+def _corners(
+    population: Population, drifts: tuple[float, float], own: tuple[tuple[float, float], tuple[float, float]]
+) -> list[_Point]:
+    """Points whose hull is the region of two lights, nm."""
+    (a, b), (x, y) = drifts, own
+    both = [(warmer, warmer) for warmer in population.warmer_k]
+    if population.temperatures == "independent":
+        both = [(one, other) for one in population.warmer_k for other in population.warmer_k]
+    return [(a * one + u, b * other + v) for one, other in both for u in x for v in y]
+
+
+def _hull(points: list[_Point]) -> list[_Point]:
+    """The corners of the convex hull (Andrew, 1979); two points of a line, one of a single point."""
+    points = sorted({(round(x, _DIGITS), round(y, _DIGITS)) for x, y in points})
+    if len(points) < 3:
+        return points
+
+    def half(ordered: list[_Point]) -> list[_Point]:
+        chain: list[_Point] = []
+        for point in ordered:
+            while len(chain) > 1 and _cross(chain[-2], chain[-1], point) <= _TINY:
+                chain.pop()
+            chain.append(point)
+        return chain[:-1]
+
+    return half(points) + half(points[::-1])
+
+
+def _cross(o: _Point, p: _Point, q: _Point) -> float:
+    return (p[0] - o[0]) * (q[1] - o[1]) - (p[1] - o[1]) * (q[0] - o[0])
+
+
+def _clipped(polygon: list[_Point], axis: int, bound: float, sign: float) -> list[_Point]:
+    """The part of a polygon with sign x (coordinate - bound) >= 0 (Sutherland and Hodgman)."""
+    kept: list[_Point] = []
+    for here, there in zip(polygon, polygon[1:] + polygon[:1], strict=True):
+        u, v = sign * (here[axis] - bound), sign * (there[axis] - bound)
+        if u >= 0:
+            kept.append(here)
+        if (u < 0 < v) or (v < 0 < u):
+            share = u / (u - v)
+            cut = [p + (q - p) * share for p, q in zip(here, there, strict=True)]
+            cut[axis] = bound
+            kept.append((cut[0], cut[1]))
+    return list(dict.fromkeys(kept))
+
+
+def _size(polygon: list[_Point]) -> tuple[float, float]:
+    """Area, and the longest way between two corners."""
+    area = sum(_cross(polygon[0], p, q) for p, q in pairwise(polygon)) / 2
+    longest = max((float(np.hypot(p[0] - q[0], p[1] - q[1])) for p in polygon for q in polygon), default=0.0)
+    return abs(area), longest
+
+
+def _region(points: list[_Point]) -> ShiftRegion:
+    hull = _hull(points)
+    area, length = _size(hull)
+    cells, shares = [], []
+    low, high = np.floor(np.min(hull, axis=0)), np.ceil(np.max(hull, axis=0))
+    for k in range(int(low[0]), max(int(high[0]), int(low[0]) + 1)):
+        column = _clipped(_clipped(hull, 0, k, 1.0), 0, k + 1, -1.0)
+        for m in range(int(low[1]), max(int(high[1]), int(low[1]) + 1)) if column else ():
+            piece = _clipped(_clipped(column, 1, m, 1.0), 1, m + 1, -1.0)
+            own_area, own_length = _size(piece)
+            # What a piece has in common with its neighbor alone is part of the neighbor.
+            if not piece or (area > _TINY and own_area < _TINY**2) or (length > _TINY and own_length < _TINY):
+                continue
+            last = len(piece) - 1
+            for at in range(1, max(last, 2)):
+                corners = [piece[0], piece[min(at, last)], piece[min(at + 1, last)]]
+                cells.append((k, m))
+                shares.append([(x - k, y - m) for x, y in corners])
+    middles = np.array(cells) + np.mean(shares, axis=1)
+    return ShiftRegion(np.array(cells, dtype=np.intp), np.array(shares), _along(middles))
+
+
+def _along(points: FloatArray) -> FloatArray:
+    """Where points lie along the direction in which they are spread most, 0 to 1."""
+    off = points - points.mean(axis=0)
+    at = off @ np.linalg.svd(off, full_matrices=False)[2][0]
+    return np.asarray((at - at.min()) / max(float(np.ptp(at)), _TINY), dtype=float)

@@ -1,0 +1,123 @@
+"""How lamps differ from the spectra of a study: temperature, binning, ageing, width.
+
+A warm LED emits at longer wavelengths. Each signal of a study becomes a set of spectra: its own, shifted by
+drift x (temperature of the junction - reference) + binning + ageing, and stretched by each of the width factors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from ..types import Section
+
+_Value = TypeVar("_Value")
+_Celsius = Annotated[float, Field(ge=-100, le=300)]
+_Drift = Annotated[float, Field(ge=-2, le=2)]
+_Off = Annotated[float, Field(ge=0, le=30)]
+_Aged = Annotated[float, Field(ge=-30, le=30)]
+_ALL = ""
+"""Key of what holds for every signal."""
+
+DRIFT_NM_PER_K: Mapping[str, float] = {"green": 0.03, "yellow": 0.1, "orange": 0.1, "red": 0.1}
+"""Drift of the peak where a study states none.
+
+Yellow, orange and red LEDs are of AlGaInP: the peak follows the band gap E, d l / d T = (l^2 / hc) (-d E / d T), with
+Varshni's -d E / d T = a T (T + 2 b) / (T + b)^2. InP's a = 0.363 meV/K and b = 162 K (Vurgaftman, Meyer, Ram-Mohan,
+"Band parameters for III-V compound semiconductors", J. Appl. Phys. 89, 5815, 2001) give 0.32 meV/K at 300 K: 0.09 nm/K
+at 592 nm, 0.105 nm/K at 640 nm. Green is of InGaN, whose peak follows the gap less: 0.02 to 0.04 nm/K, the middle of it
+here. A study of certain LEDs should state what their data sheets say.
+"""
+
+
+def _by_name(value: Any) -> Any:
+    """A number alone holds for every signal."""
+    return value if isinstance(value, dict) else {_ALL: value}
+
+
+def _span(value: Any) -> Any:
+    """A list of two."""
+    if not isinstance(value, list | tuple) or len(value) != 2:
+        raise ValueError("two numbers, from and to")
+    return tuple(value)
+
+
+def _spans_by_name(value: Any) -> Any:
+    """Two numbers alone hold for every signal."""
+    return {name: _span(each) for name, each in _by_name(value).items()}
+
+
+class Population(Section):
+    """The lamps that the study's lights stand for, by how their spectra shift; `worst_csd_...` is over all of them.
+
+    `temperature_c`: ambient, from the coldest to the hottest; `self_heating_k`: by how much the junction may be warmer;
+    the study's spectra are those at a junction of `reference_c`. `drift_nm_per_k`: left out, 0.03 for green and 0.1 for
+    yellow, orange and red. `temperatures`: two lights are compared at one junction temperature (`common`), or each has
+    its own (`independent`). `binning_nm`: so far off, to either side, a lamp may be; `ageing_nm`: from and to so much
+    it moves in its life; both are independent of each other and for each signal. `width`: each spectrum is stretched
+    about its middle by each of these factors. Where values differ, keys are signal types or names of signals; a value
+    alone holds for all.
+    """
+
+    temperature_c: Annotated[
+        tuple[_Celsius, _Celsius],
+        BeforeValidator(_span, json_schema_input_type=Annotated[list[_Celsius], Field(min_length=2, max_length=2)]),
+    ] = (25.0, 25.0)
+    reference_c: _Celsius = 25.0
+    self_heating_k: float = Field(default=0.0, ge=0, le=200)
+    drift_nm_per_k: Annotated[
+        dict[str, _Drift], BeforeValidator(_by_name, json_schema_input_type=_Drift | dict[str, _Drift])
+    ] = {}
+    temperatures: Literal["common", "independent"] = "common"
+    binning_nm: Annotated[
+        dict[str, _Off], BeforeValidator(_by_name, json_schema_input_type=_Off | dict[str, _Off])
+    ] = {}
+    ageing_nm: Annotated[
+        dict[str, tuple[_Aged, _Aged]],
+        BeforeValidator(_spans_by_name, json_schema_input_type=list[_Aged] | dict[str, list[_Aged]]),
+    ] = {}
+    width: list[Annotated[float, Field(ge=0.5, le=2)]] = Field(default=[1.0], min_length=1, max_length=9)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Population:
+        if not self.temperature_c[0] <= self.temperature_c[1]:
+            raise ValueError(f"temperature_c: {self.temperature_c[0]:g} must not be above {self.temperature_c[1]:g}")
+        for name, (low, high) in self.ageing_nm.items():
+            if not low <= 0 <= high:
+                told = name or "a lamp"
+                raise ValueError(f"ageing_nm: {told} begins as new, so from 0 or less to 0 or more")
+        return self
+
+    @property
+    def names(self) -> dict[str, set[str]]:
+        """Key of the section -> the signal types and signals that it names."""
+        return {key: set(getattr(self, key)) - {_ALL} for key in ("drift_nm_per_k", "binning_nm", "ageing_nm")}
+
+    @property
+    def told(self) -> str:
+        """What differs from a single lamp in it, in words."""
+        given = self.model_dump(mode="json", exclude_defaults=True)
+        return f"lamps of {given}"
+
+    @property
+    def warmer_k(self) -> tuple[float, float]:
+        """By how much a junction is warmer than the reference, at least and at most."""
+        low, high = self.temperature_c
+        return low - self.reference_c, high + self.self_heating_k - self.reference_c
+
+    def drift(self, kind: str, name: str) -> float | None:
+        """nm/K of a signal of a type; None where neither the study nor a default says it."""
+        return _of(self.drift_nm_per_k, kind, name, DRIFT_NM_PER_K.get(kind))
+
+    def own_nm(self, kind: str, name: str) -> tuple[float, float]:
+        """From and to where binning and ageing alone shift a signal."""
+        binning = _of(self.binning_nm, kind, name, 0.0)
+        low, high = _of(self.ageing_nm, kind, name, (0.0, 0.0))
+        return low - binning, high + binning
+
+
+def _of(values: Mapping[str, _Value], kind: str, name: str, default: _Value) -> _Value:
+    """That of the signal, else of its type, else of all."""
+    return values.get(name, values.get(kind, values.get(_ALL, default)))

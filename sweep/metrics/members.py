@@ -1,0 +1,125 @@
+"""The worst case over a population of lights: the nearest of all members of two signal types.
+
+It is that of the response before clipping and rounding, which is linear in a spectrum's shift between whole steps of
+the grid (see `curves.members`): the smallest distance over all shifts is found exactly, not by samples of them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ..cache import Cache
+from ..camera.linear import LinearImager, smooth_imager
+from ..camera.methods import REFERENCE
+from ..camera.view import View
+from ..curves.lights import Pair, class_pairs
+from ..curves.members import Members
+from ..types import FloatArray, IndexArray
+from .separation import csd_name
+
+_HELD = 4_000_000
+"""Values of responses that are held at once."""
+PARTS = 5
+"""Parts of a region of shifts whose nearest members a search sees apart."""
+
+
+@dataclass(frozen=True)
+class NearestMembers:
+    """The nearest members of each two lights of two types, in each part of their region.
+
+    `squared`: DN^2, ndarray[n_first, n_second, n_parts], infinite where there are none; `steps`, `shares`: ndarray[...,
+    2], of both. `first`, `second`: where the spectra of each light begin.
+    """
+
+    squared: FloatArray
+    steps: IndexArray
+    shares: FloatArray
+    first: IndexArray
+    second: IndexArray
+
+    def of(self, values: FloatArray, side: int) -> FloatArray:
+        """What the nearest members on one side (0 or 1) have; ndarray[..., n_spectra, n] -> [..., *squared, n]."""
+        starts = self.first[:, None, None] if side == 0 else self.second[None, :, None]
+        rows, share = starts + self.steps[..., side], self.shares[..., side, None]
+        return np.asarray(values[..., rows, :] * (1 - share) + values[..., rows + 1, :] * share, dtype=float)
+
+
+@dataclass(frozen=True)
+class _Table:
+    """The regions of two types, as `nearest_members` takes them."""
+
+    first: IndexArray
+    second: IndexArray
+    which: IndexArray
+    starts: IndexArray
+    cells: IndexArray
+    shares: FloatArray
+    along: FloatArray
+
+
+class PopulationImager:
+    """A scene whose lights are all members of their population."""
+
+    def __init__(self, view: View) -> None:
+        """Everything is on, whatever the plan of `view` leaves out: plans promise nothing of other members."""
+        self.members = Members(view.lights, view.grid)
+        self.view = replace(view, lights=self.members.lights, methods=REFERENCE)
+        self._tables: dict[Pair, _Table] = {}
+
+    @cached_property
+    def imager(self) -> LinearImager:
+        """The smooth response to every spectrum of the members."""
+        return smooth_imager(self.view)
+
+    def worst(self, curves: FloatArray) -> dict[str, FloatArray]:
+        """The smallest CSD of each pair over all members and places, DN, by the name of the CSD, ndarray[n_designs].
+
+        `curves`: QE of the modified channels, ndarray[n_designs, n_modified, n_wavelengths]. NaN where the response is
+        no number.
+        """
+        pairs = class_pairs(self.view.lights.classes)
+        found = {pair: np.full(len(curves), np.nan) for pair in pairs}
+        step = max(1, _HELD // (self.imager.n_cases * self.view.lights.photons.shape[0] * len(self.view.qe)))
+        for start in range(0, len(curves), step):
+            for index, response in enumerate(self.imager.smooth(curves[start : start + step]), start):
+                if np.isfinite(response).all():
+                    for pair in pairs:
+                        least = min(float(self.nearest(case, pair, alone=True).squared.min()) for case in response)
+                        found[pair][index] = np.sqrt(least)
+        return {csd_name(pair): values for pair, values in found.items()}
+
+    def nearest(self, response: FloatArray, pair: Pair, *, parts: int = 1, alone: bool = False) -> NearestMembers:
+        """The nearest members of two types; `response`: ndarray[n_spectra, n_channels]; `alone`: of all, only."""
+        from .compiled_members import nearest_members  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+        table = self._table(pair)
+        part = np.minimum((table.along * parts).astype(np.intp), parts - 1)
+        shape = (table.first.size, table.second.size, parts)
+        squared, steps, shares = np.empty(shape), np.zeros((*shape, 2), dtype=np.intp), np.zeros((*shape, 2))
+        own = (table.first, table.second, table.which, table.starts, table.cells, table.shares)
+        nearest_members(np.ascontiguousarray(response), *own, part, alone, squared, steps, shares)
+        return NearestMembers(squared, steps, shares, table.first, table.second)
+
+    def _table(self, pair: Pair) -> _Table:
+        if pair not in self._tables:
+            regions, which = self.members.regions(pair)
+            first, second = (self.members.rows[name] for name in pair)
+            starts = np.cumsum([0, *(len(region.cells) for region in regions)])
+            cells, shares, along = (
+                np.concatenate([getattr(region, name) for region in regions]) for name in ("cells", "shares", "along")
+            )
+            self._tables[pair] = _Table(first, second, which, starts, cells, shares, along)
+        return self._tables[pair]
+
+
+_imagers: Cache[bytes, PopulationImager] = Cache(16)
+
+
+def population_imager(view: View) -> PopulationImager:
+    """That of a view whose lights have a population; the latest ones are kept."""
+    return _imagers.get(hashlib.sha256(pickle.dumps(view)).digest(), lambda: PopulationImager(view))

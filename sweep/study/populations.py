@@ -1,0 +1,79 @@
+"""The population of a study's lights: what it names, and in which scenes worst cases over it are exact."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..camera.effects.saturation import top_e
+from ..camera.field import over_field
+from ..camera.pixel import unquantized
+from ..camera.plan.bounds import Reach
+from ..curves.lights import Lights
+from ..curves.members import Members, spans_nm
+from ..curves.population import DRIFT_NM_PER_K, Population
+from ..errors import StudyError
+from .model import Study
+from .schema import StudySection
+from .sources import Sources
+from .yaml_tree import Key
+
+_MOST_SPECTRA = 20_000
+_AT: tuple[Key, ...] = ("population",)
+
+
+def with_population(lights: Lights, section: StudySection, sources: Sources) -> Lights:
+    """The lights with the population that the study asks for; what does not fit adds a fault."""
+    population = section.population
+    if population is None:
+        return lights
+    known = [*lights.classes, *lights.names]
+    for key, names in population.names.items():
+        for name in sorted(names - set(known)):
+            sources.unknown((*_AT, key, name), "signal type or signal", name, known)
+    for kind, name in zip(lights.types, lights.names, strict=True):
+        if population.drift(kind, name) is None:
+            problem = f"no drift is known for signals of type {kind}"
+            allowed = f"nm/K of {kind}; known are {', '.join(DRIFT_NM_PER_K)}"
+            sources.add((*_AT, "drift_nm_per_k"), problem, None, allowed)
+            return lights
+    for name, scenario in section.scenarios.items():
+        if scenario.intensity_cd is not None:
+            problem = "lights of a population have their photons, not their luminous intensity, in common"
+            sources.add(("scenarios", name, "intensity_cd"), problem, scenario.intensity_cd, "photon_radiance")
+        if scenario.target is not None and scenario.target.phase_px == "any":
+            problem = "worst cases over a population need a light at a named place of the mosaic"
+            sources.add(("scenarios", name, "target", "phase_px"), problem, "any", "[column, row]")
+    return _not_too_large(replace(lights, population=population), population, section, sources)
+
+
+def _not_too_large(lights: Lights, population: Population, section: StudySection, sources: Sources) -> Lights:
+    """The lights, with a fault where their members are too many."""
+    ends = [end for span in spans_nm(lights, population) for end in span]
+    steps = (max(ends) - min(ends)) / section.wavelengths.step_nm
+    spectra = len(lights.names) * len(population.width) * (steps + 2)
+    if spectra > _MOST_SPECTRA:
+        told = f"{spectra:,.0f} spectra, {len(lights.names)} signals at every step of the grid"
+        sources.add(_AT, "the population has too many members", told, f"at most {_MOST_SPECTRA:,}")
+    return lights
+
+
+def check_range(study: Study, sources: Sources) -> None:
+    """No member of the population is cut off when it is read out. Raises StudyError.
+
+    Worst cases over the population are those of a response that is not cut off.
+    """
+    if study.lights.population is None:
+        return
+    lights = Members(study.lights, study.grid).lights
+    for name in study.scenarios:
+        for space in study.spaces:
+            box = study.box(space, name)
+            places = [replace(box, view=replace(place, lights=lights)) for place in over_field(box.view)]
+            brightest_dn = max(float(Reach(place).brightest_pixels_dn.max()) for place in places)
+            top_dn = float(unquantized(np.array(top_e(box.view.pixel)), box.view.pixel))
+            if brightest_dn > top_dn:
+                problem = f"lights of the population exceed the full well or the range of the ADC (CFA {space.cfa})"
+                sources.add(("scenarios", name), problem, f"{brightest_dn:,.0f} DN", f"up to {top_dn:,.0f} DN")
+                raise StudyError(sources.faults)

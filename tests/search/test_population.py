@@ -1,0 +1,85 @@
+"""Search and limit over a population of lights: derivatives, and filters that a program of its own would not allow."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from sweep.curves.population import Population
+from sweep.metrics.evaluate import designed_quantities
+from sweep.metrics.members import population_imager
+from sweep.metrics.objective import Objective
+from sweep.search.gradients import Model
+from sweep.search.limit import Limit, limit_of, why_not
+from sweep.search.problem import Problem, SearchRun, starting_points
+from sweep.study import load_study
+
+from ..conftest import STUDIES
+from .test_limit import random_filters
+
+STUDY = load_study(STUDIES / "stopband.yaml")
+
+
+@cache
+def problem(**given: float) -> Problem:
+    assert STUDY.search is not None
+    plain = STUDY.problem(STUDY.search)
+    population = Population.model_validate({"temperature_c": [-40, 85], "self_heating_k": 20, **given})
+    view = replace(plain.view, lights=replace(plain.view.lights, population=population))
+    return replace(plain, view=view, objective=Objective(minimum={"worst_csd_yellow_red": 1.0}))
+
+
+def test_rows_over_the_population_have_their_derivative() -> None:
+    shifted = replace(problem(binning_nm=1), edge_shift_nm=2.0)
+    model, checked = Model(shifted, SearchRun(0), 1000), 0
+    for u in starting_points(shifted, 4, 3):
+        here = model.at(u)
+        assert np.sqrt(here.terms.values.min()) == pytest.approx(here.evaluation.objective, rel=1e-12)
+        rows = np.argsort(here.terms.values)[:20]
+        for free in range(u.size):
+            step = np.zeros(u.size)
+            step[free] = 1e-6
+            if not 1e-6 <= u[free] <= 1 - 1e-6:
+                continue
+            ends = [model.at(u + sign * step).terms.values[rows] for sign in (1, -1)]
+            np.testing.assert_allclose((ends[0] - ends[1]) / 2e-6, here.terms.by_u[rows, free], rtol=1e-3, atol=1e-2)
+            checked += 1
+    assert checked >= 12
+
+
+@cache
+def limit() -> Limit:
+    assert why_not(problem(binning_nm=1)) is None
+    return limit_of(problem(binning_nm=1))
+
+
+def test_the_limit_is_attained_over_all_members() -> None:
+    found = limit()
+    assert found.curve is not None
+    assert 0 <= found.proven - found.attained <= 0.02
+    over = population_imager(problem(binning_nm=1).view).worst(found.curve[None, None])["csd_yellow_red"][0]
+    assert over == pytest.approx(found.attained, rel=1e-9)
+    assert found.open_parts == 0
+
+
+def test_a_larger_population_has_a_lower_limit() -> None:
+    assert STUDY.search is not None
+    assert limit().proven < limit_of(problem()).proven < limit_of(STUDY.problem(STUDY.search)).proven
+
+
+@pytest.mark.slow
+def test_no_random_filter_beats_the_limit_over_the_population() -> None:
+    view = problem(binning_nm=1).view
+    base, seen = view.base_qe, population_imager(view)
+    rng, best = np.random.default_rng(3), 0.0
+    for kind in ("stopband", "multi_stopband", "free_form"):
+        curves = random_filters(kind, 3000, rng)
+        lost = 1 - designed_quantities(view, curves)["sensitivity"]
+        curves = base + np.minimum(1.0, 0.1 / np.maximum(lost, 1e-12))[:, None, None] * (curves - base)
+        found = designed_quantities(view, curves)
+        curves = curves[(found["sensitivity"] >= 0.9) & (found["slope_per_nm"] <= 0.06)]
+        best = max(best, float(seen.worst(curves)["csd_yellow_red"].max()))
+    assert 0.3 * limit().proven < best <= limit().proven
