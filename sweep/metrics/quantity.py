@@ -15,6 +15,7 @@ from ..camera.imager import Imager
 from ..camera.noisy_readout import NoisyReadout
 from ..camera.view import View
 from ..curves.lights import Pair
+from ..curves.tasks import TaskName
 from ..designs.block import Block
 from ..designs.family import Family
 from ..types import FloatArray, IndexArray
@@ -144,12 +145,13 @@ class Quantity(Column):
 
 @dataclass(frozen=True)
 class Asked:
-    """What a study asks for: signal types, states that noise may confuse, any place of the light, shifts of edges."""
+    """What a study asks for: signal types, states that noise may confuse, any place, shifts of edges, and tasks."""
 
     classes: tuple[str, ...]
     states: tuple[str, ...] = ()
     any_place: bool = False
     edge_shift: bool = False
+    tasks: tuple[TaskName, ...] = ()
 
 
 class Metric(ABC):

@@ -18,6 +18,7 @@ from ..camera.sensor import SensorCurves
 from ..camera.view import View
 from ..curves.lights import Lights, Pair, class_pairs
 from ..curves.spectrum import WavelengthGrid
+from ..curves.tasks import StudyTasks
 from ..designs.space import Space
 from ..designs.technology import Technology
 from ..errors import Fault, StudyError
@@ -61,6 +62,7 @@ class Study:
     digests: Mapping[str, str]
     warnings: tuple[str, ...]
     held_out: Lights | None = None
+    tasks: StudyTasks | None = None
     plans: Mapping[str, Plan] = field(default_factory=dict)
 
     @property
@@ -87,7 +89,8 @@ class Study:
     @property
     def asked(self) -> Asked:
         """What the study asks for of its designs."""
-        return Asked(self.lights.classes, self.states, self.any_place, self.edge_shift_nm > 0)
+        tasks = () if self.tasks is None else self.tasks.keys
+        return Asked(self.lights.classes, self.states, self.any_place, self.edge_shift_nm > 0, tasks)
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -154,6 +157,7 @@ class Study:
             pixel=self.pixel if scene.noise is None else scene.noise.of(self.pixel),
             scenario=scene,
             technologies=tuple(technologies) if any(technologies) else (),
+            tasks=self.tasks,
             methods=self.plans[scenario].methods if scenario in self.plans else REFERENCE,
         )
 
