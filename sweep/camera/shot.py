@@ -9,6 +9,7 @@ import numpy as np
 
 from ..curves.lights import Lights
 from ..curves.spectrum import WavelengthGrid
+from ..curves.tasks import StudyTasks
 from ..designs.technology import Technology, index_of
 from ..types import FloatArray, IndexArray
 from .mosaic import Mosaic
@@ -23,7 +24,7 @@ class Shot:
     `qe`: ndarray[n_channels, n_wavelengths] of the mosaic's channels, electrons per photon; the rows of `modified`
     (channel indices, one per curve that a family makes) hold the base curve. `clear_qe`: the reference of the CFA's
     sensitivity, ndarray[n_wavelengths]. `technologies`: by what each channel's filter works, None where that is not
-    stated; empty where it is of none.
+    stated; empty where it is of none. `tasks`: what else the study asks of its designs.
     """
 
     grid: WavelengthGrid
@@ -35,6 +36,7 @@ class Shot:
     pixel: Pixel
     scenario: Scene
     technologies: tuple[Technology | None, ...] = field(default=(), kw_only=True)
+    tasks: StudyTasks | None = field(default=None, kw_only=True)
 
     @property
     def base_qe(self) -> FloatArray:

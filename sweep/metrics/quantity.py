@@ -15,6 +15,7 @@ from ..camera.imager import Imager
 from ..camera.noisy_readout import NoisyReadout
 from ..camera.view import View
 from ..curves.lights import Pair
+from ..curves.tasks import TaskName
 from ..designs.block import Block
 from ..designs.family import Family
 from ..types import FloatArray, IndexArray
@@ -149,7 +150,7 @@ class Quantity(Column):
 @dataclass(frozen=True)
 class Asked:
     """What a study asks for: signal types, states that noise may confuse, any place of the light, shifts of edges, a
-    population of its lights.
+    population of its lights, and tasks.
     """
 
     classes: tuple[str, ...]
@@ -157,6 +158,7 @@ class Asked:
     any_place: bool = False
     edge_shift: bool = False
     population: bool = False
+    tasks: tuple[TaskName, ...] = ()
 
 
 class Metric(ABC):

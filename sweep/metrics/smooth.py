@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,6 +16,8 @@ from ..designs.family import Family
 from ..types import FloatArray, IndexArray
 from .members import PARTS, PopulationImager
 from .separation import separation
+
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,14 @@ class SmoothDesign:
         self.curves = family.curves(x[None])[0]
         self.by_u = family.gradient(x)[free] * span[:, None, None]
         self._imager, self._free, self._span = imager, free, span
+        self._made: dict[str, Any] = {}
+
+    def once(self, key: str, make: Callable[[], Made]) -> Made:
+        """What several quantities need of this design, made for the first of them."""
+        if key not in self._made:
+            self._made[key] = make()
+        found: Made = self._made[key]
+        return found
 
     @cached_property
     def _response(self) -> tuple[FloatArray, FloatArray]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
+from ..curves.tasks import Measure, TaskName
 from ..metrics.quantity import Asked
 from ..metrics.registry import listed
 from .curves import SCHEMA
@@ -60,10 +63,11 @@ KEYS = tuple(name for names in (*_KEYS, *_VERDICTS) for name in names)
 
 
 def columns_table() -> list[str]:
-    """A table of Markdown: column, unit, meaning; `<a>`, `<b>` stand for any two signal types."""
+    """A table of Markdown: column, unit, meaning; `<a>`, `<b>` stand for any two signal types, `<task>` for a task."""
     types = ("<a>", "<b>")
     rows = [_row(names, "", meaning) for names, meaning in _KEYS.items()]
-    for quantity in listed(Asked(types, types, any_place=True)):
+    tasks = tuple(TaskName("<task>", metric, ("<light>",)) for metric in get_args(Measure))
+    for quantity in listed(Asked(types, types, any_place=True, tasks=tasks)):
         rows.append(_row((quantity.name,), quantity.unit, quantity.meaning))
     rows.append(_row(("worst_<quantity>",), "", _WORST))
     rows += [_row(names, "", meaning) for names, meaning in _VERDICTS.items()]

@@ -39,7 +39,8 @@ class Problem:
     @property
     def quantities(self) -> Mapping[str, Quantity]:
         """What objective and constraints may name."""
-        return quantities_of(Asked(self.view.lights.classes, edge_shift=True, population=self.population))
+        tasks = () if self.view.tasks is None else self.view.tasks.keys
+        return quantities_of(Asked(self.view.lights.classes, edge_shift=True, population=self.population, tasks=tasks))
 
     @property
     def population(self) -> bool:

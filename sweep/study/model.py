@@ -19,6 +19,7 @@ from ..camera.sensor import SensorCurves
 from ..camera.view import View
 from ..curves.lights import Lights, Pair, class_pairs
 from ..curves.spectrum import WavelengthGrid
+from ..curves.tasks import StudyTasks
 from ..designs.space import Space
 from ..designs.technology import Technology
 from ..errors import Fault, StudyError
@@ -62,6 +63,7 @@ class Study:
     digests: Mapping[str, str]
     warnings: tuple[str, ...]
     held_out: Lights | None = None
+    tasks: StudyTasks | None = None
     plans: Mapping[str, Plan] = field(default_factory=dict)
 
     @property
@@ -94,6 +96,7 @@ class Study:
             self.any_place,
             self.edge_shift_nm > 0,
             self.section.population is not None,
+            () if self.tasks is None else self.tasks.keys,
         )
 
     @property
@@ -161,6 +164,7 @@ class Study:
             pixel=self.pixel if scene.noise is None else scene.noise.of(self.pixel),
             scenario=scene,
             technologies=tuple(technologies) if any(technologies) else (),
+            tasks=self.tasks,
             methods=self.plans[scenario].methods if scenario in self.plans else REFERENCE,
         )
 

@@ -9,9 +9,9 @@ from ..camera.effects import blur
 from ..camera.kernel import too_large
 from ..camera.mosaic import Mosaic
 from ..camera.scene import OBJECT_RESOLUTION, WhitePatchExposure
-from ..curves.color import VISIBLE_NM
 from ..curves.lights import Lights
 from ..curves.spectrum import Curves
+from ..curves.tasks import StudyTasks
 from ..designs.space import Space
 from ..errors import StudyError, SweepError
 from ..metrics.quantity import WORST_CASE, Asked, Quantity
@@ -19,6 +19,7 @@ from ..metrics.registry import listed, quantities_of
 from ..search.solver import ALGORITHMS
 from .axes import Axis
 from .document import Document
+from .luminances import check_luminances
 from .model import Search, Study
 from .populations import check_range, with_population
 from .schema import CfaSection, StudySection
@@ -29,8 +30,6 @@ from .technologies import check_lenses, with_technologies
 from .yaml_tree import Key
 
 MOST_DESIGNS = 10**9
-_LEAST_VISIBLE = 1e-6
-"""Share of a light's photons that the eye must see where its luminous intensity is given."""
 
 
 class _Resolver:
@@ -51,6 +50,7 @@ class _Resolver:
         self.faults = self.sources.faults
         self.add = self.sources.add
         self.unknown = self.sources.unknown
+        self.tasks: StudyTasks | None = None
 
     def resolve(self) -> Study:
         section = self.section
@@ -62,11 +62,16 @@ class _Resolver:
         sensor = with_technologies(sensor, section, self.sources)
         held_out = self.held_out(lights)
         lights = with_population(lights, section, self.sources)
+        self.read_tasks()
         spaces = SpaceBuilder(section, self.sources, sensor, mosaics).spaces()
         self.check_columns(lights)
-        self.check_luminances(lights)
+        check_luminances(section, lights, self.sources)
         self.check_images()
         check_lenses(section, sensor, spaces, self.sources)
+        if self.tasks is not None:
+            from .tasks import check_seen  # noqa: PLC0415  (few studies have tasks)
+
+            check_seen(self.tasks, section, sensor, spaces, self.sources)
         self.check_recognition(lights)
         self.check_objective(lights)
         self.check_constraints(lights)
@@ -91,6 +96,7 @@ class _Resolver:
             digests=dict(self.sources.digests),
             warnings=tuple(self.sources.warnings),
             held_out=held_out,
+            tasks=self.tasks,
         )
         self.check_memory(study)
         check_range(study, self.sources)
@@ -111,12 +117,21 @@ class _Resolver:
             self.add(("validate", "leave_one_out"), "nothing is searched", None, "a study with `search`")
         return None if asked is None or asked.lights is None else self.sources.held_out(asked.lights, lights)
 
+    def read_tasks(self) -> None:
+        """The study's tasks, where it has some."""
+        if self.section.tasks is not None:
+            from .tasks import tasks_of  # noqa: PLC0415  (few studies have tasks)
+
+            self.tasks = tasks_of(self.section.tasks, self.sources)
+
     def asked(self, lights: Lights, *, edge_shift: bool | None = None) -> Asked:
         """What an objective or a constraint can name; `edge_shift`: as if worst cases were asked for, or not."""
         recognition = self.section.recognition
         states = () if recognition is None else tuple(recognition.states or lights.classes)
         shifts = self.section.production.edge_shift_nm > 0 if edge_shift is None else edge_shift
-        return Asked(lights.classes, states, edge_shift=shifts, population=self.section.population is not None)
+        population = self.section.population is not None
+        tasks = () if self.tasks is None else self.tasks.keys
+        return Asked(lights.classes, states, edge_shift=shifts, population=population, tasks=tasks)
 
     def check_columns(self, lights: Lights) -> None:
         """Every pair of signal types has columns of its own."""
@@ -127,21 +142,6 @@ class _Resolver:
                 pairs = f"{'/'.join(other.pair)} and {'/'.join(quantity.pair)}"
                 problem = f"the pairs {pairs} share the column {quantity.name}"
                 self.add(("lights",), problem, None, "other names of signal types")
-
-    def check_luminances(self, lights: Lights) -> None:
-        """Candelas are given of lights, and of a background, that the eye sees."""
-        nodes = self.section.wavelengths.nodes_nm
-        visible = (nodes >= VISIBLE_NM[0]) & (nodes <= VISIBLE_NM[1])
-        share = self.section.wavelengths.integrate(lights.photons * visible)
-        dark = [name for name, part in zip(lights.names, share, strict=True) if not part >= _LEAST_VISIBLE]
-        allowed = f"photons between {VISIBLE_NM[0]:g} and {VISIBLE_NM[1]:g} nm"
-        for name, scenario in self.section.scenarios.items():
-            if scenario.intensity_cd is not None and dark:
-                problem = f"a light that the eye does not see has no luminous intensity: {dark[0]}"
-                self.add(("scenarios", name, "intensity_cd"), problem, scenario.intensity_cd, allowed)
-            if scenario.background_cd_m2 and not visible.any():
-                problem = "a background on wavelengths that the eye does not see has no luminance"
-                self.add(("scenarios", name, "background_cd_m2"), problem, scenario.background_cd_m2, allowed)
 
     def check_images(self) -> None:
         """Every target makes an image that can be computed."""

@@ -20,6 +20,7 @@ from ..metrics.objective import Objective
 from ..types import Number, Section
 from .axes import ScenarioTemplate, Span, Values, expanded
 from .schema_curves import Documented, LightsSection, Name, SensorSection, builtin, named
+from .schema_tasks import TasksAsked
 
 _FEWEST_PATCHES = 10
 _MOST_ROWS = 64
@@ -261,6 +262,8 @@ class StudySection(Documented):
     """The lamps that the lights stand for: temperature, binning, ageing; then worst_csd_... quantities exist."""
     recognition: Recognition | None = None
     """How often noise confuses signal types; needs noise in every scenario."""
+    tasks: TasksAsked = None
+    """What else designs are judged by: `all`, a list of tasks of the package, or a mapping with own ones."""
     objective: Objective = Objective(minimum={"csd_yellow_red": 1.0})
     """What is maximized: a CSD or sensitivity, or several: {minimum: {...}} or {sum: {...}} with weights."""
     constraints: dict[Name, Bound] = {}

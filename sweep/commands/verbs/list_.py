@@ -1,4 +1,4 @@
-"""List studies."""
+"""List studies, or the spectra that the package ships."""
 
 from __future__ import annotations
 
@@ -14,12 +14,23 @@ PANEL = OF_STUDIES
 
 
 def list_(
-    folder: Annotated[Path, typer.Argument(help="Folder of the studies.")] = Path("studies"),
+    folder: Annotated[
+        str, typer.Argument(help="Folder of the studies; `data` lists the spectra of the package instead.")
+    ] = "studies",
     data: DataFolder = None,
     output: Outputs = Path("outputs"),
 ) -> None:
-    """List the studies of a folder: question, number of designs, and whether they have been run."""
-    from ..list_studies import list_lines
+    """List the studies of a folder: question, number of designs, and whether they have been run.
 
-    for line in list_lines(folder, output, data):
+    `sweep list data` lists the spectra that the package ships; a folder of that name is `./data`.
+    """
+    if folder == "data":
+        from ..list_data import data_lines
+
+        lines = data_lines()
+    else:
+        from ..list_studies import list_lines
+
+        lines = list_lines(Path(folder), output, data)
+    for line in lines:
         typer.echo(line)

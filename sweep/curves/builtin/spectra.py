@@ -1,0 +1,111 @@
+"""Measured and standard spectra that the package ships, with a data card for each set (`tests/make_spectra.py`)."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Literal
+
+import numpy as np
+
+from ...types import FloatArray
+from ..spectrum import Resampling, WavelengthGrid, photons_from_energy, resample
+
+SpectrumKind = Literal["reflectance", "emission"]
+_FILE = "spectra.parquet"
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """A spectrum as it came: `value` at `wavelength_nm`, ndarray[n] each; of an emission relative radiant power."""
+
+    name: str
+    kind: SpectrumKind
+    wavelength_nm: FloatArray
+    value: FloatArray
+
+
+@dataclass(frozen=True)
+class Card:
+    """What is known of a set of spectra: where it comes from, who may use it, whom to thank, its range and digest.
+
+    `groups`: the parts of the set that a task may name, with the number of spectra of each. `surrogate`: modeled by
+    us from stated numbers, not measured.
+    """
+
+    name: str
+    source: str
+    license: str
+    credit: str
+    kind: str
+    groups: Mapping[str, int]
+    first_nm: float
+    last_nm: float
+    sha256: str
+    surrogate: bool = False
+
+
+@cache
+def _read() -> tuple[dict[str, dict[str, str]], dict[str, dict[str, tuple[Spectrum, ...]]]]:
+    """Set -> what the file says of it, and set -> group -> spectra, in the file's order."""
+    from pyarrow import parquet  # noqa: PLC0415  (few studies need it)
+
+    table = parquet.read_table(str(files(__package__).joinpath(_FILE)))
+    told = json.loads(table.schema.metadata[b"cards"])
+    found: dict[str, dict[str, list[Spectrum]]] = {}
+    for row in table.to_pylist():
+        wave, value = (np.asarray(row[key], dtype=float) for key in ("wavelength_nm", "value"))
+        spectrum = Spectrum(row["name"], row["kind"], wave, value)
+        found.setdefault(row["set"], {}).setdefault(row["group"], []).append(spectrum)
+    groups = {name: {group: tuple(own) for group, own in parts.items()} for name, parts in found.items()}
+    return told, groups
+
+
+def shipped_groups() -> dict[str, tuple[Spectrum, ...]]:
+    """Group -> its spectra, over all sets."""
+    return {group: own for parts in _read()[1].values() for group, own in parts.items()}
+
+
+def numbers_digest(spectra: tuple[Spectrum, ...]) -> str:
+    """SHA-256 of names and numbers (32-bit floats, wavelengths first), hexadecimal."""
+    found = hashlib.sha256()
+    for each in spectra:
+        wave, value = each.wavelength_nm.astype(np.float32), each.value.astype(np.float32)
+        found.update(each.name.encode() + wave.tobytes() + value.tobytes())
+    return found.hexdigest()
+
+
+def cards() -> list[Card]:
+    """The card of each set of the file; its range and digest are those of the numbers that are there."""
+    told, parts = _read()
+    found = []
+    for name, own in parts.items():
+        every = tuple(spectrum for group in own.values() for spectrum in group)
+        sizes = {group: len(spectra) for group, spectra in own.items()}
+        first, last = min(s.wavelength_nm[0] for s in every), max(s.wavelength_nm[-1] for s in every)
+        source, license_, credit = (told[name][key] for key in ("source", "license", "credit"))
+        kind = every[0].kind
+        found.append(
+            Card(name, source, license_, credit, kind, sizes, float(first), float(last), numbers_digest(every))
+        )
+    return found
+
+
+def spectrum_of(group: str, name: str) -> Spectrum:
+    """A spectrum of a group by its name."""
+    return next(spectrum for spectrum in shipped_groups()[group] if spectrum.name == name)
+
+
+def gridded(grid: WavelengthGrid, spectrum: Spectrum) -> FloatArray:
+    """A reflectance, or a relative photon spectrum, on the grid, ndarray[n_wavelengths].
+
+    On a grid that is coarser than its samples it is the mean over each bin, so that narrow lines keep their photons.
+    """
+    finest = float(np.diff(spectrum.wavelength_nm).min())
+    method: Resampling = "mean" if grid.step_nm > finest else "linear"
+    value = resample(spectrum.wavelength_nm, np.maximum(spectrum.value, 0.0), grid, method, "zero")
+    return value if spectrum.kind == "reflectance" else photons_from_energy(grid.nodes_nm, value)

@@ -1,0 +1,153 @@
+"""The eight tasks that the package ships, and tasks of a study's own from the groups of spectra that it ships."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from ...types import FloatArray
+from ..color import color_matching, luminance_per_photon_radiance
+from ..spectrum import WavelengthGrid, energy_from_photons, equal_photons
+from ..tasks import ILLUMINANTS, Chart, GriddedTask, TaskName
+from . import spectra, stand_ins
+from .surrogate import surrogate_parameters
+from .tl16 import tl16
+
+_WHITE_LED = [f"LED-{kind}" for kind in ("B1", "B2", "B3", "B4", "B5", "BH1", "V1", "V2")]
+_HID = ["HP4", "HP5"]
+_GRAY = 0.18
+_STREET = ("d65", "a", "led", "hps")
+_MOST = 20
+"""Spectra of a class of a shipped task: of larger groups an even share."""
+
+
+def illuminant(grid: WavelengthGrid, name: str) -> FloatArray:
+    """Relative photons of a light, ndarray[n_wavelengths]."""
+    return spectra.gridded(grid, spectra.spectrum_of(*ILLUMINANTS[name]))
+
+
+def task_groups() -> dict[str, int]:
+    """Every group that a task may name as a class, and how many spectra it has."""
+    shipped = {name: len(own) for name, own in spectra.shipped_groups().items()}
+    return shipped | {name: len(shapes) for name, shapes in stand_ins.STAND_INS.items()}
+
+
+def is_surface(group: str) -> bool:
+    """Whether a group is of surfaces, not of lamps."""
+    if group in stand_ins.STAND_INS:
+        return stand_ins.is_sheeting(group)
+    return spectra.shipped_groups()[group][0].kind == "reflectance"
+
+
+def group(grid: WavelengthGrid, name: str, most: int | None = None) -> FloatArray:
+    """The spectra of a group, ndarray[n, n_wavelengths]; `most`: so many of them, evenly spaced in their order."""
+    if name in stand_ins.STAND_INS:
+        return np.stack([shape.on(grid) for shape in stand_ins.STAND_INS[name]])
+    own = spectra.shipped_groups()[name]
+    count = len(own) if most is None else min(most, len(own))
+    chosen = np.unique(np.linspace(0, len(own) - 1, count).round().astype(int))
+    return np.stack([spectra.gridded(grid, own[at]) for at in chosen])
+
+
+def chart(grid: WavelengthGrid, reflectances: FloatArray, lights: Sequence[str]) -> Chart:
+    """Patches of these reflectances, ndarray[n_patches, n_wavelengths], under lights of 1 lx."""
+    matching = color_matching(grid)
+    photons, gray, xyz, white = [], [], [], []
+    for name in lights:
+        light = equal_photons(grid, illuminant(grid, name)[None])[0]
+        of_white = light / (np.pi * luminance_per_photon_radiance(grid, light[None])[0])  # 1 lx: a luminance of 1 / pi
+        seen = np.concatenate([reflectances, np.ones((1, grid.size))]) * of_white
+        found = energy_from_photons(grid.nodes_nm, seen) @ matching.T
+        photons.append(seen[:-1])
+        gray.append(_GRAY * of_white)
+        xyz.append(found[:-1] / found[-1, 1])
+        white.append(found[-1] / found[-1, 1])
+    return Chart(np.stack(photons), np.stack(gray), np.stack(xyz), np.stack(white))
+
+
+def separation_task(
+    grid: WavelengthGrid, name: str, classes: Mapping[str, FloatArray], lights: Sequence[str] = ()
+) -> GriddedTask:
+    """A task of classes of spectra, ndarray[n, n_wavelengths] each: lamps, or reflectances under each of `lights`."""
+    stacked = np.concatenate(list(classes.values()))
+    lit = [stacked * illuminant(grid, light) for light in lights] or [stacked]
+    types = tuple(kind for kind, own in classes.items() for _ in own)
+    photons = np.stack([equal_photons(grid, own) for own in lit])
+    return GriddedTask(TaskName(name, "separation", tuple(lights) or ("",)), types, photons)
+
+
+def own_task(
+    grid: WavelengthGrid, name: str, classes: Mapping[str, Sequence[str]], lights: Sequence[str]
+) -> GriddedTask:
+    """A task of groups that the package ships."""
+    found = {kind: np.concatenate([group(grid, each) for each in names]) for kind, names in classes.items()}
+    return separation_task(grid, name, found, lights)
+
+
+def _color(grid: WavelengthGrid, name: str) -> GriddedTask:
+    lights = _STREET
+    index = chart(grid, group(grid, "iso_17321")[:18], ["d50"])
+    return GriddedTask(
+        TaskName(name, "color", lights), chart=chart(grid, group(grid, "colorchecker"), lights), index=index
+    )
+
+
+def _low_light(grid: WavelengthGrid, name: str) -> GriddedTask:
+    lights = ("a", "led", "hps")
+    return GriddedTask(TaskName(name, "low_light", lights), chart=chart(grid, group(grid, "colorchecker"), lights))
+
+
+def _vehicle_lamps(grid: WavelengthGrid, name: str) -> GriddedTask:
+    white = np.stack([illuminant(grid, "a"), *_named(grid, _WHITE_LED)])
+    return separation_task(grid, name, {**_groups(grid, "brake red", "turn amber"), "reversing white": white})
+
+
+def _emergency(grid: WavelengthGrid, name: str) -> GriddedTask:
+    white = np.stack(_named(grid, [*_WHITE_LED, *_HID]))
+    return separation_task(grid, name, {**_groups(grid, "emergency blue"), "white": white})
+
+
+def _road_marking(grid: WavelengthGrid, name: str) -> GriddedTask:
+    return separation_task(grid, name, _groups(grid, "white marking", "yellow marking"), (*_STREET, "lps"))
+
+
+def _traffic_signs(grid: WavelengthGrid, name: str) -> GriddedTask:
+    return separation_task(
+        grid, name, _groups(grid, *(g for g in stand_ins.STAND_INS if stand_ins.is_sheeting(g))), _STREET
+    )
+
+
+def _vegetation(grid: WavelengthGrid, name: str) -> GriddedTask:
+    lights = tl16(grid, surrogate_parameters())
+    leaves = group(grid, "canopy", _MOST) * illuminant(grid, "d65")
+    return separation_task(grid, name, {"vegetation": leaves, "green": lights.photons[lights.members["green"]]})
+
+
+def _unseen_lamps(grid: WavelengthGrid, name: str) -> GriddedTask:
+    return separation_task(grid, name, _groups(grid, "unseen green", "unseen yellow", "unseen red"))
+
+
+def _groups(grid: WavelengthGrid, *names: str) -> dict[str, FloatArray]:
+    return {name: group(grid, name, _MOST) for name in names}
+
+
+def _named(grid: WavelengthGrid, names: Sequence[str]) -> list[FloatArray]:
+    return [spectra.gridded(grid, spectra.spectrum_of("cie_illuminants", name)) for name in names]
+
+
+_MADE: dict[str, Callable[[WavelengthGrid, str], GriddedTask]] = {
+    "color": _color,
+    "low_light": _low_light,
+    "vehicle_lamps": _vehicle_lamps,
+    "emergency": _emergency,
+    "road_marking": _road_marking,
+    "traffic_signs": _traffic_signs,
+    "vegetation": _vegetation,
+    "unseen_lamps": _unseen_lamps,
+}
+
+
+def shipped(grid: WavelengthGrid, name: str) -> GriddedTask:
+    """A task that the package ships, on the grid."""
+    return _MADE[name](grid, name)

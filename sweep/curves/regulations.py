@@ -1,0 +1,43 @@
+"""Color regions of regulations: where the surrogates of vehicle lamps and of sign sheeting have to lie."""
+
+from __future__ import annotations
+
+from .color import ColorRegion
+
+_R48 = "UN Regulation 48, 2.29, color of the light emitted from a device (red, amber, white)"
+_R65 = "UN Regulation 65, special warning lamps (blue)"
+LAMP_REGIONS = {
+    "red": ColorRegion(((0, 1, 0.335), (-1, -1, -0.980)), _R48),
+    "amber": ColorRegion(((-1, 1, -0.120), (0, -1, -0.390), (-0.670, -1, -0.790)), _R48),
+    "white": ColorRegion(
+        ((-0.640, 1, 0.150), (0, 1, 0.440), (1, 0, 0.500), (0.750, -1, -0.050), (-1, 0, -0.310)),
+        f"{_R48}; its convex part",
+    ),
+    "blue": ColorRegion(((-0.805, 1, 0.065), (1, 1, 0.400), (1, -0.600, 0.133)), _R65),
+}
+"""red: y <= 0.335, y >= 0.980 - x; amber: y <= x - 0.120, y >= 0.390, y >= 0.790 - 0.670 x; blue: y <= 0.065 + 0.805 x,
+y <= 0.400 - x, x <= 0.133 + 0.600 y; white: y <= 0.150 + 0.640 x, y <= 0.440, x <= 0.500, y >= 0.050 + 0.750 x,
+x >= 0.310 (right of x = 0.443 the regulation lets y down to 0.382)."""
+
+
+def corners(*points: tuple[float, float], source: str) -> ColorRegion:
+    """The convex region with these corners (x, y), in either order of rotation."""
+    area = sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(points, (*points[1:], points[0]), strict=True))
+    ordered = points if area > 0 else points[::-1]
+    bounds = []
+    for (x0, y0), (x1, y1) in zip(ordered, (*ordered[1:], ordered[0]), strict=True):
+        normal = (y1 - y0, x0 - x1)  # outward of a polygon that runs counterclockwise
+        bounds.append((*normal, normal[0] * x0 + normal[1] * y0))
+    return ColorRegion(tuple(bounds), source)
+
+
+_FHWA = "23 CFR 655, subpart F, appendix, table 1: daytime color of retroreflective sign material (D65, 2 degrees)"
+SHEETING_REGIONS = {
+    "white": corners((0.303, 0.300), (0.368, 0.366), (0.340, 0.393), (0.274, 0.329), source=_FHWA),
+    "red": corners((0.648, 0.351), (0.735, 0.265), (0.629, 0.281), (0.565, 0.346), source=_FHWA),
+    "orange": corners((0.558, 0.352), (0.636, 0.364), (0.570, 0.429), (0.506, 0.404), source=_FHWA),
+    "yellow": corners((0.498, 0.412), (0.557, 0.442), (0.479, 0.520), (0.438, 0.472), source=_FHWA),
+    "green": corners((0.026, 0.399), (0.166, 0.364), (0.286, 0.446), (0.207, 0.771), source=_FHWA),
+    "blue": corners((0.140, 0.035), (0.244, 0.210), (0.190, 0.255), (0.065, 0.216), source=_FHWA),
+}
+"""Corners (x, y) of each color."""

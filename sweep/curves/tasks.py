@@ -1,0 +1,116 @@
+"""What else a camera must see: tasks as spectra on the wavelength grid, with what their columns are called by."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..types import FloatArray, IndexArray
+
+Measure = Literal["color", "low_light", "separation"]
+Case = str
+"""The light of a task: an illuminant's name, as columns write it; empty for a task of lamps alone."""
+
+SHIPPED: Mapping[str, str] = {
+    "color": "colors of 24 patches after a color matrix, under daylight, a filament, a white LED and a sodium lamp",
+    "low_light": "how little light is enough for a clean gray",
+    "vehicle_lamps": "brake red, turn amber and reversing white",
+    "emergency": "emergency blue and white headlamps",
+    "road_marking": "white and yellow road markings",
+    "traffic_signs": "six colors of traffic signs",
+    "vegetation": "leaves by day and green signals",
+    "unseen_lamps": "green, yellow and red lamps that no search has seen",
+}
+"""Every task that the package ships, and what it is about."""
+ILLUMINANTS: Mapping[str, tuple[str, str]] = {
+    "d65": ("cie_illuminants", "D65"),
+    "d50": ("cie_illuminants", "D50"),
+    "a": ("cie_illuminants", "A"),
+    "led": ("cie_illuminants", "LED-B3"),
+    "hps": ("cie_illuminants", "HP1"),
+    "lps": ("light_sources", "LPS"),
+}
+"""Lights by the names that columns give them, as group and spectrum: daylight, a filament, a white LED, sodium lamps of
+high and low pressure."""
+
+
+@dataclass(frozen=True)
+class TaskName:
+    """What names a task's columns: its metric, and its lights."""
+
+    name: str
+    metric: Measure
+    cases: tuple[Case, ...]
+
+    def column(self, what: str, case: Case = "") -> str:
+        """`<task>_<what>`, and the light's name where the task has several."""
+        return "_".join(part for part in (self.name, what, case) if part)
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Patches of a chart under several lights.
+
+    `photons`: ndarray[n_cases, n_patches, n_wavelengths], photon radiance of each at 1 lx, per nm; `gray`: the same of
+    18 % gray, ndarray[n_cases, n_wavelengths]. `xyz`: CIE 1931 of the patches, ndarray[n_cases, n_patches, 3], and
+    `white` of a perfect reflector, ndarray[n_cases, 3], which has Y = 1.
+    """
+
+    photons: FloatArray
+    gray: FloatArray
+    xyz: FloatArray
+    white: FloatArray
+
+
+@dataclass(frozen=True)
+class GriddedTask:
+    """A task on the wavelength grid.
+
+    A separation has classes of spectra: `photons`, ndarray[n_cases, n_spectra, n_wavelengths], each integrates to one
+    photon, so that brightness tells nothing; `types`: the class of each. A task of color has a chart, and `index`: the
+    one of the metamerism index.
+    """
+
+    key: TaskName
+    types: tuple[str, ...] = ()
+    photons: FloatArray | None = None
+    chart: Chart | None = None
+    index: Chart | None = None
+
+    @property
+    def pairs(self) -> tuple[IndexArray, IndexArray]:
+        """Both spectra of every pair of two classes."""
+        kinds = np.asarray(self.types)
+        first, second = np.triu_indices(len(kinds), 1)
+        apart = kinds[first] != kinds[second]
+        return first[apart], second[apart]
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Under which all tasks are judged: exposure, read noise, and the illuminance of charts."""
+
+    exposure_s: float
+    read_noise_e: float
+    illuminance_lx: float
+
+
+@dataclass(frozen=True)
+class StudyTasks:
+    """The tasks of a study, each once, and their conditions."""
+
+    conditions: Conditions
+    tasks: tuple[GriddedTask, ...]
+
+    @property
+    def keys(self) -> tuple[TaskName, ...]:
+        """What names their columns."""
+        return tuple(task.key for task in self.tasks)
+
+    @property
+    def by_name(self) -> Mapping[str, GriddedTask]:
+        """Each by its name."""
+        return {task.key.name: task for task in self.tasks}

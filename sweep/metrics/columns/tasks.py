@@ -1,0 +1,72 @@
+"""What a study's tasks measure: color, low light, and separations of other lamps and of surfaces."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+from ...camera.view import View
+from ...curves.tasks import Case
+from ...designs.block import Block
+from ..quantity import Asked, Columns, DesignMetric, Quantity
+from ..smooth import Rows, SmoothDesign
+
+if TYPE_CHECKING:
+    from ..tasks.judge import JudgedTask
+
+PREFIX = "task_"
+"""How the metrics of tasks begin."""
+
+
+class TaskFigures(DesignMetric):
+    """Nothing where a study has no tasks."""
+
+    order = 6
+
+    def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
+        """Every figure of each task, under each of its lights."""
+        if not asked.tasks:
+            return ()
+        from ..tasks.figures import figures_of
+
+        return tuple(
+            Quantity(
+                name=name,
+                metric=PREFIX + figure.what,
+                meaning=figure.meaning,
+                unit=figure.unit,
+                label=" ".join(part for part in (task.name.replace("_", " "), figure.words, case.upper()) if part),
+                digits=figure.digits,
+                wanted=figure.wanted,
+                ends=("min",) if figure.wanted == "more" else ("max",),
+                goal=figure.wanted == "more",
+                smooth=partial(_rows, task=task.name, what=figure.what, case=case),
+            )
+            for task in asked.tasks
+            for name, figure, case in figures_of(task)
+        )
+
+    def of_designs(self, view: View, block: Block) -> Columns:
+        """See `judge.task_columns`."""
+        if view.tasks is None:
+            return {}
+        from ..tasks.judge import task_columns
+
+        return task_columns(view, block)
+
+
+def _rows(design: SmoothDesign, *, task: str, what: str, case: Case) -> Rows:
+    """A figure's rows with their derivatives; the figures of a task share what they need."""
+    from ..tasks.looks import COMPLEX_STEP
+
+    rows = design.once(task, partial(_judged, design, task)).rows(what, case)
+    return Rows(rows.real[0], rows.imag.T / COMPLEX_STEP)
+
+
+def _judged(design: SmoothDesign, task: str) -> JudgedTask:
+    from ..tasks.judge import JudgedTask
+    from ..tasks.looks import Looks
+
+    tasks = design.view.tasks
+    assert tasks is not None
+    return JudgedTask(tasks.by_name[task], Looks.along(design.view, design.curves, design.by_u), tasks.conditions)
