@@ -1,6 +1,6 @@
 """`python -m sweep` is the command `sweep`."""
 
-from .commands.app import main
+from .commands.start import main
 
 if __name__ == "__main__":
     main()
