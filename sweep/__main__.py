@@ -1,6 +1,6 @@
 """`python -m sweep` is the command `sweep`."""
 
-from .commands.start import main
+from .commands.start import start
 
 if __name__ == "__main__":
-    main()
+    start()

@@ -13,7 +13,7 @@ from .hard.scenes import DARK, F2, FAMILY, FAR, FIXED, scene
 AXES = ((590.0, 600.0, 610.0), (5.0, 20.0), (640.0, 655.0), (0.0, 6.0, 30.0), (0.5, 1.0))
 
 
-SPACE = Space("sweep", "edges", "RYNCy", Filter(FAMILY, ("N",), "Y", "G"), AXES)
+SPACE = Space("sweep", "edges", "RYNCy", Filter(FAMILY, {"N": "Y"}, "G"), AXES)
 
 
 def view_of(scenario: dict[str, Any], pixel: dict[str, Any] | None = None, **methods: str) -> View:

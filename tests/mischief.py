@@ -52,7 +52,7 @@ def mischievous(study: Study, file: Path) -> Study:
     assert sweep.filter is not None
     family = Mischief(study.grid.nodes_nm, study.sensor.qe["Y"], study.sensor.qe["G"], 1)
     family.file = file
-    made = replace(sweep, filter=Filter(family, sweep.filter.channels, sweep.filter.base, sweep.filter.target))
+    made = replace(sweep, filter=Filter(family, sweep.filter.bases, sweep.filter.target))
     return replace(study, spaces=(*study.spaces[:-1], made))
 
 

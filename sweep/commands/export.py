@@ -31,14 +31,14 @@ class Filters:
     """The channels of a CFA with a design's filters in it.
 
     `qe`: ndarray[n_channels, n_wavelengths], in the order of the mosaic's channels. `bases`: modified channel -> name
-    of the curve that it replaces; `base_qe`: that curve, ndarray[n_wavelengths].
+    of the curve that it replaces; `base_qe`: those curves, ndarray[n_wavelengths] each.
     """
 
     mosaic: Mosaic
     wavelength_nm: FloatArray
     qe: FloatArray
     bases: Mapping[str, str]
-    base_qe: FloatArray
+    base_qe: Mapping[str, FloatArray]
 
     @property
     def curves(self) -> dict[str, FloatArray]:
@@ -52,10 +52,10 @@ class Filters:
         """
         found = {}
         for channel, base in self.bases.items():
-            made = self.curves[channel]
+            made, base_qe = self.curves[channel], self.base_qe[channel]
             nothing = np.where(made > 0, np.inf, 1.0)
             with np.errstate(over="ignore"):
-                found[f"{channel}_over_{base}"] = np.divide(made, self.base_qe, out=nothing, where=self.base_qe > 0)
+                found[f"{channel}_over_{base}"] = np.divide(made, base_qe, out=nothing, where=base_qe > 0)
         return found
 
 
@@ -103,9 +103,9 @@ def filters_of(study: Study, row: Mapping[Any, Any]) -> Filters:
     view = study.view(space, row["scenario"])
     qe = view.qe.copy()
     qe[list(view.modified)] = made[0]
-    channels, base = ((), "") if space.filter is None else (space.filter.channels, space.filter.base)
-    base_qe = study.sensor.curve(base) if base else np.zeros(study.grid.size)
-    return Filters(view.mosaic, study.grid.nodes_nm, qe, dict.fromkeys(channels, base), base_qe)
+    bases = {} if space.filter is None else space.filter.bases
+    replaced = {channel: study.sensor.curve(base) for channel, base in bases.items()}
+    return Filters(view.mosaic, study.grid.nodes_nm, qe, bases, replaced)
 
 
 def _verify(output: Output, row: Mapping[Any, Any], filters: Filters) -> None:
@@ -114,7 +114,7 @@ def _verify(output: Output, row: Mapping[Any, Any], filters: Filters) -> None:
     kept = output.curves.designs.get(int(row["design_id"]), {})
     check_kept(output, kept, {channel: filters.curves[channel] for channel in filters.bases})
     if made:
-        ratio = sum(values.sum() for values in made) / (len(made) * filters.base_qe.sum())
+        ratio = sum(values.sum() for values in made) / sum(base.sum() for base in filters.base_qe.values())
         if not abs(ratio - row["sensitivity"]) <= _SAME_TOTAL * max(1.0, ratio):
             problem = "computed again, this is not what the run has: sensitivity"
             raise OutputError(Fault(problem, str(output.folder), allowed="the version of that run"))

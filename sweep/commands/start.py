@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 
 
-def main() -> None:
+def start() -> None:
     """Load the command, and run it."""
     usual = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # not where the caller had it ignored
     if usual:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -18,13 +19,17 @@ Kind = Literal["reference", "design", "sweep", "search"]
 
 @dataclass(frozen=True)
 class Filter:
-    """A family bound to its curves, which channels of which CFA it replaces, and by what it works, where stated."""
+    """A family bound to its curves: which curve of the sensor it replaces in each channel, and by what it works."""
 
     family: Family
-    channels: tuple[str, ...]
-    base: str
+    bases: Mapping[str, str]
     target: str
     technology: Technology | None = None
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The channels that it replaces."""
+        return tuple(self.bases)
 
 
 @dataclass(frozen=True)

@@ -133,7 +133,7 @@ def filter_of_run(folder: Path, design: str | None, wishes: AskedFor) -> Judged:
     scene = {str(row["scenario"]): study.section.scenarios[str(row["scenario"])]}
     keys = {"pixel": study.section.pixel, "scenarios": scene, "wavelengths": study.grid}
     note = f"{folder}: {row['name'] or design} of {space.cfa}, in scenario {row['scenario']}"
-    bases = dict.fromkeys(space.filter.channels, space.filter.base)
+    bases = dict(space.filter.bases)
     return Judged(mosaic, bases, sensor, lights, types, named, keys, (note,), space.filter.technology)
 
 

@@ -36,10 +36,10 @@ def bases_of(study: Study, cfa: str, channels: Sequence[str], base: str | None) 
     Raises DataError where nothing says it.
     """
     said = {
-        channel: space.filter.base
+        channel: curve
         for space in study.spaces
         if space.filter is not None and space.cfa == cfa
-        for channel in space.filter.channels
+        for channel, curve in space.filter.bases.items()
     }
     named = dict(study.section.cfas[cfa].curves)
     found = {}

@@ -20,6 +20,7 @@ from . import tables
 from . import values as content
 from .answer import answer_sentences, large_numbers
 from .figures import draw_curves, draw_pareto, rendered
+from .filter_figures import filters_figure
 from .leaders import leaders_of
 from .noise import all_series, told_apart_table
 from .overview import draw_overview, overview_figure
@@ -131,7 +132,7 @@ def _drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
         figure = draw_pareto(content.pareto_figure(output, scenario, cfa))
         yield ("pareto" if number == 0 else f"pareto-{number + 1}"), f"Trade-off of {cfa}", figure
     for number, cfa in enumerate(cfas):
-        yield f"filters-{number + 1}", f"Filters of {cfa}", draw_curves(content.filters_figure(output, cfa))
+        yield f"filters-{number + 1}", f"Filters of {cfa}", draw_curves(filters_figure(output, cfa))
     for number, series in enumerate(all_series(output)):
         yield f"series-{number + 1}", series.title, draw_series(series)
     yield "tiles", "Tiles of the CFAs; a hatched pixel is modified", draw_tiles(tiles_figure(output))

@@ -17,6 +17,7 @@ from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
 from . import values as content
 from .figures import COLORS, CURVE_COLORS, TYPE_COLORS, ParetoFigure, even
+from .filter_figures import end_curves
 from .history import history_of
 from .noise import all_series
 from .overview import OverviewFigure, overview_figure
@@ -199,7 +200,7 @@ def _curves(output: Output) -> dict[str, Any]:
         "designs": {str(at): [_packed(qe, "f4") for qe in made.values()] for at, made in curves.designs.items()},
         "shades": {kind: _packed(shade, "f4") for kind, shade in content.light_shades(output).items()},
         "plain": {cfa: content.channel_curves(output, cfa) for cfa in output.study.cfas},
-        "ends": {cfa: content.end_curves(output, cfa) for cfa in dict.fromkeys(output.table["cfa"].astype(str))},
+        "ends": {cfa: end_curves(output, cfa) for cfa in dict.fromkeys(output.table["cfa"].astype(str))},
     }
 
 

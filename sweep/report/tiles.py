@@ -32,7 +32,8 @@ def tiles_figure(output: Output) -> TilesFigure:
     study = output.study
     modified: dict[str, dict[str, str]] = {}
     for entry in (*study.designs.values(), *study.sweeps.values(), *study.boxes.values()):
-        modified.setdefault(entry.cfa, {}).update(dict.fromkeys(entry.channel, entry.base))
+        if entry.base is not None:
+            modified.setdefault(entry.cfa, {}).update(dict.fromkeys(entry.channel, entry.base))
     return TilesFigure({name: mosaic_of(output, name) for name in names}, modified)
 
 

@@ -16,7 +16,7 @@ from ..results.facts import Origin
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
 from ..study.schema import Modification
-from .figures import LIMIT_NAME, TYPE_COLORS, CurvesFigure, ParetoFigure, Points
+from .figures import TYPE_COLORS, CurvesFigure, ParetoFigure, Points
 from .names import label
 from .series import Line, SeriesFigure
 from .signal_figures import ChartFigure, Cloud
@@ -220,38 +220,6 @@ def _cloud(points: pd.DataFrame, title: str, first: str, other: str, near: Neare
         )
         nearest = (x, y, near[2])
     return Cloud(title, f"{first} / DN", f"{other} / DN", types, nearest)
-
-
-def filters_figure(output: Output, cfa: str) -> CurvesFigure:
-    """Modified channels of the named designs and the best ones of a CFA, beside the green and yellow pixels' curves and
-    those that they go between.
-    """
-    rows = drawn(output)
-    rows = rows[rows["cfa"] == cfa]
-    ends = end_curves(output, cfa)
-    curves = {name: values for name, values in output.curves.sensor.items() if name in ends}
-    for row in rows.to_dict("records"):
-        made = output.curves.drawn[row["design_id"]]
-        curves |= {label(row) + (f", {channel}" if len(made) > 1 else ""): qe for channel, qe in made.items()}
-    if cfa in output.curves.limits:
-        curves[LIMIT_NAME] = output.curves.limits[cfa]
-    dashed = (*ends, LIMIT_NAME)
-    return CurvesFigure(
-        f"{cfa}: modified channel",
-        "QE",
-        output.curves.wavelength_nm,
-        curves,
-        dashed,
-        {LIMIT_NAME: "#000000"},
-        light_shades(output),
-    )
-
-
-def end_curves(output: Output, cfa: str) -> list[str]:
-    """Names of the sensor's curves that a CFA's filters go between, and those of the green and the yellow pixel."""
-    entries = [entry for entry in modifications(output) if entry.cfa == cfa]
-    ends = {end for entry in entries for end in (entry.base, entry.to) if isinstance(end, str)} | {"G", "Y"}
-    return [name for name in output.curves.sensor if name in ends]
 
 
 def mosaic_of(output: Output, cfa: str) -> Mosaic:

@@ -21,11 +21,11 @@ def limited_by_table(
 ) -> pa.Table:
     """Columns `design_id` and `limited_by_<a>_<b>`, the names of two lights, of the rows to draw and of the front."""
     every = pd.concat([rows, on_front]).drop_duplicates("design_id")
-    groups: dict[tuple[str, str], list[tuple[int, FloatArray]]] = {}
-    views: dict[tuple[str, str], View] = {}
+    groups: dict[tuple[str, ...], list[tuple[int, FloatArray]]] = {}
+    views: dict[tuple[str, ...], View] = {}
     for row in every[every["status"] == "ok"].to_dict("records"):
         space, curves = row_curves(study, row)
-        key = (str(row["scenario"]), space.cfa)
+        key = (str(row["scenario"]), space.cfa, *(() if space.filter is None else space.filter.channels))
         views.setdefault(key, study.view(space, key[0]))
         groups.setdefault(key, []).append((int(row["design_id"]), curves))
     calls = [

@@ -139,7 +139,7 @@ class Study:
 
     def view(self, space: Space, scenario: str) -> View:
         """What the designs of `space` share in a scenario."""
-        bases = {} if space.filter is None else dict.fromkeys(space.filter.channels, space.filter.base)
+        bases = {} if space.filter is None else space.filter.bases
         technology = None if space.filter is None else space.filter.technology
         return self.view_of(space.cfa, scenario, bases, technology)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -52,11 +52,12 @@ class Modification(Documented):
     cfa: Name
     """One of `cfas`."""
     family: Annotated[Name, Field(description=f"One of {told()}; or FILE.py:CLASS of your own.")] = "stopband"
-    channel: Annotated[
-        list[Name], BeforeValidator(_listed, json_schema_input_type=list[Name] | Name), Field(min_length=1)
-    ]
+    where: Literal["pixel", "lens"] = "pixel"
+    """`pixel`: the filter replaces a channel. `lens`: it is a glass in front of the lens, whose transmission every
+    channel sees, the same at every place of the image; it starts from 1, and has neither `channel` nor `base`."""
+    channel: Annotated[list[Name], BeforeValidator(_listed, json_schema_input_type=list[Name] | Name)] = []
     """The channel of the CFA that the filter replaces; `dual` takes a list of two."""
-    base: Name
+    base: Name | None = None
     """The curve that the filter starts from."""
     to: Name | Annotated[float, Field(ge=0, le=1)] | None = None
     """The curve that it follows inside the band; a number is a floor, that share of the base."""

@@ -6,10 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
 
+import numpy as np
+
 from ..camera.mosaic import Mosaic
 from ..camera.sensor import SensorCurves
 from ..curves.builtin.surrogate import surrogate_parameters
 from ..designs.family import Family, Parameter
+from ..designs.glass import Glass
 from ..designs.plugin import PluginFamily, is_plugin, plugin_parts, read_plugin
 from ..designs.registry import FAMILIES, build_family
 from ..designs.space import Filter, Kind, Space
@@ -92,6 +95,7 @@ class SpaceBuilder:
 
     def _check_channels(self, path: tuple[Key, ...], entry: Modification, mosaic: Mosaic | None) -> None:
         """The channels that a family replaces: of the CFA, as many as the family wants, each once."""
+        self._check_where(path, entry)
         for channel in entry.channel:
             if mosaic is not None and channel not in mosaic.channels:
                 self.sources.unknown((*path, "channel"), f"channel of {entry.cfa}", channel, list(mosaic.channels))
@@ -103,10 +107,25 @@ class SpaceBuilder:
             self.sources.add((*path, "family"), "a family of one's own has no edges that production could shift")
         elif not own and entry.family not in FAMILIES:
             self.sources.unknown((*path, "family"), "family", entry.family, list(FAMILIES))
-        elif len(entry.channel) != (n_modified := 1 if own else FAMILIES[entry.family].n_modified):
+        elif entry.where == "lens" and not own and FAMILIES[entry.family].n_modified > 1:
+            self.sources.add((*path, "family"), f"{entry.family} replaces several channels; a glass is one filter")
+        elif entry.channel and len(entry.channel) != (n_modified := 1 if own else FAMILIES[entry.family].n_modified):
             self.sources.add((*path, "channel"), f"{entry.family} replaces {n_modified} channel(s)", entry.channel)
         elif len(set(entry.channel)) < len(entry.channel):
             self.sources.add((*path, "channel"), "a channel is named twice", entry.channel)
+
+    def _check_where(self, path: tuple[Key, ...], entry: Modification) -> None:
+        """What a filter in a pixel must say, and one in front of the lens must not."""
+        if entry.where == "lens":
+            for key, given in (("channel", entry.channel), ("base", entry.base), ("technology", entry.technology)):
+                if given:
+                    self.sources.add((*path, key), "every channel sees a filter in front of the lens: leave it out")
+            if isinstance(entry.to, str):
+                self.sources.add((*path, "to"), "a glass goes to a share of its light", entry.to, "0 to 1")
+        else:
+            for key, given in (("channel", entry.channel), ("base", entry.base)):
+                if not given:
+                    self.sources.add((*path, key), "missing")
 
     def _filtered(
         self,
@@ -123,14 +142,14 @@ class SpaceBuilder:
         mosaic = self.mosaics.get(entry.cfa)
         if entry.cfa not in self.section.cfas:
             self.sources.unknown((*path, "cfa"), "CFA", entry.cfa, list(self.section.cfas))
-        if entry.base not in curves:
+        if entry.base is not None and entry.base not in curves:
             self.sources.unknown((*path, "base"), "curve", entry.base, curves)
         if isinstance(entry.to, str) and entry.to not in curves:
             self.sources.unknown((*path, "to"), "curve", entry.to, curves)
         self._check_channels(path, entry, mosaic)
         if len(self.sources.faults) > before:
             return []
-        base = self.sensor.curve(entry.base)
+        base = np.ones_like(self.sensor.qe[curves[0]]) if entry.base is None else self.sensor.curve(entry.base)
         target = (
             self.sensor.curve(entry.to) if isinstance(entry.to, str) else None if entry.to is None else base * entry.to
         )
@@ -147,10 +166,20 @@ class SpaceBuilder:
         if len(self.sources.faults) > before:
             return []
         target_name = "" if entry.to is None else str(entry.to)
-        made = Filter(family, tuple(entry.channel), entry.base, target_name, entry.technology)
+        bases = self._bases(entry, self.mosaics[entry.cfa])
+        if entry.where == "lens":
+            family = cast(Family, Glass(family, np.stack([self.sensor.curve(name) for name in bases.values()])))
+        made = Filter(family, bases, target_name, entry.technology)
         space = Space(kind, name, entry.cfa, made, tuple(ordered), kind != "search" and rows is None, rows)
         check_filter(space, path, self.sensor, self.sources)
         return [space]
+
+    def _bases(self, entry: Modification, mosaic: Mosaic) -> dict[str, str]:
+        """Channel -> the curve that the filter replaces there, or stands before."""
+        if entry.base is not None:
+            return dict.fromkeys(entry.channel, entry.base)
+        named = self.section.cfas[entry.cfa].curves
+        return {c: named.get(c, self.sensor.curve_name(entry.cfa, c)) for c in mosaic.channels}
 
     def _family(self, entry: Modification, base: FloatArray, target: FloatArray | None) -> Family:
         """The family over its curves; raises SweepError."""
@@ -164,7 +193,7 @@ class SpaceBuilder:
             raise SweepError(Fault("no such file", value=file, allowed=f"a path relative to {searched}"))
         source, self.sources.digests[file] = read_plugin(found)
         own = PluginFamily(entry.family, source, nodes_nm, base, target)
-        bounds = f"0 and {entry.base}" if own.below_base else "0 and 1"
+        bounds = f"0 and {entry.base or 1}" if own.below_base else "0 and 1"
         note = (
             f"{entry.family} runs code of that file: its gradients are differences, and its filters are taken for any "
             f"between {bounds}, which each of them is checked to be"

@@ -41,16 +41,18 @@ def check_filter(space: Space, path: tuple[Key, ...], sensor: SensorCurves, sour
     """What is put on a base can be taken apart from it: the base is no interference filter, nor exceeded by one."""
     made = space.filter
     assert made is not None
-    if _moves(sensor, made.base):
-        problem = f"the base curve {made.base} is an interference filter itself"
-        sources.add((*path, "base"), problem, made.base, "a base of pigment")
+    for base in dict.fromkeys(made.bases.values()):
+        if _moves(sensor, base):
+            problem = f"the base curve {base} is an interference filter itself"
+            sources.add((*path, "base"), problem, base, "a base of pigment")
     if made.technology is None or made.technology.interference is None:
         return
     low, high = (np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max))
-    base = sensor.curve(made.base)
-    if (made.family.upper(low, high) > base * (1 + _ROUNDING)).any():
+    bases = np.stack([sensor.curve(base) for base in made.bases.values()])
+    if (made.family.upper(low, high) > bases * (1 + _ROUNDING)).any():
         problem = "an interference filter lets through a share of its base"
-        sources.add((*path, "technology"), problem, f"filters that exceed {made.base}", "a filter below it, or pigment")
+        exceeded = f"filters that exceed {' and '.join(dict.fromkeys(made.bases.values()))}"
+        sources.add((*path, "technology"), problem, exceeded, "a filter below it, or pigment")
 
 
 def check_lenses(section: StudySection, sensor: SensorCurves, spaces: Sequence[Space], sources: Sources) -> None:

@@ -52,8 +52,8 @@ class Finder:
         if name == "sweep.commands.app":
             os.kill(os.getpid(), signal.SIGINT)
 sys.meta_path.insert(0, Finder())
-from sweep.commands.start import main
-main()
+from sweep.commands.start import start
+start()
 """
 
 

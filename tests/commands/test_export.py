@@ -257,7 +257,7 @@ def test_a_transmission_where_the_base_has_no_light() -> None:
 
     def of(made: list[float]) -> np.ndarray:
         qe = np.stack([base, base, np.array(made), base])
-        return Filters(mosaic, wave, qe, {"N": "Y"}, base).transmissions()["N_over_Y"]
+        return Filters(mosaic, wave, qe, {"N": "Y"}, {"N": base}).transmissions()["N_over_Y"]
 
     np.testing.assert_array_equal(of([0.0, 0.25, 0.4]), [1.0, 0.5, 1.0])
     np.testing.assert_array_equal(of([0.1, 0.25, 0.6]), [np.inf, 0.5, 0.6 / 0.4])

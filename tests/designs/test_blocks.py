@@ -112,7 +112,7 @@ def test_the_separable_route_refuses_what_is_not_separable(monkeypatch: pytest.M
     two = MultiStopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"], bands=2)
     free = FreeForm(GRID.nodes_nm, SENSOR.qe["Y"], np.array([500.0, 600.0]))
     for family, axes in ((two, AXES + AXES), (free, ((0.5,), (0.5,)))):
-        assert edges_of(Space("sweep", "x", "RYNCy", Filter(family, ("N",), "Y", ""), axes), 0, 1) is None
+        assert edges_of(Space("sweep", "x", "RYNCy", Filter(family, {"N": "Y"}, ""), axes), 0, 1) is None
     assert edges_of(Space("reference", "RGGB", "RGGB"), 0, 1) is None
     assert edges_of(replace(SPACE, gridded=False), 0, 1) is None
     monkeypatch.setattr(blocks, "_MOST_BYTES", 1000)

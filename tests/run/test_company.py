@@ -26,7 +26,7 @@ from ..hard.scenes import DARK, F2, FAMILY, FAR, FIXED, GRID, SENSOR, lights
 
 # Crossed edges among them, which lift N above Y, so that it sets the exposure.
 AXES = ((590.0, 603.0, 690.0), (5.0, 20.0), (410.0, 640.0, 655.0), (0.0, 6.0, 30.0), (0.5, 0.8, 1.0))
-MIXED = Space("sweep", "edges", "RYNCy", Filter(FAMILY, ("N",), "Y", "G"), AXES)
+MIXED = Space("sweep", "edges", "RYNCy", Filter(FAMILY, {"N": "Y"}, "G"), AXES)
 MORE = {
     "noise, far": view_of({"noise": True, "target": FAR, "optics": F2}, DARK | {"prnu": 0.01}),
     "background, pixel by pixel": view_of(
@@ -100,14 +100,14 @@ def test_a_bad_design_changes_no_other(separable: bool) -> None:
             "sweep",
             "free",
             "RYNCy",
-            Filter(FreeForm(GRID.nodes_nm, SENSOR.qe["Y"], np.arange(540.0, 700.0, 8.0)), ("N",), "Y", ""),
+            Filter(FreeForm(GRID.nodes_nm, SENSOR.qe["Y"], np.arange(540.0, 700.0, 8.0)), {"N": "Y"}, ""),
             ((0.3, 0.7, 0.9), *(((0.2, 0.85),) * 5), *((0.6,),) * 14),
         ),
         Space(
             "sweep",
             "bands",
             "RYNCy",
-            Filter(MultiStopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"], bands=2), ("N",), "Y", "G"),
+            Filter(MultiStopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"], bands=2), {"N": "Y"}, "G"),
             (
                 (470.0, 480.0, 490.5),
                 (10.0,),
@@ -144,7 +144,7 @@ def test_two_modified_channels(scenario: dict[str, Any]) -> None:
     modified = tuple(mosaic.channels.index(name) for name in ("Na", "Nb"))
     view = View(GRID, mosaic, qe, modified, SENSOR.qe["C"], lights(), Pixel(), Scenario.model_validate(scenario))
     family = Dual(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["C"])
-    space = Space("sweep", "dual", "RAACy", Filter(family, ("Na", "Nb"), "Y", "C"), AXES)
+    space = Space("sweep", "dual", "RAACy", Filter(family, {"Na": "Y", "Nb": "Y"}, "C"), AXES)
     curves = space.curves(space.points(0, 40), GRID.size)
     imager = Imager(view)
     whole = evaluate(imager, curves)

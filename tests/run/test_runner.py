@@ -142,7 +142,7 @@ def test_a_failing_design_is_a_row(study: Study) -> None:
 
     family = Fragile(study.grid.nodes_nm, study.sensor.qe["Y"], study.sensor.qe["G"])
     axes = ((2.0, 3.0, 4.0, 5.0), (10.0,), (650.0,), (10.0,), (1.0,))
-    space = Space("sweep", "fragile", "RYNCy", Filter(family, ("N",), "Y", "G"), axes)
+    space = Space("sweep", "fragile", "RYNCy", Filter(family, {"N": "Y"}, "G"), axes)
     rules = replace(rules_of(study), constraints={})
     rows = run_job(Job(space, "chart", 0, 4, 0), study.view(space, "chart"), rules).to_pandas()
     assert list(rows["status"]) == ["ok", "error: ValueError: no such filter", "ok", "not finite"]
