@@ -140,13 +140,14 @@ def _others(output: Output, leaders: Leaders) -> Iterator[str]:
         return
     measure = per_light(separation.name)
     same = more and most is not None and most["design_id"] == rate["design_id"]
-    who = "It" if same else _capital(full_name(rate))
-    text = f"{who} separates most per light{', too' if same else ''}: "
-    text += f"{_rate_told(rate[measure])} {separation.unit} per ms of exposure"
+    told = _rate_told(rate[measure])
     rivals = [r for r in (best, leaders.plain) if r is not None and r["design_id"] != rate["design_id"]]
-    against = ", ".join(
-        f"{full_name(r)} {_rate_told(r[measure])}" for r in {r["design_id"]: r for r in rivals}.values()
-    )
+    others = {full_name(r): _rate_told(r[measure]) for r in rivals}
+    tied = [name for name, value in others.items() if value == told]
+    who = " and ".join(["it" if same else full_name(rate), *tied])
+    text = f"{_capital(who)} separate{'' if tied else 's'} most per light{', too' if same else ''}: "
+    text += f"{told} {separation.unit} per ms of exposure"
+    against = ", ".join(f"{name} {value}" for name, value in others.items() if name not in tied)
     yield text + (f" ({against})" if against else "") + ("" if same else _missed(output, rate)) + "."
 
 

@@ -34,6 +34,7 @@ CURVE_COLORS = {
     "Y": "#c9a800",
     "Cy": "#17a2a2",
     "C": "#555555",
+    "W": "#999999",
 }
 TRACED_NAME, LIMIT_NAME = "found by the search", "limit of any filter, unquantized"
 """What a search found at levels of sensitivity, and what is proven there."""

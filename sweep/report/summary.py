@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..results.facts import SearchFacts
 from ..results.output import Output
-from ..results.tables import NAMED
 from .answer import answer_sentences
 from .assumed import assumed_line
 from .published import comparison_lines, comparison_with_published
@@ -26,7 +26,7 @@ def _scene_lines(output: Output) -> list[str]:
             continue
         each = ", ".join(
             f"{row['name']} {shown.told(row[shown.name])}"
-            + (f" at {row['sensitivity']:.3f}" if row["kind"] == NAMED and len(scenarios) == 1 else "")
+            + (f" at {row[CFA_SENSITIVITY]:.3f}" if len(scenarios) == 1 else "")
             for row in rows[(rows["scenario"] == name) & rows[shown.name].notna()].to_dict("records")
         )
         if each:
@@ -92,7 +92,9 @@ def _plan_line(output: Output) -> str:
 def counts_line(output: Output) -> str:
     """How many designs there are, and what the report leaves out."""
     counts = output.counts
-    text = f"{counts.rows:,} designs, {counts.feasible:,} feasible, {counts.front:,} of these on the Pareto front"
+    text = f"{counts.rows:,} designs, {counts.feasible:,} feasible"
+    if counts.front:
+        text += f", {counts.front:,} of these on the Pareto front of separation and sensitivity"
     if counts.failed:
         text += f", {counts.failed:,} failed"
     if counts.left_out:
