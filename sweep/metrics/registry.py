@@ -15,7 +15,9 @@ METRICS = tuple(sorted(made_in(columns, Metric), key=lambda metric: metric.order
 def listed(asked: Asked) -> list[Quantity]:
     """The columns of a study in order, worst cases last; names of pairs may coincide."""
     found = [quantity for metric in METRICS for quantity in metric.quantities(asked)]
-    return found + [quantity.worst() for quantity in found if asked.edge_shift and quantity.goal]
+    return found + [
+        quantity.worst() for quantity in found if asked.edge_shift and quantity.goal and not quantity.nominal
+    ]
 
 
 @lru_cache(maxsize=64)

@@ -12,7 +12,7 @@ from ..curves.lights import Pair
 from ..designs.family import Family
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.objective import Objective
-from ..metrics.quantity import Asked, Quantity
+from ..metrics.quantity import DN, Asked, Quantity
 from ..metrics.registry import quantities_of
 from ..types import FloatArray, IndexArray
 
@@ -25,7 +25,7 @@ class Problem:
     """Maximize `objective` over the box `low`..`high` (ndarray[n_parameters]) under `constraints`.
 
     Quantities are those of `metrics.registry` with smooth rows; the worst ones are over edges that come out up to
-    `edge_shift_nm` off.
+    `edge_shift_nm` off. `states`: signal types that noise may confuse.
     """
 
     view: View
@@ -35,16 +35,17 @@ class Problem:
     objective: Objective
     constraints: Mapping[str, Bound]
     edge_shift_nm: float = 0.0
+    states: tuple[str, ...] = ()
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
         """What objective and constraints may name."""
-        return quantities_of(Asked(self.view.lights.classes, edge_shift=True))
+        return quantities_of(Asked(self.view.lights.classes, self.states, edge_shift=True))
 
     @property
     def pairs(self) -> dict[str, Pair]:
         """The pair of signal types of each distance."""
-        own = [q for q in self.quantities.values() if q.squared and not q.extreme]
+        own = [q for q in self.quantities.values() if q.apart == DN and not q.extreme]
         return {q.name: q.pair for q in own if q.pair is not None}
 
     @property

@@ -201,4 +201,5 @@ class Study:
             objective=self.objective,
             constraints=self.constraints,
             edge_shift_nm=self.edge_shift_nm,
+            states=self.states,
         )

@@ -19,13 +19,13 @@ from ..metrics.registry import listed, quantities_of
 from ..search.solver import ALGORITHMS
 from .axes import Axis
 from .document import Document
+from .goals import check_goals
 from .model import Search, Study
 from .schema import CfaSection, StudySection
 from .sensors import sensor_of
 from .sources import KeptSources, Sources
 from .spaces import SpaceBuilder
 from .technologies import check_lenses, with_technologies
-from .yaml_tree import Key
 
 MOST_DESIGNS = 10**9
 _LEAST_VISIBLE = 1e-6
@@ -66,8 +66,7 @@ class _Resolver:
         self.check_images()
         check_lenses(section, sensor, spaces, self.sources)
         self.check_recognition(lights)
-        self.check_objective(lights)
-        self.check_constraints(lights)
+        check_goals(section, self.sources, self.asked(lights))
         self.check_published(lights, mosaics)
         search = self.search(spaces, lights)
         if self.faults:
@@ -196,38 +195,6 @@ class _Resolver:
                     names = [OBJECT_RESOLUTION] if row in section.geometry else columns
                     if row in known and quantity not in names:
                         self.unknown((*path, quantity), "quantity", quantity, names)
-
-    def check_quantity(self, path: tuple[Key, ...], what: str, name: str, known: list[str], lights: Lights) -> bool:
-        """Add a fault where the name is not `known`."""
-        if name in known:
-            return True
-        shifted = quantities_of(self.asked(lights, edge_shift=True)).get(name)
-        if shifted is not None and shifted.extreme == "worst edges" and not self.section.production.edge_shift_nm:
-            self.add(path, f"{name} needs `production.edge_shift_nm`", None, "a shift above 0")
-        else:
-            self.unknown(path, what, name, known)
-        return False
-
-    def check_objective(self, lights: Lights) -> None:
-        goals = [name for name, quantity in quantities_of(self.asked(lights)).items() if quantity.goal]
-        path: tuple[Key, ...] = ("objective",)
-        given = self.document.data.get("objective")
-        for name in self.section.objective.weights:
-            inner = (*path, self.section.objective.rule.name, name) if isinstance(given, dict) else path
-            self.check_quantity(inner, "objective", name, goals, lights)
-
-    def check_constraints(self, lights: Lights) -> None:
-        known = {name: q for name, q in quantities_of(self.asked(lights)).items() if q.ends}
-        for name, bound in self.section.constraints.items():
-            path = ("constraints", name)
-            if not self.check_quantity(path, "quantity", name, list(known), lights):
-                continue
-            if known[name].smooth is None and self.section.search is not None:
-                self.add(path, f"the search does not know {name}", None, "a study without `search`")
-            for end in ("min", "max"):
-                if end not in known[name].ends and getattr(bound, end) is not None:
-                    right = " or ".join(f"`{each}`" for each in known[name].ends)
-                    self.add((*path, end), f"{name} has no `{end}`", getattr(bound, end), right)
 
     def search(self, spaces: list[Space], lights: Lights) -> Search | None:
         section = self.section.search

@@ -259,7 +259,8 @@ class StudySection(Documented):
     recognition: Recognition | None = None
     """How often noise confuses signal types; needs noise in every scenario."""
     objective: Objective = Objective(minimum={"csd_yellow_red": 1.0})
-    """What is maximized: a CSD or sensitivity, or several: {minimum: {...}} or {sum: {...}} with weights."""
+    """What is maximized: a CSD or sensitivity, or several: {minimum: {...}} or {sum: {...}} with weights; or, of errors
+    under noise, made small: {least: {...}}."""
     constraints: dict[Name, Bound] = {}
     """Quantity -> {min: ...}, {max: ...} or both."""
     search: SearchSection | None = None

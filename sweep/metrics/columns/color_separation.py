@@ -38,7 +38,8 @@ class ColorSeparation(ReadoutMetric):
                 goal=True,
                 promised=True,
                 pair=pair,
-                squared=True,
+                rows="squares",
+                apart="DN",
                 smooth=partial(_squared, pair=pair),
             )
             for pair in class_pairs(asked.classes)
@@ -55,7 +56,8 @@ class ColorSeparation(ReadoutMetric):
                 of=each.name,
                 ends=(),
                 goal=False,
-                squared=False,
+                rows="values",
+                apart="",
                 smooth=None,
             )
             for each in nearest
