@@ -53,6 +53,16 @@ class LinearImager(Imager):
         per_e = pixel.dn_per_e**2 * (1 + 2 * pixel.prnu**2 * self.by_pixel._expected(curves[None])[0])
         return self.by_pixel.readout.spread(per_e * self.by_pixel._slope(curves, curves_gradient))
 
+    def spread_electrons(self, curves: FloatArray) -> FloatArray:
+        """Expected electrons of the pixels, each with its share of a channel's variance, of the shape of `smooth`."""
+        return self.by_pixel.readout.spread(self.by_pixel._expected(curves))
+
+    def spread_shares(self) -> FloatArray:
+        """Sum of the shares that the pixels have in a channel's variance, ndarray[n_cases, n_channels]."""
+        kernel = self.by_pixel.electrons.kernel
+        repeats = self.by_pixel._expected(self.view.base_qe[None]).shape[1] // len(kernel.spread)
+        return np.repeat(kernel.spread.sum(axis=1), repeats, axis=0)
+
     @cached_property
     def by_pixel(self) -> LinearImager:
         """The same scene with its pixels kept apart, whose variances are not those of their mean.
@@ -91,15 +101,35 @@ class LinearImager(Imager):
         ndarray[n_cases, n_signals, n_units, n_wavelengths]; the smooth response is linear in it where N does not set
         the exposure.
         """
+        kernel, channel = self.electrons.kernel, self.view.modified[modified]
+        rates = self._per_qe(modified, curves, kernel.light[:, :, channel], kernel.uniform[:, :, channel])
+        return rates * self.view.pixel.dn_per_e
+
+    def spread_per_qe(self, modified: int, curves: FloatArray) -> FloatArray:
+        """Electrons per QE of one modified channel in its pixels, each with its share of the channel's variance.
+
+        ndarray[n_cases, n_signals, n_wavelengths]; see `per_qe`.
+        """
+        own, channel = self.by_pixel, self.view.modified[modified]
+        kernel = own.electrons.kernel
+        share = kernel.spread[:, :, channel]
+        light = np.einsum("xu,xuw->xw", share, kernel.light[:, :, channel])
+        uniform = (share * kernel.uniform[:, :, channel]).sum(axis=1)
+        return own._per_qe(modified, curves, light[:, None], uniform[:, None])[:, :, 0]
+
+    def _per_qe(self, modified: int, curves: FloatArray, light: FloatArray, uniform: FloatArray) -> FloatArray:
+        """Electrons per QE of one modified channel, ndarray[n_cases, n_signals, n_units, n_wavelengths].
+
+        `light`, `uniform`: what units get through it, see `Kernel`, without the axis of the channels.
+        """
         own, channel = self.electrons, self.view.modified[modified]
         exposure_s = own.exposure_s(curves[None])
         scales = own.scales(exposure_s)[0]
-        light = own.kernel.light[:, None, None, :, channel] * own.signals[:, None, :]
-        light = own.at_each_place(light[..., None, :], [channel])[..., 0, :]
+        seen = light[:, None, None] * own.signals[:, None, :]
+        seen = own.at_each_place(seen[..., None, :], [channel])[..., 0, :]
         background = own.background[own.place, modified][:, None, None, None]
-        uniform = own.kernel.uniform[:, None, None, :, channel, None] * background
-        both = light * scales[None, :, None, None, None] + uniform
-        return np.asarray(both.reshape(-1, *both.shape[2:]) * (exposure_s[0] * self.view.pixel.dn_per_e), dtype=float)
+        both = seen * scales[None, :, None, None, None] + uniform[:, None, None, :, None] * background
+        return np.asarray(both.reshape(-1, *both.shape[2:]) * exposure_s[0], dtype=float)
 
 
 _imagers: Cache[bytes, LinearImager] = Cache(16)

@@ -122,7 +122,7 @@ class Quantity(Column):
     @property
     def has_limit(self) -> bool:
         """Whether the limit of any filter knows it."""
-        return self.apart == DN or self.share or self.linear is not None
+        return bool(self.apart) or self.share or self.linear is not None
 
     @property
     def column(self) -> Column:

@@ -14,8 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import log_ndtr, logsumexp
 
+from ..camera.linear import smooth_imager
+from ..camera.view import View
 from ..curves.lights import Pair, class_pairs
 from ..types import FloatArray
+from .discrimination import detectability
 from .smooth import Rows, SmoothDesign
 
 _LN10 = math.log(10)
@@ -139,3 +142,12 @@ def _between(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:
         + (found.by_second * variance_by_u[1]).sum(axis=-1)
     )
     return Rows(found.values, by_u.T)
+
+
+def smooth_detectability(view: View, curves: FloatArray, pair: Pair) -> FloatArray:
+    """d' of the smooth response, the smallest over the cases, ndarray[n_designs]; see `smooth.smooth_csd`."""
+    imager = smooth_imager(view)
+    mean, variance = imager.smooth(curves), imager.variance(curves)
+    both = view.members[pair[0]], view.members[pair[1]]
+    over = [detectability(mean[:, case], variance[:, case], *both) for case in range(mean.shape[1])]
+    return np.asarray(np.min(over, axis=0), dtype=float)

@@ -15,10 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_matrix, hstack, vstack
 
-from ..camera.linear import smooth_imager
+from ..camera.linear import LinearImager, smooth_imager
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
 from ..types import FloatArray, IndexArray
+from .least_noise import least_variance
 from .problem import Problem
 
 ROUNDING = 1e-9
@@ -152,14 +153,20 @@ class FilterProgram:
         # Exposure does not depend on N, so the response to a filter is linear, plus what does not depend on it.
         gain = imager.per_qe(0, self.base[None])[:, :, channel]
         fixed = np.delete(imager.smooth(self.base[None, None])[0], channel, axis=2)
+        noise = self._noise(imager) if self.noisy else None
         apart, columns = [np.empty((0, self.base.size))], [np.empty((0, 4))]
         for name, (a, b) in problem.pairs.items():
             bound, weight = problem.constraints.get(name), problem.objective.weights.get(name)
             if weight is None and (bound is None or bound.min is None):
                 continue
             first, second = view.members[a], view.members[b]
-            apart.append((gain[:, first, None] - gain[:, None, second]).reshape(-1, self.base.size))
-            squared = ((fixed[:, first, None] - fixed[:, None, second]) ** 2).sum(axis=3).ravel()
+            differences = gain[:, first, None] - gain[:, None, second]
+            squares = (fixed[:, first, None] - fixed[:, None, second]) ** 2
+            if noise is not None and problem.quantities[name].apart == "noise":
+                own_noise, others = ((each[:, first, None] + each[:, None, second]) / 2 for each in noise)
+                differences, squares = differences / np.sqrt(own_noise)[..., None], squares / others
+            apart.append(differences.reshape(-1, self.base.size))
+            squared = squares.sum(axis=3).ravel()
             least, slack = (0.0, 0.0) if bound is None else (bound.min or 0.0, FEASIBLE * bound.scale)
             own = [least, slack, 0.0 if weight is None else 1 / weight]
             columns.append(np.column_stack([squared, np.tile(own, (squared.size, 1))]))
@@ -170,6 +177,28 @@ class FilterProgram:
         most = np.sqrt(self._squared[:, None] + np.maximum(np.stack(ends, axis=1), 0.0) ** 2) * (1 + _SUM_ROUNDING)
         reach = np.divide(most, self._rate[:, None], out=np.full(most.shape, np.inf), where=self._rate[:, None] > 0)
         self.reach = np.where(most < (self._least - self._slack)[:, None], -np.inf, reach)
+
+    def _noise(self, imager: LinearImager) -> tuple[FloatArray, FloatArray]:
+        """The least variance in the modified channel, ndarray[n_cases, n_signals], and those of the others, DN^2."""
+        row, least = np.zeros_like(self.base), 0.0
+        bound = self.problem.constraints.get(SENSITIVITY)
+        if bound is not None and bound.min is not None:
+            row, least = 1 / self.base.sum() + row, bound.min - FEASIBLE * bound.scale
+        others = np.delete(imager.variance(self.base[None, None])[0], imager.view.modified[0], axis=2)
+        return least_variance(imager, self.base, self._box, row, least), others
+
+    @property
+    def noisy(self) -> bool:
+        """Whether any distance of the problem is in units of the noise, whose least is that of its sensitivity."""
+        asked = {*self.problem.objective.weights, *self.problem.constraints} & self.problem.pairs.keys()
+        return any(self.problem.quantities[name].apart == "noise" for name in asked)
+
+    def reaches(self, curve: FloatArray) -> float:
+        """The objective of a filter as this program counts it: with the least noise, no less than what it has."""
+        pairs, rows = self._rate > 0, self._rows.rate > 0
+        far = np.sqrt(self._squared + (self.apart @ curve) ** 2)[pairs] / self._rate[pairs]
+        linear = (self._rows.matrix @ curve + self._rows.constant)[rows] / self._rows.rate[rows]
+        return float(min(self.top, far.min(initial=np.inf), linear.min(initial=np.inf)))
 
     def _keep(self, wanted: IndexArray) -> None:
         self.apart, self.reach = self.apart[wanted], self.reach[wanted]

@@ -2,7 +2,8 @@
 
 All filters means: every N between the least transmission and the base curve that meets the study's bounds on slope,
 sensitivities and CSDs, whichever of two signals it makes the brighter one. The limit is that of the response before
-clipping and quantization, in the scene of the search. The certificate is a bracket: a filter that attains the lower
+clipping and quantization, in the scene of the search. Of d' it is a bound with the least noise (`least_noise.py`), near
+which no filter need be. The certificate is a bracket: a filter that attains the lower
 end, and linear programs that no filter above the upper end could meet. What only some families have (edges and bands,
 and their shifts in production) is left out: that makes the set of filters larger, so the upper end stays true for them.
 """
@@ -19,9 +20,12 @@ from ..camera.exposure import may_set_exposure
 from ..camera.pixel import unquantized
 from ..errors import Fault, SweepError
 from ..metrics.bound import FEASIBLE, Bound
+from ..metrics.columns.sensitivity import SENSITIVITY
 from ..metrics.evaluate import designed_quantities
 from ..metrics.objective import Objective
+from ..metrics.quantity import DN
 from ..metrics.smooth import smooth_csd, smooth_response
+from ..metrics.smooth_noise import smooth_detectability
 from ..types import FloatArray
 from .filter_program import ROUNDING, FilterProgram
 from .problem import Problem
@@ -29,6 +33,7 @@ from .sides import SideSearch
 
 _SENSITIVITY_TOLERANCE = 1e-6
 _MOST_PROGRAMS = 5000
+_NOT_LINEAR = "is not linear in the filter"
 _SHARES = (0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 """How far a solver's filter is moved toward one that is inside, to make up for the solver's tolerance."""
 
@@ -73,21 +78,27 @@ def limit_of(
     tolerance = tolerance_dn if set(nominal.pairs) & set(nominal.objective.weights) else _SENSITIVITY_TOLERANCE
 
     def value(curve: FloatArray, inside: FloatArray | None) -> tuple[float, FloatArray]:
-        return _inside(nominal, np.clip(curve, program.low, program.base), inside)
+        attained, moved = _inside(nominal, np.clip(curve, program.low, program.base), inside)
+        return (program.reaches(moved) if program.noisy and attained > -np.inf else attained), moved
 
     proof = SideSearch(program, value, tolerance, most_programs).run()
-    elsewhere = tuple(proof.proven_at(program, sensitivity) for sensitivity in sensitivities)
-    return Limit(proof.attained, proof.proven, proof.curve, left_out, program.solved, proof.open_parts, elsewhere)
+    least = nominal.constraints.get(SENSITIVITY)
+    from_here = -np.inf if not program.noisy or least is None or least.min is None else least.min
+    elsewhere = tuple(proof.proven_at(program, s) if s >= from_here else np.inf for s in sensitivities)
+    attained = proof.attained if proof.curve is None or not program.noisy else _attained(nominal, proof.curve)
+    return Limit(attained, proof.proven, proof.curve, left_out, program.solved, proof.open_parts, elsewhere)
 
 
 def why_not(problem: Problem) -> str | None:
     """Why a problem has no linear limit; None when it has."""
     unknown = [name for name in problem.objective.weights if not problem.quantities[name].has_limit]
+    noisy = any(problem.quantities[name].states for name in unknown)
+    why = "is not convex in the filter: its noise grows with the light; d' has a limit" if noisy else _NOT_LINEAR
     base, family = problem.view.base_qe[0], problem.family
     reasons: tuple[tuple[Callable[[], bool], str], ...] = (
         (lambda: family.n_modified != 1, "more than one modified channel"),
         (lambda: not problem.objective.rule.smallest, f"the objective is a {problem.objective.rule.name}"),
-        (lambda: bool(unknown), f"{', '.join(unknown)} is not linear in the filter"),
+        (lambda: bool(unknown), f"{', '.join(unknown)} {why}"),
         (lambda: problem.view.pixel.crosstalk > 0, "crosstalk mixes the modified channel into others"),
         (
             lambda: bool((_top(problem) > base * (1 + ROUNDING)).any()),
@@ -155,7 +166,8 @@ def _attained(problem: Problem, curve: FloatArray) -> float:
     curves = curve[None, None]
     found = designed_quantities(problem.view, curves)
     for name in {*problem.objective.weights, *problem.constraints} & problem.pairs.keys():
-        found[name] = smooth_csd(problem.view, curves, problem.pairs[name])
+        of = smooth_csd if problem.quantities[name].apart == DN else smooth_detectability
+        found[name] = of(problem.view, curves, problem.pairs[name])
     for name, bound in problem.constraints.items():
         if not bound.violation(found[name])[0] <= FEASIBLE:
             return -np.inf

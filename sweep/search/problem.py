@@ -12,7 +12,7 @@ from ..curves.lights import Pair
 from ..designs.family import Family
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.objective import Objective
-from ..metrics.quantity import DN, Asked, Quantity
+from ..metrics.quantity import Asked, Quantity
 from ..metrics.registry import quantities_of
 from ..types import FloatArray, IndexArray
 
@@ -44,8 +44,8 @@ class Problem:
 
     @property
     def pairs(self) -> dict[str, Pair]:
-        """The pair of signal types of each distance."""
-        own = [q for q in self.quantities.values() if q.apart == DN and not q.extreme]
+        """The pair of signal types of each distance, be it in DN or in units of the noise."""
+        own = [q for q in self.quantities.values() if q.apart and not q.extreme]
         return {q.name: q.pair for q in own if q.pair is not None}
 
     @property

@@ -92,6 +92,7 @@ def _quantity(metric: str, name: str, types: tuple[str, ...]) -> Quantity:
         nominal=True,  # each shift would take an evaluation with noise
         infinite=True,  # a signal without noise is told apart for certain
         rows="decades" if less else "squares",
+        apart="noise" if metric == D_PRIME else "",
         smooth=smooth,
     )
 
