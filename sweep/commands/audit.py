@@ -153,7 +153,9 @@ def _exact(study: Study, space: Space, scenario: str, points: FloatArray) -> dic
     """The promised columns with every effect on, ndarray[n_designs] each."""
     imager = imager_of(replace(study.view(space, scenario), methods=REFERENCE))
     shifts = [study.edge_shift_nm * s for s in SHIFTS if s] if study.edge_shift_nm and space.filter is not None else []
-    cases = [evaluate(imager, space.curves(points, study.grid.size), study.states)]
+    cases = [
+        evaluate(imager, space.curves(points, study.grid.size), study.states, probabilities=study.asked.probabilities)
+    ]
     cases += [evaluate(imager, space.curves(points, study.grid.size, shift)) for shift in shifts]
     promised = [quantity for quantity in study.quantities.values() if quantity.promised]
     worst = [quantity for quantity in promised if quantity.extreme == "worst edges"]

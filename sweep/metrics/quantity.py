@@ -155,12 +155,15 @@ class Quantity(Column):
 
 @dataclass(frozen=True)
 class Asked:
-    """What a study asks for: signal types, states that noise may confuse, any place of the light, shifts of edges."""
+    """What a study asks for: signal types, states that noise may confuse, any place of the light, shifts of edges, and
+    probabilities of detection and separation.
+    """
 
     classes: tuple[str, ...]
     states: tuple[str, ...] = ()
     any_place: bool = False
     edge_shift: bool = False
+    probabilities: bool = False
 
 
 class Metric(ABC):
@@ -196,7 +199,9 @@ class ReadoutMetric(Metric):
 
 
 class NoiseMetric(Metric):
-    """What mean and variance of a noisy scene give."""
+    """What mean and variance of a noisy scene give. `extra`: only where a study asks for probabilities."""
+
+    extra: ClassVar[bool] = False
 
     @abstractmethod
     def of_noise(

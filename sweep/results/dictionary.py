@@ -61,7 +61,7 @@ def columns_table() -> list[str]:
     """A table of Markdown: column, unit, meaning; `<a>`, `<b>` stand for any two signal types."""
     types = ("<a>", "<b>")
     rows = [_row(names, "", meaning) for names, meaning in _KEYS.items()]
-    for quantity in listed(Asked(types, types, any_place=True)):
+    for quantity in listed(Asked(types, types, any_place=True, probabilities=True)):
         rows.append(_row((quantity.name,), quantity.unit, quantity.meaning))
     rows.append(_row(("worst_<quantity>",), "", _WORST))
     rows += [_row(names, "", meaning) for names, meaning in _VERDICTS.items()]

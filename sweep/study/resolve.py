@@ -112,7 +112,8 @@ class _Resolver:
         recognition = self.section.recognition
         states = () if recognition is None else tuple(recognition.states or lights.classes)
         shifts = self.section.production.edge_shift_nm > 0 if edge_shift is None else edge_shift
-        return Asked(lights.classes, states, edge_shift=shifts)
+        also = recognition is not None and recognition.probabilities
+        return Asked(lights.classes, states, edge_shift=shifts, probabilities=also)
 
     def check_columns(self, lights: Lights) -> None:
         """Every pair of signal types has columns of its own."""

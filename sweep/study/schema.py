@@ -131,12 +131,14 @@ class Recognition(Section):
 
     `states`: the signal types to tell apart; all of them where it is left out. `patches`: raw patches that are drawn
     of every signal for each plain CFA, named design and answer of the search, half of them to train the classifiers;
-    0 draws none. `error_max`: a CFA is usable while no two states are confused more often.
+    0 draws none. `error_max`: a CFA is usable while no two states are confused more often. `probabilities`: columns of
+    CDP and CSP, too, which are discussed for IEEE P2020.
     """
 
     states: Annotated[list[Name], Field(min_length=2, max_length=MOST_TYPES)] | None = None
     patches: int = Field(default=200, ge=0, le=5000)
     error_max: float = Field(default=1e-3, ge=1e-300, lt=0.5)
+    probabilities: bool = False
 
     @model_validator(mode="after")
     def _enough(self) -> Recognition:
