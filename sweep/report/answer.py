@@ -62,7 +62,7 @@ def said_separation(output: Output, row: Row) -> str:
     separation = output.trade_off[0]
     told = separation.told(row[separation.name])
     light = f"at {row[CFA_SENSITIVITY]:.3f} {_OF_CLEAR}"
-    if separation.pair is None:
+    if separation.pair is None or separation.metric in _BY_NOISE:
         return f"reaches {separation.words} {told} {light}"
     worst = " in the worst case of production" if separation.extreme else ""
     return f"separates {' from '.join(separation.pair)} by {told}{worst} {light}"

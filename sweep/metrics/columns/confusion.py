@@ -35,6 +35,7 @@ _MEANINGS = {
     STATE_ERROR: "largest pairwise error over all pairs of states",
     STATE_ERROR_BOUND: "bound on how often the best rule tells the wrong state, for the worst signal",
 }
+_TOLD = {CNR: "contrast to noise", D_PRIME: "d'"}
 _ByPair = dict[Pair, FloatArray]
 _LESS = (ERROR, ERROR_BOUND, STATE_ERROR, STATE_ERROR_BOUND)
 
@@ -86,6 +87,7 @@ def _quantity(metric: str, name: str, types: tuple[str, ...]) -> Quantity:
         meaning=_MEANINGS[metric],
         pair=pairs[0] if metric in (CNR, D_PRIME, ERROR, ERROR_BOUND) else None,
         states=types,
+        label=f"{'/'.join(types)} {_TOLD[metric]}" if metric in _TOLD else "",
         wanted="less" if less else "more",
         ends=("max",) if less else ("min",),
         goal=True,
