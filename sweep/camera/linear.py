@@ -1,19 +1,29 @@
-"""The smooth response of a scene, neither clipped nor rounded, with its derivatives: what a search sees."""
+"""The smooth response of a scene and the variance of its noise, with their derivatives: what a search sees.
+
+Nothing is clipped or rounded. The noise is that of a pixel far from both ends of its range, whose steps of rounding
+are dithered: gain^2 (n + (PRNU n)^2 + read noise^2) + 1/12 for n expected electrons (EMVA 1288).
+"""
 
 from __future__ import annotations
 
 import hashlib
 import pickle
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
 from ..cache import Cache
+from ..errors import Fault, SweepError
 from ..types import FloatArray
 from .exposure import relative_slope
 from .imager import Imager
+from .methods import REFERENCE
 from .pixel import unquantized
 from .view import View
+
+_STEPS_DN2 = 1 / 12
+"""Variance of rounding to whole digital numbers, DN^2."""
 
 
 class LinearImager(Imager):
@@ -21,9 +31,7 @@ class LinearImager(Imager):
 
     def smooth(self, curves: FloatArray) -> FloatArray:
         """Unquantized, unclipped response, DN, ndarray[n_designs, n_cases, n_signals, n_channels]."""
-        exposure_s = self.electrons.exposure_s(curves)
-        expected = self.electrons.expected(curves, self.electrons.scales(exposure_s), exposure_s)
-        return self.readout.folded(unquantized(expected, self.readout.pixel))
+        return self.readout.folded(unquantized(self._expected(curves), self.readout.pixel))
 
     def gradient(self, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
         """Exact derivative of `smooth` at one design, with that of its exposure; a pulse's share of it is held.
@@ -31,6 +39,51 @@ class LinearImager(Imager):
         `curves`: ndarray[n_modified, n_wavelengths]; `curves_gradient`: ndarray[n_parameters, n_modified,
         n_wavelengths]. Returns DN per unit of parameter, ndarray[n_parameters, n_cases, n_signals, n_channels].
         """
+        return self.readout.folded(self._slope(curves, curves_gradient) * self.view.pixel.dn_per_e)
+
+    def variance(self, curves: FloatArray) -> FloatArray:
+        """Variance of the noise, DN^2, of the shape of `smooth`."""
+        electrons, pixel = self.by_pixel._expected(curves), self.readout.pixel
+        own = electrons + (pixel.prnu * electrons) ** 2 + pixel.read_noise_e**2
+        return self.by_pixel.readout.spread(pixel.dn_per_e**2 * own + _STEPS_DN2)
+
+    def variance_gradient(self, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
+        """Exact derivative of `variance` at one design, DN^2 per unit of parameter; see `gradient`."""
+        pixel = self.readout.pixel
+        per_e = pixel.dn_per_e**2 * (1 + 2 * pixel.prnu**2 * self.by_pixel._expected(curves[None])[0])
+        return self.by_pixel.readout.spread(per_e * self.by_pixel._slope(curves, curves_gradient))
+
+    def spread_electrons(self, curves: FloatArray) -> FloatArray:
+        """Expected electrons of the pixels, each with its share of a channel's variance, of the shape of `smooth`."""
+        return self.by_pixel.readout.spread(self.by_pixel._expected(curves))
+
+    def spread_shares(self) -> FloatArray:
+        """Sum of the shares that the pixels have in a channel's variance, ndarray[n_cases, n_channels]."""
+        kernel = self.by_pixel.electrons.kernel
+        repeats = self.by_pixel._expected(self.view.base_qe[None]).shape[1] // len(kernel.spread)
+        return np.repeat(kernel.spread.sum(axis=1), repeats, axis=0)
+
+    @cached_property
+    def by_pixel(self) -> LinearImager:
+        """The same scene with its pixels kept apart, whose variances are not those of their mean.
+
+        Raises SweepError where the pixels of all places of the light do not fit into memory.
+        """
+        apart = {name: getattr(REFERENCE, name) for name in ("saturation", "quantization")}
+        found = LinearImager(replace(self.view, methods=replace(self.view.methods, **apart)))
+        if found._others:
+            most = f"at most those of {found.n_cases} places: a smaller light, or a named place"
+            problem = "too many pixels for a search under noise"
+            raise SweepError(Fault(problem, value=f"{found.n_places} places", allowed=most))
+        return found
+
+    def _expected(self, curves: FloatArray) -> FloatArray:
+        """Expected electrons of the units, ndarray[n_designs, n_cases, n_signals, n_units]."""
+        exposure_s = self.electrons.exposure_s(curves)
+        return self.electrons.expected(curves, self.electrons.scales(exposure_s), exposure_s)
+
+    def _slope(self, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
+        """Exact derivative of `_expected` at one design, electrons per unit of parameter; see `gradient`."""
         own, n = self.electrons, len(curves_gradient)
         one = curves[None]
         exposure_s = own.exposure_s(one)
@@ -40,8 +93,7 @@ class LinearImager(Imager):
         uniform = own.through_filters(own.of_background(curves_gradient))
         slope = (light + uniform[:, :, None, None, :]).reshape(n, *whole.shape) * exposure_s
         relative = relative_slope(self.view, curves, curves_gradient)
-        slope = slope + relative[:, None, None, None] * whole
-        return self.readout.folded(np.asarray(slope, dtype=float) * self.view.pixel.dn_per_e)
+        return np.asarray(slope + relative[:, None, None, None] * whole, dtype=float)
 
     def per_qe(self, modified: int, curves: FloatArray) -> FloatArray:
         """DN per QE of one modified channel at every wavelength, with the exposure of the design `curves`.
@@ -49,15 +101,35 @@ class LinearImager(Imager):
         ndarray[n_cases, n_signals, n_units, n_wavelengths]; the smooth response is linear in it where N does not set
         the exposure.
         """
+        kernel, channel = self.electrons.kernel, self.view.modified[modified]
+        rates = self._per_qe(modified, curves, kernel.light[:, :, channel], kernel.uniform[:, :, channel])
+        return rates * self.view.pixel.dn_per_e
+
+    def spread_per_qe(self, modified: int, curves: FloatArray) -> FloatArray:
+        """Electrons per QE of one modified channel in its pixels, each with its share of the channel's variance.
+
+        ndarray[n_cases, n_signals, n_wavelengths]; see `per_qe`.
+        """
+        own, channel = self.by_pixel, self.view.modified[modified]
+        kernel = own.electrons.kernel
+        share = kernel.spread[:, :, channel]
+        light = np.einsum("xu,xuw->xw", share, kernel.light[:, :, channel])
+        uniform = (share * kernel.uniform[:, :, channel]).sum(axis=1)
+        return own._per_qe(modified, curves, light[:, None], uniform[:, None])[:, :, 0]
+
+    def _per_qe(self, modified: int, curves: FloatArray, light: FloatArray, uniform: FloatArray) -> FloatArray:
+        """Electrons per QE of one modified channel, ndarray[n_cases, n_signals, n_units, n_wavelengths].
+
+        `light`, `uniform`: what units get through it, see `Kernel`, without the axis of the channels.
+        """
         own, channel = self.electrons, self.view.modified[modified]
         exposure_s = own.exposure_s(curves[None])
         scales = own.scales(exposure_s)[0]
-        light = own.kernel.light[:, None, None, :, channel] * own.signals[:, None, :]
-        light = own.at_each_place(light[..., None, :], [channel])[..., 0, :]
+        seen = light[:, None, None] * own.signals[:, None, :]
+        seen = own.at_each_place(seen[..., None, :], [channel])[..., 0, :]
         background = own.background[own.place, modified][:, None, None, None]
-        uniform = own.kernel.uniform[:, None, None, :, channel, None] * background
-        both = light * scales[None, :, None, None, None] + uniform
-        return np.asarray(both.reshape(-1, *both.shape[2:]) * (exposure_s[0] * self.view.pixel.dn_per_e), dtype=float)
+        both = seen * scales[None, :, None, None, None] + uniform[:, None, None, :, None] * background
+        return np.asarray(both.reshape(-1, *both.shape[2:]) * exposure_s[0], dtype=float)
 
 
 _imagers: Cache[bytes, LinearImager] = Cache(16)

@@ -81,6 +81,10 @@ class Readout:
         """Value of each channel from those of the units: the last axis n_units -> n_channels."""
         return dn if self.by_channel else self._weighed(dn, self._weights)
 
+    def spread(self, variance: FloatArray) -> FloatArray:
+        """Variance of each channel from those of the units: the last axis n_units -> n_channels."""
+        return self._weighed(variance, self._spread)
+
     def with_noise(self, electrons: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray, FloatArray]:
         """`NoisyReadout.mean`, `variance`, `gaussian` and `reach_dn` of a block.
 
@@ -91,7 +95,7 @@ class Readout:
         # rounding of the arithmetic, by which two signals would seem told apart for certain.
         certain = variance_dn < _CERTAIN_DN2
         dn, variance_dn = np.where(certain, np.rint(dn), dn), np.where(certain, 0.0, variance_dn)
-        mean, variance = self.folded(dn), self._weighed(variance_dn, self._spread)
+        mean, variance = self.folded(dn), self.spread(variance_dn)
         return (mean, variance, *self._shape_of_noise(electrons, variance))
 
     def channels_of(self, pixels: FloatArray, place: int) -> FloatArray:

@@ -153,7 +153,8 @@ def _compared(
 def _exact(study: Study, space: Space, scenario: str, points: FloatArray) -> dict[str, FloatArray]:
     """The promised columns with every effect on, ndarray[n_designs] each."""
     imager = imager_of(replace(study.view(space, scenario), methods=REFERENCE))
-    nominal = evaluate(imager, space.curves(points, study.grid.size), study.states)
+    curves = space.curves(points, study.grid.size)
+    nominal = evaluate(imager, curves, study.states, probabilities=study.asked.probabilities)
     promised = [quantity for quantity in study.quantities.values() if quantity.promised]
     worst = [quantity for quantity in promised if quantity.extreme == WORST_CASE]
     found = {quantity.name: nominal[quantity.name] for quantity in promised if quantity not in worst}

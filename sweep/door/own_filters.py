@@ -96,7 +96,7 @@ def judged(study: Study, view: View, curves: FloatArray) -> Columns:
     if not curves.max(initial=0.0) <= _MOST_QE:
         allowed = "0 to 1; a transmission is relative to a curve (`relative_to`), percent are divided by 100"
         raise DataError(Fault("a QE above 1", value=round(float(curves.max()), 6), allowed=allowed))
-    found = evaluate(imager_of(view), curves, study.states)
+    found = evaluate(imager_of(view), curves, study.states, probabilities=study.asked.probabilities)
     found |= family_quantities(None, np.empty((len(curves), 0)))
     lacking = np.full(len(curves), np.nan)
     columns = {name: found.get(name, lacking) for name in study.quantities if name != COMBINED}

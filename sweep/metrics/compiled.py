@@ -227,15 +227,32 @@ def _least_error(
 
     Half the sum of min(p, q), that is of sqrt(p q) exp(-|ln(p / q)| / 2); the logarithms of independent channels add.
     """
-    first, shares = 0, np.ones(1)
+    # Two halves of the channels, so that their sum over both need not be written out.
+    first, one, other = 0, np.ones(1), np.ones(1)
     for c in range(rows.shape[0]):
         if rows[c, a] != rows[c, b]:
             own_first, own = _ratios(firsts, starts, roots, rows[c, a], rows[c, b], step)
-            first, shares = first + own_first, _sum_of(shares, own)
+            first += own_first
+            if one.size <= other.size:
+                one = _sum_of(one, own)
+            else:
+                other = _sum_of(other, own)
+    return 0.5 * _mean_decay(one, other, first, step / 2)
+
+
+@njit(cache=True, nogil=True)
+def _mean_decay(one: FloatArray, other: FloatArray, first: int, rate: float) -> float:
+    """Sum of one[i] other[j] exp(-rate |first + i + j|), by the sums of `other` on either side of where that turns."""
+    n, decay = other.size, math.exp(-rate)
+    before, after = np.zeros(n + 1), np.zeros(n + 1)  # of other[m] exp(-rate |j - m|), for m < j and m >= j
+    for m in range(n):
+        before[m + 1] = (before[m] + other[m]) * decay
+        after[n - 1 - m] = other[n - 1 - m] + after[n - m] * decay
     total = 0.0
-    for k in range(shares.size):
-        total += shares[k] * math.exp(-abs(first + k) * step / 2)
-    return 0.5 * total
+    for i in range(one.size):
+        turn = min(max(-(first + i), 0), n)
+        total += one[i] * (before[turn] + after[turn]) * math.exp(-rate * abs(first + i + turn))
+    return total
 
 
 @njit(cache=True, nogil=True)

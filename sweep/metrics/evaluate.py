@@ -91,19 +91,21 @@ def _as_read(imager: Imager, curves: FloatArray, found: Mapping[Pair, Extremes |
     return {pair: kept.get(pair) for pair in found}
 
 
-def evaluate(imager: Imager, designs: FloatArray | Block, states: Sequence[str] = ()) -> Columns:
+def evaluate(
+    imager: Imager, designs: FloatArray | Block, states: Sequence[str] = (), *, probabilities: bool = False
+) -> Columns:
     """Evaluate a block of designs as the camera reads them out, as far as the scene's methods go.
 
     `designs`: see `designed_quantities`. Returns the columns of all metrics but those of a family, each
-    ndarray[n_designs]; `states`: signal types that noise may confuse. CSDs are the smallest over the places of the
-    light and the moments of its pulses; `best_place_csd_<a>_<b>` is the largest over the places of the smallest over
-    the moments. Noise metrics are the worst over the places of the lattice. Distances are NaN where the extremes over
-    all places take more cells than `places` allows.
+    ndarray[n_designs]; `states`: signal types that noise may confuse, `probabilities`: with their CDP and CSP. CSDs are
+    the smallest over the places of the light and the moments of its pulses; `best_place_csd_<a>_<b>` is the largest
+    over the places of the smallest over the moments. Noise metrics are the worst over the places of the lattice.
+    Distances are NaN where the extremes over all places take more cells than `places` allows.
     """
     block = _block(designs)
     changing = None if states or _OTHERS else imager.read_changing(block)
     if changing is None:
-        columns = _read(imager, block, states)
+        columns = _read(imager, block, states, probabilities=probabilities)
     elif changing.which.all():
         columns = _distances_along(imager, changing)
     else:
@@ -127,14 +129,14 @@ def _distances_along(imager: Imager, changing: Changing) -> Columns:
     return _over(imager, named) | {EXPOSURE: np.full(len(changing.values), changing.exposure_s)}
 
 
-def _read(imager: Imager, block: Block, states: Sequence[str] = ()) -> Columns:
+def _read(imager: Imager, block: Block, states: Sequence[str] = (), *, probabilities: bool = False) -> Columns:
     """What the readout of any designs gives; with `states`, what noise does to them, too."""
     curves, members, apart = block.curves(), imager.view.members, Columns()
     if states:
         read = imager.read_with_noise(curves)
         response, exposure_s = read.mean, read.exposure_s
         confused = {name: members[name] for name in states}
-        noisy = [metric for metric in METRICS if isinstance(metric, NoiseMetric)]
+        noisy = [m for m in METRICS if isinstance(m, NoiseMetric) and (probabilities or not m.extra)]
         apart = _joined([metric.of_noise(imager, curves, read, confused) for metric in noisy])
     else:
         response, exposure_s = imager.read(curves)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from pydantic_core import CoreSchema
 from ..found import made_in
 from ..types import FloatArray, Section
 from . import rules
-from .quantity import Asked, Quantity
+from .quantity import DECADES, Asked, Quantity
 from .registry import quantities_of
 from .rule import Rule
 from .rules.minimum import Minimum
@@ -30,7 +31,8 @@ _FIELDS: dict[str, Any] = {name: (dict[str, Weight], {}) for name in RULES}
 
 
 class Objective(create_model("_Rules", __base__=Section, **_FIELDS)):  # type: ignore[misc]
-    """Maximize weight x quantity of several quantities under one rule, such as the smallest (`minimum`) or the `sum`.
+    """Maximize weight x quantity of several quantities under one rule: the smallest (`minimum`), the `sum`, or of
+    errors the `least`, which is -log10 of the largest weight x error.
 
     A name alone is that quantity; a list is the smallest of its members.
     """
@@ -70,7 +72,8 @@ class Objective(create_model("_Rules", __base__=Section, **_FIELDS)):  # type: i
     @property
     def column(self) -> str:
         """Column of the result table that holds it."""
-        return next(iter(self.weights)) if list(self.weights.values()) == [1.0] else COMBINED
+        alone = list(self.weights.values()) == [1.0] and self.rule.wanted == "more"
+        return next(iter(self.weights)) if alone else COMBINED
 
     def of(self, columns: Mapping[str, FloatArray]) -> FloatArray:
         """Its value from the quantities, ndarray[n_designs] each."""
@@ -78,7 +81,7 @@ class Objective(create_model("_Rules", __base__=Section, **_FIELDS)):  # type: i
 
     def __str__(self) -> str:
         terms = [name if weight == 1 else f"{weight:g} {name}" for name, weight in self.weights.items()]
-        return terms[0] if len(terms) == 1 else self.rule.words(terms)
+        return terms[0] if len(terms) == 1 and self.rule.wanted == "more" else self.rule.words(terms)
 
 
 def columns_of(asked: Asked, objective: Objective) -> Mapping[str, Quantity]:
@@ -86,4 +89,6 @@ def columns_of(asked: Asked, objective: Objective) -> Mapping[str, Quantity]:
     if objective.column != COMBINED:
         return quantities_of(asked)
     whole = Quantity(COMBINED, COMBINED, f"the study's objective: {objective}", wanted="more")
+    if objective.rule.wanted == "less":
+        whole = replace(whole, unit=DECADES, label=str(objective), digits=3, infinite=True)
     return {**quantities_of(asked), COMBINED: whole}

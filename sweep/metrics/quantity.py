@@ -32,6 +32,8 @@ HELD_OUT = "held_out_"
 """How the name of a CSD of lights that the study does not optimize for begins."""
 DN = "DN"
 """Unit of what is measured in digital numbers."""
+DECADES = "decades"
+"""Unit of how far an error is below 1: its logarithm to base 10."""
 Columns = dict[str, FloatArray]
 End = Literal["min", "max"]
 
@@ -98,11 +100,13 @@ class LinearRows:
 class Quantity(Column):
     """A column that is computed, with what constraints, search and limit need.
 
-    `ends`: ends of a constraint on it. `goal`: it may be maximized, and has a worst case. `needs`: it
-    exists only with a modified channel, or in a family that has it. `infinite`: it may be so. `promised`: a plan's
-    promise holds for it. `squared`: it is a distance, whose squares are the smooth rows. `most`: no filter reaches
-    more. `share`: it is the smallest ratio of N to the curve that N replaces.
-    `smooth_members`: its smooth rows over the population of the lights.
+    `ends`: ends of a constraint on it. `goal`: a search may make it large, or small where less is wanted, and it has a
+    worst case unless it is `nominal`. `needs`: it exists only with a modified channel, or in a family that has it.
+    `infinite`: it may be so. `promised`: a plan's promise holds for it. `rows`: what its smooth rows are: its values,
+    their squares, or their number of decades below 1, -log10. `apart`: it is the smallest distance of two signals, in
+    DN or in units of the noise. `most`: no filter reaches more. `share`: it is the smallest ratio of N to the curve
+    that N replaces. `states`: the signal types that noise may confuse in it. `smooth_members`: its smooth rows over the
+    population of the lights.
     """
 
     ends: tuple[End, ...] = ()
@@ -110,9 +114,12 @@ class Quantity(Column):
     needs: Literal["modified", "family", ""] = ""
     infinite: bool = False
     promised: bool = False
-    squared: bool = False
+    nominal: bool = False
+    rows: Literal["values", "squares", "decades"] = "values"
+    apart: Literal["", "DN", "noise"] = ""
     most: float = np.inf
     share: bool = False
+    states: tuple[str, ...] = ()
     smooth: Callable[[SmoothDesign], Rows] | None = field(default=None, repr=False)
     smooth_members: Callable[[SmoothDesign], Rows] | None = field(default=None, repr=False)
     linear: Callable[[View], LinearRows] | None = field(default=None, repr=False)
@@ -120,7 +127,7 @@ class Quantity(Column):
     @property
     def has_limit(self) -> bool:
         """Whether the limit of any filter knows it."""
-        return self.squared or self.share or self.linear is not None
+        return bool(self.apart) or self.share or self.linear is not None
 
     @property
     def column(self) -> Column:
@@ -137,10 +144,14 @@ class Quantity(Column):
 
     def value(self, rows: Rows) -> float:
         """The quantity from its smooth rows."""
-        if self.wanted == "less":
-            return float(rows.values.max())
-        least = float(rows.values.min())
-        return float(np.sqrt(least)) if self.squared else least
+        most = self.wanted == "less" and self.rows != "decades"
+        return self.of_row(float(rows.values.max() if most else rows.values.min()))
+
+    def of_row(self, row: float) -> float:
+        """The value that a smooth row stands for; a probability is at most 1."""
+        if self.rows == "decades":
+            return float(min(10.0**-row, 1.0))
+        return math.sqrt(max(row, 0.0)) if self.rows == "squares" else row
 
     def worse(self, values: FloatArray | Sequence[FloatArray]) -> FloatArray:
         """The worst of several cases, ndarray[n_designs]."""
@@ -150,7 +161,7 @@ class Quantity(Column):
 @dataclass(frozen=True)
 class Asked:
     """What a study asks for: signal types, states that noise may confuse, any place of the light, shifts of edges, a
-    population of its lights, and tasks.
+    population of its lights, probabilities of detection and separation, and tasks.
     """
 
     classes: tuple[str, ...]
@@ -159,6 +170,7 @@ class Asked:
     edge_shift: bool = False
     population: bool = False
     tasks: tuple[TaskName, ...] = ()
+    probabilities: bool = False
 
 
 class Metric(ABC):
@@ -194,7 +206,9 @@ class ReadoutMetric(Metric):
 
 
 class NoiseMetric(Metric):
-    """What mean and variance of a noisy scene give."""
+    """What mean and variance of a noisy scene give. `extra`: only where a study asks for probabilities."""
+
+    extra: ClassVar[bool] = False
 
     @abstractmethod
     def of_noise(

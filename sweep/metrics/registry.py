@@ -28,7 +28,7 @@ def _worst(quantity: Quantity, asked: Asked) -> Quantity | None:
     seen = quantity.smooth_members if asked.population else None
     if seen is not None:
         over.append(POPULATION)
-    if not quantity.goal or not over:
+    if not quantity.goal or quantity.nominal or not over:
         return None
     return replace(quantity.worst(over), smooth=quantity.smooth if seen is None else seen)
 

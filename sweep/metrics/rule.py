@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from ..types import FloatArray
 
 
 class Rule(ABC):
-    """A rule that falls in none of its terms. A file in `metrics/rules/` holds one.
+    """A rule that never gets worse where one of its terms gets better. A file in `metrics/rules/` holds one.
 
-    `name`: its key in a study. `smallest`: whether it is the smallest of the terms, which a search bounds from below
-    by one number, and a limit can be proven of.
+    `name`: its key in a study. `wanted`: whether more of its terms is better, or less. `smallest`: whether it is as
+    good as its worst term, which a search bounds from below by one number, and a limit can be proven of.
     """
 
     name: ClassVar[str]
+    wanted: ClassVar[Literal["more", "less"]] = "more"
     smallest: ClassVar[bool] = False
 
     @abstractmethod
@@ -25,8 +26,8 @@ class Rule(ABC):
 
     @abstractmethod
     def gradient(self, terms: FloatArray) -> FloatArray:
-        """Its derivative by each term, ndarray[n_terms], >= 0; `terms`: ndarray[n_terms]."""
+        """Its derivative by each term, ndarray[n_terms], >= 0 where more is wanted; `terms`: ndarray[n_terms]."""
 
     @abstractmethod
     def words(self, terms: Sequence[str]) -> str:
-        """The objective in words, of terms in words; two or more."""
+        """The objective in words, of terms in words: two or more, or one of which less is wanted."""

@@ -92,6 +92,16 @@ class SmoothDesign:
         """Its derivative, ndarray[n_free, n_cases, n_signals, n_channels]."""
         return self._response[1]
 
+    @cached_property
+    def variance(self) -> FloatArray:
+        """Variance of the response's noise, DN^2, ndarray[n_cases, n_signals, n_channels]."""
+        return np.asarray(self._imager.variance(self.curves[None])[0], dtype=float)
+
+    @cached_property
+    def variance_by_u(self) -> FloatArray:
+        """Its derivative, ndarray[n_free, n_cases, n_signals, n_channels]."""
+        return self._imager.variance_gradient(self.curves, self.by_u)
+
     def linear(self, matrix: FloatArray) -> Rows:
         """Rows of sums over the parameters; `matrix`: ndarray[n, n_parameters]."""
         return Rows(matrix @ self.x, matrix[:, self._free] * self._span)

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..metrics.bound import FEASIBLE
+from ..metrics.columns.confusion import CNR, D_PRIME
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.limiting import limited_by_name
-from ..metrics.quantity import HELD_OUT
+from ..metrics.quantity import DECADES, HELD_OUT
 from ..results.output import Output
 from ..results.tables import FOUND, PLAIN, SWEPT
 from ..results.thinning import per_light
@@ -21,6 +22,8 @@ from .noise import usable_lines
 from .series import SeriesFigure, lead_sentence, leads_of
 from .values import series_figures
 
+_BY_NOISE = (D_PRIME, CNR)
+"""Metrics of separations in units of the noise."""
 _OF_CLEAR = "of a clear sensor's light"
 
 
@@ -59,7 +62,7 @@ def said_separation(output: Output, row: Row) -> str:
     separation = output.trade_off[0]
     told = separation.told(row[separation.name])
     light = f"at {row[CFA_SENSITIVITY]:.3f} {_OF_CLEAR}"
-    if separation.pair is None:
+    if separation.pair is None or separation.metric in _BY_NOISE:
         return f"reaches {separation.words} {told} {light}"
     worst = " in the worst case of production" if separation.extreme else ""
     return f"separates {' from '.join(separation.pair)} by {told}{worst} {light}"
@@ -115,10 +118,12 @@ def _times(output: Output, best: Row, plain: Row) -> str:
     of, light = float(plain[separation.name]), float(plain[CFA_SENSITIVITY])
     if not of > 0:
         return f" ({plain['name']} by {separation.told(of)} at {light:.3f})"
-    return (
-        f": {best[separation.name] / of:.2f} times the separation of {plain['name']} ({separation.told(of)}) "
-        f"and {best[CFA_SENSITIVITY] / light:.2f} times its light ({light:.3f})"
-    )
+    times, name = f"{best[CFA_SENSITIVITY] / light:.2f} times its light ({light:.3f})", plain["name"]
+    if separation.unit == DECADES:  # a ratio of logarithms says nothing
+        more = separation.told(best[separation.name] - of)
+        return f": {more} beyond {name} ({separation.told(of)}), and {times}"
+    what = "that" if separation.metric in _BY_NOISE else "the separation"
+    return f": {best[separation.name] / of:.2f} times {what} of {name} ({separation.told(of)}) and {times}"
 
 
 def who_else(output: Output) -> list[str]:
@@ -131,12 +136,14 @@ def _others(output: Output, leaders: Leaders) -> Iterator[str]:
     """Who separates most and who does so per light, where that is somebody else."""
     best, most, rate = leaders.chosen, leaders.separates, leaders.per_light
     separation = output.trade_off[0]
+    per_time = separation.unit != DECADES and separation.metric not in _BY_NOISE
     if most is not None and best is not None and most["design_id"] == best["design_id"]:
-        yield "Nothing else in this run separates more."
+        yield f"Nothing else in this run {'separates' if per_time else 'has'} more."
     more = most is not None and (best is None or most[separation.name] > best[separation.name])
     if most is not None and more:
-        yield f"{_capital(full_name(most))} separates most of all: {_figures(output, most)}{_missed(output, most)}."
-    if rate is None:
+        verb = "separates most" if per_time else "has the most"
+        yield f"{_capital(full_name(most))} {verb} of all: {_figures(output, most)}{_missed(output, most)}."
+    if rate is None or not per_time:
         return
     measure = per_light(separation.name)
     same = more and most is not None and most["design_id"] == rate["design_id"]
@@ -188,8 +195,11 @@ def large_numbers(output: Output) -> list[LargeNumber]:
     if best is None:
         return []
     value, measure = float(best[separation.name]), per_light(separation.name)
+    against = _beside(plain, separation.name, value, separation.told)
+    if plain is not None and separation.unit == DECADES:
+        against = f"{plain['name']} {separation.told(float(plain[separation.name]))}"
     numbers = [
-        LargeNumber(separation.told(value), separation.words, _beside(plain, separation.name, value, separation.told)),
+        LargeNumber(separation.told(value), separation.words, against),
         LargeNumber(
             f"{best[CFA_SENSITIVITY]:.3f}",
             _OF_CLEAR,
@@ -201,7 +211,7 @@ def large_numbers(output: Output) -> list[LargeNumber]:
         left = separation.told(max(0.0, search.limit_proven - value))
         limit = f"{separation.told_bound(search.limit_proven)}: no filter exceeds it before quantization"
         numbers.append(LargeNumber(left, "below the limit of any filter", limit))
-    elif best[measure] == best[measure]:
+    elif best[measure] == best[measure] and separation.unit != DECADES and separation.metric not in _BY_NOISE:
         rate = float(best[measure])
         beside = _beside(plain, measure, rate, _rate_told)
         numbers.append(LargeNumber(f"{_rate_told(rate)} {separation.unit}/ms", "per light (ms of exposure)", beside))

@@ -64,7 +64,7 @@ def usable_lines(output: Output) -> Iterator[str]:
         name, unit = series.quantity
         ranges: dict[str, list[str]] = {}
         for design, line in series.lines.items():
-            ranges.setdefault(_range(series.x, line.y <= allowed, unit), []).append(design)
+            ranges.setdefault(_range(series.x, line.y, allowed, unit), []).append(design)
         found = [f"{_listed(designs)} {where}" for where, designs in ranges.items()]
         if found:
             yield f"Over {name}, noise confuses states at most {allowed:g} of the time: {'; '.join(found)}."
@@ -74,8 +74,12 @@ def _listed(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
-def _range(x: FloatArray, usable: np.ndarray, unit: str) -> str:
-    """Where among the numbers `x` (ascending) a design is usable, in words."""
+def _range(x: FloatArray, errors: FloatArray, allowed: float, unit: str) -> str:
+    """Where among the numbers `x` (ascending) a design is usable, in words.
+
+    Where that ends once, about where: by the logarithms of error and number, linear between the two scenarios.
+    """
+    usable = errors <= allowed
     if usable.all():
         return "everywhere"
     if not usable.any():
@@ -83,10 +87,21 @@ def _range(x: FloatArray, usable: np.ndarray, unit: str) -> str:
     ends = np.flatnonzero(np.diff(usable))
     if len(ends) == 1:
         at, of = ends[0], f" {unit}".rstrip()
+        about = _crossing(x[at : at + 2], errors[at : at + 2], allowed)
         if usable[0]:
-            return f"up to {x[at]:g}{of} (not at {x[at + 1]:g})"
-        return f"from {x[at + 1]:g}{of} (not at {x[at]:g})"
+            return f"up to about {about:.2g}{of} (at {x[at]:g}, not at {x[at + 1]:g})"
+        return f"from about {about:.2g}{of} (at {x[at + 1]:g}, not at {x[at]:g})"
     return f"at {' '.join(f'{v:g}' for v in x[usable])} {unit}".rstrip()
+
+
+def _crossing(x: FloatArray, errors: FloatArray, allowed: float) -> float:
+    """Where between two numbers the error is what is allowed; one of them where it is told no smaller."""
+    logarithms = np.log(np.maximum(errors, _LEAST))
+    share = (np.log(allowed) - logarithms[0]) / (logarithms[1] - logarithms[0])
+    share = min(max(float(share), 0.0), 1.0)
+    if not x[0] > 0:
+        return float(x[0] + share * (x[1] - x[0]))
+    return float(x[0] * (x[1] / x[0]) ** share)
 
 
 def told_apart_table(output: Output) -> pd.DataFrame:

@@ -67,7 +67,7 @@ def columns_table() -> list[str]:
     types = ("<a>", "<b>")
     rows = [_row(names, "", meaning) for names, meaning in _KEYS.items()]
     tasks = tuple(TaskName("<task>", metric, ("<light>",)) for metric in get_args(Measure))
-    for quantity in listed(Asked(types, types, any_place=True, tasks=tasks)):
+    for quantity in listed(Asked(types, types, any_place=True, probabilities=True, tasks=tasks)):
         rows.append(_row((quantity.name,), quantity.unit, quantity.meaning))
     rows.append(_row(("worst_<quantity>",), "", _WORST))
     rows += [_row(names, "", meaning) for names, meaning in _VERDICTS.items()]

@@ -83,8 +83,8 @@ def left_out_table(study: Study, search: Search, best: Evaluation, parallel: Par
 
 
 def _types(problem: Problem, column: str) -> tuple[str, ...]:
-    pair = problem.quantities[column].pair
-    return () if pair is None else pair
+    quantity = problem.quantities[column]
+    return quantity.states if quantity.pair is None else quantity.pair
 
 
 def _without(

@@ -86,7 +86,7 @@ def _columns(space: Space, view: View, points: FloatArray, request: Request, blo
     size = view.grid.size
     imager = imager_of(view)
     designs = CurveBlock(space.curves(points, size)) if block is None else block
-    columns = evaluate(imager, designs, request.asked.states)
+    columns = evaluate(imager, designs, request.asked.states, probabilities=request.asked.probabilities)
     columns |= family_quantities(None if space.filter is None else space.filter.family, points)
     worst = [quantity for quantity in request.quantities.values() if quantity.extreme == WORST_CASE]
     if worst:

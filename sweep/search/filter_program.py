@@ -16,10 +16,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_matrix, hstack, vstack
 
-from ..camera.linear import smooth_imager
+from ..camera.linear import LinearImager, smooth_imager
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
 from ..types import FloatArray, IndexArray
+from .certificate import Certificate, Sides, Solved
+from .least_noise import least_variance
 from .member_pairs import MemberPairs
 from .problem import Problem
 
@@ -34,47 +36,6 @@ _LEAST_WEIGHT = 1e-9
 """Weights smaller than this share of the largest one are rounding, and left out."""
 _HALVINGS = 60
 _SOLVED, _INFEASIBLE = 0, 2
-
-
-@dataclass(frozen=True)
-class Sides:
-    """Pairs of signals with a decided side: their indices, and +1 where the first signal is above the other, or -1."""
-
-    pairs: tuple[int, ...] = ()
-    signs: tuple[float, ...] = ()
-
-    def joined(self, pairs: IndexArray, signs: FloatArray) -> Sides:
-        """These and more pairs."""
-        return Sides((*self.pairs, *map(int, pairs)), (*self.signs, *map(float, signs)))
-
-
-@dataclass(frozen=True)
-class Certificate:
-    """Weights y of rows and of pairs with a decided side, and V(y): they bound what filters reach at any sensitivity.
-
-    `rows`, `pairs`: those whose `row_weights` and `pair_weights` are above 0, ndarray[n] each; `most`: V(y).
-    """
-
-    rows: IndexArray
-    row_weights: FloatArray
-    pairs: IndexArray
-    pair_weights: FloatArray
-    most: float
-
-
-@dataclass(frozen=True)
-class Solved:
-    """What a linear program for a t and some sides found, in the objective's unit.
-
-    `beyond`: no filter with these sides reaches more (-inf: there is none), and already those of `needs` say so, by
-    `certificate`. `curve`: the filter with the largest `margin` above t, QE; None where no filter was found.
-    """
-
-    beyond: float
-    margin: float = -np.inf
-    curve: FloatArray | None = None
-    needs: Sides = Sides()
-    certificate: Certificate | None = None
 
 
 @dataclass(frozen=True)
@@ -157,10 +118,15 @@ class FilterProgram:
         # Exposure does not depend on N, so the response to a filter is linear, plus what does not depend on it.
         gain = imager.per_qe(0, self.base[None])[:, :, channel]
         fixed = np.delete(imager.smooth(self.base[None, None])[0], channel, axis=2)
+        noise = self._noise(imager) if self.noisy else None
         for name, (a, b) in self.problem.pairs.items():
             first, second = view.members[a], view.members[b]
-            apart = (gain[:, first, None] - gain[:, None, second]).reshape(-1, self.base.size)
-            yield name, apart, ((fixed[:, first, None] - fixed[:, None, second]) ** 2).sum(axis=3).ravel()
+            apart = gain[:, first, None] - gain[:, None, second]
+            squares = (fixed[:, first, None] - fixed[:, None, second]) ** 2
+            if noise is not None and self.problem.quantities[name].apart == "noise":
+                own_noise, others = ((each[:, first, None] + each[:, None, second]) / 2 for each in noise)
+                apart, squares = apart / np.sqrt(own_noise)[..., None], squares / others
+            yield name, apart.reshape(-1, self.base.size), squares.sum(axis=3).ravel()
         if self._members is not None:
             for name in self._members.names:
                 yield name, *self._members.rows(name)
@@ -183,6 +149,28 @@ class FilterProgram:
         most = np.sqrt(self._squared[:, None] + np.maximum(np.stack(ends, axis=1), 0.0) ** 2) * (1 + _SUM_ROUNDING)
         reach = np.divide(most, self._rate[:, None], out=np.full(most.shape, np.inf), where=self._rate[:, None] > 0)
         self.reach = np.where(most < (self._least - self._slack)[:, None], -np.inf, reach)
+
+    def _noise(self, imager: LinearImager) -> tuple[FloatArray, FloatArray]:
+        """The least variance in the modified channel, ndarray[n_cases, n_signals], and those of the others, DN^2."""
+        row, least = np.zeros_like(self.base), 0.0
+        bound = self.problem.constraints.get(SENSITIVITY)
+        if bound is not None and bound.min is not None:
+            row, least = 1 / self.base.sum() + row, bound.min - FEASIBLE * bound.scale
+        others = np.delete(imager.variance(self.base[None, None])[0], imager.view.modified[0], axis=2)
+        return least_variance(imager, self.base, self._box, row, least), others
+
+    @property
+    def noisy(self) -> bool:
+        """Whether any distance of the problem is in units of the noise, whose least is that of its sensitivity."""
+        asked = {*self.problem.objective.weights, *self.problem.constraints} & self.problem.pairs.keys()
+        return any(self.problem.quantities[name].apart == "noise" for name in asked)
+
+    def reaches(self, curve: FloatArray) -> float:
+        """The objective of a filter as this program counts it: with the least noise, no less than what it has."""
+        pairs, rows = self._rate > 0, self._rows.rate > 0
+        far = np.sqrt(self._squared + (self.apart @ curve) ** 2)[pairs] / self._rate[pairs]
+        linear = (self._rows.matrix @ curve + self._rows.constant)[rows] / self._rows.rate[rows]
+        return float(min(self.top, far.min(initial=np.inf), linear.min(initial=np.inf)))
 
     def _keep(self, wanted: IndexArray) -> None:
         self.apart, self.reach = self.apart[wanted], self.reach[wanted]

@@ -1,11 +1,13 @@
 """The smooth model of a search problem with exact derivatives: unquantized, unclipped, one simulation per point.
 
 Every quantity is written as rows of smooth functions: a CSD is the root of the smallest of its squared pair distances,
-a slope the largest of the curve's differences. A solver takes the rows, so nothing that it sees has a kink.
+a slope the largest of the curve's differences, an error the one with the fewest decades below 1. A solver takes the
+rows, so nothing that it sees has a kink.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
@@ -33,12 +35,14 @@ _CONDITION_NM = 100.0
 class Point:
     """Everything that one simulation gives.
 
-    `terms`: the objective's weighted quantities, squared, as rows; `term`: ndarray[n], the term that each row belongs
-    to (all 0 for a minimum). `conditions`: met where <= 0. `quantities`: rows of each constrained quantity.
+    `terms`: the objective's weighted quantities as rows, squared, or as decades below 1 of errors that are to be the
+    least; `power`: 2 or 1. `term`: ndarray[n], the term that each row belongs to (all 0 for a minimum). `conditions`:
+    met where <= 0. `quantities`: rows of each constrained quantity.
     """
 
     evaluation: Evaluation
     terms: Rows
+    power: int
     term: IndexArray
     conditions: Rows
     quantities: Mapping[str, Rows]
@@ -46,7 +50,8 @@ class Point:
     @property
     def term_values(self) -> FloatArray:
         """Value of each term, ndarray[n_terms]."""
-        return np.sqrt([self.terms.values[self.term == k].min() for k in range(int(self.term.max()) + 1)])
+        least = [self.terms.values[self.term == k].min() for k in range(int(self.term.max()) + 1)]
+        return np.sqrt(least) if self.power == 2 else np.array(least)
 
 
 def _finite(point: Point) -> Point:
@@ -118,17 +123,23 @@ class Model:
         evaluation = Evaluation(x, objective, own, whole, worst)
         own_term = np.arange(len(terms)) * (not problem.objective.rule.smallest)  # what is smallest needs one bound
         term = np.repeat(own_term, [rows.values.size for rows in terms])
-        return Point(evaluation, Rows.joined(terms), term, Rows.joined(conditions), quantities)
+        power = 2 if problem.objective.rule.wanted == "more" else 1
+        return Point(evaluation, Rows.joined(terms), power, term, Rows.joined(conditions), quantities)
 
     def _terms(self, made: Mapping[float, SmoothDesign]) -> tuple[list[Rows], float]:
-        """The squared rows of each weighted quantity of the objective, and the objective's value."""
+        """The rows of each weighted quantity of the objective, see `Point`, and the objective's value."""
         terms, columns = [], {}
         for name, weight in self._problem.objective.weights.items():
             quantity, rows = self._quantities[name], self._rows(name, made)
             columns[name] = np.array([quantity.value(rows)])
-            if not quantity.squared:
+            if quantity.rows == "decades":
+                terms.append(rows.scaled(1.0, -math.log10(weight)))
+                continue
+            if quantity.rows == "values":
                 rows = Rows(rows.values**2, 2 * rows.values[:, None] * rows.by_u)
             terms.append(rows.scaled(weight**2))
+        if self._problem.objective.rule.wanted == "less":  # by the decades, which do not end where numbers do
+            return terms, float(min(rows.values.min() for rows in terms))
         return terms, float(self._problem.objective.of(columns)[0])
 
     def _rows(self, name: str, made: Mapping[float, SmoothDesign]) -> Rows:
@@ -151,7 +162,10 @@ def _back_off(problem: Problem, name: str, bound: Bound) -> float:
 def _conditions(quantity: Quantity, bound: Bound, rows: Rows, back_off: float) -> list[Rows]:
     """Rows that are <= 0 where the bound is kept, `back_off` inside, relative to its scale."""
     found, scale = [], bound.scale
-    if bound.min is not None and quantity.squared:
+    if quantity.rows == "decades" and bound.max is not None:
+        least = -math.log10(bound.max)
+        return [rows.scaled(-1.0, least + back_off * max(1.0, least))]
+    if bound.min is not None and quantity.rows == "squares":
         found.append(rows.scaled(-1 / scale**2, (bound.min * (1 + back_off) / scale) ** 2))
     elif bound.min is not None:
         found.append(rows.scaled(-1 / scale, bound.min / scale + back_off))

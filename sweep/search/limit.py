@@ -2,7 +2,8 @@
 
 All filters means: every N between the least transmission and the base curve that meets the study's bounds on slope,
 sensitivities and CSDs, whichever of two signals it makes the brighter one. The limit is that of the response before
-clipping and quantization, in the scene of the search. The certificate is a bracket: a filter that attains the lower
+clipping and quantization, in the scene of the search. Of d' it is a bound with the least noise (`least_noise.py`), near
+which no filter need be. The certificate is a bracket: a filter that attains the lower
 end, and linear programs that no filter above the upper end could meet. What only some families have (edges and bands,
 and their shifts in production) is left out: that makes the set of filters larger, so the upper end stays true for them.
 """
@@ -19,9 +20,12 @@ from ..camera.exposure import may_set_exposure
 from ..camera.pixel import unquantized
 from ..errors import Fault, SweepError
 from ..metrics.bound import FEASIBLE, Bound
+from ..metrics.columns.sensitivity import SENSITIVITY
 from ..metrics.evaluate import designed_quantities
 from ..metrics.objective import Objective
+from ..metrics.quantity import DN
 from ..metrics.smooth import smooth_csd, smooth_response
+from ..metrics.smooth_noise import smooth_detectability
 from ..types import FloatArray
 from .filter_program import ROUNDING, FilterProgram
 from .member_pairs import MemberPairs
@@ -30,6 +34,7 @@ from .sides import Proof, SideSearch
 
 _SENSITIVITY_TOLERANCE = 1e-6
 _MOST_PROGRAMS = 5000
+_NOT_LINEAR = "is not linear in the filter"
 _SHARES = (0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 """How far a solver's filter is moved toward one that is inside, to make up for the solver's tolerance."""
 
@@ -70,7 +75,7 @@ def limit_of(
     if refused is not None:
         raise SweepError(Fault(f"no limit: {refused}"))
     relaxed, left_out = _relaxed(problem)
-    distances = any(relaxed.quantities[name].squared for name in relaxed.objective.weights)
+    distances = any(relaxed.quantities[name].apart for name in relaxed.objective.weights)
     tolerance = tolerance_dn if distances else _SENSITIVITY_TOLERANCE
     over = [n for n in dict.fromkeys((*relaxed.objective.weights, *relaxed.constraints)) if relaxed.over_population(n)]
     members, solved = MemberPairs(relaxed, over) if over else None, 0
@@ -81,9 +86,12 @@ def limit_of(
         if members is None or proof.curve is None or solved >= most_programs or not members.more(proof.curve):
             break
     attained = proof.attained
-    if members is not None and proof.curve is not None:
-        attained = _attained(relaxed, proof.curve, {name: members.least(name, proof.curve) for name in over})
-    elsewhere = tuple(proof.proven_at(program, sensitivity) for sensitivity in sensitivities)
+    if proof.curve is not None and (members is not None or program.noisy):
+        worst = {} if members is None else {name: members.least(name, proof.curve) for name in over}
+        attained = _attained(relaxed, proof.curve, worst)
+    least = relaxed.constraints.get(SENSITIVITY)
+    from_here = -np.inf if not program.noisy or least is None or least.min is None else least.min
+    elsewhere = tuple(proof.proven_at(program, s) if s >= from_here else np.inf for s in sensitivities)
     return Limit(attained, proof.proven, proof.curve, left_out, solved, proof.open_parts, elsewhere)
 
 
@@ -91,7 +99,8 @@ def _proof(program: FilterProgram, members: MemberPairs | None, tolerance: float
     """What no filter of a program exceeds."""
 
     def value(curve: FloatArray, inside: FloatArray | None) -> tuple[float, FloatArray]:
-        return _inside(program.problem, np.clip(curve, program.low, program.base), inside, members)
+        attained, moved = _inside(program.problem, np.clip(curve, program.low, program.base), inside, members)
+        return (program.reaches(moved) if program.noisy and attained > -np.inf else attained), moved
 
     return SideSearch(program, value, tolerance, most_programs).run()
 
@@ -99,11 +108,13 @@ def _proof(program: FilterProgram, members: MemberPairs | None, tolerance: float
 def why_not(problem: Problem) -> str | None:
     """Why a problem has no linear limit; None when it has."""
     unknown = [name for name in problem.objective.weights if not problem.quantities[name].has_limit]
+    noisy = any(problem.quantities[name].states for name in unknown)
+    why = "is not convex in the filter: its noise grows with the light; d' has a limit" if noisy else _NOT_LINEAR
     base, family = problem.view.base_qe[0], problem.family
     reasons: tuple[tuple[Callable[[], bool], str], ...] = (
         (lambda: family.n_modified != 1, "more than one modified channel"),
         (lambda: not problem.objective.rule.smallest, f"the objective is a {problem.objective.rule.name}"),
-        (lambda: bool(unknown), f"{', '.join(unknown)} is not linear in the filter"),
+        (lambda: bool(unknown), f"{', '.join(unknown)} {why}"),
         (lambda: problem.view.pixel.crosstalk > 0, "crosstalk mixes the modified channel into others"),
         (
             lambda: bool((_top(problem) > base * (1 + ROUNDING)).any()),
@@ -185,7 +196,8 @@ def _attained(problem: Problem, curve: FloatArray, over: Mapping[str, float]) ->
     curves = curve[None, None]
     found = designed_quantities(problem.view, curves) | {name: np.array([value]) for name, value in over.items()}
     for name in {*problem.objective.weights, *problem.constraints} & problem.pairs.keys():
-        found[name] = smooth_csd(problem.view, curves, problem.pairs[name])
+        of = smooth_csd if problem.quantities[name].apart == DN else smooth_detectability
+        found[name] = of(problem.view, curves, problem.pairs[name])
     for name, bound in problem.constraints.items():
         if not bound.violation(found[name])[0] <= FEASIBLE:
             return -np.inf

@@ -12,7 +12,7 @@ from ..curves.lights import Pair
 from ..designs.family import Family
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.objective import Objective
-from ..metrics.quantity import WORST_CASE, Asked, Quantity
+from ..metrics.quantity import DN, WORST_CASE, Asked, Quantity
 from ..metrics.registry import quantities_of
 from ..types import FloatArray, IndexArray
 
@@ -25,7 +25,7 @@ class Problem:
     """Maximize `objective` over the box `low`..`high` (ndarray[n_parameters]) under `constraints`.
 
     Quantities are those of `metrics.registry` with smooth rows; the worst ones are over edges that come out up to
-    `edge_shift_nm` off, and over the population of the view's lights.
+    `edge_shift_nm` off, and over the population of the view's lights. `states`: signal types that noise may confuse.
     """
 
     view: View
@@ -35,12 +35,15 @@ class Problem:
     objective: Objective
     constraints: Mapping[str, Bound]
     edge_shift_nm: float = 0.0
+    states: tuple[str, ...] = ()
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
         """What objective and constraints may name."""
         tasks = () if self.view.tasks is None else self.view.tasks.keys
-        return quantities_of(Asked(self.view.lights.classes, edge_shift=True, population=self.population, tasks=tasks))
+        return quantities_of(
+            Asked(self.view.lights.classes, self.states, edge_shift=True, population=self.population, tasks=tasks)
+        )
 
     @property
     def population(self) -> bool:
@@ -50,12 +53,12 @@ class Problem:
     def over_population(self, quantity: str) -> bool:
         """Whether a quantity is a worst case over the population of the lights."""
         asked = self.quantities[quantity]
-        return self.population and asked.extreme == WORST_CASE and asked.squared
+        return self.population and asked.extreme == WORST_CASE and asked.apart == DN
 
     @property
     def pairs(self) -> dict[str, Pair]:
-        """The pair of signal types of each distance."""
-        own = [q for q in self.quantities.values() if q.squared and not q.extreme]
+        """The pair of signal types of each distance, be it in DN or in units of the noise."""
+        own = [q for q in self.quantities.values() if q.apart and not q.extreme]
         return {q.name: q.pair for q in own if q.pair is not None}
 
     @property

@@ -16,7 +16,8 @@ from itertools import count
 import numpy as np
 
 from ..types import FloatArray, IndexArray
-from .filter_program import Certificate, FilterProgram, Sides
+from .certificate import Certificate, Sides
+from .filter_program import FilterProgram
 
 _DIVE_STEPS = 40
 _DIVE_PAIRS = 8

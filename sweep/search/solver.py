@@ -2,8 +2,8 @@
 
 Maximize a study's objective, such as the smallest distance of a pair of signal types. The minimum over pairs is not
 smooth, so it is written in the epigraph form: maximize t subject to (distance of every pair)^2 >= t^2, with exact
-gradients. The search sees the smooth response (unquantized, unclipped); every evaluation is logged, and the answer is
-the best feasible one of the log.
+gradients; where errors are to be the least, t is a bound of their decades below 1. The search sees the smooth response
+(unquantized, unclipped); every evaluation is logged, and the answer is the best feasible one of the log.
 """
 
 from __future__ import annotations
@@ -37,6 +37,8 @@ _ENDINGS = {
     nlopt.MAXEVAL_REACHED: "maxeval_reached",
 }
 _X_TOLERANCE = 1e-9
+_FAR = 1e4
+"""So many times its value at the start a term under noise may reach; a number that no design comes near."""
 
 
 def search_from(
@@ -82,36 +84,39 @@ def _epigraph(
 ) -> tuple[nlopt.opt, list[float]]:
     """Maximize the rule of the t_k (a minimum has one t) subject to rows of term k >= t_k^2 and the conditions.
 
-    z = (u, t); each t_k is in units of its term's first value.
+    z = (u, t); each t_k is in units of its term's first value. Rows that are no squares are >= t_k.
     """
-    values, rule = first.term_values, problem.objective.rule
+    values, rule, power = first.term_values, problem.objective.rule, first.power
     scale = np.maximum(values, 1.0)
     n_free, n_rows = u0.size, first.terms.values.size
-    unit = float(rule.of(scale))
-    row_scale = scale[first.term] ** 2
+    alone = scale.size == 1
+    unit = 1.0 if alone else float(rule.of(scale))
+    row_scale = scale[first.term] ** power
     opt = nlopt.opt(GRADIENT[algorithm], n_free + scale.size)
 
     def objective(z: FloatArray, gradient: FloatArray) -> float:
         model.at(z[:n_free])
         if gradient.size:
             gradient[:n_free] = 0.0
-            gradient[n_free:] = rule.gradient(scale * z[n_free:]) * scale / unit
-        return float(rule.of(scale * z[n_free:])) / unit if scale.size > 1 else float(z[-1])
+            gradient[n_free:] = 1.0 if alone else rule.gradient(scale * z[n_free:]) * scale / unit
+        return float(z[-1]) if alone else float(rule.of(scale * z[n_free:])) / unit
 
     def constraints(result: FloatArray, z: FloatArray, gradient: FloatArray) -> None:
         point = model.at(z[:n_free])
         t = z[n_free:][point.term]
-        result[:n_rows] = t**2 - point.terms.values / row_scale
+        result[:n_rows] = t**power - point.terms.values / row_scale
         result[n_rows:] = point.conditions.values
         if gradient.size:
             gradient[:] = 0.0
             gradient[:n_rows, :n_free] = -point.terms.by_u / row_scale[:, None]
-            gradient[np.arange(n_rows), n_free + point.term] = 2 * t
+            gradient[np.arange(n_rows), n_free + point.term] = power * t ** (power - 1)
             gradient[n_rows:, :n_free] = point.conditions.by_u
 
-    # No term exceeds its largest weight times the longest distance between two digital numbers.
-    reach = max(problem.objective.weights.values()) * problem.view.longest_distance_dn / scale
-    opt.set_lower_bounds([0.0] * (n_free + scale.size))
+    # No term exceeds its largest weight times the longest distance between two digital numbers; noise has no such end.
+    noisy = any(problem.quantities[name].states for name in problem.objective.weights)
+    far = _FAR * scale if noisy else max(problem.objective.weights.values()) * problem.view.longest_distance_dn
+    reach = far / scale
+    opt.set_lower_bounds([0.0] * n_free + [0.0 if power == 2 else -_FAR] * scale.size)
     opt.set_upper_bounds([1.0] * n_free + [max(float(r), 1.0) for r in reach])
     opt.set_max_objective(objective)
     opt.add_inequality_mconstraint(constraints, np.zeros(n_rows + first.conditions.values.size))
@@ -123,10 +128,14 @@ def _direct(
 ) -> tuple[nlopt.opt, list[float]]:
     """Maximize the objective itself, subject to the worst of the conditions."""
     rule = problem.objective.rule
-    scale = float(rule.of(np.maximum(first.term_values, 1.0)))
+
+    def whole(terms: FloatArray) -> float:
+        return float(terms.min() if rule.smallest else rule.of(terms))
+
+    scale = whole(np.maximum(first.term_values, 1.0))
 
     def objective(u: FloatArray, _: FloatArray) -> float:
-        return float(rule.of(model.at(u).term_values)) / scale
+        return whole(model.at(u).term_values) / scale
 
     opt = nlopt.opt(DIRECT[algorithm], u0.size)
     opt.set_lower_bounds([0.0] * u0.size)
@@ -141,10 +150,11 @@ def best_reachable(problem: Problem, quantity: str, starts: FloatArray, max_eval
     asks for a minimum, else its smallest. `starts`: ndarray[n, n_free].
     """
     alone = replace(problem, constraints={quantity: problem.constraints[quantity]})
-    sign = 1.0 if problem.constraints[quantity].min is not None else -1.0
+    own = problem.quantities[quantity]
+    sign = 1.0 if problem.constraints[quantity].min is not None or own.rows == "decades" else -1.0
     found = [v for u0 in starts for v in _extremes(alone, quantity, sign, u0, max_evaluations)]
     best = sign * max((sign * value for value in found), default=-np.inf)
-    return float(np.sqrt(best)) if problem.quantities[quantity].squared and best > 0 else best
+    return own.of_row(best) if np.isfinite(best) else best
 
 
 def _extremes(problem: Problem, quantity: str, sign: float, u0: FloatArray, max_evaluations: int) -> list[float]:

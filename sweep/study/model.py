@@ -90,13 +90,15 @@ class Study:
     @property
     def asked(self) -> Asked:
         """What the study asks for of its designs."""
+        recognition = self.section.recognition
         return Asked(
             self.lights.classes,
             self.states,
             self.any_place,
-            self.edge_shift_nm > 0,
-            self.section.population is not None,
-            () if self.tasks is None else self.tasks.keys,
+            edge_shift=self.edge_shift_nm > 0,
+            probabilities=recognition is not None and recognition.probabilities,
+            population=self.section.population is not None,
+            tasks=() if self.tasks is None else self.tasks.keys,
         )
 
     @property
@@ -220,6 +222,7 @@ class Study:
             objective=self.objective,
             constraints=self.constraints,
             edge_shift_nm=self.edge_shift_nm,
+            states=self.states,
         )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from ..designs.space import Space
 from ..errors import Fault
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY
+from ..metrics.quantity import DN
 from ..search.problem import SHIFTS
 from .model import Study
 
@@ -48,7 +49,7 @@ def _most(study: Study, space: Space, scenario: str) -> Iterator[tuple[str, floa
     """Quantities with the largest values that they can have in a space."""
     view = study.view(space, scenario)
     for name, quantity in study.quantities.items():
-        if quantity.squared and not quantity.extreme:
+        if quantity.apart == DN and not quantity.extreme:
             yield name, view.longest_distance_dn
     if space.filter is None:
         return

@@ -14,11 +14,12 @@ from ..curves.spectrum import Curves
 from ..curves.tasks import StudyTasks
 from ..designs.space import Space
 from ..errors import StudyError, SweepError
-from ..metrics.quantity import WORST_CASE, Asked, Quantity
+from ..metrics.quantity import Asked, Quantity
 from ..metrics.registry import listed, quantities_of
 from ..search.solver import ALGORITHMS
 from .axes import Axis
 from .document import Document
+from .goals import check_goals
 from .luminances import check_luminances
 from .model import Search, Study
 from .populations import check_range, with_population
@@ -27,7 +28,6 @@ from .sensors import sensor_of
 from .sources import KeptSources, Sources
 from .spaces import SpaceBuilder
 from .technologies import check_lenses, with_technologies
-from .yaml_tree import Key
 
 MOST_DESIGNS = 10**9
 
@@ -73,8 +73,7 @@ class _Resolver:
 
             check_seen(self.tasks, section, sensor, spaces, self.sources)
         self.check_recognition(lights)
-        self.check_objective(lights)
-        self.check_constraints(lights)
+        check_goals(section, self.sources, self.asked(lights))
         self.check_published(lights, mosaics)
         search = self.search(spaces, lights)
         if self.faults:
@@ -129,9 +128,14 @@ class _Resolver:
         recognition = self.section.recognition
         states = () if recognition is None else tuple(recognition.states or lights.classes)
         shifts = self.section.production.edge_shift_nm > 0 if edge_shift is None else edge_shift
-        population = self.section.population is not None
-        tasks = () if self.tasks is None else self.tasks.keys
-        return Asked(lights.classes, states, edge_shift=shifts, population=population, tasks=tasks)
+        return Asked(
+            lights.classes,
+            states,
+            edge_shift=shifts,
+            probabilities=recognition is not None and recognition.probabilities,
+            population=self.section.population is not None,
+            tasks=() if self.tasks is None else self.tasks.keys,
+        )
 
     def check_columns(self, lights: Lights) -> None:
         """Every pair of signal types has columns of its own."""
@@ -199,39 +203,6 @@ class _Resolver:
                     names = [OBJECT_RESOLUTION] if row in section.geometry else columns
                     if row in known and quantity not in names:
                         self.unknown((*path, quantity), "quantity", quantity, names)
-
-    def check_quantity(self, path: tuple[Key, ...], what: str, name: str, known: list[str], lights: Lights) -> bool:
-        """Add a fault where the name is not `known`."""
-        if name in known:
-            return True
-        shifted = quantities_of(self.asked(lights, edge_shift=True)).get(name)
-        if shifted is not None and shifted.extreme == WORST_CASE and not self.section.production.edge_shift_nm:
-            needed = "`production.edge_shift_nm`" + (" or `population`" if shifted.squared else "")
-            self.add(path, f"{name} needs {needed}", None, "a shift above 0")
-        else:
-            self.unknown(path, what, name, known)
-        return False
-
-    def check_objective(self, lights: Lights) -> None:
-        goals = [name for name, quantity in quantities_of(self.asked(lights)).items() if quantity.goal]
-        path: tuple[Key, ...] = ("objective",)
-        given = self.document.data.get("objective")
-        for name in self.section.objective.weights:
-            inner = (*path, self.section.objective.rule.name, name) if isinstance(given, dict) else path
-            self.check_quantity(inner, "objective", name, goals, lights)
-
-    def check_constraints(self, lights: Lights) -> None:
-        known = {name: q for name, q in quantities_of(self.asked(lights)).items() if q.ends}
-        for name, bound in self.section.constraints.items():
-            path = ("constraints", name)
-            if not self.check_quantity(path, "quantity", name, list(known), lights):
-                continue
-            if known[name].smooth is None and self.section.search is not None:
-                self.add(path, f"the search does not know {name}", None, "a study without `search`")
-            for end in ("min", "max"):
-                if end not in known[name].ends and getattr(bound, end) is not None:
-                    right = " or ".join(f"`{each}`" for each in known[name].ends)
-                    self.add((*path, end), f"{name} has no `{end}`", getattr(bound, end), right)
 
     def search(self, spaces: list[Space], lights: Lights) -> Search | None:
         section = self.section.search

@@ -134,12 +134,14 @@ class Recognition(Section):
 
     `states`: the signal types to tell apart; all of them where it is left out. `patches`: raw patches that are drawn
     of every signal for each plain CFA, named design and answer of the search, half of them to train the classifiers;
-    0 draws none. `error_max`: a CFA is usable while no two states are confused more often.
+    0 draws none. `error_max`: a CFA is usable while no two states are confused more often. `probabilities`: columns of
+    CDP and CSP, too, which are discussed for IEEE P2020.
     """
 
     states: Annotated[list[Name], Field(min_length=2, max_length=MOST_TYPES)] | None = None
     patches: int = Field(default=200, ge=0, le=5000)
     error_max: float = Field(default=1e-3, ge=1e-300, lt=0.5)
+    probabilities: bool = False
 
     @model_validator(mode="after")
     def _enough(self) -> Recognition:
@@ -266,7 +268,8 @@ class StudySection(Documented):
     tasks: TasksAsked = None
     """What else designs are judged by: `all`, a list of tasks of the package, or a mapping with own ones."""
     objective: Objective = Objective(minimum={"csd_yellow_red": 1.0})
-    """What is maximized: a CSD or sensitivity, or several: {minimum: {...}} or {sum: {...}} with weights."""
+    """What is maximized: a CSD or sensitivity, or several: {minimum: {...}} or {sum: {...}} with weights; or, of errors
+    under noise, made small: {least: {...}}."""
     constraints: dict[Name, Bound] = {}
     """Quantity -> {min: ...}, {max: ...} or both."""
     search: SearchSection | None = None

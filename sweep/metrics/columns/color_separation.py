@@ -38,7 +38,8 @@ class ColorSeparation(ReadoutMetric):
                 goal=True,
                 promised=True,
                 pair=pair,
-                squared=True,
+                rows="squares",
+                apart="DN",
                 smooth=partial(_squared, pair=pair),
                 smooth_members=partial(_squared_of_members, pair=pair),
             )
@@ -56,7 +57,8 @@ class ColorSeparation(ReadoutMetric):
                 of=each.name,
                 ends=(),
                 goal=False,
-                squared=False,
+                rows="values",
+                apart="",
                 smooth=None,
                 smooth_members=None,
             )

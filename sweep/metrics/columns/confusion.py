@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from ..discrimination import (
     state_error_bound,
 )
 from ..quantity import Asked, Columns, NoiseMetric, Quantity
+from ..smooth_noise import bound_rows, error_decades, pair_rows, squared_contrast, squared_detectability
 
 CNR, D_PRIME, ERROR, ERROR_BOUND = "cnr", "dprime", "error", "error_bound"
 STATE_ERROR, STATE_ERROR_BOUND = "state_error", "state_error_bound"
@@ -33,6 +35,7 @@ _MEANINGS = {
     STATE_ERROR: "largest pairwise error over all pairs of states",
     STATE_ERROR_BOUND: "bound on how often the best rule tells the wrong state, for the worst signal",
 }
+_TOLD = {CNR: "contrast to noise", D_PRIME: "d'"}
 _ByPair = dict[Pair, FloatArray]
 _LESS = (ERROR, ERROR_BOUND, STATE_ERROR, STATE_ERROR_BOUND)
 
@@ -51,7 +54,7 @@ class Confusion(NoiseMetric):
             for pair in class_pairs(asked.states)
             for metric in (CNR, D_PRIME, ERROR, ERROR_BOUND)
         ]
-        return (*each, *(_quantity(metric, metric) for metric in (STATE_ERROR, STATE_ERROR_BOUND)))
+        return (*each, *(_quantity(metric, metric, asked.states) for metric in (STATE_ERROR, STATE_ERROR_BOUND)))
 
     def of_noise(
         self, imager: Imager, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
@@ -71,16 +74,28 @@ class Confusion(NoiseMetric):
         return found
 
 
-def _quantity(metric: str, name: str, pair: Pair | None = None) -> Quantity:
-    less = metric in _LESS
+def _quantity(metric: str, name: str, types: tuple[str, ...]) -> Quantity:
+    less, pairs = metric in _LESS, class_pairs(types)
+    if metric in (ERROR_BOUND, STATE_ERROR_BOUND):
+        smooth = partial(bound_rows, types=types)
+    else:
+        of = {CNR: squared_contrast, D_PRIME: squared_detectability}.get(metric, error_decades)
+        smooth = partial(pair_rows, of=of, pairs=pairs)
     return Quantity(
         name=name,
         metric=metric,
         meaning=_MEANINGS[metric],
-        pair=pair,
+        pair=pairs[0] if metric in (CNR, D_PRIME, ERROR, ERROR_BOUND) else None,
+        states=types,
+        label=f"{'/'.join(types)} {_TOLD[metric]}" if metric in _TOLD else "",
         wanted="less" if less else "more",
         ends=("max",) if less else ("min",),
+        goal=True,
+        nominal=True,  # each shift would take an evaluation with noise
         infinite=True,  # a signal without noise is told apart for certain
+        rows="decades" if less else "squares",
+        apart="noise" if metric == D_PRIME else "",
+        smooth=smooth,
     )
 
 

@@ -1,0 +1,118 @@
+"""Probabilities that are discussed for IEEE P2020: of detecting a contrast (CDP), and of separating colors (CSP).
+
+CDP: the probability that the Weber contrast K of two noisy readouts, bright over dark less 1, is within a share of the
+contrast of their means: P(K (1 - e) <= K measured <= K (1 + e)); Geese, Seger, Paolillo, "Detection probabilities:
+performance prediction for sensors of autonomous vehicles" (Electronic Imaging 2018); Artmann, Geese, Gaede, "Contrast
+detection probability: implementation and use cases" (2019). Here the pedestal is taken away, noise is Gaussian, e is
+1/2, and of two signals the channel with the largest CDP counts.
+
+CSP: the working group names photon noise and metameric spectra as its parts (Geese, "Automotive image quality concepts
+for the next SAE levels: color separation probability and contrast detection probability", AutoSens); a formula is not
+published there. Here it is the probability that a light of either type, each pair of lights as likely, falls on its own
+side of the plane between the two: 1 less the mean pairwise error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.special import ndtr
+
+from ...camera.imager import Imager
+from ...camera.noisy_readout import NoisyReadout
+from ...curves.lights import class_pairs, pair_name
+from ...types import FloatArray, IndexArray
+from ..discrimination import NoiseShape, pairwise_error
+from ..quantity import Asked, Columns, NoiseMetric, Quantity
+
+CDP, CSP = "cdp", "csp"
+_MOST = 1e12
+"""Contrast to a dark readout of 0."""
+_SHARE = 0.5
+"""How far a measured contrast may be from that of the means, of it."""
+_MEANINGS = {
+    CDP: "contrast detection probability: that the Weber contrast of two readouts is within half of that of their "
+    "means, in the best channel, for the worst two signals of two types",
+    CSP: "color separation probability: that noise leaves a light on its own side of the plane between two, the mean "
+    "over all pairs of lights of two types",
+}
+
+
+class Probabilities(NoiseMetric):
+    """The least over the places of the light and the moments of its pulses."""
+
+    order = 6
+    extra = True
+
+    def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
+        """Two columns for each pair of states, where a study asks for them."""
+        if not asked.probabilities:
+            return ()
+        return tuple(
+            Quantity(
+                name=pair_name(metric, pair),
+                metric=metric,
+                meaning=_MEANINGS[metric],
+                pair=pair,
+                wanted="more",
+                ends=("min",),
+                most=1.0,
+            )
+            for pair in class_pairs(asked.states)
+            for metric in (CDP, CSP)
+        )
+
+    def of_noise(
+        self, imager: Imager, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
+    ) -> Columns:
+        """From mean and variance of the digital numbers."""
+        del curves
+        found: Columns = {}
+        pedestal_dn, cases = imager.readout.pixel.offset_dn, range(read.mean.shape[1])
+        for pair in class_pairs(list(members)):
+            both = members[pair[0]], members[pair[1]]
+            each = [(read.mean[:, case], read.variance[:, case]) for case in cases]
+            shapes = [NoiseShape(read.gaussian[:, case], read.reach_dn[:, case]) for case in cases]
+            detected = [detection(mean - pedestal_dn, variance, *both) for mean, variance in each]
+            separated = [_separation(*own, *both, shape) for own, shape in zip(each, shapes, strict=True)]
+            found[pair_name(CDP, pair)] = np.min(detected, axis=0)
+            found[pair_name(CSP, pair)] = np.min(separated, axis=0)
+        return found
+
+
+def detection(mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
+    """CDP of the worst two signals of two types in their best channel, ndarray[n_designs].
+
+    `mean` (DN, without pedestal), `variance`: ndarray[n_designs, n_signals, n_channels]. Where the darker readout is
+    above 0, the contrast of two Gaussians is within its ends where bright - r dark is above 0 for the lower ratio r and
+    below it for the higher one. Darker readouts below 0, whose contrast means nothing, count against it.
+    """
+    least = np.ones(len(mean))
+    for signal in first:
+        one, others = mean[:, signal, None], mean[:, second]
+        own, other = variance[:, signal, None], variance[:, second]
+        bright, dark = np.maximum(one, others), np.minimum(one, others)
+        bright_noise = np.where(one >= others, own, other)
+        dark_noise = np.where(one >= others, other, own)
+        apart = bright - dark
+        contrast = np.divide(apart, dark, out=np.full(apart.shape, _MOST), where=dark > 0)
+        ratios = [1 + contrast * (1 + side * _SHARE) for side in (1, -1)]
+        above, below = (_beyond(_SHARE * apart, bright_noise, dark_noise, ratio) for ratio in ratios)
+        inside = np.maximum(ndtr(above) - ndtr(-below), 0.0)
+        least = np.minimum(least, inside.max(axis=2).min(axis=1))
+    return least
+
+
+def _beyond(apart: FloatArray, bright: FloatArray, dark: FloatArray, ratio: FloatArray) -> FloatArray:
+    """A distance over the noise of bright - ratio x dark; 0 where there is no distance, infinite without noise."""
+    noise = np.sqrt(bright + np.where(dark > 0, ratio**2 * dark, 0.0))
+    return np.where(apart > 0, np.divide(apart, noise, out=np.full(apart.shape, np.inf), where=noise > 0), 0.0)
+
+
+def _separation(
+    mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray, shape: NoiseShape
+) -> FloatArray:
+    """CSP of two types, ndarray[n_designs]."""
+    errors = [pairwise_error(mean, variance, np.array([a]), np.array([b]), shape) for a in first for b in second]
+    return np.asarray(1 - np.mean(errors, axis=0), dtype=float)

@@ -1,0 +1,54 @@
+"""The least noise that any filter leaves: what makes a bound on d' of one on distances.
+
+d'^2 = sum of D^2 / S over the channels, where S, the mean variance of the two signals, grows with the light in the
+modified channel. Put in its place the least that any filter of the program has there, and no filter's d' is above
+
+    d'^2 <= sum over the other channels of D^2 / S + D_N^2 / (least S_N),
+
+which is a distance in units of a noise that does not depend on the filter. The least light of a signal under a least
+sensitivity is a fractional knapsack: light is taken where it costs least sensitivity. Its bound is that of the
+multiplier y, min l @ N >= y h + sum of min((l - y a) low, (l - y a) high) for a @ N >= h, and holds for any y >= 0.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..camera.linear import LinearImager
+from ..types import FloatArray
+
+_ROUNDING = 1e-12
+"""Of the sums over wavelengths, relative."""
+
+
+def least_variance(
+    imager: LinearImager, base: FloatArray, box: tuple[FloatArray, FloatArray], row: FloatArray, least: float
+) -> FloatArray:
+    """Variance in the only modified channel that none of the filters goes below, DN^2, ndarray[n_cases, n_signals].
+
+    Filters lie in the `box`, ndarray[n_wavelengths] each, and have row @ N >= least, for a row >= 0. The variance grows
+    with the light of every pixel. `base`: the curve at which the variance is known.
+    """
+    pixel, channel = imager.readout.pixel, imager.view.modified[0]
+    per_qe = imager.spread_per_qe(0, base[None])
+    at_base = imager.spread_electrons(base[None, None])[0, :, :, channel]
+    share = imager.spread_shares()[:, None, channel]
+    constant = at_base - per_qe @ base
+    electrons = np.maximum(_least_light(per_qe, box, row, least) + constant, 0.0)
+    # The weighted sum of the pixels' squares is no less than the square of their weighted sum over that of the weights.
+    own = electrons + pixel.prnu**2 * electrons**2 / share + pixel.read_noise_e**2 * share
+    return np.asarray((pixel.dn_per_e**2 * own + share / 12) * (1 - _ROUNDING), dtype=float)
+
+
+def _least_light(light: FloatArray, box: tuple[FloatArray, FloatArray], row: FloatArray, least: float) -> FloatArray:
+    """A bound of min light @ N, ndarray[...] of ndarray[..., n_wavelengths]."""
+    low, high = box
+    used = row > 0
+    ratio = np.divide(light, row, out=np.zeros_like(light), where=used)
+    # From high on, take away where most light goes with the sensitivity, down to the least one.
+    order = np.argsort(-ratio, axis=-1)
+    taken = np.cumsum(np.take_along_axis(np.broadcast_to(row * (high - low), light.shape), order, axis=-1), axis=-1)
+    last = np.minimum((taken < row @ high - least).sum(axis=-1, keepdims=True), row.size - 1)
+    y = np.maximum(np.take_along_axis(np.take_along_axis(ratio, order, axis=-1), last, axis=-1), 0.0)
+    rest = light - y * row
+    return np.asarray(y[..., 0] * least + np.minimum(rest * low, rest * high).sum(axis=-1), dtype=float)

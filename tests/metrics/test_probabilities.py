@@ -1,0 +1,49 @@
+"""CDP and CSP: only where a study asks, and what they do not see."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sweep.camera.imager import Imager
+from sweep.camera.methods import REFERENCE
+from sweep.camera.pixel import Pixel
+from sweep.camera.scenario import Scenario
+from sweep.metrics.columns.probabilities import detection
+from sweep.metrics.evaluate import evaluate
+from sweep.study import load_study
+
+from ..conftest import STUDIES
+
+TWO = np.array([[612.89, 5.92, 651.18, 6.25, 1.0], [600.0, 20.0, 660.0, 20.0, 0.7]])
+"""A stopband that separates well, and one of about half its d'."""
+
+
+def test_what_they_do_not_see_d_prime_does() -> None:
+    """In a bright scene both are near 1 for filters whose d' differs by more than 1.8 times."""
+    study = load_study(STUDIES / "stopband.yaml")
+    assert study.search is not None
+    problem = study.problem(study.search)
+    scenario = Scenario.model_validate({"noise": True})
+    pixel = Pixel(read_noise_e=10, prnu=0.01, offset_dn=168)
+    imager = Imager(replace(problem.view, scenario=scenario, pixel=pixel, methods=REFERENCE))
+    curves = problem.family.curves(TWO)
+    assert not {"cdp_yellow_red", "csp_yellow_red"} & evaluate(imager, curves, ("yellow", "red")).keys()
+    found = evaluate(imager, curves, ("yellow", "red"), probabilities=True)
+    good, poor = found["dprime_yellow_red"]
+    assert good > 1.8 * poor
+    for name, apart in (("cdp_yellow_red", 0.005), ("csp_yellow_red", 1e-6)):
+        assert (found[name] > 1 - apart).all()
+
+
+def test_contrasts_that_are_none_or_have_no_noise_or_no_light() -> None:
+    first, second = np.array([0]), np.array([1])
+
+    def of(one: float, other: float, variance: float) -> float:
+        return float(detection(np.array([[[one], [other]]]), np.full((1, 2, 1), variance), first, second)[0])
+
+    assert of(100, 100, 4) == 0  # no contrast
+    assert of(100, 50, 0) == 1  # no noise
+    assert 0 <= of(100, 0, 4) < 1e-6  # any contrast may be measured
+    assert of(50, 100, 4) == of(100, 50, 4)

@@ -1,0 +1,99 @@
+"""The limit of d': no filter exceeds it, whatever its noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from sweep.camera.linear import smooth_imager
+from sweep.camera.methods import REFERENCE
+from sweep.camera.scenario import Scenario
+from sweep.metrics.bound import Bound
+from sweep.metrics.objective import Objective
+from sweep.metrics.smooth_noise import smooth_detectability
+from sweep.search.least_noise import least_variance
+from sweep.search.limit import limit_of, why_not
+from sweep.search.problem import Problem
+
+from .test_under_noise import problem_of, searched
+
+GOAL = Objective(minimum={"dprime_yellow_red": 1.0})
+SCENES = {
+    "chart": {"noise": True, "exposure": {"kind": "white_patch", "level": 0.3}},
+    "far": {"noise": {"prnu": 0.05}, "target": {"distance_m": 150, "fov_deg": 60, "phase_px": [0.3, 0.7]}},
+    "pulsed": {
+        "noise": True,
+        "background_cd_m2": 50,
+        "exposure": {"kind": "fixed", "exposure_s": 8e-3},
+        "drive": {"duty": 0.5, "frequency_hz": 90},
+    },
+}
+
+
+def problem_in(scene: str) -> Problem:
+    problem = problem_of("stopband", 5, 0.3, GOAL)
+    scenario = Scenario.model_validate(SCENES[scene])
+    assert scenario.noise is not None
+    view = replace(problem.view, scenario=scenario, pixel=scenario.noise.of(problem.view.pixel), methods=REFERENCE)
+    return replace(problem, view=view, constraints={"sensitivity": Bound(min=0.9)})
+
+
+def filters(problem: Problem, n: int) -> np.ndarray:
+    """Random filters below the base with at least nine tenths of its sensitivity: smooth, steps, and deep bands."""
+    base, rng = problem.view.base_qe[0], np.random.default_rng(5)
+    found = [base]
+    while len(found) < n:
+        share = np.ones(base.size)
+        for _ in range(rng.integers(1, 4)):
+            start = rng.integers(0, base.size)
+            share[start : start + rng.integers(1, 60)] = rng.uniform(0, 1)
+        if (share @ base) / base.sum() >= 0.9:
+            found.append(share * base)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_no_filter_has_less_noise_or_a_larger_d_prime(scene: str) -> None:
+    problem = problem_in(scene)
+    imager, base = smooth_imager(problem.view), problem.view.base_qe[0]
+    curves = filters(problem, 200)[:, None]
+    row, channel = np.ones_like(base) / base.sum(), problem.view.modified[0]
+    least = least_variance(imager, base, (np.zeros_like(base), base), row, 0.9)
+    assert (imager.variance(curves)[..., channel] >= least).all()
+    limit = limit_of(problem)
+    assert limit.curve is not None
+    reached = smooth_detectability(problem.view, curves, ("yellow", "red"))
+    assert reached.max() <= limit.proven
+    best = searched(problem)
+    assert reached.max() < best.objective <= limit.proven
+    own = smooth_detectability(problem.view, limit.curve[None, None], ("yellow", "red"))[0]
+    assert limit.attained == pytest.approx(own, rel=1e-12)
+    assert limit.attained <= limit.proven
+
+
+def test_the_least_light_is_that_of_a_linear_program() -> None:
+    problem = problem_in("chart")
+    imager, base = smooth_imager(problem.view), problem.view.base_qe[0]
+    row, channel, gain = np.ones_like(base) / base.sum(), problem.view.modified[0], problem.view.pixel.dn_per_e
+    no_prnu = replace(problem.view, pixel=problem.view.pixel.model_copy(update={"prnu": 0.0}))
+    least = least_variance(smooth_imager(no_prnu), base, (0.2 * base, base), row, 0.9)[0]
+    light = imager.per_qe(0, base[None])[0, :, channel] / gain
+    for signal in (0, 20, 40):
+        found = linprog(light[signal], A_ub=-row[None], b_ub=[-0.9], bounds=np.column_stack([0.2 * base, base]))
+        expected = gain**2 * (found.fun + 25) + 1 / 12
+        assert least[signal] == pytest.approx(expected, rel=1e-9)
+
+
+def test_between_levels_a_bound_is_told_only_where_its_noise_holds() -> None:
+    limit = limit_of(problem_in("chart"), sensitivities=(0.85, 0.9, 0.95))
+    below, here, above = limit.elsewhere
+    assert below == np.inf
+    assert above <= here <= limit.proven + 1e-3
+
+
+def test_errors_have_no_limit_and_say_why() -> None:
+    problem = replace(problem_in("chart"), objective=Objective(least={"state_error": 1.0}))
+    assert why_not(problem) == "state_error is not convex in the filter: its noise grows with the light; d' has a limit"
