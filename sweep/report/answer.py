@@ -10,7 +10,6 @@ import numpy as np
 from ..metrics.bound import FEASIBLE
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.limiting import limited_by_name
-from ..metrics.quantity import HELD_OUT
 from ..results.output import Output
 from ..results.tables import FOUND, PLAIN, SWEPT
 from ..results.thinning import per_light
@@ -18,7 +17,9 @@ from .assumed import assumed, moves_with_light
 from .leaders import Leaders, Row, leaders_of
 from .names import full_name
 from .noise import usable_lines
+from .robustness import over_population, robustness_lines, worst_over
 from .series import SeriesFigure, lead_sentence, leads_of
+from .unseen import unseen_lines
 from .values import series_figures
 
 _OF_CLEAR = "of a clear sensor's light"
@@ -61,7 +62,7 @@ def said_separation(output: Output, row: Row) -> str:
     light = f"at {row[CFA_SENSITIVITY]:.3f} {_OF_CLEAR}"
     if separation.pair is None:
         return f"reaches {separation.words} {told} {light}"
-    worst = " in the worst case of production" if separation.extreme else ""
+    worst = f" in the worst case of {worst_over(output)}" if separation.extreme else ""
     return f"separates {' from '.join(separation.pair)} by {told}{worst} {light}"
 
 
@@ -90,23 +91,12 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
         most = separation.told_bound(proven)
         alike = " and moves like it" if moves_with_light(output, best) else ""
         parts.append(f"No filter in its place that meets the same{alike} exceeds {most} (proven, before quantization).")
-    if isinstance(lights, str):
+    if isinstance(lights, str) and not over_population(output):
         parts.append(f"The two lights that limit it are {lights}.")
     if parts:
         yield " ".join(parts)
-    yield from _unseen(output, best)
-
-
-def _unseen(output: Output, best: Row) -> Iterator[str]:
-    """How the best one does on lights that its search did not see."""
-    separation = output.trade_off[0]
-    held_out = float(best.get(HELD_OUT + (separation.of or separation.name), np.nan))
-    if np.isfinite(held_out):
-        own = separation.told(best[separation.name])
-        yield f"On lights that it has not seen it has {separation.told(held_out)} (on its own lights {own})."
-    if output.left_out is not None and output.left_out["fall"].notna().any():
-        worst = output.left_out.nlargest(1, "fall").iloc[0]
-        yield f"Left out of the search, {worst['signal']} costs its optimum most: {separation.told(worst['fall'])}."
+    yield from robustness_lines(output, best)
+    yield from unseen_lines(output, best)
 
 
 def _times(output: Output, best: Row, plain: Row) -> str:
