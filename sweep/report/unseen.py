@@ -27,12 +27,12 @@ def unseen_lines(output: Output, best: Row) -> Iterator[str]:
         falls = output.left_out["fall"].dropna().to_numpy()
         if falls.size > 1:
             mean, low, high = generalization_gap(falls, output.study.seed)
-            ends = f"{separation.told(low)} to {separation.told(high)}"
-            yield f"A light that the search has not seen costs {separation.told(mean)} on average (95 % interval {ends})."
+            ends = f"95 % interval {separation.told(low)} to {separation.told(high)}"
+            yield f"A light that the search has not seen costs {separation.told(mean)} on average ({ends})."
 
 
 def generalization_gap(falls: FloatArray, seed: int) -> tuple[float, float, float]:
-    """The mean fall of an optimum on the light that was left out, with the 95 % interval of a bootstrap over the lights.
+    """The mean fall of an optimum on the light that was left out, with its 95 % interval by a bootstrap over the lights.
 
     `falls`: DN, ndarray[n_lights]. The interval is of lights like these, drawn at random (Efron and Tibshirani, An
     Introduction to the Bootstrap, 1993, chapter 13).
