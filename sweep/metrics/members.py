@@ -25,8 +25,6 @@ from .separation import csd_name
 
 _HELD = 4_000_000
 """Values of responses that are held at once."""
-PARTS = 5
-"""Parts of a region of shifts whose nearest members a search sees apart."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +62,12 @@ class _Table:
 
 
 class PopulationImager:
-    """A scene whose lights are all members of their population."""
+    """A scene whose lights are all members of their population.
+
+    `parts`: of a region of shifts, whose nearest members search and limit see apart.
+    """
+
+    parts = 5
 
     def __init__(self, view: View) -> None:
         """Everything is on, whatever the plan of `view` leaves out: plans promise nothing of other members."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,8 +13,10 @@ from ..camera.view import View
 from ..curves.lights import Pair
 from ..designs.family import Family
 from ..types import FloatArray, IndexArray
-from .members import PARTS, PopulationImager
 from .separation import separation
+
+if TYPE_CHECKING:
+    from .members import PopulationImager
 
 
 @dataclass(frozen=True)
@@ -101,7 +104,7 @@ class SmoothDesign:
         response, by_u = self._response_of_members
         values, slopes = [], []
         for case in range(len(response)):
-            near = self._members.nearest(response[case], pair, parts=PARTS)
+            near = self._members.nearest(response[case], pair, parts=self._members.parts)
             apart = near.of(response[case], 0) - near.of(response[case], 1)
             slope = near.of(by_u[:, case], 0) - near.of(by_u[:, case], 1)
             some = np.isfinite(near.squared)

@@ -32,7 +32,7 @@ def unseen_lines(output: Output, best: Row) -> Iterator[str]:
 
 
 def generalization_gap(falls: FloatArray, seed: int) -> tuple[float, float, float]:
-    """The mean fall of an optimum on the light that was left out, with its 95 % interval by a bootstrap over the lights.
+    """The mean fall of an optimum on a light that was left out, with its 95 % interval by a bootstrap over the lights.
 
     `falls`: DN, ndarray[n_lights]. The interval is of lights like these, drawn at random (Efron and Tibshirani, An
     Introduction to the Bootstrap, 1993, chapter 13).

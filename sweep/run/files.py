@@ -47,7 +47,6 @@ from .held_out import held_out_table, left_out_table
 from .limiting import limited_by_table
 from .provenance import plan_facts, provenance, resolved_yaml
 from .recognition import recognition_table
-from .robustness import robustness_table
 from .routes import Detours, detours_in_words
 from .rows import Rules, detours_of, with_local_front
 from .search import SearchAnswer, answer_row, front_table, limit_alone, run_search, search_facts, search_log
@@ -190,6 +189,8 @@ class Making:
             table = held_out_table(self.study, rows, on_front, self.crew, self.progress)
             self.inventory.write_table(VALIDATED, table)
         if ROBUSTNESS in names:
+            from .robustness import robustness_table  # noqa: PLC0415  (only where lights have a population)
+
             self.inventory.write_table(ROBUSTNESS, robustness_table(self.study, rows, self.crew, self.progress))
         if RECOGNITION in names:
             table = recognition_table(self.study, rows, self.crew, self.progress)

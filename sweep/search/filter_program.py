@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csr_matrix, hstack, vstack
@@ -20,8 +21,10 @@ from ..camera.linear import smooth_imager
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
 from ..types import FloatArray, IndexArray
-from .member_pairs import MemberPairs
 from .problem import Problem
+
+if TYPE_CHECKING:
+    from .member_pairs import MemberPairs
 
 ROUNDING = 1e-9
 """Filters may exceed their base by this share: rounding."""
