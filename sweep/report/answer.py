@@ -47,7 +47,9 @@ def answer_sentences(output: Output) -> list[str]:
     series = usable + [lead_sentence(s) for s in series_figures(output) if not usable or len(leads_of(s)) > 1]
     if series and output.best.empty:
         return series
-    return [*_best(output, leaders_of(output)), *who_else(output), *series]
+    leaders = leaders_of(output)
+    lamps = robustness_lines(output, leaders.chosen)
+    return [*_best(output, leaders), *lamps, *who_else(output), *series]
 
 
 def _under(output: Output) -> str:
@@ -95,7 +97,6 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
         parts.append(f"The two lights that limit it are {lights}.")
     if parts:
         yield " ".join(parts)
-    yield from robustness_lines(output, best)
     yield from unseen_lines(output, best)
 
 

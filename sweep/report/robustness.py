@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..metrics.quantity import WORST
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN
 from .leaders import Row
@@ -24,12 +25,16 @@ def worst_over(output: Output) -> str:
     return " and ".join(over + (["all lamps"] if over_population(output) else []))
 
 
-def robustness_lines(output: Output, best: Row) -> Iterator[str]:
-    """The price of the worst case, what breaks designs, and yields; nothing without a population of lights."""
+def robustness_lines(output: Output, best: Row | None) -> Iterator[str]:
+    """The price of the worst case, what breaks designs, and yields; nothing without a population of lights.
+
+    In the scenario of the best design, else in the first one.
+    """
     if output.study.population is None:
         return
-    few = output.few[output.few["scenario"] == best["scenario"]].to_dict("records")
-    if over_population(output):
+    scenario = output.scenarios[0] if best is None else best["scenario"]
+    few: list[Row] = list(output.few[output.few["scenario"] == scenario].to_dict("records"))
+    if best is not None and over_population(output):
         yield from _price(output, best, [row for row in few if row["kind"] == NAMED])
     for row in few:
         if row["kind"] in (NAMED, FOUND) and np.isfinite(row.get("breaks_at", np.nan)):
@@ -63,7 +68,8 @@ def _price(output: Output, best: Row, named: list[Row]) -> Iterator[str]:
 def _breaks(output: Output, row: Row, few: list[Row]) -> str:
     """Where a design falls below the best plain CFA, by which lights, at which temperature."""
     separation = output.trade_off[0]
-    plain = max((each for each in few if each["kind"] == PLAIN), key=lambda each: float(each[separation.name]))
+    worst = WORST + (separation.of or separation.name)
+    plain = max((each for each in few if each["kind"] == PLAIN), key=lambda each: float(each[worst]))
     if row["breaks_at"] == 0:
         return f"{_named(row)} is below {plain['name']} with the study's own lights."
     each = [f"{row[f'breaks_{side}']} ({row[f'breaks_{side}_nm']:+.1f} nm)" for side in ("first", "second")]

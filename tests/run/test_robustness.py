@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.optimize import brentq
 
+from sweep.report.summary import summary_lines
+from sweep.results.output import read_output
 from sweep.results.tables import ROBUSTNESS
 from sweep.run.robustness import Candidate, drawn_dn, interval
 from sweep.study import Study, load_study
@@ -109,6 +112,9 @@ def test_any_number_of_workers_gives_the_same_and_a_break_is_where_the_worst_cas
         ran(study, tmp_path / f"out{jobs}", jobs)
         tables.append(pq.read_table(tmp_path / f"out{jobs}" / ROBUSTNESS))
     assert tables[0].equals(tables[1])
+    said = "\n".join(summary_lines(read_output(tmp_path / "out1")))
+    assert re.search(r"Mine falls below RGGB at [\d.]+ times .*: \S+yellow \([+-].* nm\) and \S+red .*, \d+ DN", said)
+    assert re.search(r"At least 200 DN have, of random lamps and cameras: RGGB [\d.]+%.*, mine [\d.]+%", said)
     plain, mine = tables[0].to_pylist()
     assert plain["breaks_at"] is None
     assert 0.25 < mine["breaks_at"] < 3

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from sweep.curves.population import Population
+from sweep.door.own_filters import judged
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.members import population_imager
 from sweep.metrics.objective import Objective
@@ -107,3 +108,12 @@ def test_the_table_of_the_documentation() -> None:
         )
         found[space.name] = [f"{value:.0f}" for value in values]
     assert printed == found
+
+
+def test_a_filter_of_ones_own_has_its_worst_case_where_no_edges_shift() -> None:
+    study = load_study(STUDIES / "robust.yaml", changes={"production.edge_shift_nm": "0"})
+    view = study.view(study.spaces[3], "f/2")
+    curves = 0.9 * view.base_qe[None]
+    found = judged(study, view, curves)["worst_csd_yellow_red"]
+    assert found == population_imager(view).worst(curves)["csd_yellow_red"]
+    assert 0 < found[0] < smooth_csd(view, curves, ("yellow", "red"))[0]
