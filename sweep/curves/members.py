@@ -49,12 +49,12 @@ class Members:
 
     def __init__(self, lights: Lights, grid: WavelengthGrid) -> None:
         assert lights.population is not None
-        self._lights, self._step_nm, self._population = lights, grid.step_nm, lights.population
+        self._lights, self._step_nm, self.population = lights, grid.step_nm, lights.population
         spans = spans_nm(lights, lights.population)
         self._first = int(np.floor(min(low for low, _ in spans) / grid.step_nm + _TINY))
         last = int(np.ceil(max(high for _, high in spans) / grid.step_nm - _TINY))
         self.n_steps = max(last - self._first, 1) + 1
-        widths = self._population.width
+        widths = self.population.width
         photons = [stretched(grid, spectrum, factor) for spectrum in lights.photons for factor in widths]
         steps = range(self._first, self._first + self.n_steps)
         made = np.stack([moved(spectrum, step) for spectrum in photons for step in steps])
@@ -72,14 +72,18 @@ class Members:
 
     def signal(self, row: int) -> int:
         """The signal whose spectra begin at a row."""
-        return row // (len(self._population.width) * self.n_steps)
+        return row // (len(self.population.width) * self.n_steps)
+
+    def steps_of(self, shift_nm: FloatArray) -> FloatArray:
+        """How many steps after the first shift a shift is, 0 or more."""
+        return np.asarray(np.clip(shift_nm / self._step_nm - self._first, 0.0, self.n_steps - 1), dtype=float)
 
     def shift_nm(self, cell: int, share: float) -> float:
         """By how much a spectrum is shifted so many steps after the first shift."""
         return (self._first + cell + share) * self._step_nm
 
     def _of(self, signal: int) -> tuple[float, tuple[float, float]]:
-        return _drift_and_own(self._lights, self._population, signal)
+        return _drift_and_own(self._lights, self.population, signal)
 
     def regions(self, pair: Pair) -> tuple[list[ShiftRegion], IndexArray]:
         """The different regions of two types, and that of each two signals and widths, ndarray[n_first, n_second]."""
@@ -101,7 +105,7 @@ class Members:
         (a, own_a), (b, own_b) = self._of(one), self._of(other)
         key = (a, *own_a, b, *own_b)
         if key not in self._regions:
-            corners = _corners(self._population, (a, b), (own_a, own_b))
+            corners = _corners(self.population, (a, b), (own_a, own_b))
             self._regions[key] = _region(
                 [(x / self._step_nm - self._first, y / self._step_nm - self._first) for x, y in corners]
             )

@@ -58,7 +58,8 @@ class Population(Section):
     its own (`independent`). `binning_nm`: so far off, to either side, a lamp may be; `ageing_nm`: from and to so much
     it moves in its life; both are independent of each other and for each signal. `width`: each spectrum is stretched
     about its middle by each of these factors. Where values differ, keys are signal types or names of signals; a value
-    alone holds for all.
+    alone holds for all. `wanted_dn`: what share of lamps and cameras has at least this CSD is told, from `draws` of two
+    lights, their temperatures, bins, ages and widths, a place of the field and a shift of the edges, each evenly.
     """
 
     temperature_c: Annotated[
@@ -79,6 +80,8 @@ class Population(Section):
         BeforeValidator(_spans_by_name, json_schema_input_type=list[_Aged] | dict[str, list[_Aged]]),
     ] = {}
     width: list[Annotated[float, Field(ge=0.5, le=2)]] = Field(default=[1.0], min_length=1, max_length=9)
+    wanted_dn: float | None = Field(default=None, ge=0, le=1e6)
+    draws: int = Field(default=100_000, ge=100, le=10_000_000)
 
     @model_validator(mode="after")
     def _ordered(self) -> Population:
@@ -106,6 +109,26 @@ class Population(Section):
         """By how much a junction is warmer than the reference, at least and at most."""
         low, high = self.temperature_c
         return low - self.reference_c, high + self.self_heating_k - self.reference_c
+
+    def scaled(self, factor: float) -> Population:
+        """The population with every shift so many times as large."""
+        low, high = (self.reference_c + factor * warmer for warmer in self.warmer_k)
+        update = {
+            "temperature_c": (low, high),
+            "self_heating_k": 0.0,
+            "binning_nm": {name: factor * value for name, value in self.binning_nm.items()},
+            "ageing_nm": {name: (factor * low, factor * high) for name, (low, high) in self.ageing_nm.items()},
+        }
+        return self.model_copy(update=update)
+
+    def temperature_of(self, kind: str, name: str, shift_nm: float) -> tuple[float, float]:
+        """Between which temperatures of its junction a signal may be shifted so far, degrees Celsius."""
+        drift, (low, high) = self.drift(kind, name), self.own_nm(kind, name)
+        ends = self.warmer_k
+        if drift:
+            own = sorted((shift_nm - off) / drift for off in (low, high))
+            ends = max(ends[0], own[0]), min(ends[1], own[1])
+        return self.reference_c + ends[0], self.reference_c + ends[1]
 
     def drift(self, kind: str, name: str) -> float | None:
         """nm/K of a signal of a type; None where neither the study nor a default says it."""

@@ -15,7 +15,7 @@ from ..errors import DataError, Fault, nearest
 from ..metrics.bound import FEASIBLE, total_violation
 from ..metrics.evaluate import evaluate, family_quantities
 from ..metrics.objective import COMBINED
-from ..metrics.quantity import Column, Columns
+from ..metrics.quantity import WORST, Column, Columns
 from ..study import Study
 from ..types import FloatArray
 
@@ -97,6 +97,10 @@ def judged(study: Study, view: View, curves: FloatArray) -> Columns:
         allowed = "0 to 1; a transmission is relative to a curve (`relative_to`), percent are divided by 100"
         raise DataError(Fault("a QE above 1", value=round(float(curves.max()), 6), allowed=allowed))
     found = evaluate(imager_of(view), curves, study.states, probabilities=study.asked.probabilities)
+    if view.lights.population is not None and not study.edge_shift_nm:
+        from ..metrics.members import population_imager  # noqa: PLC0415  (only where lights have a population)
+
+        found |= {WORST + name: values for name, values in population_imager(view).worst(curves).items()}
     found |= family_quantities(None, np.empty((len(curves), 0)))
     lacking = np.full(len(curves), np.nan)
     columns = {name: found.get(name, lacking) for name in study.quantities if name != COMBINED}

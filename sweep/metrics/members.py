@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import pickle
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -24,8 +25,6 @@ from .separation import csd_name
 
 _HELD = 4_000_000
 """Values of responses that are held at once."""
-PARTS = 5
-"""Parts of a region of shifts whose nearest members a search sees apart."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +62,12 @@ class _Table:
 
 
 class PopulationImager:
-    """A scene whose lights are all members of their population."""
+    """A scene whose lights are all members of their population.
+
+    `parts`: of a region of shifts, whose nearest members search and limit see apart.
+    """
+
+    parts = 5
 
     def __init__(self, view: View) -> None:
         """Everything is on, whatever the plan of `view` leaves out: plans promise nothing of other members."""
@@ -76,13 +80,13 @@ class PopulationImager:
         """The smooth response to every spectrum of the members."""
         return smooth_imager(self.view)
 
-    def worst(self, curves: FloatArray) -> dict[str, FloatArray]:
+    def worst(self, curves: FloatArray, pairs: Sequence[Pair] = ()) -> dict[str, FloatArray]:
         """The smallest CSD of each pair over all members and places, DN, by the name of the CSD, ndarray[n_designs].
 
-        `curves`: QE of the modified channels, ndarray[n_designs, n_modified, n_wavelengths]. NaN where the response is
-        no number.
+        `curves`: QE of the modified channels, ndarray[n_designs, n_modified, n_wavelengths]; `pairs`: all, if none are
+        named. NaN where the response is no number.
         """
-        pairs = class_pairs(self.view.lights.classes)
+        pairs = pairs or class_pairs(self.view.lights.classes)
         found = {pair: np.full(len(curves), np.nan) for pair in pairs}
         step = max(1, _HELD // (self.imager.n_cases * self.view.lights.photons.shape[0] * len(self.view.qe)))
         for start in range(0, len(curves), step):

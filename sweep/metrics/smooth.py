@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -14,8 +14,10 @@ from ..camera.view import View
 from ..curves.lights import Pair
 from ..designs.family import Family
 from ..types import FloatArray, IndexArray
-from .members import PARTS, PopulationImager
 from .separation import separation
+
+if TYPE_CHECKING:
+    from .members import PopulationImager
 
 Made = TypeVar("Made")
 
@@ -123,7 +125,7 @@ class SmoothDesign:
         response, by_u = self._response_of_members
         values, slopes = [], []
         for case in range(len(response)):
-            near = self._members.nearest(response[case], pair, parts=PARTS)
+            near = self._members.nearest(response[case], pair, parts=self._members.parts)
             apart = near.of(response[case], 0) - near.of(response[case], 1)
             slope = near.of(by_u[:, case], 0) - near.of(by_u[:, case], 1)
             some = np.isfinite(near.squared)

@@ -11,7 +11,7 @@ from ..metrics.bound import FEASIBLE
 from ..metrics.columns.confusion import CNR, D_PRIME
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.limiting import limited_by_name
-from ..metrics.quantity import DECADES, HELD_OUT
+from ..metrics.quantity import DECADES
 from ..results.output import Output
 from ..results.tables import FOUND, PLAIN, SWEPT
 from ..results.thinning import per_light
@@ -19,7 +19,9 @@ from .assumed import assumed, moves_with_light
 from .leaders import Leaders, Row, leaders_of
 from .names import full_name
 from .noise import usable_lines
+from .robustness import over_population, robustness_lines, worst_over
 from .series import SeriesFigure, lead_sentence, leads_of
+from .unseen import unseen_lines
 from .values import series_figures
 
 _BY_NOISE = (D_PRIME, CNR)
@@ -49,7 +51,9 @@ def answer_sentences(output: Output) -> list[str]:
     series = usable + [lead_sentence(s) for s in series_figures(output) if not usable or len(leads_of(s)) > 1]
     if series and output.best.empty:
         return series
-    return [*_best(output, leaders_of(output)), *who_else(output), *series]
+    leaders = leaders_of(output)
+    lamps = robustness_lines(output, leaders.chosen)
+    return [*_best(output, leaders), *lamps, *who_else(output), *series]
 
 
 def _under(output: Output) -> str:
@@ -64,7 +68,7 @@ def said_separation(output: Output, row: Row) -> str:
     light = f"at {row[CFA_SENSITIVITY]:.3f} {_OF_CLEAR}"
     if separation.pair is None or separation.metric in _BY_NOISE:
         return f"reaches {separation.words} {told} {light}"
-    worst = " in the worst case of production" if separation.extreme else ""
+    worst = f" in the worst case of {worst_over(output)}" if separation.extreme else ""
     return f"separates {' from '.join(separation.pair)} by {told}{worst} {light}"
 
 
@@ -93,23 +97,11 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
         most = separation.told_bound(proven)
         alike = " and moves like it" if moves_with_light(output, best) else ""
         parts.append(f"No filter in its place that meets the same{alike} exceeds {most} (proven, before quantization).")
-    if isinstance(lights, str):
+    if isinstance(lights, str) and not over_population(output):
         parts.append(f"The two lights that limit it are {lights}.")
     if parts:
         yield " ".join(parts)
-    yield from _unseen(output, best)
-
-
-def _unseen(output: Output, best: Row) -> Iterator[str]:
-    """How the best one does on lights that its search did not see."""
-    separation = output.trade_off[0]
-    held_out = float(best.get(HELD_OUT + (separation.of or separation.name), np.nan))
-    if np.isfinite(held_out):
-        own = separation.told(best[separation.name])
-        yield f"On lights that it has not seen it has {separation.told(held_out)} (on its own lights {own})."
-    if output.left_out is not None and output.left_out["fall"].notna().any():
-        worst = output.left_out.nlargest(1, "fall").iloc[0]
-        yield f"Left out of the search, {worst['signal']} costs its optimum most: {separation.told(worst['fall'])}."
+    yield from unseen_lines(output, best)
 
 
 def _times(output: Output, best: Row, plain: Row) -> str:

@@ -20,6 +20,7 @@ from .tables import (
     RECOGNITION,
     RESOLVED,
     RESULTS,
+    ROBUSTNESS,
     SEARCH_LOG,
     VALIDATED,
     front_schema,
@@ -79,6 +80,10 @@ FILES = {
     LIMITED_BY: "the two lights that limit each CSD of the designs that the report can show: `design_id`, "
     "`limited_by_<a>_<b>` (of a light at any place, at the worst one of the lattice that was computed)",
     VALIDATED: "where a study validates on other lights: `design_id` and `held_out_csd_<a>_<b>`, their CSDs, DN",
+    ROBUSTNESS: "where the lights have a population, for each plain CFA, named design and answer of the search: "
+    "`design_id`; how many times as large population and edge shift must be for the worst CSD to fall below that of "
+    "the best plain CFA (`breaks_at`; null: not up to 3 times), and the CSD, lights, shifts and temperatures there; "
+    "`yield`, the share of random lamps and cameras with the wanted CSD, with its 95 % interval",
     LEFT_OUT: "where each light is left out of a search in turn: signal_type, signal, the optimum that was "
     "`seen`, the same design `with_it`, and the `fall`",
     SEARCH_LOG: "every evaluation of the search and of its front: " + ", ".join(search_schema(["<parameters>"]).names),

@@ -15,13 +15,14 @@ from .tables import (
     RECOGNITION,
     RESOLVED,
     RESULTS,
+    ROBUSTNESS,
     SEARCH_LOG,
     VALIDATED,
 )
 
 RUN, SUMS = "run.json", "SHA256SUMS"
 REPORT, FIGURES = "report.html", "figures"
-TABLES = (RESULTS, SEARCH_LOG, FRONT, CURVES, POINTS, LIMITED_BY, VALIDATED, LEFT_OUT, RECOGNITION)
+TABLES = (RESULTS, SEARCH_LOG, FRONT, CURVES, POINTS, LIMITED_BY, VALIDATED, LEFT_OUT, ROBUSTNESS, RECOGNITION)
 MADE_BY_RUN = frozenset((*TABLES, RESOLVED, PROVENANCE))
 """What a run itself writes beside its list; the report draws from it, `sweep audit` adds a table."""
 _DRAWN = re.compile(

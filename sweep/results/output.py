@@ -43,6 +43,7 @@ from .tables import (
     RECOGNITION,
     RESOLVED,
     RESULTS,
+    ROBUSTNESS,
     ROW_COLUMNS,
     SEARCH_LOG,
     SWEPT,
@@ -55,6 +56,7 @@ from .thinning import Counts, thinned
 _SAME = 1e-12
 """Curves that were computed twice, on other machines, differ by no more."""
 _MOST_SHOWN = 10
+_OPTIONAL = (FRONT, RECOGNITION, SEARCH_LOG, AUDIT, VALIDATED, ROBUSTNESS, LEFT_OUT)
 _ALWAYS_WRITTEN = ("study", "seed", "wavelengths", "scenarios", "objective")
 """Keys of every resolved study: it has its defaults, too, so that one that lacks them was cut."""
 _Key = TypeVar("_Key")
@@ -180,9 +182,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         raise no_run(folder)
     if PROVENANCE not in inventory.files:
         raise OutputError(Fault("no finished run here", str(folder), allowed="a folder that `sweep run` finished"))
-    optional = [
-        name for name in (FRONT, RECOGNITION, SEARCH_LOG, AUDIT, VALIDATED, LEFT_OUT) if name in inventory.files
-    ]
+    optional = [name for name in _OPTIONAL if name in inventory.files]
     if not audited and AUDIT in optional:
         optional.remove(AUDIT)
     inventory.require([RESULTS, CURVES, POINTS, LIMITED_BY, RESOLVED, PROVENANCE, *optional])
@@ -201,16 +201,15 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
     table, counts = thinned(folder / RESULTS, [objective, *provenance.trade_off], provenance.trade_off[0], profiles.add)
     points = read_table(folder / POINTS).to_pandas()
     limited = read_table(folder / LIMITED_BY).to_pandas()
-    front, recognition, searched, audit, validated, left_out = (
-        read_table(folder / name).to_pandas() if name in optional else None
-        for name in (FRONT, RECOGNITION, SEARCH_LOG, AUDIT, VALIDATED, LEFT_OUT)
+    front, recognition, searched, audit, validated, robust, left_out = (
+        read_table(folder / name).to_pandas() if name in optional else None for name in _OPTIONAL
     )
     return Output(
         folder=folder,
         study=study,
         resolved=resolved,
         provenance=provenance,
-        table=_joined(table, limited, validated),
+        table=_joined(table, limited, validated, robust),
         counts=counts,
         curves=_kept_curves(folder / CURVES),
         points=points,

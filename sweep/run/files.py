@@ -29,6 +29,7 @@ from ..results.tables import (
     RECOGNITION,
     RESOLVED,
     RESULTS,
+    ROBUSTNESS,
     SEARCH_LOG,
     VALIDATED,
     holds,
@@ -60,6 +61,7 @@ def files_of(study: Study) -> set[str]:
         names |= {SEARCH_LOG, FRONT} if study.search.levels else {SEARCH_LOG}
     names |= {VALIDATED} if study.held_out is not None else set()
     names |= {LEFT_OUT} if study.leaves_one_out else set()
+    names |= {ROBUSTNESS} if study.pair_over_population is not None else set()
     asked = study.section.recognition
     return names | ({RECOGNITION} if asked is not None and asked.patches else set())
 
@@ -95,7 +97,7 @@ class Making:
                 self._sweep()
             if todo & {SEARCH_LOG, FRONT, LEFT_OUT}:
                 self._write_search(todo)
-            if todo & {CURVES, POINTS, LIMITED_BY, VALIDATED, RECOGNITION}:
+            if todo & {CURVES, POINTS, LIMITED_BY, VALIDATED, ROBUSTNESS, RECOGNITION}:
                 self._write_drawn(todo)
             if RESOLVED in todo:
                 self.inventory.write({RESOLVED: resolved_yaml(self.study).encode("utf-8")})
@@ -186,6 +188,10 @@ class Making:
         if VALIDATED in names:
             table = held_out_table(self.study, rows, on_front, self.crew, self.progress)
             self.inventory.write_table(VALIDATED, table)
+        if ROBUSTNESS in names:
+            from .robustness import robustness_table  # noqa: PLC0415  (only where lights have a population)
+
+            self.inventory.write_table(ROBUSTNESS, robustness_table(self.study, rows, self.crew, self.progress))
         if RECOGNITION in names:
             table = recognition_table(self.study, rows, self.crew, self.progress)
             assert table is not None

@@ -16,7 +16,6 @@ from ..camera.view import View
 from ..designs.block import Block, CurveBlock, EdgeBlock, edges_of
 from ..designs.space import Space
 from ..metrics.evaluate import evaluate, family_quantities
-from ..metrics.members import population_imager
 from ..metrics.objective import COMBINED, Objective, columns_of
 from ..metrics.quantity import WORST_CASE, Asked, Columns, Quantity
 from ..search.problem import SHIFTS
@@ -108,6 +107,8 @@ def worst_cases(
     curves = [space.curves(points, view.grid.size, shift) for shift in (0.0, *shifts)]
     cases = [nominal, *(evaluate(imager, shifted) for shifted in curves[1:])]
     if view.lights.population is not None:
+        from ..metrics.members import population_imager  # noqa: PLC0415  (only where lights have a population)
+
         members = population_imager(view)
         cases = [case | members.worst(shifted) for case, shifted in zip(cases, curves, strict=True)]
     return {quantity.name: quantity.worse([case[quantity.of] for case in cases]) for quantity in worst}

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csr_matrix, hstack, vstack
@@ -22,8 +23,10 @@ from ..metrics.columns.sensitivity import SENSITIVITY
 from ..types import FloatArray, IndexArray
 from .certificate import Certificate, Sides, Solved
 from .least_noise import least_variance
-from .member_pairs import MemberPairs
 from .problem import Problem
+
+if TYPE_CHECKING:
+    from .member_pairs import MemberPairs
 
 ROUNDING = 1e-9
 """Filters may exceed their base by this share: rounding."""

@@ -10,18 +10,22 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..camera.linear import smooth_imager
+from ..camera.view import View
 from ..designs.block import CurveBlock
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY, Sensitivity
-from ..metrics.members import population_imager
 from ..metrics.quantity import Quantity
 from ..metrics.smooth import Rows, SmoothDesign
 from ..types import FloatArray, IndexArray
 from .problem import Evaluation, Problem, SearchRun
+
+if TYPE_CHECKING:
+    from ..metrics.members import PopulationImager
 
 BACK_OFF = 1e-8
 """The search keeps this far (relative) inside each bound, so that rounding does not leave its answer outside."""
@@ -54,6 +58,12 @@ class Point:
         return np.sqrt(least) if self.power == 2 else np.array(least)
 
 
+def _members_of(view: View) -> PopulationImager:
+    from ..metrics.members import population_imager  # noqa: PLC0415  (only where lights have a population)
+
+    return population_imager(view)
+
+
 def _finite(point: Point) -> Point:
     """The point as it is, or with zeros for what is not a number: a NaN would end the search; it is never feasible."""
     if point.terms.finite and point.conditions.finite and np.isfinite(point.evaluation.objective):
@@ -82,7 +92,7 @@ class Model:
         shifts = dict.fromkeys((0.0, *(shift for name in wanted for shift in problem.shifts_nm(name))))
         self._families = {s: problem.family.shifted(s) if s else problem.family for s in shifts}
         over = any(problem.over_population(name) for name in wanted)
-        self._members = population_imager(problem.view) if over else None
+        self._members = _members_of(problem.view) if over else None
         self._back_off = {name: _back_off(problem, name, bound) for name, bound in problem.constraints.items()}
         self._seen: dict[bytes, Point] = {}
 

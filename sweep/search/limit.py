@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,9 +29,11 @@ from ..metrics.smooth import smooth_csd, smooth_response
 from ..metrics.smooth_noise import smooth_detectability
 from ..types import FloatArray
 from .filter_program import ROUNDING, FilterProgram
-from .member_pairs import MemberPairs
 from .problem import Problem
 from .sides import Proof, SideSearch
+
+if TYPE_CHECKING:
+    from .member_pairs import MemberPairs
 
 _SENSITIVITY_TOLERANCE = 1e-6
 _MOST_PROGRAMS = 5000
@@ -78,7 +81,7 @@ def limit_of(
     distances = any(relaxed.quantities[name].apart for name in relaxed.objective.weights)
     tolerance = tolerance_dn if distances else _SENSITIVITY_TOLERANCE
     over = [n for n in dict.fromkeys((*relaxed.objective.weights, *relaxed.constraints)) if relaxed.over_population(n)]
-    members, solved = MemberPairs(relaxed, over) if over else None, 0
+    members, solved = _members_of(relaxed, over) if over else None, 0
     while True:
         program = FilterProgram(relaxed, members)
         proof = _proof(program, members, tolerance, most_programs - solved)
@@ -93,6 +96,12 @@ def limit_of(
     from_here = -np.inf if not program.noisy or least is None or least.min is None else least.min
     elsewhere = tuple(proof.proven_at(program, s) if s >= from_here else np.inf for s in sensitivities)
     return Limit(attained, proof.proven, proof.curve, left_out, solved, proof.open_parts, elsewhere)
+
+
+def _members_of(problem: Problem, over: Sequence[str]) -> MemberPairs:
+    from .member_pairs import MemberPairs  # noqa: PLC0415  (only where lights have a population)
+
+    return MemberPairs(problem, over)
 
 
 def _proof(program: FilterProgram, members: MemberPairs | None, tolerance: float, most_programs: int) -> Proof:

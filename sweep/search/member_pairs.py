@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..metrics.members import PARTS, population_imager
+from ..metrics.members import population_imager
 from ..types import BoolArray, FloatArray, IndexArray
 from .problem import Problem
 
@@ -87,7 +87,7 @@ class MemberPairs:
         response = self._seen.imager.smooth(curve[None, None])[0]
         parts = []
         for case, values in enumerate(response):
-            near = self._seen.nearest(values, self._types[name], parts=PARTS)
+            near = self._seen.nearest(values, self._types[name], parts=self._seen.parts)
             one, other, part = np.nonzero(np.isfinite(near.squared))
             below = near.steps[one, other, part] + np.stack([near.first[one], near.second[other]], axis=1)
             share = near.shares[one, other, part]

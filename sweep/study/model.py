@@ -78,6 +78,11 @@ class Study:
         return asked is not None and asked.leave_one_out and self.search is not None
 
     @property
+    def pair_over_population(self) -> Pair | None:
+        """The two signal types of the Pareto front where the study has a population of lights; else None."""
+        return None if self.lights.population is None else self.quantities[self.trade_off[0]].pair
+
+    @property
     def edge_shift_nm(self) -> float:
         """How far production may move the edges to either side."""
         return self.section.production.edge_shift_nm

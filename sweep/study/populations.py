@@ -11,7 +11,6 @@ from ..camera.field import over_field
 from ..camera.pixel import unquantized
 from ..camera.plan.bounds import Reach
 from ..curves.lights import Lights
-from ..curves.members import Members, spans_nm
 from ..curves.population import DRIFT_NM_PER_K, Population
 from ..errors import StudyError
 from .model import Study
@@ -50,6 +49,8 @@ def with_population(lights: Lights, section: StudySection, sources: Sources) -> 
 
 def _not_too_large(lights: Lights, population: Population, section: StudySection, sources: Sources) -> Lights:
     """The lights, with a fault where their members are too many."""
+    from ..curves.members import spans_nm  # noqa: PLC0415  (only where lights have a population)
+
     ends = [end for span in spans_nm(lights, population) for end in span]
     steps = (max(ends) - min(ends)) / section.wavelengths.step_nm
     spectra = len(lights.names) * len(population.width) * (steps + 2)
@@ -66,6 +67,8 @@ def check_range(study: Study, sources: Sources) -> None:
     """
     if study.lights.population is None:
         return
+    from ..curves.members import Members  # noqa: PLC0415  (only where lights have a population)
+
     lights = Members(study.lights, study.grid).lights
     for name in study.scenarios:
         for space in study.spaces:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
 from functools import cache
 
@@ -182,3 +184,16 @@ def test_the_triangles_of_two_lights_fill_their_region(given: dict[str, object],
     assert np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]).sum() / 2 == pytest.approx(area, abs=1e-9)
     assert ((region.shares >= 0) & (region.shares <= 1)).all()
     assert region.cells.max() + 1 < members.n_steps
+
+
+def test_without_a_population_nothing_of_it_is_imported() -> None:
+    code = (
+        "import sys\n"
+        "import sweep\n"
+        "import sweep.commands.audit, sweep.run.files, sweep.search.solver\n"
+        f"study = sweep.load_study({str(STUDIES / 'stopband.yaml')!r})\n"
+        "study.evaluate()\n"
+        "own = [name for name in sys.modules if name.startswith('sweep.') and ('member' in name or 'robustness' in name)]\n"
+        "assert own in ([], ['sweep.report.robustness']), own\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

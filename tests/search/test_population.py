@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from sweep.curves.population import Population
+from sweep.door.own_filters import judged
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.members import population_imager
 from sweep.metrics.objective import Objective
+from sweep.metrics.smooth import smooth_csd
 from sweep.search.gradients import Model
 from sweep.search.limit import Limit, limit_of, why_not
 from sweep.search.problem import Problem, SearchRun, starting_points
@@ -83,3 +85,35 @@ def test_no_random_filter_beats_the_limit_over_the_population() -> None:
         curves = curves[(found["sensitivity"] >= 0.9) & (found["slope_per_nm"] <= 0.06)]
         best = max(best, float(seen.worst(curves)["csd_yellow_red"].max()))
     assert 0.3 * limit().proven < best <= limit().proven
+
+
+def test_the_table_of_the_documentation() -> None:
+    """Each figure in `studies/README.md`, but those of the answer and the limit: nominal, over temperature, over all."""
+    text = (STUDIES / "README.md").read_text(encoding="utf-8")
+    lines = text.split("| worst case: temperature, bins, edges |")[1].splitlines()[2:6]
+    printed = {cells[0]: cells[1:] for cells in ([c.strip() for c in line.strip("|").split("|")] for line in lines)}
+    study = load_study(STUDIES / "robust.yaml")
+    alone = load_study(STUDIES / "robust.yaml", changes={"population.binning_nm": "0"})
+    found = {}
+    for at, space in enumerate(study.spaces[:4]):
+        shifts = (0.0,) if space.filter is None else (-2.0, -1.0, 0.0, 1.0, 2.0)
+        point, view = space.points(0, 1), study.view(space, "f/2")
+        curves = [space.curves(point, study.grid.size, shift) for shift in shifts]
+        over = population_imager(view).worst(np.concatenate(curves))["csd_yellow_red"].min()
+        warm = population_imager(alone.view(alone.spaces[at], "f/2")).worst(space.curves(point, study.grid.size))
+        values = (
+            smooth_csd(view, space.curves(point, study.grid.size), ("yellow", "red"))[0],
+            warm["csd_yellow_red"][0],
+            over,
+        )
+        found[space.name] = [f"{value:.0f}" for value in values]
+    assert printed == found
+
+
+def test_a_filter_of_ones_own_has_its_worst_case_where_no_edges_shift() -> None:
+    study = load_study(STUDIES / "robust.yaml", changes={"production.edge_shift_nm": "0"})
+    view = study.view(study.spaces[3], "f/2")
+    curves = 0.9 * view.base_qe[None]
+    found = judged(study, view, curves)["worst_csd_yellow_red"]
+    assert found == population_imager(view).worst(curves)["csd_yellow_red"]
+    assert 0 < found[0] < smooth_csd(view, curves, ("yellow", "red"))[0]

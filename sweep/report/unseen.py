@@ -1,0 +1,43 @@
+"""How an answer does on lights that its search did not see."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..metrics.quantity import HELD_OUT
+from ..results.output import Output
+from ..types import FloatArray
+from .leaders import Row
+
+_RESAMPLES = 10_000
+
+
+def unseen_lines(output: Output, best: Row) -> Iterator[str]:
+    """What the best one has on other lights, and what its search loses on lights that are left out of it."""
+    separation = output.trade_off[0]
+    held_out = float(best.get(HELD_OUT + (separation.of or separation.name), np.nan))
+    if np.isfinite(held_out):
+        own = separation.told(best[separation.name])
+        yield f"On lights that it has not seen it has {separation.told(held_out)} (on its own lights {own})."
+    if output.left_out is not None and output.left_out["fall"].notna().any():
+        worst = output.left_out.nlargest(1, "fall").iloc[0]
+        yield f"Left out of the search, {worst['signal']} costs its optimum most: {separation.told(worst['fall'])}."
+        falls = output.left_out["fall"].dropna().to_numpy()
+        if falls.size > 1:
+            mean, low, high = generalization_gap(falls, output.study.seed)
+            ends = f"95 % interval {separation.told(low)} to {separation.told(high)}"
+            yield f"A light that the search has not seen costs {separation.told(mean)} on average ({ends})."
+
+
+def generalization_gap(falls: FloatArray, seed: int) -> tuple[float, float, float]:
+    """The mean fall of an optimum on a light that was left out, with its 95 % interval by a bootstrap over the lights.
+
+    `falls`: DN, ndarray[n_lights]. The interval is of lights like these, drawn at random (Efron and Tibshirani, An
+    Introduction to the Bootstrap, 1993, chapter 13).
+    """
+    rng = np.random.default_rng([seed, 2])
+    means = falls[rng.integers(falls.size, size=(_RESAMPLES, falls.size))].mean(axis=1)
+    low, high = np.quantile(means, (0.025, 0.975))
+    return float(falls.mean()), float(low), float(high)

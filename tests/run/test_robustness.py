@@ -1,0 +1,130 @@
+"""Yields beside draws of their own, and what breaks a design beside its worst case there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from scipy.optimize import brentq
+
+from sweep.report.summary import summary_lines
+from sweep.results.output import read_output
+from sweep.results.tables import ROBUSTNESS
+from sweep.run.robustness import Candidate, drawn_dn, interval
+from sweep.study import Study, load_study
+
+from ..build import ran
+
+TEXT = """\
+study: street
+sensor: ar0820
+lights: tl16
+cfas: [RGGB, RYNCy]
+population: {temperature_c: [-40, 85], self_heating_k: 20, binning_nm: {yellow: 2, red: 1}, wanted_dn: WANTED, draws: DRAWS}
+production: {edge_shift_nm: 2}
+designs:
+  mine: {cfa: RYNCy, channel: N, base: Y, to: G, at: {left_nm: 613, left_width_nm: 6, right_nm: 651, right_width_nm: 6}}
+objective: worst_csd_yellow_red
+"""
+WANTED, EDGES = 200.0, (613.0, 6.0, 651.0, 6.0)
+
+
+def street(folder: Path, draws: int = 20_000) -> Study:
+    path = folder / "street.yaml"
+    path.write_text(TEXT.replace("DRAWS", str(draws)).replace("WANTED", str(WANTED)))
+    return load_study(path)
+
+
+def quintic(t: np.ndarray | float) -> np.ndarray | float:
+    return 6 * t**5 - 15 * t**4 + 10 * t**3
+
+
+def rise(wave: np.ndarray, center: float, width: float) -> np.ndarray:
+    """An edge of so much between 10 and 90 %."""
+    tenth = brentq(lambda t: quintic(t) - 0.1, 0, 0.5)
+    return np.asarray(quintic(np.clip((wave - center) / width * (1 - 2 * tenth) + 0.5, 0, 1)))
+
+
+def brute_force(study: Study, n: int, seed: int) -> np.ndarray:
+    """DN of n random lamps and cameras: each with its own spectra and its own filter."""
+    rng, lights, grid = np.random.default_rng(seed), study.lights, study.grid
+    wave, qe = grid.nodes_nm, study.sensor.qe
+    plain = np.stack([qe[name] for name in ("R", "Y", "Cy")])
+    dn = 0.95 * 4095 * lights.photon_ratio * grid.size / plain.sum(axis=1).max()
+    found = []
+    for size in np.full(n // 2000, 2000):
+        warm = rng.uniform(-40, 85, size) + rng.uniform(0, 20, size) - 25
+        edge = rng.uniform(-2, 2, size)[:, None]
+        left, right = (rise(wave - edge, EDGES[at], EDGES[at + 1]) for at in (0, 2))
+        filters = qe["Y"] + (qe["G"] - qe["Y"]) * (left - right)
+        points = []
+        for kind, binning in (("yellow", 2.0), ("red", 1.0)):
+            nm = 0.1 * warm + rng.uniform(-binning, binning, size)
+            photons = np.pad(lights.photons[rng.choice(lights.members[kind], size)], ((0, 0), (20, 20)))
+            below = np.floor(nm).astype(int)
+            share = (nm - below)[:, None]
+            column = 20 + np.arange(wave.size) - below[:, None]
+            rows = np.arange(size)[:, None]
+            spectra = (1 - share) * photons[rows, column] + share * photons[rows, column - 1]
+            points.append(np.column_stack([spectra @ plain.T, (spectra * filters).sum(axis=1)]) * dn)
+        found.append(np.linalg.norm(points[0] - points[1], axis=1))
+    return np.concatenate(found)
+
+
+def candidate(study: Study) -> Candidate:
+    space = next(space for space in study.spaces if space.name == "mine")
+    return Candidate(study.view(space, "chart"), space, space.points(0, 1), study.edge_shift_nm)
+
+
+def agree(study: Study, n: int) -> None:
+    drawn = drawn_dn(candidate(study), ("yellow", "red"), study.section.seed)
+    own = brute_force(study, n, 9)
+    for wanted in (WANTED, 230.0):
+        ends = [interval(int((values >= wanted).sum()), values.size) for values in (drawn, own)]
+        assert 0.01 < (own >= wanted).mean() < 0.99
+        assert max(low for low, _ in ends) <= min(high for _, high in ends), ends
+
+
+def test_a_yield_is_that_of_draws_of_their_own(tmp_path: Path) -> None:
+    agree(street(tmp_path), 20_000)
+
+
+@pytest.mark.slow
+def test_yields_agree_with_a_million_draws(tmp_path: Path) -> None:
+    agree(street(tmp_path, 1_000_000), 1_000_000)
+
+
+def test_the_interval_of_a_share() -> None:
+    """Wilson's: the shares p with |k/n - p| <= 1.96 sqrt(p (1 - p) / n)."""
+    for kept, n in ((0, 50), (3, 20), (500, 1000), (20, 20)):
+        for end in interval(kept, n):
+            if 1e-9 < end < 1 - 1e-9:
+                assert abs(kept / n - end) == pytest.approx(1.959964 * np.sqrt(end * (1 - end) / n), rel=1e-6)
+
+
+def test_any_number_of_workers_gives_the_same_and_a_break_is_where_the_worst_cases_cross(tmp_path: Path) -> None:
+    study = street(tmp_path, 1000)
+    tables = []
+    for jobs in (1, 2):
+        ran(study, tmp_path / f"out{jobs}", jobs)
+        tables.append(pq.read_table(tmp_path / f"out{jobs}" / ROBUSTNESS))
+    assert tables[0].equals(tables[1])
+    said = "\n".join(summary_lines(read_output(tmp_path / "out1")))
+    assert re.search(r"Mine falls below RGGB at [\d.]+ times .*: \S+yellow \([+-].* nm\) and \S+red .*, \d+ DN", said)
+    assert re.search(r"At least 200 DN have, of random lamps and cameras: RGGB [\d.]+%.*, mine [\d.]+%", said)
+    plain, mine = tables[0].to_pylist()
+    assert plain["breaks_at"] is None
+    assert 0.25 < mine["breaks_at"] < 3
+    pair = ("yellow", "red")
+    rggb = Candidate(study.view(study.spaces[0], "chart"), study.spaces[0], np.empty((1, 0)), study.edge_shift_nm)
+    just = mine["breaks_at"] - 0.25 / 2**6
+    here, before = (
+        candidate(study).worst(pair, scale)[0] - rggb.worst(pair, scale)[0] for scale in (mine["breaks_at"], just)
+    )
+    assert here < 0 <= before
+    assert mine["breaks_dn"] == pytest.approx(candidate(study).worst(pair, mine["breaks_at"])[0])
+    drift = mine["breaks_at"] * np.array([-6.5, 8])
+    assert drift[0] - 3 * mine["breaks_at"] <= mine["breaks_first_nm"] <= drift[1] + 3 * mine["breaks_at"]
