@@ -26,7 +26,7 @@ MADE_BY_RUN = frozenset((*TABLES, RESOLVED, PROVENANCE))
 """What a run itself writes beside its list; the report draws from it, `sweep audit` adds a table."""
 _DRAWN = re.compile(
     r"report\.html|cfas\.(png|svg)|pareto(-\d+)?\.(png|svg)|paper_comparison\.(csv|parquet)"
-    r"|figures/((filters|series)-\d+|tiles|sensor|signals|chart|clouds-(cfas|designs))\.(png|svg)"
+    r"|figures/((filters|series)-\d+|tiles|sensor|signals|chart|scorecard|clouds-(cfas|designs))\.(png|svg)"
 )
 
 

@@ -58,14 +58,14 @@ FIGURES: dict[Measure, tuple[Figure, ...]] = {
     "color": (
         Figure(
             MEAN,
-            "mean color error",
+            "mean error",
             "color difference CIEDE2000 of a chart's 24 patches after the noise-optimal color matrix, mean",
             "less",
             digits=2,
             first=True,
         ),
-        Figure(MOST_95, "95 % color error", "the same, 95th percentile", "less", digits=2),
-        Figure(MOST, "largest color error", "the same, largest", "less", digits=2),
+        Figure(MOST_95, "95 % error", "the same, 95th percentile", "less", digits=2),
+        Figure(MOST, "largest error", "the same, largest", "less", digits=2),
         Figure(
             SNR,
             "luminance SNR",
