@@ -19,6 +19,7 @@ from ..results.tables import FOUND, NAMED, PLAIN, csv_of, encoded
 from . import tables
 from . import values as content
 from .answer import answer_sentences, large_numbers
+from .colors import color_drawings
 from .figures import draw_curves, draw_pareto, rendered
 from .leaders import leaders_of
 from .noise import all_series, told_apart_table
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
 
 _PICTURES = ("tiles", "sensor", "signals", "chart")
 """Figures that the page shows as pictures; it draws all others itself, but for those of tasks."""
-_OF_TASKS = ("scorecard",)
+_OF_TASKS = ("scorecard", "color-noise", "rendered")
 
 
 def make_report(output: Output, *, mend: bool = False) -> None:
@@ -70,7 +71,7 @@ def _contents(output: Output, some: Iterable[str] | None) -> dict[str, bytes]:
                 contents[f"{where}.{kind}"] = rendered(figure, kind)
         if some is None and name in _PICTURES:
             images.append((caption, inlined(contents[f"{where}.png"])))
-        if some is None and name in _OF_TASKS:
+        if some is None and name.startswith(_OF_TASKS):
             of_tasks.append((caption, inlined(contents[f"{where}.png"])))
     published = comparison_with_published(output)
     if len(published):
@@ -150,6 +151,7 @@ def _drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
     card = scorecard(output)
     if card is not None:
         yield "scorecard", f"Every figure relative to {card.names[card.reference]}", draw_scorecard(card)
+    yield from color_drawings(output)
     yield "tiles", "Tiles of the CFAs; a hatched pixel is modified", draw_tiles(tiles_figure(output))
     yield "sensor", "Quantum efficiency of the sensor", draw_curves(content.sensor_figure(output))
     yield "signals", "Spectra of the signals", draw_curves(content.lights_figure(output))

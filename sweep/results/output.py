@@ -41,17 +41,21 @@ from .tables import (
     POINTS,
     PROVENANCE,
     RECOGNITION,
+    RENDERED,
     RESOLVED,
     RESULTS,
     ROW_COLUMNS,
     SEARCH_LOG,
     SWEPT,
+    TRADED,
     VALIDATED,
     front_schema,
     read_table,
 )
 from .thinning import Counts, thinned
 
+_OPTIONAL = (FRONT, RECOGNITION, SEARCH_LOG, AUDIT, VALIDATED, LEFT_OUT, TRADED, RENDERED)
+"""Files that some runs alone have."""
 _SAME = 1e-12
 """Curves that were computed twice, on other machines, differ by no more."""
 _MOST_SHOWN = 10
@@ -67,7 +71,7 @@ class Output:
 
     `study`: the study that was run, and `resolved` its file. `profiles`: over the whole table, per CFA; none where a
     sweep is no grid. `searched`: the search's evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per
-    light that was left out of a search.
+    light that was left out of a search. `traded`: color error against noise, `rendered`: areas of pictures.
     """
 
     folder: Path
@@ -83,6 +87,8 @@ class Output:
     searched: pd.DataFrame | None
     audited: pd.DataFrame | None
     left_out: pd.DataFrame | None
+    traded: pd.DataFrame | None
+    rendered: pd.DataFrame | None
     profiles: Mapping[str, Sequence[ParameterProfile]]
 
     @property
@@ -180,9 +186,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         raise no_run(folder)
     if PROVENANCE not in inventory.files:
         raise OutputError(Fault("no finished run here", str(folder), allowed="a folder that `sweep run` finished"))
-    optional = [
-        name for name in (FRONT, RECOGNITION, SEARCH_LOG, AUDIT, VALIDATED, LEFT_OUT) if name in inventory.files
-    ]
+    optional = [name for name in _OPTIONAL if name in inventory.files]
     if not audited and AUDIT in optional:
         optional.remove(AUDIT)
     inventory.require([RESULTS, CURVES, POINTS, LIMITED_BY, RESOLVED, PROVENANCE, *optional])
@@ -199,26 +203,24 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         _check_columns(folder / FRONT, front_schema(()).names)
     profiles = Profiles(objective, next(iter(study.scenarios)), provenance.parameters)
     table, counts = thinned(folder / RESULTS, [objective, *provenance.trade_off], provenance.trade_off[0], profiles.add)
-    points = read_table(folder / POINTS).to_pandas()
-    limited = read_table(folder / LIMITED_BY).to_pandas()
-    front, recognition, searched, audit, validated, left_out = (
-        read_table(folder / name).to_pandas() if name in optional else None
-        for name in (FRONT, RECOGNITION, SEARCH_LOG, AUDIT, VALIDATED, LEFT_OUT)
-    )
+    points, limited = (read_table(folder / name).to_pandas() for name in (POINTS, LIMITED_BY))
+    more = {name: read_table(folder / name).to_pandas() for name in optional}
     return Output(
         folder=folder,
         study=study,
         resolved=resolved,
         provenance=provenance,
-        table=_joined(table, limited, validated),
+        table=_joined(table, limited, more.get(VALIDATED)),
         counts=counts,
         curves=_kept_curves(folder / CURVES),
         points=points,
-        front=front,
-        recognition=recognition,
-        searched=searched,
-        audited=audit,
-        left_out=left_out,
+        front=more.get(FRONT),
+        recognition=more.get(RECOGNITION),
+        searched=more.get(SEARCH_LOG),
+        audited=more.get(AUDIT),
+        left_out=more.get(LEFT_OUT),
+        traded=more.get(TRADED),
+        rendered=more.get(RENDERED),
         profiles=profiles.found if all(made.grid is not None for made in study.sweeps.values()) else {},
     )
 
