@@ -16,7 +16,10 @@ LUX, SNR_AT_1_LX = "lux", "snr_at_1_lx"
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of a task. `each`: it has a value for each of the task's lights. `first`: a scorecard shows it."""
+    """A figure of a task. `each`: it has a value for each of the task's lights. `first`: a scorecard shows it.
+
+    `signed`: it may be negative, so that no search maximizes it.
+    """
 
     what: str
     words: str
@@ -26,6 +29,7 @@ class Figure:
     digits: int = 3
     each: bool = True
     first: bool = False
+    signed: bool = False
 
 
 FIGURES: dict[Measure, tuple[Figure, ...]] = {
@@ -91,6 +95,7 @@ FIGURES: dict[Measure, tuple[Figure, ...]] = {
             digits=1,
             each=False,
             first=True,
+            signed=True,
         ),
     ),
     "low_light": (

@@ -23,7 +23,7 @@ class ErrorAndNoise(NamedTuple):
     snr: FloatArray
 
 
-class Areas(NamedTuple):
+class AreaColors(NamedTuple):
     """Colors of areas of a picture over its white: XYZ, ndarray[n_areas, 3], and covariances, ndarray[n_areas, 3, 3].
 
     The noise is that of four pixels.
@@ -47,13 +47,13 @@ def traded(looks: Looks, chart: Chart, case: int, conditions: Conditions) -> Err
     return ErrorAndNoise(delta_e, snr)
 
 
-def rendered_areas(looks: Looks, chart: Chart, case: int, photons: FloatArray, conditions: Conditions) -> Areas:
+def rendered_areas(looks: Looks, chart: Chart, case: int, photons: FloatArray, conditions: Conditions) -> AreaColors:
     """Areas through the noise-optimal matrix for a chart under a light; `photons`: ndarray[n_areas, n_wavelengths]."""
     noise = looks.noise(conditions.read_noise_e)
     patches = _seen(looks, chart.photons[case], conditions)
     matrix = color_matrix(patches, chart.xyz[case], chart.white[case], noise)[0]
     electrons = looks.electrons(photons, conditions.exposure_s)[0]
-    return Areas(electrons @ matrix, _covariance(matrix, electrons, noise))
+    return AreaColors(electrons @ matrix, _covariance(matrix, electrons, noise))
 
 
 def _seen(looks: Looks, photons: FloatArray, conditions: Conditions) -> FloatArray:
