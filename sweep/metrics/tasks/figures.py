@@ -105,7 +105,7 @@ FIGURES: dict[Measure, tuple[Figure, ...]] = {
             "illuminance at which 18 % gray has a luminance SNR of 10 after the color matrix, of four pixels",
             "less",
             "lx",
-            2,
+            1,
             first=True,
         ),
         Figure(SNR_AT_1_LX, "luminance SNR at 1 lx", "the luminance SNR at 1 lx", "more"),
