@@ -100,10 +100,12 @@ def audit_rows(study: Study, tables: Iterable[pd.DataFrame], progress: Progress 
     return Audit(pd.DataFrame(rows, columns=list(_COLUMNS)), n_designs)
 
 
-def audit_output(folder: Path, data: Path | None, progress: Progress = lambda *_: None) -> Audit:
-    """Audit a finished run and write its rows beside it; errors as for `Inventory.write`."""
+def audit_output(
+    folder: Path, data: Path | None, progress: Progress = lambda *_: None, *, allow_code: bool = False
+) -> Audit:
+    """Audit a finished run and write its rows beside it; errors as for `study_of` and `Inventory.write`."""
     output = read_output(folder, audited=False)
-    study = study_of(output, data)
+    study = study_of(output, data, allow_code=allow_code)
     found = audit_rows(study, (table.to_pandas() for table in batches(folder / RESULTS)), progress)
     with locked(folder):
         Inventory(folder).write_table(AUDIT, pa.Table.from_pandas(found.rows, preserve_index=False))

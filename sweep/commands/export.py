@@ -59,7 +59,15 @@ class Filters:
         return found
 
 
-def export_design(folder: Path, key: str, data: Path | None, to: Path | None, also: Collection[Also] = ()) -> list[str]:
+def export_design(
+    folder: Path,
+    key: str,
+    data: Path | None,
+    to: Path | None,
+    also: Collection[Also] = (),
+    *,
+    allow_code: bool = False,
+) -> list[str]:
     """Write `<key>.csv` and `<key>.mat` of a design of a finished run to `to` (FOLDER/export), and say what it is.
 
     `key`: a name, a design_id, or `best`. The filter is computed again, from the study's files in `data`, or, without
@@ -70,7 +78,7 @@ def export_design(folder: Path, key: str, data: Path | None, to: Path | None, al
     """
     output = read_output(folder)
     row = find_row(output, key)
-    study = study_of(output, data)
+    study = study_of(output, data, allow_code=allow_code)
     filters = filters_of(study, row)
     _verify(output, row, filters)
     transmissions = filters.transmissions()

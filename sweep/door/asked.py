@@ -107,9 +107,10 @@ def filter_of_run(folder: Path, design: str | None, wishes: AskedFor) -> Judged:
 
     Raises SweepError for an unknown design, a plain CFA, and a folder without a finished run.
     """
+    from ..results.again import study_of
     from ..results.chosen import BEST, find_row
     from ..results.designs import row_curves
-    from ..results.output import read_output, study_of
+    from ..results.output import read_output
 
     output = read_output(folder)
     study = study_of(output, None)

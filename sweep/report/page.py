@@ -19,6 +19,7 @@ from ..results.tables import FOUND, NAMED, PLAIN, csv_of, encoded
 from . import tables
 from . import values as content
 from .answer import answer_sentences, large_numbers
+from .colors import color_drawings
 from .figures import draw_curves, draw_pareto, rendered
 from .filter_figures import filters_figure
 from .leaders import leaders_of
@@ -28,6 +29,7 @@ from .page_data import payload
 from .pages import inlined, library, page, rows, script
 from .published import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
 from .scenes import effect_table, scene_groups, scene_table
+from .scorecard import draw_scorecard, score_cells, scorecard
 from .series import draw_series
 from .signal_figures import draw_chart, draw_clouds
 from .summary import counts_line, summary_lines
@@ -38,7 +40,8 @@ if TYPE_CHECKING:
 
 
 _PICTURES = ("tiles", "sensor", "signals", "chart")
-"""Figures that the page shows as pictures; it draws all others itself."""
+"""Figures that the page shows as pictures; it draws all others itself, but for those of tasks."""
+_OF_TASKS = ("scorecard", "color-noise", "rendered")
 
 
 def make_report(output: Output, *, mend: bool = False) -> None:
@@ -61,7 +64,7 @@ def make_report(output: Output, *, mend: bool = False) -> None:
 
 def _contents(output: Output, some: Iterable[str] | None) -> dict[str, bytes]:
     """The files of the report -> what they hold; `some` of them, or all, since the page has every picture in it."""
-    images, contents = [], dict[str, bytes]()
+    images, of_tasks, contents = [], [], dict[str, bytes]()
     for name, caption, figure in _drawings(output):
         where = name if name.startswith(("cfas", "pareto")) else f"{FIGURES}/{name}"
         for kind in ("png", "svg"):
@@ -69,17 +72,24 @@ def _contents(output: Output, some: Iterable[str] | None) -> dict[str, bytes]:
                 contents[f"{where}.{kind}"] = rendered(figure, kind)
         if some is None and name in _PICTURES:
             images.append((caption, inlined(contents[f"{where}.png"])))
+        if some is None and name.startswith(_OF_TASKS):
+            of_tasks.append((caption, inlined(contents[f"{where}.png"])))
     published = comparison_with_published(output)
     if len(published):
         contents[PUBLISHED_CSV] = csv_of(published).encode("utf-8")
         contents[PUBLISHED_PARQUET] = encoded(pa.Table.from_pandas(published, preserve_index=False))
     if some is None:
-        contents[REPORT] = _html(output, images, published).encode("utf-8")
+        contents[REPORT] = _html(output, images, of_tasks, published).encode("utf-8")
     return contents
 
 
-def _html(output: Output, images: Sequence[tuple[str, str]], published: pd.DataFrame) -> str:
-    drawn = payload(output)
+def _html(
+    output: Output,
+    images: Sequence[tuple[str, str]],
+    of_tasks: Sequence[tuple[str, str]],
+    published: pd.DataFrame,
+) -> str:
+    drawn, card = payload(output), scorecard(output)
     groups = scene_groups(output)
     return page(
         "report.html.j2",
@@ -106,6 +116,10 @@ def _html(output: Output, images: Sequence[tuple[str, str]], published: pd.DataF
         comparison=rows(tables.comparison_table(output)),
         best=rows(tables.best_table(output)),
         recognition=rows(told_apart_table(output)),
+        score_names=() if card is None else card.names,
+        score_rows=[] if card is None else score_cells(card),
+        score_images=of_tasks,
+        conditions=output.study.tasks,
         left_out=rows(tables.worst_left_out(output)),
         geometry=rows(tables.geometry_table(output)),
         published=rows(published),
@@ -135,6 +149,10 @@ def _drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
         yield f"filters-{number + 1}", f"Filters of {cfa}", draw_curves(filters_figure(output, cfa))
     for number, series in enumerate(all_series(output)):
         yield f"series-{number + 1}", series.title, draw_series(series)
+    card = scorecard(output)
+    if card is not None:
+        yield "scorecard", f"Every figure relative to {card.names[card.reference]}", draw_scorecard(card)
+    yield from color_drawings(output)
     yield "tiles", "Tiles of the CFAs; a hatched pixel is modified", draw_tiles(tiles_figure(output))
     yield "sensor", "Quantum efficiency of the sensor", draw_curves(content.sensor_figure(output))
     yield "signals", "Spectra of the signals", draw_curves(content.lights_figure(output))

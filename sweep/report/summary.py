@@ -8,6 +8,7 @@ from ..results.output import Output
 from .answer import answer_sentences
 from .assumed import assumed_line
 from .published import comparison_lines, comparison_with_published
+from .scorecard import score_lines, scorecard
 from .tables import geometry_table
 
 _MOST_PARAMETERS = 10
@@ -49,6 +50,7 @@ def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
             f"{row['scenario']}: {row['distance_m']:g} m, {row['fov_deg']:g} deg: "
             f"{row['object_resolution_px']:g} px across the light."
         )
+    lines += score_lines(scorecard(output))
     lines += comparison_lines(comparison_with_published(output))
     lines.append(counts_line(output))
     lines.append(_plan_line(output))

@@ -9,7 +9,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -21,8 +20,7 @@ from ..errors import Fault, OutputError
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective
 from ..metrics.quantity import Column
-from ..study import KeptSources, Study, StudySection, load_study
-from ..types import FloatArray
+from ..study import StudySection
 from .curves import SCHEMA as CURVES_SCHEMA
 from .curves import KeptCurves
 from .facts import Provenance, lacking
@@ -41,25 +39,25 @@ from .tables import (
     POINTS,
     PROVENANCE,
     RECOGNITION,
+    RENDERED,
     RESOLVED,
     RESULTS,
     ROBUSTNESS,
     ROW_COLUMNS,
     SEARCH_LOG,
     SWEPT,
+    TRADED,
     VALIDATED,
     front_schema,
     read_table,
 )
 from .thinning import Counts, thinned
 
-_SAME = 1e-12
-"""Curves that were computed twice, on other machines, differ by no more."""
+_OPTIONAL = (FRONT, RECOGNITION, SEARCH_LOG, AUDIT, VALIDATED, ROBUSTNESS, LEFT_OUT, TRADED, RENDERED)
+"""Files that some runs alone have."""
 _MOST_SHOWN = 10
-_OPTIONAL = (FRONT, RECOGNITION, SEARCH_LOG, AUDIT, VALIDATED, ROBUSTNESS, LEFT_OUT)
 _ALWAYS_WRITTEN = ("study", "seed", "wavelengths", "scenarios", "objective")
 """Keys of every resolved study: it has its defaults, too, so that one that lacks them was cut."""
-_Key = TypeVar("_Key")
 _Model = TypeVar("_Model", bound=BaseModel)
 
 
@@ -69,7 +67,7 @@ class Output:
 
     `study`: the study that was run, and `resolved` its file. `profiles`: over the whole table, per CFA; none where a
     sweep is no grid. `searched`: the search's evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per
-    light that was left out of a search.
+    light that was left out of a search. `traded`: color error against noise, `rendered`: areas of pictures.
     """
 
     folder: Path
@@ -85,6 +83,8 @@ class Output:
     searched: pd.DataFrame | None
     audited: pd.DataFrame | None
     left_out: pd.DataFrame | None
+    traded: pd.DataFrame | None
+    rendered: pd.DataFrame | None
     profiles: Mapping[str, Sequence[ParameterProfile]]
 
     @property
@@ -199,25 +199,24 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         _check_columns(folder / FRONT, front_schema(()).names)
     profiles = Profiles(objective, next(iter(study.scenarios)), provenance.parameters)
     table, counts = thinned(folder / RESULTS, [objective, *provenance.trade_off], provenance.trade_off[0], profiles.add)
-    points = read_table(folder / POINTS).to_pandas()
-    limited = read_table(folder / LIMITED_BY).to_pandas()
-    front, recognition, searched, audit, validated, robust, left_out = (
-        read_table(folder / name).to_pandas() if name in optional else None for name in _OPTIONAL
-    )
+    points, limited = (read_table(folder / name).to_pandas() for name in (POINTS, LIMITED_BY))
+    more = {name: read_table(folder / name).to_pandas() for name in optional}
     return Output(
         folder=folder,
         study=study,
         resolved=resolved,
         provenance=provenance,
-        table=_joined(table, limited, validated, robust),
+        table=_joined(table, limited, more.get(VALIDATED), more.get(ROBUSTNESS)),
         counts=counts,
         curves=_kept_curves(folder / CURVES),
         points=points,
-        front=front,
-        recognition=recognition,
-        searched=searched,
-        audited=audit,
-        left_out=left_out,
+        front=more.get(FRONT),
+        recognition=more.get(RECOGNITION),
+        searched=more.get(SEARCH_LOG),
+        audited=more.get(AUDIT),
+        left_out=more.get(LEFT_OUT),
+        traded=more.get(TRADED),
+        rendered=more.get(RENDERED),
         profiles=profiles.found if all(made.grid is not None for made in study.sweeps.values()) else {},
     )
 
@@ -235,34 +234,6 @@ def _kept_curves(path: Path) -> KeptCurves:
         return KeptCurves.of_table(read_table(path))
     except ValueError as error:
         raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
-
-
-def study_of(output: Output, data: Path | None) -> Study:
-    """The study of a finished run again: with its files, looked for in `data`, or with the curves that the run kept.
-
-    Raises OutputError when the curves are not those that the run kept.
-    """
-    path = output.folder / RESOLVED
-    if data is None and output.provenance.data_sha256:
-        return load_study(path, kept=KeptSources(output.curves.sensor, output.curves.lights))
-    study = load_study(path, data)
-    lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
-    check_kept(output, output.curves.sensor, study.sensor.qe)
-    check_kept(output, output.curves.lights, {(kind, name): values for kind, name, values in lights})
-    return study
-
-
-def check_kept(output: Output, kept: Mapping[_Key, FloatArray], made: Mapping[_Key, FloatArray]) -> None:
-    """Compare curves with those that the run kept under these names; raises OutputError where they differ."""
-    other = [str(name) for name, values in made.items() if name in kept and not _same(kept[name], values)]
-    if other:
-        shown = ", ".join(other[:_MOST_SHOWN]) + (" and more" if len(other) > _MOST_SHOWN else "")
-        problem = f"computed again, these are not what the run has: {shown}"
-        raise OutputError(Fault(problem, str(output.folder), allowed="the curve files and the version of that run"))
-
-
-def _same(one: FloatArray, other: FloatArray) -> bool:
-    return one.shape == other.shape and bool(np.abs(one - other).max(initial=0.0) <= _SAME)
 
 
 def _mapping(path: Path, parse: Callable[[str], Any]) -> dict[str, Any]:

@@ -23,6 +23,14 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SCHEMA_VERSION = "2"
+_DESIGN = [("design_id", pa.int64()), ("name", pa.string()), ("scenario", pa.string())]
+TRADED_SCHEMA = pa.schema(
+    [*_DESIGN, ("light", pa.string()), *((name, pa.float64()) for name in ("regularization", "delta_e_mean", "snr"))]
+)
+_NUMBERS = pa.list_(pa.float64())
+RENDERED_SCHEMA = pa.schema(
+    [*_DESIGN, ("picture", pa.string()), ("area", pa.string()), ("xyz", _NUMBERS), ("covariance", _NUMBERS)]
+)
 RESULTS = "results.parquet"
 SEARCH_LOG = "search.parquet"
 FRONT = "front.parquet"
@@ -31,6 +39,9 @@ POINTS = "points.parquet"
 RECOGNITION = "recognition.parquet"
 LIMITED_BY = "limited_by.parquet"
 ROBUSTNESS = "robustness.parquet"
+TRADED, RENDERED = "color_noise.parquet", "rendered.parquet"
+CHART, NIGHT = "chart", "night"
+"""Pictures of which `rendered.parquet` has the areas."""
 VALIDATED, LEFT_OUT = "validated.parquet", "leave_one_out.parquet"
 AUDIT = "audit.parquet"
 PROVENANCE = "provenance.json"

@@ -27,10 +27,12 @@ from ..results.tables import (
     POINTS,
     PROVENANCE,
     RECOGNITION,
+    RENDERED,
     RESOLVED,
     RESULTS,
     ROBUSTNESS,
     SEARCH_LOG,
+    TRADED,
     VALIDATED,
     holds,
     json_of,
@@ -41,6 +43,7 @@ from ..search.limit import Limit
 from ..study import Study
 from ..types import Progress
 from .answers import Kept
+from .colors import rendered_table, traded_table
 from .curves import kept_curves, points_table
 from .front import Front, Gathered, few_of
 from .held_out import held_out_table, left_out_table
@@ -62,6 +65,7 @@ def files_of(study: Study) -> set[str]:
     names |= {VALIDATED} if study.held_out is not None else set()
     names |= {LEFT_OUT} if study.leaves_one_out else set()
     names |= {ROBUSTNESS} if study.pair_over_population is not None else set()
+    names |= {TRADED, RENDERED} if study.tasks is not None and "color" in study.tasks.by_name else set()
     asked = study.section.recognition
     return names | ({RECOGNITION} if asked is not None and asked.patches else set())
 
@@ -97,7 +101,7 @@ class Making:
                 self._sweep()
             if todo & {SEARCH_LOG, FRONT, LEFT_OUT}:
                 self._write_search(todo)
-            if todo & {CURVES, POINTS, LIMITED_BY, VALIDATED, ROBUSTNESS, RECOGNITION}:
+            if todo & {CURVES, POINTS, LIMITED_BY, VALIDATED, ROBUSTNESS, RECOGNITION, TRADED, RENDERED}:
                 self._write_drawn(todo)
             if RESOLVED in todo:
                 self.inventory.write({RESOLVED: resolved_yaml(self.study).encode("utf-8")})
@@ -196,6 +200,10 @@ class Making:
             table = recognition_table(self.study, rows, self.crew, self.progress)
             assert table is not None
             self.inventory.write_table(RECOGNITION, table)
+        if TRADED in names:
+            self.inventory.write_table(TRADED, traded_table(self.study, rows))
+        if RENDERED in names:
+            self.inventory.write_table(RENDERED, rendered_table(self.study, rows))
 
     def _limit(self) -> Limit | None:
         """The search's limit, found alone where the search itself need not be repeated."""

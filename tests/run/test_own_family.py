@@ -87,6 +87,20 @@ def test_it_resumes_reports_and_is_another_study_with_other_code(tmp_path: Path)
         run_study(study(tmp_path, code=STOPBAND + "# changed\n"), tmp_path / "out", 1, lambda *_: None)
 
 
+def test_a_run_is_exported_and_audited_with_its_own_code_alone(tmp_path: Path) -> None:
+    ran(study(tmp_path), tmp_path / "out", 1)
+    for verb in (("audit",), ("export", "--design", "best")):
+        command = (*verb, str(tmp_path / "out"), "--data", str(tmp_path))
+        code, _, said = commanded(*command)
+        assert code == 2
+        assert "its filters are made by the code of filters.py; allowed: --data FOLDER" in said
+        assert commanded(*command, "--allow-code")[0] == 0
+    (tmp_path / "filters.py").write_text(STOPBAND + "# changed\n")
+    code, _, said = commanded("audit", str(tmp_path / "out"), "--data", str(tmp_path), "--allow-code")
+    assert code == 2
+    assert "not the code that the run had: filters.py" in said
+
+
 def test_code_runs_only_when_it_is_allowed(tmp_path: Path) -> None:
     code = f"open({str(tmp_path / 'ran')!r}, 'w')\n{STOPBAND}"
     with pytest.raises(SweepError, match=r"names a Python file, whose code would run.*--allow-code") as caught:

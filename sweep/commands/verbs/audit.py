@@ -5,13 +5,13 @@ from __future__ import annotations
 import typer
 
 from ...errors import BrokenPromiseError
-from ..options import DataFolder, RunFolder
+from ..options import AllowCode, DataFolder, RunFolder
 from ..panels import OF_RESULTS
 
 PANEL = OF_RESULTS
 
 
-def audit(folder: RunFolder, data: DataFolder = None) -> None:
+def audit(folder: RunFolder, data: DataFolder = None, allow_code: AllowCode = False) -> None:
     """Recompute the front and 1 % of a run's rows with every effect on: promised beside realized error.
 
     Exit code 5 says that an error is larger than promised.
@@ -21,7 +21,7 @@ def audit(folder: RunFolder, data: DataFolder = None) -> None:
     from ..progress import ProgressDisplay
 
     with ProgressDisplay() as display:
-        found = audit_output(folder, data, display.update)
+        found = audit_output(folder, data, display.update, allow_code=allow_code)
     for line in found.lines:
         typer.echo(line)
     typer.echo(f"Files: {folder}/: {AUDIT}.")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..options import Also, RunFolder
+from ..options import AllowCode, Also, RunFolder
 from ..panels import OF_RESULTS
 
 PANEL = OF_RESULTS
@@ -24,9 +24,10 @@ def export(
         typer.Option(help="Another file, too: .spectrum of Speos, or weights of the sensor's R, G and B."),
     ] = None,
     to: Annotated[Path | None, typer.Option(help="Folder for the files.", show_default="FOLDER/export")] = None,
+    allow_code: AllowCode = False,
 ) -> None:
     """Write a filter of a finished run as CSV and as ISETCam color filters (.mat), and for other programs."""
     from ..export import export_design
 
-    for line in export_design(folder, design, data, to, also or ()):
+    for line in export_design(folder, design, data, to, also or (), allow_code=allow_code):
         typer.echo(line)

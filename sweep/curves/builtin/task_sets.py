@@ -132,6 +132,45 @@ def _groups(grid: WavelengthGrid, *names: str) -> dict[str, FloatArray]:
     return {name: group(grid, name, _MOST) for name in names}
 
 
+NIGHT_LX = 50.0
+NIGHT_LIGHT = "led"
+"""Light of the street lamps on the night scene."""
+_NIGHT_SURFACES = {
+    "road": "asphalt",
+    "white line": "white marking",
+    "yellow line": "yellow marking",
+    "leaves": "canopy",
+    "wall": "concrete",
+    "red sign": "red sheeting",
+    "blue sign": "blue sheeting",
+}
+_NIGHT_LAMPS = {
+    "brake lamp": "brake red",
+    "turn lamp": "turn amber",
+    "emergency lamp": "emergency blue",
+    "green signal": "unseen green",
+    "yellow signal": "unseen yellow",
+    "red signal": "unseen red",
+}
+
+
+def night_scene(grid: WavelengthGrid) -> dict[str, FloatArray]:
+    """Area of a street at night -> its photon radiance, photons/s/sr/m^2/nm, ndarray[n_wavelengths].
+
+    Surfaces under white LEDs, and lamps that have as much of X, Y or Z as white paper there, so that none is
+    overexposed.
+    """
+    light = equal_photons(grid, illuminant(grid, NIGHT_LIGHT)[None])[0]
+    white = light * (NIGHT_LX / np.pi / luminance_per_photon_radiance(grid, light[None])[0])
+    found = {"sky": 0.01 * white}
+    found |= {area: group(grid, name).mean(axis=0) * white for area, name in _NIGHT_SURFACES.items()}
+    of_white = energy_from_photons(grid.nodes_nm, white) @ color_matching(grid).T
+    for area, name in _NIGHT_LAMPS.items():
+        own = group(grid, name)[0]
+        found[area] = own / (energy_from_photons(grid.nodes_nm, own) @ color_matching(grid).T / of_white).max()
+    return found
+
+
 def _named(grid: WavelengthGrid, names: Sequence[str]) -> list[FloatArray]:
     return [spectra.gridded(grid, spectra.spectrum_of("cie_illuminants", name)) for name in names]
 

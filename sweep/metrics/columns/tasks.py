@@ -39,7 +39,7 @@ class TaskFigures(DesignMetric):
                 digits=figure.digits,
                 wanted=figure.wanted,
                 ends=("min",) if figure.wanted == "more" else ("max",),
-                goal=figure.wanted == "more",
+                goal=figure.wanted == "more" and not figure.signed,
                 smooth=partial(_rows, task=task.name, what=figure.what, case=case),
             )
             for task in asked.tasks

@@ -16,7 +16,10 @@ LUX, SNR_AT_1_LX = "lux", "snr_at_1_lx"
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of a task. `each`: it has a value for each of the task's lights. `first`: a scorecard shows it."""
+    """A figure of a task. `each`: it has a value for each of the task's lights. `first`: a scorecard shows it.
+
+    `signed`: it may be negative, so that no search maximizes it.
+    """
 
     what: str
     words: str
@@ -26,6 +29,7 @@ class Figure:
     digits: int = 3
     each: bool = True
     first: bool = False
+    signed: bool = False
 
 
 FIGURES: dict[Measure, tuple[Figure, ...]] = {
@@ -58,14 +62,14 @@ FIGURES: dict[Measure, tuple[Figure, ...]] = {
     "color": (
         Figure(
             MEAN,
-            "mean color error",
+            "mean error",
             "color difference CIEDE2000 of a chart's 24 patches after the noise-optimal color matrix, mean",
             "less",
             digits=2,
             first=True,
         ),
-        Figure(MOST_95, "95 % color error", "the same, 95th percentile", "less", digits=2),
-        Figure(MOST, "largest color error", "the same, largest", "less", digits=2),
+        Figure(MOST_95, "95 % error", "the same, 95th percentile", "less", digits=2),
+        Figure(MOST, "largest error", "the same, largest", "less", digits=2),
         Figure(
             SNR,
             "luminance SNR",
@@ -91,6 +95,7 @@ FIGURES: dict[Measure, tuple[Figure, ...]] = {
             digits=1,
             each=False,
             first=True,
+            signed=True,
         ),
     ),
     "low_light": (
@@ -100,7 +105,7 @@ FIGURES: dict[Measure, tuple[Figure, ...]] = {
             "illuminance at which 18 % gray has a luminance SNR of 10 after the color matrix, of four pixels",
             "less",
             "lx",
-            2,
+            1,
             first=True,
         ),
         Figure(SNR_AT_1_LX, "luminance SNR at 1 lx", "the luminance SNR at 1 lx", "more"),

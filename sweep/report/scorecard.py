@@ -1,0 +1,134 @@
+"""What designs gain and lose elsewhere: the tasks of a study in one table, and as factors in one plot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..metrics.columns.tasks import PREFIX
+from ..metrics.quantity import Column
+from ..results.output import Output
+from ..results.tables import PLAIN
+from ..types import FloatArray
+from .figures import CURVE_CYCLE, canvas
+from .names import label
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_MARKERS = "osD^vPX*"
+_MOST_FACTOR = 10.0
+_SAME = 1e-9
+"""Designs whose values differ by less, relative to the largest, are told apart by rounding alone."""
+
+
+@dataclass(frozen=True)
+class ScoreRow:
+    """A figure of a task over the designs: `values`, ndarray[n_designs], NaN where a design has none.
+
+    `best`, `worst`: which designs have the best and the worst value; none where all are the same.
+    """
+
+    column: Column
+    values: FloatArray
+    best: frozenset[int]
+    worst: frozenset[int]
+
+    @property
+    def cells(self) -> list[tuple[str, str]]:
+        """(text, mark) of each design: `best`, `worst` or nothing."""
+        return [
+            ("-" if np.isnan(value) else f"{value:.{self.column.digits}f}", self._mark(at))
+            for at, value in enumerate(self.values)
+        ]
+
+    def _mark(self, at: int) -> str:
+        return "best" if at in self.best else "worst" if at in self.worst else ""
+
+    def factors(self, reference: int) -> FloatArray:
+        """How many times better each design is than one of them, ndarray[n_designs]; NaN where that means nothing."""
+        of = self.values[reference]
+        ratio = np.full(self.values.shape, np.nan)
+        some = (self.values > 0) & (of > 0) & bool(self.best)
+        np.divide(self.values, of, out=ratio, where=some)
+        return ratio if self.column.wanted == "more" else 1 / ratio
+
+
+@dataclass(frozen=True)
+class Scorecard:
+    """All rows of a scorecard. `names`: of the designs; `reference`: the plain CFA that factors are relative to."""
+
+    names: tuple[str, ...]
+    rows: tuple[ScoreRow, ...]
+    reference: int
+
+
+def scorecard(output: Output) -> Scorecard | None:
+    """Of the plain CFAs, named designs and the search's answer in the first scenario; None without tasks."""
+    columns = list(_shown(output.columns))
+    rows = output.few[(output.few["scenario"] == output.scenarios[0]) & (output.few["status"] == "ok")]
+    if not columns or rows.empty:
+        return None
+    names = tuple(label(row) for row in rows.to_dict("records"))
+    found = tuple(_row(column, rows[column.name].to_numpy(dtype=float)) for column in columns)
+    plain = np.flatnonzero(rows["kind"] == PLAIN)
+    return Scorecard(names, found, int(plain[0]) if plain.size else 0)
+
+
+def _shown(columns: Mapping[str, Column]) -> Iterator[Column]:
+    """The columns of tasks that a scorecard shows."""
+    own = [column for column in columns.values() if column.metric.startswith(PREFIX) and not column.extreme]
+    if own:
+        from ..metrics.tasks.figures import FIGURES  # noqa: PLC0415  (few studies have tasks)
+
+        first = {PREFIX + figure.what for figures in FIGURES.values() for figure in figures if figure.first}
+        yield from (column for column in own if column.metric in first)
+
+
+def _row(column: Column, values: FloatArray) -> ScoreRow:
+    known = values[np.isfinite(values)]
+    if not known.size or np.ptp(known) <= _SAME * np.abs(known).max() or np.abs(known).max() < 10.0**-column.digits:
+        return ScoreRow(column, values, frozenset(), frozenset())
+    ends = (known.max(), known.min()) if column.wanted == "more" else (known.min(), known.max())
+    best, worst = (frozenset(np.flatnonzero(values == end).tolist()) for end in ends)
+    return ScoreRow(column, values, best, worst)
+
+
+def score_lines(card: Scorecard | None) -> list[str]:
+    """How often each design is the best and the worst, in one line."""
+    if card is None:
+        return []
+    marked = [row for row in card.rows if row.best]
+    counts = [
+        f"{name} best in {sum(at in row.best for row in marked)}, worst in {sum(at in row.worst for row in marked)}"
+        for at, name in enumerate(card.names)
+    ]
+    return [f"Elsewhere, over {len(marked)} figures of tasks: {'; '.join(counts)}."]
+
+
+def score_cells(card: Scorecard) -> list[tuple[str, Sequence[tuple[str, str]]]]:
+    """(name of the figure with its unit, cells of the designs) of each row."""
+    return [(row.column.axis, row.cells) for row in card.rows]
+
+
+def draw_scorecard(card: Scorecard) -> Figure:
+    """Draw how many times better each design is than the reference, a line per figure; better is to the right."""
+    drawn = [(row.column.words, row.factors(card.reference)) for row in card.rows]
+    drawn = [(words, factors) for words, factors in drawn if np.isfinite(factors).sum() > 1]
+    figure, axes = canvas(9.0, 1.4 + 0.27 * len(drawn))
+    for at, name in enumerate(card.names):
+        x = np.clip([factors[at] for _, factors in drawn], 1 / _MOST_FACTOR, _MOST_FACTOR)
+        marker, color = _MARKERS[at % len(_MARKERS)], CURVE_CYCLE[at % len(CURVE_CYCLE)]
+        axes.plot(x, np.arange(len(drawn)), marker, color=color, label=name, markersize=5.5, alpha=0.85)
+    axes.axvline(1.0, color="#666666", linewidth=1.0)
+    axes.set_xscale("log")
+    axes.set_xlim(0.9 / _MOST_FACTOR, 1.1 * _MOST_FACTOR)
+    axes.set_yticks(np.arange(len(drawn)), [words for words, _ in drawn], fontsize=8)
+    axes.invert_yaxis()
+    axes.grid(axis="y", color="#eeeeee")
+    axes.set_xlabel(f"times better than {card.names[card.reference]} (beyond {_MOST_FACTOR:g} times: at the edge)")
+    axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False)
+    return figure

@@ -1,0 +1,90 @@
+"""Colors of a study with the task of color: error against noise, and areas of two pictures, of each named design."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+
+from ..curves.tasks import Chart, StudyTasks
+from ..results.designs import row_curves
+from ..results.tables import CHART, FEW, NIGHT, RENDERED_SCHEMA, TRADED_SCHEMA
+from ..study import Study
+from ..types import FloatArray
+
+_TOLD = ("design_id", "name", "scenario")
+
+
+def _shown(study: Study, highlights: pd.DataFrame) -> Iterator[tuple[dict[str, Any], Any]]:
+    """What a row is called by, and what its design sees: plain CFAs, named designs and the search's answer."""
+    from ..metrics.tasks.looks import Looks  # noqa: PLC0415  (few studies have tasks)
+
+    rows = highlights[highlights["kind"].isin(FEW) & (highlights["status"] == "ok")]
+    for row in rows.to_dict("records"):
+        space, curves = row_curves(study, row)
+        yield {key: row[key] for key in _TOLD}, Looks(study.view(space, row["scenario"]), curves)
+
+
+def _chart_of(tasks: StudyTasks) -> tuple[tuple[str, ...], Chart]:
+    task = tasks.by_name["color"]
+    assert task.chart is not None
+    return task.key.cases, task.chart
+
+
+def traded_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
+    """A row per design, light and regularization of the color matrix."""
+    from ..metrics.tasks.palette import REGULARIZATIONS, traded  # noqa: PLC0415  (few studies have tasks)
+
+    assert study.tasks is not None
+    cases, chart = _chart_of(study.tasks)
+    rows = []
+    for told, looks in _shown(study, highlights):
+        for at, case in enumerate(cases):
+            found = traded(looks, chart, at, study.tasks.conditions)
+            for regularization, delta_e, snr in zip(REGULARIZATIONS, *found, strict=True):
+                own = {"light": case, "regularization": float(regularization), "delta_e_mean": delta_e, "snr": snr}
+                rows.append(told | own)
+    return pa.Table.from_pylist(rows, schema=TRADED_SCHEMA)
+
+
+def rendered_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
+    """A row per design, picture and area; those of the eye itself have no design.
+
+    The chart stands in daylight of the study's illuminance; the night scene under white LEDs has its own.
+    """
+    from ..curves.builtin.task_sets import NIGHT_LIGHT, NIGHT_LX, night_scene  # noqa: PLC0415  (few studies have tasks)
+    from ..curves.color import color_matching  # noqa: PLC0415
+    from ..curves.spectrum import energy_from_photons  # noqa: PLC0415
+    from ..metrics.tasks.palette import rendered_areas  # noqa: PLC0415
+
+    tasks = study.tasks
+    assert tasks is not None
+    cases, chart = _chart_of(tasks)
+    day, night = cases.index("d65"), cases.index(NIGHT_LIGHT)
+    streets = night_scene(study.grid)
+    street = np.stack(list(streets.values()))
+    white = chart.gray[night] / 0.18 * NIGHT_LX
+    seen = [energy_from_photons(study.grid.nodes_nm, each) @ color_matching(study.grid).T for each in (street, white)]
+    names = [str(number) for number in range(1, len(chart.xyz[day]) + 1)]
+    rows = _areas({}, CHART, names, chart.xyz[day] / chart.white[day]) + _areas({}, NIGHT, streets, seen[0] / seen[1])
+    dark = replace(tasks.conditions, illuminance_lx=NIGHT_LX)
+    for told, looks in _shown(study, highlights):
+        patches = chart.photons[day] * tasks.conditions.illuminance_lx
+        rows += _areas(told, CHART, names, *rendered_areas(looks, chart, day, patches, tasks.conditions))
+        rows += _areas(told, NIGHT, streets, *rendered_areas(looks, chart, night, street, dark))
+    return pa.Table.from_pylist(rows, schema=RENDERED_SCHEMA)
+
+
+def _areas(
+    told: dict[str, Any], picture: str, names: Any, xyz: FloatArray, covariance: FloatArray | None = None
+) -> list[dict[str, Any]]:
+    """Rows of a picture; without a covariance there is no noise."""
+    spread = np.zeros((len(xyz), 3, 3)) if covariance is None else covariance
+    return [
+        told | {"picture": picture, "area": area, "xyz": own.tolist(), "covariance": noise.ravel().tolist()}
+        for area, own, noise in zip(names, xyz, spread, strict=True)
+    ]
