@@ -34,6 +34,40 @@ def draw(
 
 
 @njit(cache=True, nogil=True)
+def cases_on_table(
+    unlit: NDArray[np.float64],
+    phantoms: NDArray[np.float64],
+    lamps: NDArray[np.float64],
+    cases: NDArray[np.intp],
+    candelas: NDArray[np.float64],
+    orders: NDArray[np.intp],
+    step: float,
+    last: int,
+    node: NDArray[np.int32],
+    share: NDArray[np.float32],
+) -> None:
+    """`PixelTable.at` of the expected electrons of all cases, ndarray[n_cases, n_pixels].
+
+    `unlit`, `phantoms`, `lamps`: see `HeadElectrons`, the first of one background, ndarray[n_places, n_pixels].
+    `cases`: ndarray[n_cases, 5]: type of the lit lens or -1, signal, order, phantom, place; `candelas`: ndarray[n_cases].
+    """
+    for case in range(len(cases)):
+        kind, lamp, order, sunny, place = cases[case]
+        for p in range(unlit.shape[1]):
+            electrons = unlit[place, p]
+            for position in range(3):
+                own = orders[order, position]
+                if sunny:
+                    electrons += phantoms[place, position, own, p]
+                if own == kind:
+                    electrons += candelas[case] * lamps[place, position, lamp, p]
+            below = min(int(np.sqrt(electrons) / step), last)
+            part = (electrons / (step * step) - float(below) * below) / (2.0 * below + 1)
+            node[case, p] = below
+            share[case, p] = min(max(part, 0.0), 1.0)
+
+
+@njit(cache=True, nogil=True)
 def log_likelihoods(
     numbers: NDArray[np.int16],
     node: NDArray[np.int32],

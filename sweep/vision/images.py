@@ -89,7 +89,7 @@ class HeadCamera:
         self.levels = list(vision.levels.values())
         self._views = [[view_at(view, vision, d, level) for level in self.levels] for d in vision.distances_m]
         channels = list(range(len(qe)))
-        self._qe = SeenFilters(self._views[0][0], REFERENCE.angle).curves(qe, channels)
+        self.qe = SeenFilters(self._views[0][0], REFERENCE.angle).curves(qe, channels)
         self.pixel: Pixel = self._views[0][0].pixel
         self.table: PixelTable = pixel_table(self.pixel)
         size = vision.crop_px + 2 * MARGIN
@@ -150,9 +150,9 @@ class HeadCamera:
         """
         view = self.view
         on_knots = hats(view.grid.nodes_nm, maps.knots_nm)
-        weight = np.einsum("cw,sw,kw->cks", self._qe, spectra, on_knots, optimize=True) * per_photon(view)
+        weight = np.einsum("cw,sw,kw->cks", self.qe, spectra, on_knots, optimize=True) * per_photon(view)
         found = np.empty((len(light), len(spectra), *self._channel.shape))
-        for channel in range(len(self._qe)):
+        for channel in range(len(self.qe)):
             own = self._channel == channel
             found[:, :, own] = np.moveaxis(light[:, own] @ weight[channel], 2, 1)
         share = crosstalk.share(view, REFERENCE.crosstalk)

@@ -12,41 +12,40 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..types import FloatArray, IndexArray
-from .compiled_images import log_likelihoods
-from .images import HeadCamera, Numbers
+from .compiled_images import cases_on_table, log_likelihoods
+from .images import HeadCamera, HeadElectrons, Numbers
 from .lamps import Lamps
+from .pixel_table import STEP
 from .scenes import ORDER_OF_LENSES, PHANTOM_SHARE, SHUFFLED, Scenes, states_of
 
 
 @dataclass(frozen=True)
 class _Cases:
-    """All that a head can be, one by one: ndarray[n_cases] each; `share`: how frequent it is in its state."""
+    """All that a head can be, one by one.
 
-    state: IndexArray
-    lamp: IndexArray
-    intensity: IndexArray
-    order: IndexArray
-    phantom: IndexArray
-    place: IndexArray
+    `table`: ndarray[n_cases, 5]: type of the lit lens or -1, signal, order, phantom, place; `candelas` and `share`, how
+    frequent each is in its state, ndarray[n_cases].
+    """
+
+    table: IndexArray
+    candelas: FloatArray
     share: FloatArray
 
 
 def _cases(camera: HeadCamera, lamps: Lamps, order: str, sunny: bool) -> _Cases:
-    vision = camera.vision
-    n_orders = len(ORDER_OF_LENSES) if order == SHUFFLED else 1
-    rest = np.array(
-        [(o, p, at) for o in range(n_orders) for p in range(1 + sunny) for at in range(camera.n_places())]
-    )
-    sun = np.where(rest[:, 1] == 1, PHANTOM_SHARE, 1 - PHANTOM_SHARE) if sunny else np.ones(len(rest))
-    weight = sun / (n_orders * camera.n_places())
-    lit = [(0, -1, 0, 1.0)]
+    intensities, n_places = camera.vision.intensities_cd, camera.n_places()
+    orders = range(len(ORDER_OF_LENSES) if order == SHUFFLED else 1)
+    rest = np.array([(o, sun, at) for o in orders for sun in range(1 + sunny) for at in range(n_places)])
+    sun_share = np.where(rest[:, 1] == 1, PHANTOM_SHARE, 1 - PHANTOM_SHARE) if sunny else np.ones(len(rest))
+    lit = [(-1, -1, 0.0, 1.0)]
     for kind, own in enumerate(lamps.of_lens):
-        each = 1 / (len(own) * len(vision.intensities_cd))
-        lit += [(1 + kind, int(lamp), i, each) for lamp in own for i in range(len(vision.intensities_cd))]
-    table = np.array(lit)
-    first, second = (a.ravel() for a in np.meshgrid(np.arange(len(lit)), np.arange(len(rest)), indexing="ij"))
-    whole = table[first][:, :3].astype(np.intp)
-    return _Cases(*whole.T, *rest[second].T.astype(np.intp), table[first, 3] * weight[second])
+        each = 1 / (len(own) * len(intensities))
+        lit += [(kind, int(lamp), candelas, each) for lamp in own for candelas in intensities]
+    whole = np.array(lit)
+    first, second = np.repeat(np.arange(len(lit)), len(rest)), np.tile(np.arange(len(rest)), len(lit))
+    table = np.concatenate([whole[first, :2].astype(np.intp), rest[second]], axis=1)
+    weight = whole[first, 3] * sun_share[second] / (len(orders) * n_places)
+    return _Cases(np.ascontiguousarray(table), np.ascontiguousarray(whole[first, 2]), weight)
 
 
 def posteriors(camera: HeadCamera, scenes: Scenes, images: Numbers, lamps: Lamps, order: str) -> FloatArray:
@@ -59,25 +58,30 @@ def posteriors(camera: HeadCamera, scenes: Scenes, images: Numbers, lamps: Lamps
     for distance, level in np.unique(groups[:, :2], axis=0):
         heads = camera.electrons(int(distance), int(level))
         cases = _cases(camera, lamps, order, camera.levels[level].phantom_cd > 0)
-        candelas = np.array(camera.vision.intensities_cd)[cases.intensity]
         for background in np.unique(groups[(groups[:, 0] == distance) & (groups[:, 1] == level), 2]):
             here = np.flatnonzero((groups == (distance, level, background)).all(axis=1))
-            ground = np.full(len(cases.state), background)
-            lit = (cases.state - 1, cases.lamp, candelas)
-            electrons = heads.of(cases.place, ground, cases.order, cases.phantom, lit)
-            found[here] = _of_states(camera, images[here].reshape(len(here), -1), electrons, cases)
+            found[here] = _of_states(camera, images[here].reshape(len(here), -1), heads, int(background), cases)
     return found
 
 
-def _of_states(camera: HeadCamera, images: Numbers, electrons: FloatArray, cases: _Cases) -> FloatArray:
-    """Probability of each state, ndarray[n_images, n_states]; `electrons`: of each case, ndarray[n_cases, n_pixels]."""
-    telling = np.argsort(-np.sqrt(electrons).std(axis=0), kind="stable")
-    node, share = camera.table.at(np.ascontiguousarray(electrons[:, telling]))
-    numbers = np.ascontiguousarray(images[:, telling])
-    likelihood = np.empty((len(images), len(electrons)))
-    log_likelihoods(numbers, node, share, camera.table.shares, likelihood)
-    likelihood -= likelihood.max(axis=1, keepdims=True)
-    weights = np.exp(likelihood) * cases.share
-    own = cases.state[:, None] == np.arange(1 + len(camera.vision.lenses))
-    found = weights @ own.astype(float)
+def _of_states(
+    camera: HeadCamera, images: Numbers, heads: HeadElectrons, background: int, cases: _Cases
+) -> FloatArray:
+    """Probability of each state before a background, ndarray[n_images, n_states]."""
+    n_cases, unlit = len(cases.table), heads.unlit[:, background]
+    telling = np.argsort(-_telling(heads, unlit), kind="stable")
+    parts = [np.ascontiguousarray(each[..., telling]) for each in (unlit, heads.phantoms, heads.lamps)]
+    node, share = (np.empty((n_cases, telling.size), dtype=kind) for kind in (np.int32, np.float32))
+    last = camera.table.last
+    cases_on_table(*parts, cases.table, cases.candelas, ORDER_OF_LENSES, STEP, last, node, share)
+    likelihood = np.empty((len(images), n_cases))
+    log_likelihoods(np.ascontiguousarray(images[:, telling]), node, share, camera.table.shares, likelihood)
+    weights = np.exp(likelihood - likelihood.max(axis=1, keepdims=True)) * cases.share
+    own = cases.table[:, 0] + 1 == np.arange(1 + len(camera.vision.lenses))[:, None]
+    found = weights @ own.T.astype(float)
     return np.asarray(found / found.sum(axis=1, keepdims=True), dtype=float)
+
+
+def _telling(heads: HeadElectrons, unlit: FloatArray) -> FloatArray:
+    """About how much each pixel tells: how much a mean lamp changes it beside its noise, ndarray[n_pixels]."""
+    return np.asarray(heads.lamps.mean(axis=(0, 1, 2)) / np.sqrt(unlit.mean(axis=0) + 1), dtype=float)

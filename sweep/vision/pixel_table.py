@@ -36,11 +36,14 @@ class PixelTable:
     shares: NDArray[np.float32]
     below: NDArray[np.float32]
 
+    @property
+    def last(self) -> int:
+        """The last node but one."""
+        return len(self.below) - 2
+
     def at(self, electrons: FloatArray) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
         """The node below each expected number of electrons, and the share of the next one, of any shape."""
-        last = len(self.below) - 1
-        root = np.clip(np.sqrt(electrons) / STEP, 0.0, last - 1e-3)
-        node = root.astype(np.int32)
+        node = np.minimum(np.sqrt(electrons) / STEP, self.last).astype(np.int32)
         # Linear in the electrons, not in their root, so that the mean is exact.
         share = (electrons / STEP**2 - node.astype(float) ** 2) / (2.0 * node + 1)
         return node, np.clip(share, 0.0, 1.0).astype(np.float32)
