@@ -13,7 +13,7 @@ from ..camera.imager import imager_of
 from ..camera.view import View
 from ..errors import DataError, Fault, nearest
 from ..metrics.bound import FEASIBLE, total_violation
-from ..metrics.evaluate import evaluate, family_quantities
+from ..metrics.evaluate import evaluate, family_quantities, image_quantities
 from ..metrics.objective import COMBINED
 from ..metrics.quantity import Column, Columns
 from ..study import Study
@@ -98,6 +98,7 @@ def judged(study: Study, view: View, curves: FloatArray) -> Columns:
         raise DataError(Fault("a QE above 1", value=round(float(curves.max()), 6), allowed=allowed))
     found = evaluate(imager_of(view), curves, study.states)
     found |= family_quantities(None, np.empty((len(curves), 0)))
+    found |= image_quantities(view, curves, study.section.vision, study.section.seed)
     lacking = np.full(len(curves), np.nan)
     columns = {name: found.get(name, lacking) for name in study.quantities if name != COMBINED}
     if COMBINED in study.quantities:

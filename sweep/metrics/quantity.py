@@ -18,6 +18,7 @@ from ..curves.lights import Pair
 from ..designs.block import Block
 from ..designs.family import Family
 from ..types import FloatArray, IndexArray
+from ..vision.section import Vision
 from .smooth import Rows, SmoothDesign
 
 WORST = "worst_"
@@ -144,12 +145,15 @@ class Quantity(Column):
 
 @dataclass(frozen=True)
 class Asked:
-    """What a study asks for: signal types, states that noise may confuse, any place of the light, shifts of edges."""
+    """What a study asks for: signal types, states that noise may confuse, any place of the light, shifts of edges,
+    and a benchmark of vision.
+    """
 
     classes: tuple[str, ...]
     states: tuple[str, ...] = ()
     any_place: bool = False
     edge_shift: bool = False
+    vision: bool = False
 
 
 class Metric(ABC):
@@ -195,6 +199,17 @@ class NoiseMetric(Metric):
 
         `read`: what the camera reads of `curves`, ndarray[n_designs, n_modified, n_wavelengths]; `members`: state ->
         indices of its signals.
+        """
+
+
+class VisionMetric(Metric):
+    """What images of signal heads give, where a study asks for a benchmark of vision."""
+
+    @abstractmethod
+    def of_images(self, view: View, curves: FloatArray, vision: Vision, seed: int) -> Columns:
+        """Each column, ndarray[n_designs]; `seed`: the study's.
+
+        `curves`: ndarray[n_designs, n_modified, n_wavelengths].
         """
 
 

@@ -19,6 +19,9 @@ from .tables import (
     RESULTS,
     SEARCH_LOG,
     VALIDATED,
+    VISION,
+    VISION_CONDITIONS,
+    VISION_MISREAD,
     front_schema,
     search_schema,
 )
@@ -61,7 +64,7 @@ def columns_table() -> list[str]:
     """A table of Markdown: column, unit, meaning; `<a>`, `<b>` stand for any two signal types."""
     types = ("<a>", "<b>")
     rows = [_row(names, "", meaning) for names, meaning in _KEYS.items()]
-    for quantity in listed(Asked(types, types, any_place=True)):
+    for quantity in listed(Asked(types, types, any_place=True, vision=True)):
         rows.append(_row((quantity.name,), quantity.unit, quantity.meaning))
     rows.append(_row(("worst_<quantity>",), "", _WORST))
     rows += [_row(names, "", meaning) for names, meaning in _VERDICTS.items()]
@@ -81,6 +84,12 @@ FILES = {
     CURVES: "a row per curve and wavelength: " + ", ".join(SCHEMA.names),
     POINTS: "what the clouds draw: design_id, signal_type, signal, channel, dn",
     RECOGNITION: "raw patches told apart by classifiers, where a study asks for them, with 95 % intervals",
+    VISION: "a row per image of the benchmark of vision: design_id, name, cfa, seed, order (of the lenses), lamps "
+    "(seen in training or unseen), image, state, lamp, intensity_cd, background, phantom, distance_m, level, and what "
+    "each reader says with its probability: observer, network, half (a network that learned from half of the images)",
+    VISION_CONDITIONS: "of each design at each distance and level of light: csd (DN), dprime and pair_error, the "
+    "smallest or the largest over the pairs of lenses",
+    VISION_MISREAD: "images that were read wrongly, in false colors: bytes of rows x columns x 3 in `pixels`",
     AUDIT: "rows of `sweep audit`: promised and realized errors",
     RESOLVED: "the study with every default written out; a study file itself",
     PROVENANCE: "versions, seed, command, machine, plans of the scenes, what the columns mean",

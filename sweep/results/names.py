@@ -17,16 +17,17 @@ from .tables import (
     RESULTS,
     SEARCH_LOG,
     VALIDATED,
+    VISION_TABLES,
 )
 
 RUN, SUMS = "run.json", "SHA256SUMS"
 REPORT, FIGURES = "report.html", "figures"
-TABLES = (RESULTS, SEARCH_LOG, FRONT, CURVES, POINTS, LIMITED_BY, VALIDATED, LEFT_OUT, RECOGNITION)
+TABLES = (RESULTS, SEARCH_LOG, FRONT, CURVES, POINTS, LIMITED_BY, VALIDATED, LEFT_OUT, RECOGNITION, *VISION_TABLES)
 MADE_BY_RUN = frozenset((*TABLES, RESOLVED, PROVENANCE))
 """What a run itself writes beside its list; the report draws from it, `sweep audit` adds a table."""
 _DRAWN = re.compile(
     r"report\.html|cfas\.(png|svg)|pareto(-\d+)?\.(png|svg)|paper_comparison\.(csv|parquet)"
-    r"|figures/((filters|series)-\d+|tiles|sensor|signals|chart|clouds-(cfas|designs))\.(png|svg)"
+    r"|figures/((filters|series)-\d+|tiles|sensor|signals|chart|clouds-(cfas|designs)|vision-(errors|ranks|misread))\.(png|svg)"
 )
 
 

@@ -31,6 +31,7 @@ from ..results.tables import (
     RESULTS,
     SEARCH_LOG,
     VALIDATED,
+    VISION_TABLES,
     holds,
     json_of,
     sliced,
@@ -60,6 +61,7 @@ def files_of(study: Study) -> set[str]:
         names |= {SEARCH_LOG, FRONT} if study.search.levels else {SEARCH_LOG}
     names |= {VALIDATED} if study.held_out is not None else set()
     names |= {LEFT_OUT} if study.leaves_one_out else set()
+    names |= {*VISION_TABLES} if study.section.vision is not None else set()
     asked = study.section.recognition
     return names | ({RECOGNITION} if asked is not None and asked.patches else set())
 
@@ -97,6 +99,8 @@ class Making:
                 self._write_search(todo)
             if todo & {CURVES, POINTS, LIMITED_BY, VALIDATED, RECOGNITION}:
                 self._write_drawn(todo)
+            if todo & {*VISION_TABLES}:
+                self._write_vision(todo)
             if RESOLVED in todo:
                 self.inventory.write({RESOLVED: resolved_yaml(self.study).encode("utf-8")})
             if PROVENANCE in todo:
@@ -190,6 +194,14 @@ class Making:
             table = recognition_table(self.study, rows, self.crew, self.progress)
             assert table is not None
             self.inventory.write_table(RECOGNITION, table)
+
+    def _write_vision(self, names: set[str]) -> None:
+        from .vision import vision_tables  # noqa: PLC0415  (only where a study asks for images)
+
+        parallel = Kept(self.crew, self.journal, f"{self.sweep.fingerprint} vision")
+        tables = vision_tables(self.study, self.gathered.frame(), parallel, self.progress)
+        for name in names & tables.keys():
+            self.inventory.write_table(name, tables[name])
 
     def _limit(self) -> Limit | None:
         """The search's limit, found alone where the search itself need not be repeated."""

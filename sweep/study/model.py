@@ -87,7 +87,9 @@ class Study:
     @property
     def asked(self) -> Asked:
         """What the study asks for of its designs."""
-        return Asked(self.lights.classes, self.states, self.any_place, self.edge_shift_nm > 0)
+        return Asked(
+            self.lights.classes, self.states, self.any_place, self.edge_shift_nm > 0, self.section.vision is not None
+        )
 
     @property
     def states(self) -> tuple[str, ...]:

@@ -21,6 +21,7 @@ from .axes import Axis
 from .document import Document
 from .model import Search, Study
 from .schema import CfaSection, StudySection
+from .seen_images import check_vision
 from .sensors import sensor_of
 from .sources import KeptSources, Sources
 from .spaces import SpaceBuilder
@@ -66,6 +67,7 @@ class _Resolver:
         self.check_images()
         check_lenses(section, sensor, spaces, self.sources)
         self.check_recognition(lights)
+        check_vision(section, lights, mosaics, self.sources)
         self.check_objective(lights)
         self.check_constraints(lights)
         self.check_published(lights, mosaics)
@@ -113,7 +115,8 @@ class _Resolver:
         recognition = self.section.recognition
         states = () if recognition is None else tuple(recognition.states or lights.classes)
         shifts = self.section.production.edge_shift_nm > 0 if edge_shift is None else edge_shift
-        return Asked(lights.classes, states, edge_shift=shifts)
+        vision = self.section.vision is not None
+        return Asked(lights.classes, states, edge_shift=shifts, vision=vision)
 
     def check_columns(self, lights: Lights) -> None:
         """Every pair of signal types has columns of its own."""

@@ -17,6 +17,7 @@ from ..designs.technology import Stated
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective
 from ..types import Number, Section
+from ..vision.section import Vision
 from .axes import ScenarioTemplate, Span, Values, expanded
 from .schema_curves import Documented, LightsSection, Name, SensorSection, builtin, named
 
@@ -258,6 +259,8 @@ class StudySection(Documented):
     """What production does to a filter; then worst_... quantities exist."""
     recognition: Recognition | None = None
     """How often noise confuses signal types; needs noise in every scenario."""
+    vision: Vision | None = None
+    """Images of signal heads, read by the ideal observer and by a network; lamps need luminous intensity."""
     objective: Objective = Objective(minimum={"csd_yellow_red": 1.0})
     """What is maximized: a CSD or sensitivity, or several: {minimum: {...}} or {sum: {...}} with weights."""
     constraints: dict[Name, Bound] = {}

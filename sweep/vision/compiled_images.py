@@ -12,14 +12,17 @@ _LOOK = 16
 
 
 @njit(cache=True, nogil=True)
-def draw(
+def draw_numbers(
     node: NDArray[np.int32],
     share: NDArray[np.float32],
     below: NDArray[np.float32],
     uniform: NDArray[np.float64],
     out: NDArray[np.int16],
 ) -> None:
-    """The digital number up to which a share `uniform` of all lies, ndarray[n]; `node`, `share`: see `PixelTable.at`."""
+    """The digital number up to which a share `uniform` of all lies, ndarray[n].
+
+    `node`, `share`: see `PixelTable.at`; `below`: see there.
+    """
     last = below.shape[1] - 1
     for i in range(node.size):
         one, two, w, u = below[node[i]], below[node[i] + 1], share[i], uniform[i]
@@ -49,7 +52,7 @@ def cases_on_table(
     """`PixelTable.at` of the expected electrons of all cases, ndarray[n_cases, n_pixels].
 
     `unlit`, `phantoms`, `lamps`: see `HeadElectrons`, the first of one background, ndarray[n_places, n_pixels].
-    `cases`: ndarray[n_cases, 5]: type of the lit lens or -1, signal, order, phantom, place; `candelas`: ndarray[n_cases].
+    `cases`: ndarray[n_cases, 5]: type of the lit lens or -1, signal, order, phantom, place; `candelas`: of each case.
     """
     for case in range(len(cases)):
         kind, lamp, order, sunny, place = cases[case]

@@ -43,7 +43,7 @@ class HeadMaps:
     backplate: FloatArray
 
 
-def places_px(vision: Vision, mosaic: Mosaic) -> FloatArray:
+def head_places_px(vision: Vision, mosaic: Mosaic) -> FloatArray:
     """Where the middle lens's center may be, from the image's first pixel: ndarray[n_places, 2] as (column, row)."""
     rows, columns = mosaic.indices.shape
     n = vision.places_per_pixel
@@ -66,8 +66,8 @@ def head_maps(view: View, vision: Vision) -> HeadMaps:
 
 def _made(view: View, vision: Vision, target: Target) -> HeadMaps:
     knots = blur.knots(view.grid.nodes_nm, _KNOTS)
-    places, across = places_px(vision, view.mosaic), target.object_resolution_px
-    lenses = [_disc(view, vision, places + [[0, SPACING * across * up]], knots) for up in (-1, 0, 1)]
+    places, across = head_places_px(vision, view.mosaic), target.object_resolution_px
+    lenses = [_disc(view, vision, places + np.array([0, SPACING * across * up]), knots) for up in (-1, 0, 1)]
     housing, backplate = (
         _rectangle(view, vision, places, (size[0] * across, size[1] * across), knots) for size in (HOUSING, BACKPLATE)
     )

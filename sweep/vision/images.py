@@ -18,7 +18,7 @@ from ..camera.view import View, per_photon, signal_irradiance
 from ..curves.color import luminance_per_photon_radiance
 from ..curves.hats import hats
 from ..types import FloatArray, IndexArray
-from .compiled_images import draw
+from .compiled_images import draw_numbers
 from .head import MARGIN, HeadMaps, head_maps
 from .materials import illuminant, phantom, reflectance
 from .pixel_table import PixelTable, pixel_table
@@ -188,5 +188,5 @@ class HeadCamera:
         electrons = self.expected(scenes)
         node, share = self.table.at(electrons.ravel())
         found = np.empty(electrons.size, dtype=np.int16)
-        draw(node, share, self.table.below, uniforms(scenes, electrons.shape[1]).ravel(), found)
+        draw_numbers(node, share, self.table.below, uniforms(scenes, electrons.shape[1]).ravel(), found)
         return found.reshape(len(scenes), self.vision.crop_px, self.vision.crop_px)

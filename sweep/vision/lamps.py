@@ -24,10 +24,10 @@ class Lamps:
 
     def digests(self, lights: Lights) -> set[str]:
         """Digests of their spectra."""
-        return {digest(lights.photons[i]) for own in self.of_lens for i in own}
+        return {spectrum_digest(lights.photons[i]) for own in self.of_lens for i in own}
 
 
-def digest(spectrum: FloatArray) -> str:
+def spectrum_digest(spectrum: FloatArray) -> str:
     """SHA-256 of a spectrum."""
     return hashlib.sha256(np.ascontiguousarray(spectrum, dtype="<f8").tobytes()).hexdigest()
 
@@ -42,7 +42,7 @@ def split_lamps(lights: Lights, vision: Vision, seed: tuple[int, int]) -> dict[s
     for lens in vision.lenses:
         own: dict[str, list[int]] = {}
         for i in lights.members[lens]:
-            own.setdefault(digest(lights.photons[i]), []).append(int(i))
+            own.setdefault(spectrum_digest(lights.photons[i]), []).append(int(i))
         groups = [own[key] for key in own]
         order = rng.permutation(len(groups))
         few = max(1, len(groups) // 4)

@@ -101,7 +101,7 @@ class Network:
         """Of each state, ndarray[n, n_states]; `planes`: ndarray[n, rows, columns, planes]."""
         told = _told(self.weights, _scaled(planes, self.mean, self.deviation))
         found = np.asarray(told, dtype=float)
-        return found / found.sum(axis=1, keepdims=True)
+        return np.asarray(found / found.sum(axis=1, keepdims=True), dtype=float)
 
 
 def _scaled(planes: FloatArray, mean: float, deviation: float) -> Any:

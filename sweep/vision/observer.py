@@ -15,7 +15,7 @@ from ..types import FloatArray, IndexArray
 from .compiled_images import cases_on_table, log_likelihoods
 from .images import HeadCamera, HeadElectrons, Numbers
 from .lamps import Lamps
-from .pixel_table import STEP
+from .pixel_table import ROOT_STEP
 from .scenes import ORDER_OF_LENSES, PHANTOM_SHARE, SHUFFLED, Scenes, states_of
 
 
@@ -64,16 +64,15 @@ def posteriors(camera: HeadCamera, scenes: Scenes, images: Numbers, lamps: Lamps
     return found
 
 
-def _of_states(
-    camera: HeadCamera, images: Numbers, heads: HeadElectrons, background: int, cases: _Cases
-) -> FloatArray:
+def _of_states(camera: HeadCamera, images: Numbers, heads: HeadElectrons, background: int, cases: _Cases) -> FloatArray:
     """Probability of each state before a background, ndarray[n_images, n_states]."""
     n_cases, unlit = len(cases.table), heads.unlit[:, background]
     telling = np.argsort(-_telling(heads, unlit), kind="stable")
-    parts = [np.ascontiguousarray(each[..., telling]) for each in (unlit, heads.phantoms, heads.lamps)]
-    node, share = (np.empty((n_cases, telling.size), dtype=kind) for kind in (np.int32, np.float32))
+    dark, sun, lamp = (np.ascontiguousarray(each[..., telling]) for each in (unlit, heads.phantoms, heads.lamps))
+    node = np.empty((n_cases, telling.size), dtype=np.int32)
+    share = np.empty(node.shape, dtype=np.float32)
     last = camera.table.last
-    cases_on_table(*parts, cases.table, cases.candelas, ORDER_OF_LENSES, STEP, last, node, share)
+    cases_on_table(dark, sun, lamp, cases.table, cases.candelas, ORDER_OF_LENSES, ROOT_STEP, last, node, share)
     likelihood = np.empty((len(images), n_cases))
     log_likelihoods(np.ascontiguousarray(images[:, telling]), node, share, camera.table.shares, likelihood)
     weights = np.exp(likelihood - likelihood.max(axis=1, keepdims=True)) * cases.share

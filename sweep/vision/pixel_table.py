@@ -1,4 +1,4 @@
-"""How often a pixel reads each digital number: exact sums over Poisson electrons, tabulated over the expected electrons.
+"""How often a pixel reads each digital number: sums over Poisson electrons, tabulated over the expected electrons.
 
 The order is the camera's: gain error, Poisson electrons, full well, read noise, gain and pedestal, ADC range, rounding.
 Between two nodes of the root of the electrons the distributions are mixed linearly: the mean is exact, and a mixture of
@@ -19,10 +19,8 @@ from ..camera.noisy import gaussian, moments
 from ..camera.pixel import Pixel
 from ..types import FloatArray
 
-STEP = 1 / 16
+ROOT_STEP = 1 / 16
 """Distance of nodes in the root of the expected electrons."""
-MOST_BITS, MOST_WELL_E = 12, 30_000.0
-"""Larger tables would not fit into memory."""
 _LEAST = 1e-30
 _REACH = 9.5
 
@@ -43,9 +41,9 @@ class PixelTable:
 
     def at(self, electrons: FloatArray) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
         """The node below each expected number of electrons, and the share of the next one, of any shape."""
-        node = np.minimum(np.sqrt(electrons) / STEP, self.last).astype(np.int32)
+        node = np.minimum(np.sqrt(electrons) / ROOT_STEP, self.last).astype(np.int32)
         # Linear in the electrons, not in their root, so that the mean is exact.
-        share = (electrons / STEP**2 - node.astype(float) ** 2) / (2.0 * node + 1)
+        share = (electrons / ROOT_STEP**2 - node.astype(float) ** 2) / (2.0 * node + 1)
         return node, np.clip(share, 0.0, 1.0).astype(np.float32)
 
 
@@ -63,7 +61,7 @@ def pixel_table(pixel: Pixel) -> PixelTable:
 def _nodes_e(pixel: Pixel) -> FloatArray:
     """Expected electrons of the nodes, from none to where nothing changes any more."""
     last = math.sqrt(moments.Ends.of(moments.without_prnu(pixel)).last_e)
-    return np.asarray((np.arange(math.ceil(last / STEP) + 2) * STEP) ** 2, dtype=float)
+    return np.asarray((np.arange(math.ceil(last / ROOT_STEP) + 2) * ROOT_STEP) ** 2, dtype=float)
 
 
 def _without_prnu(pixel: Pixel) -> FloatArray:

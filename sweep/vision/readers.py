@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib.util import find_spec
 
 import numpy as np
 
 from ..camera.view import View
-from ..errors import Fault, SweepError
 from ..types import FloatArray
 from .images import HeadCamera, Numbers
 from .lamps import CHECK, TEST, TRAIN, Lamps, split_lamps
@@ -51,13 +49,6 @@ class SeedReading:
     pictured: list[int]
 
 
-def require_network() -> None:
-    """Raises SweepError where JAX and Optax are not installed."""
-    if any(find_spec(name) is None for name in ("jax", "optax")):
-        allowed = "pip install 'cfa-sweep[vision]', or `network: false`"
-        raise SweepError(Fault("the network needs JAX and Optax, which are not installed", key="vision", allowed=allowed))
-
-
 def read_images(view: View, curves: FloatArray, vision: Vision, seed: tuple[int, int]) -> SeedReading:
     """One design and one seed; `curves`: of the modified channels, ndarray[n_modified, n_wavelengths].
 
@@ -65,12 +56,13 @@ def read_images(view: View, curves: FloatArray, vision: Vision, seed: tuple[int,
     """
     camera = HeadCamera(view, curves, vision)
     lamps = split_lamps(view.lights, vision, seed)
-    unseen, seen = {}, {}
-    for number, order in enumerate(ORDERS):
-        key = (*seed, 10 + number)
-        test = _drawn(camera, lamps[TEST], order, vision.test_images, (*key, 0))
+    unseen: dict[str, Answers] = {}
+    seen: dict[str, Answers] = {}
+    for order in ORDERS:
+        key = _key(seed, order)[:-1]
+        test = _drawn(camera, lamps[TEST], order, vision.test_images, _key(seed, order))
         known = _drawn(camera, lamps[TRAIN], order, vision.test_images // 2, (*key, 1))
-        told = _of_networks(camera, lamps, order, key, [test[1], known[1]]) if vision.network else _none(camera)
+        told = _of_networks(camera, lamps, order, key, [test[1], known[1]]) if vision.network else _none()
         for where, (scenes, images), whole, half, of in zip(
             (unseen, seen), (test, known), *told[:2], (lamps[TEST], lamps[TRAIN]), strict=True
         ):
@@ -78,6 +70,22 @@ def read_images(view: View, curves: FloatArray, vision: Vision, seed: tuple[int,
             ideal = posteriors(camera, scenes, images, of, order) if where is unseen else np.empty((0, 0))
             where[order] = Answers(scenes, ideal, whole, half, told[2])
     return SeedReading(unseen, seen, *_pictures(camera, unseen[ORDERS[-1]], test[1]))
+
+
+def observer_error(view: View, curves: FloatArray, vision: Vision, seed: tuple[int, int]) -> float:
+    """What the ideal observer leaves in doubt of one seed's test images, the lenses in any order; see `read_images`.
+
+    The mean of one less the probability of the most probable state: its expected error, with less scatter than a count.
+    """
+    camera, order = HeadCamera(view, curves, vision), ORDERS[-1]
+    lamps = split_lamps(view.lights, vision, seed)[TEST]
+    scenes, images = _drawn(camera, lamps, order, vision.test_images, _key(seed, order))
+    return float(np.mean(1 - posteriors(camera, scenes, images, lamps, order).max(axis=1)))
+
+
+def _key(seed: tuple[int, int], order: str) -> tuple[int, ...]:
+    """Of the test's scenes."""
+    return (*seed, 10 + ORDERS.index(order), 0)
 
 
 def _drawn(camera: HeadCamera, lamps: Lamps, order: str, count: int, key: tuple[int, ...]) -> tuple[Scenes, Numbers]:
@@ -92,14 +100,14 @@ def planes_of(camera: HeadCamera, images: Numbers) -> FloatArray:
     return tile_planes(np.sqrt(light), camera.view.mosaic)
 
 
-def _none(camera: HeadCamera) -> tuple[list[FloatArray], list[FloatArray], int]:
+def _none() -> tuple[list[FloatArray], list[FloatArray], int]:
     return [np.empty((0, 0))] * 2, [np.empty((0, 0))] * 2, 0
 
 
 def _of_networks(
     camera: HeadCamera, lamps: dict[str, Lamps], order: str, key: tuple[int, ...], tests: list[Numbers]
 ) -> tuple[list[FloatArray], list[FloatArray], int]:
-    """What a network that is trained on all images, and one on half of them, say of tests; and the first one's epochs."""
+    """What a network that learned from all images, and one from half of them, say of tests; epochs of the first."""
     from .network import train  # noqa: PLC0415  (JAX: only where a study asks for a network)
 
     vision = camera.vision

@@ -15,7 +15,7 @@ from .section import Vision
 OFF = "off"
 FIXED, SHUFFLED = "fixed", "shuffled"
 ORDERS = (FIXED, SHUFFLED)
-"""Whether the lenses stand as they do in the street, so that the place of the lit one says its color, or in any order."""
+"""Whether the lenses stand as in the street, so that the place of the lit one says its color, or in any order."""
 ORDER_OF_LENSES = np.array(list(permutations(range(3))))
 """Signal type of the lens at each of the three positions, from the top; the first row is the street's."""
 PHANTOM_SHARE = 0.5

@@ -15,7 +15,10 @@ Material = Literal["foliage", "sky", "gray", "dark gray", "black", "white"]
 _Intensity = Annotated[float, Field(ge=1e-3, le=1e6)]
 _Text = Annotated[str, Field(min_length=1, max_length=100)]
 MOST_IMAGES = 100_000
-_FEWEST_LAMPS = 3
+FEWEST_LAMPS = 3
+"""Of each lens: one to train, one to check, one to test."""
+MOST_BITS, MOST_WELL_E = 12, 30_000.0
+"""Tables of larger pixels would not fit into a worker's memory."""
 
 
 class LightLevel(Section):
