@@ -12,7 +12,7 @@ import pyarrow as pa
 from ..metrics.objective import COMBINED
 from ..results.inventory import Inventory
 from ..results.lock import locked
-from ..results.names import FIGURES, REPORT, is_drawn
+from ..results.names import FIGURES, REPORT, VISION_FIGURES, is_drawn
 from ..results.output import Output
 from ..results.profiles import profile_table
 from ..results.tables import FOUND, NAMED, PLAIN, csv_of, encoded
@@ -61,13 +61,13 @@ def make_report(output: Output, *, mend: bool = False) -> None:
 def _contents(output: Output, some: Iterable[str] | None) -> dict[str, bytes]:
     """The files of the report -> what they hold; `some` of them, or all, since the page has every picture in it."""
     images, contents = [], dict[str, bytes]()
-    for name, caption, figure in _drawings(output):
+    for name, caption, figure in (*_drawings(output), *_vision_drawings(output)):
         where = name if name.startswith(("cfas", "pareto")) else f"{FIGURES}/{name}"
         for kind in ("png", "svg"):
             if some is None or {f"{where}.png", f"{where}.svg"} & {*some}:
                 contents[f"{where}.{kind}"] = rendered(figure, kind)
-        if some is None and name in _PICTURES:
-            images.append((caption, inlined(contents[f"{where}.png"])))
+        if some is None and (name in _PICTURES or name.startswith(VISION_FIGURES)):
+            images.append((name, caption, inlined(contents[f"{where}.png"])))
     published = comparison_with_published(output)
     if len(published):
         contents[PUBLISHED_CSV] = csv_of(published).encode("utf-8")
@@ -77,7 +77,7 @@ def _contents(output: Output, some: Iterable[str] | None) -> dict[str, bytes]:
     return contents
 
 
-def _html(output: Output, images: Sequence[tuple[str, str]], published: pd.DataFrame) -> str:
+def _html(output: Output, images: Sequence[tuple[str, str, str]], published: pd.DataFrame) -> str:
     drawn = payload(output)
     groups = scene_groups(output)
     return page(
@@ -101,7 +101,9 @@ def _html(output: Output, images: Sequence[tuple[str, str]], published: pd.DataF
         scenes=rows(scene_table(groups)),
         group_rows=[rows(effect_table(group)) for group in groups],
         audited=output.audited is not None,
-        images=images,
+        images=[(caption, uri) for name, caption, uri in images if name in _PICTURES],
+        vision=_vision(output),
+        vision_images=[(caption, uri) for name, caption, uri in images if name not in _PICTURES],
         comparison=rows(tables.comparison_table(output)),
         best=rows(tables.best_table(output)),
         recognition=rows(told_apart_table(output)),
@@ -113,6 +115,25 @@ def _html(output: Output, images: Sequence[tuple[str, str]], published: pd.DataF
         provenance=output.provenance.model_dump(mode="json"),
         limited=output.provenance.search is not None and output.provenance.search.limit_proven is not None,
     )
+
+
+def _vision(output: Output) -> dict[str, list[list[str]]]:
+    """Tables of the benchmark of vision; none where the study asks for none."""
+    if output.study.vision is None:
+        return {}
+    from .vision import benchmark_of  # noqa: PLC0415  (only where a study asks for images)
+    from .vision_tables import vision_parts  # noqa: PLC0415
+
+    return {title: rows(table) for title, table in vision_parts(benchmark_of(output)).items()}
+
+
+def _vision_drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
+    """The figures of the benchmark of vision; none where the study asks for none."""
+    if output.study.vision is not None:
+        from .vision import benchmark_of  # noqa: PLC0415  (only where a study asks for images)
+        from .vision_figures import vision_drawings  # noqa: PLC0415
+
+        yield from vision_drawings(output, benchmark_of(output))
 
 
 def _objective(output: Output) -> str:

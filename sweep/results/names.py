@@ -21,7 +21,7 @@ from .tables import (
 )
 
 RUN, SUMS = "run.json", "SHA256SUMS"
-REPORT, FIGURES = "report.html", "figures"
+REPORT, FIGURES, VISION_FIGURES = "report.html", "figures", "vision-"
 TABLES = (RESULTS, SEARCH_LOG, FRONT, CURVES, POINTS, LIMITED_BY, VALIDATED, LEFT_OUT, RECOGNITION, *VISION_TABLES)
 MADE_BY_RUN = frozenset((*TABLES, RESOLVED, PROVENANCE))
 """What a run itself writes beside its list; the report draws from it, `sweep audit` adds a table."""

@@ -47,6 +47,7 @@ from .tables import (
     SEARCH_LOG,
     SWEPT,
     VALIDATED,
+    VISION_TABLES,
     front_schema,
     read_table,
 )
@@ -67,7 +68,7 @@ class Output:
 
     `study`: the study that was run, and `resolved` its file. `profiles`: over the whole table, per CFA; none where a
     sweep is no grid. `searched`: the search's evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per
-    light that was left out of a search.
+    light that was left out of a search; `vision`: tables of the benchmark of vision by their files' names.
     """
 
     folder: Path
@@ -83,6 +84,7 @@ class Output:
     searched: pd.DataFrame | None
     audited: pd.DataFrame | None
     left_out: pd.DataFrame | None
+    vision: Mapping[str, pd.DataFrame]
     profiles: Mapping[str, Sequence[ParameterProfile]]
 
     @property
@@ -180,9 +182,8 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         raise no_run(folder)
     if PROVENANCE not in inventory.files:
         raise OutputError(Fault("no finished run here", str(folder), allowed="a folder that `sweep run` finished"))
-    optional = [
-        name for name in (FRONT, RECOGNITION, SEARCH_LOG, AUDIT, VALIDATED, LEFT_OUT) if name in inventory.files
-    ]
+    known = (FRONT, RECOGNITION, SEARCH_LOG, AUDIT, VALIDATED, LEFT_OUT, *VISION_TABLES)
+    optional = [name for name in known if name in inventory.files]
     if not audited and AUDIT in optional:
         optional.remove(AUDIT)
     inventory.require([RESULTS, CURVES, POINTS, LIMITED_BY, RESOLVED, PROVENANCE, *optional])
@@ -191,15 +192,14 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         raise _lacking(folder / RESOLVED, lacks)
     study = _checked(folder / RESOLVED, StudySection, resolved)
     provenance = _checked(folder / PROVENANCE, Provenance, _mapping(folder / PROVENANCE, json.loads))
-    objective = study.objective.column
     _check_columns(folder / RESULTS, [*ROW_COLUMNS, *provenance.parameters, *(c.name for c in provenance.quantities)])
     _check_columns(folder / LIMITED_BY, ["design_id"])
     _check_columns(folder / POINTS, ["design_id", "signal_type", "signal", "channel", "dn"])
     if FRONT in optional:
         _check_columns(folder / FRONT, front_schema(()).names)
-    profiles = Profiles(objective, next(iter(study.scenarios)), provenance.parameters)
-    table, counts = thinned(folder / RESULTS, [objective, *provenance.trade_off], provenance.trade_off[0], profiles.add)
-    points = read_table(folder / POINTS).to_pandas()
+    order, separation = [study.objective.column, *provenance.trade_off], provenance.trade_off[0]
+    profiles = Profiles(order[0], next(iter(study.scenarios)), provenance.parameters)
+    table, counts = thinned(folder / RESULTS, order, separation, profiles.add)
     limited = read_table(folder / LIMITED_BY).to_pandas()
     front, recognition, searched, audit, validated, left_out = (
         read_table(folder / name).to_pandas() if name in optional else None
@@ -213,12 +213,13 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         table=_joined(table, limited, validated),
         counts=counts,
         curves=_kept_curves(folder / CURVES),
-        points=points,
+        points=read_table(folder / POINTS).to_pandas(),
         front=front,
         recognition=recognition,
         searched=searched,
         audited=audit,
         left_out=left_out,
+        vision={name: read_table(folder / name).to_pandas() for name in VISION_TABLES if name in optional},
         profiles=profiles.found if all(made.grid is not None for made in study.sweeps.values()) else {},
     )
 

@@ -21,8 +21,8 @@ from ..results.tables import FEW, FOUND, VISION, VISION_CONDITIONS, VISION_MISRE
 from ..study import Study
 from ..types import FloatArray, Parallel, Progress, delayed
 from ..vision.images import view_at
-from ..vision.readers import SEEN, UNSEEN, Answers, SeedReading, read_images
-from ..vision.scenes import ORDERS, states_of
+from ..vision.readers import Answers, SeedReading, read_images
+from ..vision.scenes import ORDERS, SEEN, UNSEEN, states_of
 from ..vision.section import Vision
 
 _TEXT, _NUMBER, _COUNT = pa.string(), pa.float64(), pa.int64()

@@ -46,12 +46,14 @@ class HeadElectrons:
     """Expected electrons of the parts of a head at one distance and level.
 
     `unlit`: ndarray[n_places, n_backgrounds, n_pixels], all lenses off. What is added: `phantoms`, ndarray[n_places,
-    3 positions, 3 types, n_pixels], and `lamps` for each candela, ndarray[n_places, 3 positions, n_signals, n_pixels].
+    3 positions, 3 types, n_pixels], and for each candela and second `lamps`, ndarray[n_places, 3 positions, n_signals,
+    n_pixels].
     """
 
     unlit: FloatArray
     phantoms: FloatArray
     lamps: FloatArray
+    time_s: float
 
     def of(
         self,
@@ -71,7 +73,7 @@ class HeadElectrons:
             kinds = ORDER_OF_LENSES[order, position]
             found[sunny] += self.phantoms[place[sunny], position, kinds[sunny]]
             on = np.flatnonzero(lit[0] == kinds)
-            found[on] += lit[2][on, None] * self.lamps[place[on], position, lit[1][on]]
+            found[on] += (self.time_s * lit[2][on, None]) * self.lamps[place[on], position, lit[1][on]]
         return found
 
 
@@ -97,9 +99,15 @@ class HeadCamera:
         at = np.arange(-MARGIN, size - MARGIN)
         self._channel = view.mosaic.indices[np.ix_(at % rows, at % columns)]
         self._lamps: dict[int, FloatArray] = {}
+        self._heads: dict[tuple[int, int], HeadElectrons] = {}
 
     def electrons(self, distance: int, level: int) -> HeadElectrons:
-        """Of one distance and level, by their numbers."""
+        """Of one distance and level, by their numbers; kept."""
+        if (distance, level) not in self._heads:
+            self._heads[distance, level] = self._made(distance, level)
+        return self._heads[distance, level]
+
+    def _made(self, distance: int, level: int) -> HeadElectrons:
         view, said = self._views[distance][level], self.levels[level]
         maps = head_maps(view, self.vision)
         time_s = said.exposure_s
@@ -110,13 +118,14 @@ class HeadCamera:
         housing, plate, glass = (arriving * reflectance(grid, of) for of in ("dark gray", "black", "black"))
         around = np.stack([arriving * reflectance(grid, each) for each in self.vision.backgrounds])
         uniform = np.ones((1, *maps.backplate.shape[1:]))
-        unlit = self._seen(maps, uniform, around)[:, 0] + self._seen(maps, maps.backplate, plate - around)
+        unlit = self._seen(maps, uniform, around) + self._seen(maps, maps.backplate, plate - around)
         unlit += self._seen(maps, maps.housing, (housing - plate)[None])
         unlit += self._seen(maps, maps.lenses.sum(axis=1), (glass - housing)[None])
         return HeadElectrons(
             np.maximum(unlit, 0.0) * time_s + self.pixel.dark_e_per_s * time_s,
             self._phantoms(maps, view, said) * time_s,
-            self._lamp_rates(distance, maps, view) * time_s,
+            self._lamp_rates(distance, maps, view),
+            time_s,
         )
 
     def _phantoms(self, maps: HeadMaps, view: View, level: LightLevel) -> FloatArray:
@@ -134,7 +143,7 @@ class HeadCamera:
     def _lamp_rates(self, distance: int, maps: HeadMaps, view: View) -> FloatArray:
         """Electrons/s of each lamp of one candela at each position; the same at all levels."""
         if distance not in self._lamps:
-            self._lamps = {distance: self._of_lenses(maps, signal_irradiance(view))}
+            self._lamps[distance] = self._of_lenses(maps, signal_irradiance(view))
         return self._lamps[distance]
 
     def _of_lenses(self, maps: HeadMaps, spectra: FloatArray) -> FloatArray:

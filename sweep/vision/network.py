@@ -78,7 +78,7 @@ def _steps(weights: _Weights, state: Any, x: Any, y: Any) -> tuple[_Weights, Any
 
     def step(held: tuple[_Weights, Any], batch: tuple[Any, Any]) -> tuple[tuple[_Weights, Any], None]:
         gradient = jax.grad(_loss)(held[0], *batch)
-        updates, moved = _OPTIMIZER.update(gradient, held[1])
+        updates, moved = _OPTIMIZER.update(gradient, held[1], held[0])
         return (optax.apply_updates(held[0], updates), moved), None
 
     return jax.lax.scan(step, (weights, state), (x, y))[0]

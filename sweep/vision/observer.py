@@ -71,8 +71,8 @@ def _of_states(camera: HeadCamera, images: Numbers, heads: HeadElectrons, backgr
     dark, sun, lamp = (np.ascontiguousarray(each[..., telling]) for each in (unlit, heads.phantoms, heads.lamps))
     node = np.empty((n_cases, telling.size), dtype=np.int32)
     share = np.empty(node.shape, dtype=np.float32)
-    last = camera.table.last
-    cases_on_table(dark, sun, lamp, cases.table, cases.candelas, ORDER_OF_LENSES, ROOT_STEP, last, node, share)
+    light, last = cases.candelas * heads.time_s, camera.table.last
+    cases_on_table(dark, sun, lamp, cases.table, light, ORDER_OF_LENSES, ROOT_STEP, last, node, share)
     likelihood = np.empty((len(images), n_cases))
     log_likelihoods(np.ascontiguousarray(images[:, telling]), node, share, camera.table.shares, likelihood)
     weights = np.exp(likelihood - likelihood.max(axis=1, keepdims=True)) * cases.share

@@ -15,8 +15,6 @@ from .planes import false_colors, tile_planes
 from .scenes import ORDERS, Scenes, draw_scenes, states_of
 from .section import Vision
 
-SEEN, UNSEEN = "seen", "unseen"
-"""Whether the network has learned from the lamps of an image; never from the image itself."""
 _SHOWN = 12
 """Images that were read wrongly and are kept to look at, of each design."""
 

@@ -16,6 +16,8 @@ OFF = "off"
 FIXED, SHUFFLED = "fixed", "shuffled"
 ORDERS = (FIXED, SHUFFLED)
 """Whether the lenses stand as in the street, so that the place of the lit one says its color, or in any order."""
+SEEN, UNSEEN = "seen", "unseen"
+"""Whether the network has learned from the lamps of an image; never from the image itself."""
 ORDER_OF_LENSES = np.array(list(permutations(range(3))))
 """Signal type of the lens at each of the three positions, from the top; the first row is the street's."""
 PHANTOM_SHARE = 0.5
