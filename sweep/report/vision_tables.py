@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
 import pandas as pd
 
 from ..results.output import Output
 from ..vision.scenes import FIXED, SEEN, SHUFFLED
-from ..vision.scores import macro_f1
+from ..vision.scores import costs, macro_f1
 from .vision import NETWORK, OBSERVER, READER_NAMES, Benchmark, benchmark_of, said_interval, said_percent
 from .vision_ranks import PREDICTORS, Ranks, ranks_of
 
@@ -87,9 +86,9 @@ def vision_table(benchmark: Benchmark) -> pd.DataFrame:
 def _unknown(benchmark: Benchmark, design: str, reader: str) -> str:
     """Mean cost of an answer where "unknown" is allowed, and how often it is given."""
     rows, cost = benchmark.said(design, reader, SHUFFLED), benchmark.vision.unknown_cost
-    unknown = (1 - rows["p"]) > cost
-    wrong = (rows["said"] != rows["state"]).astype(float)
-    return f"{float(np.where(unknown, cost, wrong).mean()):.3f} ({100 * float(unknown.mean()):.0f} %)"
+    wrong = (rows["said"] != rows["state"]).to_numpy(dtype=bool)
+    each, unknown = costs(wrong, rows["p"].to_numpy(dtype=float), cost)
+    return f"{each.mean():.3f} ({100 * unknown.mean():.0f} %)"
 
 
 def vision_conditions_table(benchmark: Benchmark, ranks: Ranks) -> pd.DataFrame:

@@ -77,9 +77,11 @@ def _without_prnu(pixel: Pixel) -> FloatArray:
     poisson[:, -1] += np.maximum(1 - poisson.sum(axis=1), 0.0)  # what is more than the well holds
     held = np.minimum(counts, pixel.well_e)
     mean, sigma = held * pixel.dn_per_e + pixel.offset_dn, pixel.read_noise_e * pixel.dn_per_e
-    top, reach = pixel.full_scale_dn, math.ceil(_REACH * sigma) + 1
-    number = np.floor(mean + 0.5)[:, None] + np.arange(-reach, reach + 1)
+    top = pixel.full_scale_dn
+    reach = min(math.ceil(_REACH * sigma), top) + 1
+    number = np.floor(np.clip(mean, 0, top) + 0.5)[:, None] + np.arange(-reach, reach + 1)
     low, high = (number + side - mean[:, None] for side in (-0.5, 0.5))
+    low[:, 0], high[:, -1] = -np.inf, np.inf
     if sigma:
         low, high = ndtr(low / sigma), ndtr(high / sigma)
     else:

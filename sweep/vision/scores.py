@@ -72,11 +72,11 @@ def macro_f1(matrix: IndexArray) -> float:
     return float(np.mean(np.divide(2 * right, total, out=np.zeros_like(right), where=total > 0)))
 
 
-def costs(probabilities: FloatArray, truth: IndexArray, unknown_cost: float) -> tuple[FloatArray, BoolArray]:
+def costs(wrong: BoolArray, probability: FloatArray, unknown_cost: float) -> tuple[FloatArray, BoolArray]:
     """Cost of each answer and where it is "unknown", ndarray[n] each.
 
-    The answer is the most probable state, or "unknown" where that is expected to cost less; a wrong one costs 1.
+    `wrong`: where the most probable state is not the true one; `probability`: of that state, as the reader says it. It
+    answers "unknown" where that is expected to cost less; a wrong answer costs 1.
     """
-    unknown = 1 - probabilities.max(axis=1) > unknown_cost
-    wrong = (probabilities.argmax(axis=1) != truth).astype(float)
-    return np.where(unknown, unknown_cost, wrong), unknown
+    unknown = np.asarray(1 - probability > unknown_cost, dtype=bool)
+    return np.where(unknown, unknown_cost, wrong.astype(float)), unknown

@@ -85,7 +85,9 @@ def brute_force(scenes: Scenes, at: int) -> np.ndarray:
     frequency = np.hypot(*np.meshgrid(*[np.fft.fftfreq(size * fine, 2.1 / fine)] * 2))
     electrons = np.zeros((size, size))
     tile = view.mosaic.indices[np.ix_((np.arange(size) + start) % 2, (np.arange(size) + start) % 2)]
-    shapes = [(np.abs(x) <= wide * across / 2) & (np.abs(y) <= high * across / 2) for wide, high in (BACKPLATE, HOUSING)]
+    shapes = [
+        (np.abs(x) <= wide * across / 2) & (np.abs(y) <= high * across / 2) for wide, high in (BACKPLATE, HOUSING)
+    ]
     shapes += [x**2 + (y - up * SPACING * across) ** 2 <= (across / 2) ** 2 for up in (-1, 0, 1)]
     covered = [shape.reshape(size * fine, finer, size * fine, finer).mean(axis=(1, 3)) for shape in shapes]
     layers = [black - ground, dark - black, *(lens - dark for lens in lenses)]
