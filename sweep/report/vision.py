@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from ..cache import Cache
 from ..results.output import Output
 from ..results.tables import VISION, VISION_CONDITIONS
 from ..types import FloatArray
@@ -91,11 +93,17 @@ class Benchmark:
         return pd.DataFrame(confusion_matrix(truth, said, len(states)), states, states)
 
 
+_benchmarks: Cache[tuple[Path, str], Benchmark] = Cache(2)
+"""The latest ones, whose sentences, tables and figures share what they need."""
+
+
 def benchmark_of(output: Output) -> Benchmark:
     """The benchmark of a run whose study asks for one."""
     vision = output.study.vision
     assert vision is not None
-    return Benchmark(vision, output.study.seed, output.vision[VISION], output.vision[VISION_CONDITIONS])
+    tables = output.vision[VISION], output.vision[VISION_CONDITIONS]
+    key = (output.folder, output.provenance.fingerprint)
+    return _benchmarks.get(key, lambda: Benchmark(vision, output.study.seed, *tables))
 
 
 def said_interval(found: Interval, digits: int = 2) -> str:

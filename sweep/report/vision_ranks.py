@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import pandas as pd
@@ -10,7 +11,7 @@ from scipy.stats import rankdata
 
 from ..types import BoolArray, FloatArray
 from ..vision.scenes import SHUFFLED
-from ..vision.scores import Interval, interval
+from ..vision.scores import Interval, interval_around
 from .vision import OBSERVER, Benchmark
 
 PREDICTORS = {
@@ -47,6 +48,7 @@ class Ranks:
     conditions: list[Condition]
 
 
+@lru_cache(maxsize=4)
 def ranks_of(benchmark: Benchmark) -> Ranks:
     """What predicts the network's errors, lenses in any order; intervals by the bootstrap of scenes nested in seeds."""
     scenes, weights = benchmark.scenes(SHUFFLED), benchmark.weights(SHUFFLED)
@@ -66,10 +68,10 @@ def ranks_of(benchmark: Benchmark) -> Ranks:
             continue
         sign = -1.0 if name in _FALLS else 1.0
         flat = _spearman(sign * given.reshape(len(given), -1), judged.reshape(len(judged), -1))
-        everywhere[name] = interval(float(flat[0]), flat[1:])
+        everywhere[name] = interval_around(float(flat[0]), flat[1:])
         each = np.stack([_spearman(sign * given[:, :, at], judged[:, :, at]) for at in range(len(where))])
         mean = _mean_of_known(each)
-        between[name] = interval(float(mean[0]), mean[1:])
+        between[name] = interval_around(float(mean[0]), mean[1:])
     conditions = [
         Condition(
             design,

@@ -27,7 +27,7 @@ def vision_sentences(output: Output) -> Iterator[str]:
         others = ", ".join(f"{PREDICTORS[n]} {said_interval(v)}" for n, v in ranks.between.items() if n != "csd")
         yield (
             f"The color separation {how} which CFA the {who} reads best at the same distance and light: its rank "
-            f"correlation is {said_interval(csd)}, of 1; {others}."
+            f"correlation is {said_interval(csd)} (1: it does, below 0: the other way round); {others}."
         )
     yield from _against_reference(benchmark)
     if benchmark.judge == NETWORK:

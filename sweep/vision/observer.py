@@ -4,8 +4,8 @@ It knows the lamps that the images show, and is told distance, light level and b
 show. It sums over the state, the lamp, its intensity, the sun on the lenses, their order, and the place of the head.
 So no reader of these images is more often right on average.
 
-Between two nodes of the pixel's table images are drawn from a mixture, of which it takes the mean of the logarithms: less
-than 0.002 of a pixel's log-likelihood.
+Between two nodes of the pixel's table images are drawn from a mixture, of which it takes the mean of the logarithms:
+less than 0.002 of a pixel's log-likelihood.
 """
 
 from __future__ import annotations

@@ -52,6 +52,17 @@ def interval(value: float, samples: FloatArray) -> Interval:
     return Interval(value, float(low), float(high))
 
 
+def interval_around(value: float, samples: FloatArray) -> Interval:
+    """The value and 1.96 standard deviations of its bootstrap samples on either side.
+
+    For rank correlations: scatter in the samples makes these smaller than the value itself, so that their percentiles
+    may lie below it. For the same reason endless images would give a value that is rather farther from 0.
+    """
+    known = samples[np.isfinite(samples)]
+    reach = 1.96 * float(known.std()) if known.size else np.nan
+    return Interval(value, max(value - reach, -1.0), min(value + reach, 1.0))
+
+
 def mean_of(values: FloatArray | BoolArray, weights: FloatArray) -> Interval:
     """The mean of one value for each scene, ndarray[n]; `weights`: see `nested_weights`."""
     numbers = np.asarray(values, dtype=float)
