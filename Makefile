@@ -12,13 +12,15 @@ VENV := .venv
 BIN := $(VENV)/bin
 NAME ?= stopband
 ARGS ?=
+# A study of vision needs the extra of that name, and no other study does.
+EXTRA = $(if $(shell grep -s "^vision:" studies/$(NAME).yaml),-vision)
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 TESTS := $(ONE_THREAD) $(BIN)/python -m pytest -n logical --dist
 
 .PHONY: study report test slow accuracy check documents bench clean
 .DELETE_ON_ERROR:
 
-study: $(VENV)/.ready
+study: $(VENV)/.ready$(EXTRA)
 	$(BIN)/sweep run studies/$(NAME).yaml $(ARGS)
 
 report: $(VENV)/.ready
@@ -58,10 +60,14 @@ $(VENV)/.ready: pyproject.toml | $(VENV)/bin/python
 	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
 	@touch $@
 
+$(VENV)/.ready-vision: pyproject.toml | $(VENV)/bin/python
+	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[vision]'
+	@touch $@ $(VENV)/.ready
+
 $(VENV)/.ready-dev: pyproject.toml | $(VENV)/bin/python
 	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
-	@touch $@ $(VENV)/.ready
+	@touch $@ $(VENV)/.ready $(VENV)/.ready-vision
 
 $(VENV)/.ready-bench: pyproject.toml | $(VENV)/bin/python
 	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev,bench]'
-	@touch $@ $(VENV)/.ready $(VENV)/.ready-dev
+	@touch $@ $(VENV)/.ready $(VENV)/.ready-vision $(VENV)/.ready-dev

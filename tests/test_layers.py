@@ -16,7 +16,19 @@ LEVELS = [
     {"types", "cache", "disk", "found"},
     *(
         {room}
-        for room in ("curves", "designs", "camera", "metrics", "search", "study", "results", "run", "report", "door")
+        for room in (
+            "curves",
+            "designs",
+            "camera",
+            "vision",
+            "metrics",
+            "search",
+            "study",
+            "results",
+            "run",
+            "report",
+            "door",
+        )
     ),
     {"commands"},
     {"__main__"},
@@ -30,10 +42,13 @@ ONLY_USER = {
     "jinja2": ["report/"],
     "typer": ["commands/"],
     "sklearn": ["metrics/recognition"],
+    "jax": ["vision/network"],
+    "optax": ["vision/network"],
     "numba": [
         "designs/compiled",
         "camera/compiled",
         "camera/plan/compiled",
+        "vision/compiled",
         "metrics/compiled",
         "metrics/nearest",
         "designs/vectorized",

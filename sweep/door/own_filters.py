@@ -13,7 +13,7 @@ from ..camera.imager import imager_of
 from ..camera.view import View
 from ..errors import DataError, Fault, nearest
 from ..metrics.bound import FEASIBLE, total_violation
-from ..metrics.evaluate import evaluate, family_quantities
+from ..metrics.evaluate import evaluate, family_quantities, image_quantities
 from ..metrics.objective import COMBINED
 from ..metrics.quantity import WORST, Column, Columns
 from ..study import Study
@@ -102,6 +102,7 @@ def judged(study: Study, view: View, curves: FloatArray) -> Columns:
 
         found |= {WORST + name: values for name, values in population_imager(view).worst(curves).items()}
     found |= family_quantities(None, np.empty((len(curves), 0)))
+    found |= image_quantities(view, curves, study.section.vision, study.section.seed)
     lacking = np.full(len(curves), np.nan)
     columns = {name: found.get(name, lacking) for name in study.quantities if name != COMBINED}
     if COMBINED in study.quantities:

@@ -16,9 +16,19 @@ from ..curves.lights import Pair
 from ..designs.block import Block, CurveBlock
 from ..designs.family import Family
 from ..types import FloatArray
+from ..vision.section import Vision
 from .columns.color_separation import ColorSeparation
 from .columns.exposure import EXPOSURE
-from .quantity import BEST_PLACE, Asked, Columns, DesignMetric, FamilyMetric, NoiseMetric, ReadoutMetric
+from .quantity import (
+    BEST_PLACE,
+    Asked,
+    Columns,
+    DesignMetric,
+    FamilyMetric,
+    NoiseMetric,
+    ReadoutMetric,
+    VisionMetric,
+)
 from .registry import METRICS, quantities_of
 from .separation import csd_name, separations, separations_along
 
@@ -39,6 +49,17 @@ def designed_quantities(view: View, designs: FloatArray | Block) -> Columns:
 def family_quantities(family: Family | None, points: FloatArray) -> Columns:
     """What the parameters of designs say, each ndarray[n_designs]; `points`: ndarray[n_designs, n_parameters]."""
     return _joined([metric.of_parameters(family, points) for metric in METRICS if isinstance(metric, FamilyMetric)])
+
+
+def image_quantities(view: View, curves: FloatArray, vision: Vision | None, seed: int) -> Columns:
+    """What images of signal heads give, each ndarray[n_designs]; nothing where a study does not ask.
+
+    `curves`: ndarray[n_designs, n_modified, n_wavelengths]; `seed`: the study's.
+    """
+    if vision is None:
+        return {}
+    metrics = [metric for metric in METRICS if isinstance(metric, VisionMetric)]
+    return _joined([metric.of_images(view, curves, vision, seed) for metric in metrics])
 
 
 def _block(designs: FloatArray | Block) -> Block:

@@ -19,6 +19,7 @@ from ..curves.tasks import TaskName
 from ..designs.block import Block
 from ..designs.family import Family
 from ..types import FloatArray, IndexArray
+from ..vision.section import Vision
 from .smooth import Rows, SmoothDesign
 
 WORST = "worst_"
@@ -161,7 +162,7 @@ class Quantity(Column):
 @dataclass(frozen=True)
 class Asked:
     """What a study asks for: signal types, states that noise may confuse, any place of the light, shifts of edges, a
-    population of its lights, probabilities of detection and separation, and tasks.
+    population of its lights, probabilities of detection and separation, tasks, and a benchmark of vision.
     """
 
     classes: tuple[str, ...]
@@ -171,6 +172,7 @@ class Asked:
     population: bool = False
     tasks: tuple[TaskName, ...] = ()
     probabilities: bool = False
+    vision: bool = False
 
 
 class Metric(ABC):
@@ -218,6 +220,17 @@ class NoiseMetric(Metric):
 
         `read`: what the camera reads of `curves`, ndarray[n_designs, n_modified, n_wavelengths]; `members`: state ->
         indices of its signals.
+        """
+
+
+class VisionMetric(Metric):
+    """What images of signal heads give, where a study asks for a benchmark of vision."""
+
+    @abstractmethod
+    def of_images(self, view: View, curves: FloatArray, vision: Vision, seed: int) -> Columns:
+        """Each column, ndarray[n_designs]; `seed`: the study's.
+
+        `curves`: ndarray[n_designs, n_modified, n_wavelengths].
         """
 
 

@@ -39,6 +39,19 @@ class LargeNumber:
 
 
 def answer_sentences(output: Output) -> list[str]:
+    """What images say first; then over scenarios that differ in one number who leads where, else who is best."""
+    return [*_of_images(output), *_of_designs(output)]
+
+
+def _of_images(output: Output) -> Iterator[str]:
+    """What the benchmark of vision says, where a study asks for one."""
+    if output.study.vision is not None:
+        from .vision_tables import vision_sentences  # noqa: PLC0415  (only where a study asks for images)
+
+        yield from vision_sentences(output)
+
+
+def _of_designs(output: Output) -> list[str]:
     """Over scenarios that differ in one number who leads where; else who is best, and what limits it."""
     searched = output.kind(SWEPT, FOUND)
     if len(searched) and output.best.empty:

@@ -12,7 +12,7 @@ import pyarrow as pa
 from ..metrics.objective import COMBINED
 from ..results.inventory import Inventory
 from ..results.lock import locked
-from ..results.names import FIGURES, REPORT, is_drawn
+from ..results.names import FIGURES, REPORT, VISION_FIGURES, is_drawn
 from ..results.output import Output
 from ..results.profiles import profile_table
 from ..results.tables import FOUND, NAMED, PLAIN, csv_of, encoded
@@ -64,31 +64,24 @@ def make_report(output: Output, *, mend: bool = False) -> None:
 
 def _contents(output: Output, some: Iterable[str] | None) -> dict[str, bytes]:
     """The files of the report -> what they hold; `some` of them, or all, since the page has every picture in it."""
-    images, of_tasks, contents = [], [], dict[str, bytes]()
-    for name, caption, figure in _drawings(output):
+    images, contents = [], dict[str, bytes]()
+    for name, caption, figure in (*_drawings(output), *_vision_drawings(output)):
         where = name if name.startswith(("cfas", "pareto")) else f"{FIGURES}/{name}"
         for kind in ("png", "svg"):
             if some is None or {f"{where}.png", f"{where}.svg"} & {*some}:
                 contents[f"{where}.{kind}"] = rendered(figure, kind)
-        if some is None and name in _PICTURES:
-            images.append((caption, inlined(contents[f"{where}.png"])))
-        if some is None and name.startswith(_OF_TASKS):
-            of_tasks.append((caption, inlined(contents[f"{where}.png"])))
+        if some is None and name.startswith((*_PICTURES, *_OF_TASKS, VISION_FIGURES)):
+            images.append((name, caption, inlined(contents[f"{where}.png"])))
     published = comparison_with_published(output)
     if len(published):
         contents[PUBLISHED_CSV] = csv_of(published).encode("utf-8")
         contents[PUBLISHED_PARQUET] = encoded(pa.Table.from_pandas(published, preserve_index=False))
     if some is None:
-        contents[REPORT] = _html(output, images, of_tasks, published).encode("utf-8")
+        contents[REPORT] = _html(output, images, published).encode("utf-8")
     return contents
 
 
-def _html(
-    output: Output,
-    images: Sequence[tuple[str, str]],
-    of_tasks: Sequence[tuple[str, str]],
-    published: pd.DataFrame,
-) -> str:
+def _html(output: Output, images: Sequence[tuple[str, str, str]], published: pd.DataFrame) -> str:
     drawn, card = payload(output), scorecard(output)
     groups = scene_groups(output)
     return page(
@@ -112,13 +105,15 @@ def _html(
         scenes=rows(scene_table(groups)),
         group_rows=[rows(effect_table(group)) for group in groups],
         audited=output.audited is not None,
-        images=images,
+        images=[(caption, uri) for name, caption, uri in images if name in _PICTURES],
+        vision=_vision(output),
+        vision_images=[(caption, uri) for name, caption, uri in images if name.startswith(VISION_FIGURES)],
         comparison=rows(tables.comparison_table(output)),
         best=rows(tables.best_table(output)),
         recognition=rows(told_apart_table(output)),
         score_names=() if card is None else card.names,
         score_rows=[] if card is None else score_cells(card),
-        score_images=of_tasks,
+        score_images=[(caption, uri) for name, caption, uri in images if name.startswith(_OF_TASKS)],
         conditions=output.study.tasks,
         left_out=rows(tables.worst_left_out(output)),
         geometry=rows(tables.geometry_table(output)),
@@ -128,6 +123,25 @@ def _html(
         provenance=output.provenance.model_dump(mode="json"),
         limited=output.provenance.search is not None and output.provenance.search.limit_proven is not None,
     )
+
+
+def _vision(output: Output) -> dict[str, list[list[str]]]:
+    """Tables of the benchmark of vision; none where the study asks for none."""
+    if output.study.vision is None:
+        return {}
+    from .vision import benchmark_of  # noqa: PLC0415  (only where a study asks for images)
+    from .vision_tables import vision_parts  # noqa: PLC0415
+
+    return {title: rows(table) for title, table in vision_parts(benchmark_of(output)).items()}
+
+
+def _vision_drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
+    """The figures of the benchmark of vision; none where the study asks for none."""
+    if output.study.vision is not None:
+        from .vision import benchmark_of  # noqa: PLC0415  (only where a study asks for images)
+        from .vision_figures import vision_drawings  # noqa: PLC0415
+
+        yield from vision_drawings(output, benchmark_of(output))
 
 
 def _objective(output: Output) -> str:

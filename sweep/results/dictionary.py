@@ -25,6 +25,9 @@ from .tables import (
     SEARCH_LOG,
     TRADED,
     VALIDATED,
+    VISION,
+    VISION_CONDITIONS,
+    VISION_MISREAD,
     front_schema,
     search_schema,
 )
@@ -70,7 +73,8 @@ def columns_table() -> list[str]:
     types = ("<a>", "<b>")
     rows = [_row(names, "", meaning) for names, meaning in _KEYS.items()]
     tasks = tuple(TaskName("<task>", metric, ("<light>",)) for metric in get_args(Measure))
-    for quantity in listed(Asked(types, types, any_place=True, probabilities=True, tasks=tasks)):
+    asked = Asked(types, types, any_place=True, probabilities=True, tasks=tasks, vision=True)
+    for quantity in listed(asked):
         rows.append(_row((quantity.name,), quantity.unit, quantity.meaning))
     rows.append(_row(("worst_<quantity>",), "", _WORST))
     rows += [_row(names, "", meaning) for names, meaning in _VERDICTS.items()]
@@ -97,6 +101,12 @@ FILES = {
     TRADED: "where a study has the task `color`: mean color error against luminance SNR, a row per design, light and "
     "regularization of the color matrix",
     RENDERED: "there, too: colors (XYZ over white) and noise of the areas of two rendered pictures",
+    VISION: "a row per image of the benchmark of vision: design_id, name, cfa, seed, order (of the lenses), lamps "
+    "(seen in training or unseen), image, state, lamp, intensity_cd, background, phantom, distance_m, level, and what "
+    "each reader says with its probability: observer, network, half (a network that learned from half of the images)",
+    VISION_CONDITIONS: "of each design at each distance and level of light: csd (DN), dprime and pair_error, the "
+    "smallest or the largest over the pairs of lenses",
+    VISION_MISREAD: "images that were read wrongly, in false colors: bytes of rows x columns x 3 in `pixels`",
     AUDIT: "rows of `sweep audit`: promised and realized errors",
     RESOLVED: "the study with every default written out; a study file itself",
     PROVENANCE: "versions, seed, command, machine, plans of the scenes, what the columns mean",

@@ -20,10 +20,11 @@ from .tables import (
     SEARCH_LOG,
     TRADED,
     VALIDATED,
+    VISION_TABLES,
 )
 
 RUN, SUMS = "run.json", "SHA256SUMS"
-REPORT, FIGURES = "report.html", "figures"
+REPORT, FIGURES, VISION_FIGURES = "report.html", "figures", "vision-"
 TABLES = (
     RESULTS,
     SEARCH_LOG,
@@ -37,12 +38,14 @@ TABLES = (
     RECOGNITION,
     TRADED,
     RENDERED,
+    *VISION_TABLES,
 )
 MADE_BY_RUN = frozenset((*TABLES, RESOLVED, PROVENANCE))
 """What a run itself writes beside its list; the report draws from it, `sweep audit` adds a table."""
 _DRAWN = re.compile(
     r"report\.html|cfas\.(png|svg)|pareto(-\d+)?\.(png|svg)|paper_comparison\.(csv|parquet)"
-    r"|figures/((filters|series)-\d+|tiles|sensor|signals|chart|scorecard|(color-noise|rendered)-\d+|clouds-(cfas|designs))\.(png|svg)"
+    r"|figures/((filters|series)-\d+|tiles|sensor|signals|chart|scorecard|(color-noise|rendered)-\d+"
+    r"|clouds-(cfas|designs)|vision-(errors|ranks|misread))\.(png|svg)"
 )
 
 

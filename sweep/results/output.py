@@ -48,12 +48,13 @@ from .tables import (
     SWEPT,
     TRADED,
     VALIDATED,
+    VISION_TABLES,
     front_schema,
     read_table,
 )
 from .thinning import Counts, thinned
 
-_OPTIONAL = (FRONT, RECOGNITION, SEARCH_LOG, AUDIT, VALIDATED, ROBUSTNESS, LEFT_OUT, TRADED, RENDERED)
+_OPTIONAL = (FRONT, RECOGNITION, SEARCH_LOG, AUDIT, VALIDATED, ROBUSTNESS, LEFT_OUT, TRADED, RENDERED, *VISION_TABLES)
 """Files that some runs alone have."""
 _MOST_SHOWN = 10
 _ALWAYS_WRITTEN = ("study", "seed", "wavelengths", "scenarios", "objective")
@@ -67,7 +68,8 @@ class Output:
 
     `study`: the study that was run, and `resolved` its file. `profiles`: over the whole table, per CFA; none where a
     sweep is no grid. `searched`: the search's evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per
-    light that was left out of a search. `traded`: color error against noise, `rendered`: areas of pictures.
+    light that was left out of a search. `traded`: color error against noise, `rendered`: areas of pictures; `vision`:
+    tables of the benchmark of vision by their files' names.
     """
 
     folder: Path
@@ -85,6 +87,7 @@ class Output:
     left_out: pd.DataFrame | None
     traded: pd.DataFrame | None
     rendered: pd.DataFrame | None
+    vision: Mapping[str, pd.DataFrame]
     profiles: Mapping[str, Sequence[ParameterProfile]]
 
     @property
@@ -191,12 +194,12 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         raise _lacking(folder / RESOLVED, lacks)
     study = _checked(folder / RESOLVED, StudySection, resolved)
     provenance = _checked(folder / PROVENANCE, Provenance, _mapping(folder / PROVENANCE, json.loads))
-    objective = study.objective.column
     _check_columns(folder / RESULTS, [*ROW_COLUMNS, *provenance.parameters, *(c.name for c in provenance.quantities)])
     _check_columns(folder / LIMITED_BY, ["design_id"])
     _check_columns(folder / POINTS, ["design_id", "signal_type", "signal", "channel", "dn"])
     if FRONT in optional:
         _check_columns(folder / FRONT, front_schema(()).names)
+    objective = study.objective.column
     profiles = Profiles(objective, next(iter(study.scenarios)), provenance.parameters)
     table, counts = thinned(folder / RESULTS, [objective, *provenance.trade_off], provenance.trade_off[0], profiles.add)
     points, limited = (read_table(folder / name).to_pandas() for name in (POINTS, LIMITED_BY))
@@ -217,6 +220,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         left_out=more.get(LEFT_OUT),
         traded=more.get(TRADED),
         rendered=more.get(RENDERED),
+        vision={name: table for name, table in more.items() if name in VISION_TABLES},
         profiles=profiles.found if all(made.grid is not None for made in study.sweeps.values()) else {},
     )
 

@@ -23,14 +23,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SCHEMA_VERSION = "2"
-_DESIGN = [("design_id", pa.int64()), ("name", pa.string()), ("scenario", pa.string())]
-TRADED_SCHEMA = pa.schema(
-    [*_DESIGN, ("light", pa.string()), *((name, pa.float64()) for name in ("regularization", "delta_e_mean", "snr"))]
-)
-_NUMBERS = pa.list_(pa.float64())
-RENDERED_SCHEMA = pa.schema(
-    [*_DESIGN, ("picture", pa.string()), ("area", pa.string()), ("xyz", _NUMBERS), ("covariance", _NUMBERS)]
-)
 RESULTS = "results.parquet"
 SEARCH_LOG = "search.parquet"
 FRONT = "front.parquet"
@@ -43,6 +35,10 @@ TRADED, RENDERED = "color_noise.parquet", "rendered.parquet"
 CHART, NIGHT = "chart", "night"
 """Pictures of which `rendered.parquet` has the areas."""
 VALIDATED, LEFT_OUT = "validated.parquet", "leave_one_out.parquet"
+VISION, VISION_CONDITIONS = "vision.parquet", "vision_conditions.parquet"
+VISION_MISREAD = "vision_misread.parquet"
+VISION_TABLES = (VISION, VISION_CONDITIONS, VISION_MISREAD)
+"""Of the benchmark of vision: a row per image, per distance and level, per picture that was read wrongly."""
 AUDIT = "audit.parquet"
 PROVENANCE = "provenance.json"
 RESOLVED = "study.resolved.yaml"

@@ -12,11 +12,19 @@ import pyarrow as pa
 
 from ..curves.tasks import Chart, StudyTasks
 from ..results.designs import row_curves
-from ..results.tables import CHART, FEW, NIGHT, RENDERED_SCHEMA, TRADED_SCHEMA
+from ..results.tables import CHART, FEW, NIGHT
 from ..study import Study
 from ..types import FloatArray
 
 _TOLD = ("design_id", "name", "scenario")
+_DESIGN = [("design_id", pa.int64()), ("name", pa.string()), ("scenario", pa.string())]
+_TRADED = pa.schema(
+    [*_DESIGN, ("light", pa.string()), *((name, pa.float64()) for name in ("regularization", "delta_e_mean", "snr"))]
+)
+_NUMBERS = pa.list_(pa.float64())
+_RENDERED = pa.schema(
+    [*_DESIGN, ("picture", pa.string()), ("area", pa.string()), ("xyz", _NUMBERS), ("covariance", _NUMBERS)]
+)
 
 
 def _shown(study: Study, highlights: pd.DataFrame) -> Iterator[tuple[dict[str, Any], Any]]:
@@ -48,7 +56,7 @@ def traded_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
             for regularization, delta_e, snr in zip(REGULARIZATIONS, *found, strict=True):
                 own = {"light": case, "regularization": float(regularization), "delta_e_mean": delta_e, "snr": snr}
                 rows.append(told | own)
-    return pa.Table.from_pylist(rows, schema=TRADED_SCHEMA)
+    return pa.Table.from_pylist(rows, schema=_TRADED)
 
 
 def rendered_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
@@ -76,7 +84,7 @@ def rendered_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
         patches = chart.photons[day] * tasks.conditions.illuminance_lx
         rows += _areas(told, CHART, names, *rendered_areas(looks, chart, day, patches, tasks.conditions))
         rows += _areas(told, NIGHT, streets, *rendered_areas(looks, chart, night, street, dark))
-    return pa.Table.from_pylist(rows, schema=RENDERED_SCHEMA)
+    return pa.Table.from_pylist(rows, schema=_RENDERED)
 
 
 def _areas(

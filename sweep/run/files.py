@@ -34,6 +34,7 @@ from ..results.tables import (
     SEARCH_LOG,
     TRADED,
     VALIDATED,
+    VISION_TABLES,
     holds,
     json_of,
     sliced,
@@ -66,6 +67,7 @@ def files_of(study: Study) -> set[str]:
     names |= {LEFT_OUT} if study.leaves_one_out else set()
     names |= {ROBUSTNESS} if study.pair_over_population is not None else set()
     names |= {TRADED, RENDERED} if study.tasks is not None and "color" in study.tasks.by_name else set()
+    names |= {*VISION_TABLES} if study.section.vision is not None else set()
     asked = study.section.recognition
     return names | ({RECOGNITION} if asked is not None and asked.patches else set())
 
@@ -103,6 +105,8 @@ class Making:
                 self._write_search(todo)
             if todo & {CURVES, POINTS, LIMITED_BY, VALIDATED, ROBUSTNESS, RECOGNITION, TRADED, RENDERED}:
                 self._write_drawn(todo)
+            if todo & {*VISION_TABLES}:
+                self._write_vision(todo)
             if RESOLVED in todo:
                 self.inventory.write({RESOLVED: resolved_yaml(self.study).encode("utf-8")})
             if PROVENANCE in todo:
@@ -204,6 +208,14 @@ class Making:
             self.inventory.write_table(TRADED, traded_table(self.study, rows))
         if RENDERED in names:
             self.inventory.write_table(RENDERED, rendered_table(self.study, rows))
+
+    def _write_vision(self, names: set[str]) -> None:
+        from .vision import vision_tables  # noqa: PLC0415  (only where a study asks for images)
+
+        parallel = Kept(self.crew, self.journal, f"{self.sweep.fingerprint} vision")
+        tables = vision_tables(self.study, self.gathered.frame(), parallel, self.progress)
+        for name in names & tables.keys():
+            self.inventory.write_table(name, tables[name])
 
     def _limit(self) -> Limit | None:
         """The search's limit, found alone where the search itself need not be repeated."""

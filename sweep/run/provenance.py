@@ -17,6 +17,12 @@ from ..study.yaml_tree import yaml_text
 _PACKAGES = ("cfa-sweep", "numpy", "scipy", "numba", "scikit-learn", "pandas", "pyarrow", "joblib", "nlopt", "moocore")
 
 
+def _packages(study: Study) -> tuple[str, ...]:
+    """The packages that a run's numbers may depend on."""
+    vision = study.section.vision
+    return (*_PACKAGES, "jax", "optax") if vision is not None and vision.network else _PACKAGES
+
+
 def resolved_yaml(study: Study) -> str:
     """The study with every default written out; a study file itself."""
     section = study.section.model_dump(mode="json", by_alias=True, exclude_none=True)
@@ -57,7 +63,7 @@ def provenance(study: Study, how: Mapping[str, Any]) -> dict[str, Any]:
         "data_sha256": dict(study.digests),
         "sensor": {"name": study.sensor.name, "source": study.sensor.source, "surrogate": study.sensor.surrogate},
         "lights": {"name": study.lights.name, "source": study.lights.source, "surrogate": study.lights.surrogate},
-        "versions": {"python": platform.python_version()} | {name: version(name) for name in _PACKAGES},
+        "versions": {"python": platform.python_version()} | {name: version(name) for name in _packages(study)},
         "platform": platform.platform(),
         "byte_order": sys.byteorder,
         "cores": os.cpu_count(),

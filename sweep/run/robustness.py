@@ -110,7 +110,7 @@ def _robustness(design: Candidate, rival: Candidate | None, pair: Pair, seed: in
     assert population is not None
     if population.wanted_dn is not None:
         kept = int((drawn_dn(design, pair, seed) >= population.wanted_dn).sum())
-        low, high = interval(kept, population.draws)
+        low, high = yield_interval(kept, population.draws)
         found |= {"yield": kept / population.draws, "yield_low": low, "yield_high": high}
     return found
 
@@ -204,7 +204,7 @@ def _at(response: FloatArray, case: Any, rows: Any, steps: FloatArray) -> FloatA
     return np.asarray(low + share * (high - low), dtype=float)
 
 
-def interval(kept: int, n: int) -> tuple[float, float]:
+def yield_interval(kept: int, n: int) -> tuple[float, float]:
     """The 95 % interval of a share, of which `kept` of `n` were counted (Wilson, J. Am. Stat. Assoc. 22, 209, 1927)."""
     share, z = kept / n, _Z**2 / n
     middle, half = share + z / 2, _Z * math.sqrt(share * (1 - share) / n + z / (4 * n))

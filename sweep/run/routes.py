@@ -15,11 +15,12 @@ from ..camera.imager import Imager, imager_of
 from ..camera.view import View
 from ..designs.block import Block, CurveBlock, EdgeBlock, edges_of
 from ..designs.space import Space
-from ..metrics.evaluate import evaluate, family_quantities
+from ..metrics.evaluate import evaluate, family_quantities, image_quantities
 from ..metrics.objective import COMBINED, Objective, columns_of
 from ..metrics.quantity import WORST_CASE, Asked, Columns, Quantity
 from ..search.problem import SHIFTS
 from ..types import FloatArray
+from ..vision.section import Vision
 
 BY_CURVES = "computed from their curves, since the fast way by their edges failed"
 ALONE = "computed one by one, since their block failed"
@@ -30,11 +31,13 @@ Detours = Counter[tuple[str, str]]
 
 @dataclass(frozen=True)
 class Request:
-    """What is wanted of each design: quantities, the objective, and shifts of its edges."""
+    """What is wanted of each design: quantities, the objective, shifts of its edges, images and their seed."""
 
     asked: Asked
     objective: Objective
     edge_shift_nm: float
+    vision: Vision | None = None
+    seed: int = 0
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
@@ -87,6 +90,8 @@ def _columns(space: Space, view: View, points: FloatArray, request: Request, blo
     designs = CurveBlock(space.curves(points, size)) if block is None else block
     columns = evaluate(imager, designs, request.asked.states, probabilities=request.asked.probabilities)
     columns |= family_quantities(None if space.filter is None else space.filter.family, points)
+    if request.vision is not None:
+        columns |= image_quantities(view, space.curves(points, size), request.vision, request.seed)
     worst = [quantity for quantity in request.quantities.values() if quantity.extreme == WORST_CASE]
     if worst:
         columns |= worst_cases(space, imager, points, columns, worst, request.edge_shift_nm)

@@ -20,6 +20,7 @@ from ..results.tables import PROVENANCE, RESOLVED, RESULTS
 from ..study import Study
 from ..study.reach import out_of_reach
 from ..types import Progress
+from ..vision.installed import require_network
 from .files import Making, files_of, fits
 from .plans import with_plans
 from .provenance import resolved_yaml
@@ -71,6 +72,8 @@ def run_study(
     started = time.monotonic()
     if study.search is not None and (beyond := out_of_reach(study, study.search.space, study.search.scenario)):
         raise InfeasibleError([Fault(f"{study.name}: no design can be feasible"), *beyond])
+    if study.section.vision is not None and study.section.vision.network:
+        require_network()
     with stop_on_signals(stop) as own, workers(Workers(n_jobs, own, backend, scheduler)) as crew, locked(output):
         inventory = Inventory(output)
         mended, wrong, how = inventory.wrong_lists(), _wrong(inventory, study), _how(inventory)

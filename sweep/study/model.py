@@ -104,6 +104,7 @@ class Study:
             probabilities=recognition is not None and recognition.probabilities,
             population=self.section.population is not None,
             tasks=() if self.tasks is None else self.tasks.keys,
+            vision=self.section.vision is not None,
         )
 
     @property

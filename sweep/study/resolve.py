@@ -24,6 +24,7 @@ from .luminances import check_luminances
 from .model import Search, Study
 from .populations import check_range, with_population
 from .schema import CfaSection, StudySection
+from .seen_images import check_vision
 from .sensors import sensor_of
 from .sources import KeptSources, Sources
 from .spaces import SpaceBuilder
@@ -73,6 +74,7 @@ class _Resolver:
 
             check_seen(self.tasks, section, sensor, spaces, self.sources)
         self.check_recognition(lights)
+        check_vision(section, lights, mosaics, self.sources)
         check_goals(section, self.sources, self.asked(lights))
         self.check_published(lights, mosaics)
         search = self.search(spaces, lights)
@@ -135,6 +137,7 @@ class _Resolver:
             probabilities=recognition is not None and recognition.probabilities,
             population=self.section.population is not None,
             tasks=() if self.tasks is None else self.tasks.keys,
+            vision=self.section.vision is not None,
         )
 
     def check_columns(self, lights: Lights) -> None:

@@ -18,6 +18,7 @@ from ..designs.technology import Stated
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective
 from ..types import Number, Section
+from ..vision.section import Vision
 from .axes import ScenarioTemplate, Span, Values, expanded
 from .schema_curves import Documented, LightsSection, Name, SensorSection, builtin, named
 from .schema_tasks import TasksAsked
@@ -267,6 +268,8 @@ class StudySection(Documented):
     """How often noise confuses signal types; needs noise in every scenario."""
     tasks: TasksAsked = None
     """What else designs are judged by: `all`, a list of tasks of the package, or a mapping with own ones."""
+    vision: Vision | None = None
+    """Images of signal heads, read by the ideal observer and by a network; lamps need luminous intensity."""
     objective: Objective = Objective(minimum={"csd_yellow_red": 1.0})
     """What is maximized: a CSD or sensitivity, or several: {minimum: {...}} or {sum: {...}} with weights; or, of errors
     under noise, made small: {least: {...}}."""

@@ -1,0 +1,32 @@
+"""How often the ideal observer reads images of signal heads wrongly: no reader of these images errs less on average."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...camera.view import View
+from ...types import FloatArray
+from ...vision.section import Vision
+from ..quantity import Asked, Columns, Quantity, VisionMetric
+
+VISION_ERROR = "vision_error"
+
+
+class ImageReading(VisionMetric):
+    """The ideal observer over the images of the benchmark's first seed, with the lenses in any order."""
+
+    order = 8
+
+    def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
+        """One column, where a benchmark of vision is asked for."""
+        meaning = (
+            "expected share of images of signal heads that the ideal observer reads wrongly, where a study has "
+            "`vision`: over all its distances and levels, the lenses in any order, unseen lamps of the first seed"
+        )
+        return (Quantity(VISION_ERROR, VISION_ERROR, meaning, wanted="less", ends=("max",)),) if asked.vision else ()
+
+    def of_images(self, view: View, curves: FloatArray, vision: Vision, seed: int) -> Columns:
+        """The mean of what each image leaves in doubt: one less the probability of its most probable state."""
+        from ...vision.readers import observer_error  # noqa: PLC0415  (only where a study asks for images)
+
+        return {VISION_ERROR: np.array([observer_error(view, each, vision, (seed, 0)) for each in curves])}

@@ -1,0 +1,146 @@
+"""The benchmark of vision in sentences and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import pandas as pd
+
+from ..results.output import Output
+from ..vision.scenes import FIXED, SEEN, SHUFFLED
+from ..vision.scores import costs, macro_f1
+from .vision import NETWORK, OBSERVER, READER_NAMES, Benchmark, benchmark_of, said_interval, said_percent
+from .vision_ranks import PREDICTORS, Ranks, ranks_of
+
+_WELL = 0.5
+"""A rank correlation from which on something is said to predict well."""
+
+
+def vision_sentences(output: Output) -> Iterator[str]:
+    """What predicts the errors, who errs less than the reference, and how far the network is from the best reader."""
+    benchmark = benchmark_of(output)
+    ranks = ranks_of(benchmark)
+    csd = ranks.between.get("csd")
+    who = READER_NAMES[benchmark.judge]
+    if csd is not None:
+        how = "does not predict" if not csd.low > 0 else "predicts" if csd.value >= _WELL else "predicts badly"
+        others = ", ".join(f"{PREDICTORS[n]} {said_interval(v)}" for n, v in ranks.between.items() if n != "csd")
+        yield (
+            f"The color separation {how} which CFA the {who} reads best at the same distance and light: its rank "
+            f"correlation is {said_interval(csd)} (1: it does, below 0: the other way round); {others}."
+        )
+    yield from _against_reference(benchmark)
+    if benchmark.judge == NETWORK:
+        pairs = [
+            (d, benchmark.error(d, NETWORK, SHUFFLED), benchmark.error(d, OBSERVER, SHUFFLED))
+            for d in benchmark.designs
+        ]
+        best = min(pairs, key=lambda each: each[1].value)
+        yield (
+            f"The network reads {said_percent(best[1])} % of the images of {best[0]} wrongly, the ideal observer "
+            f"{said_percent(best[2])} % (lamps not seen in training, lenses in any order)."
+        )
+
+
+def _against_reference(benchmark: Benchmark) -> Iterator[str]:
+    less: list[str] = []
+    more: list[str] = []
+    same: list[str] = []
+    for design in benchmark.designs:
+        if design == benchmark.reference:
+            continue
+        found = benchmark.difference(design, SHUFFLED)
+        group = same if not found.excludes_zero else less if found.value < 0 else more
+        group.append(f"{design} {100 * found.value:+.1f}" if group is not same else design)
+    who = READER_NAMES[benchmark.judge]
+    parts = [f"less often with {', '.join(less)}"] * bool(less) + [f"more often with {', '.join(more)}"] * bool(more)
+    parts += [f"not told apart from it: {', '.join(same)}"] * bool(same)
+    yield f"Beside {benchmark.reference}, the {who} errs (percent of the images) {'; '.join(parts)}."
+
+
+def vision_table(benchmark: Benchmark) -> pd.DataFrame:
+    """A row per design: errors by reader, order of lenses and lamps, differences, F1, and what "unknown" saves."""
+    rows = []
+    for design in benchmark.designs:
+        row: dict[str, str] = {"design": design}
+        for reader in benchmark.readers:
+            for order in (FIXED, SHUFFLED):
+                title = f"{READER_NAMES[reader]}, lenses {'in order' if order == FIXED else 'shuffled'}"
+                row[f"error %: {title}"] = said_percent(benchmark.error(design, reader, order))
+        if benchmark.judge == NETWORK:
+            seen = benchmark.error(design, NETWORK, SHUFFLED, SEEN)
+            row["error %: network, shuffled, lamps seen in training"] = said_percent(seen)
+        if design == benchmark.reference:
+            row[f"less that of {benchmark.reference} %"] = "-"
+        else:
+            found = benchmark.difference(design, SHUFFLED)
+            told = "" if found.excludes_zero else ", not told apart"
+            row[f"less that of {benchmark.reference} %"] = said_percent(found) + told
+        row["F1"] = f"{macro_f1(benchmark.confusion(design, benchmark.judge, SHUFFLED).to_numpy()):.3f}"
+        for reader in benchmark.readers[:2]:
+            row[f"cost with unknown (share): {READER_NAMES[reader]}"] = _unknown(benchmark, design, reader)
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _unknown(benchmark: Benchmark, design: str, reader: str) -> str:
+    """Mean cost of an answer where "unknown" is allowed, and how often it is given."""
+    rows, cost = benchmark.said(design, reader, SHUFFLED), benchmark.vision.unknown_cost
+    wrong = (rows["said"] != rows["state"]).to_numpy(dtype=bool)
+    each, unknown = costs(wrong, rows["p"].to_numpy(dtype=float), cost)
+    return f"{each.mean():.3f} ({100 * unknown.mean():.0f} %)"
+
+
+def vision_conditions_table(benchmark: Benchmark, ranks: Ranks) -> pd.DataFrame:
+    """A row per level and distance: percent read wrongly with each design, and in brackets by the ideal observer."""
+    rows = []
+    for level in benchmark.vision.levels:
+        for distance_m in benchmark.vision.distances_m:
+            lux = benchmark.vision.levels[level].illuminance_lx
+            row = {"light": f"{level} ({lux:g} lx)", "distance / m": f"{distance_m:g}"}
+            for each in ranks.conditions:
+                if (each.level, each.distance_m) == (level, distance_m):
+                    ideal = each.predictors.get(OBSERVER)
+                    row[each.design] = f"{100 * each.error:.1f}" + ("" if ideal is None else f" ({100 * ideal:.1f})")
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def confusion_table(benchmark: Benchmark) -> pd.DataFrame:
+    """How often the judge takes each state for each, a row per design and state, lenses in any order."""
+    parts = []
+    for design in benchmark.designs:
+        found = benchmark.confusion(design, benchmark.judge, SHUFFLED)
+        shown = found.rename(columns=lambda name: f"said {name}").reset_index(names="state")
+        parts.append(shown.assign(design=design))
+    table = pd.concat(parts, ignore_index=True)
+    columns: Sequence[str] = ["design", *(c for c in table.columns if c != "design")]
+    return table[list(columns)]
+
+
+def ranks_table(ranks: Ranks) -> pd.DataFrame:
+    """A row per predictor: its rank correlations with their intervals."""
+    rows = [
+        {
+            "predictor": PREDICTORS[name],
+            "over designs, distances and levels": said_interval(ranks.everywhere[name]),
+            "between designs at one distance and level": said_interval(ranks.between[name]),
+        }
+        for name in ranks.everywhere
+    ]
+    return pd.DataFrame(rows)
+
+
+def vision_parts(benchmark: Benchmark) -> dict[str, pd.DataFrame]:
+    """Every table of the report, by its title."""
+    ranks = ranks_of(benchmark)
+    who = READER_NAMES[benchmark.judge]
+    beside = ", in brackets by the ideal observer" if benchmark.judge == NETWORK else ""
+    return {
+        "Errors of each design, percent of the images, with 95 % intervals": vision_table(benchmark),
+        f"Percent of the images that the {who} reads wrongly{beside}; lenses shuffled": vision_conditions_table(
+            benchmark, ranks
+        ),
+        f"Rank correlation with how rarely the {who} errs, with 95 % intervals": ranks_table(ranks),
+        f"What the {who} says of each state; lenses shuffled": confusion_table(benchmark),
+    }

@@ -1,0 +1,157 @@
+"""The benchmark of vision: every plain CFA, named design and answer of the search before the same images."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+
+from ..camera.imager import Imager
+from ..camera.view import View
+from ..curves.lights import class_pairs, pair_name
+from ..metrics.columns.confusion import D_PRIME, STATE_ERROR
+from ..metrics.evaluate import evaluate
+from ..metrics.separation import csd_name
+from ..results.designs import row_curves
+from ..results.tables import FEW, FOUND, VISION, VISION_CONDITIONS, VISION_MISREAD
+from ..study import Study
+from ..types import FloatArray, Parallel, Progress, delayed
+from ..vision.images import view_at
+from ..vision.readers import Answers, SeedReading, read_images
+from ..vision.scenes import ORDERS, SEEN, UNSEEN, states_of
+from ..vision.section import Vision
+
+_TEXT, _NUMBER, _COUNT = pa.string(), pa.float64(), pa.int64()
+_DESIGN = [("design_id", _COUNT), ("name", _TEXT), ("cfa", _TEXT)]
+_READERS = ("observer", "network", "half")
+_IMAGES = pa.schema(
+    [
+        *_DESIGN,
+        *(("seed", _COUNT), ("order", _TEXT), ("lamps", _TEXT), ("image", _COUNT), ("state", _TEXT), ("lamp", _TEXT)),
+        *(("intensity_cd", _NUMBER), ("background", _TEXT), ("phantom", pa.bool_())),
+        *(("distance_m", _NUMBER), ("level", _TEXT)),
+        *(field for reader in _READERS for field in ((reader, _TEXT), (f"{reader}_p", _NUMBER))),
+    ]
+)
+_CONDITIONS = pa.schema(
+    [*_DESIGN, ("distance_m", _NUMBER), ("level", _TEXT)]
+    + [(name, _NUMBER) for name in ("csd", "dprime", "pair_error")]
+)
+_MISREAD = pa.schema(
+    [*_DESIGN, ("seed", _COUNT), ("image", _COUNT), ("rows", _COUNT), ("columns", _COUNT), ("pixels", pa.binary())]
+)
+
+
+@dataclass(frozen=True)
+class Predictors:
+    """What is known of a design without images, at each distance and level: ndarray[n_distances, n_levels].
+
+    The smallest CSD (DN) and d', and the largest pairwise error, over the pairs of lenses; for the study's middle
+    intensity, no background, and the mean over the disc.
+    """
+
+    csd: FloatArray
+    dprime: FloatArray
+    pair_error: FloatArray
+
+
+def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> dict[str, pa.Table]:
+    """The tables of `VISION_TABLES`; of designs in several scenarios the first one's rows count.
+
+    Random numbers follow from the study's seed: all designs see the same scenes and the same photons.
+    """
+    vision = study.section.vision
+    assert vision is not None
+    shown = rows[rows["kind"].isin(FEW) & (rows["status"] == "ok")]
+    shown = shown[(shown["scenario"] == next(iter(study.scenarios))) | (shown["kind"] == FOUND)]
+    designs = shown.to_dict("records")
+    views = []
+    for row in designs:
+        space, curves = row_curves(study, row)
+        views.append((study.view(space, row["scenario"]), np.asarray(curves[0], dtype=float)))
+    each = [(at, seed) for seed in range(vision.seeds) for at in range(len(designs))]
+    calls = [delayed(read_images, *views[at], vision, (study.section.seed, seed)) for at, seed in each]
+    images: list[dict[str, Any]] = []
+    pictures: list[dict[str, Any]] = []
+    for done, ((at, seed), reading) in enumerate(zip(each, parallel(calls), strict=True), 1):
+        design = {name: designs[at][name] for name, _ in _DESIGN}
+        images += _image_rows(study, vision, design | {"seed": seed}, reading)
+        pictures += _picture_rows(design | {"seed": seed}, reading)
+        progress("images read (designs x seeds)", done, len(each))
+    conditions: list[dict[str, Any]] = []
+    known = parallel([delayed(predictors, *view, vision) for view in views])
+    for row, found in zip(designs, known, strict=True):
+        conditions += _condition_rows(vision, {name: row[name] for name, _ in _DESIGN}, found)
+    return {
+        VISION: pa.Table.from_pylist(images, schema=_IMAGES),
+        VISION_CONDITIONS: pa.Table.from_pylist(conditions, schema=_CONDITIONS),
+        VISION_MISREAD: pa.Table.from_pylist(pictures, schema=_MISREAD),
+    }
+
+
+def _image_rows(study: Study, vision: Vision, key: dict[str, Any], reading: SeedReading) -> Iterator[dict[str, Any]]:
+    """A row for each image of a design and seed."""
+    for lamps, by_order in ((UNSEEN, reading.unseen), (SEEN, reading.seen)):
+        for order in ORDERS:
+            yield from _rows_of(study, vision, key | {"order": order, "lamps": lamps}, by_order[order])
+
+
+def _rows_of(study: Study, vision: Vision, key: dict[str, Any], answers: Answers) -> Iterator[dict[str, Any]]:
+    scenes, states, levels = answers.scenes, states_of(vision), list(vision.levels)
+    told = {name: getattr(answers, name) for name in _READERS}
+    for at in range(len(scenes)):
+        row = key | {
+            "image": at,
+            "state": states[scenes.state[at]],
+            "lamp": study.lights.names[scenes.lamp[at]] if scenes.lamp[at] >= 0 else None,
+            "intensity_cd": vision.intensities_cd[scenes.intensity[at]] if scenes.lamp[at] >= 0 else None,
+            "background": vision.backgrounds[scenes.background[at]],
+            "phantom": bool(scenes.phantom[at]),
+            "distance_m": vision.distances_m[scenes.distance[at]],
+            "level": levels[scenes.level[at]],
+        }
+        for name, probabilities in told.items():
+            if probabilities.size:
+                best = int(probabilities[at].argmax())
+                row |= {name: states[best], f"{name}_p": float(probabilities[at, best])}
+        yield row
+
+
+def _picture_rows(key: dict[str, Any], reading: SeedReading) -> Iterator[dict[str, Any]]:
+    for at, picture in zip(reading.pictured, reading.pictures, strict=True):
+        pixels = np.rint(255 * picture).astype(np.uint8)
+        yield key | {"image": at, "rows": len(pixels), "columns": pixels.shape[1], "pixels": pixels.tobytes()}
+
+
+def _condition_rows(vision: Vision, key: dict[str, Any], found: Predictors) -> Iterator[dict[str, Any]]:
+    for i, distance_m in enumerate(vision.distances_m):
+        for j, level in enumerate(vision.levels):
+            values = {"csd": found.csd[i, j], "dprime": found.dprime[i, j], "pair_error": found.pair_error[i, j]}
+            yield key | {"distance_m": distance_m, "level": level} | {name: float(v) for name, v in values.items()}
+
+
+def predictors(view: View, curves: FloatArray, vision: Vision) -> Predictors:
+    """See `Predictors`; `curves`: of the modified channels, ndarray[n_modified, n_wavelengths]."""
+    middle_cd = sorted(vision.intensities_cd)[len(vision.intensities_cd) // 2]
+    shape = (len(vision.distances_m), len(vision.levels))
+    found = Predictors(np.empty(shape), np.empty(shape), np.empty(shape))
+    pairs = class_pairs(tuple(kind for kind in view.lights.classes if kind in vision.lenses))
+    for i, distance_m in enumerate(vision.distances_m):
+        for j, level in enumerate(vision.levels.values()):
+            there = view_at(view, vision, distance_m, level)
+            there = replace(there, scenario=there.scenario.model_copy(update={"intensity_cd": middle_cd}))
+            columns = evaluate(Imager(there, once=True), curves[None], vision.lenses)
+            found.csd[i, j] = min(columns[csd_name(pair)][0] for pair in pairs)
+            found.dprime[i, j] = min(_of_pair(columns, pair) for pair in pairs)
+            found.pair_error[i, j] = columns[STATE_ERROR][0]
+    return found
+
+
+def _of_pair(columns: dict[str, FloatArray], pair: tuple[str, str]) -> float:
+    """d' of a pair, in whichever order its column names it."""
+    name = pair_name(D_PRIME, pair)
+    return float(columns[name if name in columns else pair_name(D_PRIME, (pair[1], pair[0]))][0])

@@ -1,0 +1,98 @@
+"""Compiled inner loops of images: digital numbers that are drawn, and how likely they are."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+_MARGIN = 50.0
+"""What is less likely than the most likely by more than this factor's logarithm counts as impossible."""
+_LOOK = 16
+
+
+@njit(cache=True, nogil=True)
+def draw_numbers(
+    node: NDArray[np.int32],
+    share: NDArray[np.float32],
+    below: NDArray[np.float32],
+    uniform: NDArray[np.float64],
+    out: NDArray[np.int16],
+) -> None:
+    """The digital number up to which a share `uniform` of all lies, ndarray[n].
+
+    `node`, `share`: see `PixelTable.at`; `below`: see there.
+    """
+    last = below.shape[1] - 1
+    for i in range(node.size):
+        one, two, w, u = below[node[i]], below[node[i] + 1], share[i], uniform[i]
+        low, high = 0, last
+        while low < high:
+            middle = (low + high) // 2
+            if one[middle] * (1 - w) + two[middle] * w >= u:
+                high = middle
+            else:
+                low = middle + 1
+        out[i] = low
+
+
+@njit(cache=True, nogil=True)
+def cases_on_table(
+    unlit: NDArray[np.float64],
+    phantoms: NDArray[np.float64],
+    lamps: NDArray[np.float64],
+    cases: NDArray[np.intp],
+    candelas: NDArray[np.float64],
+    orders: NDArray[np.intp],
+    step: float,
+    last: int,
+    node: NDArray[np.int32],
+    share: NDArray[np.float32],
+) -> None:
+    """`PixelTable.at` of the expected electrons of all cases, ndarray[n_cases, n_pixels].
+
+    `unlit`, `phantoms`, `lamps`: see `HeadElectrons`, the first of one background, ndarray[n_places, n_pixels].
+    `cases`: ndarray[n_cases, 5]: type of the lit lens or -1, signal, order, phantom, place; `candelas`: of each case.
+    """
+    for case in range(len(cases)):
+        kind, lamp, order, sunny, place = cases[case]
+        for p in range(unlit.shape[1]):
+            electrons = unlit[place, p]
+            for position in range(3):
+                own = orders[order, position]
+                if sunny:
+                    electrons += phantoms[place, position, own, p]
+                if own == kind:
+                    electrons += candelas[case] * lamps[place, position, lamp, p]
+            below = min(int(np.sqrt(electrons) / step), last)
+            part = (electrons / (step * step) - float(below) * below) / (2.0 * below + 1)
+            node[case, p] = below
+            share[case, p] = min(max(part, 0.0), 1.0)
+
+
+@njit(cache=True, nogil=True)
+def log_likelihoods(
+    numbers: NDArray[np.int16],
+    node: NDArray[np.int32],
+    share: NDArray[np.float32],
+    table: NDArray[np.float32],
+    out: NDArray[np.float64],
+) -> None:
+    """Log-likelihood of each case for each image, up to a constant of the image, ndarray[n_images, n_cases].
+
+    `numbers`: ndarray[n_images, n_pixels]; `node`, `share`: ndarray[n_cases, n_pixels], see `PixelTable.at`, pixels
+    that tell most first; `table`: its `shares`, none above 0. -inf for cases that are impossible beside the best.
+    """
+    n_pixels = numbers.shape[1]
+    for image in range(numbers.shape[0]):
+        best = -np.inf
+        for case in range(node.shape[0]):
+            total = 0.0
+            for p in range(n_pixels):
+                row, i = table[numbers[image, p]], node[case, p]
+                total += row[i] + share[case, p] * (row[i + 1] - row[i])
+                if p % _LOOK == 0 and total < best - _MARGIN:
+                    total = -np.inf
+                    break
+            out[image, case] = total
+            best = max(best, total)

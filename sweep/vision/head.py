@@ -1,0 +1,130 @@
+"""A signal head on the pixels: how much of each part every pixel sees, blurred, at each wavelength and place.
+
+Three round lenses stand one above the other in a housing before a backplate (all rectangles), as EN 12368's heads of
+200 mm: lenses 1.5 diameters apart, the housing 1.6 x 4.6 diameters, the backplate 3 x 6.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..cache import Cache
+from ..camera.effects import blur
+from ..camera.effects.sampling import Window, light_on_pixels
+from ..camera.mosaic import Mosaic
+from ..camera.scene import Target
+from ..camera.view import View
+from ..types import FloatArray
+from .section import Vision
+
+SPACING, HOUSING, BACKPLATE = 1.5, (1.6, 4.6), (3.0, 6.0)
+"""In diameters of a lens: from lens to lens; width and height."""
+_KNOTS = "every 10 nm"
+MARGIN = 1
+"""Pixels around the image whose light crosstalk brings into it."""
+_PERIOD_PX = 160
+"""A rectangle's image is a Fourier series of this period."""
+
+
+@dataclass(frozen=True)
+class HeadMaps:
+    """Light of each part relative to a uniform field of its radiance.
+
+    `lenses`: ndarray[n_places, 3, side, side, n_knots], `housing` and `backplate` (what lies before them counts as
+    theirs): ndarray[n_places, side, side, n_knots]; the side has `MARGIN` at both ends. `knots_nm`: ndarray[n_knots].
+    """
+
+    knots_nm: FloatArray
+    lenses: FloatArray
+    housing: FloatArray
+    backplate: FloatArray
+
+
+def head_places_px(vision: Vision, mosaic: Mosaic) -> FloatArray:
+    """Where the middle lens's center may be, from the image's first pixel: ndarray[n_places, 2] as (column, row)."""
+    rows, columns = mosaic.indices.shape
+    n = vision.places_per_pixel
+    middle = [(vision.crop_px // 2 // size) * size - size / 2 for size in (columns, rows)]
+    x, y = np.meshgrid(np.arange(columns * n) / n + middle[0], np.arange(rows * n) / n + middle[1])
+    return np.stack([x.ravel(), y.ravel()], axis=1)
+
+
+_maps: Cache[tuple[object, ...], HeadMaps] = Cache(12)
+
+
+def head_maps(view: View, vision: Vision) -> HeadMaps:
+    """The maps of the view's target; they do not depend on filters, and the latest ones are kept."""
+    target, pixel = view.scenario.target, view.pixel
+    assert target is not None
+    optics = vision.optics
+    key = (target, optics, pixel.pitch_um, pixel.fill_factor, view.grid, vision.crop_px, vision.places_per_pixel)
+    return _maps.get((*key, view.mosaic.indices.shape), lambda: _made(view, vision, target))
+
+
+def _made(view: View, vision: Vision, target: Target) -> HeadMaps:
+    knots = blur.knots(view.grid.nodes_nm, _KNOTS)
+    places, across = head_places_px(vision, view.mosaic), target.object_resolution_px
+    lenses = [_disc(view, vision, places + np.array([0, SPACING * across * up]), knots) for up in (-1, 0, 1)]
+    housing, backplate = (
+        _rectangle(view, vision, places, (size[0] * across, size[1] * across), knots) for size in (HOUSING, BACKPLATE)
+    )
+    return HeadMaps(knots, np.stack(lenses, axis=1), housing, backplate)
+
+
+def _apart(vision: Vision, centers: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Columns and rows of the pixels (with margin) from each center, ndarray[n_places, side] each."""
+    at = np.arange(-MARGIN, vision.crop_px + MARGIN)
+    return at - centers[:, :1], at - centers[:, 1:]
+
+
+def _disc(view: View, vision: Vision, centers: FloatArray, knots_nm: FloatArray) -> FloatArray:
+    """A lens by the product's own image of a disc, ndarray[n_places, side, side, n_knots]."""
+    target, pixel = view.scenario.target, view.pixel
+    assert target is not None
+    dx, dy = _apart(vision, centers)
+    shape = (len(centers), dy.shape[1], dx.shape[1])
+    seen = Window(
+        np.zeros(shape[1:], dtype=np.intp), np.broadcast_to(dx[:, None], shape), np.broadcast_to(dy[..., None], shape)
+    )
+    radius = target.object_resolution_px / 2
+    furthest = (float(np.hypot(np.abs(dx).max(), np.abs(dy).max())) + 2) * pixel.pitch_um
+    defocus = blur.defocus_um(view.scenario, pixel.pitch_um)
+    wave = tuple(knots_nm * 1e-3)
+    profile = blur.profile(radius * pixel.pitch_um, furthest, wave, vision.optics.f_number, defocus)
+    every = np.ones(shape, dtype=bool)
+    return light_on_pixels(seen, every, pixel.fill_factor**0.5 / 2, radius, profile, pixel.pitch_um).by_pixel()
+
+
+def _rectangle(
+    view: View, vision: Vision, centers: FloatArray, size_px: tuple[float, float], knots_nm: FloatArray
+) -> FloatArray:
+    """A rectangle through the same lens onto the same pixels, ndarray[n_places, side, side, n_knots].
+
+    The spectrum of rectangle and pixel times the product's transfer function, which ends at 1 / (lambda N): a cosine
+    series of a period that leaves its neighbors far away.
+    """
+    pixel, pitch = view.pixel, view.pixel.pitch_um
+    defocus = blur.defocus_um(view.scenario, pitch)
+    highest = 1 / (knots_nm[0] * 1e-3 * vision.optics.f_number) * pitch  # per pixel
+    orders = np.arange(math.ceil(highest * _PERIOD_PX) + 1)
+    nu = orders / _PERIOD_PX
+    twice = np.where(orders == 0, 1.0, 2.0)
+    side = pixel.fill_factor**0.5
+    series = [twice * width / _PERIOD_PX * np.sinc(nu * width) * np.sinc(nu * side) for width in size_px]
+    radial = np.hypot(nu[:, None], nu[None, :]) / pitch
+    distinct, which = np.unique(np.round(radial, 12), return_inverse=True)
+    transfer = blur.transfer(distinct, knots_nm * 1e-3, vision.optics.f_number, defocus)
+    waves = [np.cos(2 * math.pi * nu * x[..., None]) * s for x, s in zip(_apart(vision, centers), series, strict=True)]
+    columns, of_column = np.unique(waves[0].reshape(-1, nu.size), axis=0, return_inverse=True)
+    rows, of_row = np.unique(waves[1].reshape(-1, nu.size), axis=0, return_inverse=True)
+    shape = waves[0].shape[:2]
+    of_column, of_row = of_column.reshape(shape), of_row.reshape(shape)
+    found = np.empty((*shape, shape[1], knots_nm.size))
+    for knot in range(knots_nm.size):
+        otf = transfer[:, knot][which.reshape(radial.shape)]  # [nu of columns, nu of rows]
+        image = rows @ otf.T @ columns.T
+        found[..., knot] = image[of_row[:, :, None], of_column[:, None, :]]
+    return found

@@ -1,0 +1,201 @@
+"""Expected electrons of a signal head's pixels for one design, and images drawn from them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera.effects import crosstalk
+from ..camera.methods import REFERENCE
+from ..camera.pixel import Pixel, irradiance_factor
+from ..camera.scenario import Scenario
+from ..camera.scene import FixedExposure, Noise
+from ..camera.seen import SeenFilters
+from ..camera.view import View, per_photon, signal_irradiance
+from ..curves.color import luminance_per_photon_radiance
+from ..curves.hats import hats
+from ..types import FloatArray, IndexArray
+from .compiled_images import draw_numbers
+from .head import MARGIN, HeadMaps, head_maps
+from .materials import ambient_light, phantom, reflectance
+from .pixel_table import PixelTable, pixel_table
+from .scenes import ORDER_OF_LENSES, Scenes, uniforms
+from .section import LightLevel, Vision
+
+Numbers = NDArray[np.int16]
+"""Digital numbers of images, ndarray[n_images, crop_px, crop_px]."""
+
+
+def view_at(view: View, vision: Vision, distance_m: float, level: LightLevel) -> View:
+    """The view's camera before a head at a distance: lamps of 1 cd, exposed as the level says."""
+    scenario = Scenario(
+        target=vision.target(distance_m),
+        optics=vision.optics,
+        intensity_cd=1.0,
+        exposure=FixedExposure(exposure_s=level.exposure_s),
+        noise=Noise(),
+    )
+    return replace(view, scenario=scenario, methods=REFERENCE)
+
+
+@dataclass(frozen=True)
+class HeadElectrons:
+    """Expected electrons of the parts of a head at one distance and level.
+
+    `unlit`: ndarray[n_places, n_backgrounds, n_pixels], all lenses off. What is added: `phantoms`, ndarray[n_places,
+    3 positions, 3 types, n_pixels], and for each candela and second `lamps`, ndarray[n_places, 3 positions, n_signals,
+    n_pixels].
+    """
+
+    unlit: FloatArray
+    phantoms: FloatArray
+    lamps: FloatArray
+    time_s: float
+
+    def of(
+        self,
+        place: IndexArray,
+        background: IndexArray,
+        order: IndexArray,
+        phantom_on: IndexArray,
+        lit: tuple[IndexArray, IndexArray, FloatArray],
+    ) -> FloatArray:
+        """Electrons of some heads, ndarray[n, n_pixels]; the other arguments are ndarray[n].
+
+        `lit`: the type of the lit lens (-1: none), its signal, its intensity in candelas.
+        """
+        found = self.unlit[place, background]
+        sunny = np.flatnonzero(phantom_on)
+        for position in range(3):
+            kinds = ORDER_OF_LENSES[order, position]
+            found[sunny] += self.phantoms[place[sunny], position, kinds[sunny]]
+            on = np.flatnonzero(lit[0] == kinds)
+            found[on] += (self.time_s * lit[2][on, None]) * self.lamps[place[on], position, lit[1][on]]
+        return found
+
+
+class HeadCamera:
+    """A design before signal heads: what it expects of each part, at every distance and level of a benchmark.
+
+    `curves`: QE of the modified channels, ndarray[n_modified, n_wavelengths].
+    """
+
+    def __init__(self, view: View, curves: FloatArray, vision: Vision) -> None:
+        qe = view.qe.copy()
+        qe[list(view.modified)] = curves
+        self.vision = vision
+        self.view = view
+        self.levels = list(vision.levels.values())
+        self._views = [[view_at(view, vision, d, level) for level in self.levels] for d in vision.distances_m]
+        channels = list(range(len(qe)))
+        self.qe = SeenFilters(self._views[0][0], REFERENCE.angle).curves(qe, channels)
+        self.pixel: Pixel = self._views[0][0].pixel
+        self.table: PixelTable = pixel_table(self.pixel)
+        size = vision.crop_px + 2 * MARGIN
+        rows, columns = view.mosaic.indices.shape
+        at = np.arange(-MARGIN, size - MARGIN)
+        self._channel = view.mosaic.indices[np.ix_(at % rows, at % columns)]
+        self._lamps: dict[int, FloatArray] = {}
+        self._heads: dict[tuple[int, int], HeadElectrons] = {}
+
+    def electrons(self, distance: int, level: int) -> HeadElectrons:
+        """Of one distance and level, by their numbers; kept."""
+        if (distance, level) not in self._heads:
+            self._heads[distance, level] = self._made(distance, level)
+        return self._heads[distance, level]
+
+    def _made(self, distance: int, level: int) -> HeadElectrons:
+        view, said = self._views[distance][level], self.levels[level]
+        maps = head_maps(view, self.vision)
+        time_s = said.exposure_s
+        grid, factor = view.grid, irradiance_factor(self.vision.optics)
+        ambient = ambient_light(grid, said.light)
+        radiance = said.illuminance_lx / math.pi / luminance_per_photon_radiance(grid, ambient[None])[0]
+        arriving = ambient * (radiance * factor)
+        housing, plate, glass = (arriving * reflectance(grid, of) for of in ("dark gray", "black", "black"))
+        around = np.stack([arriving * reflectance(grid, each) for each in self.vision.backgrounds])
+        uniform = np.ones((1, *maps.backplate.shape[1:]))
+        unlit = self._seen(maps, uniform, around) + self._seen(maps, maps.backplate, plate - around)
+        unlit += self._seen(maps, maps.housing, (housing - plate)[None])
+        unlit += self._seen(maps, maps.lenses.sum(axis=1), (glass - housing)[None])
+        return HeadElectrons(
+            np.maximum(unlit, 0.0) * time_s + self.pixel.dark_e_per_s * time_s,
+            self._phantoms(maps, view, said) * time_s,
+            self._lamp_rates(distance, maps, view),
+            time_s,
+        )
+
+    def _phantoms(self, maps: HeadMaps, view: View, level: LightLevel) -> FloatArray:
+        """Electrons/s of sun on each lens, as its color lets it back."""
+        spectra = np.stack([phantom(view.grid, kind) for kind in self.vision.lenses])
+        per_cd = self._per_candela(view) / luminance_per_photon_radiance(view.grid, spectra)
+        return self._of_lenses(maps, spectra * (level.phantom_cd * per_cd)[:, None])
+
+    def _per_candela(self, view: View) -> float:
+        """Luminance of a lens of one candela, times the irradiance for each radiance."""
+        luminance = view.scenario.luminance_cd_m2
+        assert luminance is not None
+        return luminance * irradiance_factor(self.vision.optics)
+
+    def _lamp_rates(self, distance: int, maps: HeadMaps, view: View) -> FloatArray:
+        """Electrons/s of each lamp of one candela at each position; the same at all levels."""
+        if distance not in self._lamps:
+            self._lamps[distance] = self._of_lenses(maps, signal_irradiance(view))
+        return self._lamps[distance]
+
+    def _of_lenses(self, maps: HeadMaps, spectra: FloatArray) -> FloatArray:
+        """Spectra on each lens: ndarray[n_places, 3, n_spectra, n_pixels]."""
+        places, positions = maps.lenses.shape[:2]
+        seen = self._seen(maps, maps.lenses.reshape(-1, *maps.lenses.shape[2:]), spectra)
+        return np.maximum(seen.reshape(places, positions, *seen.shape[1:]), 0.0)
+
+    def _seen(self, maps: HeadMaps, light: FloatArray, spectra: FloatArray) -> FloatArray:
+        """Electrons/s of images with spectra, through each pixel's filter, with crosstalk.
+
+        `light`: ndarray[n, side, side, n_knots] -> ndarray[n, n_spectra, n_pixels].
+        """
+        view = self.view
+        on_knots = hats(view.grid.nodes_nm, maps.knots_nm)
+        weight = np.einsum("cw,sw,kw->cks", self.qe, spectra, on_knots, optimize=True) * per_photon(view)
+        found = np.empty((len(light), len(spectra), *self._channel.shape))
+        for channel in range(len(self.qe)):
+            own = self._channel == channel
+            found[:, :, own] = np.moveaxis(light[:, own] @ weight[channel], 2, 1)
+        share = crosstalk.share(view, REFERENCE.crosstalk)
+        if share:
+            flat = found.reshape(-1, *self._channel.shape)
+            found = crosstalk.mixed(flat, share).reshape(found.shape)
+        inner = slice(MARGIN, -MARGIN)
+        return found[:, :, inner, inner].reshape(*found.shape[:2], -1)
+
+    def n_places(self) -> int:
+        """Places of the head on the mosaic."""
+        return int(self.view.mosaic.indices.size * self.vision.places_per_pixel**2)
+
+    def expected(self, scenes: Scenes) -> FloatArray:
+        """Expected electrons of scenes, ndarray[n, n_pixels]."""
+        n_pixels = self.vision.crop_px**2
+        found = np.empty((len(scenes), n_pixels))
+        candelas = np.array(self.vision.intensities_cd)
+        for distance in np.unique(scenes.distance):
+            for level in np.unique(scenes.level):
+                here = np.flatnonzero((scenes.distance == distance) & (scenes.level == level))
+                if not here.size:
+                    continue
+                own = scenes.some(here)
+                lit = (own.state - 1, own.lamp, candelas[own.intensity])
+                place = (own.place * self.n_places()).astype(np.intp)
+                heads = self.electrons(int(distance), int(level))
+                found[here] = heads.of(place, own.background, own.order, own.phantom, lit)
+        return found
+
+    def images(self, scenes: Scenes) -> Numbers:
+        """Images of scenes as the camera reads them, each with its own photons."""
+        electrons = self.expected(scenes)
+        node, share = self.table.at(electrons.ravel())
+        found = np.empty(electrons.size, dtype=np.int16)
+        draw_numbers(node, share, self.table.below, uniforms(scenes, electrons.shape[1]).ravel(), found)
+        return found.reshape(len(scenes), self.vision.crop_px, self.vision.crop_px)

@@ -1,0 +1,16 @@
+"""Whether the libraries are there that the network needs; nothing is imported to find out."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+from ..errors import Fault, SweepError
+
+
+def require_network() -> None:
+    """Raises SweepError where JAX and Optax are not installed."""
+    if any(find_spec(name) is None for name in ("jax", "optax")):
+        allowed = "pip install 'cfa-sweep[vision]', or `network: false`"
+        raise SweepError(
+            Fault("the network needs JAX and Optax, which are not installed", key="vision", allowed=allowed)
+        )

@@ -1,0 +1,55 @@
+"""Which lamps a reader may learn from: those of the test are never among them, by the digest of their spectra."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..curves.lights import Lights
+from ..errors import Fault, SweepError
+from ..types import FloatArray, IndexArray
+from .section import Vision
+
+TRAIN, CHECK, TEST = "train", "check", "test"
+_PARTS = (TRAIN, CHECK, TEST)
+
+
+@dataclass(frozen=True)
+class Lamps:
+    """Lamps of each lens that a part of the images shows: for each of the three signal types the indices of signals."""
+
+    of_lens: tuple[IndexArray, IndexArray, IndexArray]
+
+    def digests(self, lights: Lights) -> set[str]:
+        """Digests of their spectra."""
+        return {spectrum_digest(lights.photons[i]) for own in self.of_lens for i in own}
+
+
+def spectrum_digest(spectrum: FloatArray) -> str:
+    """SHA-256 of a spectrum."""
+    return hashlib.sha256(np.ascontiguousarray(spectrum, dtype="<f8").tobytes()).hexdigest()
+
+
+def split_lamps(lights: Lights, vision: Vision, seed: tuple[int, int]) -> dict[str, Lamps]:
+    """Half of the lamps of each signal type to train, a quarter to check, a quarter to test; one at least.
+
+    Signals of one spectrum are one lamp. Raises SweepError where a lamp of the test has the spectrum of another part's.
+    """
+    rng = np.random.default_rng((*seed, 1))
+    parts: dict[str, list[IndexArray]] = {part: [] for part in _PARTS}
+    for lens in vision.lenses:
+        own: dict[str, list[int]] = {}
+        for i in lights.members[lens]:
+            own.setdefault(spectrum_digest(lights.photons[i]), []).append(int(i))
+        groups = [own[key] for key in own]
+        order = rng.permutation(len(groups))
+        few = max(1, len(groups) // 4)
+        for part, some in ((TEST, order[:few]), (CHECK, order[few : 2 * few]), (TRAIN, order[2 * few :])):
+            parts[part].append(np.array([i for at in some for i in groups[at]], dtype=np.intp))
+    found = {part: Lamps((own[0], own[1], own[2])) for part, own in parts.items()}
+    seen = found[TRAIN].digests(lights) | found[CHECK].digests(lights)
+    if seen & found[TEST].digests(lights):
+        raise SweepError(Fault("a lamp of the test has the spectrum of one to learn from", key="vision"))
+    return found

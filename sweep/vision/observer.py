@@ -1,0 +1,89 @@
+"""The ideal observer: it knows how images come about, and sums the likelihood over everything that is random.
+
+It knows the lamps that the images show, and is told distance, light level and background, which the images themselves
+show. It sums over the state, the lamp, its intensity, the sun on the lenses, their order, and the place of the head.
+So no reader of these images is more often right on average.
+
+Between two nodes of the pixel's table images are drawn from a mixture, of which it takes the mean of the logarithms:
+less than 0.002 of a pixel's log-likelihood.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..types import FloatArray, IndexArray
+from .compiled_images import cases_on_table, log_likelihoods
+from .images import HeadCamera, HeadElectrons, Numbers
+from .lamps import Lamps
+from .pixel_table import ROOT_STEP
+from .scenes import ORDER_OF_LENSES, PHANTOM_SHARE, SHUFFLED, Scenes, states_of
+
+
+@dataclass(frozen=True)
+class _Cases:
+    """All that a head can be, one by one.
+
+    `table`: ndarray[n_cases, 5]: type of the lit lens or -1, signal, order, phantom, place; `candelas` and `share`, how
+    frequent each is in its state, ndarray[n_cases].
+    """
+
+    table: IndexArray
+    candelas: FloatArray
+    share: FloatArray
+
+
+def _cases(camera: HeadCamera, lamps: Lamps, order: str, sunny: bool) -> _Cases:
+    intensities, n_places = camera.vision.intensities_cd, camera.n_places()
+    orders = range(len(ORDER_OF_LENSES) if order == SHUFFLED else 1)
+    rest = np.array([(o, sun, at) for o in orders for sun in range(1 + sunny) for at in range(n_places)])
+    sun_share = np.where(rest[:, 1] == 1, PHANTOM_SHARE, 1 - PHANTOM_SHARE) if sunny else np.ones(len(rest))
+    lit = [(-1, -1, 0.0, 1.0)]
+    for kind, own in enumerate(lamps.of_lens):
+        each = 1 / (len(own) * len(intensities))
+        lit += [(kind, int(lamp), candelas, each) for lamp in own for candelas in intensities]
+    whole = np.array(lit)
+    first, second = np.repeat(np.arange(len(lit)), len(rest)), np.tile(np.arange(len(rest)), len(lit))
+    table = np.concatenate([whole[first, :2].astype(np.intp), rest[second]], axis=1)
+    weight = whole[first, 3] * sun_share[second] / (len(orders) * n_places)
+    return _Cases(np.ascontiguousarray(table), np.ascontiguousarray(whole[first, 2]), weight)
+
+
+def posteriors(camera: HeadCamera, scenes: Scenes, images: Numbers, lamps: Lamps, order: str) -> FloatArray:
+    """Probability of each state given each image, ndarray[n_images, n_states]; all states are equally frequent.
+
+    `lamps`, `order`: from which the scenes were drawn.
+    """
+    found = np.empty((len(scenes), len(states_of(camera.vision))))
+    groups = np.stack([scenes.distance, scenes.level, scenes.background], axis=1)
+    for distance, level in np.unique(groups[:, :2], axis=0):
+        heads = camera.electrons(int(distance), int(level))
+        cases = _cases(camera, lamps, order, camera.levels[level].phantom_cd > 0)
+        for background in np.unique(groups[(groups[:, 0] == distance) & (groups[:, 1] == level), 2]):
+            here = np.flatnonzero((groups == (distance, level, background)).all(axis=1))
+            found[here] = _of_states(camera, images[here].reshape(len(here), -1), heads, int(background), cases)
+    return found
+
+
+def _of_states(camera: HeadCamera, images: Numbers, heads: HeadElectrons, background: int, cases: _Cases) -> FloatArray:
+    """Probability of each state before a background, ndarray[n_images, n_states]."""
+    n_cases, unlit = len(cases.table), heads.unlit[:, background]
+    telling = np.argsort(-_telling(heads, unlit), kind="stable")
+    dark, sun, lamp = (np.ascontiguousarray(each[..., telling]) for each in (unlit, heads.phantoms, heads.lamps))
+    node = np.empty((n_cases, telling.size), dtype=np.int32)
+    share = np.empty(node.shape, dtype=np.float32)
+    light, last = cases.candelas * heads.time_s, camera.table.last
+    cases_on_table(dark, sun, lamp, cases.table, light, ORDER_OF_LENSES, ROOT_STEP, last, node, share)
+    likelihood = np.empty((len(images), n_cases))
+    log_likelihoods(np.ascontiguousarray(images[:, telling]), node, share, camera.table.shares, likelihood)
+    weights = np.exp(likelihood - likelihood.max(axis=1, keepdims=True)) * cases.share
+    own = cases.table[:, 0] + 1 == np.arange(1 + len(camera.vision.lenses))[:, None]
+    found = weights @ own.T.astype(float)
+    return np.asarray(found / found.sum(axis=1, keepdims=True), dtype=float)
+
+
+def _telling(heads: HeadElectrons, unlit: FloatArray) -> FloatArray:
+    """About how much each pixel tells: how much a mean lamp changes it beside its noise, ndarray[n_pixels]."""
+    return np.asarray(heads.lamps.mean(axis=(0, 1, 2)) / np.sqrt(unlit.mean(axis=0) + 1), dtype=float)

@@ -1,0 +1,48 @@
+"""A raw image as planes: one for each pixel of the tile, or one for each channel after demosaicking."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import convolve
+
+from ..camera.mosaic import Mosaic
+from ..types import FloatArray
+
+
+def tile_planes(images: FloatArray, mosaic: Mosaic) -> FloatArray:
+    """Each position of the tile as a plane: [n, rows, columns] -> [n, rows / tile, columns / tile, positions]."""
+    rows, columns = mosaic.indices.shape
+    n, high, wide = images.shape
+    parts = images.reshape(n, high // rows, rows, wide // columns, columns)
+    return np.ascontiguousarray(np.moveaxis(parts, 2, 3).reshape(n, high // rows, wide // columns, rows * columns))
+
+
+def demosaicked(image: FloatArray, mosaic: Mosaic) -> FloatArray:
+    """Every channel at every pixel, ndarray[n_channels, rows, columns], of a tile of any size.
+
+    Normalized convolution with a tent as wide as the tile, the product's own rule (`camera/effects/demosaic.py`).
+    """
+    tile = mosaic.indices
+    rows, columns = tile.shape
+    channel = tile[np.ix_(np.arange(image.shape[0]) % rows, np.arange(image.shape[1]) % columns)]
+    tents = [1 - np.abs(np.arange(-size + 1, size)) / size for size in (rows, columns)]
+    tent = np.outer(*tents)
+    found = np.empty((len(mosaic.channels), *image.shape))
+    for number in range(len(mosaic.channels)):
+        own = (channel == number).astype(float)
+        # Beyond the border is nothing; at a border one channel may lack a neighbor, and never all of them.
+        weight = convolve(own, tent, mode="constant")
+        found[number] = convolve(own * image, tent, mode="constant") / np.maximum(weight, 1e-12)
+    return found
+
+
+def false_colors(image: FloatArray, mosaic: Mosaic, mean_nm: FloatArray, offset_dn: float) -> FloatArray:
+    """A demosaicked image in false colors, 0 to 1, ndarray[rows, columns, 3].
+
+    Red shows the channel that sees the longest wavelengths on average, blue that of the shortest, green the one in the
+    middle; `mean_nm`: ndarray[n_channels]. The brightest value is 1, and the root brings out what is dark.
+    """
+    planes = np.maximum(demosaicked(image, mosaic) - offset_dn, 0.0)
+    order = np.argsort(-mean_nm)
+    shown = np.stack([planes[order[at]] for at in (0, len(order) // 2, -1)], axis=-1)
+    return np.asarray(np.sqrt(shown / max(float(shown.max()), 1.0)), dtype=float)

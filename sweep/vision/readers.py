@@ -1,0 +1,134 @@
+"""A design before the benchmark: what the ideal observer and the network say of the same images, for one seed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..camera.view import View
+from ..types import FloatArray
+from .images import HeadCamera, Numbers
+from .lamps import CHECK, TEST, TRAIN, Lamps, split_lamps
+from .observer import posteriors
+from .planes import false_colors, tile_planes
+from .scenes import ORDERS, Scenes, draw_scenes, states_of
+from .section import Vision
+
+_SHOWN = 12
+"""Images that were read wrongly and are kept to look at, of each design."""
+
+
+@dataclass(frozen=True)
+class Answers:
+    """Probability of each state, ndarray[n, n_states], as readers of the same images say it.
+
+    `half`: of a network that learned from half of the images. Without a network both are empty.
+    """
+
+    scenes: Scenes
+    observer: FloatArray
+    network: FloatArray
+    half: FloatArray
+    epochs: int
+
+
+@dataclass(frozen=True)
+class SeedReading:
+    """Answers of one seed, by the order of the lenses, on lamps that the network has not seen, and on those it has.
+
+    `pictures`: images of unseen lamps that were read wrongly in false colors, ndarray[n, rows, columns, 3] of 0 to 1;
+    `pictured`: their numbers among the images with lenses in any order.
+    """
+
+    unseen: dict[str, Answers]
+    seen: dict[str, Answers]
+    pictures: FloatArray
+    pictured: list[int]
+
+
+def read_images(view: View, curves: FloatArray, vision: Vision, seed: tuple[int, int]) -> SeedReading:
+    """One design and one seed; `curves`: of the modified channels, ndarray[n_modified, n_wavelengths].
+
+    `seed`: the study's and the number of this one, from which lamps, scenes, photons and training follow.
+    """
+    camera = HeadCamera(view, curves, vision)
+    lamps = split_lamps(view.lights, vision, seed)
+    unseen: dict[str, Answers] = {}
+    seen: dict[str, Answers] = {}
+    for order in ORDERS:
+        key = _key(seed, order)[:-1]
+        test = _drawn(camera, lamps[TEST], order, vision.test_images, _key(seed, order))
+        known = _drawn(camera, lamps[TRAIN], order, vision.test_images // 2, (*key, 1))
+        told = _of_networks(camera, lamps, order, key, [test[1], known[1]]) if vision.network else _none()
+        for where, (scenes, images), whole, half, of in zip(
+            (unseen, seen), (test, known), *told[:2], (lamps[TEST], lamps[TRAIN]), strict=True
+        ):
+            # The observer of the lamps that were learned from is not asked for: the bound is that of the test.
+            ideal = posteriors(camera, scenes, images, of, order) if where is unseen else np.empty((0, 0))
+            where[order] = Answers(scenes, ideal, whole, half, told[2])
+    return SeedReading(unseen, seen, *_pictures(camera, unseen[ORDERS[-1]], test[1]))
+
+
+def observer_error(view: View, curves: FloatArray, vision: Vision, seed: tuple[int, int]) -> float:
+    """What the ideal observer leaves in doubt of one seed's test images, the lenses in any order; see `read_images`.
+
+    The mean of one less the probability of the most probable state: its expected error, with less scatter than a count.
+    """
+    camera, order = HeadCamera(view, curves, vision), ORDERS[-1]
+    lamps = split_lamps(view.lights, vision, seed)[TEST]
+    scenes, images = _drawn(camera, lamps, order, vision.test_images, _key(seed, order))
+    return float(np.mean(1 - posteriors(camera, scenes, images, lamps, order).max(axis=1)))
+
+
+def _key(seed: tuple[int, int], order: str) -> tuple[int, ...]:
+    """Of the test's scenes."""
+    return (*seed, 10 + ORDERS.index(order), 0)
+
+
+def _drawn(camera: HeadCamera, lamps: Lamps, order: str, count: int, key: tuple[int, ...]) -> tuple[Scenes, Numbers]:
+    scenes = draw_scenes(camera.vision, lamps, order, count, key)
+    return scenes, camera.images(scenes)
+
+
+def planes_of(camera: HeadCamera, images: Numbers) -> FloatArray:
+    """What the network sees: roots of the digital numbers above the pedestal, whose noise is even, by tile position."""
+    pixel = camera.pixel
+    light = np.maximum(images - pixel.offset_dn, 0.0) / (pixel.full_scale_dn - pixel.offset_dn)
+    return tile_planes(np.sqrt(light), camera.view.mosaic)
+
+
+def _none() -> tuple[list[FloatArray], list[FloatArray], int]:
+    return [np.empty((0, 0))] * 2, [np.empty((0, 0))] * 2, 0
+
+
+def _of_networks(
+    camera: HeadCamera, lamps: dict[str, Lamps], order: str, key: tuple[int, ...], tests: list[Numbers]
+) -> tuple[list[FloatArray], list[FloatArray], int]:
+    """What a network that learned from all images, and one from half of them, say of tests; epochs of the first."""
+    from .network import train  # noqa: PLC0415  (JAX: only where a study asks for a network)
+
+    vision = camera.vision
+    scenes, images = _drawn(camera, lamps[TRAIN], order, vision.train_images, (*key, 2))
+    checked, check = _drawn(camera, lamps[CHECK], order, vision.check_images, (*key, 3))
+    planes, held_out = planes_of(camera, images), (planes_of(camera, check), checked.state)
+    told, epochs = [], []
+    for count in (len(scenes), len(scenes) // 2):
+        some = slice(0, count)
+        n_states = len(states_of(vision))
+        network = train(planes[some], scenes.state[some], held_out, n_states, vision.epochs, (*key, 4))
+        told.append([network.probabilities(planes_of(camera, each)) for each in tests])
+        epochs.append(network.epochs)
+    return told[0], told[1], epochs[0]
+
+
+def _pictures(camera: HeadCamera, answers: Answers, images: Numbers) -> tuple[FloatArray, list[int]]:
+    """Images that the network (without one, the observer) read wrongly, as many as are kept."""
+    told = answers.network if answers.network.size else answers.observer
+    wrong = np.flatnonzero(told.argmax(axis=1) != answers.scenes.state)[:_SHOWN]
+    curves = camera.qe
+    mean_nm = curves @ camera.view.grid.nodes_nm / np.maximum(curves.sum(axis=1), 1e-300)
+    mosaic, offset = camera.view.mosaic, camera.pixel.offset_dn
+    shown = [false_colors(images[at].astype(float), mosaic, mean_nm, offset) for at in wrong]
+    side = camera.vision.crop_px
+    return np.array(shown).reshape(-1, side, side, 3), [int(at) for at in wrong]

@@ -1,0 +1,93 @@
+"""The scenes of a benchmark: one list for all CFAs, with the numbers from which their photons are drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..types import FloatArray, IndexArray
+from .lamps import Lamps
+from .section import Vision
+
+OFF = "off"
+FIXED, SHUFFLED = "fixed", "shuffled"
+ORDERS = (FIXED, SHUFFLED)
+"""Whether the lenses stand as in the street, so that the place of the lit one says its color, or in any order."""
+SEEN, UNSEEN = "seen", "unseen"
+"""Whether the network has learned from the lamps of an image; never from the image itself."""
+ORDER_OF_LENSES = np.array(list(permutations(range(3))))
+"""Signal type of the lens at each of the three positions, from the top; the first row is the street's."""
+PHANTOM_SHARE = 0.5
+
+
+def states_of(vision: Vision) -> tuple[str, ...]:
+    """What a reader can answer: off, or the type of the lit lens."""
+    return (OFF, *vision.lenses)
+
+
+@dataclass(frozen=True)
+class Scenes:
+    """Scenes one by one, ndarray[n] each.
+
+    `state`: index into `states_of`; `lamp`: index of the lit signal; `intensity`, `background`, `distance`, `level`:
+    index into the study's lists; `order`: into `ORDER_OF_LENSES`; `phantom`: 1 with sun on the lenses; `place`: where
+    the head stands, as a share of all places; `key`: from which the photons are drawn.
+    """
+
+    state: IndexArray
+    lamp: IndexArray
+    intensity: IndexArray
+    background: IndexArray
+    distance: IndexArray
+    level: IndexArray
+    order: IndexArray
+    phantom: IndexArray
+    place: FloatArray
+    key: IndexArray
+
+    def __len__(self) -> int:
+        return len(self.state)
+
+    def some(self, which: IndexArray | NDArray[np.bool_] | slice) -> Scenes:
+        """Some of them."""
+        return Scenes(**{each.name: getattr(self, each.name)[which] for each in fields(self)})
+
+
+def draw_scenes(vision: Vision, lamps: Lamps, order: str, count: int, key: tuple[int, ...]) -> Scenes:
+    """`count` scenes, as many of each distance and level and of each state as can be, the rest at random.
+
+    They follow from `key` alone: all CFAs see the same ones.
+    """
+    rng = np.random.default_rng(key)
+    levels, at = list(vision.levels.values()), np.arange(count)
+    n_distances, n_levels = len(vision.distances_m), len(levels)
+    state = rng.permutation(at % (1 + len(vision.lenses)))
+    condition = at % (n_distances * n_levels)
+    distance, level = np.divmod(condition, n_levels)
+    lit = np.maximum(state - 1, 0)
+    which = rng.random(count)
+    lamp = np.array([lamps.of_lens[k][int(u * len(lamps.of_lens[k]))] for k, u in zip(lit, which, strict=True)])
+    sunny = np.array([each.phantom_cd > 0 for each in levels])
+    return Scenes(
+        state=state,
+        lamp=np.where(state > 0, lamp, -1),
+        intensity=rng.integers(len(vision.intensities_cd), size=count),
+        background=rng.integers(len(vision.backgrounds), size=count),
+        distance=distance,
+        level=level,
+        order=rng.integers(len(ORDER_OF_LENSES), size=count) if order == SHUFFLED else np.zeros(count, dtype=int),
+        phantom=((rng.random(count) < PHANTOM_SHARE) & sunny[level]).astype(np.intp),
+        place=rng.random(count),
+        key=rng.integers(2**62, size=count),
+    )
+
+
+def uniforms(scenes: Scenes, n_pixels: int) -> FloatArray:
+    """A number between 0 and 1 for each pixel of each scene, ndarray[n, n_pixels], the same for all CFAs.
+
+    Each scene has a counter-based generator of its own (Philox), so that it does not matter what is drawn before.
+    """
+    return np.stack([np.random.Generator(np.random.Philox(key=int(key))).random(n_pixels) for key in scenes.key])

@@ -1,0 +1,77 @@
+"""What a study says of its benchmark of vision: scenes, lamps, images, and what an answer costs."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from ..camera.pixel import Optics
+from ..camera.scene import DIAMETER_M, Target
+from ..types import Fraction, Meters, Seconds, Section
+
+Illuminant = Literal["daylight", "LED street light", "sodium street light"]
+Material = Literal["foliage", "sky", "gray", "dark gray", "black", "white"]
+_Intensity = Annotated[float, Field(ge=1e-3, le=1e6)]
+_Text = Annotated[str, Field(min_length=1, max_length=100)]
+MOST_IMAGES = 100_000
+FEWEST_LAMPS = 3
+"""Of each lens: one to train, one to check, one to test."""
+MOST_BITS, MOST_WELL_E, MOST_READ_NOISE_DN = 12, 30_000.0, 100.0
+"""Tables of larger pixels would not fit into a worker's memory."""
+
+
+class LightLevel(Section):
+    """How bright it is around the signal head, and how long is exposed.
+
+    `illuminance_lx` of the `light` on background, backplate and housing. `phantom_cd`: what low sun makes an unlit lens
+    shine with, in half of the scenes (EN 12368 classes its ratio to a lit lens: 1 to 16); 0 without sun on the lens.
+    """
+
+    illuminance_lx: float = Field(ge=0, le=1e6)
+    light: Illuminant = "daylight"
+    exposure_s: Seconds
+    phantom_cd: float = Field(default=0.0, ge=0, le=1e6)
+
+
+class Vision(Section):
+    """A benchmark of vision: images of signal heads, read by the ideal observer and by a small network.
+
+    `lenses`: the signal types of the head's three lenses, from the top. `distances_m`: of the heads; `levels`: of
+    light. `intensities_cd`: of a lit lamp, all equally frequent. `crop_px`: side of an image, even. `places_per_pixel`:
+    places of the head along a pixel, over the CFA's tile. `train_images`, `check_images` (for early stopping) and
+    `test_images`: of each seed, order of lenses and CFA. `epochs`: passes over the training images at most.
+    `unknown_cost`: of the answer "unknown", where a wrong one costs 1. `network`: false leaves the network out.
+    """
+
+    lenses: Annotated[list[_Text], Field(min_length=3, max_length=3)] = ["red", "yellow", "green"]
+    distances_m: Annotated[list[Meters], Field(min_length=1, max_length=20)]
+    levels: Annotated[dict[_Text, LightLevel], Field(min_length=1, max_length=10)]
+    intensities_cd: Annotated[list[_Intensity], Field(min_length=1, max_length=6)] = [20.0, 60.0, 200.0]
+    backgrounds: Annotated[list[Material], Field(min_length=1)] = ["foliage", "sky", "gray"]
+    fov_deg: float = Field(default=60.0, ge=1e-6, le=360)
+    diameter_m: Meters = DIAMETER_M
+    optics: Optics = Optics(f_number=2.0)
+    crop_px: int = Field(default=24, ge=8, le=48)
+    places_per_pixel: int = Field(default=2, ge=1, le=4)
+    seeds: int = Field(default=5, ge=2, le=20)
+    train_images: int = Field(default=2000, ge=50, le=MOST_IMAGES)
+    check_images: int = Field(default=400, ge=20, le=MOST_IMAGES)
+    test_images: int = Field(default=400, ge=20, le=MOST_IMAGES)
+    epochs: int = Field(default=12, ge=1, le=1000)
+    unknown_cost: Fraction = 0.2
+    network: bool = True
+
+    @model_validator(mode="after")
+    def _fits(self) -> Vision:
+        if self.crop_px % 2:
+            raise ValueError(f"crop_px {self.crop_px} must be even")
+        for name in ("lenses", "distances_m", "intensities_cd", "backgrounds"):
+            values = getattr(self, name)
+            if len(set(values)) < len(values):
+                raise ValueError(f"{name}: one is named twice")
+        return self
+
+    def target(self, distance_m: float) -> Target:
+        """A lens of the head at a distance, as the target of a scene."""
+        return Target(distance_m=distance_m, fov_deg=self.fov_deg, diameter_m=self.diameter_m)

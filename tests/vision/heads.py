@@ -1,0 +1,38 @@
+"""A small benchmark of vision for tests."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from sweep.camera.mosaic import Mosaic
+from sweep.camera.pixel import Pixel
+from sweep.camera.scenario import Scenario
+from sweep.camera.sensor import ar0820_sensor
+from sweep.camera.view import View
+from sweep.curves.builtin.data_sets.tl16 import lights
+from sweep.curves.builtin.surrogate import surrogate_parameters
+from sweep.curves.spectrum import WavelengthGrid
+from sweep.vision.section import Vision
+
+GRID = WavelengthGrid(step_nm=20)
+LEVELS = {
+    "day": {"illuminance_lx": 4e4, "exposure_s": 5e-5, "phantom_cd": 50.0},
+    "night": {"illuminance_lx": 10.0, "light": "sodium street light", "exposure_s": 1e-3},
+}
+
+
+def vision(**changes: Any) -> Vision:
+    given: dict[str, Any] = {"fov_deg": 120.0, "distances_m": [150.0, 400.0], "levels": LEVELS}
+    return Vision(**given | {"test_images": 60, "train_images": 200, "epochs": 2, "seeds": 2} | changes)
+
+
+def head_view(cfa: str = "RGGB", grid: WavelengthGrid = GRID, **pixel: Any) -> View:
+    sensor, mosaic = ar0820_sensor(grid, surrogate_parameters()), Mosaic.from_name(cfa)
+    noise = {"read_noise_e": 2.0, "offset_dn": 168.0, "prnu": 0.01, "crosstalk": 0.01} | pixel
+    qe = sensor.mosaic_qe(mosaic)
+    return View(grid, mosaic, qe, (), sensor.curve("C"), lights(grid), Pixel(**noise), Scenario())
+
+
+NO_FILTERS = np.empty((0, GRID.size))

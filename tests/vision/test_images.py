@@ -1,0 +1,161 @@
+"""Images against the product's readout, and against a simulation that shares no code with them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sweep.camera.effects.noise import draws_dn
+from sweep.camera.imager import Imager
+from sweep.camera.methods import Methods
+from sweep.camera.mosaic import Mosaic
+from sweep.camera.noisy import table
+from sweep.curves.color import luminance_per_photon_radiance
+from sweep.vision.head import BACKPLATE, HOUSING, SPACING, head_places_px
+from sweep.vision.images import HeadCamera, view_at
+from sweep.vision.lamps import TEST, split_lamps
+from sweep.vision.materials import ambient_light, phantom, reflectance
+from sweep.vision.pixel_table import pixel_table
+from sweep.vision.planes import demosaicked, tile_planes
+from sweep.vision.scenes import ORDER_OF_LENSES, SHUFFLED, Scenes, draw_scenes
+
+from .heads import NO_FILTERS, head_view, vision
+
+EXACT = Methods(saturation="skip", quantization="skip", noise="skip", pedestal="skip")
+
+
+@pytest.mark.parametrize("cfa", ["RGGB", "RCCB"])
+def test_a_lamp_is_what_the_product_reads(cfa: str) -> None:
+    """The mean over the middle lens, and with it every CSD, at a place between pixels."""
+    asked, view = vision(distances_m=[100.0]), head_view(cfa)
+    camera = HeadCamera(view, NO_FILTERS, asked)
+    place = 7
+    center = head_places_px(asked, view.mosaic)[place]
+    there = view_at(view, asked, 100.0, camera.levels[0])
+    assert there.scenario.target is not None
+    target = there.scenario.target.model_copy(update={"phase_px": (float(center[0]), float(center[1]))})
+    imager = Imager(replace(there, methods=EXACT, scenario=there.scenario.model_copy(update={"target": target})))
+    wanted = imager.read(NO_FILTERS[None])[0][0, 0] / view.pixel.dn_per_e
+    heads = camera.electrons(0, 0)
+    lamps = heads.lamps[place, 1] * heads.time_s
+    across = np.arange(asked.crop_px)
+    tile = view.mosaic.indices[np.ix_(across % 2, across % 2)].ravel()
+    # The share of each pixel that the disc covers, from 40 x 40 points of it.
+    fine = (np.arange(40) + 0.5) / 40 - 0.5
+    x, y = (across[:, None] + fine - c for c in center)
+    inside = y[:, None, :, None] ** 2 + x[None, :, None, :] ** 2 <= (target.object_resolution_px / 2) ** 2
+    covered = inside.mean(axis=(2, 3)).ravel()
+    for channel in range(len(view.qe)):
+        weight = covered * (tile == channel)
+        np.testing.assert_allclose(lamps @ weight / weight.sum(), wanted[:, channel], rtol=5e-3, atol=2e-3)
+
+
+def brute_force(scenes: Scenes, at: int) -> np.ndarray:
+    """Expected electrons of a scene: radiance on a fine grid, a discrete Fourier transform, pixels, neighbors."""
+    asked, view = vision(), head_view()
+    grid, fine, finer, size = view.grid, 8, 8, 48
+    level = list(asked.levels.values())[scenes.level[at]]
+    distance_m = asked.distances_m[scenes.distance[at]]
+    across = view_at(view, asked, distance_m, level).scenario.target.object_resolution_px  # type: ignore[union-attr]
+    center = head_places_px(asked, view.mosaic)[int(scenes.place[at] * 16)]
+    start = -(size - asked.crop_px) // 2
+    points = start - 0.5 + (np.arange(size * fine * finer) + 0.5) / (fine * finer)
+    x, y = points[None, :] - center[0], points[:, None] - center[1]
+    ambient = ambient_light(grid, level.light)
+    luminance = luminance_per_photon_radiance(grid, ambient[None])[0]
+    arriving = ambient * level.illuminance_lx / math.pi / luminance
+    black, dark = (arriving * reflectance(grid, of) for of in ("black", "dark gray"))  # type: ignore[arg-type]
+    ground = arriving * reflectance(grid, asked.backgrounds[scenes.background[at]])
+    area = math.pi * 0.1**2
+    lit = scenes.state[at] - 1
+    lenses = []
+    for kind in ORDER_OF_LENSES[scenes.order[at]]:
+        seen = black.copy()
+        if scenes.phantom[at]:
+            sun = phantom(grid, asked.lenses[kind])
+            seen += sun * level.phantom_cd / area / luminance_per_photon_radiance(grid, sun[None])[0]
+        if kind == lit:
+            lamp = view.lights.photons[scenes.lamp[at]]
+            candelas = asked.intensities_cd[scenes.intensity[at]]
+            seen += lamp * candelas / area / luminance_per_photon_radiance(grid, lamp[None])[0]
+        lenses.append(seen)
+    frequency = np.hypot(*np.meshgrid(*[np.fft.fftfreq(size * fine, 2.1 / fine)] * 2))
+    electrons = np.zeros((size, size))
+    tile = view.mosaic.indices[np.ix_((np.arange(size) + start) % 2, (np.arange(size) + start) % 2)]
+    shapes = [
+        (np.abs(x) <= wide * across / 2) & (np.abs(y) <= high * across / 2) for wide, high in (BACKPLATE, HOUSING)
+    ]
+    shapes += [x**2 + (y - up * SPACING * across) ** 2 <= (across / 2) ** 2 for up in (-1, 0, 1)]
+    covered = [shape.reshape(size * fine, finer, size * fine, finer).mean(axis=(1, 3)) for shape in shapes]
+    layers = [black - ground, dark - black, *(lens - dark for lens in lenses)]
+    for w, wavelength_um in enumerate(grid.nodes_nm * 1e-3):
+        scene = ground[w] + sum(share * layer[w] for share, layer in zip(covered, layers, strict=True))
+        s = np.minimum(frequency * wavelength_um * 2.0, 1.0)
+        otf = 2 / math.pi * (np.arccos(s) - s * np.sqrt(1 - s**2))
+        image = np.fft.ifft2(np.fft.fft2(scene) * otf).real
+        pixels = image.reshape(size, fine, size, fine).mean(axis=(1, 3))
+        electrons += pixels * view.qe[tile, w] * grid.step_nm * math.pi / 17 * (2.1e-6) ** 2 * level.exposure_s
+    around = sum(np.roll(electrons, shift, axis) for shift in (-1, 1) for axis in (0, 1))
+    mixed = 0.99 * electrons + 0.0025 * around
+    inner = slice(-start, -start + asked.crop_px)
+    return np.asarray(mixed[inner, inner])
+
+
+@pytest.mark.slow
+def test_ten_scenes_are_those_of_a_brute_force_simulation() -> None:
+    """Within 1 % of the brightest pixel: shapes are made of 64 points along a pixel, light of 8."""
+    asked, view = vision(), head_view()
+    scenes = draw_scenes(asked, split_lamps(view.lights, asked, (1, 0))[TEST], SHUFFLED, 10, (3,))
+    found = HeadCamera(view, NO_FILTERS, asked).expected(scenes)
+    for at in range(10):
+        wanted = brute_force(scenes, at)
+        np.testing.assert_allclose(found[at].reshape(wanted.shape), wanted, atol=0.01 * wanted.max())
+
+
+def test_the_table_is_the_product_s_noise() -> None:
+    """Mean and variance of every digital number that is read, dark, bright and saturated."""
+    pixel = head_view().pixel
+    held, electrons = pixel_table(pixel), np.array([0.0, 3.3, 40.0, 700.0, 5000.0, 9900.0, 50000.0])
+    node, share = held.at(electrons)
+    below = held.below[node].astype(float) * (1 - share[:, None]) + held.below[node + 1] * share[:, None]
+    shares, numbers = np.diff(below, prepend=0.0, axis=1), np.arange(4096)
+    mean = shares @ numbers
+    variance = shares @ numbers**2 - mean**2
+    np.testing.assert_allclose(mean, table.mean_rounded(electrons, pixel), rtol=2e-4)
+    np.testing.assert_allclose(variance, table.variance(electrons, pixel), rtol=2e-2, atol=0.05)
+
+
+def test_drawn_images_are_as_noisy_as_the_product_draws_them() -> None:
+    asked, view = vision(), head_view()
+    camera = HeadCamera(view, NO_FILTERS, asked)
+    lamps = split_lamps(view.lights, asked, (1, 0))[TEST]
+    one = draw_scenes(asked, lamps, SHUFFLED, 1, (5,))
+    many = one.some(np.zeros(2000, dtype=np.intp))
+    many = replace(many, key=np.arange(2000))
+    drawn = camera.images(many).reshape(2000, -1)
+    again = draws_dn(np.repeat(camera.expected(one), 2000, axis=0), camera.pixel, np.random.default_rng(1))
+    apart = (drawn.mean(axis=0) - again.mean(axis=0)) / np.sqrt((drawn.var(axis=0) + again.var(axis=0)) / 2000)
+    assert np.abs(apart).max() < 5
+    assert (drawn.var(axis=0) / again.var(axis=0)).mean() == pytest.approx(1.0, abs=0.01)
+    np.testing.assert_array_equal(camera.images(many.some(np.arange(3, 5))).reshape(2, -1), drawn[3:5])
+
+
+def test_planes_of_a_tile() -> None:
+    mosaic = Mosaic.from_rows("own", [["R", "G", "C"], ["B", "C", "G"]])
+    image = np.arange(2 * 12 * 12, dtype=float).reshape(2, 12, 12)
+    planes = tile_planes(image, mosaic)
+    assert planes.shape == (2, 6, 4, 6)
+    np.testing.assert_array_equal(planes[1, 2, 3], image[1, 4:6, 9:12].ravel())
+
+
+def test_a_demosaicked_plane_keeps_a_line_and_what_was_measured() -> None:
+    """Bilinear for a Bayer tile: exact for light that changes evenly, away from the border."""
+    mosaic = Mosaic.from_name("RGGB")
+    rows, columns = np.mgrid[0:12, 0:12].astype(float)
+    light = 3 + 2 * rows - columns
+    found = demosaicked(light, mosaic)
+    for plane in found:
+        np.testing.assert_allclose(plane[2:-2, 2:-2], light[2:-2, 2:-2])

@@ -1,0 +1,191 @@
+"""The readers where the answer is known, and what they may not know."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.special import ndtr
+
+from sweep.errors import SweepError
+from sweep.vision.compiled_images import draw_numbers, log_likelihoods
+from sweep.vision.images import HeadCamera
+from sweep.vision.installed import require_network
+from sweep.vision.lamps import CHECK, TEST, TRAIN, split_lamps
+from sweep.vision.observer import posteriors
+from sweep.vision.pixel_table import pixel_table
+from sweep.vision.scenes import FIXED, ORDERS, SHUFFLED, draw_scenes
+from sweep.vision.scores import confusion_matrix, costs, macro_f1, mean_of, nested_weights
+
+from ..build import BASE, faults
+from .heads import NO_FILTERS, head_view, vision
+
+
+def test_the_likelihood_errs_as_two_gaussians_do() -> None:
+    """Sixteen bright pixels of two known images: the least error is that of Gaussians apart by d'."""
+    pixel = head_view().pixel
+    held = pixel_table(pixel)
+    electrons = np.array([np.full(16, 2000.0), np.full(16, 2030.0)])
+    node, share = held.at(electrons)
+    n, rng = 20_000, np.random.default_rng(2)
+    truth = rng.integers(2, size=n)
+    numbers = np.empty(n * 16, dtype=np.int16)
+    draw_numbers(node[truth].ravel(), share[truth].ravel(), held.below, rng.random(n * 16), numbers)
+    found = np.empty((n, 2))
+    log_likelihoods(numbers.reshape(n, 16), node, share, held.shares, found)
+    variance = 2015 + (0.01 * 2015) ** 2 + pixel.read_noise_e**2 + 1 / 12 / pixel.dn_per_e**2
+    least = ndtr(-0.5 * 30 * np.sqrt(16 / variance))
+    assert 0.05 < least < 0.2
+    assert (found.argmax(axis=1) != truth).mean() == pytest.approx(least, abs=0.01)
+    likely = np.exp(found - found.max(axis=1, keepdims=True))
+    doubt = 1 - (likely / likely.sum(axis=1, keepdims=True)).max(axis=1)
+    assert doubt.mean() == pytest.approx(least, abs=0.005)
+
+
+@pytest.mark.slow
+def test_the_network_errs_as_two_gaussians_do() -> None:
+    """Two images that differ in four of 64 values, in Gaussian noise."""
+    from sweep.vision.network import train
+
+    rng = np.random.default_rng(4)
+    apart = np.zeros((4, 4, 4))
+    apart[1:3, 1:3, 2] = 1.2
+
+    def some(n: int) -> tuple[np.ndarray, np.ndarray]:
+        truth = rng.integers(2, size=n)
+        return truth[:, None, None, None] * apart + rng.standard_normal((n, 4, 4, 4)), truth
+
+    planes, states = some(60_000)
+    seen, truth = some(20_000)
+    told = train(planes, states, some(5000), 2, 6, (1,)).probabilities(seen)
+    error, least = (told.argmax(axis=1) != truth).mean(), ndtr(-0.5 * 1.2 * 2)
+    assert least - 0.01 < error < least + 0.01
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_the_observer_is_as_often_wrong_as_it_says(order: str) -> None:
+    """A likelihood that left something random out, or counted it wrongly, would be too sure, or not sure enough."""
+    asked, view = vision(distances_m=[500.0], intensities_cd=[3.0, 10.0]), head_view("RCCC")
+    camera, lamps = HeadCamera(view, NO_FILTERS, asked), split_lamps(view.lights, asked, (1, 0))[TEST]
+    scenes = draw_scenes(asked, lamps, order, 600, (8, ORDERS.index(order)))
+    found = posteriors(camera, scenes, camera.images(scenes), lamps, order)
+    wrong = (found.argmax(axis=1) != scenes.state).astype(float)
+    doubt = 1 - found.max(axis=1)
+    assert 0.05 < wrong.mean() < 0.6
+    assert abs((wrong - doubt).mean()) < 4 * (wrong - doubt).std() / np.sqrt(600)
+    for state in range(4):  # each probability is the share of its state, not the largest alone
+        off = (scenes.state == state) - found[:, state]
+        assert abs(off.mean()) < 4 * off.std() / np.sqrt(600)
+
+
+def test_an_observer_of_other_lenses_is_worse() -> None:
+    """It does not take the order of the lenses from the scene: in the street's order it would know the color."""
+    asked, view = vision(distances_m=[400.0], levels={"day": {"illuminance_lx": 4e4, "exposure_s": 5e-5}}), head_view()
+    camera, lamps = HeadCamera(view, NO_FILTERS, asked), split_lamps(view.lights, asked, (1, 0))[TEST]
+    scenes = draw_scenes(asked, lamps, SHUFFLED, 200, (9,))
+    images = camera.images(scenes)
+    right = [(posteriors(camera, scenes, images, lamps, o).argmax(axis=1) == scenes.state).mean() for o in ORDERS]
+    assert right[ORDERS.index(SHUFFLED)] > right[ORDERS.index(FIXED)] + 0.1
+
+
+def test_lamps_of_the_test_are_nowhere_else() -> None:
+    lights = head_view().lights
+    for seed in range(5):
+        parts = split_lamps(lights, vision(), (1, seed))
+        digests = {name: lamps.digests(lights) for name, lamps in parts.items()}
+        assert not digests[TEST] & (digests[TRAIN] | digests[CHECK])
+        assert not digests[TRAIN] & digests[CHECK]
+        assert [len(digests[name]) for name in (TRAIN, CHECK, TEST)] == [24, 12, 12]
+    scenes = draw_scenes(vision(), parts[TRAIN], SHUFFLED, 200, (1,))
+    shown = {lights.names[i] for i in scenes.lamp if i >= 0}
+    assert not shown & {lights.names[i] for own in parts[TEST].of_lens for i in own}
+
+
+def test_lamps_of_one_spectrum_stay_together() -> None:
+    lights = head_view().lights
+    photons = lights.photons.copy()
+    red = lights.members["red"]
+    photons[red[1::2]] = photons[red[::2]]  # eight pairs of the same lamp
+    twins = replace(lights, photons=photons)
+    parts = split_lamps(twins, vision(), (1, 0))
+    assert sorted(len(parts[name].of_lens[0]) for name in (TRAIN, CHECK, TEST)) == [4, 4, 8]
+    assert not parts[TEST].digests(twins) & (parts[TRAIN].digests(twins) | parts[CHECK].digests(twins))
+
+
+def test_scenes_are_the_same_for_all_cfas() -> None:
+    """The brightest pixels of one channel that two CFAs share, at the same place of the tile, are the same numbers."""
+    asked = vision()
+    seen = []
+    for cfa in ("RCCB", "RCCC"):
+        view = head_view(cfa, crosstalk=0.0)
+        lamps = split_lamps(view.lights, asked, (1, 0))[TEST]
+        scenes = draw_scenes(asked, lamps, SHUFFLED, 8, (2,))
+        seen.append(HeadCamera(view, NO_FILTERS, asked).images(scenes)[:, 0::2, 1::2])
+    np.testing.assert_array_equal(*seen)
+
+
+def test_scores() -> None:
+    truth, said = np.array([0, 0, 1, 1, 2, 2]), np.array([0, 1, 1, 1, 2, 0])
+    matrix = confusion_matrix(truth, said, 3)
+    np.testing.assert_array_equal(matrix, [[1, 1, 0], [0, 2, 0], [1, 0, 1]])
+    assert macro_f1(matrix) == pytest.approx((0.5 + 0.8 + 2 / 3) / 3)
+    cost, unknown = costs(np.array([True, False, False]), np.array([0.9, 0.7, 0.8]), 0.25)
+    np.testing.assert_allclose(cost, [1.0, 0.25, 0.0])
+    np.testing.assert_array_equal(unknown, [False, True, False])
+
+
+def test_an_interval_holds_its_share() -> None:
+    """Of scenes in seeds that differ, 95 % intervals hold the truth at least as often as few seeds let them."""
+    rng = np.random.default_rng(3)
+    held = 0
+    for _ in range(60):
+        level = np.repeat(0.3 + 0.05 * rng.standard_normal(8), 40)
+        found = mean_of(rng.random(320) < level, nested_weights(np.repeat(np.arange(8), 40), rng, 300))
+        held += found.low <= 0.3 <= found.high
+    assert held >= 50
+
+
+def test_a_missing_library_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sweep.vision.installed.find_spec", lambda _: None)
+    with pytest.raises(SweepError, match=r"vision: the network needs JAX and Optax.*pip install 'cfa-sweep\[vision\]'"):
+        require_network()
+
+
+def test_what_a_study_of_vision_cannot_be(tmp_path: Path) -> None:
+    asked = (
+        "vision: {distances_m: [100], lenses: [red, yelow, green], levels: {day: {illuminance_lx: 1, exposure_s: 1}}"
+    )
+    (found,) = faults(tmp_path, f"{BASE}{asked}}}\n")
+    assert "vision.lenses" in found
+    assert "did you mean 'yellow'" in found
+    (found,) = faults(tmp_path, f"{BASE}{asked.replace('yelow', 'yellow')}, crop_px: 25}}\n")
+    assert "crop_px 25 must be even" in found
+    odd = "cfas: {RGGB: , RYNCy: , wide: {tile: [[R, G, B, R, G]]}}"
+    text = BASE.replace("cfas: [RGGB, RYNCy]", odd)
+    (found,) = faults(tmp_path, f"{text}{asked.replace('yelow', 'yellow')}}}\n")
+    assert "the tile of wide (1 x 5) does not divide the images" in found
+    (found,) = faults(tmp_path, f"{BASE}pixel: {{bits: 14}}\n{asked.replace('yelow', 'yellow')}}}\n")
+    assert "pixel.bits" in found
+    assert "at most 12" in found
+
+
+@pytest.mark.slow
+def test_a_study_without_vision_loads_nothing_of_it(tmp_path: Path) -> None:
+    (tmp_path / "tiny.yaml").write_text("study: tiny\nsensor: ar0820\nlights: tl16\ncfas: [RGGB]\n")
+    code = (
+        "import sys; from pathlib import Path; from sweep.run import run_study; from sweep.study import load_study;"
+        "from sweep.report import make_report, read_output;"
+        "study = load_study(Path('tiny.yaml')); run_study(study, Path('out'), 1, lambda *_: None);"
+        "make_report(read_output(Path('out')));"
+        "loaded = sorted(m for m in sys.modules if m.split('.')[0] in ('jax', 'optax') or m.startswith('sweep.vision.'));"
+        "print(loaded)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == "['sweep.vision.installed', 'sweep.vision.section']"
+    assert not list((tmp_path / "out").glob("vision*"))
+    assert "Images of traffic lights" not in (tmp_path / "out" / "report.html").read_text()
