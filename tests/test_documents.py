@@ -98,3 +98,19 @@ def test_every_figure_of_the_readme_has_its_command() -> None:
 @pytest.mark.parametrize("said", list(FIGURES))
 def test_a_figure_of_the_readme_is_that_of_its_command(finished: Finished, said: str) -> None:
     assert FIGURES[said](stopband(finished)) == said
+
+
+@pytest.mark.slow
+def test_the_table_of_the_readme_is_that_of_its_command(finished: Finished) -> None:
+    folder = finished("robust")
+    rows = pd.read_parquet(folder / "results.parquet").merge(
+        pd.read_parquet(folder / "robustness.parquet"), on="design_id"
+    )
+    rows = rows.set_index("name")
+    names = ("RGGB", "N_4", "nominal", "best stopband")
+    lines = [line for line in README.splitlines() if line.endswith(" % |")]
+    assert len(lines) == len(names)
+    for line, name in zip(lines, names, strict=True):
+        row = rows.loc[name]
+        own = f"{row['csd_yellow_red']:.0f} DN | {row['worst_csd_yellow_red']:.0f} DN | {100 * row['yield']:.1f} %"
+        assert own in line, name

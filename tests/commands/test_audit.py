@@ -76,7 +76,7 @@ def broken_audit() -> Audit:
 def test_a_broken_promise_has_an_exit_code_of_its_own(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("sweep.commands.audit.audit_output", lambda *_: broken_audit())
+    monkeypatch.setattr("sweep.commands.audit.audit_output", lambda *_, **__: broken_audit())
     monkeypatch.setattr(sys, "argv", ["sweep", "audit", str(tmp_path)])
     with pytest.raises(SystemExit) as left:
         cli.main()
@@ -88,7 +88,7 @@ def test_a_broken_promise_has_an_exit_code_of_its_own(
         "allowed: at most 0.1 DN\n"
     )
     kept = broken_audit().rows.iloc[:1]
-    monkeypatch.setattr("sweep.commands.audit.audit_output", lambda *_: Audit(kept, 1000))
+    monkeypatch.setattr("sweep.commands.audit.audit_output", lambda *_, **__: Audit(kept, 1000))
     with pytest.raises(SystemExit) as left:
         cli.main()
     assert not left.value.code

@@ -47,6 +47,7 @@ def test_a_wrong_command_is_one_line(arguments: list[str], expected: str) -> Non
 
 EARLY = """
 import os, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell in the background has it ignored
 class Finder:
     def find_spec(self, name, path, target=None):
         if name == "sweep.commands.app":

@@ -188,7 +188,6 @@ def test_a_noisy_study_from_file_to_report(tmp_path: Path) -> None:
         ("offset_dn: 168}", "offset_dn: 168, well_e: 1.0e+300}", "less than or equal to 10000000"),
         ("offset_dn: 168}", "offset_dn: 168, gain_dn_per_e: 1.0e+300}", "less than or equal to 1000000000"),
         ("noise: true", "noise: {read_noise_e: 1.0e+300}", "less than or equal to 10000"),
-        ("constraints:", "search: {starts: 2}\nconstraints:", "the search does not know"),
     ],
 )
 def test_faults(tmp_path: Path, old: str, new: str, said: str) -> None:
