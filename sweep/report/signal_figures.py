@@ -57,7 +57,7 @@ def draw_clouds(rows: Sequence[Sequence[Cloud]], title: str, top_dn: float) -> F
                 axes.annotate(text, (x.mean(), y.mean()), (6, -10), textcoords="offset points", fontsize=7)
             axes.set(xlim=(0, top_dn), ylim=(0, top_dn), aspect="equal", xlabel=cloud.x_label, ylabel=cloud.y_label)
             axes.set_title(cloud.title, fontsize=9)
-    panels[0][0].legend(fontsize=7, frameon=False)
+    panels[0][0].legend(fontsize=7, frameon=False, loc="upper right")
     figure.suptitle(title)
     return figure
 

@@ -24,7 +24,7 @@ from ..camera.plan.plan import Choice, Plan
 from ..disk import read_plain
 from ..errors import OutputError
 from ..study import Study
-from .identity import MODEL_VERSION
+from .identity import MODEL_VERSION, fingerprint
 from .tables import write_bytes
 
 CACHE = "SWEEP_CACHE"
@@ -69,8 +69,23 @@ class KeptPlans:
         return self._folder / f"{key}.json"
 
 
+def study_key(study: Study, scenario: str, tolerance_dn: float | None) -> str:
+    """SHA-256 of all that the whole study depends on, and the scene: nothing of its families is asked for it."""
+    digest = hashlib.sha256()
+    spaces = [
+        (s.kind, s.name, s.cfa, s.axes, None if s.filter is None else (s.filter.family.kind, s.filter.bases))
+        for s in study.spaces
+    ]
+    held = (study.scenarios, study.pixel, study.lights, spaces)
+    _add(digest, (fingerprint(study), held, _code(), scenario, study.tolerance_dn(tolerance_dn)))
+    return digest.hexdigest()
+
+
 def plan_key(study: Study, scenario: str, tolerance_dn: float | None) -> str:
-    """SHA-256 of all that the plan of a scene depends on: its boxes, the tolerance, what is asked, and the code."""
+    """SHA-256 of all that the plan of a scene depends on: its boxes, the tolerance, what is asked, and the code.
+
+    A study that changes elsewhere leaves it as it is.
+    """
     digest = hashlib.sha256()
     asked = (MODEL_VERSION, _code(), scenario, study.tolerance_dn(tolerance_dn), bool(study.states))
     _add(digest, (asked, study.boxes(scenario)))

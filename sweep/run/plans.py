@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from ..camera.plan.plan import Plan
-from ..results.kept_plans import KeptPlans, plan_key
+from ..results.kept_plans import KeptPlans, plan_key, study_key
 from ..study import Study
 from ..types import Progress, delayed
 from .stop import Stop
@@ -22,7 +22,7 @@ def with_plans(
     is planned again. Raises InterruptedRunError after `stop` was asked for.
     """
     kept = KeptPlans()
-    keys = {name: plan_key(study, name, tolerance_dn) for name in study.scenarios}
+    keys = {name: study_key(study, name, tolerance_dn) for name in study.scenarios}
     plans = {name: plan for name, key in keys.items() if (plan := kept.of(key)) is not None}
     missing = [name for name in keys if name not in plans]
     for name, plan in zip(missing, _found(study, missing, n_jobs, tolerance_dn, stop), strict=True):
@@ -41,4 +41,14 @@ def _found(
     # One scene is planned faster than workers are started.
     how = Workers(min(n_jobs, len(names)), Stop() if stop is None else stop)
     with workers(how) as crew:
-        yield from crew(delayed(study.plan, name, tolerance_dn) for name in names)
+        yield from crew(delayed(_planned, study, name, tolerance_dn) for name in names)
+
+
+def _planned(study: Study, scenario: str, tolerance_dn: float | None) -> Plan:
+    """The plan of a scene: that of another study with the same scene, or a new one."""
+    kept, key = KeptPlans(), plan_key(study, scenario, tolerance_dn)
+    plan = kept.of(key)
+    if plan is None:
+        plan = study.plan(scenario, tolerance_dn)
+        kept.keep(key, plan)
+    return plan

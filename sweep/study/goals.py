@@ -72,7 +72,7 @@ def _is_known(
     if shifted is not None and shifted.extreme == WORST_CASE and not section.production.edge_shift_nm:
         needed = "`production.edge_shift_nm`" + (" or `population`" if shifted.apart == DN else "")
         sources.add(path, f"{name} needs {needed}", None, "a shift above 0")
-    elif name in quantities_of(replace(asked, states=asked.classes)) and not asked.states:
+    elif not asked.states and name in {*quantities_of(replace(asked, states=asked.classes))} - {*quantities_of(asked)}:
         sources.add(path, f"{name} needs `recognition`", None, "`recognition: {}`, and noise in every scenario")
     else:
         sources.unknown(path, what, name, known)

@@ -89,14 +89,14 @@ def test_the_key_knows_what_a_plan_depends_on(study_at: Callable[..., Study], te
 def test_a_damaged_plan_is_found_again(found: list[str], study_at: Callable[..., Study], tmp_path: Path) -> None:
     plans = with_plans(study_at(), 1, _silent).plans
     kept = sorted((tmp_path / "cache" / "plans").iterdir())
-    assert len(kept) == 2
-    text = kept[0].read_text()
-    assert "skip" in text
-    kept[0].write_text(text.replace("skip", "full", 1))
-    kept[1].write_text("[" * 100_000)
+    assert len(kept) == 4  # under the study's key, and under that of each scene
+    texts = [path.read_text() for path in kept]
+    for path, text in zip(kept, texts, strict=True):
+        assert "skip" in text
+        path.write_text(text.replace("skip", "full", 1) if path is not kept[0] else "[" * 100_000)
     assert with_plans(study_at(), 1, _silent).plans == plans
     assert len(found) == 4
-    assert kept[0].read_text() == text
+    assert [path.read_text() for path in kept] == texts
 
 
 def test_a_folder_that_cannot_be_written_costs_nothing_but_time(
