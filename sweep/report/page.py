@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+_FIRST_LINES = 3
+"""Of the answer, above the first plot; the others stand below it."""
 _PICTURES = ("tiles", "sensor", "signals", "chart")
 """Figures that the page shows as pictures; it draws all others itself, but for those of tasks."""
 _OF_TASKS = ("scorecard", "color-noise", "rendered")
@@ -94,6 +96,7 @@ def _html(output: Output, images: Sequence[tuple[str, str, str]], published: pd.
         series_first=bool(drawn["series"]) and output.best.empty,
         objective_words=output.goal.words,
         answer=answer_sentences(output),
+        first_lines=_FIRST_LINES,
         numbers=large_numbers(output),
         counts=counts_line(output),
         interactive=drawn,

@@ -23,7 +23,23 @@ from ..build import ran
 from ..conftest import STUDIES, Finished
 
 FAST = ("stopband", "fog")
-SLOW = ("dual", "paper", "freeform", "producible", "rccb", "exposure", "night", "noise", "distance", "accuracy")
+SLOW = (
+    "dual",
+    "paper",
+    "freeform",
+    "producible",
+    "rccb",
+    "exposure",
+    "night",
+    "noise",
+    "distance",
+    "accuracy",
+    "angle",
+    "glass",
+    "robust",
+    "scorecard",
+    "balanced",
+)
 EVERY = [*FAST, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)]
 
 
