@@ -107,7 +107,7 @@ def test_the_table_of_the_readme_is_that_of_its_command(finished: Finished) -> N
         pd.read_parquet(folder / "robustness.parquet"), on="design_id"
     )
     rows = rows.set_index("name")
-    names = ("RGGB", "N_4", "nominal", "best stopband")
+    names = ("RGGB", "RYYCy", "N_4", "nominal", "best stopband")
     lines = [line for line in README.splitlines() if line.endswith(" % |")]
     assert len(lines) == len(names)
     for line, name in zip(lines, names, strict=True):
