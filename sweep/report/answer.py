@@ -92,6 +92,7 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
         return
     under = _under(output).removeprefix(" with ")
     text = f"Under {under}, {full_name(best)}" if under else _capital(full_name(best))
+    text += _band(best)
     if output.goal.name not in (separation.name, separation.of):
         text += f" has the best {output.goal.words}, {output.goal.amount(best[output.goal.name])}, and"
     text += f" {said_separation(output, best)}"
@@ -115,6 +116,12 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     if parts:
         yield " ".join(parts)
     yield from unseen_lines(output, best)
+
+
+def _band(row: Row) -> str:
+    """Where the band of a found filter lies, between the middles of its edges; nothing of other filters."""
+    ends = [row.get(name, np.nan) for name in ("left_nm", "right_nm")]
+    return f" ({ends[0]:.0f} to {ends[1]:.0f} nm)" if row["kind"] in (SWEPT, FOUND) and np.isfinite(ends).all() else ""
 
 
 def _times(output: Output, best: Row, plain: Row) -> str:
