@@ -89,8 +89,8 @@ def _range(x: FloatArray, errors: FloatArray, allowed: float, unit: str) -> str:
         at, of = ends[0], f" {unit}".rstrip()
         about = _crossing(x[at : at + 2], errors[at : at + 2], allowed)
         if usable[0]:
-            return f"up to about {about:.2g}{of} (at {x[at]:g}, not at {x[at + 1]:g})"
-        return f"from about {about:.2g}{of} (at {x[at + 1]:g}, not at {x[at]:g})"
+            return f"up to about {float(f'{about:.2g}'):g}{of} (at {x[at]:g}, not at {x[at + 1]:g})"
+        return f"from about {float(f'{about:.2g}'):g}{of} (at {x[at + 1]:g}, not at {x[at]:g})"
     return f"at {' '.join(f'{v:g}' for v in x[usable])} {unit}".rstrip()
 
 
