@@ -87,7 +87,7 @@ def _range(x: FloatArray, errors: FloatArray, allowed: float, unit: str) -> str:
     ends = np.flatnonzero(np.diff(usable))
     if len(ends) == 1:
         at, of = ends[0], f" {unit}".rstrip()
-        about = _crossing(x[at : at + 2], errors[at : at + 2], allowed)
+        about = float(f"{_crossing(x[at : at + 2], errors[at : at + 2], allowed):.2g}")
         if usable[0]:
             return f"up to about {float(f'{about:.2g}'):g}{of} (at {x[at]:g}, not at {x[at + 1]:g})"
         return f"from about {float(f'{about:.2g}'):g}{of} (at {x[at + 1]:g}, not at {x[at]:g})"
