@@ -6,9 +6,10 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from types import FrameType
 
 from ..errors import InterruptedRunError
@@ -17,6 +18,8 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 GRACE_S = 2.0
 """What is computed when a stop is asked for may still be finished for so long."""
 _KNOCK_S, _AGAIN_S, _LAST_S = 0.05, 3.0, 4.5
+_POOL = "ExecutorManagerThread"
+"""Name of the thread in which loky hands out work."""
 _SAID = "interrupted; finished chunks are kept, the same command continues"
 
 
@@ -126,6 +129,8 @@ def stop_on_signals(outer: Stop | None = None, *, ends_process: bool = False) ->
     os.set_blocking(at_once, False)
     watcher = threading.Thread(target=stop.watch, args=(signals, threading.get_ident()), daemon=True)
     watcher.start()
+    usual = threading.excepthook
+    threading.excepthook = partial(_told_unless_stopped, stop, usual)
     earlier = signal.set_wakeup_fd(at_once, warn_on_full_buffer=False)
     before = [(number, signal.signal(number, stop._asked)) for number in SIGNALS]
     try:
@@ -134,6 +139,8 @@ def stop_on_signals(outer: Stop | None = None, *, ends_process: bool = False) ->
         raise InterruptedRunError(_SAID) from None
     finally:
         stop._over.set()
+        if not stop.requested:  # else the process ends, and the pool's thread may end after this
+            threading.excepthook = usual
         with stop._sending:
             for number, handler in before:
                 signal.signal(number, handler)
@@ -142,6 +149,14 @@ def stop_on_signals(outer: Stop | None = None, *, ends_process: bool = False) ->
         watcher.join()
         os.close(signals)
         os.close(at_once)
+
+
+def _told_unless_stopped(
+    stop: Stop, usual: Callable[[threading.ExceptHookArgs], object], fault: threading.ExceptHookArgs
+) -> None:
+    """Say what went wrong in a thread, but where a pool of workers finds them gone that a stop has ended."""
+    if not (stop.requested and fault.thread is not None and fault.thread.name == _POOL):
+        usual(fault)
 
 
 @contextmanager

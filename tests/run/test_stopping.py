@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -273,3 +274,24 @@ def test_forty_kills_in_every_phase(tmp_path: Path, undisturbed: Path) -> None:
                 made.rmdir() if made.is_dir() else made.unlink()
             out.rmdir()
     assert_continues(tmp_path, undisturbed, 2)
+
+
+def test_a_pool_that_misses_its_workers_after_a_stop_is_no_news(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(threading, "excepthook", threading.__excepthook__)
+
+    def fails() -> None:
+        raise OSError("handle is closed")
+
+    def told(name: str) -> str:
+        thread = threading.Thread(target=fails, name=name)
+        thread.start()
+        thread.join()
+        return capsys.readouterr().err
+
+    with stop_on_signals() as stop:
+        assert "handle is closed" in told("ExecutorManagerThread")
+        stop._request()
+        assert told("ExecutorManagerThread") == ""
+        assert "handle is closed" in told("another")
