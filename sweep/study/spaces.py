@@ -147,7 +147,7 @@ class SpaceBuilder:
         if isinstance(entry.to, str) and entry.to not in curves:
             self.sources.unknown((*path, "to"), "curve", entry.to, curves)
         self._check_channels(path, entry, mosaic)
-        if len(self.sources.faults) > before:
+        if len(self.sources.faults) > before or mosaic is None:  # a CFA without a mosaic has a fault of its own
             return []
         base = np.ones_like(self.sensor.qe[curves[0]]) if entry.base is None else self.sensor.curve(entry.base)
         target = (
@@ -166,7 +166,10 @@ class SpaceBuilder:
         if len(self.sources.faults) > before:
             return []
         target_name = "" if entry.to is None else str(entry.to)
-        bases = self._bases(entry, self.mosaics[entry.cfa])
+        bases = self._bases(entry, mosaic)
+        if unknown := [name for name in bases.values() if name not in curves]:
+            self.sources.unknown((*path, "cfa"), "curve of a channel behind the glass", unknown[0], curves)
+            return []
         if entry.where == "lens":
             family = cast(Family, Glass(family, np.stack([self.sensor.curve(name) for name in bases.values()])))
         made = Filter(family, bases, target_name, entry.technology)

@@ -97,6 +97,8 @@ def test_its_derivatives_are_those_of_its_curves() -> None:
             "where: lens, to: G",
             "designs.dark.to: a glass goes to a share of its light (got 'G')",
         ),
+        ("cfas: [RGGB, RYYCy]", "cfas: {RGGB: RGGB, RYYCy: {tile: []}}", "cfas."),
+        ("RYYCy]\n", "RYYCy]\nboxes: {b: {cfa: RYYCy, where: lens, to: 0.1, box: {left_nm: [3, 4]}}}\n", "boxes.b.box"),
         ("where: lens, to", "where: glass, to", "designs.dark.where: not allowed (got 'glass')"),
         ("where: lens, to", "to", "designs.dark.channel: missing"),
         ("where: lens, to", "where: lens, family: dual, to", "designs.dark.family: dual replaces several channels"),
