@@ -8,6 +8,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from ..designs.plugin import read_plugin
+from ..disk import is_file
 from ..errors import Fault, OutputError
 from ..study import Study, load_study
 from ..study.sources import KeptSources
@@ -25,23 +27,22 @@ _Key = TypeVar("_Key")
 def study_of(output: Output, data: Path | None, *, allow_code: bool = False) -> Study:
     """The study of a finished run again: with its files, looked for in `data`, or with the curves that the run kept.
 
-    `allow_code`: the code of its own families may run, which must be that of the run. Raises OutputError when the
-    curves or the code are not those of the run, and where code is needed but not allowed.
+    `allow_code`: the code of its own families may run; code that is not that of the run does not. Raises OutputError
+    when the curves or the code are not those of the run, and where code is needed but not allowed.
     """
     path, digests = output.folder / RESOLVED, output.provenance.data_sha256
-    own = [name for name in digests if name.endswith(_CODE)]
-    if own and (data is None or not allow_code):
-        problem = f"its filters are made by the code of {' and '.join(own)}"
-        allowed = "--data FOLDER, which holds it, and --allow-code, if you trust it"
-        raise OutputError(Fault(problem, str(output.folder), allowed=allowed))
+    for name in (name for name in digests if name.endswith(_CODE)):
+        if data is None or not allow_code:
+            allowed = "--data FOLDER, which holds it, and --allow-code, if you trust it"
+            raise OutputError(Fault(f"its filters are made by the code of {name}", str(output.folder), allowed=allowed))
+        if not is_file(data / name) or read_plugin(data / name)[1] != digests[name]:
+            raise OutputError(Fault("not the code that the run had", str(data / name)))
     if data is None and digests:
         return load_study(path, kept=KeptSources(output.curves.sensor, output.curves.lights))
     study = load_study(path, data, allow_code=allow_code)
     lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
     check_kept(output, output.curves.sensor, study.sensor.qe)
     check_kept(output, output.curves.lights, {(kind, name): values for kind, name, values in lights})
-    if changed := [name for name in own if study.digests.get(name) != digests[name]]:
-        raise OutputError(Fault(f"not the code that the run had: {', '.join(changed)}", str(output.folder)))
     return study
 
 

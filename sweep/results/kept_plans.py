@@ -19,7 +19,6 @@ import numpy as np
 from platformdirs import user_cache_path
 from pydantic import BaseModel
 
-from .. import camera
 from ..camera.plan.plan import Choice, Plan
 from ..disk import read_plain
 from ..errors import OutputError
@@ -70,7 +69,10 @@ class KeptPlans:
 
 
 def study_key(study: Study, scenario: str, tolerance_dn: float | None) -> str:
-    """SHA-256 of all that the whole study depends on, and the scene: nothing of its families is asked for it."""
+    """SHA-256 of all that the whole study depends on, and the scene: nothing of its families is asked for it.
+
+    What an object may have in place of what its section says (spaces, scenes, pixel, lights) is part of it.
+    """
     digest = hashlib.sha256()
     spaces = [
         (s.kind, s.name, s.cfa, s.axes, None if s.filter is None else (s.filter.family.kind, s.filter.bases))
@@ -94,10 +96,10 @@ def plan_key(study: Study, scenario: str, tolerance_dn: float | None) -> str:
 
 @cache
 def _code() -> tuple[object, ...]:
-    """The version of the package, and when the files that plans come from were changed."""
-    root = Path(camera.__path__[0])
-    files = sorted(root.rglob("*.py"))
-    stamps = [(str(path.relative_to(root)), path.stat().st_mtime_ns, path.stat().st_size) for path in files]
+    """The version of the package, and when its files were changed: a plan of other code is another one."""
+    root = Path(__file__).parent.parent
+    files = [(path, path.stat()) for path in sorted(root.rglob("*.py"))]
+    stamps = [(str(path.relative_to(root)), found.st_mtime_ns, found.st_size) for path, found in files]
     return version("cfa-sweep"), tuple(stamps)
 
 

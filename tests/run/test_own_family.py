@@ -95,10 +95,11 @@ def test_a_run_is_exported_and_audited_with_its_own_code_alone(tmp_path: Path) -
         assert code == 2
         assert "its filters are made by the code of filters.py; allowed: --data FOLDER" in said
         assert commanded(*command, "--allow-code")[0] == 0
-    (tmp_path / "filters.py").write_text(STOPBAND + "# changed\n")
+    (tmp_path / "filters.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w')\n{STOPBAND}")
     code, _, said = commanded("audit", str(tmp_path / "out"), "--data", str(tmp_path), "--allow-code")
     assert code == 2
-    assert "not the code that the run had: filters.py" in said
+    assert "filters.py: not the code that the run had" in said
+    assert not (tmp_path / "ran").exists()
 
 
 def test_code_runs_only_when_it_is_allowed(tmp_path: Path) -> None:
