@@ -116,7 +116,9 @@ def whole(plain: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFram
 
 @pytest.fixture
 def plain_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Reports whose pictures take no time: for tests of the files and of the page's text."""
+    """Reports and descriptions whose pictures take no time: for tests of the files and of the text."""
     names = ("pareto", "sensor", "signals", "chart")
     monkeypatch.setattr("sweep.report.page._drawings", lambda _: ((name, name, None) for name in names))
     monkeypatch.setattr("sweep.report.page.rendered", lambda _, kind: kind.encode())
+    monkeypatch.setattr("sweep.commands.describe.draw", lambda *_: None)
+    monkeypatch.setattr("sweep.commands.describe.rendered", lambda _, kind: kind.encode())

@@ -102,6 +102,7 @@ def broken(made: Scene, tolerance_dn: float, per_pixel: int, names: tuple[str, .
 SMALL = {"target": target(300, 60, phase_px="any"), "optics": {"f_number": 1.4}, "noise": True}
 
 
+@pytest.mark.slow
 def test_the_worst_place_between_the_quarters_of_a_pixel() -> None:
     made = scene("small", "RGGB", SMALL, DARK)
     plan, row = planned(made, 0.1)
@@ -347,6 +348,7 @@ def under_limit(tmp_path: Any, text: str, what: str) -> subprocess.CompletedProc
     return subprocess.run(arguments, capture_output=True, text=True, timeout=300, check=False)
 
 
+@pytest.mark.slow
 def test_a_tile_with_too_many_places_is_refused(tmp_path: Any) -> None:
     tile = ", ".join(["[" + ", ".join("RGGB"[(2 * (r % 2) + c % 2)] for c in range(16)) + "]" for r in range(16)])
     ended = under_limit(tmp_path, STUDY.format(distance=250, noise="true", tile=tile), "plan")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
@@ -154,8 +155,9 @@ def contrast_detected(made: Made, quantity: Quantity) -> list[float]:
         low, high = (1 + share * (x / y - 1) for share in (0.5, 1.5))
 
         def inside(dark: float) -> float:
-            bright = norm(x, v**0.5)
-            return norm.pdf(dark, y, w**0.5) * (bright.cdf(high * dark) - bright.cdf(low * dark))
+            among_darker = math.exp(-((dark - y) ** 2) / (2 * w)) / math.sqrt(2 * math.pi * w)
+            near, far = ((factor * dark - x) / math.sqrt(2 * v) for factor in (low, high))
+            return among_darker * (math.erf(far) - math.erf(near)) / 2
 
         return quad(inside, max(y - 9 * w**0.5, 0), y + 9 * w**0.5, points=[y], epsabs=1e-9, limit=200)[0]
 

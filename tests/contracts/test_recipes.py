@@ -275,6 +275,7 @@ def with_file(package: str, file: Path, *arguments: object) -> subprocess.Comple
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 def test_a_family_is_one_new_file(tmp_path: Path) -> None:
     file, study = tmp_path / "more" / "gray.py", tmp_path / "gray.yaml"
     file.parent.mkdir()
@@ -297,6 +298,7 @@ def test_a_family_is_one_new_file(tmp_path: Path) -> None:
     assert "unknown family (got 'gray')" in without
 
 
+@pytest.mark.slow
 def test_a_new_effect_promises_what_it_changes(tmp_path: Path) -> None:
     """In straight readouts and in noisy ones that clip, of the light and of the background."""
     (tmp_path / "windshield.py").write_text(WINDSHIELD)

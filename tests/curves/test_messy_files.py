@@ -102,6 +102,7 @@ VARIANTS: dict[str, tuple[str, str, str]] = {
 """Name of the file, its text, and a word of the line that says how it was read; none where `--clean` must help."""
 
 
+@pytest.mark.usefixtures("plain_pictures")
 @pytest.mark.parametrize("name", list(VARIANTS))
 def test_a_variant_reaches_a_study_or_ends_with_what_helps(tmp_path: Path, name: str) -> None:
     file, content, said = VARIANTS[name]

@@ -56,6 +56,7 @@ def test_nothing_is_loaded_before_a_name_is_used() -> None:
     assert done.stdout.split() == []
 
 
+@pytest.mark.slow
 def test_the_guide_runs_and_shows_every_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shown = re.findall(r"sweep\.([A-Za-z_]+)", "\n".join(re.findall(r"^(?:>>>|\.\.\.) .*", GUIDE.read_text(), re.M)))
     assert set(shown) >= NAMES

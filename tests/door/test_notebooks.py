@@ -15,7 +15,13 @@ from ..conftest import STUDIES
 NOTEBOOKS = sorted((STUDIES / "notebooks").glob("*.py"))
 
 
-@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "notebook",
+    [
+        pytest.param(path, marks=[] if path.stem == "first_filter" else pytest.mark.slow, id=path.stem)
+        for path in NOTEBOOKS
+    ],
+)
 def test_a_notebook_runs(notebook: Path, tmp_path: Path) -> None:
     text = notebook.read_text()
     assert "format_name: percent" in text

@@ -207,6 +207,7 @@ def test_what_is_not_a_number_stays_alone() -> None:
     assert found.error["a", "b"][2] <= 1e-17
 
 
+@pytest.mark.slow
 def test_sums_that_take_too_long_are_left_to_other_rules() -> None:
     """Pixels over all that a study may say: the sums of those that are affordable stay within what was counted."""
     rng, affordable = np.random.default_rng(31), 0

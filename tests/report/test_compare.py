@@ -255,6 +255,7 @@ def test_what_cannot_be_compared_is_one_line(runs: dict[str, Path], tmp_path: Pa
     assert (code, len(said.splitlines())) == (2, 1)
 
 
+@pytest.mark.slow
 def test_by_default_a_folder_of_both_names(
     runs: dict[str, Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

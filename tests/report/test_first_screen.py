@@ -20,10 +20,10 @@ browser, opened, standing = pages.browser, pages.opened, pages.standing
 pytestmark = pages.pytestmark
 
 SCREENS = [
-    *((name, width) for name in ("stopband", "fog") for width in (1440, 400)),
+    *(("stopband", width) for width in (1440, 400)),
     *(
         pytest.param(name, width, marks=pytest.mark.slow)
-        for name in ("dual", "distance", "noise")
+        for name in ("fog", "dual", "distance", "noise")
         for width in (1440, 400)
     ),
 ]
@@ -175,7 +175,7 @@ def test_no_figure_is_shown_twice(finished: Finished, standing: Any) -> None:
     assert not any("Trade-off" in text or "Filters" in text or "All CFAs" in text for text in pictures)
 
 
-@pytest.mark.parametrize("name", ["fog", *(pytest.param(n, marks=pytest.mark.slow) for n in ("dual", "paper"))])
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) for name in ("fog", "dual", "paper")])
 def test_nothing_is_drawn_as_a_trade_off_where_nothing_trades_off(finished: Finished, opened: Any, name: str) -> None:
     assert opened(finished(name)).page.locator("#pareto").count() == 0
     assert not (finished(name) / "pareto.png").exists()

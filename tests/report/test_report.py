@@ -157,6 +157,7 @@ def test_a_dollar_in_a_name_is_no_formula() -> None:
         assert not figure.axes[0].title.get_parse_math()
 
 
+@pytest.mark.slow
 def test_a_camera_of_one_channel_has_a_report(tmp_path: Path) -> None:
     from sweep.report import make_report
 

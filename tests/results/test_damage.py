@@ -46,10 +46,10 @@ def without_trade_off(content: bytes) -> bytes:
     ("file", "damage", "computed"),
     [
         ("results.parquet", cut, True),
-        ("curves.parquet", cut, False),
-        ("points.parquet", None, False),
+        pytest.param("curves.parquet", cut, False, marks=pytest.mark.slow),
+        pytest.param("points.parquet", None, False, marks=pytest.mark.slow),
         ("provenance.json", cut, False),
-        ("provenance.json", without_trade_off, False),
+        pytest.param("provenance.json", without_trade_off, False, marks=pytest.mark.slow),
         ("study.resolved.yaml", None, False),
     ],
 )

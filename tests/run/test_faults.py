@@ -219,6 +219,7 @@ def most_threads(pause_s: float) -> int:
     return max(found)
 
 
+@pytest.mark.slow
 def test_threads_beside_each_other_do_not_give_their_libraries_more() -> None:
     with threadpool_limits(2), workers(Workers(2, Stop(), "threading")) as crew:  # whatever the environment says
         calls = (joblib.delayed(most_threads)(0.001 * (i % 3 + 1)) for i in range(20))

@@ -58,6 +58,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.usefixtures("plain_pictures")
 def test_other_lights_read_as_in_a_study_of_their_own(folder: Path) -> None:
     validated = "validate:\n  lights:\n    " + FILE.replace("FILE", "other").replace("REDS", "[r1]") + "\n"
     study = load(folder, text("one", "own", after=validated))
@@ -78,6 +79,8 @@ def test_other_lights_read_as_in_a_study_of_their_own(folder: Path) -> None:
     assert "yellow/<wbr>red CSD, other lights" in (folder / "one" / "report.html").read_text()
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("plain_pictures")
 def test_a_search_without_a_light_finds_no_less(folder: Path) -> None:
     """Fewer pairs of lights cannot lower the optimum; the same design with the light is at most the study's optimum."""
     asked = "search: {starts: 4, max_evaluations: 400}\nvalidate: {leave_one_out: true}\n"

@@ -55,6 +55,7 @@ def study(folder: Path, text: str = OWN, code: str = STOPBAND, *, allow: bool = 
     return load_study(path, allow_code=allow)
 
 
+@pytest.mark.slow
 def test_a_stopband_written_again_gives_the_same_rows_and_the_same_optimum(tmp_path: Path) -> None:
     own, plain = study(tmp_path), study(tmp_path, BUILT_IN)
     ran(own, tmp_path / "own", 2)
@@ -75,6 +76,7 @@ def test_a_stopband_written_again_gives_the_same_rows_and_the_same_optimum(tmp_p
 
 
 @pytest.mark.usefixtures("plain_pictures")
+@pytest.mark.slow
 def test_it_resumes_reports_and_is_another_study_with_other_code(tmp_path: Path) -> None:
     first = study(tmp_path)
     assert run_study(first, tmp_path / "out", 1, lambda *_: None)

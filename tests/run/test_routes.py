@@ -63,6 +63,7 @@ def counting(looked: list[int], way: Any) -> Any:
     return counted
 
 
+@pytest.mark.slow
 def test_detours_before_a_kill_are_told_after_it_and_mended_when_asked(
     plain: Study, whole: pd.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -209,6 +209,7 @@ def test_a_killed_run_is_continued(tmp_path: Path, number: signal.Signals) -> No
     assert tables[0].equals(tables[1])
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_one_line_and_loses_nothing(study: Study, output: Path, tmp_path: Path) -> None:
     def small_files_only() -> None:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

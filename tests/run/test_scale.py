@@ -31,6 +31,7 @@ def test_a_hundred_thousand_chunks_have_keys_of_their_own(tmp_path: Path) -> Non
     assert len(keys) == len(jobs)
 
 
+@pytest.mark.slow
 def test_a_long_table_is_drawn_thinned_but_with_its_whole_front(tmp_path: Path) -> None:
     path = large(tmp_path, 5)  # 250,000 designs
     ran(load_study(path), tmp_path / "out", 1)

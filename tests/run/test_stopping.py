@@ -216,6 +216,7 @@ def test_results_are_handed_on_as_they_finish_and_given_in_order(backend: str) -
     assert finished[0] != 0  # the slow one did not hold up what was finished beside it
 
 
+@pytest.mark.slow
 def test_a_worker_whose_parent_was_killed_before_it_began_ends() -> None:
     program = "import os, sys; from sweep.run.worker_process import prepare_worker; prepare_worker({}); print('lives')"
     for parent, said in (("os.getppid()", "lives\n"), ("os.getppid() + 1", "")):

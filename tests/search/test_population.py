@@ -58,6 +58,7 @@ def limit() -> Limit:
     return limit_of(problem(binning_nm=1))
 
 
+@pytest.mark.slow
 def test_the_limit_is_attained_over_all_members() -> None:
     found = limit()
     assert found.curve is not None

@@ -141,13 +141,13 @@ def test_worst_case_is_the_smallest_over_the_shifts() -> None:
     assert other.objective > best.objective
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("algorithm", "objective"),
     [
-        pytest.param(algorithm, objective, marks=[] if few else pytest.mark.slow, id=f"{algorithm}-{objective}")
+        pytest.param(algorithm, objective, id=f"{algorithm}-{objective}")
         for algorithm in ("SLSQP", "COBYLA")
         for objective in OBJECTIVES[1:]
-        for few in [(algorithm, objective) == ("SLSQP", OBJECTIVES[2])]
     ],
 )
 def test_combined_objectives_improve_on_their_starts(algorithm: str, objective: Objective) -> None:
@@ -179,6 +179,7 @@ def test_dimensions_are_kept() -> None:
     assert right - left >= 40 * (1 - 1e-9)
 
 
+@pytest.mark.slow
 def test_best_reachable_is_the_extreme_of_a_quantity_alone() -> None:
     starts = starting_points(STOPBAND, 4, 1)
     impossible = {

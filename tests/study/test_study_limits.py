@@ -117,6 +117,7 @@ def test_too_much_is_one_line(tmp_path: Path, name: str) -> None:
     assert all(len(line) < 10_000 and line.isprintable() for line in found)
 
 
+@pytest.mark.slow
 def test_many_faults_say_how_many_more(tmp_path: Path) -> None:
     path = tmp_path / "a.yaml"
     path.write_text(SMALL + "".join(f"k{i}: 1\n" for i in range(20_000)))
