@@ -18,6 +18,7 @@ from .tables import (
     POINTS,
     PROVENANCE,
     RECOGNITION,
+    REGIONS_MAP,
     RENDERED,
     RESOLVED,
     RESULTS,
@@ -90,6 +91,10 @@ FILES = {
     "`design_id`; how many times as large population and edge shift must be for the worst CSD to fall below that of "
     "the best plain CFA (`breaks_at`; null: not up to 3 times), and the CSD, lights, shifts and temperatures there; "
     "`yield`, the share of random lamps and cameras with the wanted CSD, with its 95 % interval",
+    REGIONS_MAP: "where a study asks for maps of color regions, for each plain CFA, named design and answer of the "
+    "search: design_id, norm, peak of the yellow LED (yellow_nm) and of the red one (red_nm), how many pairs of widths "
+    "the norm allows (pairs), how many of these have the wanted distance (separated), the smallest one (least_dn) and "
+    "the widths there (yellow_fwhm_nm, red_fwhm_nm)",
     LEFT_OUT: "where each light is left out of a search in turn: signal_type, signal, the optimum that was "
     "`seen`, the same design `with_it`, and the `fall`",
     SEARCH_LOG: "every evaluation of the search and of its front: " + ", ".join(search_schema(["<parameters>"]).names),

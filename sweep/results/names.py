@@ -13,6 +13,7 @@ from .tables import (
     POINTS,
     PROVENANCE,
     RECOGNITION,
+    REGIONS_MAP,
     RENDERED,
     RESOLVED,
     RESULTS,
@@ -35,6 +36,7 @@ TABLES = (
     VALIDATED,
     LEFT_OUT,
     ROBUSTNESS,
+    REGIONS_MAP,
     RECOGNITION,
     TRADED,
     RENDERED,
@@ -45,7 +47,7 @@ MADE_BY_RUN = frozenset((*TABLES, RESOLVED, PROVENANCE))
 _DRAWN = re.compile(
     r"report\.html|cfas\.(png|svg)|pareto(-\d+)?\.(png|svg)|paper_comparison\.(csv|parquet)"
     r"|figures/((filters|series)-\d+|tiles|sensor|signals|chart|scorecard|(color-noise|rendered)-\d+"
-    r"|clouds-(cfas|designs)|vision-(errors|ranks|misread))\.(png|svg)"
+    r"|regions-\d+|clouds-(cfas|designs)|vision-(errors|ranks|misread))\.(png|svg)"
 )
 
 

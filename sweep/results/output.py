@@ -39,6 +39,7 @@ from .tables import (
     POINTS,
     PROVENANCE,
     RECOGNITION,
+    REGIONS_MAP,
     RENDERED,
     RESOLVED,
     RESULTS,
@@ -54,7 +55,19 @@ from .tables import (
 )
 from .thinning import Counts, thinned
 
-_OPTIONAL = (FRONT, RECOGNITION, SEARCH_LOG, AUDIT, VALIDATED, ROBUSTNESS, LEFT_OUT, TRADED, RENDERED, *VISION_TABLES)
+_OPTIONAL = (
+    FRONT,
+    RECOGNITION,
+    SEARCH_LOG,
+    AUDIT,
+    VALIDATED,
+    ROBUSTNESS,
+    REGIONS_MAP,
+    LEFT_OUT,
+    TRADED,
+    RENDERED,
+    *VISION_TABLES,
+)
 """Files that some runs alone have."""
 _MOST_SHOWN = 10
 _ALWAYS_WRITTEN = ("study", "seed", "wavelengths", "scenarios", "objective")
@@ -68,8 +81,8 @@ class Output:
 
     `study`: the study that was run, and `resolved` its file. `profiles`: over the whole table, per CFA; none where a
     sweep is no grid. `searched`: the search's evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per
-    light that was left out of a search. `traded`: color error against noise, `rendered`: areas of pictures; `vision`:
-    tables of the benchmark of vision by their files' names.
+    light that was left out of a search; `regions`: cells of the maps of color regions. `traded`: color error against
+    noise, `rendered`: areas of pictures; `vision`: tables of the benchmark of vision by their files' names.
     """
 
     folder: Path
@@ -85,6 +98,7 @@ class Output:
     searched: pd.DataFrame | None
     audited: pd.DataFrame | None
     left_out: pd.DataFrame | None
+    regions: pd.DataFrame | None
     traded: pd.DataFrame | None
     rendered: pd.DataFrame | None
     vision: Mapping[str, pd.DataFrame]
@@ -218,6 +232,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         searched=more.get(SEARCH_LOG),
         audited=more.get(AUDIT),
         left_out=more.get(LEFT_OUT),
+        regions=more.get(REGIONS_MAP),
         traded=more.get(TRADED),
         rendered=more.get(RENDERED),
         vision={name: table for name, table in more.items() if name in VISION_TABLES},

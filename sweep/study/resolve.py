@@ -17,6 +17,7 @@ from ..errors import StudyError, SweepError
 from ..metrics.quantity import Asked, Quantity
 from ..metrics.registry import listed, quantities_of
 from ..search.solver import ALGORITHMS
+from .allowed_lamps import check_regions
 from .axes import Axis
 from .document import Document
 from .goals import check_goals
@@ -67,6 +68,7 @@ class _Resolver:
         spaces = SpaceBuilder(section, self.sources, sensor, mosaics).spaces()
         self.check_columns(lights)
         check_luminances(section, lights, self.sources)
+        check_regions(section, self.sources)
         self.check_images()
         check_lenses(section, sensor, spaces, self.sources)
         if self.tasks is not None:

@@ -12,6 +12,7 @@ from ..camera.scene import Geometry
 from ..camera.sensor import BUILT_IN_SENSORS
 from ..curves.builtin.registry import BUILT_IN_LIGHTS
 from ..curves.population import Population
+from ..curves.single_leds import RegionMap
 from ..curves.spectrum import WavelengthGrid
 from ..designs.registry import FamilyOptions, told
 from ..designs.technology import Stated
@@ -264,6 +265,8 @@ class StudySection(Documented):
     """What production does to a filter; then worst_... quantities exist."""
     population: Population | None = None
     """The lamps that the lights stand for: temperature, binning, ageing; then worst_csd_... quantities exist."""
+    regions: RegionMap | None = None
+    """Which yellow and red lamps that a norm allows each CFA tells apart."""
     recognition: Recognition | None = None
     """How often noise confuses signal types; needs noise in every scenario."""
     tasks: TasksAsked = None
