@@ -25,6 +25,7 @@ from ..results.tables import (
     LEFT_OUT,
     LIMITED_BY,
     POINTS,
+    PRICE,
     PROVENANCE,
     RECOGNITION,
     REGIONS_MAP,
@@ -54,7 +55,16 @@ from .provenance import plan_facts, provenance, resolved_yaml
 from .recognition import recognition_table
 from .routes import Detours, detours_in_words
 from .rows import Rules, detours_of, with_local_front
-from .search import SearchAnswer, answer_row, front_table, limit_alone, run_search, search_facts, search_log
+from .search import (
+    SearchAnswer,
+    answer_row,
+    front_table,
+    limit_alone,
+    price_table,
+    run_search,
+    search_facts,
+    search_log,
+)
 from .sweep import Sweep
 from .workers import Workers
 
@@ -67,6 +77,7 @@ def files_of(study: Study) -> set[str]:
     names = {RESULTS, CURVES, POINTS, LIMITED_BY, RESOLVED, PROVENANCE}
     if study.search is not None:
         names |= {SEARCH_LOG, FRONT} if study.search.levels else {SEARCH_LOG}
+    names |= {PRICE} if study.search is not None and study.search.nominal_levels else set()
     names |= {VALIDATED} if study.held_out is not None else set()
     names |= {LEFT_OUT} if study.leaves_one_out else set()
     names |= {ROBUSTNESS} if study.pair_over_population is not None else set()
@@ -106,7 +117,7 @@ class Making:
         while todo:
             if RESULTS in todo:
                 self._sweep()
-            if todo & {SEARCH_LOG, FRONT, LEFT_OUT}:
+            if todo & {SEARCH_LOG, FRONT, PRICE, LEFT_OUT}:
                 self._write_search(todo)
             if todo & _DRAWN:
                 self._write_drawn(todo)
@@ -185,6 +196,8 @@ class Making:
             self.inventory.write_table(SEARCH_LOG, search_log(self.answer))
         if FRONT in names:
             self.inventory.write_table(FRONT, front_table(self.study, self.answer))
+        if PRICE in names:
+            self.inventory.write_table(PRICE, price_table(self.answer))
         if LEFT_OUT in names:
             given = self.study, self.answer.search, self.answer.best, self.crew, self.progress
             self.inventory.write_table(LEFT_OUT, left_out_table(*given))
