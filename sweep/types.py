@@ -32,6 +32,13 @@ class Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
 
 
+def from_to(value: Any) -> Any:
+    """A list of two numbers as a tuple, for sections; raises ValueError for anything else."""
+    if not isinstance(value, list | tuple) or len(value) != 2:
+        raise ValueError("two numbers, from and to")
+    return tuple(value)
+
+
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
 Fraction = Annotated[float, Field(ge=0, le=1)]

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..types import Section
+from ..types import Section, from_to
 
 _Value = TypeVar("_Value")
 _Celsius = Annotated[float, Field(ge=-100, le=300)]
@@ -37,16 +37,9 @@ def _by_name(value: Any) -> Any:
     return value if isinstance(value, dict) else {_ALL: value}
 
 
-def _span(value: Any) -> Any:
-    """A list of two."""
-    if not isinstance(value, list | tuple) or len(value) != 2:
-        raise ValueError("two numbers, from and to")
-    return tuple(value)
-
-
 def _spans_by_name(value: Any) -> Any:
     """Two numbers alone hold for every signal."""
-    return {name: _span(each) for name, each in _by_name(value).items()}
+    return {name: from_to(each) for name, each in _by_name(value).items()}
 
 
 class Population(Section):
@@ -64,7 +57,7 @@ class Population(Section):
 
     temperature_c: Annotated[
         tuple[_Celsius, _Celsius],
-        BeforeValidator(_span, json_schema_input_type=Annotated[list[_Celsius], Field(min_length=2, max_length=2)]),
+        BeforeValidator(from_to, json_schema_input_type=Annotated[list[_Celsius], Field(min_length=2, max_length=2)]),
     ] = (25.0, 25.0)
     reference_c: _Celsius = 25.0
     self_heating_k: float = Field(default=0.0, ge=0, le=200)

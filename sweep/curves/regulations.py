@@ -1,8 +1,10 @@
-"""Color regions of regulations: where the surrogates of vehicle lamps and of sign sheeting have to lie."""
+"""Color regions of regulations: of yellow and red signals, of vehicle lamps, and of sign sheeting."""
 
 from __future__ import annotations
 
-from .color import ColorRegion
+from collections.abc import Mapping
+
+from .color import REGIONS, ColorRegion
 
 _R48 = "UN Regulation 48, 2.29, color of the light emitted from a device (red, amber, white)"
 _R65 = "UN Regulation 65, special warning lamps (blue)"
@@ -18,6 +20,24 @@ LAMP_REGIONS = {
 """red: y <= 0.335, y >= 0.980 - x; amber: y <= x - 0.120, y >= 0.390, y >= 0.790 - 0.670 x; blue: y <= 0.065 + 0.805 x,
 y <= 0.400 - x, x <= 0.133 + 0.600 y; white: y <= 0.150 + 0.640 x, y <= 0.440, x <= 0.500, y >= 0.050 + 0.750 x,
 x >= 0.310 (right of x = 0.443 the regulation lets y down to 0.382)."""
+
+_ITE = "ITE, Vehicle Traffic Control Signal Heads, 1985, and its part 2 of 1998 for LED modules"
+SIGNAL_REGIONS: Mapping[str, Mapping[str, ColorRegion]] = {
+    "en_12368": {kind: REGIONS[kind] for kind in ("yellow", "red")},
+    "ite": {
+        "yellow": ColorRegion(((0, -1, -0.411), (0, 1, 0.452), (-1, -1, -0.995)), _ITE),
+        "red": ColorRegion(((0, 1, 0.308), (-1, -1, -0.998)), _ITE),
+    },
+    "un_r48": {"yellow": LAMP_REGIONS["amber"], "red": LAMP_REGIONS["red"]},
+}
+"""What yellow and red lights a norm allows, between these bounds and the spectral locus, with corners (x, y).
+
+EN 12368: yellow (0.593, 0.387), (0.536, 0.444), red (0.660, 0.320), (0.690, 0.290). ITE: yellow 0.411 <= y <= 0.452,
+y >= 0.995 - x: (0.584, 0.411), (0.543, 0.452), red y <= 0.308, y >= 0.998 - x: (0.690, 0.308). Bounds of both as
+compared by the Lighting Research Center, Rensselaer, "LED Traffic Signal Comparison". UN R48, which SAE J578 shares:
+yellow (0.545, 0.425), (0.597, 0.390), red (0.645, 0.335), (0.721, 0.259), of vehicles' lamps.
+"""
+NORM_NAMES: Mapping[str, str] = {"en_12368": "EN 12368", "ite": "ITE", "un_r48": "UN R48 and SAE J578"}
 
 
 def corners(*points: tuple[float, float], source: str) -> ColorRegion:

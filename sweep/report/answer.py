@@ -15,6 +15,7 @@ from ..metrics.quantity import DECADES
 from ..results.output import Output
 from ..results.tables import FOUND, PLAIN, SWEPT
 from ..results.thinning import per_light
+from .allowed_lamps import lamp_lines
 from .assumed import assumed, moves_with_light
 from .leaders import Leaders, Row, leaders_of
 from .names import full_name
@@ -66,7 +67,7 @@ def _of_designs(output: Output) -> list[str]:
         return series
     leaders = leaders_of(output)
     lamps = robustness_lines(output, leaders.chosen)
-    return [*_best(output, leaders), *lamps, *who_else(output), *series]
+    return [*_best(output, leaders), *lamps, *lamp_lines(output), *who_else(output), *series]
 
 
 def _under(output: Output) -> str:

@@ -18,6 +18,7 @@ from ..results.profiles import profile_table
 from ..results.tables import FOUND, NAMED, PLAIN, csv_of, encoded
 from . import tables
 from . import values as content
+from .allowed_lamps import lamp_drawings, lamp_table
 from .answer import answer_sentences, large_numbers
 from .colors import color_drawings
 from .figures import draw_curves, draw_pareto, rendered
@@ -27,6 +28,7 @@ from .noise import all_series, told_apart_table
 from .overview import draw_overview, overview_figure
 from .page_data import payload
 from .pages import inlined, library, page, rows, script
+from .price import price_drawings
 from .published import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
 from .scenes import effect_table, scene_groups, scene_table
 from .scorecard import draw_scorecard, score_cells, scorecard
@@ -44,6 +46,7 @@ _FIRST_LINES = 3
 _PICTURES = ("tiles", "sensor", "signals", "chart")
 """Figures that the page shows as pictures; it draws all others itself, but for those of tasks."""
 _OF_TASKS = ("scorecard", "color-noise", "rendered")
+_OF_REGIONS, _OF_PRICE = "regions", "price"
 
 
 def make_report(output: Output, *, mend: bool = False) -> None:
@@ -72,7 +75,7 @@ def _contents(output: Output, some: Iterable[str] | None) -> dict[str, bytes]:
         for kind in ("png", "svg"):
             if some is None or {f"{where}.png", f"{where}.svg"} & {*some}:
                 contents[f"{where}.{kind}"] = rendered(figure, kind)
-        if some is None and name.startswith((*_PICTURES, *_OF_TASKS, VISION_FIGURES)):
+        if some is None and name.startswith((*_PICTURES, *_OF_TASKS, _OF_REGIONS, _OF_PRICE, VISION_FIGURES)):
             images.append((name, caption, inlined(contents[f"{where}.png"])))
     published = comparison_with_published(output)
     if len(published):
@@ -109,6 +112,9 @@ def _html(output: Output, images: Sequence[tuple[str, str, str]], published: pd.
         group_rows=[rows(effect_table(group)) for group in groups],
         audited=output.audited is not None,
         images=[(caption, uri) for name, caption, uri in images if name in _PICTURES],
+        price_images=[(caption, uri) for name, caption, uri in images if name == _OF_PRICE],
+        lamps=rows(lamp_table(output)),
+        lamp_images=[(caption, uri) for name, caption, uri in images if name.startswith(_OF_REGIONS)],
         vision=_vision(output),
         vision_images=[(caption, uri) for name, caption, uri in images if name.startswith(VISION_FIGURES)],
         comparison=rows(tables.comparison_table(output)),
@@ -170,6 +176,8 @@ def _drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
     if card is not None:
         yield "scorecard", f"Every figure relative to {card.names[card.reference]}", draw_scorecard(card)
     yield from color_drawings(output)
+    yield from price_drawings(output)
+    yield from lamp_drawings(output)
     yield "tiles", "Tiles of the CFAs; a hatched pixel is modified", draw_tiles(tiles_figure(output))
     yield "sensor", "Quantum efficiency of the sensor", draw_curves(content.sensor_figure(output))
     yield "signals", "Spectra of the signals", draw_curves(content.lights_figure(output))

@@ -11,6 +11,7 @@ from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN
 from .leaders import Row
 from .names import full_name
+from .price import price_lines
 
 
 def over_population(output: Output) -> bool:
@@ -36,6 +37,7 @@ def robustness_lines(output: Output, best: Row | None) -> Iterator[str]:
     few: list[Row] = list(output.few[output.few["scenario"] == scenario].to_dict("records"))
     if best is not None and over_population(output):
         yield from _price(output, best, [row for row in few if row["kind"] == NAMED])
+    yield from price_lines(output)
     for row in few:
         if row["kind"] in (NAMED, FOUND) and np.isfinite(row.get("breaks_at", np.nan)):
             yield _breaks(output, row, few)

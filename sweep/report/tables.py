@@ -64,7 +64,8 @@ def worst_left_out(output: Output, most: int = 10) -> pd.DataFrame:
     """The lights whose absence from the search costs most."""
     if output.left_out is None:
         return pd.DataFrame()
-    return output.left_out.nlargest(most, "fall").round(1)
+    worst = output.left_out.nlargest(most, "fall").round(1)
+    return worst.assign(objective=[output.words(name) for name in worst["objective"]])
 
 
 def geometry_table(output: Output) -> pd.DataFrame:

@@ -21,14 +21,19 @@ def unseen_lines(output: Output, best: Row) -> Iterator[str]:
     if np.isfinite(held_out):
         own = separation.told(best[separation.name])
         yield f"On lights that it has not seen it has {separation.told(held_out)} (on its own lights {own})."
-    if output.left_out is not None and output.left_out["fall"].notna().any():
-        worst = output.left_out.nlargest(1, "fall").iloc[0]
-        yield f"Left out of the search, {worst['signal']} costs its optimum most: {separation.told(worst['fall'])}."
-        falls = output.left_out["fall"].dropna().to_numpy()
+    if output.left_out is None:
+        return
+    several = output.left_out["objective"].nunique() > 1
+    for objective, rows in output.left_out[output.left_out["fall"].notna()].groupby("objective", sort=False):
+        quantity = output.columns[str(objective)]
+        of = f" of the {quantity.words}" if several else ""
+        worst = rows.nlargest(1, "fall").iloc[0]
+        yield f"Left out of the search, {worst['signal']} costs its optimum{of} most: {quantity.told(worst['fall'])}."
+        falls = rows["fall"].to_numpy()
         if falls.size > 1:
             mean, low, high = generalization_gap(falls, output.study.seed)
-            ends = f"95 % interval {separation.told(low)} to {separation.told(high)}"
-            yield f"A light that the search has not seen costs {separation.told(mean)} on average ({ends})."
+            ends = f"95 % interval {quantity.told(low)} to {quantity.told(high)}"
+            yield f"A light that the search{of} has not seen costs {quantity.told(mean)} on average ({ends})."
 
 
 def generalization_gap(falls: FloatArray, seed: int) -> tuple[float, float, float]:

@@ -9,6 +9,7 @@ from ..metrics.quantity import Asked
 from ..metrics.registry import listed
 from .curves import SCHEMA
 from .names import FIGURES, REPORT, RUN, SUMS
+from .price import price_schema
 from .tables import (
     AUDIT,
     CURVES,
@@ -16,8 +17,10 @@ from .tables import (
     LEFT_OUT,
     LIMITED_BY,
     POINTS,
+    PRICE,
     PROVENANCE,
     RECOGNITION,
+    REGIONS_MAP,
     RENDERED,
     RESOLVED,
     RESULTS,
@@ -90,11 +93,18 @@ FILES = {
     "`design_id`; how many times as large population and edge shift must be for the worst CSD to fall below that of "
     "the best plain CFA (`breaks_at`; null: not up to 3 times), and the CSD, lights, shifts and temperatures there; "
     "`yield`, the share of random lamps and cameras with the wanted CSD, with its 95 % interval",
-    LEFT_OUT: "where each light is left out of a search in turn: signal_type, signal, the optimum that was "
-    "`seen`, the same design `with_it`, and the `fall`",
+    REGIONS_MAP: "where a study asks for maps of color regions, for each plain CFA, named design and answer of the "
+    "search: design_id, norm, peak of the yellow LED (yellow_nm) and of the red one (red_nm), how many pairs of widths "
+    "the norm allows (pairs), how many of these have the wanted distance (separated), the smallest one (least_dn) and "
+    "the widths there (yellow_fwhm_nm, red_fwhm_nm)",
+    LEFT_OUT: "where each light is left out of a search in turn: the objective (of a worst case the nominal quantity, "
+    "too), signal_type, signal, the optimum that was `seen`, the same design `with_it`, and the `fall`",
     SEARCH_LOG: "every evaluation of the search and of its front: " + ", ".join(search_schema(["<parameters>"]).names),
     FRONT: "what the search found at each level of sensitivity, and the limit there; between two levels rows with the "
     "limit alone: " + ", ".join(front_schema(["<parameters>"]).names),
+    PRICE: "where a search asks for `nominal_levels` of an objective that is a worst case: the search's answer, the "
+    "filter with the largest worst case at each nominal level, and the one with the most nominally, all before "
+    "clipping and rounding: " + ", ".join(price_schema(["<parameters>"]).names),
     CURVES: "a row per curve and wavelength: " + ", ".join(SCHEMA.names),
     POINTS: "what the clouds draw: design_id, signal_type, signal, channel, dn",
     RECOGNITION: "raw patches told apart by classifiers, where a study asks for them, with 95 % intervals",

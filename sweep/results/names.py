@@ -11,8 +11,10 @@ from .tables import (
     LEFT_OUT,
     LIMITED_BY,
     POINTS,
+    PRICE,
     PROVENANCE,
     RECOGNITION,
+    REGIONS_MAP,
     RENDERED,
     RESOLVED,
     RESULTS,
@@ -29,12 +31,14 @@ TABLES = (
     RESULTS,
     SEARCH_LOG,
     FRONT,
+    PRICE,
     CURVES,
     POINTS,
     LIMITED_BY,
     VALIDATED,
     LEFT_OUT,
     ROBUSTNESS,
+    REGIONS_MAP,
     RECOGNITION,
     TRADED,
     RENDERED,
@@ -45,7 +49,7 @@ MADE_BY_RUN = frozenset((*TABLES, RESOLVED, PROVENANCE))
 _DRAWN = re.compile(
     r"report\.html|cfas\.(png|svg)|pareto(-\d+)?\.(png|svg)|paper_comparison\.(csv|parquet)"
     r"|figures/((filters|series)-\d+|tiles|sensor|signals|chart|scorecard|(color-noise|rendered)-\d+"
-    r"|clouds-(cfas|designs)|vision-(errors|ranks|misread))\.(png|svg)"
+    r"|price|regions-\d+|clouds-(cfas|designs)|vision-(errors|ranks|misread))\.(png|svg)"
 )
 
 

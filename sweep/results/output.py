@@ -37,8 +37,10 @@ from .tables import (
     NAMED,
     PLAIN,
     POINTS,
+    PRICE,
     PROVENANCE,
     RECOGNITION,
+    REGIONS_MAP,
     RENDERED,
     RESOLVED,
     RESULTS,
@@ -54,7 +56,20 @@ from .tables import (
 )
 from .thinning import Counts, thinned
 
-_OPTIONAL = (FRONT, RECOGNITION, SEARCH_LOG, AUDIT, VALIDATED, ROBUSTNESS, LEFT_OUT, TRADED, RENDERED, *VISION_TABLES)
+_OPTIONAL = (
+    FRONT,
+    PRICE,
+    RECOGNITION,
+    SEARCH_LOG,
+    AUDIT,
+    VALIDATED,
+    ROBUSTNESS,
+    REGIONS_MAP,
+    LEFT_OUT,
+    TRADED,
+    RENDERED,
+    *VISION_TABLES,
+)
 """Files that some runs alone have."""
 _MOST_SHOWN = 10
 _ALWAYS_WRITTEN = ("study", "seed", "wavelengths", "scenarios", "objective")
@@ -68,8 +83,9 @@ class Output:
 
     `study`: the study that was run, and `resolved` its file. `profiles`: over the whole table, per CFA; none where a
     sweep is no grid. `searched`: the search's evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per
-    light that was left out of a search. `traded`: color error against noise, `rendered`: areas of pictures; `vision`:
-    tables of the benchmark of vision by their files' names.
+    light that was left out of a search; `price`: the largest worst
+    case at each nominal level; `regions`: cells of the maps of color regions. `traded`: color error against
+    noise, `rendered`: areas of pictures; `vision`: tables of the benchmark of vision by their files' names.
     """
 
     folder: Path
@@ -85,6 +101,8 @@ class Output:
     searched: pd.DataFrame | None
     audited: pd.DataFrame | None
     left_out: pd.DataFrame | None
+    price: pd.DataFrame | None
+    regions: pd.DataFrame | None
     traded: pd.DataFrame | None
     rendered: pd.DataFrame | None
     vision: Mapping[str, pd.DataFrame]
@@ -199,6 +217,8 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
     _check_columns(folder / POINTS, ["design_id", "signal_type", "signal", "channel", "dn"])
     if FRONT in optional:
         _check_columns(folder / FRONT, front_schema(()).names)
+    if LEFT_OUT in optional:
+        _check_columns(folder / LEFT_OUT, ["objective", "signal_type", "signal", "fall"])
     objective = study.objective.column
     profiles = Profiles(objective, next(iter(study.scenarios)), provenance.parameters)
     table, counts = thinned(folder / RESULTS, [objective, *provenance.trade_off], provenance.trade_off[0], profiles.add)
@@ -218,6 +238,8 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         searched=more.get(SEARCH_LOG),
         audited=more.get(AUDIT),
         left_out=more.get(LEFT_OUT),
+        price=more.get(PRICE),
+        regions=more.get(REGIONS_MAP),
         traded=more.get(TRADED),
         rendered=more.get(RENDERED),
         vision={name: table for name, table in more.items() if name in VISION_TABLES},

@@ -25,8 +25,10 @@ from ..results.tables import (
     LEFT_OUT,
     LIMITED_BY,
     POINTS,
+    PRICE,
     PROVENANCE,
     RECOGNITION,
+    REGIONS_MAP,
     RENDERED,
     RESOLVED,
     RESULTS,
@@ -53,9 +55,21 @@ from .provenance import plan_facts, provenance, resolved_yaml
 from .recognition import recognition_table
 from .routes import Detours, detours_in_words
 from .rows import Rules, detours_of, with_local_front
-from .search import SearchAnswer, answer_row, front_table, limit_alone, run_search, search_facts, search_log
+from .search import (
+    SearchAnswer,
+    answer_row,
+    front_table,
+    limit_alone,
+    price_table,
+    run_search,
+    search_facts,
+    search_log,
+)
 from .sweep import Sweep
 from .workers import Workers
+
+_DRAWN = {CURVES, POINTS, LIMITED_BY, VALIDATED, ROBUSTNESS, REGIONS_MAP, RECOGNITION, TRADED, RENDERED}
+"""Tables of what is drawn of the rows."""
 
 
 def files_of(study: Study) -> set[str]:
@@ -63,9 +77,11 @@ def files_of(study: Study) -> set[str]:
     names = {RESULTS, CURVES, POINTS, LIMITED_BY, RESOLVED, PROVENANCE}
     if study.search is not None:
         names |= {SEARCH_LOG, FRONT} if study.search.levels else {SEARCH_LOG}
+    names |= {PRICE} if study.search is not None and study.search.nominal_levels else set()
     names |= {VALIDATED} if study.held_out is not None else set()
     names |= {LEFT_OUT} if study.leaves_one_out else set()
     names |= {ROBUSTNESS} if study.pair_over_population is not None else set()
+    names |= {REGIONS_MAP} if study.section.regions is not None else set()
     names |= {TRADED, RENDERED} if study.tasks is not None and "color" in study.tasks.by_name else set()
     names |= {*VISION_TABLES} if study.section.vision is not None else set()
     asked = study.section.recognition
@@ -101,9 +117,9 @@ class Making:
         while todo:
             if RESULTS in todo:
                 self._sweep()
-            if todo & {SEARCH_LOG, FRONT, LEFT_OUT}:
+            if todo & {SEARCH_LOG, FRONT, PRICE, LEFT_OUT}:
                 self._write_search(todo)
-            if todo & {CURVES, POINTS, LIMITED_BY, VALIDATED, ROBUSTNESS, RECOGNITION, TRADED, RENDERED}:
+            if todo & _DRAWN:
                 self._write_drawn(todo)
             if todo & {*VISION_TABLES}:
                 self._write_vision(todo)
@@ -180,6 +196,8 @@ class Making:
             self.inventory.write_table(SEARCH_LOG, search_log(self.answer))
         if FRONT in names:
             self.inventory.write_table(FRONT, front_table(self.study, self.answer))
+        if PRICE in names:
+            self.inventory.write_table(PRICE, price_table(self.answer))
         if LEFT_OUT in names:
             given = self.study, self.answer.search, self.answer.best, self.crew, self.progress
             self.inventory.write_table(LEFT_OUT, left_out_table(*given))
@@ -200,6 +218,10 @@ class Making:
             from .robustness import robustness_table  # noqa: PLC0415  (only where lights have a population)
 
             self.inventory.write_table(ROBUSTNESS, robustness_table(self.study, rows, self.crew, self.progress))
+        if REGIONS_MAP in names:
+            from .allowed_lamps import regions_table  # noqa: PLC0415  (only where a study asks for it)
+
+            self.inventory.write_table(REGIONS_MAP, regions_table(self.study, rows, self.crew, self.progress))
         if RECOGNITION in names:
             table = recognition_table(self.study, rows, self.crew, self.progress)
             assert table is not None

@@ -17,12 +17,15 @@ from ..metrics.evaluate import evaluate
 from ..metrics.quantity import HELD_OUT
 from ..metrics.separation import csd_name
 from ..results.designs import row_curves
+from ..search.price import best_nominal, has_nominal, nominal_problem
 from ..search.problem import Evaluation, Problem, best_feasible, starting_points
 from ..search.solver import search_from, smooth_objective
+from ..search.trade_off import Effort
 from ..study import Search, Study
 from ..types import FloatArray, Parallel, Progress, delayed
 
 _STARTS = 4
+_FIGURES = ("seen", "with_it", "fall")
 
 
 def held_out_table(
@@ -58,28 +61,33 @@ def _on_lights(view: View, curves: FloatArray) -> dict[str, float]:
 def left_out_table(study: Study, search: Search, best: Evaluation, parallel: Parallel, progress: Progress) -> pa.Table:
     """A row per light of the objective: the search without it, and what its optimum falls to with it.
 
-    Columns `signal_type`, `signal`; `seen`: the objective of the optimum without the light, `with_it`: that of the
-    same design with all lights, `fall`: the difference; before quantization. Each search starts from the study's
-    answer and a few other points. A light that is alone in its type cannot be left out.
+    Columns `objective`, `signal_type`, `signal`; `seen`: the objective of the optimum without the light, `with_it`:
+    that of the same design with all lights, `fall`: the difference; before quantization. Each search starts from the
+    study's answer and a few other points. Of an objective that is a worst case the nominal quantity is searched, too.
+    A light that is alone in its type cannot be left out.
     """
-    problem = study.problem(search)
-    asked = {name for column in problem.objective.weights for name in _types(problem, column)}
-    lights = study.lights
-    members = {name: len(own) for name, own in lights.members.items()}
-    at = [i for i, kind in enumerate(lights.types) if kind in asked and members[kind] > 1]
-    starts = [problem.to_unit(best.x), *starting_points(problem, _STARTS - 1, study.section.seed)]
-    each = max(1, search.max_evaluations // _STARTS)
-    tasks = [delayed(_without, problem, i, starts, search.algorithm, each, study.section.seed) for i in at]
+    problem, seed = study.problem(search), study.section.seed
+    lights, members = study.lights, {name: len(own) for name, own in study.lights.members.items()}
+    points = starting_points(problem, _STARTS - 1, seed)
+    effort = Effort(search.algorithm, points, max(1, search.max_evaluations // _STARTS), seed)
+    optima: list[tuple[Problem, Evaluation]] = [(problem, best)]
+    if has_nominal(problem):
+        nominal = best_nominal(problem, best, effort, parallel)
+        optima += [] if nominal is None else [(nominal_problem(problem), nominal)]
+    tasks = []
     rows: list[dict[str, Any]] = []
-    for i, answer in zip(at, parallel(tasks), strict=True):
-        key = {"signal_type": lights.types[i], "signal": lights.names[i]}
-        rows.append(key | dict(zip(("seen", "with_it", "fall"), answer or (None,) * 3, strict=True)))
-        progress("lights left out", len(rows), len(at))
-    number = pa.float64()
-    fields = [("signal_type", pa.string()), ("signal", pa.string())]
-    return pa.Table.from_pylist(
-        rows, schema=pa.schema([*fields, ("seen", number), ("with_it", number), ("fall", number)])
-    )
+    for asked, optimum in optima:
+        types = {name for column in asked.objective.weights for name in _types(asked, column)}
+        starts = [asked.to_unit(optimum.x), *points]
+        for at, kind in enumerate(lights.types):
+            if kind in types and members[kind] > 1:
+                tasks.append(delayed(_without, asked, at, starts, effort.algorithm, effort.evaluations, seed))
+                rows.append({"objective": asked.objective.column, "signal_type": kind, "signal": lights.names[at]})
+    for done, (row, answer) in enumerate(zip(rows, parallel(tasks), strict=True), 1):
+        row |= dict(zip(_FIGURES, answer or (None,) * len(_FIGURES), strict=True))
+        progress("lights left out", done, len(rows))
+    fields = [(name, pa.string()) for name in ("objective", "signal_type", "signal")]
+    return pa.Table.from_pylist(rows, schema=pa.schema([*fields, *((name, pa.float64()) for name in _FIGURES)]))
 
 
 def _types(problem: Problem, column: str) -> tuple[str, ...]:

@@ -13,8 +13,10 @@ from ..designs.space import Space
 from ..errors import Fault, InfeasibleError
 from ..metrics.bound import FEASIBLE
 from ..metrics.columns.sensitivity import cfa_sensitivity_at
+from ..results.price import price_schema
 from ..results.tables import front_schema, search_schema
 from ..search.limit import Limit, limit_of, why_not
+from ..search.price import PricePoint, worst_case_price
 from ..search.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
 from ..search.solver import best_reachable, search_from
 from ..search.trade_off import Effort, FrontPoint, check_proof, gap_of, trade_off
@@ -35,6 +37,7 @@ class SearchAnswer:
     limit: Limit | None
     no_limit: str | None
     front: tuple[FrontPoint, ...]
+    price: tuple[PricePoint, ...] = ()
 
     @property
     def gap(self) -> float | None:
@@ -67,7 +70,10 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     check_proof(best, limit)
     effort = Effort(search.algorithm, starts, each, study.section.seed)
     front = trade_off(problem, search.levels, effort, parallel, progress) if search.levels else ()
-    return SearchAnswer(search, tuple(runs), best, limit, no_limit, front)
+    price: tuple[PricePoint, ...] = ()
+    if search.nominal_levels:
+        price = worst_case_price(problem, best, limit, search.nominal_levels, effort, parallel, progress)
+    return SearchAnswer(search, tuple(runs), best, limit, no_limit, front, price)
 
 
 def limit_alone(study: Study, search: Search) -> Limit | None:
@@ -169,3 +175,20 @@ def front_table(study: Study, answer: SearchAnswer) -> pa.Table:
                 whole = cfa_sensitivity_at(view, sensitivity)
                 rows.append({"sensitivity_min": sensitivity, "cfa_sensitivity_min": whole, "limit": proven})
     return pa.Table.from_pylist(rows, schema=front_schema(names))
+
+
+def price_table(answer: SearchAnswer) -> pa.Table:
+    """A row per filter of the price of the worst case, from the search's answer to the best nominal filter."""
+    names = answer.search.space.parameters
+    rows = [
+        {
+            "nominal_min": point.level,
+            "nominal": point.nominal,
+            "worst": point.worst,
+            "sensitivity": point.best.sensitivity,
+            "cfa_sensitivity": point.best.cfa_sensitivity,
+            **dict(zip(names, map(float, point.best.x), strict=True)),
+        }
+        for point in answer.price
+    ]
+    return pa.Table.from_pylist(rows, schema=price_schema(names))

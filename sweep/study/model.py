@@ -41,6 +41,7 @@ class Search:
     starts: int
     max_evaluations: int
     levels: tuple[float, ...] = ()
+    nominal_levels: int = 0
 
 
 @dataclass(frozen=True)

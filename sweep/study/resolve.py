@@ -14,9 +14,10 @@ from ..curves.spectrum import Curves
 from ..curves.tasks import StudyTasks
 from ..designs.space import Space
 from ..errors import StudyError, SweepError
-from ..metrics.quantity import Asked, Quantity
+from ..metrics.quantity import WORST_CASE, Asked, Quantity
 from ..metrics.registry import listed, quantities_of
 from ..search.solver import ALGORITHMS
+from .allowed_lamps import check_regions
 from .axes import Axis
 from .document import Document
 from .goals import check_goals
@@ -67,6 +68,7 @@ class _Resolver:
         spaces = SpaceBuilder(section, self.sources, sensor, mosaics).spaces()
         self.check_columns(lights)
         check_luminances(section, lights, self.sources)
+        check_regions(section, self.sources)
         self.check_images()
         check_lenses(section, sensor, spaces, self.sources)
         if self.tasks is not None:
@@ -239,7 +241,8 @@ class _Resolver:
         seen = self.section.scenarios[scenario]
         if seen.drive is not None and isinstance(seen.exposure, WhitePatchExposure):
             self.add(("search", "scenario"), "a search under a pulsed light needs a fixed exposure", scenario)
-        return Search(boxes[chosen], scenario, section.algorithm, section.starts, section.max_evaluations, levels)
+        effort = section.algorithm, section.starts, section.max_evaluations
+        return Search(boxes[chosen], scenario, *effort, levels, section.nominal_levels)
 
     def check_searched(self, space: Space, lights: Lights) -> None:
         """What the searched family must have for the study's constraints, and the front for its objective."""
@@ -255,6 +258,13 @@ class _Resolver:
         if self.section.search.front is not None and light:
             problem = "the front is searched at levels of sensitivity, which is in the objective"
             self.add(("search", "front"), problem, None, "an objective of CSDs")
+        column = self.section.objective.column
+        if self.section.search.nominal_levels and (column not in known or known[column].extreme != WORST_CASE):
+            problem = "levels of what is nominal go with an objective that is a single worst case"
+            worst = ", ".join(
+                name for name, quantity in known.items() if quantity.extreme == WORST_CASE and quantity.goal
+            )
+            self.add(("search", "nominal_levels"), problem, column, worst or "`production` or `population`")
 
 
 def resolve(

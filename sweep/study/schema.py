@@ -12,6 +12,7 @@ from ..camera.scene import Geometry
 from ..camera.sensor import BUILT_IN_SENSORS
 from ..curves.builtin.registry import BUILT_IN_LIGHTS
 from ..curves.population import Population
+from ..curves.single_leds import RegionMap
 from ..curves.spectrum import WavelengthGrid
 from ..designs.registry import FamilyOptions, told
 from ..designs.technology import Stated
@@ -188,12 +189,14 @@ class Levels(Section):
 class SearchSection(Documented):
     """A search in a box, or in that of a sweep (from the smallest to the largest value of each parameter).
 
-    `front`: repeat the search over these levels of the least sensitivity.
+    `front`: repeat the search over these levels of the least sensitivity. `nominal_levels`: of an objective that is a
+    worst case, repeat it at so many levels of the same quantity where nothing is off: what does the worst case cost?
     """
 
     space: Name | None = None
     """The sweep or box to search; may be left out where there is one."""
     front: Levels | None = None
+    nominal_levels: int = Field(default=0, ge=0, le=1000)
     scenario: Name | None = None
     algorithm: Name = "SLSQP"
     """SLSQP, MMA, CCSAQ; without gradients COBYLA, ISRES, ORIG_DIRECT_L, AGS."""
@@ -264,6 +267,8 @@ class StudySection(Documented):
     """What production does to a filter; then worst_... quantities exist."""
     population: Population | None = None
     """The lamps that the lights stand for: temperature, binning, ageing; then worst_csd_... quantities exist."""
+    regions: RegionMap | None = None
+    """Which yellow and red lamps that a norm allows each CFA tells apart."""
     recognition: Recognition | None = None
     """How often noise confuses signal types; needs noise in every scenario."""
     tasks: TasksAsked = None

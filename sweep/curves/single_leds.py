@@ -1,0 +1,106 @@
+"""Single LEDs that a norm allows: all peaks and widths whose color lies in its region of yellow or of red."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
+
+from ..types import FloatArray, Section, from_to
+from .builtin.led import led_photons
+from .color import chromaticity
+from .regulations import SIGNAL_REGIONS
+from .signal_color import VISIBLE
+from .spectrum import WavelengthGrid, equal_photons
+
+Norm = Literal["en_12368", "ite", "un_r48"]
+_FWHM = 2 * math.log(2 + math.sqrt(3))
+"""Full width at half maximum of sech(u / a), in units of a."""
+_MOST_LEDS = 20_000
+
+
+_Peak = Annotated[float, Field(ge=400, le=780)]
+_Width = Annotated[float, Field(ge=5, le=100)]
+
+
+class RegionMap(Section):
+    """Which lamps that a norm allows a camera can't tell apart: every yellow and every red LED in its color regions.
+
+    `norms`: `en_12368` (European signal heads), `ite` (American ones), `un_r48` (vehicles; the same as SAE J578).
+    `wanted_dn`: the distance that a pair should have. An LED is modeled: a hyperbolic secant with a peak and a full
+    width at half maximum, from and to `peak_nm` every `peak_step_nm`, from and to `fwhm_nm` every `fwhm_step_nm`. Those
+    whose color is inside the region are allowed, and count equally. The red regions of `ite` and `un_r48` have no end
+    toward the red: there `peak_nm` is the end. Photons are those of the study's lights, filters as designed.
+    """
+
+    norms: list[Norm] = Field(default=["en_12368"], min_length=1, max_length=3)
+    wanted_dn: float = Field(gt=0, le=1e6)
+    peak_nm: Annotated[
+        tuple[_Peak, _Peak],
+        BeforeValidator(from_to, json_schema_input_type=Annotated[list[_Peak], Field(min_length=2, max_length=2)]),
+    ] = (560.0, 660.0)
+    peak_step_nm: float = Field(default=1.0, ge=0.1, le=20)
+    fwhm_nm: Annotated[
+        tuple[_Width, _Width],
+        BeforeValidator(from_to, json_schema_input_type=Annotated[list[_Width], Field(min_length=2, max_length=2)]),
+    ] = (10.0, 30.0)
+    fwhm_step_nm: float = Field(default=2.0, ge=0.1, le=50)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> RegionMap:
+        for key, (low, high) in (("peak_nm", self.peak_nm), ("fwhm_nm", self.fwhm_nm)):
+            if not low <= high:
+                raise ValueError(f"{key}: {low:g} must not be above {high:g}")
+        if len(set(self.norms)) < len(self.norms):
+            raise ValueError("norms: one is named twice")
+        count = self.peaks_nm.size * self.widths_nm.size
+        if count > _MOST_LEDS:
+            raise ValueError(f"{count:,} LEDs are too many: at most {_MOST_LEDS:,}, with larger steps")
+        return self
+
+    @property
+    def peaks_nm(self) -> FloatArray:
+        """Every peak, ndarray[n_peaks]."""
+        return _steps(*self.peak_nm, self.peak_step_nm)
+
+    @property
+    def widths_nm(self) -> FloatArray:
+        """Every full width at half maximum, ndarray[n_widths]."""
+        return _steps(*self.fwhm_nm, self.fwhm_step_nm)
+
+
+@dataclass(frozen=True)
+class SingleLeds:
+    """LEDs by their peaks and full widths at half maximum, nm, ndarray[n] each."""
+
+    peak_nm: FloatArray
+    fwhm_nm: FloatArray
+
+    def photons(self, grid: WavelengthGrid) -> FloatArray:
+        """Photon spectra that integrate to 1 on the grid, ndarray[n, n_wavelengths]."""
+        return equal_photons(grid, self._shapes(grid))
+
+    def allowed(self, norm: Norm, kind: str) -> SingleLeds:
+        """Those whose color is inside a norm's region of a signal type."""
+        inside = SIGNAL_REGIONS[norm][kind].violation(chromaticity(VISIBLE, self._shapes(VISIBLE))) <= 0
+        return SingleLeds(self.peak_nm[inside], self.fwhm_nm[inside])
+
+    def _shapes(self, grid: WavelengthGrid) -> FloatArray:
+        """Photon spectra with a peak of 1, ndarray[n, n_wavelengths]."""
+        decays = self.fwhm_nm / _FWHM
+        nodes = grid.nodes_nm
+        each = [led_photons(nodes, peak, a, a) for peak, a in zip(self.peak_nm, decays, strict=True)]
+        return np.asarray(each, dtype=float).reshape(-1, grid.size)
+
+
+def every_led(asked: RegionMap) -> SingleLeds:
+    """All peaks with all widths."""
+    peaks, widths = np.meshgrid(asked.peaks_nm, asked.widths_nm, indexing="ij")
+    return SingleLeds(peaks.ravel(), widths.ravel())
+
+
+def _steps(low: float, high: float, step: float) -> FloatArray:
+    return np.asarray(low + step * np.arange(math.floor((high - low) / step + 1e-9) + 1), dtype=float)

@@ -1,0 +1,101 @@
+"""Maps of color regions beside every pair read out by hand, and what a study may ask for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sweep.report import make_report, read_output, summary_lines
+from sweep.results.tables import REGIONS_MAP
+from sweep.study import load_study
+
+from ..build import faults, ran
+
+ASKED = "regions: {wanted_dn: 150, peak_nm: [585, 645], peak_step_nm: 5, fwhm_nm: [12, 24], fwhm_step_nm: 6}"
+TEXT = f"""\
+study: allowed
+sensor: ar0820
+lights: tl16
+cfas: [RGGB, RYYCy]
+designs:
+  mine: {{cfa: RYYCy, channel: Cy, base: Cy, to: 0.0, at: {{left_nm: 613, left_width_nm: 6, right_nm: 651, right_width_nm: 6}}}}
+{ASKED}
+"""
+YELLOW = {(590.0, 12.0), (590.0, 18.0), (590.0, 24.0), (595.0, 12.0), (595.0, 18.0), (595.0, 24.0), (600.0, 24.0)}
+"""Not by the code under test: of these peaks and widths those with a color that EN 12368 calls yellow."""
+
+
+def test_a_map_is_that_of_every_pair_read_out(tmp_path: Path) -> None:
+    path = tmp_path / "allowed.yaml"
+    path.write_text(TEXT)
+    study = load_study(path)
+    ran(study, tmp_path / "out", 1)
+    found = pd.read_parquet(tmp_path / "out" / REGIONS_MAP)
+    wave, qe = study.grid.nodes_nm, np.stack([study.sensor.qe[name] for name in "RGB"])
+    scale = 0.95 * 4095 * study.lights.photon_ratio * study.grid.size / qe.sum(axis=1).max()
+
+    def read(peak: float, fwhm: float) -> np.ndarray:
+        photons = 1 / np.cosh((wave - peak) * 2 * np.arccosh(2) / fwhm)
+        return np.asarray(np.rint(photons / photons.sum() @ qe.T * scale))
+
+    own = found[found["design_id"] == 0]
+    assert {*own["yellow_nm"]} == {peak for peak, _ in YELLOW}
+    widths = (12.0, 18.0, 24.0)
+    for row in own.to_dict("records"):
+        yellow = {fwhm for peak, fwhm in YELLOW if peak == row["yellow_nm"]}
+        assert row["pairs"] % len(yellow) == 0
+        if row["pairs"] == len(yellow) * len(widths):  # every width of the red LED is allowed
+            apart = {
+                (a, b): np.linalg.norm(read(row["yellow_nm"], a) - read(row["red_nm"], b))
+                for a in yellow
+                for b in widths
+            }
+            assert row["separated"] == sum(dn >= 150 for dn in apart.values())
+            assert row["least_dn"] == pytest.approx(min(apart.values()))
+            assert apart[row["yellow_fwhm_nm"], row["red_fwhm_nm"]] == pytest.approx(row["least_dn"])
+    assert (own["pairs"] == 3 * 3).any()
+    output = read_output(tmp_path / "out")
+    make_report(output)
+    share = own["separated"].sum() / own["pairs"].sum()
+    assert 0 < share < 1
+    said = "\n".join(summary_lines(output))
+    assert f"Of all {own['pairs'].sum()} pairs of a yellow and a red LED that EN 12368 allows, " in said
+    assert f"{share:.1%}" in said
+    assert "modeled as hyperbolic secants" in said
+    assert "Lamps that norms allow" in (tmp_path / "out" / "report.html").read_text()
+    assert (tmp_path / "out" / "figures" / "regions-1.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ("regions: {}", "wanted_dn"),
+        ("regions: {wanted_dn: 100, norms: [en_12369]}", "en_12368"),
+        ("regions: {wanted_dn: 100, norms: [ite, ite]}", "named twice"),
+        ("regions: {wanted_dn: 100, peak_nm: [660, 560]}", "660 must not be above 560"),
+        ("regions: {wanted_dn: 100, peak_nm: 600}", "two numbers, from and to"),
+        ("regions: {wanted_dn: 100, peak_step_nm: 0.1, fwhm_step_nm: 0.1}", "too many"),
+        ("regions: {wanted_dn: 100, peak_nm: [560, 750]}", "peaks outside the study's wavelengths"),
+        ("regions: {wanted_dn: 100, peak_nm: [610, 660]}", "is yellow as en_12368 allows it"),
+        ("region: {wanted_dn: 100}", "did you mean 'regions'?"),
+        ("wavelengths: {step_nm: 20}\nregions: {wanted_dn: 100}", "narrower than a step"),
+        (
+            "scenarios: {far: {target: {distance_m: 50, fov_deg: 60, phase_px: any}}}\nregions: {wanted_dn: 100}",
+            "needs a light at a named place",
+        ),
+    ],
+)
+def test_a_wrong_map_is_one_line(tmp_path: Path, asked: str, said: str) -> None:
+    found = faults(tmp_path, TEXT.replace(ASKED, asked))
+    assert any(said in fault for fault in found), found
+
+
+def test_a_study_without_regions_makes_no_map(tmp_path: Path) -> None:
+    path = tmp_path / "allowed.yaml"
+    path.write_text(TEXT.replace(ASKED, ""))
+    ran(load_study(path), tmp_path / "out", 1)
+    assert not (tmp_path / "out" / REGIONS_MAP).exists()
+    assert "LED that" not in "\n".join(summary_lines(read_output(tmp_path / "out")))
