@@ -15,23 +15,21 @@ from .seen import SKIP, moves
 from .view import View
 
 
-def scene_at(scene: Scene, place: int) -> Scene:
-    """What one place of a scene's field sees; places are counted from the middle to the corner."""
+def scene_at(scene: Scene, height: float) -> Scene:
+    """What a scene's field sees at an image height, 0 to 1."""
     assert scene.field is not None
-    angles = scene.field.angles_deg
-    height = place / (len(angles) - 1)
     corner = math.tan(math.radians(Options.of(scene).off_axis_deg))
-    optics = scene.optics.model_copy(update={"cra_deg": angles[place]})
+    optics = scene.optics.model_copy(update={"cra_deg": scene.field.cra_at(height)})
     off_axis = {"off_axis_deg": math.degrees(math.atan(height * corner))}
     return scene.model_copy(update={"field": None, "optics": optics, **off_axis})
 
 
 def over_field(view: View) -> tuple[View, ...]:
-    """A view of each place of the field; one where the scene asks for none, or where all of them see the same."""
+    """A view of each place of the field that is looked at; one where no field is asked for, or all see the same."""
     scene = view.scenario
     if scene.field is None:
         return (view,)
     still = view.methods.angle == SKIP or not moves(view)
     bright = view.methods.illumination == "skip" or Options.of(scene).off_axis_deg == 0
-    places = range(1 if still and bright else len(scene.field.angles_deg))
-    return tuple(replace(view, scenario=scene_at(scene, place)) for place in places)
+    heights = (0.0,) if still and bright else scene.field.seen_heights
+    return tuple(replace(view, scenario=scene_at(scene, height)) for height in heights)

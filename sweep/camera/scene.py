@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from ..types import Meters, Ratio, Seconds, Section, Share
 from .pixel import DarkCurrent, Optics, Pixel, Prnu, ReadNoise
+from .sensor_field import SensorField
 
 DIAMETER_M = 0.2
 """Diameter of a usual traffic light, EN 12368."""
@@ -88,40 +89,6 @@ class Target(Geometry):
     readout: Literal["mean", "center"] = "mean"
 
 
-_PLACES = 9
-_Cra = Annotated[float, Field(ge=0, le=60)]
-
-
-class SensorField(Section):
-    """Places of the sensor from its middle to its corner, in equal steps of image height; the worst of them counts.
-
-    `cra_max_deg`: the chief ray angle in the corner, growing linearly from 0 over `places` (9 where left out); or
-    `cra_deg`: that of each place, from a lens's data sheet. A scene's `off_axis_deg` is then the field angle of the
-    corner.
-    """
-
-    cra_max_deg: _Cra | None = None
-    places: Annotated[int, Field(ge=2, le=100)] | None = None
-    cra_deg: Annotated[list[_Cra], Field(min_length=2, max_length=100)] | None = None
-
-    @model_validator(mode="after")
-    def _one_profile(self) -> SensorField:
-        if (self.cra_max_deg is None) == (self.cra_deg is None):
-            raise ValueError("a field has either `cra_max_deg` or a list `cra_deg`")
-        if self.cra_deg is not None and self.places is not None:
-            raise ValueError("`places` goes with `cra_max_deg`; a list `cra_deg` says how many there are")
-        return self
-
-    @property
-    def angles_deg(self) -> tuple[float, ...]:
-        """The chief ray angle of each place."""
-        if self.cra_deg is not None:
-            return tuple(self.cra_deg)
-        assert self.cra_max_deg is not None
-        count = _PLACES if self.places is None else self.places
-        return tuple(self.cra_max_deg * place / (count - 1) for place in range(count))
-
-
 class Drive(Section):
     """A pulsed LED: on for `duty` of each period; its mean intensity is the rated one."""
 
@@ -155,7 +122,7 @@ class Scene(Section):
     `photon_radiance` (photons/s/sr/m^2, summed over the wavelength grid), or, with `intensity_cd`, the luminance of a
     light of that luminous intensity and the target's diameter (0.2 m without a target). `background_cd_m2`: light that
     is added over the whole field, also in front of the target, flat in photons. `drive`: of a pulsed LED. `field`: the
-    worst of several places of the sensor. `noise`: photon, read and dark noise and PRNU act before the mean is taken;
+    worst place of the sensor. `noise`: photon, read and dark noise and PRNU act before the mean is taken;
     true, or figures of its own. Limits: 1 to 1e40 photons (the sun's disc: 1e25), 1e-12 to 1e15 cd, a background up to
     1e15 cd/m^2 (the sun: 2e9).
     """

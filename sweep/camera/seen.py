@@ -82,6 +82,11 @@ class SeenFilters:
         return found
 
 
+def known_at(carrier: FloatArray) -> IndexArray:
+    """At which wavelengths a carrier lets enough light through that what is on it is known."""
+    return np.flatnonzero(carrier > _LEAST_BASE * carrier.max())
+
+
 _matrices: Cache[bytes, csr_matrix] = Cache(32)
 
 
@@ -92,7 +97,7 @@ def _matrix(wavelength_nm: FloatArray, carrier: FloatArray, index: float, cone: 
     def made() -> csr_matrix:
         from scipy.sparse import csr_matrix, diags_array  # noqa: PLC0415  (slow to import: only where filters move)
 
-        known = np.flatnonzero(carrier > _LEAST_BASE * carrier.max())
+        known = known_at(carrier)
         rows, columns, shares = _means(wavelength_nm, wavelength_nm[known], index, cone, method)
         shape = (wavelength_nm.size, wavelength_nm.size)
         mean = csr_matrix((shares, (rows, known[columns])), shape=shape)

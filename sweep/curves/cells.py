@@ -23,13 +23,16 @@ _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 class TableCells:
     """The numbers of a table, and the faults of its cells and rows, up to a limit.
 
-    `decimal`: the mark in its numbers; `falling`: its wavelengths fall from row to row.
+    `decimal`: the mark in its numbers; `falling`: its wavelengths fall from row to row. `first`, `noun`: what the
+    first column is called, and what it holds.
     """
 
     file: str
     header: list[str]
     decimal: str = "."
     falling: bool = False
+    first: str = WAVELENGTH
+    noun: str = "wavelength"
     faults: list[Fault] = field(default_factory=list)
 
     def read(self, rows: list[tuple[int, list[str]]]) -> tuple[FloatArray, list[Fault]]:
@@ -48,11 +51,11 @@ class TableCells:
             step = values[index, 0] - before
             if (step >= 0) if self.falling else (step <= 0):
                 same = values[index, 0] == before
-                problem = "wavelength occurs twice" if same else "wavelengths are not sorted"
+                problem = f"{self.noun} occurs twice" if same else f"{self.noun}s are not sorted"
                 self.add(
                     problem,
                     line,
-                    WAVELENGTH,
+                    self.first,
                     values[index, 0].item(),
                     "strictly decreasing" if self.falling else "strictly increasing",
                 )

@@ -42,6 +42,11 @@ def plainly(table: TextTable) -> TextTable:
     return table
 
 
+def evenly(table: TextTable) -> TextTable:
+    """The table without an empty last column, and with the mark of its decimals, whatever its columns are."""
+    return _with_decimal(_without_empty_column(table))
+
+
 def _without_empty_column(table: TextTable) -> TextTable:
     """Without a last column that is empty in every row, as trailing separators make it."""
     width = len(table.header)

@@ -36,10 +36,17 @@ def scan_text(path: Path) -> Scan:
     What is not as `wavelength_nm,...` with points is in `notes`. What two readers could read in two ways is a fault.
     Raises DataError where there is no table at all.
     """
+    return _numbers(plainly(text_table(path)))
+
+
+def text_table(path: Path, first: str = WAVELENGTH) -> TextTable:
+    """Head and rows of a file, as texts; `first`: what its first column is to be called.
+
+    Raises DataError where there is no table at all.
+    """
     text, notes, faults = _decoded(path)
-    table = _laid_out(str(path), text)
-    table = replace(table, notes=(*notes, *table.notes), faults=(*faults, *table.faults))
-    return _numbers(plainly(table))
+    table = _laid_out(str(path), text, first)
+    return replace(table, notes=(*notes, *table.notes), faults=(*faults, *table.faults))
 
 
 def _decoded(path: Path) -> tuple[str, list[str], list[Fault]]:
@@ -61,7 +68,7 @@ def _decoded(path: Path) -> tuple[str, list[str], list[Fault]]:
     return text, notes, []
 
 
-def _laid_out(file: str, text: str) -> TextTable:
+def _laid_out(file: str, text: str, first: str) -> TextTable:
     """Head and rows of a text: the head is the line above the first numbers, or the first that names wavelengths."""
     lines = io.StringIO(text, newline=None).read().split("\n")
     kept = [(n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.startswith(_COMMENTS)]
@@ -71,7 +78,7 @@ def _laid_out(file: str, text: str) -> TextTable:
     if kept and _END.fullmatch(kept[-1][1].strip()):
         kept = kept[:-1]
     if not kept:
-        raise DataError(Fault("the file is empty", file, allowed=f"a header `{WAVELENGTH},...` and rows of numbers"))
+        raise DataError(Fault("the file is empty", file, allowed=f"a header `{first},...` and rows of numbers"))
     mark = _mark([line for _, line in kept[:_RELEVANT]])
     count = kept[0][1].count(mark) if mark else 0
     check_size(file, None, len(kept) - 1, count)
@@ -82,7 +89,7 @@ def _laid_out(file: str, text: str) -> TextTable:
         notes.append(f"columns are separated by {_MARKS[mark]}")
     rows = _rows(file, kept[at or 0 :], mark)
     if not rows:
-        raise DataError(Fault("the file is empty", file, allowed=f"a header `{WAVELENGTH},...` and rows of numbers"))
+        raise DataError(Fault("the file is empty", file, allowed=f"a header `{first},...` and rows of numbers"))
     line, header = rows[0]
     if at is None:
         columns = len(header)

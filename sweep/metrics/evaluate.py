@@ -7,10 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..camera.effects.image_height import HEIGHTS
 from ..camera.effects.phase import Cases
 from ..camera.electrons import Changing
-from ..camera.imager import Imager
+from ..camera.field import scene_at
+from ..camera.imager import Imager, imager_of
 from ..camera.places import Extremes
+from ..camera.registry import EFFECTS
+from ..camera.sensor_places import SensorPlaces
 from ..camera.view import View
 from ..curves.lights import Pair
 from ..designs.block import Block, CurveBlock
@@ -92,6 +96,27 @@ def _over_all_places(
             best[design] = np.maximum(best[design], largest)
 
 
+def _over_all_heights(imager: Imager, curves: FloatArray, exposure_s: FloatArray, columns: Columns) -> None:
+    """Put the smallest distances over all places of the sensor into the columns, which hold those of a few.
+
+    They are looked for in the straight response, and read out where they are.
+    """
+    view = imager.view
+    asked = EFFECTS[HEIGHTS].limit_dn(view.methods.field)
+    assert asked is not None
+    places = SensorPlaces(view, asked, imager.work)
+    for design in np.flatnonzero(np.isfinite(exposure_s)):
+        found = places.worst(curves[design])
+        for pair in (pair for pair, worst in found.items() if worst is None):
+            columns[csd_name(pair)][design] = np.nan
+        for height in {worst.height for worst in found.values() if worst is not None}:
+            there = imager_of(replace(view, scenario=scene_at(view.scenario, height)))
+            for moment in np.moveaxis(there.read(curves[design : design + 1])[0], 1, 0):
+                for pair, distance in separations(moment, view.members).items():
+                    own = columns[csd_name(pair)]
+                    own[design] = np.minimum(own[design], distance[0])
+
+
 def _as_read(imager: Imager, curves: FloatArray, found: Mapping[Pair, Extremes | None]) -> dict[Pair, Extremes | None]:
     """Extremes of one design at the places where those of the straight response are, as the camera reads them out.
 
@@ -121,7 +146,7 @@ def evaluate(
     ndarray[n_designs]; `states`: signal types that noise may confuse, `probabilities`: with their CDP and CSP. CSDs are
     the smallest over the places of the light and the moments of its pulses; `best_place_csd_<a>_<b>` is the largest
     over the places of the smallest over the moments. Noise metrics are the worst over the places of the lattice.
-    Distances are NaN where the extremes over all places take more cells than `places` allows.
+    Distances are NaN where the extremes over all places take more cells than `places` allows, or `sensor_places`.
     """
     block = _block(designs)
     changing = None if states or _OTHERS else imager.read_changing(block)
@@ -137,6 +162,8 @@ def evaluate(
             values[changing.which], values[~changing.which] = along[name], rest[name]
     if imager.anywhere is not None:
         _over_all_places(imager, block.curves(), columns[EXPOSURE], columns)
+    if EFFECTS[HEIGHTS].all_count(imager.view, imager.view.methods):
+        _over_all_heights(imager, block.curves(), columns[EXPOSURE], columns)
     return columns | designed_quantities(imager.view, block)
 
 

@@ -44,9 +44,10 @@ def told_light(scene: Scene) -> str:
     lens = f"behind f/{scene.optics.f_number:g}"
     if scene.field is None:
         return f"{lens} at a chief ray angle of {scene.optics.cra_deg:g} degrees"
-    angles = scene.field.angles_deg
+    angles = scene.field.knots[1]
     ends = f"{min(angles):g} to {max(angles):g}"
-    return f"{lens} at chief ray angles of {ends} degrees, the worst of {len(angles)} places of the sensor"
+    places = "all" if scene.field.everywhere else f"{len(scene.field.seen_heights)}"
+    return f"{lens} at chief ray angles of {ends} degrees, the worst of {places} places of the sensor"
 
 
 def assumed_line(output: Output) -> str:

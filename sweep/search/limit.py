@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..camera.effects.image_height import all_heights_count
 from ..camera.effects.saturation import top_e
 from ..camera.exposure import may_set_exposure
 from ..camera.pixel import unquantized
@@ -33,6 +34,7 @@ from .problem import Problem
 from .sides import Proof, SideSearch
 
 if TYPE_CHECKING:
+    from .any_height import AnyHeight
     from .member_pairs import MemberPairs
 
 _SENSITIVITY_TOLERANCE = 1e-6
@@ -78,19 +80,23 @@ def limit_of(
     if refused is not None:
         raise SweepError(Fault(f"no limit: {refused}"))
     relaxed, left_out = _relaxed(problem)
+    heights = _any_height_of(relaxed) if all_heights_count(relaxed.view) else None
     distances = any(relaxed.quantities[name].apart for name in relaxed.objective.weights)
     tolerance = tolerance_dn if distances else _SENSITIVITY_TOLERANCE
     over = [n for n in dict.fromkeys((*relaxed.objective.weights, *relaxed.constraints)) if relaxed.over_population(n)]
     members, solved = _members_of(relaxed, over) if over else None, 0
     while True:
+        relaxed = relaxed if heights is None else heights.problem
         program = FilterProgram(relaxed, members)
         proof = _proof(program, members, tolerance, most_programs - solved)
         solved += program.solved
-        if members is None or proof.curve is None or solved >= most_programs or not members.more(proof.curve):
+        known = members if heights is None else heights
+        if known is None or proof.curve is None or solved >= most_programs or not known.more(proof.curve):
             break
     attained = proof.attained
-    if proof.curve is not None and (members is not None or program.noisy):
+    if proof.curve is not None and (known is not None or program.noisy):
         worst = {} if members is None else {name: members.least(name, proof.curve) for name in over}
+        worst |= {} if heights is None else heights.least(proof.curve)
         attained = _attained(relaxed, proof.curve, worst)
     least = relaxed.constraints.get(SENSITIVITY)
     from_here = -np.inf if not program.noisy or least is None or least.min is None else least.min
@@ -102,6 +108,12 @@ def _members_of(problem: Problem, over: Sequence[str]) -> MemberPairs:
     from .member_pairs import MemberPairs  # noqa: PLC0415  (only where lights have a population)
 
     return MemberPairs(problem, over)
+
+
+def _any_height_of(problem: Problem) -> AnyHeight:
+    from .any_height import AnyHeight  # noqa: PLC0415  (only where all places of the sensor count)
+
+    return AnyHeight(problem)
 
 
 def _proof(program: FilterProgram, members: MemberPairs | None, tolerance: float, most_programs: int) -> Proof:
@@ -200,13 +212,13 @@ def _inside(
 def _attained(problem: Problem, curve: FloatArray, over: Mapping[str, float]) -> float:
     """The objective for a filter as the search evaluates it; -inf when it does not meet the constraints.
 
-    `over`: worst cases over a population.
+    `over`: worst cases over a population, or distances of which a scene has no smaller ones.
     """
     curves = curve[None, None]
     found = designed_quantities(problem.view, curves) | {name: np.array([value]) for name, value in over.items()}
     for name in {*problem.objective.weights, *problem.constraints} & problem.pairs.keys():
         of = smooth_csd if problem.quantities[name].apart == DN else smooth_detectability
-        found[name] = of(problem.view, curves, problem.pairs[name])
+        found[name] = np.minimum(of(problem.view, curves, problem.pairs[name]), over.get(name, np.inf))
     for name, bound in problem.constraints.items():
         if not bound.violation(found[name])[0] <= FEASIBLE:
             return -np.inf

@@ -44,6 +44,9 @@ def with_population(lights: Lights, section: StudySection, sources: Sources) -> 
         if scenario.target is not None and scenario.target.phase_px == "any":
             problem = "worst cases over a population need a light at a named place of the mosaic"
             sources.add(("scenarios", name, "target", "phase_px"), problem, "any", "[column, row]")
+        if scenario.field is not None and scenario.field.everywhere:
+            problem = "worst cases over a population need places of the sensor that are counted"
+            sources.add(("scenarios", name, "field", "places"), problem, "any", "a number, 2 to 100")
     return _not_too_large(replace(lights, population=population), population, section, sources)
 
 

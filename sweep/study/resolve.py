@@ -26,6 +26,7 @@ from .model import Search, Study
 from .populations import check_range, with_population
 from .schema import CfaSection, StudySection
 from .seen_images import check_vision
+from .sensor_fields import check_fields, with_chief_rays
 from .sensors import sensor_of
 from .sources import KeptSources, Sources
 from .spaces import SpaceBuilder
@@ -47,8 +48,8 @@ class _Resolver:
         allow_code: bool,
     ) -> None:
         self.document = document
-        self.section = section
         self.sources = Sources(document, section.wavelengths, folders, kept, given, allow_code)
+        self.section = with_chief_rays(section, self.sources)
         self.faults = self.sources.faults
         self.add = self.sources.add
         self.unknown = self.sources.unknown
@@ -103,6 +104,9 @@ class _Resolver:
         )
         self.check_memory(study)
         check_range(study, self.sources)
+        check_fields(study, self.sources)
+        if self.faults:
+            raise StudyError(self.faults)
         if not study.n_designs and search is None:
             self.add(
                 ("cfas",), "no designs", None, "a CFA with a curve for each channel, a design, a sweep or a search"

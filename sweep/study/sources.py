@@ -13,6 +13,7 @@ from ..camera.sensor import SensorCurves
 from ..curves.builtin.registry import BUILT_IN_LIGHTS
 from ..curves.builtin.surrogate import BUILT_IN_RANGE_NM
 from ..curves.files import digest, read_curves
+from ..curves.lens_files import ChiefRays, read_chief_rays
 from ..curves.lights import Lights, make_lights
 from ..curves.spectrum import Curves, WavelengthGrid, photons_from_energy
 from ..disk import is_file
@@ -206,11 +207,8 @@ class Sources:
             self.digests[entry.file] = _digest_of(self.given[entry.file])
             return self._read[entry.file]
         self._read[entry.file] = None
-        found = next((folder / entry.file for folder in self.folders if is_file(folder / entry.file)), None)
+        found = self._found((*path, "file"), entry.file)
         if found is None:
-            searched = ", ".join(str(folder) for folder in self.folders)
-            near = self._near(entry.file, _names(self.folders))
-            self.add((*path, "file"), "no such file", entry.file, f"a path relative to {searched}", near)
             return None
         try:
             read = self._read[entry.file] = read_curves(found)
@@ -219,6 +217,29 @@ class Sources:
         except DataError as error:
             self.faults.extend(error.faults)
         return self._read[entry.file]
+
+    def chief_rays(self, path: tuple[Key, ...], file: str, corner_mm: float | None) -> ChiefRays | None:
+        """A lens's chief ray angles from a file that the study names at `path`, or None after adding faults."""
+        found = self._found(path, file)
+        if found is None:
+            return None
+        try:
+            read = read_chief_rays(found, corner_mm)
+            self.warnings += [f"{file}: {note}" for note in read.notes]
+            self.digests[file] = digest(found)
+        except DataError as error:
+            self.faults.extend(error.faults)
+            return None
+        return read
+
+    def _found(self, path: tuple[Key, ...], file: str) -> Path | None:
+        """Where a file lies that the study names at `path`, or None after adding a fault."""
+        found = next((folder / file for folder in self.folders if is_file(folder / file)), None)
+        if found is None:
+            searched = ", ".join(str(folder) for folder in self.folders)
+            near = self._near(file, _names(self.folders))
+            self.add(path, "no such file", file, f"a path relative to {searched}", near)
+        return found
 
     def add(
         self,

@@ -15,8 +15,8 @@ from sweep.camera.methods import REFERENCE
 from sweep.camera.plan.plan import Planner
 from sweep.camera.rays import Cone, rays
 from sweep.camera.scenario import Scenario
-from sweep.camera.scene import SensorField
 from sweep.camera.seen import METHODS, RAYS, SeenFilters, cone_of
+from sweep.camera.sensor_field import SensorField
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.block import edges_of
 from sweep.designs.technology import Technology

@@ -173,8 +173,8 @@ def test_promises_are_not_uselessly_wide(which: str) -> None:
     assert np.median(ratios) <= 10
 
 
-OF_PLACES = ("phase",)
-"""Effects that only scenes of any place see."""
+OF_PLACES = ("phase", "field")
+"""Effects that only scenes of any place see; of the sensor: `tests/camera/test_sensor_places.py`."""
 OTHERS = {name: effect for name, effect in EFFECTS.items() if name not in OF_PLACES}
 
 

@@ -91,9 +91,22 @@ def test_what_does_not_fit_is_a_fault(tmp_path: Path, old: str, new: str, expect
 @pytest.mark.parametrize(
     ("scene", "expected"),
     [
-        ("{field: {places: 3}}", "tiny.yaml:22: scenarios.a.field: a field has either `cra_max_deg` or a list"),
+        ("{field: {places: 3}}", "tiny.yaml:22: scenarios.a.field: a field has either `cra_max_deg`, a list"),
         ("{field: {cra_max_deg: 9, cra_deg: [0, 9]}}", "tiny.yaml:22: scenarios.a.field: a field has either"),
-        ("{field: {cra_deg: [0, 9], places: 2}}", "tiny.yaml:22: scenarios.a.field: `places` goes with `cra_max_deg`"),
+        ("{field: {cra_deg: [0, 9], profile: linear}}", "tiny.yaml:22: scenarios.a.field: a field has either"),
+        (
+            "{field: {cra_max_deg: 9, corner_mm: 4}}",
+            "tiny.yaml:22: scenarios.a.field: `corner_mm` goes with `profile: FI",
+        ),
+        (
+            "{field: {cra_max_deg: 9, places: 1}}",
+            "tiny.yaml:22: scenarios.a.field.places: places are `any`, or a whole",
+        ),
+        (
+            "{field: {cra_max_deg: 9, heights: [0, 1]}}",
+            "tiny.yaml:22: scenarios.a.field: `heights` are those of a list",
+        ),
+        ("{field: {cra_deg: [0, 9], heights: [0, 0.9]}}", "tiny.yaml:22: scenarios.a.field: `heights` grow from 0"),
         ("{field: {cra_max_deg: 70}}", "tiny.yaml:22: scenarios.a.field.cra_max_deg: not allowed (got 70)"),
         (
             "{field: {cra_max_deg: 9}, optics: {cra_deg: 3}}",
@@ -110,11 +123,93 @@ def test_a_field_says_one_profile(tmp_path: Path, scene: str, expected: str) -> 
 
 
 def test_a_field_grows_linearly_or_as_listed(tmp_path: Path) -> None:
-    scenes = "scenarios: {a: {field: {cra_max_deg: 30, places: 4}}, b: {field: {cra_deg: [0, 18, 20]}}}\n"
+    scenes = "scenarios: {a: {field: {cra_max_deg: 30, places: 4}}, b: {field: {cra_deg: [0, 18, 20]}}, "
+    scenes += "c: {field: {cra_deg: [0, 18, 20], places: 5}}, d: {field: {cra_deg: [0, 8, 9], heights: [0, 0.8, 1]}}}\n"
     study = load(tmp_path, BASE + scenes)
     fields = {name: scenario.field for name, scenario in study.scenarios.items()}
     assert {name: field and field.angles_deg for name, field in fields.items()} == {
         "a": (0.0, 10.0, 20.0, 30.0),
         "b": (0.0, 18.0, 20.0),
+        "c": (0.0, 9.0, 18.0, 19.0, 20.0),
+        "d": (0.0, 8.0, 9.0),
     }
     assert load(tmp_path, resolved_yaml(study)).section == study.section
+
+
+LENS = "Image height (mm);CRA (deg)\n0;0\n1,5;9\n3;15,5\n4;14\n"
+
+
+def test_a_lens_file_says_the_chief_ray_angles(tmp_path: Path) -> None:
+    """Rows in mm, decimal commas, a corner between two rows; a resolved study holds the rows, and needs no file."""
+    (tmp_path / "lens.csv").write_text(LENS)
+    text = (
+        "scenarios: {a: {field: {profile: lens.csv, places: any}}, b: {field: {profile: lens.csv, corner_mm: 3.5}}}\n"
+    )
+    study = load(tmp_path, BASE + text)
+    fields = [scenario.field for scenario in study.scenarios.values()]
+    assert [field and field.knots for field in fields] == [
+        ((0.0, 0.375, 0.75, 1.0), (0.0, 9.0, 15.5, 14.0)),
+        ((0.0, 1.5 / 3.5, 3 / 3.5, 1.0), (0.0, 9.0, 15.5, 14.75)),
+    ]
+    assert [field and field.places for field in fields] == ["any", 9]
+    assert any("the last row, 4 mm, was taken for the corner" in warning for warning in study.warnings)
+    assert list(study.digests) == ["lens.csv"]
+    (tmp_path / "lens.csv").unlink()
+    assert load(tmp_path, resolved_yaml(study)).section == study.section
+
+
+@pytest.mark.parametrize(
+    ("table", "field", "expected"),
+    [
+        ("", "", "lens.csv: the file is empty; allowed: a header `height_mm,...` and rows of numbers"),
+        (
+            "h,cra\n0,0\n1,9\n",
+            "",
+            "lens.csv:1: h: the first column does not say the unit of image heights; allowed: `hei",
+        ),
+        ("0,0\n1,9\n", "", "lens.csv:1: there is no header; allowed: `height_mm`, `height_percent`"),
+        ("h_mm,cra,x\n0,0\n", "", "lens.csv:2: wrong number of columns (got 2); allowed: 3"),
+        ("h_mm,cra\n0,0\n", "", "lens.csv:2: a lens needs two rows or more (got 1)"),
+        ("h_mm,a,b\n0,0,0\n", "", "lens.csv:1: which column has chief ray angles? (got 'h_mm, a, b')"),
+        ("h_mm,cra_rad\n0,0\n1,0.3\n", "", "lens.csv:1: cra_rad: chief ray angles are in radians; allowed: degrees"),
+        ("h_mm,cra\n0,0\n1,-9\n", "", "lens.csv:3: cra: negative value (got '-9')"),
+        ("h_mm,cra\n0,0\n1,nan\n", "", "lens.csv:3: cra: not a usable number (got 'nan')"),
+        ("h_mm,cra\n0,0\n2,9\n1,8\n", "", "lens.csv:4: height_mm: image heights are not sorted (got 1.0)"),
+        (
+            "h_mm,cra\n0.5,0\n1,9\n",
+            "",
+            "lens.csv:2: height_mm: image heights begin in the middle of the sensor (got 0.5)",
+        ),
+        ("h_mm,cra\n0,0\n1,61\n", "", "lens.csv:3: cra: too steep a chief ray (got 61.0); allowed: 0 to 60 degrees"),
+        ("height (%),cra\n0,0\n90,9\n", "", "lens.csv:3: height_percent: the last row is not the corner (got 90.0)"),
+        (
+            "rel. height,cra\n0,0\n1,9\n",
+            ", corner_mm: 3",
+            "lens.csv:1: height_relative: `corner_mm` needs heights in mm",
+        ),
+        ("h_mm,cra\n0,0\n1,9\n", ", corner_mm: 3", "lens.csv:3: height_mm: the table ends before the corner (got 1.0)"),
+    ],
+)
+def test_a_bad_lens_file_is_one_line(tmp_path: Path, table: str, field: str, expected: str) -> None:
+    (tmp_path / "lens.csv").write_text(table)
+    found = faults(tmp_path, BASE + f"scenarios: {{a: {{field: {{profile: lens.csv{field}}}}}}}\n")
+    assert len(found) == 1
+    assert expected in found[0], found
+
+
+def test_a_lens_file_that_is_not_there_has_a_near_name(tmp_path: Path) -> None:
+    (tmp_path / "lens.csv").write_text(LENS)
+    found = faults(tmp_path, BASE + "scenarios: {a: {field: {profile: lends.csv}}}\n")
+    assert len(found) == 1
+    assert found[0].startswith("tiny.yaml:22: scenarios.a.field.profile: no such file (got 'lends.csv')")
+    assert found[0].endswith("did you mean 'lens.csv'?")
+
+
+def test_all_places_need_a_lens_whose_cone_has_a_width(tmp_path: Path) -> None:
+    moved = BASE.replace("to: G, at:", f"to: G, {LAYERS}, at:", 1)
+    scene = "scenarios: {a: {optics: {f_number: 128}, field: {cra_max_deg: 9, places: any}}}\n"
+    assert faults(tmp_path, moved + scene) == [
+        "tiny.yaml:22: scenarios.a.optics.f_number: all places of the sensor are too many behind so slow a lens, where "
+        "filters move with the angle (got 128.0); allowed: up to 100, or named places"
+    ]
+    assert load(tmp_path, BASE + scene).scenarios["a"].field is not None

@@ -16,7 +16,7 @@ _STEEPEST_RAD = math.radians(85.0)
 
 def too_steep(scene: Scene) -> tuple[tuple[str, ...], str, str, str] | None:
     """Where a scene's rays graze a filter that moves with them: key, problem, value, what is allowed."""
-    chief_deg = scene.optics.cra_deg if scene.field is None else max(scene.field.angles_deg)
+    chief_deg = scene.optics.cra_deg if scene.field is None else scene.field.steepest_deg
     steepest = cone_of(scene).half_rad + math.radians(chief_deg)
     if steepest <= _STEEPEST_RAD:
         return None

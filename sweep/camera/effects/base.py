@@ -189,6 +189,10 @@ class Effect(ABC):
         """Whether its method goes together with the other methods."""
         return True
 
+    def all_count(self, shot: Shot, methods: Chosen) -> bool:
+        """Whether a scene asks for the limit, where `is_limit`, and these methods come near it."""
+        return False
+
     def limit_dn(self, method: str) -> float | None:
         """How far a CSD by this method is from the limit at most, DN, where `is_limit`; None where nothing says so."""
         return None

@@ -185,6 +185,10 @@ class Phase(KernelEffect):
         """A scene may name the place."""
         return one_is_enough(shot)
 
+    def all_count(self, shot: Shot, methods: Chosen) -> bool:
+        """Where the light may fall anywhere, and more than a lattice of places is looked at."""
+        return all_count(shot, methods)
+
     def limit_dn(self, method: str) -> float | None:
         """A lattice knows no limit."""
         return within_dn(method)
@@ -192,4 +196,4 @@ class Phase(KernelEffect):
     def work(self, shot: Shot, methods: Chosen, load: Load) -> Load:
         """All is done at every place."""
         placed = shot.scenario.target is not None and methods.sampling != "skip"
-        return replace(load, cases=float(n_places(shot, methods.phase))) if placed else load
+        return replace(load, cases=load.cases * n_places(shot, methods.phase)) if placed else load

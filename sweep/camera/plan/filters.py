@@ -6,10 +6,13 @@ little; see `seen` for why the one may be moved instead of the other.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...types import FloatArray
 from ..effects.base import FilterChange
+from ..seen import known_at
 from ..view import background_irradiance, per_photon
 from .bounds import Amounts, Box, Reach
 
@@ -47,3 +50,17 @@ def background_of_filters(reach: Reach, factor: FloatArray, change: FilterChange
         moved = matrix.T @ irradiance
         found[:, channel] = moved @ middle[channel], np.abs(moved) @ half[channel]
     return found[0], found[1]
+
+
+def at_any_height(box: Box) -> Box:
+    """The box with curves that no ray sees a filter of it exceed, at any place of the sensor.
+
+    What an interference filter lets through of its carrier is nowhere more than where it lets most through.
+    """
+    high, view = box.high.copy(), box.view
+    for channel in range(len(high)):
+        if np.isfinite(view.effective_index(channel)):
+            carrier = view.carrier(channel)
+            known = known_at(carrier)
+            high[channel] = carrier * (high[channel, known] / carrier[known]).max()
+    return replace(box, high=high)

@@ -10,17 +10,20 @@ from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 
 from ..effects.base import Effect, Stage
+from ..effects.image_height import HEIGHTS, all_heights_count
 from ..field import over_field
 from ..kernel import colorless
 from ..methods import REFERENCE, Methods
 from ..registry import EFFECTS
 from .bounds import Box
+from .filters import at_any_height
 from .promises import Promises
 from .scene_kernels import SceneKernels
 from .work import PLANNED_PATCH, PLANNED_TARGET
 
 _NOTHING_DN = 1e-9
 _NOT_ASKED = "to find out whether it matters takes longer"
+_EVERYWHERE = "on wherever all places of the sensor count"
 _LIMITS = tuple(name for name, effect in EFFECTS.items() if effect.is_limit)
 
 
@@ -107,6 +110,8 @@ class Planner:
 
         Where no plan does, one that keeps it but for what the places of a light leave open.
         """
+        if self._everywhere:
+            return self.everything(scenario, tolerance_dn)
         tried: dict[tuple[str, str], float] = {}
         kept = self._cheapest(tolerance_dn, tried) or self._cheapest(tolerance_dn, tried, besides=True)
         assert kept is not None  # everything on changes nothing but what is left open
@@ -128,6 +133,8 @@ class Planner:
         How many places a light at any place needs is not known before, so that a plan is looked for there.
         """
         methods = self._start
+        if self._everywhere:
+            return False
         if any(scene.is_anywhere(methods) for scene in self._scenes):
             return True
         works = [scene.work_of(methods) for scene in self._scenes]
@@ -137,13 +144,36 @@ class Planner:
         return once + every > len(works) * (PLANNED_PATCH if is_patch else PLANNED_TARGET)
 
     def everything(self, scenario: str, tolerance_dn: float) -> Plan:
-        """Everything on but what changes nothing: exact, for scenes whose light is not at any place (see `pays`)."""
-        methods = self._start
-        choices = tuple(
-            Choice(e, method, 0.0, _NOT_ASKED if (exact := self._exact[e]) is None else exact)
-            for e, method in asdict(methods).items()
-        )
+        """Everything on but what changes nothing: exact, but for how closely all places of the sensor are looked at."""
+        methods, promised_dn = self._start, 0.0
+        if self._everywhere:
+            methods, promised_dn = self._looked_at(methods, tolerance_dn)
+
+        def choice(effect: str, method: str) -> Choice:
+            if effect == HEIGHTS and self._everywhere:
+                return Choice(effect, method, promised_dn, f"changes a CSD by at most {promised_dn:.2g} DN")
+            exact = self._exact[effect]
+            on = _EVERYWHERE if self._everywhere else _NOT_ASKED
+            return Choice(effect, method, 0.0, on if exact is None else exact)
+
+        choices = tuple(choice(effect, method) for effect, method in asdict(methods).items())
         return Plan(scenario, tolerance_dn, choices, self._work(methods), self._work(REFERENCE))
+
+    def _looked_at(self, methods: Methods, tolerance_dn: float) -> tuple[Methods, float]:
+        """How closely all places of the sensor are looked at within a tolerance, and what that may change, DN.
+
+        What a readout that is not straight adds, however closely they are looked at, does not count.
+        """
+        closest = self.promise(HEIGHTS, methods, methods)
+        allowed = tolerance_dn if closest <= tolerance_dn else tolerance_dn + closest
+        ways = (replace(methods, **{HEIGHTS: way}) for way in EFFECTS[HEIGHTS].methods[1:])
+        found = next(way for way in ways if self.promise(HEIGHTS, methods, way) <= allowed)
+        return found, self.promise(HEIGHTS, methods, found)
+
+    @property
+    def _everywhere(self) -> bool:
+        """Whether all places of the sensor count in any box; everything is on then."""
+        return any(scene.everywhere for scene in self._scenes)
 
     @property
     def _start(self) -> Methods:
@@ -207,6 +237,8 @@ class Planner:
     def _allowed(self, name: str, methods: Methods) -> bool:
         """Whether the method of an effect goes together with the others, and with what is asked of the scene."""
         effect = EFFECTS[name]
+        if self._everywhere and not effect.is_limit:
+            return bool(getattr(methods, name) == getattr(self._start, name))
         if self._for_noise and effect.needed_for_noise:
             return bool(getattr(methods, name) == effect.reference)
         return all(effect.allowed(scene.view, methods) for scene in self._scenes)
@@ -232,12 +264,12 @@ class Planner:
 def _promises(boxes: Sequence[Box]) -> list[Promises]:
     """Those of each box; boxes whose CFAs have the same tile share their kernels."""
     kernels: dict[tuple[tuple[int, ...], ...], SceneKernels] = {}
+    found = []
     for box in boxes:
         if (tile := box.view.mosaic.tile) not in kernels:
             kernels[tile] = SceneKernels(colorless(over_field(box.view)[0]))
-    # Each place of the field sees a scene of its own; the worst of them changes by no more than any of them.
-    return [
-        Promises(replace(box, view=place), kernels[box.view.mosaic.tile])
-        for box in boxes
-        for place in over_field(box.view)
-    ]
+        # Each named place of the field sees a scene of its own; the worst changes by no more than any of them.
+        everywhere = all_heights_count(box.view)
+        own = [at_any_height(box)] if everywhere else [replace(box, view=place) for place in over_field(box.view)]
+        found += [Promises(one, kernels[tile]) for one in own]
+    return found

@@ -27,6 +27,7 @@ from ..effects.base import (
     ReadoutEffect,
     Stage,
 )
+from ..effects.image_height import all_heights_count
 from ..methods import Methods
 from ..registry import EFFECTS
 from .bounds import Box, Reach
@@ -70,16 +71,17 @@ class Promises:
     def promise(self, name: str, before: Methods, after: Methods) -> float:
         """What switching the effect of a name from its reference changes in any CSD, DN."""
         effect = EFFECTS[name]
-        if effect.is_limit and self._kernels.anywhere(after):
+        if effect.is_limit and effect.all_count(self.view, after):
             within_dn = effect.limit_dn(getattr(after, name)) or 0.0
             return min(within_dn + 2 * self._as_read(after), self._longest(after))
-        if effect.is_limit and not self._kernels.anywhere(before):
+        if effect.is_limit and not effect.all_count(self.view, before):
             return 0.0
         if getattr(before, name) == getattr(after, name):
             return 0.0
         if isinstance(effect, ReadoutEffect):
             return self._readout_promise(effect, after)
-        assert isinstance(effect, LinearEffect)
+        if not isinstance(effect, LinearEffect):
+            return math.inf  # named places of the sensor say nothing of those between them
         key = (name, *_seen(name, before, after))
         if key not in self._promises:
             self._promises[key] = self._linear_promise(effect, *key[1:])
@@ -164,6 +166,11 @@ class Promises:
             changes = (step.changed, step.change, step.remainder, step.base, step.left)
             every = self.reach.largest_change(*changes, every=True)
         return min(as_read, self._moves.promise(every, moved, clips=clips, rounds=rounds))
+
+    @property
+    def everywhere(self) -> bool:
+        """Whether all places of the sensor count."""
+        return all_heights_count(self.view)
 
     def is_anywhere(self, methods: Methods) -> bool:
         """Whether the light may fall anywhere, and more than a lattice of places is looked at."""

@@ -1,0 +1,103 @@
+"""Where on the sensor a scene is seen, from its middle to its corner, and how steeply light falls in there."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
+
+from ..types import Section
+
+PLACES = 9
+"""Places of the sensor where a study does not say how many."""
+_MOST = 1000
+_Cra = Annotated[float, Field(ge=0, le=60)]
+_Height = Annotated[float, Field(ge=0, le=1)]
+_Count = Annotated[int, Field(ge=2, le=100)]
+LINEAR = "linear"
+
+
+def _places(value: object) -> object:
+    """`any`, or how many."""
+    if value != "any" and (isinstance(value, bool) or not isinstance(value, int) or not 2 <= value <= 100):
+        raise ValueError("places are `any`, or a whole number from 2 to 100")
+    return value
+
+
+class SensorField(Section):
+    """Places of the sensor from its middle to its corner, the worst of which counts; places are image heights.
+
+    The chief ray angle grows linearly to `cra_max_deg` in the corner (`profile: linear`); or it is linear between the
+    rows of a file, `profile: FILE`, whose first column is the image height (mm, percent, or relative to the corner) and
+    whose second one the angle in degrees; or between the angles `cra_deg` at the relative `heights`, in equal steps
+    where these are left out. `corner_mm`: the image height of the corner; left out, a file's last row is the corner.
+    `places`: so many, in equal steps of image height (9 where left out, or those of a list `cra_deg`), or `any`: all
+    real places, of which the smallest CSDs are found with proof. A scene's `off_axis_deg` is then the field angle of
+    the corner.
+    """
+
+    cra_max_deg: _Cra | None = None
+    profile: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
+    corner_mm: Annotated[float, Field(ge=1e-3, le=1e4)] | None = None
+    heights: Annotated[list[_Height], Field(min_length=2, max_length=_MOST)] | None = None
+    cra_deg: Annotated[list[_Cra], Field(min_length=2, max_length=_MOST)] | None = None
+    places: Annotated[
+        Literal["any"] | int | None, BeforeValidator(_places, json_schema_input_type=Literal["any"] | _Count)
+    ] = None
+
+    @model_validator(mode="after")
+    def _one_profile(self) -> SensorField:
+        ways = (self.cra_max_deg is not None, self.cra_deg is not None, self.file is not None)
+        if sum(ways) != 1 or (self.profile == LINEAR and not ways[0]):
+            raise ValueError("a field has either `cra_max_deg`, a list `cra_deg`, or `profile: FILE`")
+        if self.corner_mm is not None and self.file is None:
+            raise ValueError("`corner_mm` goes with `profile: FILE`")
+        if self.heights is not None:
+            if self.cra_deg is None or len(self.heights) != len(self.cra_deg):
+                raise ValueError("`heights` are those of a list `cra_deg`, as many as it has")
+            if self.heights[0] != 0 or self.heights[-1] != 1 or min(np.diff(self.heights)) <= 0:
+                raise ValueError("`heights` grow from 0, the middle of the sensor, to 1, its corner")
+        return self
+
+    @property
+    def file(self) -> str | None:
+        """The file that is still to be read, relative to the study."""
+        return None if self.profile == LINEAR else self.profile
+
+    @property
+    def everywhere(self) -> bool:
+        """Whether all real places count, not only some that are named."""
+        return self.places == "any"
+
+    @property
+    def knots(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Relative image heights, and the chief ray angles there, degrees; in between it is linear."""
+        if self.cra_deg is None:
+            assert self.cra_max_deg is not None  # a file's rows take its place when a study is loaded
+            return (0.0, 1.0), (0.0, self.cra_max_deg)
+        steps = len(self.cra_deg) - 1
+        heights = [place / steps for place in range(steps + 1)] if self.heights is None else self.heights
+        return tuple(heights), tuple(self.cra_deg)
+
+    @property
+    def seen_heights(self) -> tuple[float, ...]:
+        """The image heights that are looked at; where all count, those at which the search for the worst begins."""
+        if self.places is None and self.cra_deg is not None:
+            return self.knots[0]
+        count = self.places if isinstance(self.places, int) else PLACES
+        return tuple(place / (count - 1) for place in range(count))
+
+    def cra_at(self, height: float) -> float:
+        """The chief ray angle at a relative image height, degrees."""
+        return float(np.interp(height, *self.knots))
+
+    @property
+    def angles_deg(self) -> tuple[float, ...]:
+        """The chief ray angle at each of the `seen_heights`."""
+        return tuple(self.cra_at(height) for height in self.seen_heights)
+
+    @property
+    def steepest_deg(self) -> float:
+        """The largest chief ray angle of any place."""
+        return max(self.knots[1])
