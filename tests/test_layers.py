@@ -14,6 +14,7 @@ PACKAGE = Path(__file__).parent.parent / "sweep"
 LEVELS = [
     {"errors"},
     {"types", "cache", "disk", "found"},
+    {"own_code"},
     *(
         {room}
         for room in (

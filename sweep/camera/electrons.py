@@ -42,6 +42,13 @@ class Changing:
     exposure_s: float
     which: BoolArray
 
+    @property
+    def whole(self) -> FloatArray:
+        """All channels of each, ndarray[n, n_cases, n_signals, n_channels]."""
+        found = np.repeat(self.fixed[None], len(self.values), axis=0)
+        found[..., self.channel] = self.values
+        return found
+
 
 def _background(view: View) -> FloatArray:
     """Electrons/s of the background for each QE, behind all that dims it, ndarray[n_wavelengths]."""

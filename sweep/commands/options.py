@@ -41,7 +41,12 @@ Changes = Annotated[
     typer.Option("--set", metavar="KEY=VALUE", help="A key of the study: constraints.sensitivity.min=0.92."),
 ]
 
-AllowCode = Annotated[bool, typer.Option("--allow-code", help="Run the Python files that the study names.")]
+AllowCode = Annotated[
+    bool,
+    typer.Option(
+        "--allow-code", help="Run the code that the study names: Python files and what installed packages offer."
+    ),
+]
 
 
 def changes_of(given: list[str] | None) -> dict[str, str]:

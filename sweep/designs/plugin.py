@@ -1,45 +1,24 @@
-"""A family that a user wrote, in a Python file of his own; only its parameters and its curves are asked for."""
+"""A family that a user wrote, or that an installed package offers; only its parameters and its curves are asked for."""
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Mapping
-from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from ..disk import read_input
 from ..errors import Fault, SweepError
+from ..own_code import OwnCode
 from ..types import FloatArray
 from .family import Parameter
 
-_MOST_BYTES = 1_000_000
 _STEP = 1e-5
 """Half of a central difference, in units of a parameter's range."""
 _SLACK = 1e-9
-SEPARATOR = ".py:"
-
-
-def is_plugin(kind: str) -> bool:
-    """Whether a family's name is that of a class in a Python file: `my_filters.py:Gauss`."""
-    return SEPARATOR in kind
-
-
-def plugin_parts(kind: str) -> tuple[str, str]:
-    """The file and the name of the class."""
-    file, _, name = kind.partition(SEPARATOR)
-    return f"{file}.py", name
-
-
-def kind_in_words(kind: str) -> str:
-    """A family's name as sentences say it; of one in a Python file that of its class."""
-    return plugin_parts(kind)[1] if is_plugin(kind) else kind.replace("_", " ")
 
 
 class PluginFamily:
-    """A family by a class of a user's file, `kind`: FILE.py:CLASS.
+    """A family by a class of one's own: FILE.py:CLASS, or the name by which an installed package offers it.
 
     The class has `parameters`, a list of (name, low, high) or (name, low, high, default), is made of (wavelength_nm,
     base, target), and has `curves(x)`: ndarray[n_designs, n_parameters] -> QE, ndarray[n_designs, n_wavelengths]. It
@@ -48,36 +27,28 @@ class PluginFamily:
     where that is promised, so that these bounds hold for all of them. Gradients are central differences. A row of
     `curves(x)` must not depend on the other rows.
 
-    `source` is the text of the file; a worker process gets it, not the file.
+    A worker process gets the text of a file, not the file; an installed package it must have.
     """
 
     n_modified = 1
     start_dimensions: int | None = None
 
-    def __init__(self, kind: str, source: str, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None):
-        self.kind = kind
-        self._given = kind, source, wavelength_nm, base, target
+    def __init__(self, code: OwnCode, wavelength_nm: FloatArray, base: FloatArray, target: FloatArray | None):
+        self.kind = code.name
+        self._given = code, wavelength_nm, base, target
         self._base = base
-        made = self._called(_class_of(kind, source), wavelength_nm, base, target)
+        made = code.called(code.loaded, wavelength_nm, base, target)
         self._own = made
         self.below_base = getattr(made, "below_base", False) is True
-        self.parameters = _parameters(kind, getattr(made, "parameters", None))
+        self.parameters = _parameters(code.name, getattr(made, "parameters", None))
 
     def __reduce__(self) -> tuple[type[PluginFamily], tuple[Any, ...]]:
         return PluginFamily, self._given
 
-    def _called(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """What a function of the user's returns; whatever it raises is one line."""
-        try:
-            return function(*arguments)
-        except Exception as error:  # it may raise anything
-            problem = " ".join(f"{self.kind}: {type(error).__name__}: {error}".split())
-            raise SweepError(Fault(problem[:300])) from None
-
     def _array(self, name: str, x: FloatArray, width: int | None) -> FloatArray:
         """What a method gives for a block of designs, ndarray[n_designs, width]; else raises SweepError."""
         try:
-            found = np.asarray(self._called(getattr(self._own, name), x.copy()), dtype=float)
+            found = np.asarray(self._given[0].called(getattr(self._own, name), x.copy()), dtype=float)
         except (TypeError, ValueError):
             raise SweepError(Fault(f"{self.kind}: {name} gives no array of numbers")) from None
         if found.ndim != 2 or len(found) != len(x) or (width is not None and found.shape[1] != width):
@@ -149,31 +120,6 @@ class PluginFamily:
     def start(self, points: FloatArray) -> FloatArray:
         """Not needed: a search starts anywhere in its box."""
         return points
-
-
-def read_plugin(path: Path) -> tuple[str, str]:
-    """The text of a Python file, and its SHA-256; nothing of it runs yet. Raises SweepError."""
-    content = read_input(path, _MOST_BYTES, SweepError)
-    try:
-        return content.decode("utf-8-sig"), hashlib.sha256(content).hexdigest()
-    except UnicodeDecodeError:
-        raise SweepError(Fault("not UTF-8 text", str(path))) from None
-
-
-def _class_of(kind: str, source: str) -> Callable[..., Any]:
-    """Run the text of a file, and give the class that is named in it."""
-    file, name = plugin_parts(kind)
-    module = ModuleType(Path(file).stem)
-    try:
-        exec(compile(source, file, "exec"), module.__dict__)  # what `--allow-code` allows
-    except Exception as error:
-        problem = " ".join(f"{type(error).__name__}: {error}".split())
-        raise SweepError(Fault(f"the code cannot be run: {problem[:300]}", file)) from None
-    found = getattr(module, name, None)
-    if not callable(found):
-        known = ", ".join(key for key, value in vars(module).items() if isinstance(value, type))
-        raise SweepError(Fault("no such class in the file", file, value=name, allowed=known or "a class"))
-    return found  # type: ignore[no-any-return]
 
 
 def _parameters(kind: str, said: Any) -> tuple[Parameter, ...]:

@@ -31,7 +31,8 @@ _PERCENT = 0.01
 class AskedFor:
     """What the command was told; what is None follows from the rest.
 
-    `relative_to`: the curve that the file's values are transmissions of; `transmission`: of the clear pixel.
+    `relative_to`: the curve that the file's values are transmissions of; `transmission`: of the clear pixel. Of a run:
+    `data`: the folder of its files, `allow_code`: the code that it was made with may run.
     """
 
     column: str | None = None
@@ -43,6 +44,8 @@ class AskedFor:
     quantity: LightUnit = "energy"
     relative_to: str | None = None
     transmission: bool = False
+    data: Path | str | None = None
+    allow_code: bool = False
 
 
 def verdict_on(source: Path | str, *, design: str | None = None, **wishes: Any) -> Verdict:
@@ -55,14 +58,15 @@ def verdict_on(source: Path | str, *, design: str | None = None, **wishes: Any) 
 
     `table`, `limit` and `gap` of the answer are the numbers; printed, it is what the command says. `wishes`: column,
     channel, cfa, base, sensor (`ar0820` or a file), lights (`tl16` or a file), quantity (of these), relative_to (the
-    curve that transmissions are of), transmission (of the clear pixel). Raises SweepError for what is unknown, missing
-    or not clean.
+    curve that transmissions are of), transmission (of the clear pixel); of a run that was made with code of one's own,
+    data (the folder of its files) and allow_code. Raises SweepError for what is unknown, missing or not clean.
     """
     path = Path(source)
     if is_folder(path):
         return judge(filter_of_run(path, design, AskedFor(**wishes)))
-    if design is not None:
-        raise DataError(Fault("a design is one of a run's folder", str(path), None, "--design", design))
+    for key, value in (("design", design), ("data", wishes.get("data")), ("allow-code", wishes.get("allow_code"))):
+        if value:
+            raise DataError(Fault(f"`{key}` goes with a run's folder", str(path), None, f"--{key}", str(value)))
     return judge(filter_of_file(path, AskedFor(**wishes)))
 
 
@@ -113,7 +117,8 @@ def filter_of_run(folder: Path, design: str | None, wishes: AskedFor) -> Judged:
     from ..results.output import read_output
 
     output = read_output(folder)
-    study = study_of(output, None)
+    data = None if wishes.data is None else Path(wishes.data)
+    study = study_of(output, data, allow_code=wishes.allow_code)
     row = find_row(output, design or BEST)
     space, curves = row_curves(study, row)
     if space.filter is None:

@@ -239,10 +239,10 @@ class FinishedRun:
     `output`: the same as the report knows it.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, data: Path | None = None, *, allow_code: bool = False) -> None:
         from ..report import read_output
 
-        self.folder = folder
+        self.folder, self._data, self._allow_code = folder, data, allow_code
         self.output: Output = read_output(self.folder)
 
     def __repr__(self) -> str:
@@ -278,7 +278,7 @@ class FinishedRun:
         """The study that was run, with the very curves that the run kept."""
         from ..report import study_of
 
-        return LoadedStudy(study_of(self.output, None))
+        return LoadedStudy(study_of(self.output, self._data, allow_code=self._allow_code))
 
     @property
     def summary(self) -> str:

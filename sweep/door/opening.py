@@ -37,21 +37,24 @@ def opened_study(name: Path | str, data: Path | str | None = None, *, allow_code
     >>> sweep.load_study("stopband")
     <study stopband: 116,286 designs on RGGB, RCCC, RCCB, RYYCy, RYNCy>
 
-    `data`: folder that its files are looked for in first. `allow_code`: Python files that the study names may run.
+    `data`: folder that its files are looked for in first. `allow_code`: code that the study names may run.
     Raises SweepError with a line for each thing that is wrong.
     """
     folder = None if data is None else Path(data)
     return LoadedStudy(load_study(study_path(Path(name)), folder, allow_code=allow_code))
 
 
-def finished_run(folder: Path | str) -> FinishedRun:
+def finished_run(folder: Path | str, data: Path | str | None = None, *, allow_code: bool = False) -> FinishedRun:
     """A finished run's folder as an object; raises SweepError where files are missing or not as the run wrote them.
 
     >>> import sweep
     >>> sweep.read_run("outputs/stopband").best.cfa  # doctest: +SKIP
     'RYNCy'
+
+    `data`: folder of its files, `allow_code`: the code that it was made with may run; its `.study` needs both where a
+    Python file made it.
     """
-    return FinishedRun(Path(folder))
+    return FinishedRun(Path(folder), None if data is None else Path(data), allow_code=allow_code)
 
 
 def studies() -> list[str]:
@@ -64,7 +67,9 @@ def studies() -> list[str]:
     return shipped_names()
 
 
-def made_study(study: str = "python", *, sensor: Any = "ar0820", lights: Any = "tl16", **keys: Any) -> LoadedStudy:
+def made_study(
+    study: str = "python", *, sensor: Any = "ar0820", lights: Any = "tl16", allow_code: bool = False, **keys: Any
+) -> LoadedStudy:
     """A study without a file: the keys of a study file as values, sensor and lights also from `sensor` and `lights`.
 
     >>> import sweep
@@ -72,13 +77,15 @@ def made_study(study: str = "python", *, sensor: Any = "ar0820", lights: Any = "
     >>> mine.evaluate().csd_yellow_red.round().tolist()
     [35.0, 8.0]
 
-    Sections such as `pixel` are mappings or the package's own objects. Raises SweepError as a study file does.
+    Sections such as `pixel` are mappings or the package's own objects. `allow_code`: code that it names may run. Raises
+    SweepError as a study file does.
     """
     said = {"study": study, "sensor": sensor, "lights": lights, **keys}
     given: dict[str, Curves] = {}
     for part in (sensor, lights):
         given |= part.curves if isinstance(part, Given) else {}
-    return LoadedStudy(study_of_keys({key: _plain(value) for key, value in said.items()}, Path.cwd(), given))
+    plain = {key: _plain(value) for key, value in said.items()}
+    return LoadedStudy(study_of_keys(plain, Path.cwd(), given, allow_code=allow_code))
 
 
 def own_sensor(

@@ -96,7 +96,8 @@ def judged(study: Study, view: View, curves: FloatArray) -> Columns:
     if not curves.max(initial=0.0) <= _MOST_QE:
         allowed = "0 to 1; a transmission is relative to a curve (`relative_to`), percent are divided by 100"
         raise DataError(Fault("a QE above 1", value=round(float(curves.max()), 6), allowed=allowed))
-    found = evaluate(imager_of(view), curves, study.states, probabilities=study.asked.probabilities)
+    asked = study.asked
+    found = evaluate(imager_of(view), curves, asked.states, probabilities=asked.probabilities, own=asked.own)
     if view.lights.population is not None and not study.edge_shift_nm:
         from ..metrics.members import population_imager  # noqa: PLC0415  (only where lights have a population)
 

@@ -23,6 +23,7 @@ from ..types import FloatArray
 from ..vision.section import Vision
 from .columns.color_separation import ColorSeparation
 from .columns.exposure import EXPOSURE
+from .own import OwnMetric, own_quantities
 from .quantity import (
     BEST_PLACE,
     Asked,
@@ -138,25 +139,31 @@ def _as_read(imager: Imager, curves: FloatArray, found: Mapping[Pair, Extremes |
 
 
 def evaluate(
-    imager: Imager, designs: FloatArray | Block, states: Sequence[str] = (), *, probabilities: bool = False
+    imager: Imager,
+    designs: FloatArray | Block,
+    states: Sequence[str] = (),
+    *,
+    probabilities: bool = False,
+    own: Sequence[OwnMetric] = (),
 ) -> Columns:
     """Evaluate a block of designs as the camera reads them out, as far as the scene's methods go.
 
     `designs`: see `designed_quantities`. Returns the columns of all metrics but those of a family, each
-    ndarray[n_designs]; `states`: signal types that noise may confuse, `probabilities`: with their CDP and CSP. CSDs are
-    the smallest over the places of the light and the moments of its pulses; `best_place_csd_<a>_<b>` is the largest
-    over the places of the smallest over the moments. Noise metrics are the worst over the places of the lattice.
-    Distances are NaN where the extremes over all places take more cells than `places` allows, or `sensor_places`.
+    ndarray[n_designs]; `states`: signal types that noise may confuse, `probabilities`: with their CDP and CSP; `own`:
+    metrics of a user's own. CSDs are the smallest over the places of the light and the moments of its pulses;
+    `best_place_csd_<a>_<b>` is the largest over the places of the smallest over the moments. Noise metrics and own
+    ones are the worst over the places of the lattice. Distances are NaN where the extremes over all places take more
+    cells than `places` allows, or `sensor_places`.
     """
     block = _block(designs)
     changing = None if states or _OTHERS else imager.read_changing(block)
     if changing is None:
-        columns = _read(imager, block, states, probabilities=probabilities)
+        columns = _read(imager, block, states, probabilities=probabilities, own=own)
     elif changing.which.all():
-        columns = _distances_along(imager, changing)
+        columns = _distances_along(imager, changing, own)
     else:
-        along = _distances_along(imager, changing)
-        rest = _read(imager, block.some(np.flatnonzero(~changing.which)))
+        along = _distances_along(imager, changing, own)
+        rest = _read(imager, block.some(np.flatnonzero(~changing.which)), own=own)
         columns = {name: np.empty(len(block)) for name in along}
         for name, values in columns.items():
             values[changing.which], values[~changing.which] = along[name], rest[name]
@@ -167,17 +174,25 @@ def evaluate(
     return columns | designed_quantities(imager.view, block)
 
 
-def _distances_along(imager: Imager, changing: Changing) -> Columns:
-    """CSDs and exposure of designs that differ in one channel alone."""
+def _distances_along(imager: Imager, changing: Changing, own: Sequence[OwnMetric]) -> Columns:
+    """CSDs and exposure of designs that differ in one channel alone, and own metrics."""
     cases = [
         separations_along(fixed, changing.channel, changing.values[:, case], imager.view.members)
         for case, fixed in enumerate(changing.fixed)
     ]
     named = [{csd_name(pair): values for pair, values in case.items()} for case in cases]
-    return _over(imager, named) | {EXPOSURE: np.full(len(changing.values), changing.exposure_s)}
+    found = _over(imager, named) | {EXPOSURE: np.full(len(changing.values), changing.exposure_s)}
+    return found | own_quantities(own, imager.view, changing.whole) if own else found
 
 
-def _read(imager: Imager, block: Block, states: Sequence[str] = (), *, probabilities: bool = False) -> Columns:
+def _read(
+    imager: Imager,
+    block: Block,
+    states: Sequence[str] = (),
+    *,
+    probabilities: bool = False,
+    own: Sequence[OwnMetric] = (),
+) -> Columns:
     """What the readout of any designs gives; with `states`, what noise does to them, too."""
     curves, members, apart = block.curves(), imager.view.members, Columns()
     if states:
@@ -192,6 +207,7 @@ def _read(imager: Imager, block: Block, states: Sequence[str] = (), *, probabili
         _joined([metric.of_readout(response[:, case], members) for metric in _READOUT])
         for case in range(response.shape[1])
     ]
+    apart |= own_quantities(own, imager.view, response)
     return _over(imager, cases) | apart | {EXPOSURE: exposure_s}
 
 

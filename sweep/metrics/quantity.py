@@ -20,6 +20,7 @@ from ..designs.block import Block
 from ..designs.family import Family
 from ..types import FloatArray, IndexArray
 from ..vision.section import Vision
+from .own import OwnMetric
 from .smooth import Rows, SmoothDesign
 
 WORST = "worst_"
@@ -102,7 +103,8 @@ class Quantity(Column):
     """A column that is computed, with what constraints, search and limit need.
 
     `ends`: ends of a constraint on it. `goal`: a search may make it large, or small where less is wanted, and it has a
-    worst case unless it is `nominal`. `needs`: it exists only with a modified channel, or in a family that has it.
+    worst case unless it is `nominal`. `needs`: it exists only with a modified channel, in a family that has it, or in
+    CFAs of which an own metric says something.
     `infinite`: it may be so. `promised`: a plan's promise holds for it. `rows`: what its smooth rows are: its values,
     their squares, or their number of decades below 1, -log10. `apart`: it is the smallest distance of two signals, in
     DN or in units of the noise. `most`: no filter reaches more. `share`: it is the smallest ratio of N to the curve
@@ -112,7 +114,7 @@ class Quantity(Column):
 
     ends: tuple[End, ...] = ()
     goal: bool = False
-    needs: Literal["modified", "family", ""] = ""
+    needs: Literal["modified", "family", "own", ""] = ""
     infinite: bool = False
     promised: bool = False
     nominal: bool = False
@@ -162,7 +164,7 @@ class Quantity(Column):
 @dataclass(frozen=True)
 class Asked:
     """What a study asks for: signal types, states that noise may confuse, any place of the light, shifts of edges, a
-    population of its lights, probabilities of detection and separation, tasks, and a benchmark of vision.
+    population of its lights, probabilities of detection and separation, tasks, a benchmark of vision, and own metrics.
     """
 
     classes: tuple[str, ...]
@@ -173,6 +175,7 @@ class Asked:
     tasks: tuple[TaskName, ...] = ()
     probabilities: bool = False
     vision: bool = False
+    own: tuple[OwnMetric, ...] = ()
 
 
 class Metric(ABC):

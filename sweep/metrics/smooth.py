@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from .members import PopulationImager
 
 Made = TypeVar("Made")
+_SMALLEST = 1e-300
+"""No logarithm is taken of less."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,22 @@ class Rows:
     def scaled(self, factor: float, offset: float = 0.0) -> Rows:
         """factor x rows + offset."""
         return Rows(factor * self.values + offset, factor * self.by_u)
+
+    def squares(self) -> Rows:
+        """Their squares."""
+        return Rows(self.values**2, 2 * self.values[:, None] * self.by_u)
+
+    def roots(self) -> Rows:
+        """Their roots, with no slope where they are 0."""
+        values = np.sqrt(np.maximum(self.values, 0.0))
+        per = np.divide(0.5, values, out=np.zeros_like(values), where=values > 0)
+        return Rows(values, per[:, None] * self.by_u)
+
+    def logarithms(self) -> Rows:
+        """-log10 of them, with no slope where they are 0 or less."""
+        values = np.maximum(self.values, _SMALLEST)
+        per = np.where(self.values > _SMALLEST, -1 / (np.log(10) * values), 0.0)
+        return Rows(-np.log10(values), per[:, None] * self.by_u)
 
     @staticmethod
     def joined(parts: list[Rows]) -> Rows:

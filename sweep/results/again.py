@@ -8,9 +8,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..designs.plugin import read_plugin
-from ..disk import is_file
 from ..errors import Fault, OutputError
+from ..own_code import CODE_OF, is_code
 from ..study import Study, load_study
 from ..study.sources import KeptSources
 from ..types import FloatArray
@@ -20,26 +19,26 @@ from .tables import RESOLVED
 _SAME = 1e-12
 """Curves that were computed twice, on other machines, differ by no more."""
 _MOST_SHOWN = 10
-_CODE = ".py"
 _Key = TypeVar("_Key")
 
 
 def study_of(output: Output, data: Path | None, *, allow_code: bool = False) -> Study:
     """The study of a finished run again: with its files, looked for in `data`, or with the curves that the run kept.
 
-    `allow_code`: the code of its own families may run; code that is not that of the run does not. Raises OutputError
-    when the curves or the code are not those of the run, and where code is needed but not allowed.
+    `allow_code`: code that it was made with may run, and no other. Raises OutputError where that is not allowed, and
+    when the curves are not those of the run; StudyError for other code.
     """
     path, digests = output.folder / RESOLVED, output.provenance.data_sha256
-    for name in (name for name in digests if name.endswith(_CODE)):
-        if data is None or not allow_code:
-            allowed = "--data FOLDER, which holds it, and --allow-code, if you trust it"
-            raise OutputError(Fault(f"its filters are made by the code of {name}", str(output.folder), allowed=allowed))
-        if not is_file(data / name) or read_plugin(data / name)[1] != digests[name]:
-            raise OutputError(Fault("not the code that the run had", str(data / name)))
-    if data is None and digests:
-        return load_study(path, kept=KeptSources(output.curves.sensor, output.curves.lights))
-    study = load_study(path, data, allow_code=allow_code)
+    code = {name: digest for name, digest in digests.items() if is_code(name)}
+    in_files = [name for name in code if not name.startswith(CODE_OF)]
+    if code and (not allow_code or (in_files and data is None)):
+        where = "--data FOLDER, which holds it, and " if in_files else ""
+        whose = ", ".join(in_files or [name.removeprefix(CODE_OF) for name in code])
+        problem = f"it was made with the code of {whose}"
+        raise OutputError(Fault(problem, str(output.folder), allowed=f"{where}--allow-code, if you trust it"))
+    if data is None and digests.keys() - code:
+        return load_study(path, kept=KeptSources(output.curves.sensor, output.curves.lights), allow_code=code)
+    study = load_study(path, data, allow_code=code)
     lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
     check_kept(output, output.curves.sensor, study.sensor.qe)
     check_kept(output, output.curves.lights, {(kind, name): values for kind, name, values in lights})

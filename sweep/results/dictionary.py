@@ -67,6 +67,10 @@ _WORST = (
     "and of a CSD over the population of the lights: then that of the response before clipping and rounding, with "
     "everything on, over all members exactly"
 )
+_OWN = (
+    "a metric of the study's `metrics`, the worst over moments and places of the lattice; nothing is promised of it: "
+    "the tolerance in DN is of CSDs"
+)
 KEYS = tuple(name for names in (*_KEYS, *_VERDICTS) for name in names)
 """Columns that are no quantities of a metric."""
 
@@ -79,6 +83,7 @@ def columns_table() -> list[str]:
     asked = Asked(types, types, any_place=True, probabilities=True, tasks=tasks, vision=True)
     for quantity in listed(asked):
         rows.append(_row((quantity.name,), quantity.unit, quantity.meaning))
+    rows.append(_row(("<own metric>",), "its own", _OWN))
     rows.append(_row(("worst_<quantity>",), "", _WORST))
     rows += [_row(names, "", meaning) for names, meaning in _VERDICTS.items()]
     return ["| column | unit | meaning |", "| --- | --- | --- |", *rows]

@@ -17,6 +17,7 @@ from ..designs.block import Block, CurveBlock, EdgeBlock, edges_of
 from ..designs.space import Space
 from ..metrics.evaluate import evaluate, family_quantities, image_quantities
 from ..metrics.objective import COMBINED, Objective, columns_of
+from ..metrics.own import OwnMetric
 from ..metrics.quantity import WORST_CASE, Asked, Columns, Quantity
 from ..search.problem import SHIFTS
 from ..types import FloatArray
@@ -88,29 +89,36 @@ def _columns(space: Space, view: View, points: FloatArray, request: Request, blo
     size = view.grid.size
     imager = imager_of(view)
     designs = CurveBlock(space.curves(points, size)) if block is None else block
-    columns = evaluate(imager, designs, request.asked.states, probabilities=request.asked.probabilities)
+    asked = request.asked
+    columns = evaluate(imager, designs, asked.states, probabilities=asked.probabilities, own=asked.own)
     columns |= family_quantities(None if space.filter is None else space.filter.family, points)
     if request.vision is not None:
         columns |= image_quantities(view, space.curves(points, size), request.vision, request.seed)
     worst = [quantity for quantity in request.quantities.values() if quantity.extreme == WORST_CASE]
     if worst:
-        columns |= worst_cases(space, imager, points, columns, worst, request.edge_shift_nm)
+        columns |= worst_cases(space, imager, points, columns, worst, request.edge_shift_nm, asked.own)
     if request.objective.column == COMBINED:
         columns[COMBINED] = request.objective.of(columns)
     return columns
 
 
 def worst_cases(
-    space: Space, imager: Imager, points: FloatArray, nominal: Columns, worst: Sequence[Quantity], edge_shift_nm: float
+    space: Space,
+    imager: Imager,
+    points: FloatArray,
+    nominal: Columns,
+    worst: Sequence[Quantity],
+    edge_shift_nm: float,
+    own: Sequence[OwnMetric] = (),
 ) -> Columns:
     """Worst cases of designs over shifts of their edges, and of CSDs over the population of the lights.
 
-    `nominal`: what `evaluate` gives of them; `worst`: the quantities that are asked for.
+    `nominal`: what `evaluate` gives of them; `worst`: the quantities that are asked for; `own`: metrics of a user's.
     """
     view = imager.view
     shifts = [edge_shift_nm * s for s in SHIFTS if s] if edge_shift_nm and space.filter is not None else []
     curves = [space.curves(points, view.grid.size, shift) for shift in (0.0, *shifts)]
-    cases = [nominal, *(evaluate(imager, shifted) for shifted in curves[1:])]
+    cases = [nominal, *(evaluate(imager, shifted, own=own) for shifted in curves[1:])]
     if view.lights.population is not None:
         from ..metrics.members import population_imager  # noqa: PLC0415  (only where lights have a population)
 
@@ -157,7 +165,7 @@ def _not_finite(columns: Columns, view: View, request: Request) -> dict[int, str
 
 def _may_lack(view: View, request: Request) -> set[str]:
     """Quantities that a design may not have: those of a family; of a plain CFA, all that a modified channel has."""
-    without = ("family",) if view.modified else ("family", "modified")
+    without = ("family", "own") if view.modified else ("family", "own", "modified")
     lacking = {name for name, quantity in request.quantities.items() if quantity.needs in without}
     if lacking & set(request.objective.weights):
         lacking.add(COMBINED)

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from ..designs.plugin import kind_in_words
 from ..designs.space import Space
 from ..errors import Fault, InfeasibleError
 from ..metrics.bound import FEASIBLE
 from ..metrics.columns.sensitivity import cfa_sensitivity_at
+from ..own_code import kind_in_words
 from ..results.price import price_schema
 from ..results.tables import front_schema, search_schema
 from ..search.limit import Limit, limit_of, why_not

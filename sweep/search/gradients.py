@@ -20,6 +20,7 @@ from ..designs.block import CurveBlock
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY, Sensitivity
 from ..metrics.quantity import Quantity
+from ..metrics.rule import Rule
 from ..metrics.smooth import Rows, SmoothDesign
 from ..types import FloatArray, IndexArray
 from .problem import Evaluation, Problem, SearchRun
@@ -39,9 +40,9 @@ _CONDITION_NM = 100.0
 class Point:
     """Everything that one simulation gives.
 
-    `terms`: the objective's weighted quantities as rows, squared, or as decades below 1 of errors that are to be the
-    least; `power`: 2 or 1. `term`: ndarray[n], the term that each row belongs to (all 0 for a minimum). `conditions`:
-    met where <= 0. `quantities`: rows of each constrained quantity.
+    `terms`: the objective's weighted quantities as rows, squared, as they are where an own metric is among them, or as
+    decades below 1 of what is to be the least; `power`: 2 or 1. `term`: ndarray[n], the term that each row belongs to
+    (all 0 for a minimum). `conditions`: met where <= 0. `quantities`: rows of each constrained quantity.
     """
 
     evaluation: Evaluation
@@ -93,6 +94,9 @@ class Model:
         self._families = {s: problem.family.shifted(s) if s else problem.family for s in shifts}
         over = any(problem.over_population(name) for name in wanted)
         self._members = _members_of(problem.view) if over else None
+        self._power = (
+            1 if problem.own_goal or problem.objective.rule.wanted == "less" else 2
+        )  # what may be below 0 has no root
         self._back_off = {name: _back_off(problem, name, bound) for name, bound in problem.constraints.items()}
         self._seen: dict[bytes, Point] = {}
 
@@ -133,8 +137,7 @@ class Model:
         evaluation = Evaluation(x, objective, own, whole, worst)
         own_term = np.arange(len(terms)) * (not problem.objective.rule.smallest)  # what is smallest needs one bound
         term = np.repeat(own_term, [rows.values.size for rows in terms])
-        power = 2 if problem.objective.rule.wanted == "more" else 1
-        return Point(evaluation, Rows.joined(terms), power, term, Rows.joined(conditions), quantities)
+        return Point(evaluation, Rows.joined(terms), self._power, term, Rows.joined(conditions), quantities)
 
     def _terms(self, made: Mapping[float, SmoothDesign]) -> tuple[list[Rows], float]:
         """The rows of each weighted quantity of the objective, see `Point`, and the objective's value."""
@@ -142,12 +145,7 @@ class Model:
         for name, weight in self._problem.objective.weights.items():
             quantity, rows = self._quantities[name], self._rows(name, made)
             columns[name] = np.array([quantity.value(rows)])
-            if quantity.rows == "decades":
-                terms.append(rows.scaled(1.0, -math.log10(weight)))
-                continue
-            if quantity.rows == "values":
-                rows = Rows(rows.values**2, 2 * rows.values[:, None] * rows.by_u)
-            terms.append(rows.scaled(weight**2))
+            terms.append(_term(quantity, rows, weight, self._problem.objective.rule, self._power))
         if self._problem.objective.rule.wanted == "less":  # by the decades, which do not end where numbers do
             return terms, float(min(rows.values.min() for rows in terms))
         return terms, float(self._problem.objective.of(columns)[0])
@@ -157,6 +155,17 @@ class Model:
         smooth = self._quantities[name].smooth
         assert smooth is not None
         return Rows.joined([smooth(made[shift]) for shift in self._problem.shifts_nm(name)])
+
+
+def _term(quantity: Quantity, rows: Rows, weight: float, rule: Rule, power: int) -> Rows:
+    """The rows of a weighted quantity as the objective's, see `Point`."""
+    if rule.wanted == "less" and quantity.rows == "values":
+        rows = rows.logarithms()
+    if rule.wanted == "less":
+        return rows.scaled(1.0, -math.log10(weight))
+    if power == 1:
+        return (rows.roots() if quantity.rows == "squares" else rows).scaled(weight)
+    return (rows if quantity.rows == "squares" else rows.squares()).scaled(weight**2)
 
 
 def _back_off(problem: Problem, name: str, bound: Bound) -> float:

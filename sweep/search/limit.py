@@ -129,8 +129,11 @@ def _proof(program: FilterProgram, members: MemberPairs | None, tolerance: float
 def why_not(problem: Problem) -> str | None:
     """Why a problem has no linear limit; None when it has."""
     unknown = [name for name in problem.objective.weights if not problem.quantities[name].has_limit]
-    noisy = any(problem.quantities[name].states for name in unknown)
-    why = "is not convex in the filter: its noise grows with the light; d' has a limit" if noisy else _NOT_LINEAR
+    why = _NOT_LINEAR
+    if any(problem.quantities[name].states for name in unknown):
+        why = "is not convex in the filter: its noise grows with the light; d' has a limit"
+    if problem.own_goal:
+        why = "is an own metric, of which nothing is known"
     base, family = problem.view.base_qe[0], problem.family
     reasons: tuple[tuple[Callable[[], bool], str], ...] = (
         (lambda: family.n_modified != 1, "more than one modified channel"),

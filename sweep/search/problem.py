@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from ..curves.lights import Pair
 from ..designs.family import Family
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.objective import Objective
+from ..metrics.own import OwnMetric
 from ..metrics.quantity import DN, WORST_CASE, Asked, Quantity
 from ..metrics.registry import quantities_of
 from ..types import FloatArray, IndexArray
@@ -36,14 +37,14 @@ class Problem:
     constraints: Mapping[str, Bound]
     edge_shift_nm: float = 0.0
     states: tuple[str, ...] = ()
+    own: tuple[OwnMetric, ...] = ()
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
         """What objective and constraints may name."""
         tasks = () if self.view.tasks is None else self.view.tasks.keys
-        return quantities_of(
-            Asked(self.view.lights.classes, self.states, edge_shift=True, population=self.population, tasks=tasks)
-        )
+        asked = Asked(self.view.lights.classes, self.states, edge_shift=True, tasks=tasks, own=self.own)
+        return quantities_of(replace(asked, population=self.population))
 
     @property
     def population(self) -> bool:
@@ -54,6 +55,11 @@ class Problem:
         """Whether a quantity is a worst case over the population of the lights."""
         asked = self.quantities[quantity]
         return self.population and asked.extreme == WORST_CASE and asked.apart == DN
+
+    @property
+    def own_goal(self) -> bool:
+        """Whether the objective is of an own metric."""
+        return any(self.quantities[name].needs == "own" for name in self.objective.weights)
 
     @property
     def pairs(self) -> dict[str, Pair]:

@@ -27,15 +27,15 @@ def load_study(
     kept: KeptSources | None = None,
     changes: Mapping[str, str] = {},
     *,
-    allow_code: bool = False,
+    allow_code: bool | Mapping[str, str] = False,
 ) -> Study:
     """Read and check a study file.
 
     Files that it names are looked for in `data`, when given, and then beside the study. `step_nm` replaces the step of
     its wavelength grid. `kept`: curves on that grid to take instead of those in files, `qe:<curve>` and
     `light:<type>:<name>`, each ndarray[n_wavelengths]. `changes`: dotted key -> value to take instead, as a study file
-    would have it. `allow_code`: code of Python files that the study names may run. Raises StudyError with one fault per
-    thing wrong: file:line, key, value, what is allowed, nearest name.
+    would have it. `allow_code`: code that the study names may run, or of it what has these digests. Raises StudyError
+    with one fault per thing wrong: file:line, key, value, what is allowed, nearest name.
     """
     document = Document(path)
     for key, text in changes.items():
@@ -51,14 +51,16 @@ def load_study(
     return resolve(document, section, [*([data] if data is not None else []), path.parent], kept, allow_code=allow_code)
 
 
-def study_of_keys(keys: Mapping[str, Any], folder: Path, given: Mapping[str, Curves] = {}) -> Study:
+def study_of_keys(
+    keys: Mapping[str, Any], folder: Path, given: Mapping[str, Curves] = {}, *, allow_code: bool = False
+) -> Study:
     """Check a study that stands in no file: its keys with plain values.
 
     Files that it names are looked for in `folder`; `given`: curves to take for files that are not on a disk, by the
     names that the study gives these. Raises StudyError as `load_study` does, without file and line.
     """
     document = Document(keys)
-    return resolve(document, _section(document), [folder], None, given)
+    return resolve(document, _section(document), [folder], None, given, allow_code=allow_code)
 
 
 def _section(document: Document) -> StudySection:

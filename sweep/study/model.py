@@ -25,6 +25,7 @@ from ..designs.technology import Technology
 from ..errors import Fault, StudyError
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective, columns_of
+from ..metrics.own import OwnMetric
 from ..metrics.quantity import Asked, Quantity
 from ..metrics.separation import csd_name
 from ..search.problem import SHIFTS, Problem
@@ -65,6 +66,7 @@ class Study:
     warnings: tuple[str, ...]
     held_out: Lights | None = None
     tasks: StudyTasks | None = None
+    own: tuple[OwnMetric, ...] = ()
     plans: Mapping[str, Plan] = field(default_factory=dict)
 
     @property
@@ -106,6 +108,7 @@ class Study:
             population=self.section.population is not None,
             tasks=() if self.tasks is None else self.tasks.keys,
             vision=self.section.vision is not None,
+            own=self.own,
         )
 
     @property
@@ -230,6 +233,7 @@ class Study:
             constraints=self.constraints,
             edge_shift_nm=self.edge_shift_nm,
             states=self.states,
+            own=self.own,
         )
 
 

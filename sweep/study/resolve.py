@@ -14,6 +14,7 @@ from ..curves.spectrum import Curves
 from ..curves.tasks import StudyTasks
 from ..designs.space import Space
 from ..errors import StudyError, SweepError
+from ..metrics.own import OwnMetric
 from ..metrics.quantity import WORST_CASE, Asked, Quantity
 from ..metrics.registry import listed, quantities_of
 from ..search.solver import ALGORITHMS
@@ -23,6 +24,7 @@ from .document import Document
 from .goals import check_goals
 from .luminances import check_luminances
 from .model import Search, Study
+from .own_metrics import check_names, own_metrics, try_metrics
 from .populations import check_range, with_population
 from .schema import CfaSection, StudySection
 from .seen_images import check_vision
@@ -45,7 +47,7 @@ class _Resolver:
         folders: list[Path],
         kept: KeptSources | None,
         given: Mapping[str, Curves],
-        allow_code: bool,
+        allow_code: bool | Mapping[str, str],
     ) -> None:
         self.document = document
         self.sources = Sources(document, section.wavelengths, folders, kept, given, allow_code)
@@ -54,6 +56,7 @@ class _Resolver:
         self.add = self.sources.add
         self.unknown = self.sources.unknown
         self.tasks: StudyTasks | None = None
+        self.own: tuple[OwnMetric, ...] = ()
 
     def resolve(self) -> Study:
         section = self.section
@@ -66,7 +69,9 @@ class _Resolver:
         held_out = self.held_out(lights)
         lights = with_population(lights, section, self.sources)
         self.read_tasks()
+        self.own = own_metrics(section, self.sources)
         spaces = SpaceBuilder(section, self.sources, sensor, mosaics).spaces()
+        check_names(self.own, self.asked(lights), spaces, self.sources)
         self.check_columns(lights)
         check_luminances(section, lights, self.sources)
         check_regions(section, self.sources)
@@ -101,20 +106,15 @@ class _Resolver:
             warnings=tuple(self.sources.warnings),
             held_out=held_out,
             tasks=self.tasks,
+            own=self.own,
         )
         self.check_memory(study)
+        try_metrics(study, self.sources)
         check_range(study, self.sources)
         check_fields(study, self.sources)
         if self.faults:
             raise StudyError(self.faults)
-        if not study.n_designs and search is None:
-            self.add(
-                ("cfas",), "no designs", None, "a CFA with a curve for each channel, a design, a sweep or a search"
-            )
-            raise StudyError(self.faults)
-        if study.n_designs > MOST_DESIGNS:
-            self.add(("sweeps",), "too many designs", f"{study.n_designs:,}", f"at most {MOST_DESIGNS:,}")
-            raise StudyError(self.faults)
+        self.check_size(study)
         return study
 
     def held_out(self, lights: Lights) -> Lights | None:
@@ -144,6 +144,7 @@ class _Resolver:
             population=self.section.population is not None,
             tasks=() if self.tasks is None else self.tasks.keys,
             vision=self.section.vision is not None,
+            own=self.own,
         )
 
     def check_columns(self, lights: Lights) -> None:
@@ -172,6 +173,17 @@ class _Resolver:
                     problem, value, allowed = refused
                     self.add(("scenarios", name, "target"), f"{problem} (CFA {space.cfa})", value, allowed)
                     raise StudyError(self.faults)
+
+    def check_size(self, study: Study) -> None:
+        """There are designs, and not too many. Raises StudyError."""
+        if not study.n_designs and study.search is None:
+            self.add(
+                ("cfas",), "no designs", None, "a CFA with a curve for each channel, a design, a sweep or a search"
+            )
+            raise StudyError(self.faults)
+        if study.n_designs > MOST_DESIGNS:
+            self.add(("sweeps",), "too many designs", f"{study.n_designs:,}", f"at most {MOST_DESIGNS:,}")
+            raise StudyError(self.faults)
 
     def check_recognition(self, lights: Lights) -> None:
         """Its states are signal types, each once, and every scenario has noise."""
@@ -278,11 +290,11 @@ def resolve(
     kept: KeptSources | None = None,
     given: Mapping[str, Curves] = {},
     *,
-    allow_code: bool = False,
+    allow_code: bool | Mapping[str, str] = False,
 ) -> Study:
     """Make the study; `folders` are searched in order for its files. Raises StudyError with every fault found.
 
-    `kept`: curves to take instead of those in files, `given`: files that are not on a disk; `allow_code`: Python
-    files that it names may run. See `Sources`.
+    `kept`: curves to take instead of those in files, `given`: files that are not on a disk; `allow_code`: code that
+    it names may run. See `Sources`.
     """
     return _Resolver(document, section, folders, kept, given, allow_code).resolve()

@@ -27,6 +27,7 @@ from .schema_tasks import TasksAsked
 _FEWEST_PATCHES = 10
 _MOST_ROWS = 64
 _MOST_DRAWN = 1_000_000
+_MOST_OWN = 50
 MOST_TYPES = 40
 """Signal types of a study; 780 pairs of them have columns of their own."""
 
@@ -53,7 +54,13 @@ class Modification(Documented):
 
     cfa: Name
     """One of `cfas`."""
-    family: Annotated[Name, Field(description=f"One of {told()}; or FILE.py:CLASS of your own.")] = "stopband"
+    family: Annotated[
+        Name,
+        Field(
+            description=f"One of {told()}; or your own: FILE.py:CLASS, or the name by which "
+            "an installed package offers it.",
+        ),
+    ] = "stopband"
     where: Literal["pixel", "lens"] = "pixel"
     """`pixel`: the filter replaces a channel. `lens`: it is a glass in front of the lens, whose transmission every
     channel sees, the same at every place of the image; it starts from 1, and has neither `channel` nor `base`."""
@@ -275,6 +282,10 @@ class StudySection(Documented):
     """What else designs are judged by: `all`, a list of tasks of the package, or a mapping with own ones."""
     vision: Vision | None = None
     """Images of signal heads, read by the ideal observer and by a network; lamps need luminous intensity."""
+    metrics: Annotated[
+        list[Name], BeforeValidator(_listed, json_schema_input_type=list[Name] | Name), Field(max_length=_MOST_OWN)
+    ] = []
+    """Own metrics: FILE.py:NAME, or names that installed packages offer; each is a column like any other."""
     objective: Objective = Objective(minimum={"csd_yellow_red": 1.0})
     """What is maximized: a CSD or sensitivity, or several: {minimum: {...}} or {sum: {...}} with weights; or, of errors
     under noise, made small: {least: {...}}."""

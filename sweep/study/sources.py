@@ -17,7 +17,7 @@ from ..curves.lens_files import ChiefRays, read_chief_rays
 from ..curves.lights import Lights, make_lights
 from ..curves.spectrum import Curves, WavelengthGrid, photons_from_energy
 from ..disk import is_file
-from ..errors import MOST_FAULTS, DataError, Fault, nearest
+from ..errors import MOST_FAULTS, DataError, Fault, SweepError, nearest
 from ..types import FloatArray
 from .document import Document
 from .schema import MOST_TYPES
@@ -47,7 +47,7 @@ class Sources:
     """Reads the files of one study, each once; collects faults, warnings and digests.
 
     `kept`: the curves of a finished run; no file is read then. `given`: files that are not on a disk, by their names.
-    `allow_code`: code of Python files that the study names may run.
+    `allow_code`: code that the study names may run, or of it what has these digests.
     """
 
     document: Document
@@ -55,7 +55,7 @@ class Sources:
     folders: Sequence[Path]
     kept: KeptSources | None = None
     given: Mapping[str, Curves] = field(default_factory=dict)
-    allow_code: bool = False
+    allow_code: bool | Mapping[str, str] = False
     faults: list[Fault] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     digests: dict[str, str] = field(default_factory=dict)
@@ -251,6 +251,12 @@ class Sources:
     ) -> None:
         """Add a fault at `path` of the study file."""
         self.faults.append(self.document.fault(path, problem, value, allowed, near))
+
+    def told(self, path: tuple[Key, ...], error: SweepError) -> None:
+        """Add the faults of an error at `path` of the study file."""
+        for fault in error.faults:
+            problem = f"{fault.file}: {fault.problem}" if fault.file else fault.problem
+            self.add(path, problem, fault.value, fault.allowed, fault.nearest)
 
 
 def _digest_of(curves: Curves) -> str:

@@ -13,13 +13,14 @@ from ..camera.sensor import SensorCurves
 from ..curves.builtin.surrogate import surrogate_parameters
 from ..designs.family import Family, Parameter
 from ..designs.glass import Glass
-from ..designs.plugin import PluginFamily, is_plugin, plugin_parts, read_plugin
+from ..designs.plugin import PluginFamily
 from ..designs.registry import FAMILIES, build_family
 from ..designs.space import Filter, Kind, Space
 from ..designs.ungridded import Ungridded
-from ..disk import is_file
-from ..errors import Fault, SweepError, nearest
+from ..errors import SweepError, nearest
+from ..own_code import Offered, is_in_file, offers
 from ..types import FloatArray
+from .own_codes import allowed, code_of, is_from_outside
 from .schema import DesignSection, Modification, StudySection
 from .sources import Sources
 from .sweep_axes import sweep_axes
@@ -28,6 +29,7 @@ from .yaml_tree import Key
 
 _MOST_POINTS = 2_000_000
 _MOST_DRAWN = 10_000_000
+_FAMILIES: Offered = "sweep.families"
 
 
 @dataclass(frozen=True)
@@ -99,20 +101,24 @@ class SpaceBuilder:
         for channel in entry.channel:
             if mosaic is not None and channel not in mosaic.channels:
                 self.sources.unknown((*path, "channel"), f"channel of {entry.cfa}", channel, list(mosaic.channels))
-        own = is_plugin(entry.family)
-        if own and not self.sources.allow_code:
-            problem = "the study names a Python file, whose code would run"
-            self.sources.add((*path, "family"), problem, entry.family, "--allow-code, if you trust it")
-        elif own and self.section.production.edge_shift_nm:
+        own = self._is_own(entry)
+        if own and not allowed(self.sources, (*path, "family"), entry.family):
+            return
+        if own and self.section.production.edge_shift_nm:
             self.sources.add((*path, "family"), "a family of one's own has no edges that production could shift")
         elif not own and entry.family not in FAMILIES:
-            self.sources.unknown((*path, "family"), "family", entry.family, list(FAMILIES))
+            self.sources.unknown((*path, "family"), "family", entry.family, [*FAMILIES, *offers(_FAMILIES)])
         elif entry.where == "lens" and not own and FAMILIES[entry.family].n_modified > 1:
             self.sources.add((*path, "family"), f"{entry.family} replaces several channels; a glass is one filter")
         elif entry.channel and len(entry.channel) != (n_modified := 1 if own else FAMILIES[entry.family].n_modified):
             self.sources.add((*path, "channel"), f"{entry.family} replaces {n_modified} channel(s)", entry.channel)
         elif len(set(entry.channel)) < len(entry.channel):
             self.sources.add((*path, "channel"), "a channel is named twice", entry.channel)
+
+    @staticmethod
+    def _is_own(entry: Modification) -> bool:
+        """Whether a family is not the package's."""
+        return is_from_outside(entry.family, _FAMILIES, FAMILIES)
 
     def _check_where(self, path: tuple[Key, ...], entry: Modification) -> None:
         """What a filter in a pixel must say, and one in front of the lens must not."""
@@ -156,8 +162,7 @@ class SpaceBuilder:
         try:
             family = self._family(entry, base, target)
         except SweepError as error:
-            for fault in error.faults:
-                self.sources.add((*path, "family"), fault.problem, fault.value, fault.allowed)
+            self.sources.told((*path, "family"), error)
             return []
         ordered = self._axes(axes, axes_path, family.parameters, open_ended=axes_path[-1] == "box")
         if rows is not None and rows.size * len(ordered) > _MOST_DRAWN:
@@ -187,18 +192,13 @@ class SpaceBuilder:
     def _family(self, entry: Modification, base: FloatArray, target: FloatArray | None) -> Family:
         """The family over its curves; raises SweepError."""
         nodes_nm = self.section.wavelengths.nodes_nm
-        if not is_plugin(entry.family):
+        if not self._is_own(entry):
             return build_family(entry.family, nodes_nm, base, target, entry.options)
-        file, _ = plugin_parts(entry.family)
-        found = next((folder / file for folder in self.sources.folders if is_file(folder / file)), None)
-        if found is None:
-            searched = ", ".join(str(folder) for folder in self.sources.folders)
-            raise SweepError(Fault("no such file", value=file, allowed=f"a path relative to {searched}"))
-        source, self.sources.digests[file] = read_plugin(found)
-        own = PluginFamily(entry.family, source, nodes_nm, base, target)
+        own = PluginFamily(code_of(self.sources, entry.family, _FAMILIES), nodes_nm, base, target)
         bounds = f"0 and {entry.base or 1}" if own.below_base else "0 and 1"
+        whose = "code of that file" if is_in_file(entry.family) else "code of an installed package"
         note = (
-            f"{entry.family} runs code of that file: its gradients are differences, and its filters are taken for any "
+            f"{entry.family} runs {whose}: its gradients are differences, and its filters are taken for any "
             f"between {bounds}, which each of them is checked to be"
         )
         if note not in self.sources.warnings:

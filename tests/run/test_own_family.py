@@ -89,18 +89,18 @@ def test_it_resumes_reports_and_is_another_study_with_other_code(tmp_path: Path)
         run_study(study(tmp_path, code=STOPBAND + "# changed\n"), tmp_path / "out", 1, lambda *_: None)
 
 
-def test_a_run_is_exported_and_audited_with_its_own_code_alone(tmp_path: Path) -> None:
+def test_a_run_is_exported_audited_and_evaluated_with_its_own_code_alone(tmp_path: Path) -> None:
     ran(study(tmp_path), tmp_path / "out", 1)
-    for verb in (("audit",), ("export", "--design", "best")):
+    for verb in (("audit",), ("evaluate",), ("export", "--design", "best")):
         command = (*verb, str(tmp_path / "out"), "--data", str(tmp_path))
         code, _, said = commanded(*command)
         assert code == 2
-        assert "its filters are made by the code of filters.py; allowed: --data FOLDER" in said
+        assert "it was made with the code of filters.py; allowed: --data FOLDER" in said
         assert commanded(*command, "--allow-code")[0] == 0
     (tmp_path / "filters.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w')\n{STOPBAND}")
     code, _, said = commanded("audit", str(tmp_path / "out"), "--data", str(tmp_path), "--allow-code")
     assert code == 2
-    assert "filters.py: not the code that the run had" in said
+    assert "not the code that the run had (got 'filters.py')" in said
     assert not (tmp_path / "ran").exists()
 
 
@@ -120,7 +120,7 @@ def test_code_runs_only_when_it_is_allowed(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("class Band", "class Bend", "no such class in the file (got 'Band'); allowed: Bend"),
+        ("class Band", "class Bend", "no such class or function in the file (got 'Band'); allowed: Bend"),
         ("import numpy as np\n", "import nump as np\n", "the code cannot be run: ModuleNotFoundError"),
         ("class Band:", "class Band", "the code cannot be run: SyntaxError"),
         ('("left_nm", 400, 700)', '("left_nm", 700, 400)', "no usable `parameters`"),

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from ...curves.light_unit import LightUnit
+from ..options import AllowCode, DataFolder
 from ..panels import OF_CURVES
 
 PANEL = OF_CURVES
@@ -41,6 +42,8 @@ def evaluate_(
         str | None, typer.Option(help="The values are a transmission times this curve.", show_default=False)
     ] = None,
     design: Annotated[str | None, typer.Option(help="Of a run: design_id, name or best.", show_default="best")] = None,
+    data: DataFolder = None,
+    allow_code: AllowCode = False,
 ) -> None:
     """Judge a filter of your own, or of a run: its CSDs and its light beside RGGB's, and its gap to the limit."""
     from ...door.asked import verdict_on
@@ -57,5 +60,7 @@ def evaluate_(
         quantity=quantity,
         transmission=transmission,
         relative_to=relative_to,
+        data=data,
+        allow_code=allow_code,
     )
     typer.echo(str(found))

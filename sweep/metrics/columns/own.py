@@ -1,0 +1,61 @@
+"""Metrics of a user's own, where a study names some."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from ...errors import Fault, SweepError
+from ...types import FloatArray
+from ..own import OwnMetric, Readings
+from ..quantity import Asked, Metric, Quantity
+from ..smooth import Rows, SmoothDesign
+
+_STEP = 1e-5
+"""Half of a central difference, in units of the box."""
+
+
+class OwnColumns(Metric):
+    """What the readout gives is computed with it, see `own_quantities`."""
+
+    order = 9
+
+    def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
+        """A column for each of them."""
+        return tuple(
+            Quantity(
+                name=metric.name,
+                metric=metric.name,
+                meaning=f"own metric {metric.code.name}: nothing is promised of it, the tolerance in DN is of CSDs",
+                unit=metric.unit,
+                label=metric.label,
+                digits=metric.digits,
+                wanted=metric.wanted,
+                ends=("min",) if metric.wanted == "more" else ("max",),
+                goal=True,
+                needs="own",
+                smooth=partial(_rows, metric=metric),
+            )
+            for metric in asked.own
+        )
+
+
+def _rows(design: SmoothDesign, *, metric: OwnMetric) -> Rows:
+    """A row for each of its numbers in every case of the scene, with derivatives by differences.
+
+    The response's own derivatives are exact: the metric sees it moved a little along each of them.
+    """
+    response, by_u = design.response, design.response_by_u
+    moved = np.concatenate([response[None], response + _STEP * by_u, response - _STEP * by_u])
+    parts = [_parts(metric, design, moved[:, case]) for case in range(len(response))]
+    values = np.concatenate(parts, axis=1)
+    n = len(by_u)
+    return Rows(values[0], (values[1 : n + 1] - values[n + 1 :]).T / (2 * _STEP))
+
+
+def _parts(metric: OwnMetric, design: SmoothDesign, dn: FloatArray) -> FloatArray:
+    found = metric.parts(Readings.of_view(design.view, dn), finite=False)  # a design without light is not feasible
+    if found is None:
+        raise SweepError(Fault(f"{metric.code.name} gives None for the searched CFA", value=design.view.mosaic.name))
+    return found

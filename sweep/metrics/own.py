@@ -1,0 +1,148 @@
+"""A metric that a user wrote, or that an installed package offers: numbers from what the camera reads, and no more."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from ..camera.view import View
+from ..errors import Fault, SweepError
+from ..own_code import OwnCode, own_name
+from ..types import FloatArray
+
+_NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,39}")
+_MOST_DIGITS = 12
+
+
+@dataclass(frozen=True)
+class Readings:
+    """What the camera reads of a block of designs at one place and moment of the light; an own metric gets it.
+
+    `dn`: digital numbers, ndarray[n_designs, n_signals, n_channels], with the pedestal `pedestal_dn` in them; in a
+    search they are neither clipped nor rounded. `types`, `names`: signal type and name of each signal, `channels`:
+    name of each channel of the CFA.
+    """
+
+    dn: FloatArray
+    types: tuple[str, ...]
+    names: tuple[str, ...]
+    channels: tuple[str, ...]
+    pedestal_dn: float
+
+    @staticmethod
+    def of_view(view: View, dn: FloatArray) -> Readings:
+        """Digital numbers, which the metric cannot change, of the signals and channels of a view."""
+        fixed = np.asarray(dn, dtype=float).view()
+        fixed.flags.writeable = False
+        lights = view.lights
+        return Readings(fixed, lights.types, lights.names, view.mosaic.channels, view.pixel.offset_dn)
+
+    def of(self, kind: str) -> FloatArray:
+        """Digital numbers of one signal type's signals, ndarray[n_designs, n_of_the_type, n_channels]."""
+        return self.dn[:, [own == kind for own in self.types]]
+
+
+@dataclass(frozen=True)
+class OwnMetric:
+    """A function of `Readings`, or a class with a method `of` of them, made without arguments.
+
+    It returns a number per design, ndarray[n_designs]; or several, ndarray[n_designs, n], of which the worst counts,
+    so that a search sees each of them; or None for a CFA that does not have it. A row must not depend on the other
+    rows. It may have `name`, `unit`, `label`, `digits` and `wanted`, `more` or `less`.
+    """
+
+    code: OwnCode
+
+    def __reduce__(self) -> tuple[type[OwnMetric], tuple[OwnCode]]:
+        return OwnMetric, (self.code,)
+
+    @cached_property
+    def _made(self) -> Any:
+        loaded = self.code.loaded
+        return self.code.called(loaded) if isinstance(loaded, type) else loaded
+
+    @property
+    def name(self) -> str:
+        """Its column. Raises SweepError for what is no name."""
+        usual = own_name(self.code.name)
+        found = self._said("name", usual)
+        if not _NAME.fullmatch(found):
+            allowed = "at most 40 letters, digits and `_`, a letter first"
+            raise SweepError(Fault(f"{self.code.name}: no usable `name`", value=found, allowed=allowed))
+        return found
+
+    @property
+    def unit(self) -> str:
+        """Its unit; empty for a ratio."""
+        return self._said("unit", "")
+
+    @property
+    def label(self) -> str:
+        """Its name as people write it."""
+        return self._said("label", self.name.replace("_", " "))
+
+    @property
+    def wanted(self) -> Literal["more", "less"]:
+        """Whether more of it is better, or less. Raises SweepError for anything else."""
+        found = self._said("wanted", "more")
+        if found not in ("more", "less"):
+            raise SweepError(Fault(f"{self.code.name}: no such `wanted`", value=found, allowed="more, less"))
+        return found  # type: ignore[return-value]  # one of both
+
+    @property
+    def digits(self) -> int:
+        """After the point. Raises SweepError for what is no such number."""
+        found = getattr(self._made, "digits", 4)
+        if isinstance(found, bool) or not isinstance(found, int) or not 0 <= found <= _MOST_DIGITS:
+            allowed = f"a whole number, 0 to {_MOST_DIGITS}"
+            raise SweepError(Fault(f"{self.code.name}: no such `digits`", value=found, allowed=allowed))
+        return found
+
+    def _said(self, what: str, usual: str) -> str:
+        found = getattr(self._made, what, usual)
+        if not isinstance(found, str) or len(found) > 100 or not found.isprintable():
+            raise SweepError(Fault(f"{self.code.name}: `{what}` is no short text", value=found))
+        return found
+
+    def parts(self, readings: Readings, *, finite: bool = True) -> FloatArray | None:
+        """Its numbers, ndarray[n_designs, n], of which the worst counts; None where the CFA has none.
+
+        Raises SweepError for what is raised, what is no number, what has another shape, and what is not `finite`.
+        """
+        made, n = self._made, len(readings.dn)
+        with np.errstate(all="ignore"):
+            found = self.code.called(getattr(made, "of", made), readings)
+        if found is None:
+            return None
+        values = self.code.called(np.asarray, found)
+        if values.dtype.kind not in "biuf":
+            raise SweepError(Fault(f"{self.code.name} gives no numbers", value=found, allowed="a number per design"))
+        if values.ndim not in (1, 2) or len(values) != n or values.size == 0:
+            problem = f"{self.code.name} gives another shape"
+            raise SweepError(Fault(problem, value=values.shape, allowed=f"({n},) or ({n}, n)"))
+        if finite and not np.isfinite(values).all():
+            other = float(values[~np.isfinite(values)][0])
+            raise SweepError(Fault(f"{self.code.name} is not finite", value=other))
+        return np.asarray(values.reshape(n, -1), dtype=float)
+
+    def of_cases(self, view: View, response: FloatArray) -> FloatArray:
+        """The worst over the cases, ndarray[n_designs], NaN where the CFA has none.
+
+        `response`: ndarray[n_designs, n_cases, n_signals, n_channels], DN.
+        """
+        each = [self.parts(Readings.of_view(view, response[:, case])) for case in range(response.shape[1])]
+        some = [values for values in each if values is not None]
+        if len(some) < len(each):
+            return np.full(len(response), np.nan)
+        joined = np.concatenate(some, axis=1)
+        return np.asarray(joined.min(axis=1) if self.wanted == "more" else joined.max(axis=1), dtype=float)
+
+
+def own_quantities(own: Sequence[OwnMetric], view: View, response: FloatArray) -> dict[str, FloatArray]:
+    """The column of each metric; see `OwnMetric.of_cases`."""
+    return {metric.name: metric.of_cases(view, response) for metric in own}

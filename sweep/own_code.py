@@ -1,0 +1,172 @@
+"""Code that is not the package's: of a Python file that a study names, or of an installed package that offers it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Literal
+
+from .disk import read_input
+from .errors import Fault, SweepError
+
+Offered = Literal["sweep.families", "sweep.metrics", "sweep.sensors", "sweep.lights"]
+"""Groups of entry points, by which an installed package offers what a study can name."""
+CODE_OF = "code of "
+"""How the digest of an installed package's code is named among those of a study's files."""
+_SEPARATOR = ".py:"
+_MOST_BYTES = 1_000_000
+_MOST_LETTERS = 300
+_begun: dict[str, str] = {}
+"""Digests of the packages that this process has loaded, which Python does not load again."""
+
+
+def is_in_file(name: str) -> bool:
+    """Whether a name is that of a class or function in a Python file: `my_filters.py:Gauss`."""
+    return _SEPARATOR in name
+
+
+def file_of(name: str) -> str:
+    """The file in such a name."""
+    return f"{name.partition(_SEPARATOR)[0]}.py"
+
+
+def own_name(name: str) -> str:
+    """A name without its file."""
+    return name.partition(_SEPARATOR)[2] or name
+
+
+def kind_in_words(name: str) -> str:
+    """A family's name as sentences say it; of one in a Python file that of its class."""
+    return own_name(name) if is_in_file(name) else name.replace("_", " ")
+
+
+def is_code(digested: str) -> bool:
+    """Whether what a run kept the digest of is code."""
+    return digested.endswith(".py") or digested.startswith(CODE_OF)
+
+
+@dataclass(frozen=True)
+class OwnCode:
+    """What a study names, as a worker process gets it: `name`, and the text of its file, or the group that offers it.
+
+    `digest`: that of an installed package, which a worker must have, too. Nothing runs before `loaded` is asked for.
+    """
+
+    name: str
+    source: str | None = None
+    group: Offered | None = None
+    digest: str = ""
+
+    @property
+    def loaded(self) -> Any:
+        """The class, function or value itself, made once in a process; raises SweepError."""
+        return _loaded(self)
+
+    def called(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """What a function of it returns; whatever it raises is one line."""
+        try:
+            return function(*arguments)
+        except (Exception, SystemExit) as error:  # it may raise anything
+            raise SweepError(Fault(f"{self.name}: {_told(error)}")) from None
+
+
+def _told(error: BaseException) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())[:_MOST_LETTERS]
+
+
+@lru_cache(maxsize=64)
+def _loaded(code: OwnCode) -> Any:
+    if code.source is not None:
+        return _of_file(code.name, code.source)
+    assert code.group is not None
+    offer = installed(code.group, code.name)
+    if offer is None:
+        raise SweepError(Fault("no installed package offers it", value=code.name, allowed=f"one with `{code.group}`"))
+    if offer.digest != code.digest or _begun.setdefault(offer.package, code.digest) != code.digest:
+        problem = f"the code of {offer.told} is not that with which the study was loaded"
+        raise SweepError(Fault(problem, value=code.name, allowed="the same package everywhere, and a new process"))
+    try:
+        return offer.entry.load()
+    except (Exception, SystemExit) as error:
+        raise SweepError(Fault(f"{code.name} cannot be loaded: {_told(error)}", offer.entry.value)) from None
+
+
+def _of_file(name: str, source: str) -> Any:
+    """Run the text of a file, and give what is named in it."""
+    file, own = file_of(name), own_name(name)
+    module = ModuleType(Path(file).stem)
+    try:
+        exec(compile(source, file, "exec"), module.__dict__)  # what `--allow-code` allows
+    except (Exception, SystemExit) as error:
+        raise SweepError(Fault(f"the code cannot be run: {_told(error)}", file)) from None
+    found = getattr(module, own, None)
+    if not callable(found):
+        made = [key for key, value in vars(module).items() if getattr(value, "__module__", None) == module.__name__]
+        known = ", ".join(made) or "a class or function"
+        raise SweepError(Fault("no such class or function in the file", file, value=own, allowed=known))
+    return found
+
+
+def read_code(path: Path) -> tuple[str, str]:
+    """The text of a Python file, and its SHA-256; nothing of it runs yet. Raises SweepError."""
+    content = read_input(path, _MOST_BYTES, SweepError)
+    try:
+        return content.decode("utf-8-sig"), hashlib.sha256(content).hexdigest()
+    except UnicodeDecodeError:
+        raise SweepError(Fault("not UTF-8 text", str(path))) from None
+
+
+@dataclass(frozen=True)
+class Installed:
+    """What an installed package offers under a name."""
+
+    entry: EntryPoint
+
+    @property
+    def told(self) -> str:
+        """The package, with its version."""
+        dist = self.entry.dist
+        return "a package without a name" if dist is None else f"{dist.name} {dist.version}"
+
+    @property
+    def package(self) -> str:
+        """The name by which Python imports it."""
+        return self.entry.module.partition(".")[0]
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of every Python file of the package, or of the one that it is, by path; nothing of it runs.
+
+        Raises SweepError where there is none.
+        """
+        spec = find_spec(self.package)
+        folders = [] if spec is None else [Path(place) for place in spec.submodule_search_locations or ()]
+        files = [(path.relative_to(folder), path) for folder in folders for path in sorted(folder.rglob("*.py"))]
+        if spec is not None and not folders and spec.origin is not None:
+            files = [(Path(Path(spec.origin).name), Path(spec.origin))]
+        if not files:
+            raise SweepError(Fault("no such package, though it is installed", self.told, value=self.package))
+        digest = hashlib.sha256(self.told.encode())
+        for shown, path in files:
+            digest.update(shown.as_posix().encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
+        return digest.hexdigest()
+
+
+def offers(group: Offered) -> list[str]:
+    """Names that installed packages offer; nothing of them is imported."""
+    return sorted({entry.name for entry in entry_points(group=group)})
+
+
+def installed(group: Offered, name: str) -> Installed | None:
+    """What an installed package offers under a name; raises SweepError where several packages do."""
+    found = {entry.value: entry for entry in entry_points(group=group) if entry.name == name}
+    if len(found) > 1:
+        several = " and ".join(sorted(Installed(entry).told for entry in found.values()))
+        raise SweepError(Fault(f"{several} both offer it", value=name, allowed="one of them installed"))
+    return Installed(next(iter(found.values()))) if found else None

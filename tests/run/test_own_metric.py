@@ -1,0 +1,273 @@
+"""A metric in a user's Python file: a column like any other, in sweep, search, workers, resume, report and Python."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+from scipy.spatial.distance import cdist
+
+import sweep
+from sweep.camera.linear import smooth_imager
+from sweep.errors import StudyError, SweepError
+from sweep.metrics.own import OwnMetric
+from sweep.metrics.smooth import SmoothDesign
+from sweep.own_code import OwnCode
+from sweep.report import make_report, read_output
+from sweep.results.dictionary import KEYS
+from sweep.run import run_study
+from sweep.study import Study, load_study
+from sweep.study.own_metrics import RESERVED
+
+from ..build import BASE, ran
+from ..commanded import commanded
+from ..hard.scenes import FAMILY, scene
+
+CODE = """\
+import numpy as np
+
+
+def apart(readings):
+    one, other = readings.of("yellow"), readings.of("red")
+    return np.linalg.norm(one[:, :, None] - other[:, None], axis=-1).reshape(len(one), -1)
+
+
+apart.unit, apart.label, apart.digits = "DN", "yellow/red gap", 1
+
+
+class Spread:
+    name, wanted = "red_spread", "less"
+
+    def of(self, readings):
+        return np.ptp(readings.of("red"), axis=1).max(axis=1)
+
+
+def below_zero(readings):
+    return apart(readings) - 1e4
+
+
+def only_n(readings):
+    return readings.dn[:, :, readings.channels.index("N")].min(axis=1) if "N" in readings.channels else None
+"""
+PLAIN = BASE.replace("min: 0.9", "min: 0.8").replace("space: edges", "{space: edges, starts: 4, max_evaluations: 800}")
+OWN = PLAIN.replace("constraints:", "metrics: [mine.py:apart, mine.py:Spread]\nobjective: apart\nconstraints:")
+
+
+def study(folder: Path, text: str = OWN, code: str = CODE, *, allow: bool = True) -> Study:
+    (folder / "mine.py").write_text(code)
+    path = folder / "own.yaml"
+    path.write_text(text)
+    return load_study(path, allow_code=allow)
+
+
+def rows_of(folder: Path) -> pd.DataFrame:
+    return pd.read_parquet(folder / "results.parquet")
+
+
+def test_a_csd_written_again_has_the_same_numbers_and_the_same_optimum(tmp_path: Path) -> None:
+    ran(study(tmp_path), tmp_path / "own", 2)
+    ran(study(tmp_path, PLAIN), tmp_path / "plain", 1)
+    own, plain = rows_of(tmp_path / "own"), rows_of(tmp_path / "plain")
+    np.testing.assert_allclose(own["apart"], own["csd_yellow_red"], rtol=1e-12)
+    swept = own["kind"] != "search"
+    for name in ("csd_yellow_red", "sensitivity"):
+        np.testing.assert_array_equal(own.loc[swept, name], plain.loc[swept, name])
+    found, exact = (read_output(tmp_path / name).provenance for name in ("own", "plain"))
+    assert found.search is not None
+    assert exact.search is not None
+    assert found.search.best_smooth_objective == pytest.approx(exact.search.best_smooth_objective, abs=0.01)
+    assert found.search.limit_proven is None
+    assert found.search.no_limit == "apart is an own metric, of which nothing is known"
+    assert len(found.data_sha256["mine.py"]) == 64
+    assert any("nothing is promised or proven of this metric" in warning for warning in found.warnings)
+    kept = {
+        column["name"]: column for column in json.loads((tmp_path / "own/provenance.json").read_text())["quantities"]
+    }
+    assert kept["apart"]["unit"] == "DN"
+    assert kept["red_spread"]["wanted"] == "less"
+    assert pq.read_schema(tmp_path / "own" / "results.parquet").field("apart").type == "double"
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("plain_pictures")
+def test_it_is_told_like_any_other_and_nothing_runs_for_that(tmp_path: Path) -> None:
+    ran(study(tmp_path), tmp_path / "own", 1)
+    ran(study(tmp_path, PLAIN), tmp_path / "plain", 1)
+    (tmp_path / "mine.py").unlink()
+    make_report(read_output(tmp_path / "own"))
+    page = (tmp_path / "own" / "report.html").read_text()
+    assert "yellow/red gap" in page
+    assert "no filter exceeds" not in page.lower()
+    assert commanded("compare", tmp_path / "own", tmp_path / "plain", "--output", tmp_path / "beside")[0] == 0
+    assert "apart" in pd.read_csv(next((tmp_path / "beside").glob("*.csv"))).to_string()
+
+
+def test_less_is_searched_for_constrained_and_below_zero(tmp_path: Path) -> None:
+    spread = "metrics: [mine.py:Spread, mine.py:below_zero]\n"
+    least = PLAIN.replace("constraints:", f"{spread}objective: {{least: {{red_spread: 1}}}}\nconstraints:")
+    made = study(tmp_path, least)
+    run_study(made, tmp_path / "least", 1, lambda *_: None)
+    rows = rows_of(tmp_path / "least")
+    answer = rows[rows["kind"] == "search"].iloc[0]
+    assert answer["objective"] == pytest.approx(-np.log10(answer["red_spread"]))
+    feasible = rows[rows["feasible"] & (rows["kind"] == "sweep")]
+    assert answer["red_spread"] <= feasible["red_spread"].min()
+    bound = f"{answer['red_spread'] + 10:.1f}"
+    text = PLAIN.replace("constraints:", f"{spread}objective: below_zero\nconstraints:\n  red_spread: {{max: {bound}}}")
+    run_study(study(tmp_path, text), tmp_path / "below", 1, lambda *_: None)
+    both = rows_of(tmp_path / "below")
+    best = both[both["kind"] == "search"].iloc[0]
+    np.testing.assert_allclose(both["below_zero"], both["csd_yellow_red"] - 1e4, rtol=1e-12)
+    assert best["feasible"] or best["violation"] < 0.02  # rounding to whole DN
+    inside = both[both["feasible"] & (both["kind"] == "sweep")]
+    assert best["below_zero"] >= inside["below_zero"].max() - 2
+
+
+def test_slopes_are_those_of_the_metric(tmp_path: Path) -> None:
+    """Beside the exact slopes of the squared distances."""
+    made = study(tmp_path, OWN.replace("cfas: [RGGB, RYNCy]", "cfas: [RYNCy]"))
+    own = made.quantities["apart"]
+    exact = made.quantities["csd_yellow_red"]
+    view, free = scene("chart", "RYNCy", {}).view, np.arange(5)
+    design = SmoothDesign(
+        smooth_imager(view), FAMILY, np.array([600.0, 8, 640, 9, 0.8]), free, np.array([30.0, 10, 30, 10, 0.5])
+    )
+    assert own.smooth is not None
+    assert exact.smooth is not None
+    mine, squared = own.smooth(design), exact.smooth(design)
+    np.testing.assert_allclose(mine.values**2, squared.values, rtol=1e-12)
+    np.testing.assert_allclose(2 * mine.values[:, None] * mine.by_u, squared.by_u, rtol=1e-5, atol=1e-3)
+    members = view.members
+    distances = cdist(design.response[0][members["yellow"]], design.response[0][members["red"]])
+    assert own.value(mine) == pytest.approx(distances.min(), rel=1e-12)
+
+
+def test_a_run_that_is_stopped_goes_on_and_other_code_is_another_study(tmp_path: Path) -> None:
+    made = study(tmp_path, OWN.replace("count: 3}", "count: 1100}"))
+
+    def stop(phase: str, done: int, _: int) -> None:
+        if phase == "designs" and 0 < done < 4400:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_study(made, tmp_path / "some", 1, stop)
+    assert not (tmp_path / "some" / "results.parquet").exists()
+    run_study(made, tmp_path / "some", 1, lambda *_: None)
+    run_study(made, tmp_path / "whole", 1, lambda *_: None)
+    pd.testing.assert_frame_equal(rows_of(tmp_path / "some"), rows_of(tmp_path / "whole"), check_exact=True)
+    with pytest.raises(SweepError, match="holds another study"):
+        run_study(study(tmp_path, code=CODE + "# changed\n"), tmp_path / "whole", 1, lambda *_: None)
+
+
+def test_own_filters_and_plain_cfas_have_it_in_python(tmp_path: Path) -> None:
+    study(tmp_path, OWN.replace("mine.py:apart,", "mine.py:apart, mine.py:only_n,"))
+    made = sweep.load_study(tmp_path / "own.yaml", allow_code=True)
+    table = made.evaluate(N=0.9 * made.curve("Y"))
+    assert table["apart"][0] == pytest.approx(table["csd_yellow_red"][0], rel=1e-12)
+    assert table.attrs["units"]["apart"] == "DN"
+    plain = made.evaluate().set_index("name")
+    assert np.isnan(plain.loc["RGGB", "only_n"])  # a CFA that it says nothing of
+    assert plain.loc["mine", "only_n"] > 0
+
+
+def test_code_of_a_metric_runs_only_when_it_is_allowed(tmp_path: Path) -> None:
+    code = f"open({str(tmp_path / 'ran')!r}, 'w')\n{CODE}"
+    with pytest.raises(
+        StudyError, match=r"own.yaml:\d+: metrics.*names a Python file, whose code would run.*--allow-code"
+    ):
+        study(tmp_path, code=code, allow=False)
+    assert commanded("run", tmp_path / "own.yaml")[0] == 2
+    assert not (tmp_path / "ran").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            "class Spread",
+            "class Spreads",
+            "no such class or function in the file (got 'Spread'); allowed: apart, Spreads",
+        ),
+        ('readings.of("red")\n', 'readings.off("red")\n', "AttributeError: 'Readings' object has no attribute 'off'"),
+        ("return np.linalg", "return np.nan * np.linalg", "mine.py:apart is not finite (got nan)"),
+        (".reshape(len(one), -1)", "", "mine.py:apart gives another shape (got (3, "),
+        (".reshape(len(one), -1)", ".min()", "mine.py:apart gives another shape (got ())"),
+        ("return np.linalg", "return 'wide' or np.linalg", "mine.py:apart gives no numbers (got 'wide')"),
+        ("    one, other = readings", "    readings.dn[:] = 0\n    one, other = readings", "read-only"),
+        (".reshape(len(one), -1)", ".reshape(len(one), -1) + len(one)", "depends on the designs beside it"),
+        ('"DN", "yellow', '3, "yellow', "`unit` is no short text (got 3)"),
+        ('"less"', '"fewer"', "no such `wanted` (got 'fewer'); allowed: more, less"),
+        (
+            '"red_spread"',
+            '"sensitivity"',
+            "another column has this name; the metric can say `name` (got 'sensitivity')",
+        ),
+        ('"red_spread"', '"red spread"', "no usable `name` (got 'red spread')"),
+        ("digits = ", "digits, _ = ", "the code cannot be run: ValueError"),
+    ],
+)
+def test_faults_of_a_metric_are_one_line_before_any_work(tmp_path: Path, old: str, new: str, said: str) -> None:
+    assert old in CODE
+    with pytest.raises(StudyError) as caught:
+        study(tmp_path, code=CODE.replace(old, new))
+    assert said in str(caught.value)
+    assert len(caught.value.faults) == 1
+    assert "own.yaml:" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (OWN.replace("objective: apart", "objective: red_spread"), "less of red_spread is better; allowed: `{least:"),
+        (
+            OWN.replace("constraints:", "constraints:\n  apart: {max: 3}"),
+            "apart has no `max` (got 3.0); allowed: `min`",
+        ),
+        (OWN.replace("mine.py:Spread", "mine.py:apart"), "another column has this name"),
+        (OWN.replace("mine.py:Spread", "spreads"), "unknown metric (got 'spreads')"),
+        (OWN.replace("mine.py:Spread", "other.py:Spread"), "no such file (got 'other.py')"),
+    ],
+)
+def test_what_a_study_says_of_it_is_checked(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(StudyError) as caught:
+        study(tmp_path, text)
+    assert said in str(caught.value)
+
+
+def test_a_design_that_the_metric_fails_on_costs_a_row(tmp_path: Path) -> None:
+    code = CODE.replace(
+        "return np.ptp",
+        "if (readings.dn.max() > 0) and self.bad(readings): raise OverflowError('dark')\n        return np.ptp",
+    )
+    code = code.replace(
+        "    def of(",
+        "    def bad(self, readings):\n        return self.name and abs(readings.dn[:, 0, -1] - EDGE).min() < 1e-9\n\n    def of(",
+    )
+    made = study(tmp_path, OWN.partition("search:")[0])
+    run_study(made, tmp_path / "all", 1, lambda *_: None)
+    space = next(space for space in made.spaces if space.kind == "sweep")
+    view = made.plan("chart") and made.view(space, "chart")
+    from sweep.camera.imager import imager_of
+
+    edge = imager_of(view).read(space.curves(space.points(3, 4), made.grid.size))[0][0, 0, 0, -1]
+    bad = study(tmp_path, OWN.partition("search:")[0], f"EDGE = {edge!r}\n".replace("np.float64(", "(") + code)
+    run_study(bad, tmp_path / "some", 1, lambda *_: None)
+    found = rows_of(tmp_path / "some")
+    failed = found[found["status"] != "ok"]
+    assert 0 < len(failed) < len(found)
+    assert failed["status"].astype(str).str.contains("mine.py:Spread: OverflowError: dark").all()
+    fine, same = rows_of(tmp_path / "all"), found["status"] == "ok"
+    assert (found.loc[same, "red_spread"] == fine.loc[same, "red_spread"]).all()
+
+
+def test_no_verdict_is_left_out_of_the_reserved_names() -> None:
+    assert {name for name in KEYS if name.isidentifier()} <= {*RESERVED}
+
+
+def test_metrics_of_one_text_are_one() -> None:
+    one, other = (OwnMetric(OwnCode("a.py:f", "def f(r): ...")) for _ in range(2))
+    assert {one, other} == {one}
