@@ -102,6 +102,51 @@ def poisson_moments(
             out[quantities, i] = total / weight
 
 
+@njit(cache=True, nogil=True)
+def means_over_gains(
+    electrons: FloatArray,
+    prnu: float,
+    drawn: float,
+    per_deviation: float,
+    roots: FloatArray,
+    table: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Means over pixels' Gaussian gains by the trapezoidal rule, and the variance with that of the last mean.
+
+    `electrons`: ndarray[n], expected numbers. Gains of up to `drawn` standard deviations `prnu` count, in steps of one
+    over `per_deviation` and less where there are more electrons. `roots`, `table`: nodes and coefficients of a cubic
+    spline over the root of the electrons, ndarray[4, n_nodes - 1, 3]: two means and the variance. `out`: ndarray[3, n].
+    """
+    for i in range(electrons.size):
+        half = math.ceil(drawn * per_deviation * math.sqrt(1 + prnu * prnu * electrons[i]))
+        weight = first = second = square = spread = 0.0
+        # About the value of the mean gain, so that no digits are lost.
+        root = min(math.sqrt(electrons[i]), roots[-1])
+        at = max(np.searchsorted(roots, root) - 1, 0)
+        s, c = root - roots[at], table[:, at, 1]
+        about, at = ((c[0] * s + c[1]) * s + c[2]) * s + c[3], 0
+        for k in range(-half, half + 1):
+            z = drawn * k / half
+            root = min(math.sqrt(electrons[i] * (1 + prnu * z)), roots[-1])
+            while at < roots.size - 2 and root >= roots[at + 1]:
+                at += 1
+            s, of = root - roots[at], table[:, at]
+            unrounded = ((of[0, 0] * s + of[1, 0]) * s + of[2, 0]) * s + of[3, 0]
+            rounded = ((of[0, 1] * s + of[1, 1]) * s + of[2, 1]) * s + of[3, 1]
+            variance = ((of[0, 2] * s + of[1, 2]) * s + of[2, 2]) * s + of[3, 2]
+            share = math.exp(-0.5 * z * z)
+            weight += share
+            first += share * unrounded
+            second += share * (rounded - about)
+            square += share * (rounded - about) ** 2
+            spread += share * max(variance, 0.0)
+        mean = second / weight
+        out[0, i] = first / weight
+        out[1, i] = about + mean
+        out[2, i] = spread / weight + square / weight - mean * mean
+
+
 def poisson_means(electrons: FloatArray, start: int, values: FloatArray, variance: FloatArray = _NONE) -> FloatArray:
     """`poisson_moments` into a new ndarray[n_quantities + 1, n]."""
     out = np.empty((len(values) + 1, electrons.size))

@@ -19,7 +19,7 @@ from ..camera.view import View
 from ..curves.lights import Pair
 from ..designs.block import Block, CurveBlock
 from ..designs.family import Family
-from ..types import FloatArray
+from ..types import FloatArray, IndexArray
 from ..vision.section import Vision
 from .columns.color_separation import ColorSeparation
 from .columns.exposure import EXPOSURE
@@ -40,6 +40,8 @@ from .separation import csd_name, separations, separations_along
 _READOUT = [metric for metric in METRICS if isinstance(metric, ReadoutMetric)]
 _OTHERS = [metric for metric in _READOUT if not isinstance(metric, ColorSeparation)]
 """Metrics that need the whole readout of every design."""
+_AT_ONCE = 1024
+"""Readouts of a design in a case that are compared at once."""
 
 
 def designed_quantities(view: View, designs: FloatArray | Block) -> Columns:
@@ -128,9 +130,9 @@ def _as_read(imager: Imager, curves: FloatArray, found: Mapping[Pair, Extremes |
     if not at:
         return dict(found)
     there = Imager(imager.view, imager.work, cases=Cases(*np.moveaxis(np.array(at), 1, 0)), once=True)
-    response = there.read(curves)[0]
-    response = response.reshape(len(at), -1, *response.shape[2:])
-    read = [separations(moments, imager.view.members) for moments in response]
+    every = separations(there.read(curves)[0][0], imager.view.members)
+    moments = {pair: distances.reshape(len(at), -1) for pair, distances in every.items()}
+    read = [{pair: distances[place] for pair, distances in moments.items()} for place in range(len(at))]
     for number, (pair, extremes) in enumerate(kept.items()):
         own = read[2 * number : 2 * number + 2] if imager.view.methods.straight else read
         distances = [float(each[pair].min()) for each in own]
@@ -180,8 +182,8 @@ def _distances_along(imager: Imager, changing: Changing, own: Sequence[OwnMetric
         separations_along(fixed, changing.channel, changing.values[:, case], imager.view.members)
         for case, fixed in enumerate(changing.fixed)
     ]
-    named = [{csd_name(pair): values for pair, values in case.items()} for case in cases]
-    found = _over(imager, named) | {EXPOSURE: np.full(len(changing.values), changing.exposure_s)}
+    each = {csd_name(pair): np.stack([case[pair] for case in cases]) for pair in cases[0]}
+    found = _over(imager, each) | {EXPOSURE: np.full(len(changing.values), changing.exposure_s)}
     return found | own_quantities(own, imager.view, changing.whole) if own else found
 
 
@@ -203,23 +205,35 @@ def _read(
         apart = _joined([metric.of_noise(imager, curves, read, confused) for metric in noisy])
     else:
         response, exposure_s = imager.read(curves)
-    cases = [
-        _joined([metric.of_readout(response[:, case], members) for metric in _READOUT])
-        for case in range(response.shape[1])
-    ]
     apart |= own_quantities(own, imager.view, response)
-    return _over(imager, cases) | apart | {EXPOSURE: exposure_s}
+    return _over(imager, _by_case(response, members)) | apart | {EXPOSURE: exposure_s}
 
 
-def _over(imager: Imager, cases: Sequence[Columns]) -> Columns:
-    """The worst of all cases, and of CSDs the largest over the places of the smallest over the moments."""
+def _by_case(response: FloatArray, members: Mapping[str, IndexArray]) -> Columns:
+    """What the readout gives in each case, ndarray[n_cases, n_designs]; so many cases at once that a cache holds them.
+
+    `response`: ndarray[n_designs, n_cases, n_signals, n_channels].
+    """
+    n_designs, n_cases = response.shape[:2]
+    step, parts = max(1, _AT_ONCE // max(1, n_designs)), []
+    for start in range(0, n_cases, step):
+        some = np.swapaxes(response[:, start : start + step], 0, 1)
+        parts.append(_joined([metric.of_readout(some.reshape(-1, *some.shape[2:]), members) for metric in _READOUT]))
+    return {name: np.concatenate([part[name] for part in parts]).reshape(n_cases, n_designs) for name in parts[0]}
+
+
+def _over(imager: Imager, cases: Columns) -> Columns:
+    """The worst of all cases, and of CSDs the largest over the places of the smallest over the moments.
+
+    `cases`: ndarray[n_cases, n_designs] each.
+    """
     quantities = quantities_of(Asked(imager.view.lights.classes, any_place=True))
     best = {quantity.of: name for name, quantity in quantities.items() if quantity.extreme == "best place"}
-    if len(cases) == 1:
-        return cases[0] | {best[name]: values.copy() for name, values in cases[0].items() if name in best}
     found: Columns = {}
-    for name in cases[0]:
-        each = np.stack([case[name] for case in cases])
+    for name, each in cases.items():
+        if len(each) == 1:
+            found |= {own: each[0].copy() for own in (name, best.get(name)) if own is not None}
+            continue
         moments = np.stack([quantities[name].worse(place) for place in np.split(each, imager.n_places)])
         found[name] = quantities[name].worse(moments)
         if name in best:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...types import BoolArray, FloatArray
-from ..compiled import poisson_means
+from ..compiled import means_over_gains, poisson_means
 from ..pixel import Pixel
 from . import gaussian
 
@@ -159,15 +159,10 @@ def with_prnu(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     spread = 1 + DRAWN * pixel.prnu
     ends = Ends.of(pixel)
     felt = _felt(electrons * spread, even) | _felt(electrons * (2 - spread), even)
-    for at in np.flatnonzero(felt & (electrons <= ends.last_e * 2)):
-        n = electrons[at]
-        half = math.ceil(DRAWN * _PER_DEVIATION * math.sqrt(1 + (pixel.prnu**2 * n)))
-        z = np.linspace(-DRAWN, DRAWN, 2 * half + 1)
-        weights = gaussian.density(z)
-        weights /= weights.sum()
-        unrounded, rounded, variance = table(np.minimum(np.sqrt(n * (1 + pixel.prnu * z)), table.x[-1]))
-        mean = weights @ rounded
-        found[:, at] = weights @ unrounded, mean, weights @ (np.maximum(variance, 0.0) + (rounded - mean) ** 2)
+    some = np.flatnonzero(felt & (electrons <= ends.last_e * 2))
+    averaged = np.empty((3, some.size))
+    means_over_gains(electrons[some], pixel.prnu, DRAWN, _PER_DEVIATION, table.x, table.c, averaged)
+    found[:, some] = averaged
     return found
 
 
