@@ -13,7 +13,7 @@ from ..types import FloatArray, Parallel, Progress, delayed
 from .limit import Limit
 from .problem import Evaluation, Problem, best_feasible
 from .solver import search_from, smooth_objective
-from .trade_off import Effort, with_least, check_proof
+from .trade_off import Effort, check_proof, with_least
 
 _STARTS = 4
 
