@@ -20,6 +20,11 @@ from .text_tables import scan_text
 _MAT_VARIABLES = ("wavelength", "data", "filterNames")
 
 
+def is_curve_file(name: str) -> bool:
+    """Whether a name ends like one of a file of curves."""
+    return Path(name).suffix.casefold() in _KINDS
+
+
 def digest(path: Path) -> str:
     """SHA-256 of a file's bytes, hexadecimal; raises DataError when it cannot be read."""
     return hashlib.sha256(read_input(path, MOST_BYTES, DataError)).hexdigest()
@@ -98,3 +103,5 @@ _KINDS: dict[str, Callable[[Path], Scan]] = {
     ".spectrum": scan_speos,
 }
 """Readers by the ending of a file's name."""
+CURVE_FILE = rf"\.({'|'.join(kind[1:] for kind in _KINDS)})$"
+"""How the name of such a file ends, a regular expression."""

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ..camera.effects import blur
-from ..camera.kernel import too_large
 from ..camera.mosaic import Mosaic
 from ..camera.scene import OBJECT_RESOLUTION, WhitePatchExposure
 from ..curves.lights import Lights
@@ -22,6 +21,7 @@ from .allowed_lamps import check_regions
 from .axes import Axis
 from .document import Document
 from .goals import check_goals
+from .light_files import with_light_files
 from .luminances import check_luminances
 from .model import Search, Study
 from .own_metrics import check_names, own_metrics, try_metrics
@@ -30,11 +30,10 @@ from .schema import CfaSection, StudySection
 from .seen_images import check_vision
 from .sensor_fields import check_fields, with_chief_rays
 from .sensors import sensor_of
+from .sizes import check_count, check_memory
 from .sources import KeptSources, Sources
 from .spaces import SpaceBuilder
 from .technologies import check_lenses, with_technologies
-
-MOST_DESIGNS = 10**9
 
 
 class _Resolver:
@@ -51,7 +50,7 @@ class _Resolver:
     ) -> None:
         self.document = document
         self.sources = Sources(document, section.wavelengths, folders, kept, given, allow_code)
-        self.section = with_chief_rays(section, self.sources)
+        self.section = with_chief_rays(with_light_files(section, self.sources), self.sources)
         self.faults = self.sources.faults
         self.add = self.sources.add
         self.unknown = self.sources.unknown
@@ -108,13 +107,13 @@ class _Resolver:
             tasks=self.tasks,
             own=self.own,
         )
-        self.check_memory(study)
+        check_memory(study, self.sources)
         try_metrics(study, self.sources)
         check_range(study, self.sources)
         check_fields(study, self.sources)
         if self.faults:
             raise StudyError(self.faults)
-        self.check_size(study)
+        check_count(study, self.sources)
         return study
 
     def held_out(self, lights: Lights) -> Lights | None:
@@ -164,26 +163,6 @@ class _Resolver:
             if refused is not None:
                 key, problem, value, allowed = refused
                 self.add(("scenarios", name, *key), problem, value, allowed)
-
-    def check_memory(self, study: Study) -> None:
-        """The kernels of every scene and CFA fit into memory. Raises StudyError."""
-        for name in study.scenarios:
-            for space in study.spaces:
-                if (refused := too_large(study.view(space, name))) is not None:
-                    problem, value, allowed = refused
-                    self.add(("scenarios", name, "target"), f"{problem} (CFA {space.cfa})", value, allowed)
-                    raise StudyError(self.faults)
-
-    def check_size(self, study: Study) -> None:
-        """There are designs, and not too many. Raises StudyError."""
-        if not study.n_designs and study.search is None:
-            self.add(
-                ("cfas",), "no designs", None, "a CFA with a curve for each channel, a design, a sweep or a search"
-            )
-            raise StudyError(self.faults)
-        if study.n_designs > MOST_DESIGNS:
-            self.add(("sweeps",), "too many designs", f"{study.n_designs:,}", f"at most {MOST_DESIGNS:,}")
-            raise StudyError(self.faults)
 
     def check_recognition(self, lights: Lights) -> None:
         """Its states are signal types, each once, and every scenario has noise."""

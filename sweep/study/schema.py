@@ -10,7 +10,6 @@ from ..camera.pixel import Pixel
 from ..camera.scenario import Scenario
 from ..camera.scene import Geometry
 from ..camera.sensor import BUILT_IN_SENSORS
-from ..curves.builtin.registry import BUILT_IN_LIGHTS
 from ..curves.population import Population
 from ..curves.single_leds import RegionMap
 from ..curves.spectrum import WavelengthGrid
@@ -21,7 +20,7 @@ from ..metrics.objective import Objective
 from ..types import Number, Section
 from ..vision.section import Vision
 from .axes import ScenarioTemplate, Span, Values, expanded
-from .schema_curves import Documented, LightsSection, Name, SensorSection, builtin, named
+from .schema_curves import LIGHTS_NAME, Documented, LightsSection, Name, SensorSection, Validation, builtin, named
 from .schema_tasks import TasksAsked
 
 _FEWEST_PATCHES = 10
@@ -159,24 +158,6 @@ class Recognition(Section):
         return self
 
 
-class Validation(Documented):
-    """How designs do on lights that they have not seen. The photons of a light are those of the study's own lights."""
-
-    lights: Annotated[
-        LightsSection | None,
-        BeforeValidator(builtin, json_schema_input_type=named(BUILT_IN_LIGHTS) | LightsSection),
-    ] = None
-    """Other lights, of signal types that the study has; their CSDs stand beside its own."""
-    leave_one_out: bool = False
-    """Search again without each light in turn: how far does the optimum fall on it?"""
-
-    @model_validator(mode="after")
-    def _something(self) -> Validation:
-        if self.lights is None and not self.leave_one_out:
-            raise ValueError("`lights`, `leave_one_out: true`, or both")
-        return self
-
-
 class Levels(Section):
     """Equidistant levels of sensitivity."""
 
@@ -245,9 +226,10 @@ class StudySection(Documented):
     pixel: Pixel = Pixel()
     """The pixel and its readout."""
     lights: Annotated[
-        LightsSection, BeforeValidator(builtin, json_schema_input_type=named(BUILT_IN_LIGHTS) | LightsSection)
+        LightsSection,
+        BeforeValidator(builtin, json_schema_input_type=LIGHTS_NAME | LightsSection),
     ]
-    """Traffic lights: `tl16`, a built-in surrogate, or a mapping with `files`."""
+    """Traffic lights: `tl16`, a built-in surrogate, a file, or a mapping with `files`."""
     scenarios: Annotated[
         dict[Name, Scenario],
         BeforeValidator(expanded, json_schema_input_type=dict[Name, ScenarioTemplate]),

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Annotated, Any
 
-from pydantic import ConfigDict, Field, WithJsonSchema, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, model_validator
 
+from ..curves.builtin.registry import BUILT_IN_LIGHTS
+from ..curves.files import CURVE_FILE
 from ..curves.scan import MOST_CURVES
 from ..curves.spectrum import Outside, Resampling
 from ..designs.technology import Stated
@@ -81,7 +83,10 @@ class LightFile(Documented):
 
 
 class LightsSection(Documented):
-    """A built-in data set by its name, or lights from files."""
+    """A built-in data set by its name, or lights from files.
+
+    A file alone in the place of the mapping is taken as energy; the colors of its columns tell their signal types, and
+    the resolved study holds what was understood."""
 
     builtin: str | None = None
     name: Name | None = None
@@ -92,15 +97,44 @@ class LightsSection(Documented):
     @model_validator(mode="after")
     def _one_source(self) -> LightsSection:
         if (self.builtin is None) == (not self.files):
-            raise ValueError("lights are either the name of a built-in data set or a mapping with `files`")
+            raise ValueError("lights are the name of a built-in data set, a file, or a mapping with `files`")
         return self
 
 
-def named(names: Iterable[str]) -> Any:
-    """The type of built-in names, as editors complete them; what is not among them is refused with the nearest."""
-    return Annotated[str, WithJsonSchema({"type": "string", "enum": list(names)})]
+def named(names: Iterable[str], *, or_file: bool = False) -> Any:
+    """The type of built-in names, as editors complete them; what is not among them is refused with the nearest.
+
+    `or_file`: or the name of a file of curves.
+    """
+    schemas: list[dict[str, Any]] = [{"type": "string", "enum": list(names)}]
+    if or_file:
+        schemas.append({"type": "string", "pattern": CURVE_FILE})
+    return Annotated[str, WithJsonSchema(schemas[0] if len(schemas) == 1 else {"anyOf": schemas})]
 
 
 def builtin(value: Any) -> Any:
     """A name alone is that of a built-in one."""
     return {"builtin": value} if isinstance(value, str) else value
+
+
+LIGHTS_NAME: Any = named(BUILT_IN_LIGHTS, or_file=True)
+"""The type of lights that are named alone."""
+
+
+class Validation(Documented):
+    """How designs do on lights that they have not seen. The photons of a light are those of the study's own lights."""
+
+    lights: Annotated[
+        LightsSection | None,
+        BeforeValidator(builtin, json_schema_input_type=LIGHTS_NAME | LightsSection),
+    ] = None
+    """Other lights, of signal types that the study has; their CSDs stand beside its own. A built-in set, a file, or a
+    mapping with `files`."""
+    leave_one_out: bool = False
+    """Search again without each light in turn: how far does the optimum fall on it?"""
+
+    @model_validator(mode="after")
+    def _something(self) -> Validation:
+        if self.lights is None and not self.leave_one_out:
+            raise ValueError("`lights`, `leave_one_out: true`, or both")
+        return self

@@ -207,7 +207,7 @@ class Sources:
             self.digests[entry.file] = _digest_of(self.given[entry.file])
             return self._read[entry.file]
         self._read[entry.file] = None
-        found = self._found((*path, "file"), entry.file)
+        found = self.file((*path, "file"), entry.file)
         if found is None:
             return None
         try:
@@ -220,7 +220,7 @@ class Sources:
 
     def chief_rays(self, path: tuple[Key, ...], file: str, corner_mm: float | None) -> ChiefRays | None:
         """A lens's chief ray angles from a file that the study names at `path`, or None after adding faults."""
-        found = self._found(path, file)
+        found = self.file(path, file)
         if found is None:
             return None
         try:
@@ -232,7 +232,7 @@ class Sources:
             return None
         return read
 
-    def _found(self, path: tuple[Key, ...], file: str) -> Path | None:
+    def file(self, path: tuple[Key, ...], file: str) -> Path | None:
         """Where a file lies that the study names at `path`, or None after adding a fault."""
         found = next((folder / file for folder in self.folders if is_file(folder / file)), None)
         if found is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pandas as pd
 import pytest
 
 from sweep.camera.imager import imager_of
+from sweep.errors import StudyError
 from sweep.report import make_report, read_output, summary_lines
 from sweep.results.identity import fingerprint
 from sweep.study import load_study
@@ -137,3 +139,38 @@ def test_another_light_changes_no_reading_of_a_resolved_study(folder: Path) -> N
 def test_a_wrong_validation_is_one_line(folder: Path, after: str, said: str) -> None:
     found = faults(folder, text("one", "own", after=after))
     assert any(said in fault for fault in found), found
+
+
+def test_a_file_alone_is_told_apart_by_its_colors(folder: Path) -> None:
+    """The same reading as with its columns named, told to the user, and kept in the resolved study."""
+    lights(folder, "third", 590, 634)
+    named = load(
+        folder,
+        text(
+            "one",
+            "own",
+            after="validate:\n  lights:\n    "
+            + FILE.replace("FILE", "third").replace("REDS", "[r1, r2]").replace("photons", "energy")
+            + "\n",
+        ),
+    )
+    alone = load(folder, text("one", "own", after="validate: {lights: third.csv}\n"))
+    assert any("third.csv: read as energy; green: g1; yellow: y1; red: r1, r2" in line for line in alone.warnings)
+    assert alone.held_out is not None
+    assert named.held_out is not None
+    assert alone.held_out.names == named.held_out.names
+    np.testing.assert_array_equal(alone.held_out.photons, named.held_out.photons)
+    ran(alone, folder / "out", 1)
+    kept = (folder / "out" / "study.resolved.yaml").read_text()
+    assert "third.csv" in kept
+    assert "r2" in kept.split("validate:")[1]
+
+
+@pytest.mark.parametrize(
+    ("lights", "said"),
+    [("othr.csv", "no such file (got 'othr.csv')"), ("qe.csv", "lights of one signal color or none")],
+)
+def test_a_file_that_is_no_lights_is_one_line(folder: Path, lights: str, said: str) -> None:
+    (folder / "qe.csv").write_text("nm,a,b\n400,0.1,0.2\n700,0.1,0.2\n")
+    with pytest.raises(StudyError, match=re.escape(said)):
+        load(folder, text("one", "own", after=f"validate: {{lights: {lights}}}\n"))

@@ -9,9 +9,10 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+from ...curves.light_files import lights_file
 from ...curves.light_unit import LightUnit
 from ...door.channels import Layout, layout_of
-from ...door.files import lights_file, sensor_file
+from ...door.files import sensor_file
 from ...errors import DataError, Fault, OutputError, StudyError, SweepError
 from ...results.tables import atomic, write_text
 from ...study import Study, folder_name, load_study

@@ -1,0 +1,81 @@
+"""Which columns of a user's file are lights of which signal type, by their colors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import DataError, Fault
+from .facts import Curve, Facts, condensed, facts_of
+from .files import scan_curves
+from .light_unit import LightUnit
+from .signal_color import LightColor
+from .spectrum import WavelengthGrid
+
+_SIGNAL_COLORS = ("green", "yellow", "orange", "red")
+"""Signal types in the order of a study."""
+MOST_LETTERS = 100
+"""Of a name that comes from a file's."""
+_USUAL = WavelengthGrid()
+
+
+@dataclass(frozen=True)
+class LightsFile:
+    """`types`: signal type -> column -> color; `left_out`: column -> reason.
+
+    `ends_early`: the file ends inside the wavelengths of the study; `fine`: it is finer than 1 nm.
+    """
+
+    name: str
+    quantity: LightUnit
+    types: Mapping[str, Mapping[str, LightColor | None]]
+    left_out: Mapping[str, str]
+    ends_early: bool
+    fine: bool
+
+    def keys(self, file: str) -> dict[str, Any]:
+        """What a study says of them."""
+        entry: dict[str, Any] = {"file": file, "quantity": self.quantity}
+        entry["signals"] = {kind: list(columns) for kind, columns in self.types.items()}
+        entry |= {"outside": "zero"} if self.ends_early else {}
+        entry |= {"resampling": "mean"} if self.fine else {}
+        return {"name": self.name, "files": [entry]}
+
+
+def clean_curves(path: Path) -> dict[str, Curve]:
+    """Clean curves by the names that the file has; raises DataError with all of its faults."""
+    scan = scan_curves(path)
+    if scan.faults:
+        raise DataError(condensed(list(chain.from_iterable(scan.faults))))
+    return dict(zip(scan.names, facts_of(scan).curves, strict=True))
+
+
+def lights_file(path: Path, quantity: LightUnit, start_nm: float = 400, stop_nm: float = 700) -> LightsFile:
+    """The lights of a file by their chromaticities; raises DataError where they are of fewer than two signal colors.
+
+    `start_nm`, `stop_nm`: the wavelengths of the study.
+    """
+    curves = clean_curves(path)
+    colors = dict(zip(curves, Facts(tuple(curves.values()), "").colors(quantity).values(), strict=True))
+    signals = {name: None if color is None else color.signal for name, color in colors.items()}
+    types = {kind: {name: colors[name] for name in curves if signals[name] == kind} for kind in _SIGNAL_COLORS}
+    used = {kind: columns for kind, columns in types.items() if columns}
+    left_out = {}
+    for name, color in colors.items():
+        if color is None:
+            left_out[name] = "no visible light"
+        elif signals[name] is None:
+            left_out[name] = f"xy {color.xy[0]:.3f} {color.xy[1]:.3f} is near no signal color"
+    if len(used) < 2:
+        found = "; ".join(f"{kind}: {', '.join(columns)}" for kind, columns in used.items()) or "none"
+        problem = f"lights of one signal color or none (`sweep describe {path}` shows where they lie)"
+        raise DataError(Fault(problem, str(path), None, None, found, "two of green, yellow, orange, red, or more"))
+    wave = next(iter(curves.values())).wavelength_nm
+    ends_early = bool(wave[0] > start_nm or wave[-1] < stop_nm)
+    fine = bool(np.diff(wave).min() < _USUAL.step_nm)
+    return LightsFile(path.stem[:MOST_LETTERS], quantity, used, left_out, ends_early, fine)
