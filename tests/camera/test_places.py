@@ -270,6 +270,7 @@ def test_a_part_of_the_tile_stands_for_all(name: str) -> None:
         assert values[0] == pytest.approx(values[1], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_best_place_of_a_pulsed_light_is_the_best_of_the_worst_moments() -> None:
     pulsed = {
         "target": FAR | {"phase_px": "any"},

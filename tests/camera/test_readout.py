@@ -66,7 +66,9 @@ def test_mean_and_variance_of_many_pixels() -> None:
             check(pixel, electrons)
 
 
-@pytest.mark.parametrize("prnu", [0.003, 0.01, 0.1])
+@pytest.mark.parametrize(
+    "prnu", [pytest.param(0.003, marks=pytest.mark.slow), 0.01, pytest.param(0.1, marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize(("read", "gain", "offset"), [(2.0, 0.4, 64.0), (0.1, 0.2, 168.3), (0.0, 3.0, 0.25)])
 def test_prnu_spreads_the_gains_of_poisson_electrons(prnu: float, read: float, gain: float, offset: float) -> None:
     pixel = Pixel(well_e=800, gain_dn_per_e=gain, read_noise_e=read, offset_dn=offset, prnu=prnu)

@@ -148,6 +148,7 @@ def test_micrometers_and_foreign_texts_are_read_as_meant(tmp_path: Path) -> None
     np.testing.assert_array_equal(scan_curves(tmp_path / "semi.csv").values[:, 0], [0.5, 0.25])
 
 
+@pytest.mark.slow
 def test_odd_files_are_described(tmp_path: Path) -> None:
     name = 'it\'s "$x_1$" \u4fe1\u53f7 _a'
     quoted = csv(tmp_path, 'wavelength_nm,"it\'s ""$x_1$"" \u4fe1\u53f7 _a"', WAVE, bell(590, 20))

@@ -104,6 +104,7 @@ def test_a_reader_that_leaves_is_no_fault() -> None:
         assert run.stderr.read() == b""
 
 
+@pytest.mark.slow
 def test_an_output_without_room_is_one_line() -> None:
     with Path("/dev/full").open("w") as full:
         done = subprocess.run([*COMMAND, "schema"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)

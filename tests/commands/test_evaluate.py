@@ -91,6 +91,7 @@ def test_what_exceeds_the_curve_is_measured_against_the_clear_pixel_or_has_no_li
 
 
 @pytest.mark.usefixtures("plain_pictures")
+@pytest.mark.slow
 def test_a_design_of_a_run_has_its_own_numbers_again_and_others_under_other_lights(tmp_path: Path) -> None:
     run = sweep.load_study(study_file(tmp_path)).run(tmp_path, jobs=1)
     best, mine = run.best, run.table[run.table["name"] == "mine"].iloc[0]

@@ -215,6 +215,7 @@ def coincident_with_noise() -> Result:
     "singular covariance: a channel without variance and with equal means",
     oracle="the same design without that channel, 50 digits",
     why="12 eps of each metric's argument; condition of the tail 1 + x^2, of exp(-d) d",
+    slow=True,
 )
 def singular_without_contrast() -> Result:
     results = []

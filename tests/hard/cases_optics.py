@@ -183,6 +183,7 @@ def transfer_in_focus() -> Result:
     "transfer out of focus, up to 1000 waves of blur",
     oracle="autocorrelation of the pupil: (4 / pi) integral of cos(8 pi W s x / lambda) sqrt(1 - (x + s)^2), 50 digits",
     why="8 roundings of a phase p that is passed to a cosine, and a pairwise sum of terms of at most 1: (8 p + 40) eps",
+    slow=True,
 )
 def transfer_out_of_focus() -> Result:
     results = []

@@ -46,6 +46,7 @@ def wrong_types(mean: np.ndarray, variance: np.ndarray, kinds: np.ndarray, rng: 
     "the error bounds against the most likely signal",
     oracle="20,000 draws of each signal, told by maximum likelihood",
     why="a bound: nothing above it but 4 standard deviations of a share of 20,000",
+    slow=True,
 )
 def bounds_hold() -> Result:
     rng = np.random.default_rng(10)

@@ -80,6 +80,7 @@ def test_a_point_on_a_hundredth_counts() -> None:
     assert hypervolumes([front], box)["hypervolume"][0] == pytest.approx(0.5, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_two_runs_say_who_is_best_and_by_how_much(runs: dict[str, Path], tmp_path: Path) -> None:
     said, page = compared([runs["chart"], runs["brighter"]], tmp_path / "to")
     best = {}

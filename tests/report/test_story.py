@@ -22,8 +22,9 @@ from sweep.study import load_study
 from ..build import ran
 from ..conftest import STUDIES, Finished
 
-FAST = ("stopband", "fog")
+FAST = ("stopband",)
 SLOW = (
+    "fog",
     "dual",
     "paper",
     "freeform",
@@ -167,6 +168,7 @@ def test_a_series_says_who_leads_from_where_to_where(figure: SeriesFigure, said:
     assert lead_sentence(figure) == said
 
 
+@pytest.mark.slow
 def test_a_study_of_plain_cfas_has_an_answer(tmp_path: Path) -> None:
     path = tmp_path / "plain.yaml"
     path.write_text("study: plain\nsensor: ar0820\nlights: tl16\ncfas: [RGGB, RCCC, RYYCy]\n")

@@ -206,6 +206,7 @@ def test_a_disk_without_a_byte_left_is_one_line(plain: Study, tmp_path: Path, mo
         ran(plain, tmp_path, 1)
 
 
+@pytest.mark.slow
 def test_threads_give_the_same_rows(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
     run_study(plain, tmp_path, 2, lambda *_: None, backend="threading")
     pd.testing.assert_frame_equal(rows(tmp_path), whole)

@@ -27,6 +27,7 @@ def road(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Path]:
     return study, folder / "out"
 
 
+@pytest.mark.slow
 def test_scenes_are_planned_and_drawn(road: tuple[Study, Path]) -> None:
     study, folder = road
     assert list(study.scenarios) == ["road distance_m=150", "road distance_m=250"]
@@ -104,12 +105,12 @@ def test_an_audit_of_nothing_finds_nothing_broken() -> None:
     assert audit_rows(load_study(STUDIES / "stopband.yaml"), [frame]).broken.empty
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("place", "distances", "designs"),
     [
-        ("[0.3, 0.6]", "[250]", 1),
-        pytest.param("[0.3, 0.6]", "[150, 250]", 4, marks=pytest.mark.slow),
-        pytest.param("any", "[250]", 2, marks=pytest.mark.slow),
+        ("[0.3, 0.6]", "[150, 250]", 4),
+        ("any", "[250]", 2),
     ],
 )
 def test_accuracy_measures_a_ladder_of_tolerances(tmp_path: Path, place: str, distances: str, designs: int) -> None:

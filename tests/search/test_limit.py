@@ -170,6 +170,7 @@ def test_least_loss_of_sensitivity_is_the_inverse_of_the_largest_separation() ->
     assert 0.9 < best.objective <= found.proven
 
 
+@pytest.mark.slow
 def test_the_limit_of_the_smallest_of_several_distances() -> None:
     two = replace(PROBLEM, objective=Objective(minimum={"csd_yellow_red": 1.0, "csd_orange_red": 2.0}))
     found = limit_of(two)

@@ -34,6 +34,7 @@ def problem(**given: float) -> Problem:
     return replace(plain, view=view, objective=Objective(minimum={"worst_csd_yellow_red": 1.0}))
 
 
+@pytest.mark.slow
 def test_rows_over_the_population_have_their_derivative() -> None:
     shifted = replace(problem(binning_nm=1), edge_shift_nm=2.0)
     model, checked = Model(shifted, SearchRun(0), 1000), 0
@@ -68,6 +69,7 @@ def test_the_limit_is_attained_over_all_members() -> None:
     assert found.open_parts == 0
 
 
+@pytest.mark.slow
 def test_a_larger_population_has_a_lower_limit() -> None:
     assert STUDY.search is not None
     assert limit().proven < limit_of(problem()).proven < limit_of(STUDY.problem(STUDY.search)).proven

@@ -92,6 +92,7 @@ def test_a_study_names_its_tasks() -> None:
     assert [task.key.name for task in own.tasks.tasks] == ["leaf"]
 
 
+@pytest.mark.slow
 def test_without_tasks_nothing_of_them_is_imported() -> None:
     script = """
 import sys
