@@ -23,6 +23,7 @@ from .tables import (
     RESULTS,
     ROBUSTNESS,
     SEARCH_LOG,
+    SENSOR_MAP,
     TRADED,
     VALIDATED,
     VISION,
@@ -90,6 +91,8 @@ FILES = {
     "`design_id`; how many times as large population and edge shift must be for the worst CSD to fall below that of "
     "the best plain CFA (`breaks_at`; null: not up to 3 times), and the CSD, lights, shifts and temperatures there; "
     "`yield`, the share of random lamps and cameras with the wanted CSD, with its 95 % interval",
+    SENSOR_MAP: "where a scene has a `field`, for each plain CFA, named design and answer of the search: `design_id`, "
+    "relative image `height`, `cra_deg` and the CSDs there, DN, before clipping and rounding",
     LEFT_OUT: "where each light is left out of a search in turn: signal_type, signal, the optimum that was "
     "`seen`, the same design `with_it`, and the `fall`",
     SEARCH_LOG: "every evaluation of the search and of its front: " + ", ".join(search_schema(["<parameters>"]).names),

@@ -45,6 +45,7 @@ from .tables import (
     ROBUSTNESS,
     ROW_COLUMNS,
     SEARCH_LOG,
+    SENSOR_MAP,
     SWEPT,
     TRADED,
     VALIDATED,
@@ -54,7 +55,19 @@ from .tables import (
 )
 from .thinning import Counts, thinned
 
-_OPTIONAL = (FRONT, RECOGNITION, SEARCH_LOG, AUDIT, VALIDATED, ROBUSTNESS, LEFT_OUT, TRADED, RENDERED, *VISION_TABLES)
+_OPTIONAL = (
+    FRONT,
+    RECOGNITION,
+    SEARCH_LOG,
+    AUDIT,
+    VALIDATED,
+    ROBUSTNESS,
+    SENSOR_MAP,
+    LEFT_OUT,
+    TRADED,
+    RENDERED,
+    *VISION_TABLES,
+)
 """Files that some runs alone have."""
 _MOST_SHOWN = 10
 _ALWAYS_WRITTEN = ("study", "seed", "wavelengths", "scenarios", "objective")
@@ -68,8 +81,8 @@ class Output:
 
     `study`: the study that was run, and `resolved` its file. `profiles`: over the whole table, per CFA; none where a
     sweep is no grid. `searched`: the search's evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per
-    light that was left out of a search. `traded`: color error against noise, `rendered`: areas of pictures; `vision`:
-    tables of the benchmark of vision by their files' names.
+    light that was left out of a search. `traded`: color error against noise, `rendered`: areas of pictures; `places`:
+    separations over the sensor; `vision`: tables of the benchmark of vision by their files' names.
     """
 
     folder: Path
@@ -87,6 +100,7 @@ class Output:
     left_out: pd.DataFrame | None
     traded: pd.DataFrame | None
     rendered: pd.DataFrame | None
+    places: pd.DataFrame | None
     vision: Mapping[str, pd.DataFrame]
     profiles: Mapping[str, Sequence[ParameterProfile]]
 
@@ -220,6 +234,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         left_out=more.get(LEFT_OUT),
         traded=more.get(TRADED),
         rendered=more.get(RENDERED),
+        places=more.get(SENSOR_MAP),
         vision={name: table for name, table in more.items() if name in VISION_TABLES},
         profiles=profiles.found if all(made.grid is not None for made in study.sweeps.values()) else {},
     )

@@ -32,6 +32,7 @@ from ..results.tables import (
     RESULTS,
     ROBUSTNESS,
     SEARCH_LOG,
+    SENSOR_MAP,
     TRADED,
     VALIDATED,
     VISION_TABLES,
@@ -57,6 +58,9 @@ from .search import SearchAnswer, answer_row, front_table, limit_alone, run_sear
 from .sweep import Sweep
 from .workers import Workers
 
+_DRAWN = {CURVES, POINTS, LIMITED_BY, VALIDATED, ROBUSTNESS, SENSOR_MAP, RECOGNITION, TRADED, RENDERED}
+"""Tables of the few designs that a report draws."""
+
 
 def files_of(study: Study) -> set[str]:
     """Names of the files that a run of the study makes."""
@@ -66,6 +70,7 @@ def files_of(study: Study) -> set[str]:
     names |= {VALIDATED} if study.held_out is not None else set()
     names |= {LEFT_OUT} if study.leaves_one_out else set()
     names |= {ROBUSTNESS} if study.pair_over_population is not None else set()
+    names |= {SENSOR_MAP} if any(s.field is not None for s in study.scenarios.values()) else set()
     names |= {TRADED, RENDERED} if study.tasks is not None and "color" in study.tasks.by_name else set()
     names |= {*VISION_TABLES} if study.section.vision is not None else set()
     asked = study.section.recognition
@@ -103,7 +108,7 @@ class Making:
                 self._sweep()
             if todo & {SEARCH_LOG, FRONT, LEFT_OUT}:
                 self._write_search(todo)
-            if todo & {CURVES, POINTS, LIMITED_BY, VALIDATED, ROBUSTNESS, RECOGNITION, TRADED, RENDERED}:
+            if todo & _DRAWN:
                 self._write_drawn(todo)
             if todo & {*VISION_TABLES}:
                 self._write_vision(todo)
@@ -200,6 +205,10 @@ class Making:
             from .robustness import robustness_table  # noqa: PLC0415  (only where lights have a population)
 
             self.inventory.write_table(ROBUSTNESS, robustness_table(self.study, rows, self.crew, self.progress))
+        if SENSOR_MAP in names:
+            from .sensor_map import sensor_map_table  # noqa: PLC0415  (only where a scene has places of the sensor)
+
+            self.inventory.write_table(SENSOR_MAP, sensor_map_table(self.study, rows, self.crew, self.progress))
         if RECOGNITION in names:
             table = recognition_table(self.study, rows, self.crew, self.progress)
             assert table is not None
