@@ -25,6 +25,16 @@ def _places(value: object) -> object:
     return value
 
 
+def _listed(value: object) -> object:
+    """A list of a study as a tuple, so that a scene can be a key."""
+    if value is not None and not (isinstance(value, list | tuple) and 2 <= len(value) <= _MOST):
+        raise ValueError(f"a list of 2 to {_MOST} numbers")
+    return value if value is None else tuple(value)
+
+
+_SIZE = Field(min_length=2, max_length=_MOST)
+
+
 class SensorField(Section):
     """Places of the sensor from its middle to its corner, the worst of which counts; places are image heights.
 
@@ -40,8 +50,12 @@ class SensorField(Section):
     cra_max_deg: _Cra | None = None
     profile: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
     corner_mm: Annotated[float, Field(ge=1e-3, le=1e4)] | None = None
-    heights: Annotated[list[_Height], Field(min_length=2, max_length=_MOST)] | None = None
-    cra_deg: Annotated[list[_Cra], Field(min_length=2, max_length=_MOST)] | None = None
+    heights: Annotated[
+        tuple[_Height, ...] | None, BeforeValidator(_listed, json_schema_input_type=Annotated[list[_Height], _SIZE])
+    ] = None
+    cra_deg: Annotated[
+        tuple[_Cra, ...] | None, BeforeValidator(_listed, json_schema_input_type=Annotated[list[_Cra], _SIZE])
+    ] = None
     places: Annotated[
         Literal["any"] | int | None, BeforeValidator(_places, json_schema_input_type=Literal["any"] | _Count)
     ] = None

@@ -32,6 +32,7 @@ from .price import price_drawings
 from .published import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
 from .scenes import effect_table, scene_groups, scene_table
 from .scorecard import draw_scorecard, score_cells, scorecard
+from .sensor_map import map_drawings
 from .series import draw_series
 from .signal_figures import draw_chart, draw_clouds
 from .summary import counts_line, summary_lines
@@ -45,6 +46,7 @@ _FIRST_LINES = 3
 """Of the answer, above the first plot; the others stand below it."""
 _PICTURES = ("tiles", "sensor", "signals", "chart")
 """Figures that the page shows as pictures; it draws all others itself, but for those of tasks."""
+_MAPS = "places-"
 _OF_TASKS = ("scorecard", "color-noise", "rendered")
 _OF_REGIONS, _OF_PRICE = "regions", "price"
 
@@ -75,7 +77,7 @@ def _contents(output: Output, some: Iterable[str] | None) -> dict[str, bytes]:
         for kind in ("png", "svg"):
             if some is None or {f"{where}.png", f"{where}.svg"} & {*some}:
                 contents[f"{where}.{kind}"] = rendered(figure, kind)
-        if some is None and name.startswith((*_PICTURES, *_OF_TASKS, _OF_REGIONS, _OF_PRICE, VISION_FIGURES)):
+        if some is None and name.startswith((*_PICTURES, *_OF_TASKS, _OF_REGIONS, _OF_PRICE, _MAPS, VISION_FIGURES)):
             images.append((name, caption, inlined(contents[f"{where}.png"])))
     published = comparison_with_published(output)
     if len(published):
@@ -123,6 +125,7 @@ def _html(output: Output, images: Sequence[tuple[str, str, str]], published: pd.
         score_names=() if card is None else card.names,
         score_rows=[] if card is None else score_cells(card),
         score_images=[(caption, uri) for name, caption, uri in images if name.startswith(_OF_TASKS)],
+        map_images=[(caption, uri) for name, caption, uri in images if name.startswith(_MAPS)],
         conditions=output.study.tasks,
         left_out=rows(tables.worst_left_out(output)),
         geometry=rows(tables.geometry_table(output)),
@@ -175,6 +178,7 @@ def _drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
     card = scorecard(output)
     if card is not None:
         yield "scorecard", f"Every figure relative to {card.names[card.reference]}", draw_scorecard(card)
+    yield from map_drawings(output)
     yield from color_drawings(output)
     yield from price_drawings(output)
     yield from lamp_drawings(output)

@@ -26,6 +26,7 @@ from .tables import (
     RESULTS,
     ROBUSTNESS,
     SEARCH_LOG,
+    SENSOR_MAP,
     TRADED,
     VALIDATED,
     VISION,
@@ -104,6 +105,8 @@ FILES = {
     "the widths there (yellow_fwhm_nm, red_fwhm_nm)",
     LEFT_OUT: "where each light is left out of a search in turn: the objective (of a worst case the nominal quantity, "
     "too), signal_type, signal, the optimum that was `seen`, the same design `with_it`, and the `fall`",
+    SENSOR_MAP: "where a scene has a `field`, for each plain CFA, named design and answer of the search: `design_id`, "
+    "relative image `height`, `cra_deg` and the CSDs there, DN, before clipping and rounding",
     SEARCH_LOG: "every evaluation of the search and of its front: " + ", ".join(search_schema(["<parameters>"]).names),
     FRONT: "what the search found at each level of sensitivity, and the limit there; between two levels rows with the "
     "limit alone: " + ", ".join(front_schema(["<parameters>"]).names),

@@ -20,6 +20,7 @@ from .tables import (
     RESULTS,
     ROBUSTNESS,
     SEARCH_LOG,
+    SENSOR_MAP,
     TRADED,
     VALIDATED,
     VISION_TABLES,
@@ -39,6 +40,7 @@ TABLES = (
     LEFT_OUT,
     ROBUSTNESS,
     REGIONS_MAP,
+    SENSOR_MAP,
     RECOGNITION,
     TRADED,
     RENDERED,
@@ -48,7 +50,7 @@ MADE_BY_RUN = frozenset((*TABLES, RESOLVED, PROVENANCE))
 """What a run itself writes beside its list; the report draws from it, `sweep audit` adds a table."""
 _DRAWN = re.compile(
     r"report\.html|cfas\.(png|svg)|pareto(-\d+)?\.(png|svg)|paper_comparison\.(csv|parquet)"
-    r"|figures/((filters|series)-\d+|tiles|sensor|signals|chart|scorecard|(color-noise|rendered)-\d+"
+    r"|figures/((filters|series|places)-\d+|tiles|sensor|signals|chart|scorecard|(color-noise|rendered)-\d+"
     r"|price|regions-\d+|clouds-(cfas|designs)|vision-(errors|ranks|misread))\.(png|svg)"
 )
 

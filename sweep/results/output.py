@@ -47,6 +47,7 @@ from .tables import (
     ROBUSTNESS,
     ROW_COLUMNS,
     SEARCH_LOG,
+    SENSOR_MAP,
     SWEPT,
     TRADED,
     VALIDATED,
@@ -65,6 +66,7 @@ _OPTIONAL = (
     VALIDATED,
     ROBUSTNESS,
     REGIONS_MAP,
+    SENSOR_MAP,
     LEFT_OUT,
     TRADED,
     RENDERED,
@@ -83,9 +85,9 @@ class Output:
 
     `study`: the study that was run, and `resolved` its file. `profiles`: over the whole table, per CFA; none where a
     sweep is no grid. `searched`: the search's evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per
-    light that was left out of a search; `price`: the largest worst
-    case at each nominal level; `regions`: cells of the maps of color regions. `traded`: color error against
-    noise, `rendered`: areas of pictures; `vision`: tables of the benchmark of vision by their files' names.
+    light that was left out of a search; `price`: the largest worst case at each nominal level; `regions`: cells of the
+    maps of color regions. `traded`: color error against noise, `rendered`: areas of pictures; `places`: separations
+    over the sensor; `vision`: tables of the benchmark of vision by their files' names.
     """
 
     folder: Path
@@ -105,6 +107,7 @@ class Output:
     regions: pd.DataFrame | None
     traded: pd.DataFrame | None
     rendered: pd.DataFrame | None
+    places: pd.DataFrame | None
     vision: Mapping[str, pd.DataFrame]
     profiles: Mapping[str, Sequence[ParameterProfile]]
 
@@ -242,6 +245,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         regions=more.get(REGIONS_MAP),
         traded=more.get(TRADED),
         rendered=more.get(RENDERED),
+        places=more.get(SENSOR_MAP),
         vision={name: table for name, table in more.items() if name in VISION_TABLES},
         profiles=profiles.found if all(made.grid is not None for made in study.sweeps.values()) else {},
     )

@@ -34,6 +34,7 @@ from ..results.tables import (
     RESULTS,
     ROBUSTNESS,
     SEARCH_LOG,
+    SENSOR_MAP,
     TRADED,
     VALIDATED,
     VISION_TABLES,
@@ -68,8 +69,8 @@ from .search import (
 from .sweep import Sweep
 from .workers import Workers
 
-_DRAWN = {CURVES, POINTS, LIMITED_BY, VALIDATED, ROBUSTNESS, REGIONS_MAP, RECOGNITION, TRADED, RENDERED}
-"""Tables of what is drawn of the rows."""
+_DRAWN = {CURVES, POINTS, LIMITED_BY, VALIDATED, ROBUSTNESS, REGIONS_MAP, SENSOR_MAP, RECOGNITION, TRADED, RENDERED}
+"""Tables of the few designs that a report draws."""
 
 
 def files_of(study: Study) -> set[str]:
@@ -82,6 +83,7 @@ def files_of(study: Study) -> set[str]:
     names |= {LEFT_OUT} if study.leaves_one_out else set()
     names |= {ROBUSTNESS} if study.pair_over_population is not None else set()
     names |= {REGIONS_MAP} if study.section.regions is not None else set()
+    names |= {SENSOR_MAP} if any(s.field is not None for s in study.scenarios.values()) else set()
     names |= {TRADED, RENDERED} if study.tasks is not None and "color" in study.tasks.by_name else set()
     names |= {*VISION_TABLES} if study.section.vision is not None else set()
     asked = study.section.recognition
@@ -222,6 +224,10 @@ class Making:
             from .allowed_lamps import regions_table  # noqa: PLC0415  (only where a study asks for it)
 
             self.inventory.write_table(REGIONS_MAP, regions_table(self.study, rows, self.crew, self.progress))
+        if SENSOR_MAP in names:
+            from .sensor_map import sensor_map_table  # noqa: PLC0415  (only where a scene has places of the sensor)
+
+            self.inventory.write_table(SENSOR_MAP, sensor_map_table(self.study, rows, self.crew, self.progress))
         if RECOGNITION in names:
             table = recognition_table(self.study, rows, self.crew, self.progress)
             assert table is not None

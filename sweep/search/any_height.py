@@ -40,8 +40,8 @@ class AnyHeight:
     @property
     def problem(self) -> Problem:
         """The problem at the known heights."""
-        heights = sorted(self._heights)
-        field = SensorField(heights=heights, cra_deg=[self._field.cra_at(height) for height in heights])
+        heights = tuple(sorted(self._heights))
+        field = SensorField(heights=heights, cra_deg=tuple(map(self._field.cra_at, heights)))
         scene = self._whole.view.scenario.model_copy(update={"field": field})
         return replace(self._whole, view=replace(self._whole.view, scenario=scene))
 

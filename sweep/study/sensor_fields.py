@@ -16,7 +16,7 @@ _nothing = SensorField(cra_max_deg=0.0)
 
 
 def _of_rows(rays: ChiefRays) -> SensorField:
-    return SensorField(heights=rays.heights.tolist(), cra_deg=rays.cra_deg.tolist())
+    return SensorField(heights=tuple(rays.heights.tolist()), cra_deg=tuple(rays.cra_deg.tolist()))
 
 
 def with_chief_rays(section: StudySection, sources: Sources) -> StudySection:

@@ -185,7 +185,7 @@ def test_a_field_is_the_worst_of_its_places(given: dict[str, Any]) -> None:
     """Chief ray angle and field angle follow one image height, and the worst place counts in every column."""
     angles = [0.0, 8.0, 20.0]
     view = moved(given, cra_deg=0.0).view
-    field = view.scenario.model_copy(update={"field": SensorField(cra_deg=angles)})
+    field = view.scenario.model_copy(update={"field": SensorField(cra_deg=tuple(angles))})
     block = edges_of(SPACE, 0, SPACE.size)
     assert block is not None
     curves = block.curves()

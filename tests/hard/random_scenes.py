@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from sweep.camera.effects.image_height import all_heights_count
 from sweep.camera.imager import Imager
 from sweep.camera.methods import Methods
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.plan.bounds import Box
 from sweep.camera.scenario import Scenario
+from sweep.camera.seen import moves
 from sweep.camera.view import View
 from sweep.curves.lights import class_pairs
 from sweep.designs.families.dual import Dual
@@ -34,9 +36,12 @@ _DESIGNS = 4
 _SHIFT_NM = 3.0
 _ANY_PLACE_PX = 6.0
 """Larger lights at any place take too long."""
+_WITH_N = ("RYNCy", "3x3", "1x3")
 _MOVED_EVERY = 3
 """In scenes of some seeds filters move with the angle of the light."""
-_ANY_PLACE_EVERY = 11
+_FIELD_EVERY, _EVERYWHERE_EVERY = 6, 30
+"""Of these, in some there are three places of the sensor, in some all places count."""
+_ANY_PLACE_EVERY = 14
 """Any place is asked for only in scenes of some seeds: the reference then takes a hundred times as long."""
 
 
@@ -55,19 +60,34 @@ class RandomScene:
     tolerance_dn: float
 
     @property
+    def moves(self) -> bool:
+        """Whether any filter moves with the angle of the light."""
+        return moves(self.view)
+
+    @property
+    def everywhere(self) -> bool:
+        """Whether all places of the sensor count."""
+        return all_heights_count(self.view)
+
+    @property
     def anywhere(self) -> bool:
         """Whether any place of the light is asked for."""
         target = self.view.scenario.target
         return target is not None and target.phase_px == "any"
 
 
-def random_scene(seed: int) -> RandomScene:
-    """The scene of a seed, always the same."""
+def random_scene(seed: int, *, moved: bool = False) -> RandomScene:
+    """The scene of a seed, always the same; `moved`: with a CFA and a technology by which filters move."""
     rng = np.random.default_rng([seed, 17])
     given = _scenario(rng, may_be_anywhere=seed % _ANY_PLACE_EVERY == 0)
-    given["optics"]["cra_deg"] = float(np.random.default_rng([seed, 19]).uniform(0, 35))
+    cra_deg = float(np.random.default_rng([seed, 19]).uniform(0, 35))
+    if seed % _FIELD_EVERY == 0 and given.get("target", {}).get("phase_px") != "any":
+        given["field"] = {"cra_max_deg": cra_deg, "places": 3 if seed % _EVERYWHERE_EVERY else "any"}
+    else:
+        given["optics"]["cra_deg"] = cra_deg
     pixel = _pixel(rng, noisy=given["noise"] is not False)
     cfa = str(rng.choice([*TILES, "two"]))
+    cfa = _WITH_N[seed % len(_WITH_N)] if moved and cfa not in _WITH_N else cfa
     mosaic = _TWO if cfa == "two" else TILES[cfa]
     modified = tuple(mosaic.channels.index(name) for name in ("N", "M") if name in mosaic.channels)
     scenario = Scenario.model_validate(given)
@@ -80,7 +100,7 @@ def random_scene(seed: int) -> RandomScene:
         lights=lights(),
         pixel=Pixel(**pixel) if scenario.noise is None else scenario.noise.of(Pixel(**pixel)),
         scenario=scenario,
-        technologies=_technologies(seed, mosaic),
+        technologies=_technologies(seed, mosaic, moved=moved),
     )
     low, high = view.qe.copy(), view.qe.copy()
     curves: tuple[np.ndarray, ...] = (np.empty((1, 0, GRID.size)),)
@@ -91,9 +111,9 @@ def random_scene(seed: int) -> RandomScene:
     return RandomScene(f"random {seed}", view, curves, Box(view, low, high, 1000), tolerance)
 
 
-def _technologies(seed: int, mosaic: Mosaic) -> tuple[Technology, ...]:
+def _technologies(seed: int, mosaic: Mosaic, *, moved: bool) -> tuple[Technology, ...]:
     """In a third of the scenes the modified channels move with the angle of the light, where they do not exceed it."""
-    if seed % _MOVED_EVERY or "M" in mosaic.channels:
+    if (seed % _MOVED_EVERY and not moved) or "M" in mosaic.channels:
         return ()
     return moving(mosaic, float(np.random.default_rng([seed, 20]).uniform(1.4, 2.2)))
 

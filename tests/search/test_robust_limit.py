@@ -33,7 +33,7 @@ YELLOW_RED = ("yellow", "red")
 def problem() -> Problem:
     assert STUDY.search is not None
     given = STUDY.problem(STUDY.search)
-    scene = given.view.scenario.model_copy(update={"field": SensorField(cra_deg=list(PLACES_DEG))})
+    scene = given.view.scenario.model_copy(update={"field": SensorField(cra_deg=PLACES_DEG)})
     return replace(given, view=replace(given.view, scenario=scene))
 
 
