@@ -13,7 +13,7 @@ from ..types import FloatArray, Parallel, Progress, delayed
 from .limit import Limit
 from .problem import Evaluation, Problem, best_feasible
 from .solver import search_from, smooth_objective
-from .trade_off import Effort, at_least, check_proof
+from .trade_off import Effort, check_proof, with_least
 
 _STARTS = 4
 
@@ -75,7 +75,7 @@ def worst_case_price(
     starts = [problem.to_unit(each.x) for each in (answer, top)]
     levels = np.linspace(first.nominal, top.objective, count + 2)[1:-1]
     for done, level in enumerate(map(float, levels), 1):
-        best = _best(at_least(problem, nominal.objective.column, level), starts, effort, parallel)
+        best = _best(with_least(problem, nominal.objective.column, level), starts, effort, parallel)
         check_proof(best, limit, f" at a nominal {level:g} and more")
         found += [] if best is None else [point(level, best)]
         progress("price of the worst case", done, count)

@@ -78,7 +78,7 @@ def trade_off(
 
     `parallel` runs calls over the cores. Raises BrokenProofError, see `check_proof`.
     """
-    at_level = [at_least(problem, SENSITIVITY, level) for level in levels]
+    at_level = [with_least(problem, SENSITIVITY, level) for level in levels]
     limits: list[Limit | None] = [None] * len(at_level)
     between = [tuple(map(float, np.linspace(a, b, _BETWEEN + 2)[1:-1])) for a, b in pairwise(levels)]
     if why_not(problem) is None:
@@ -129,7 +129,7 @@ def _tangents(
         yield tuple(zip(own, map(min, first, second), strict=True))
 
 
-def at_least(problem: Problem, name: str, level: float) -> Problem:
+def with_least(problem: Problem, name: str, level: float) -> Problem:
     """The problem with a quantity of `level` or more; a largest value that is smaller than that is given up."""
     given = problem.constraints.get(name)
     top = None if given is None or given.max is None or given.max < level else given.max
