@@ -92,8 +92,8 @@ def robustness_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progr
         plain = own.loc[[own[f"worst_{csd_name(pair)}"].idxmax()]].to_dict("records") if len(own) else []
         rival = _design(study, plain[0]) if plain and plain[0]["design_id"] != row["design_id"] else None
         calls.append(delayed(_robustness, _design(study, row), rival, pair, study.section.seed))
-    for row, values in zip(shown, parallel(calls), strict=True):
-        found.append({"design_id": row["design_id"], **values})
+    for row, (numbers, lights) in zip(shown, parallel(calls), strict=True):
+        found.append({"design_id": row["design_id"], **numbers, **lights})
         progress("robustness", len(found), len(shown))
     return pa.Table.from_pylist(found, schema=pa.schema(_FIELDS))
 
@@ -104,43 +104,47 @@ def _design(study: Study, row: dict[Any, Any]) -> Candidate:
     return Candidate(study.view(space, row["scenario"]), space, point, study.edge_shift_nm)
 
 
-def _robustness(design: Candidate, rival: Candidate | None, pair: Pair, seed: int) -> dict[str, Any]:
-    found = {} if rival is None else _breaks(design, rival, pair)
+def _robustness(
+    design: Candidate, rival: Candidate | None, pair: Pair, seed: int
+) -> tuple[dict[str, float], dict[str, str]]:
+    """What is found of a design, numbers and names of lights by their columns, in a form that a run can keep."""
+    numbers, lights = ({}, {}) if rival is None else _breaks(design, rival, pair)
     population = design.view.lights.population
     assert population is not None
     if population.wanted_dn is not None:
         kept = int((drawn_dn(design, pair, seed) >= population.wanted_dn).sum())
         low, high = yield_interval(kept, population.draws)
-        found |= {"yield": kept / population.draws, "yield_low": low, "yield_high": high}
-    return found
+        numbers |= {"yield": kept / population.draws, "yield_low": low, "yield_high": high}
+    return numbers, lights
 
 
-def _breaks(design: Candidate, rival: Candidate, pair: Pair) -> dict[str, Any]:
-    """Where a design falls below a rival first, and what it is that breaks it."""
+def _breaks(design: Candidate, rival: Candidate, pair: Pair) -> tuple[dict[str, float], dict[str, str]]:
+    """Where a design falls below a rival first, and what it is that breaks it: numbers, and names of lights."""
 
     def below(scale: float) -> bool:
         return design.worst(pair, scale)[0] < rival.worst(pair, scale)[0]
 
     scale = _first(below)
     if scale is None:
-        return {}
+        return {}, {}
     least, shift = design.worst(pair, scale)
     imager = design.imager(scale)
     response = imager.imager.smooth(design.curves(shift))[0]
     near = min((imager.nearest(case, pair) for case in response), key=lambda each: float(each.squared.min()))
     at = np.unravel_index(int(near.squared.argmin()), near.squared.shape)
     lights, population = design.view.lights, design.imager(scale).members.population
-    found: dict[str, Any] = {"breaks_at": scale, "breaks_dn": least, "breaks_edge_nm": shift * design.edge_shift_nm}
+    names = dict[str, str]()
+    found: dict[str, float] = {"breaks_at": scale, "breaks_dn": least, "breaks_edge_nm": shift * design.edge_shift_nm}
     warm = []
     for side, (name, starts) in enumerate((("first", near.first), ("second", near.second))):
         signal = imager.members.signal(int(starts[at[side]]))
         nm = imager.members.shift_nm(int(near.steps[at][side]), float(near.shares[at][side]))
-        found |= {f"breaks_{name}": lights.names[signal], f"breaks_{name}_nm": nm}
+        names[f"breaks_{name}"], found[f"breaks_{name}_nm"] = lights.names[signal], nm
         warm.append(population.temperature_of(lights.types[signal], lights.names[signal], nm))
     together = max(low for low, _ in warm), min(high for _, high in warm)
     if population.temperatures == "common":
         found |= {"breaks_low_c": together[0], "breaks_high_c": together[1]}
-    return found
+    return found, names
 
 
 def _first(below: Callable[[float], bool]) -> float | None:

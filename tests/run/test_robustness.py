@@ -13,16 +13,18 @@ from scipy.optimize import brentq
 from sweep.report.summary import summary_lines
 from sweep.results.output import read_output
 from sweep.results.tables import ROBUSTNESS
+from sweep.run import robustness, run_study
 from sweep.run.robustness import Candidate, drawn_dn, yield_interval
 from sweep.study import Study, load_study
 
 from ..build import ran
+from ..mischief import StoppedError
 
 TEXT = """\
 study: street
 sensor: ar0820
 lights: tl16
-cfas: [RGGB, RYNCy]
+cfas: [RGGB, RYYCy, RYNCy]
 population: {temperature_c: [-40, 85], self_heating_k: 20, binning_nm: {yellow: 2, red: 1}, wanted_dn: WANTED, draws: DRAWS}
 production: {edge_shift_nm: 2}
 designs:
@@ -115,7 +117,7 @@ def test_any_number_of_workers_gives_the_same_and_a_break_is_where_the_worst_cas
     said = "\n".join(summary_lines(read_output(tmp_path / "out1")))
     assert re.search(r"Mine falls below RGGB at [\d.]+ times .*: \S+yellow \([+-].* nm\) and \S+red .*, \d+ DN", said)
     assert re.search(r"At least 200 DN have, of random lamps and cameras: RGGB [\d.]+%.*, mine [\d.]+%", said)
-    plain, mine = tables[0].to_pylist()
+    plain, _, mine = tables[0].to_pylist()
     assert plain["breaks_at"] is None
     assert 0.25 < mine["breaks_at"] < 3
     pair = ("yellow", "red")
@@ -128,3 +130,37 @@ def test_any_number_of_workers_gives_the_same_and_a_break_is_where_the_worst_cas
     assert mine["breaks_dn"] == pytest.approx(candidate(study).worst(pair, mine["breaks_at"])[0])
     drift = mine["breaks_at"] * np.array([-6.5, 8])
     assert drift[0] - 3 * mine["breaks_at"] <= mine["breaks_first_nm"] <= drift[1] + 3 * mine["breaks_at"]
+
+
+def test_a_kill_among_the_yields_loses_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    study = street(tmp_path, 1000)
+    ran(study, tmp_path / "whole", 1)
+
+    def stop(phase: str, done: int, _total: int) -> None:
+        if phase == "robustness" and done == 2:
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        run_study(study, tmp_path / "out", 1, stop)
+    assert not (tmp_path / "out" / ROBUSTNESS).exists()
+    counted, draw = [], robustness.drawn_dn
+    monkeypatch.setattr(robustness, "drawn_dn", lambda *call: counted.append(call) or draw(*call))
+    ran(study, tmp_path / "out", 1)
+    tables = [pq.read_table(tmp_path / folder / ROBUSTNESS) for folder in ("whole", "out")]
+    assert tables[0].equals(tables[1])
+    assert len(counted) == tables[0].num_rows - 2 > 0
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_a_cluster_gives_the_same_yields(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    study = street(tmp_path, 1000)
+    ran(study, tmp_path / "one", 1)
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+    ) as cluster:
+        run_study(study, tmp_path / "far", 1, lambda *_: None, backend="dask", scheduler=cluster.scheduler_address)
+    tables = [pq.read_table(tmp_path / folder / ROBUSTNESS) for folder in ("one", "far")]
+    assert tables[0].num_rows == 3
+    assert tables[0].equals(tables[1])
