@@ -22,7 +22,9 @@ def any_filter(study: Study, view: View) -> Problem:
     # The limit asks a family only for how large and how small its filters can be.
     family = cast(Family, Stopband(study.grid.nodes_nm, base, np.zeros_like(base)))
     low, high = (np.array([getattr(p, end) for p in family.parameters], dtype=float) for end in ("low", "high"))
-    return Problem(view, family, low, high, study.objective, study.constraints, study.edge_shift_nm, study.states)
+    tolerance = study.tolerance
+    own = (study.objective, study.constraints, tolerance.edge_shift_nm, study.states, tolerance.thickness)
+    return Problem(view, family, low, high, *own)
 
 
 def at_least(problem: Problem, quantity: str, value: float) -> Problem:

@@ -97,7 +97,7 @@ def judged(study: Study, view: View, curves: FloatArray) -> Columns:
         allowed = "0 to 1; a transmission is relative to a curve (`relative_to`), percent are divided by 100"
         raise DataError(Fault("a QE above 1", value=round(float(curves.max()), 6), allowed=allowed))
     found = evaluate(imager_of(view), curves, study.states, probabilities=study.asked.probabilities)
-    if view.lights.population is not None and not study.edge_shift_nm:
+    if view.lights.population is not None and not study.tolerance:
         from ..metrics.members import population_imager  # noqa: PLC0415  (only where lights have a population)
 
         found |= {WORST + name: values for name, values in population_imager(view).worst(curves).items()}

@@ -16,6 +16,7 @@ from ..designs.glass import Glass
 from ..designs.plugin import PluginFamily, is_plugin, plugin_parts, read_plugin
 from ..designs.registry import FAMILIES, build_family
 from ..designs.space import Filter, Kind, Space
+from ..designs.technology import PIGMENT
 from ..designs.ungridded import Ungridded
 from ..disk import is_file
 from ..errors import Fault, SweepError, nearest
@@ -96,6 +97,10 @@ class SpaceBuilder:
     def _check_channels(self, path: tuple[Key, ...], entry: Modification, mosaic: Mosaic | None) -> None:
         """The channels that a family replaces: of the CFA, as many as the family wants, each once."""
         self._check_where(path, entry)
+        stated = entry.technology
+        if self.section.production.thickness and stated is not None and stated.interference is None:
+            problem = "a pigment has no films that come out too thick (`production.thickness`)"
+            self.sources.add((*path, "technology"), problem, PIGMENT, "interference, or nothing stated")
         for channel in entry.channel:
             if mosaic is not None and channel not in mosaic.channels:
                 self.sources.unknown((*path, "channel"), f"channel of {entry.cfa}", channel, list(mosaic.channels))
@@ -103,7 +108,7 @@ class SpaceBuilder:
         if own and not self.sources.allow_code:
             problem = "the study names a Python file, whose code would run"
             self.sources.add((*path, "family"), problem, entry.family, "--allow-code, if you trust it")
-        elif own and self.section.production.edge_shift_nm:
+        elif own and self.section.production.tolerance:
             self.sources.add((*path, "family"), "a family of one's own has no edges that production could shift")
         elif not own and entry.family not in FAMILIES:
             self.sources.unknown((*path, "family"), "family", entry.family, list(FAMILIES))
