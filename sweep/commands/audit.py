@@ -160,4 +160,4 @@ def _exact(study: Study, space: Space, scenario: str, points: FloatArray) -> dic
     promised = [quantity for quantity in study.quantities.values() if quantity.promised]
     worst = [quantity for quantity in promised if quantity.extreme == WORST_CASE]
     found = {quantity.name: nominal[quantity.name] for quantity in promised if quantity not in worst}
-    return found | (worst_cases(space, imager, points, nominal, worst, study.edge_shift_nm) if worst else {})
+    return found | (worst_cases(space, imager, points, nominal, worst, study.tolerance) if worst else {})

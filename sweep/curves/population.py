@@ -52,7 +52,7 @@ class Population(Section):
     it moves in its life; both are independent of each other and for each signal. `width`: each spectrum is stretched
     about its middle by each of these factors. Where values differ, keys are signal types or names of signals; a value
     alone holds for all. `wanted_dn`: what share of lamps and cameras has at least this CSD is told, from `draws` of two
-    lights, their temperatures, bins, ages and widths, a place of the field and a shift of the edges, each evenly.
+    lights, their temperatures, bins, ages and widths, a place of the field, and how its filter came out, each evenly.
     """
 
     temperature_c: Annotated[

@@ -12,6 +12,7 @@ from ..types import FloatArray
 from .edge import SPAN_PER_WIDTH, edge, edge_gradient
 from .family import Parameter
 from .products import row_products
+from .tolerance import Off
 
 _HALF = SPAN_PER_WIDTH / 2
 _PER_BAND = 5
@@ -87,9 +88,9 @@ class Bands:
             most += np.outer(depths, left_high - right_low).max(axis=0)
         return least, most
 
-    def shifted(self, shift_nm: float) -> Bands:
-        """The bands that come out with every edge `shift_nm` too far toward the red."""
-        return Bands(self._wave - shift_nm, self._count)
+    def produced(self, off: Off) -> Bands:
+        """The bands that come out."""
+        return Bands(off.nominal_nm(self._wave), self._count)
 
     @property
     def dimensions(self) -> dict[str, FloatArray]:
@@ -167,10 +168,10 @@ class Banded:
         """See `Bands.dimensions`."""
         return self._bands.dimensions
 
-    def shifted(self, shift_nm: float) -> Self:
-        """The same curves to go between, with the bands moved; see `Family.shifted`."""
+    def produced(self, off: Off) -> Self:
+        """The same curves to go between, with the bands moved; see `Family.produced`."""
         made = copy(self)
-        made._bands = self._bands.shifted(shift_nm)
+        made._bands = self._bands.produced(off)
         return made
 
     def start(self, points: FloatArray) -> FloatArray:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Protocol, Self, runtime_checkable
 
 from ..types import FloatArray, Section
+from .tolerance import Off
 
 
 @dataclass(frozen=True)
@@ -67,8 +68,8 @@ class Family(Protocol):
     def dimensions(self) -> Mapping[str, FloatArray]:
         """Lengths that a producer asks for, nm: name -> rows r, ndarray[n, n_parameters]; a length is min(r @ x)."""
 
-    def shifted(self, shift_nm: float) -> Self:
-        """The same family as produced with every edge `shift_nm` too far toward the red."""
+    def produced(self, off: Off) -> Self:
+        """The same family as production has it."""
 
     def start(self, points: FloatArray) -> FloatArray:
         """Well-formed designs to start a search from: [n, start_dimensions] in 0..1 -> [n, n_parameters]."""

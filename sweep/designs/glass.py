@@ -9,6 +9,7 @@ import numpy as np
 
 from ..types import FloatArray
 from .family import Family, Parameter
+from .tolerance import Off
 
 IN_FRONT = " in front of the lens"
 """How the name of such a family ends."""
@@ -71,9 +72,9 @@ class Glass:
         """Those of the family."""
         return self.inner.dimensions
 
-    def shifted(self, shift_nm: float) -> Glass:
-        """The glass as produced with every edge `shift_nm` too far toward the red."""
-        return Glass(self.inner.shifted(shift_nm), self.qe)
+    def produced(self, off: Off) -> Glass:
+        """The glass as production has it."""
+        return Glass(self.inner.produced(off), self.qe)
 
     def start(self, points: FloatArray) -> FloatArray:
         """See `Family.start`."""

@@ -11,6 +11,7 @@ from ..errors import Fault, SweepError
 from ..own_code import OwnCode
 from ..types import FloatArray
 from .family import Parameter
+from .tolerance import Off
 
 _STEP = 1e-5
 """Half of a central difference, in units of a parameter's range."""
@@ -111,9 +112,9 @@ class PluginFamily:
         """None: nothing is known of its edges."""
         return {}
 
-    def shifted(self, shift_nm: float) -> PluginFamily:
-        """The same where nothing is shifted; a study with shifts of edges does not take it."""
-        if shift_nm:
+    def produced(self, off: Off) -> PluginFamily:
+        """The same where nothing is off; a study with tolerances does not take it."""
+        if any(off):
             raise SweepError(Fault(f"{self.kind} has no edges that production could shift"))
         return self
 

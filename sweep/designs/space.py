@@ -12,6 +12,7 @@ import numpy as np
 from ..types import FloatArray, IndexArray
 from .family import Family
 from .technology import Technology
+from .tolerance import AS_DESIGNED, Off
 from .ungridded import Axes, Ungridded
 
 Kind = Literal["reference", "design", "sweep", "search"]
@@ -77,15 +78,15 @@ class Space:
         columns = [np.asarray(axis, dtype=float)[digit] for axis, digit in digits]
         return np.stack(columns, axis=1) if columns else np.empty((stop - start, 0))
 
-    def curves(self, points: FloatArray, n_wavelengths: int, shift_nm: float = 0.0) -> FloatArray:
+    def curves(self, points: FloatArray, n_wavelengths: int, off: Off = AS_DESIGNED) -> FloatArray:
         """QE of the modified channels: ndarray[n_designs, n_modified, n_wavelengths]; none for a plain CFA.
 
-        `shift_nm`: how far production moved every edge toward the red.
+        `off`: how production has them.
         """
         if self.filter is None:
             return np.empty((len(points), 0, n_wavelengths))
         family = self.filter.family
-        return (family.shifted(shift_nm) if shift_nm else family).curves(points)
+        return (family.produced(off) if any(off) else family).curves(points)
 
     def violation(self, points: FloatArray) -> FloatArray:
         """Largest violation of the family's own conditions, ndarray[n_designs]; 0 where a design is well formed."""

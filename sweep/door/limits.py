@@ -22,8 +22,18 @@ def any_filter(study: Study, view: View) -> Problem:
     # The limit asks a family only for how large and how small its filters can be.
     family = cast(Family, Stopband(study.grid.nodes_nm, base, np.zeros_like(base)))
     low, high = (np.array([getattr(p, end) for p in family.parameters], dtype=float) for end in ("low", "high"))
-    goal, bounds = study.objective, study.constraints
-    return Problem(view, family, low, high, goal, bounds, study.edge_shift_nm, study.states, study.own)
+    return Problem(
+        view,
+        family,
+        low,
+        high,
+        study.objective,
+        study.constraints,
+        edge_shift_nm=study.tolerance.edge_shift_nm,
+        states=study.states,
+        thickness=study.tolerance.thickness,
+        own=study.own,
+    )
 
 
 def at_least(problem: Problem, quantity: str, value: float) -> Problem:

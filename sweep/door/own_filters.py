@@ -98,7 +98,7 @@ def judged(study: Study, view: View, curves: FloatArray) -> Columns:
         raise DataError(Fault("a QE above 1", value=round(float(curves.max()), 6), allowed=allowed))
     asked = study.asked
     found = evaluate(imager_of(view), curves, asked.states, probabilities=asked.probabilities, own=asked.own)
-    if view.lights.population is not None and not study.edge_shift_nm:
+    if view.lights.population is not None and not study.tolerance:
         from ..metrics.members import population_imager  # noqa: PLC0415  (only where lights have a population)
 
         found |= {WORST + name: values for name, values in population_imager(view).worst(curves).items()}

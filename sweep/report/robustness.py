@@ -22,7 +22,7 @@ def over_population(output: Output) -> bool:
 
 def worst_over(output: Output) -> str:
     """What a worst case is over, in words."""
-    over = ["production"] if output.study.production.edge_shift_nm else []
+    over = ["production"] if output.study.production.tolerance else []
     return " and ".join(over + (["all lamps"] if over_population(output) else []))
 
 
@@ -78,6 +78,7 @@ def _breaks(output: Output, row: Row, few: list[Row]) -> str:
     low, high = row["breaks_low_c"], row["breaks_high_c"]
     warm = "" if not np.isfinite(low) else f", junctions at {_span(low, high)} degrees"
     edges = f", edges {row['breaks_edge_nm']:+.1f} nm" if row["breaks_edge_nm"] else ""
+    edges += f", films {row['breaks_thickness']:+.2%}" if row["breaks_thickness"] else ""
     return (
         f"{_named(row)} falls below {plain['name']} at {row['breaks_at']:.2f} times the stated range of lamps and "
         f"edges: {' and '.join(each)}{warm}{edges}, {separation.told(row['breaks_dn'])}."

@@ -64,7 +64,8 @@ _VERDICTS = {
     ("status",): "`ok`, or what failed",
 }
 _WORST = (
-    "the worst case of a CSD or sensitivity over edges that production shifts (five places from one end to the other), "
+    "the worst case of a CSD or sensitivity over edges that production shifts and films that it makes too thick or "
+    "too thin (five places from one end of both to the other, and the two other corners), "
     "and of a CSD over the population of the lights: then that of the response before clipping and rounding, with "
     "everything on, over all members exactly"
 )

@@ -222,6 +222,8 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         _check_columns(folder / FRONT, front_schema(()).names)
     if LEFT_OUT in optional:
         _check_columns(folder / LEFT_OUT, ["objective", "signal_type", "signal", "fall"])
+    if ROBUSTNESS in optional:
+        _check_columns(folder / ROBUSTNESS, ["design_id", "breaks_at", "breaks_thickness"])
     objective = study.objective.column
     profiles = Profiles(objective, next(iter(study.scenarios)), provenance.parameters)
     table, counts = thinned(folder / RESULTS, [objective, *provenance.trade_off], provenance.trade_off[0], profiles.add)

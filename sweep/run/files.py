@@ -219,7 +219,8 @@ class Making:
         if ROBUSTNESS in names:
             from .robustness import robustness_table  # noqa: PLC0415  (only where lights have a population)
 
-            self.inventory.write_table(ROBUSTNESS, robustness_table(self.study, rows, self.crew, self.progress))
+            kept = Kept(self.crew, self.journal, f"{self.sweep.fingerprint} robustness")
+            self.inventory.write_table(ROBUSTNESS, robustness_table(self.study, rows, kept, self.progress))
         if REGIONS_MAP in names:
             from .allowed_lamps import regions_table  # noqa: PLC0415  (only where a study asks for it)
 

@@ -15,11 +15,11 @@ from ..camera.imager import Imager, imager_of
 from ..camera.view import View
 from ..designs.block import Block, CurveBlock, EdgeBlock, edges_of
 from ..designs.space import Space
+from ..designs.tolerance import AS_DESIGNED, Tolerance
 from ..metrics.evaluate import evaluate, family_quantities, image_quantities
 from ..metrics.objective import COMBINED, Objective, columns_of
 from ..metrics.own import OwnMetric
 from ..metrics.quantity import WORST_CASE, Asked, Columns, Quantity
-from ..search.problem import SHIFTS
 from ..types import FloatArray
 from ..vision.section import Vision
 
@@ -32,11 +32,11 @@ Detours = Counter[tuple[str, str]]
 
 @dataclass(frozen=True)
 class Request:
-    """What is wanted of each design: quantities, the objective, shifts of its edges, images and their seed."""
+    """What is wanted of each design: quantities, the objective, how far off it may come out, images and their seed."""
 
     asked: Asked
     objective: Objective
-    edge_shift_nm: float
+    tolerance: Tolerance
     vision: Vision | None = None
     seed: int = 0
 
@@ -96,7 +96,7 @@ def _columns(space: Space, view: View, points: FloatArray, request: Request, blo
         columns |= image_quantities(view, space.curves(points, size), request.vision, request.seed)
     worst = [quantity for quantity in request.quantities.values() if quantity.extreme == WORST_CASE]
     if worst:
-        columns |= worst_cases(space, imager, points, columns, worst, request.edge_shift_nm, asked.own)
+        columns |= worst_cases(space, imager, points, columns, worst, request.tolerance, asked.own)
     if request.objective.column == COMBINED:
         columns[COMBINED] = request.objective.of(columns)
     return columns
@@ -108,16 +108,16 @@ def worst_cases(
     points: FloatArray,
     nominal: Columns,
     worst: Sequence[Quantity],
-    edge_shift_nm: float,
+    tolerance: Tolerance,
     own: Sequence[OwnMetric] = (),
 ) -> Columns:
-    """Worst cases of designs over shifts of their edges, and of CSDs over the population of the lights.
+    """Worst cases of designs over how far off they may come out, and of CSDs over the population of the lights.
 
     `nominal`: what `evaluate` gives of them; `worst`: the quantities that are asked for; `own`: metrics of a user's.
     """
     view = imager.view
-    shifts = [edge_shift_nm * s for s in SHIFTS if s] if edge_shift_nm and space.filter is not None else []
-    curves = [space.curves(points, view.grid.size, shift) for shift in (0.0, *shifts)]
+    places = [off for off in tolerance.places if any(off)] if space.filter is not None else []
+    curves = [space.curves(points, view.grid.size, off) for off in (AS_DESIGNED, *places)]
     cases = [nominal, *(evaluate(imager, shifted, own=own) for shifted in curves[1:])]
     if view.lights.population is not None:
         from ..metrics.members import population_imager  # noqa: PLC0415  (only where lights have a population)

@@ -150,7 +150,7 @@ def failed_rows(job: Job, rules: Rules, status: str) -> pa.Table:
 def rules_of(study: Study) -> Rules:
     """The rules of a study."""
     schema = result_schema(study.parameters, list(study.quantities))
-    request = Request(study.asked, study.objective, study.edge_shift_nm, study.section.vision, study.section.seed)
+    request = Request(study.asked, study.objective, study.tolerance, study.section.vision, study.section.seed)
     return Rules(schema, request, study.constraints, study.trade_off, study.plans)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from ..camera.linear import smooth_imager
 from ..camera.view import View
 from ..designs.block import CurveBlock
+from ..designs.tolerance import AS_DESIGNED, Off
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY, Sensitivity
 from ..metrics.quantity import Quantity
@@ -90,8 +91,8 @@ class Model:
         self.stop: Callable[[], object] | None = None
         self._span = (problem.high - problem.low)[problem.free]
         wanted = (*problem.objective.weights, *problem.constraints)
-        shifts = dict.fromkeys((0.0, *(shift for name in wanted for shift in problem.shifts_nm(name))))
-        self._families = {s: problem.family.shifted(s) if s else problem.family for s in shifts}
+        places = dict.fromkeys((AS_DESIGNED, *(off for name in wanted for off in problem.produced(name))))
+        self._families = {off: problem.family.produced(off) if any(off) else problem.family for off in places}
         over = any(problem.over_population(name) for name in wanted)
         self._members = _members_of(problem.view) if over else None
         self._power = (
@@ -120,8 +121,8 @@ class Model:
         problem, free = self._problem, self._problem.free
         x = problem.from_unit(u)
         made = {
-            shift: SmoothDesign(self._imager, family, x, free, self._span, self._members)
-            for shift, family in self._families.items()
+            off: SmoothDesign(self._imager, family, x, free, self._span, self._members)
+            for off, family in self._families.items()
         }
         terms, objective = self._terms(made)
         own = problem.family.violation(x[None])[0]
@@ -132,14 +133,14 @@ class Model:
             rows = quantities[name] = self._rows(name, made)
             conditions += _conditions(self._quantities[name], bound, rows, self._back_off[name])
             worst = max(worst, float(bound.violation(np.array([self._quantities[name].value(rows)]))[0]))
-        light = Sensitivity().of_designs(problem.view, CurveBlock(made[0.0].curves[None]))
+        light = Sensitivity().of_designs(problem.view, CurveBlock(made[AS_DESIGNED].curves[None]))
         own, whole = (float(light[name][0]) for name in (SENSITIVITY, CFA_SENSITIVITY))
         evaluation = Evaluation(x, objective, own, whole, worst)
         own_term = np.arange(len(terms)) * (not problem.objective.rule.smallest)  # what is smallest needs one bound
         term = np.repeat(own_term, [rows.values.size for rows in terms])
         return Point(evaluation, Rows.joined(terms), self._power, term, Rows.joined(conditions), quantities)
 
-    def _terms(self, made: Mapping[float, SmoothDesign]) -> tuple[list[Rows], float]:
+    def _terms(self, made: Mapping[Off, SmoothDesign]) -> tuple[list[Rows], float]:
         """The rows of each weighted quantity of the objective, see `Point`, and the objective's value."""
         terms, columns = [], {}
         for name, weight in self._problem.objective.weights.items():
@@ -150,11 +151,11 @@ class Model:
             return terms, float(min(rows.values.min() for rows in terms))
         return terms, float(self._problem.objective.of(columns)[0])
 
-    def _rows(self, name: str, made: Mapping[float, SmoothDesign]) -> Rows:
+    def _rows(self, name: str, made: Mapping[Off, SmoothDesign]) -> Rows:
         """The rows from which the quantity follows, see `Quantity.value`."""
         smooth = self._quantities[name].smooth
         assert smooth is not None
-        return Rows.joined([smooth(made[shift]) for shift in self._problem.shifts_nm(name)])
+        return Rows.joined([smooth(made[off]) for off in self._problem.produced(name)])
 
 
 def _term(quantity: Quantity, rows: Rows, weight: float, rule: Rule, power: int) -> Rows:

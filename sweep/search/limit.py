@@ -175,9 +175,11 @@ def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
     for name, weight in problem.objective.weights.items():
         plain = plains[name]
         weights[plain] = min(weight, weights.get(plain, weight))
-    if any(quantities[name].extreme for name in asked) and problem.edge_shift_nm:
+    if any(quantities[name].extreme for name in asked) and problem.tolerance:
         left_out.append("edge shifts")
-    plain_problem = replace(problem, objective=Objective(minimum=weights), constraints=kept, edge_shift_nm=0.0)
+    plain_problem = replace(
+        problem, objective=Objective(minimum=weights), constraints=kept, edge_shift_nm=0.0, thickness=0.0
+    )
     return plain_problem, tuple(left_out)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from ..camera.view import View
 from ..curves.lights import Pair
 from ..designs.family import Family
+from ..designs.tolerance import AS_DESIGNED, Off, Tolerance
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.objective import Objective
 from ..metrics.own import OwnMetric
@@ -17,16 +18,14 @@ from ..metrics.quantity import DN, WORST_CASE, Asked, Quantity
 from ..metrics.registry import quantities_of
 from ..types import FloatArray, IndexArray
 
-SHIFTS = (-1.0, -0.5, 0.0, 0.5, 1.0)
-"""Where in the range of an edge shift the worst case is looked for, in units of its half width."""
-
 
 @dataclass(frozen=True)
 class Problem:
     """Maximize `objective` over the box `low`..`high` (ndarray[n_parameters]) under `constraints`.
 
     Quantities are those of `metrics.registry` with smooth rows; the worst ones are over edges that come out up to
-    `edge_shift_nm` off, and over the population of the view's lights. `states`: signal types that noise may confuse.
+    `edge_shift_nm` and films that come out up to the share `thickness` off, and over the population of the view's
+    lights. `states`: signal types that noise may confuse.
     """
 
     view: View
@@ -37,6 +36,7 @@ class Problem:
     constraints: Mapping[str, Bound]
     edge_shift_nm: float = 0.0
     states: tuple[str, ...] = ()
+    thickness: float = 0.0
     own: tuple[OwnMetric, ...] = ()
 
     @property
@@ -72,10 +72,14 @@ class Problem:
         """Indices of the parameters that are not fixed."""
         return np.flatnonzero(self.high > self.low)
 
-    def shifts_nm(self, quantity: str) -> tuple[float, ...]:
-        """Edge shifts over which a quantity is the smallest."""
-        worst = self.quantities[quantity].extreme == WORST_CASE and self.edge_shift_nm > 0
-        return tuple(self.edge_shift_nm * s for s in SHIFTS) if worst else (0.0,)
+    @property
+    def tolerance(self) -> Tolerance:
+        """How far off filters may come out."""
+        return Tolerance(self.edge_shift_nm, self.thickness)
+
+    def produced(self, quantity: str) -> tuple[Off, ...]:
+        """How filters may come out, over which a quantity is the smallest."""
+        return self.tolerance.places if self.quantities[quantity].extreme == WORST_CASE else (AS_DESIGNED,)
 
     def from_unit(self, u: FloatArray) -> FloatArray:
         """Parameters from the free ones in units of the box: ndarray[..., n_free] -> ndarray[..., n_parameters]."""

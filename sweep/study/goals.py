@@ -69,7 +69,7 @@ def _is_known(
     if name in known:
         return True
     shifted = quantities_of(replace(asked, edge_shift=True)).get(name)
-    if shifted is not None and shifted.extreme == WORST_CASE and not section.production.edge_shift_nm:
+    if shifted is not None and shifted.extreme == WORST_CASE and not section.production.tolerance:
         needed = "`production.edge_shift_nm`" + (" or `population`" if shifted.apart == DN else "")
         sources.add(path, f"{name} needs {needed}", None, "a shift above 0")
     elif not asked.states and name in {*quantities_of(replace(asked, states=asked.classes))} - {*quantities_of(asked)}:

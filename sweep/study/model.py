@@ -22,13 +22,14 @@ from ..curves.spectrum import WavelengthGrid
 from ..curves.tasks import StudyTasks
 from ..designs.space import Space
 from ..designs.technology import Technology
+from ..designs.tolerance import Tolerance
 from ..errors import Fault, StudyError
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective, columns_of
 from ..metrics.own import OwnMetric
 from ..metrics.quantity import Asked, Quantity
 from ..metrics.separation import csd_name
-from ..search.problem import SHIFTS, Problem
+from ..search.problem import Problem
 from .schema import StudySection
 
 
@@ -86,13 +87,13 @@ class Study:
         return None if self.lights.population is None else self.quantities[self.trade_off[0]].pair
 
     @property
-    def edge_shift_nm(self) -> float:
-        """How far production may move the edges to either side."""
-        return self.section.production.edge_shift_nm
+    def tolerance(self) -> Tolerance:
+        """How far off filters may come out."""
+        return self.section.production.tolerance
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
-        """Quantities of the result table: those of a design, worst cases over the edge shift, a combined objective."""
+        """Quantities of the result table: those of a design, worst cases, a combined objective."""
         return columns_of(self.asked, self.objective)
 
     @property
@@ -103,7 +104,7 @@ class Study:
             self.lights.classes,
             self.states,
             self.any_place,
-            edge_shift=self.edge_shift_nm > 0,
+            edge_shift=bool(self.tolerance),
             probabilities=recognition is not None and recognition.probabilities,
             population=self.section.population is not None,
             tasks=() if self.tasks is None else self.tasks.keys,
@@ -186,8 +187,7 @@ class Study:
         low, high = view.qe.copy(), view.qe.copy()
         if space.filter is not None:
             ends = [np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max)]
-            shifts = [self.edge_shift_nm * s for s in SHIFTS] if self.edge_shift_nm else [0.0]
-            families = [space.filter.family.shifted(shift) for shift in shifts]
+            families = [space.filter.family.produced(off) for off in self.tolerance.places]
             lows, highs = zip(*(family.hull(*ends) for family in families), strict=True)
             low[list(view.modified)] = np.min(lows, axis=0)
             high[list(view.modified)] = np.max(highs, axis=0)
@@ -231,8 +231,9 @@ class Study:
             high=np.array([max(axis) for axis in search.space.axes], dtype=float),
             objective=self.objective,
             constraints=self.constraints,
-            edge_shift_nm=self.edge_shift_nm,
+            edge_shift_nm=self.tolerance.edge_shift_nm,
             states=self.states,
+            thickness=self.tolerance.thickness,
             own=self.own,
         )
 

@@ -11,7 +11,6 @@ from ..designs.space import Space
 from ..errors import Fault
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY
 from ..metrics.quantity import DN
-from ..search.problem import SHIFTS
 from .model import Study
 
 _PERCENT = (2.0, 100.0)
@@ -54,8 +53,8 @@ def _most(study: Study, space: Space, scenario: str) -> Iterator[tuple[str, floa
     if space.filter is None:
         return
     low, high = (np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max))
-    shifts = [study.edge_shift_nm * s for s in SHIFTS] if study.edge_shift_nm else [0.0]
-    top = np.max([space.filter.family.shifted(shift).hull(low, high)[1] for shift in shifts], axis=0)
+    made = [space.filter.family.produced(off) for off in study.tolerance.places]
+    top = np.max([family.hull(low, high)[1] for family in made], axis=0)
     counts, modified = view.mosaic.counts, list(view.modified)
     qe = view.qe.copy()
     qe[modified] = top

@@ -134,7 +134,7 @@ class _Resolver:
         """What an objective or a constraint can name; `edge_shift`: as if worst cases were asked for, or not."""
         recognition = self.section.recognition
         states = () if recognition is None else tuple(recognition.states or lights.classes)
-        shifts = self.section.production.edge_shift_nm > 0 if edge_shift is None else edge_shift
+        shifts = bool(self.section.production.tolerance) if edge_shift is None else edge_shift
         return Asked(
             lights.classes,
             states,

@@ -15,6 +15,7 @@ from ..curves.single_leds import RegionMap
 from ..curves.spectrum import WavelengthGrid
 from ..designs.registry import FamilyOptions, told
 from ..designs.technology import Stated
+from ..designs.tolerance import Tolerance
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective
 from ..types import Number, Section
@@ -132,9 +133,18 @@ class BoxSection(Modification):
 
 
 class Production(Section):
-    """What production does to a filter: every edge may come out up to `edge_shift_nm` too far to either side."""
+    """What production does to a filter: every edge may come out up to `edge_shift_nm` too far to either side, and all
+    films of an interference filter up to the share `thickness` too thick or too thin, which moves what is at l nm to
+    l (1 + thickness). Both are independent.
+    """
 
     edge_shift_nm: float = Field(default=0.0, ge=0, le=1000)
+    thickness: float = Field(default=0.0, ge=0, le=0.2)
+
+    @property
+    def tolerance(self) -> Tolerance:
+        """How far off a filter may come out."""
+        return Tolerance(self.edge_shift_nm, self.thickness)
 
 
 class Recognition(Section):

@@ -16,6 +16,7 @@ from ..designs.glass import Glass
 from ..designs.plugin import PluginFamily
 from ..designs.registry import FAMILIES, build_family
 from ..designs.space import Filter, Kind, Space
+from ..designs.technology import PIGMENT
 from ..designs.ungridded import Ungridded
 from ..errors import SweepError, nearest
 from ..own_code import Offered, is_in_file, offers
@@ -98,13 +99,17 @@ class SpaceBuilder:
     def _check_channels(self, path: tuple[Key, ...], entry: Modification, mosaic: Mosaic | None) -> None:
         """The channels that a family replaces: of the CFA, as many as the family wants, each once."""
         self._check_where(path, entry)
+        stated = entry.technology
+        if self.section.production.thickness and stated is not None and stated.interference is None:
+            problem = "a pigment has no films that come out too thick (`production.thickness`)"
+            self.sources.add((*path, "technology"), problem, PIGMENT, "interference, or nothing stated")
         for channel in entry.channel:
             if mosaic is not None and channel not in mosaic.channels:
                 self.sources.unknown((*path, "channel"), f"channel of {entry.cfa}", channel, list(mosaic.channels))
         own = self._is_own(entry)
         if own and not allowed(self.sources, (*path, "family"), entry.family):
             return
-        if own and self.section.production.edge_shift_nm:
+        if own and self.section.production.tolerance:
             self.sources.add((*path, "family"), "a family of one's own has no edges that production could shift")
         elif not own and entry.family not in FAMILIES:
             self.sources.unknown((*path, "family"), "family", entry.family, [*FAMILIES, *offers(_FAMILIES)])

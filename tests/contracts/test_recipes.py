@@ -60,7 +60,7 @@ class Gray:
     def gradient(self, x):
         return self._base[None, None, :].copy()
 
-    def shifted(self, shift_nm):
+    def produced(self, off):
         return self
 
     def start(self, points):

@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 from scipy.optimize import brentq
 
+from sweep.designs.tolerance import Tolerance
+from sweep.metrics.members import population_imager
 from sweep.report.summary import summary_lines
 from sweep.results.output import read_output
 from sweep.results.tables import ROBUSTNESS
+from sweep.run import robustness, run_study
 from sweep.run.robustness import Candidate, drawn_dn, yield_interval
 from sweep.study import Study, load_study
 
 from ..build import ran
+from ..mischief import StoppedError
 
 TEXT = """\
 study: street
 sensor: ar0820
 lights: tl16
-cfas: [RGGB, RYNCy]
+cfas: [RGGB, RYYCy, RYNCy]
 population: {temperature_c: [-40, 85], self_heating_k: 20, binning_nm: {yellow: 2, red: 1}, wanted_dn: WANTED, draws: DRAWS}
 production: {edge_shift_nm: 2}
 designs:
@@ -42,13 +48,13 @@ def quintic(t: np.ndarray | float) -> np.ndarray | float:
     return 6 * t**5 - 15 * t**4 + 10 * t**3
 
 
-def rise(wave: np.ndarray, center: float, width: float) -> np.ndarray:
+def rise(wave: np.ndarray, center: np.ndarray | float, width: np.ndarray | float) -> np.ndarray:
     """An edge of so much between 10 and 90 %."""
     tenth = brentq(lambda t: quintic(t) - 0.1, 0, 0.5)
     return np.asarray(quintic(np.clip((wave - center) / width * (1 - 2 * tenth) + 0.5, 0, 1)))
 
 
-def brute_force(study: Study, n: int, seed: int) -> np.ndarray:
+def brute_force(study: Study, n: int, seed: int, thickness: float = 0.0) -> np.ndarray:
     """DN of n random lamps and cameras: each with its own spectra and its own filter."""
     rng, lights, grid = np.random.default_rng(seed), study.lights, study.grid
     wave, qe = grid.nodes_nm, study.sensor.qe
@@ -58,7 +64,8 @@ def brute_force(study: Study, n: int, seed: int) -> np.ndarray:
     for size in np.full(n // 2000, 2000):
         warm = rng.uniform(-40, 85, size) + rng.uniform(0, 20, size) - 25
         edge = rng.uniform(-2, 2, size)[:, None]
-        left, right = (rise(wave - edge, EDGES[at], EDGES[at + 1]) for at in (0, 2))
+        film = 1 + rng.uniform(-thickness, thickness, size)[:, None]
+        left, right = (rise(wave - edge, film * EDGES[at], film * EDGES[at + 1]) for at in (0, 2))
         filters = qe["Y"] + (qe["G"] - qe["Y"]) * (left - right)
         points = []
         for kind, binning in (("yellow", 2.0), ("red", 1.0)):
@@ -76,12 +83,12 @@ def brute_force(study: Study, n: int, seed: int) -> np.ndarray:
 
 def candidate(study: Study) -> Candidate:
     space = next(space for space in study.spaces if space.name == "mine")
-    return Candidate(study.view(space, "chart"), space, space.points(0, 1), study.edge_shift_nm)
+    return Candidate(study.view(space, "chart"), space, space.points(0, 1), study.tolerance)
 
 
-def agree(study: Study, n: int) -> None:
+def agree(study: Study, n: int, thickness: float = 0.0) -> None:
     drawn = drawn_dn(candidate(study), ("yellow", "red"), study.section.seed)
-    own = brute_force(study, n, 9)
+    own = brute_force(study, n, 9, thickness)
     for wanted in (WANTED, 230.0):
         ends = [yield_interval(int((values >= wanted).sum()), values.size) for values in (drawn, own)]
         assert 0.01 < (own >= wanted).mean() < 0.99
@@ -90,6 +97,40 @@ def agree(study: Study, n: int) -> None:
 
 def test_a_yield_is_that_of_draws_of_their_own(tmp_path: Path) -> None:
     agree(street(tmp_path), 20_000)
+
+
+def thick(folder: Path) -> Study:
+    path = folder / "street.yaml"
+    street(folder)
+    path.write_text(path.read_text().replace("{edge_shift_nm: 2}", "{edge_shift_nm: 2, thickness: 0.008}"))
+    return load_study(path)
+
+
+def test_a_yield_is_over_films_that_are_too_thick_or_too_thin(tmp_path: Path) -> None:
+    agree(thick(tmp_path), 20_000, 0.008)
+
+
+def test_a_worst_case_is_over_edges_and_films_together(tmp_path: Path) -> None:
+    """Beside the corners of both tolerances, with the filter's edges moved by hand."""
+    study = thick(tmp_path)
+    design, pair = candidate(study), ("yellow", "red")
+    seen, found = population_imager(design.view), []
+    for edge in (-2.0, 2.0):
+        for film in (0.992, 1.008):
+            own = design.point * np.array([film, film, film, film, 1.0]) + np.array([edge, 0, edge, 0, 0])
+            found.append(seen.worst(design.space.curves(own, study.grid.size), [pair])["csd_yellow_red"][0])
+    worst, off = design.worst(pair, 1.0)
+    assert worst == pytest.approx(min(found), abs=1e-9)
+    assert (off.shift_nm, off.thickness) == [(a, b) for a in (-2.0, 2.0) for b in (-0.008, 0.008)][
+        int(np.argmin(found))
+    ]
+    edges_alone = replace(design, tolerance=Tolerance(2.0)).worst(pair, 1.0)[0]
+    assert worst < edges_alone - 1
+    ran(study, tmp_path / "out", 1)
+    rows = pd.read_parquet(tmp_path / "out" / "results.parquet").set_index("name")
+    assert rows.loc["mine", "worst_csd_yellow_red"] == pytest.approx(worst, abs=1e-9)
+    said = "\n".join(summary_lines(read_output(tmp_path / "out")))
+    assert re.search(r"Mine falls below RGGB at .*, films [+-][\d.]+%, \d+ DN", said)
 
 
 @pytest.mark.slow
@@ -115,11 +156,11 @@ def test_any_number_of_workers_gives_the_same_and_a_break_is_where_the_worst_cas
     said = "\n".join(summary_lines(read_output(tmp_path / "out1")))
     assert re.search(r"Mine falls below RGGB at [\d.]+ times .*: \S+yellow \([+-].* nm\) and \S+red .*, \d+ DN", said)
     assert re.search(r"At least 200 DN have, of random lamps and cameras: RGGB [\d.]+%.*, mine [\d.]+%", said)
-    plain, mine = tables[0].to_pylist()
+    plain, _, mine = tables[0].to_pylist()
     assert plain["breaks_at"] is None
     assert 0.25 < mine["breaks_at"] < 3
     pair = ("yellow", "red")
-    rggb = Candidate(study.view(study.spaces[0], "chart"), study.spaces[0], np.empty((1, 0)), study.edge_shift_nm)
+    rggb = Candidate(study.view(study.spaces[0], "chart"), study.spaces[0], np.empty((1, 0)), study.tolerance)
     just = mine["breaks_at"] - 0.25 / 2**6
     here, before = (
         candidate(study).worst(pair, scale)[0] - rggb.worst(pair, scale)[0] for scale in (mine["breaks_at"], just)
@@ -128,3 +169,37 @@ def test_any_number_of_workers_gives_the_same_and_a_break_is_where_the_worst_cas
     assert mine["breaks_dn"] == pytest.approx(candidate(study).worst(pair, mine["breaks_at"])[0])
     drift = mine["breaks_at"] * np.array([-6.5, 8])
     assert drift[0] - 3 * mine["breaks_at"] <= mine["breaks_first_nm"] <= drift[1] + 3 * mine["breaks_at"]
+
+
+def test_a_kill_among_the_yields_loses_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    study = street(tmp_path, 1000)
+    ran(study, tmp_path / "whole", 1)
+
+    def stop(phase: str, done: int, _total: int) -> None:
+        if phase == "robustness" and done == 2:
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        run_study(study, tmp_path / "out", 1, stop)
+    assert not (tmp_path / "out" / ROBUSTNESS).exists()
+    counted, draw = [], robustness.drawn_dn
+    monkeypatch.setattr(robustness, "drawn_dn", lambda *call: counted.append(call) or draw(*call))
+    ran(study, tmp_path / "out", 1)
+    tables = [pq.read_table(tmp_path / folder / ROBUSTNESS) for folder in ("whole", "out")]
+    assert tables[0].equals(tables[1])
+    assert len(counted) == tables[0].num_rows - 2 > 0
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_a_cluster_gives_the_same_yields(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    study = street(tmp_path, 1000)
+    ran(study, tmp_path / "one", 1)
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+    ) as cluster:
+        run_study(study, tmp_path / "far", 1, lambda *_: None, backend="dask", scheduler=cluster.scheduler_address)
+    tables = [pq.read_table(tmp_path / folder / ROBUSTNESS) for folder in ("one", "far")]
+    assert tables[0].num_rows == 3
+    assert tables[0].equals(tables[1])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from sweep.curves.population import Population
+from sweep.designs.tolerance import Off
 from sweep.door.own_filters import judged
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.members import population_imager
@@ -36,7 +37,7 @@ def problem(**given: float) -> Problem:
 
 @pytest.mark.slow
 def test_rows_over_the_population_have_their_derivative() -> None:
-    shifted = replace(problem(binning_nm=1), edge_shift_nm=2.0)
+    shifted = replace(problem(binning_nm=1), edge_shift_nm=2.0, thickness=0.003)
     model, checked = Model(shifted, SearchRun(0), 1000), 0
     for u in starting_points(shifted, 4, 3):
         here = model.at(u)
@@ -101,7 +102,7 @@ def test_the_table_of_the_documentation() -> None:
     for at, space in enumerate(study.spaces[:4]):
         shifts = (0.0,) if space.filter is None else (-2.0, -1.0, 0.0, 1.0, 2.0)
         point, view = space.points(0, 1), study.view(space, "f/2")
-        curves = [space.curves(point, study.grid.size, shift) for shift in shifts]
+        curves = [space.curves(point, study.grid.size, Off(shift)) for shift in shifts]
         over = population_imager(view).worst(np.concatenate(curves))["csd_yellow_red"].min()
         warm = population_imager(alone.view(alone.spaces[at], "f/2")).worst(space.curves(point, study.grid.size))
         values = (

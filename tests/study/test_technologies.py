@@ -75,6 +75,12 @@ WORDS = "a technology is `pigment`, or `interference: {effective_index: 1.8}`"
         ),
         (
             "to: G, at:",
+            "to: G, technology: pigment, at:",
+            "tiny.yaml:6: designs.mine.technology: a pigment has no films that come out too thick "
+            "(`production.thickness`) (got 'pigment'); allowed: interference, or nothing stated",
+        ),
+        (
+            "to: G, at:",
             f"to: G, {LAYERS}, at:",
             "tiny.yaml:22: scenarios.chart.optics: the steepest ray grazes a filter whose technology is interference "
             "(got '98.7 degrees'); allowed: at most 85 degrees from f_number and cra_deg together",
@@ -85,6 +91,8 @@ def test_what_does_not_fit_is_a_fault(tmp_path: Path, old: str, new: str, expect
     text = BASE.replace(old, new, 1)
     if "grazes" in expected:
         text += "scenarios: {chart: {optics: {f_number: 0.8, cra_deg: 60}}}\n"
+    if "too thick" in expected:
+        text += "production: {thickness: 0.01}\n"
     assert any(fault.startswith(expected) for fault in faults(tmp_path, text)), faults(tmp_path, text)
 
 

@@ -12,6 +12,7 @@ from ...errors import Fault, SweepError
 from ...types import FloatArray, Positive, Section
 from ..family import Parameter
 from ..products import row_products
+from ..tolerance import AS_DESIGNED, Off
 
 _MOST_NODES = 500
 
@@ -37,7 +38,7 @@ class FreeForm:
     """N = base x transmission, which is piecewise linear between nodes and 1 outside the first and the last node.
 
     Linear in its parameters, so it is the natural family to come near the limit. `nodes_nm`: ndarray[n_nodes].
-    `shift_nm` moves the transmission toward the red.
+    `off`: how production has it.
     """
 
     kind = "free_form"
@@ -51,13 +52,13 @@ class FreeForm:
         nodes: Nodes
 
     def __init__(
-        self, wavelength_nm: FloatArray, base: FloatArray, nodes_nm: FloatArray, shift_nm: float = 0.0
+        self, wavelength_nm: FloatArray, base: FloatArray, nodes_nm: FloatArray, off: Off = AS_DESIGNED
     ) -> None:
         if nodes_nm.size < 2:
             raise SweepError(Fault("a free-form filter needs two nodes or more", value=nodes_nm.tolist()))
         self.nodes_nm = nodes_nm
         self._made_of = wavelength_nm, base
-        nominal_nm = wavelength_nm - shift_nm
+        nominal_nm = off.nominal_nm(wavelength_nm)
         inside = (nominal_nm >= nodes_nm[0]) & (nominal_nm <= nodes_nm[-1])
         self._hats = hats(nominal_nm, nodes_nm) * (base * inside)
         self._fixed = np.where(inside, 0.0, base)
@@ -111,9 +112,9 @@ class FreeForm:
         """None: it has no bands."""
         return {}
 
-    def shifted(self, shift_nm: float) -> FreeForm:
-        """The whole transmission moved; see `Family.shifted`."""
-        return FreeForm(*self._made_of, self.nodes_nm, shift_nm)
+    def produced(self, off: Off) -> FreeForm:
+        """The whole transmission moved; see `Family.produced`."""
+        return FreeForm(*self._made_of, self.nodes_nm, off)
 
     def start(self, points: FloatArray) -> FloatArray:
         """Smooth dips of different place, breadth and depth: random nodes would be a filter of spikes."""

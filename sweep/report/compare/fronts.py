@@ -75,8 +75,9 @@ def dn_of(output: Output) -> str:
 
 def _meaning(output: Output) -> tuple[str, ...]:
     """What the two axes are; of a combined objective, of a worst case, of DN with all that it depends on."""
-    shift, population = output.study.production.edge_shift_nm, output.study.population
-    over = [f"edges {shift:g} nm off"] if shift else []
+    production, population = output.study.production, output.study.population
+    over = [f"edges {production.edge_shift_nm:g} nm off"] if production.edge_shift_nm else []
+    over += [f"films {production.thickness:.2%} off"] if production.thickness else []
     over += [] if population is None else [population.told]
     shifted = any(output.columns[name].extreme == WORST_CASE for name in output.objective.weights)
     words = []
