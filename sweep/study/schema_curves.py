@@ -97,8 +97,8 @@ class LightsSection(Documented):
 
 
 def named(names: Iterable[str]) -> Any:
-    """The type of built-in names, as editors complete them; what is not among them is refused with the nearest."""
-    return Annotated[str, WithJsonSchema({"type": "string", "enum": list(names)})]
+    """The type of built-in names, as editors complete them; installed packages may offer others."""
+    return Annotated[str, WithJsonSchema({"anyOf": [{"type": "string", "enum": list(names)}, {"type": "string"}]})]
 
 
 def builtin(value: Any) -> Any:
