@@ -22,7 +22,8 @@ from ..search.solver import search_from, smooth_objective
 from ..study import Search, Study
 from ..types import FloatArray, Parallel, Progress, delayed
 
-_STARTS = 4
+LEFT_OUT_STARTS = 4
+"""Of each search without a light."""
 
 
 def held_out_table(
@@ -63,12 +64,9 @@ def left_out_table(study: Study, search: Search, best: Evaluation, parallel: Par
     answer and a few other points. A light that is alone in its type cannot be left out.
     """
     problem = study.problem(search)
-    asked = {name for column in problem.objective.weights for name in _types(problem, column)}
-    lights = study.lights
-    members = {name: len(own) for name, own in lights.members.items()}
-    at = [i for i, kind in enumerate(lights.types) if kind in asked and members[kind] > 1]
-    starts = [problem.to_unit(best.x), *starting_points(problem, _STARTS - 1, study.section.seed)]
-    each = max(1, search.max_evaluations // _STARTS)
+    lights, at = study.lights, left_out_signals(problem)
+    starts = [problem.to_unit(best.x), *starting_points(problem, LEFT_OUT_STARTS - 1, study.section.seed)]
+    each = max(1, search.max_evaluations // LEFT_OUT_STARTS)
     tasks = [delayed(_without, problem, i, starts, search.algorithm, each, study.section.seed) for i in at]
     rows: list[dict[str, Any]] = []
     for i, answer in zip(at, parallel(tasks), strict=True):
@@ -82,8 +80,18 @@ def left_out_table(study: Study, search: Search, best: Evaluation, parallel: Par
     )
 
 
+def left_out_signals(problem: Problem) -> list[int]:
+    """Lights of the objective's types that are not alone in theirs."""
+    asked = {name for column in problem.objective.weights for name in _types(problem, column)}
+    lights = problem.view.lights
+    members = {name: len(own) for name, own in lights.members.items()}
+    return [i for i, kind in enumerate(lights.types) if kind in asked and members[kind] > 1]
+
+
 def _types(problem: Problem, column: str) -> tuple[str, ...]:
     quantity = problem.quantities[column]
+    if quantity.needs == "own":  # it may be of any
+        return problem.view.lights.classes
     return quantity.states if quantity.pair is None else quantity.pair
 
 
