@@ -140,13 +140,18 @@ class Installed:
         return self.entry.module.partition(".")[0]
 
     @property
+    def folders(self) -> list[Path]:
+        """Where its files are; none where it is a single file. Nothing of it runs."""
+        spec = find_spec(self.package)
+        return [] if spec is None else [Path(place) for place in spec.submodule_search_locations or ()]
+
+    @property
     def digest(self) -> str:
         """SHA-256 of every Python file of the package, or of the one that it is, by path; nothing of it runs.
 
         Raises SweepError where there is none.
         """
-        spec = find_spec(self.package)
-        folders = [] if spec is None else [Path(place) for place in spec.submodule_search_locations or ()]
+        spec, folders = find_spec(self.package), self.folders
         files = [(path.relative_to(folder), path) for folder in folders for path in sorted(folder.rglob("*.py"))]
         if spec is not None and not folders and spec.origin is not None:
             files = [(Path(Path(spec.origin).name), Path(spec.origin))]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 import webbrowser
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,7 @@ import typer
 from .. import run as runner
 from ..errors import Fault, InterruptedRunError, SweepError
 from ..results.names import REPORT
-from ..study import folder_name, load_study
+from ..study import Study, folder_name, load_study
 from .audit import mend_audit
 from .endings import end_now
 from .finish import finish
@@ -54,10 +55,7 @@ def run_one(path: Path, manner: Manner, began_s: float) -> None:
     if note is not None:
         typer.echo(f"Note: {note}.", err=True)
     if manner.dry_run:
-        with ProgressDisplay() as display:
-            found = runner.estimate(loaded, folder, manner.workers, display.update)
-        for line in runner.estimate_lines(found, folder):
-            typer.echo(line)
+        _tell(loaded, folder, manner, time.monotonic() - began_s)
         return
     kind = runner.usable_backend(manner.backend)
     if kind != manner.backend:
@@ -78,3 +76,15 @@ def run_one(path: Path, manner: Manner, began_s: float) -> None:
         raise
     if manner.opens and not webbrowser.open((folder / REPORT).absolute().as_uri()):
         typer.echo(f"Note: no browser was found for {folder / REPORT}.", err=True)
+
+
+def _tell(study: Study, folder: Path, manner: Manner, loading_s: float) -> None:
+    """Say what a run would take; `loading_s`: what it took up to here."""
+    with ProgressDisplay() as display:
+        found = runner.estimate(study, folder, manner.workers, display.update)
+    begun = time.monotonic()
+    from ..report.estimate import report_seconds  # noqa: PLC0415  (what a report imports is timed, too)
+
+    more_s = loading_s + (time.monotonic() - begun) + report_seconds(study)
+    for line in runner.estimate_lines(found, folder, more_s):
+        typer.echo(line)

@@ -103,5 +103,3 @@ _KINDS: dict[str, Callable[[Path], Scan]] = {
     ".spectrum": scan_speos,
 }
 """Readers by the ending of a file's name."""
-CURVE_FILE = rf"\.({'|'.join(kind[1:] for kind in _KINDS)})$"
-"""How the name of such a file ends, a regular expression."""

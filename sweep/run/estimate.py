@@ -20,18 +20,24 @@ from ..study import Study
 from ..types import Progress
 from .plans import with_plans
 from .rows import Job, rules_of
+from .search_estimate import search_seconds
 from .stop import Stop
 from .sweep import Sweep
 from .workers import Workers
 
 _SAMPLE = 256
 _BUDGET_S = 10.0
+_TIMES_MADE = 2
 _Kind = tuple[str, str, str]
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Designs in all and finished already; chunks, seconds, bytes of memory and of disk of the others."""
+    """Designs in all and finished already; chunks, seconds, bytes of memory and of disk of the others.
+
+    `evaluations`: about how many all searches take. `seconds` are those of everything but the report and what
+    `on_top` names.
+    """
 
     designs: int
     kept: int
@@ -39,7 +45,8 @@ class Estimate:
     seconds: float
     memory_bytes: float
     disk_bytes: float
-    searches: int
+    evaluations: int
+    on_top: tuple[str, ...] = ()
 
 
 def estimate(study: Study, output: Path, n_jobs: int, progress: Progress) -> Estimate:
@@ -57,7 +64,10 @@ def estimate(study: Study, output: Path, n_jobs: int, progress: Progress) -> Est
     if todo:
         seconds, bytes_per_row = _sampled(sweep, todo)
     own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
-    searches = 0 if whole or study.search is None else study.search.max_evaluations
+    evaluations = 0
+    if study.search is not None and not whole:
+        searched_s, evaluations = search_seconds(study, study.search)
+        seconds += searched_s
     memory = float(own) * (crew.count + 1 if crew.count > 1 else 1)
     return Estimate(
         study.n_designs,
@@ -66,8 +76,17 @@ def estimate(study: Study, output: Path, n_jobs: int, progress: Progress) -> Est
         seconds / crew.count,
         memory,
         2 * rows * bytes_per_row,
-        searches,
+        evaluations,
+        () if whole else _on_top(study),
     )
+
+
+def _on_top(study: Study) -> tuple[str, ...]:
+    """What is not timed."""
+    asked = study.section.recognition
+    patches = asked is not None and asked.patches
+    drawn = {"raw patches": patches, "images of signal heads": study.section.vision, "yields": study.section.population}
+    return tuple(what for what, given in drawn.items() if given)
 
 
 def _sampled(sweep: Sweep, todo: list[Job]) -> tuple[float, float]:
@@ -80,41 +99,47 @@ def _sampled(sweep: Sweep, todo: list[Job]) -> tuple[float, float]:
         firsts.setdefault(kind, job)
     ordered = sorted(firsts, key=lambda kind: -rows[kind])  # the largest first
     tables: list[pa.Table] = []
-    total, measured = 0.0, 0
+    total, measured, first_s = 0.0, 0, 0.0
     with threadpool_limits(1):
-        for per_row, table, kind in _measured(sweep, [(kind, firsts[kind]) for kind in ordered]):
+        for first, per_row, table, kind in _measured(sweep, [(kind, firsts[kind]) for kind in ordered]):
+            first_s += first
             total += per_row * rows[kind]
             measured += rows[kind]
             tables.append(table)
+    # A scene's kernel is made for its rows, and again for what is drawn of them.
+    kernels_s = _TIMES_MADE * first_s * len(ordered) / len(tables)
     sample = pa.concat_tables(tables).unify_dictionaries()
     bytes_per_row = (len(encoded(sample)) - len(encoded(sample.slice(0, 1)))) / max(1, sample.num_rows - 1)
-    return total * sum(rows.values()) / measured, bytes_per_row
+    return total * sum(rows.values()) / measured + kernels_s, bytes_per_row
 
 
-def _measured(sweep: Sweep, kinds: list[tuple[_Kind, Job]]) -> Iterator[tuple[float, pa.Table, _Kind]]:
-    """Seconds per design, sampled rows and kind, until the budget is spent."""
+def _measured(sweep: Sweep, kinds: list[tuple[_Kind, Job]]) -> Iterator[tuple[float, float, pa.Table, _Kind]]:
+    """Seconds of the first design and of each other one, sampled rows and kind, until the budget is spent."""
     begun = time.monotonic()
     for kind, job in kinds:
         few = replace(job, stop=min(job.stop, job.start + _SAMPLE))
+        before = time.monotonic()
         sweep.compute(replace(job, stop=job.start + 1))  # makes the scene's kernel
         started = time.monotonic()
         table = sweep.compute(few)
-        yield (time.monotonic() - started) / (few.stop - few.start), table, kind
+        yield started - before, (time.monotonic() - started) / (few.stop - few.start), table, kind
         if time.monotonic() - begun > _BUDGET_S:
             return
 
 
-def estimate_lines(found: Estimate, output: Path) -> list[str]:
-    """The estimate in words."""
+def estimate_lines(found: Estimate, output: Path, more_s: float = 0.0) -> list[str]:
+    """The estimate in words; `more_s`: of loading and of the report."""
     new = found.designs - found.kept
     lines = [f"{found.designs:,} designs: {found.kept:,} finished, {new:,} in {found.chunks:,} chunks to compute."]
-    if new:
+    if new or found.evaluations:
         lines.append(
-            f"About {_time(found.seconds)}, {found.memory_bytes / 2**20:,.0f} MiB of memory, "
+            f"About {_time(found.seconds + more_s)}, {found.memory_bytes / 2**20:,.0f} MiB of memory, "
             f"{found.disk_bytes / 2**20:,.1f} MiB of disk (half of it until the run is whole)."
         )
-    if found.searches:
-        lines.append(f"The search's evaluations (at most {found.searches:,} and its front) come on top.")
+    if found.evaluations:
+        lines.append(f"About {found.evaluations:,} evaluations of searches are in it.")
+    if found.on_top:
+        lines.append(f"On top of that: {', '.join(found.on_top)}.")
     return [*lines, f"Results go to {output}/; nothing was computed or written."]
 
 

@@ -24,7 +24,8 @@ from ..search.trade_off import Effort
 from ..study import Search, Study
 from ..types import FloatArray, Parallel, Progress, delayed
 
-_STARTS = 4
+LEFT_OUT_STARTS = 4
+"""Of each search without a light."""
 _FIGURES = ("seen", "with_it", "fall")
 
 
@@ -67,9 +68,9 @@ def left_out_table(study: Study, search: Search, best: Evaluation, parallel: Par
     A light that is alone in its type cannot be left out.
     """
     problem, seed = study.problem(search), study.section.seed
-    lights, members = study.lights, {name: len(own) for name, own in study.lights.members.items()}
-    points = starting_points(problem, _STARTS - 1, seed)
-    effort = Effort(search.algorithm, points, max(1, search.max_evaluations // _STARTS), seed)
+    lights = study.lights
+    points = starting_points(problem, LEFT_OUT_STARTS - 1, seed)
+    effort = Effort(search.algorithm, points, max(1, search.max_evaluations // LEFT_OUT_STARTS), seed)
     optima: list[tuple[Problem, Evaluation]] = [(problem, best)]
     if has_nominal(problem):
         nominal = best_nominal(problem, best, effort, parallel)
@@ -77,12 +78,11 @@ def left_out_table(study: Study, search: Search, best: Evaluation, parallel: Par
     tasks = []
     rows: list[dict[str, Any]] = []
     for asked, optimum in optima:
-        types = {name for column in asked.objective.weights for name in _types(asked, column)}
         starts = [asked.to_unit(optimum.x), *points]
-        for at, kind in enumerate(lights.types):
-            if kind in types and members[kind] > 1:
-                tasks.append(delayed(_without, asked, at, starts, effort.algorithm, effort.evaluations, seed))
-                rows.append({"objective": asked.objective.column, "signal_type": kind, "signal": lights.names[at]})
+        for at in left_out_signals(asked):
+            tasks.append(delayed(_without, asked, at, starts, effort.algorithm, effort.evaluations, seed))
+            names = {"signal_type": lights.types[at], "signal": lights.names[at]}
+            rows.append({"objective": asked.objective.column, **names})
     for done, (row, answer) in enumerate(zip(rows, parallel(tasks), strict=True), 1):
         row |= dict(zip(_FIGURES, answer or (None,) * len(_FIGURES), strict=True))
         progress("lights left out", done, len(rows))
@@ -90,8 +90,18 @@ def left_out_table(study: Study, search: Search, best: Evaluation, parallel: Par
     return pa.Table.from_pylist(rows, schema=pa.schema([*fields, *((name, pa.float64()) for name in _FIGURES)]))
 
 
+def left_out_signals(problem: Problem) -> list[int]:
+    """Lights of the objective's types that are not alone in theirs."""
+    asked = {name for column in problem.objective.weights for name in _types(problem, column)}
+    lights = problem.view.lights
+    members = {name: len(own) for name, own in lights.members.items()}
+    return [i for i, kind in enumerate(lights.types) if kind in asked and members[kind] > 1]
+
+
 def _types(problem: Problem, column: str) -> tuple[str, ...]:
     quantity = problem.quantities[column]
+    if quantity.needs == "own":  # it may be of any
+        return problem.view.lights.classes
     return quantity.states if quantity.pair is None else quantity.pair
 
 

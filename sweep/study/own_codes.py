@@ -1,14 +1,20 @@
-"""Code that a study names: allowed or refused, found, read and digested; nothing of it runs here."""
+"""What a study names that is not the package's: allowed or refused, found, read and digested."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import TypeVar
+
+from pydantic import ValidationError
 
 from ..disk import is_file
-from ..errors import Fault, SweepError
-from ..own_code import CODE_OF, Offered, OwnCode, file_of, installed, is_in_file, offers, read_code
+from ..errors import Fault, StudyError, SweepError
+from ..own_code import CODE_OF, Installed, Offered, OwnCode, file_of, installed, is_in_file, offers, read_code
+from .schema_curves import LightsSection, SensorSection
 from .sources import Sources
 from .yaml_tree import Key
+
+_Curves = TypeVar("_Curves", SensorSection, LightsSection)
 
 
 def is_from_outside(name: str, group: Offered, known: Iterable[str]) -> bool:
@@ -49,3 +55,42 @@ def _digested(sources: Sources, name: str, digest: str) -> None:
     if not isinstance(sources.allow_code, bool) and sources.allow_code.get(name) != digest:
         raise SweepError(Fault("not the code that the run had", value=name))
     sources.digests[name] = digest
+
+
+def offered_curves(
+    sources: Sources, at: tuple[Key, ...], section: _Curves, group: Offered, known: Iterable[str]
+) -> _Curves:
+    """The section as a package says it, with what the study adds to it; itself where it names none of a package.
+
+    A package offers what a study would say: a mapping with `files`, which lie in the package, or a function that
+    returns one. Raises StudyError where that cannot be had: the name is then that of nothing.
+    """
+    name = section.builtin
+    if name is None or not is_from_outside(name, group, known):
+        return section
+    if not allowed(sources, at, name):
+        raise StudyError(sources.faults)
+    try:
+        made: _Curves = type(section).model_validate(_said(code_of(sources, name, group)))
+        offer: Installed | None = installed(group, name)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        sources.add(at, f"what a package offers is no such section: {where}: {first['msg']}", name)
+        raise StudyError(sources.faults) from None
+    except SweepError as error:
+        sources.told(at, error)
+        raise StudyError(sources.faults) from None
+    sources.folders = [*([] if offer is None else offer.folders), *sources.folders]
+    own = {key: getattr(section, key) for key in section.model_fields_set - {"builtin", "files"}}
+    files = {"files": [*made.files, *section.files]}
+    return made.model_copy(update={"name": made.name or name, **files, **own})
+
+
+def _said(code: OwnCode) -> dict[str, object]:
+    """What a package says of curves. Raises SweepError where it says nothing."""
+    loaded = code.loaded
+    said = code.called(loaded) if callable(loaded) else loaded
+    if not isinstance(said, Mapping) or said.get("builtin") == code.name:
+        raise SweepError(Fault(f"{code.name} says nothing of curves", value=said, allowed="a mapping with `files`"))
+    return dict(said)

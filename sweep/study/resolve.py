@@ -8,6 +8,8 @@ from pathlib import Path
 from ..camera.effects import blur
 from ..camera.mosaic import Mosaic
 from ..camera.scene import OBJECT_RESOLUTION, WhitePatchExposure
+from ..camera.sensor import BUILT_IN_SENSORS, SensorCurves
+from ..curves.builtin.registry import BUILT_IN_LIGHTS
 from ..curves.lights import Lights
 from ..curves.spectrum import Curves
 from ..curves.tasks import StudyTasks
@@ -24,9 +26,11 @@ from .goals import check_goals
 from .light_files import with_light_files
 from .luminances import check_luminances
 from .model import Search, Study
+from .own_codes import offered_curves
 from .own_metrics import check_names, own_metrics, try_metrics
 from .populations import check_range, with_population
 from .schema import CfaSection, StudySection
+from .schema_curves import LightsSection
 from .seen_images import check_vision
 from .sensor_fields import check_fields, with_chief_rays
 from .sensors import sensor_of
@@ -59,8 +63,7 @@ class _Resolver:
 
     def resolve(self) -> Study:
         section = self.section
-        sensor = sensor_of(self.sources, section.sensor)
-        lights = self.sources.lights(section.lights)
+        sensor, lights = self.sensor(), self.sources.lights(self.offered(section.lights))
         mosaics = {name: mosaic for name, cfa in section.cfas.items() if (mosaic := self.mosaic(name, cfa)) is not None}
         if sensor is None or lights is None:
             raise StudyError(self.faults)
@@ -116,12 +119,23 @@ class _Resolver:
         check_count(study, self.sources)
         return study
 
+    def sensor(self) -> SensorCurves | None:
+        """Its curves, of an installed package where that offers it."""
+        section, known = self.section.sensor, BUILT_IN_SENSORS
+        return sensor_of(self.sources, offered_curves(self.sources, ("sensor",), section, "sweep.sensors", known))
+
+    def offered(self, lights: LightsSection, at: tuple[str, ...] = ("lights",)) -> LightsSection:
+        """Lights, of an installed package where that offers them."""
+        return offered_curves(self.sources, at, lights, "sweep.lights", BUILT_IN_LIGHTS)
+
     def held_out(self, lights: Lights) -> Lights | None:
         """Lights to validate on; leaving one out needs a search."""
         asked = self.section.validation
         if asked is not None and asked.leave_one_out and self.section.search is None:
             self.add(("validate", "leave_one_out"), "nothing is searched", None, "a study with `search`")
-        return None if asked is None or asked.lights is None else self.sources.held_out(asked.lights, lights)
+        if asked is None or asked.lights is None:
+            return None
+        return self.sources.held_out(self.offered(asked.lights, ("validate", "lights")), lights)
 
     def read_tasks(self) -> None:
         """The study's tasks, where it has some."""

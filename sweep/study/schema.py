@@ -232,14 +232,14 @@ class StudySection(Documented):
     sensor: Annotated[
         SensorSection, BeforeValidator(builtin, json_schema_input_type=named(BUILT_IN_SENSORS) | SensorSection)
     ]
-    """QE curves: `ar0820`, a built-in surrogate, or a mapping with `files`."""
+    """QE curves: `ar0820`, a built-in surrogate, the name of what a package offers, or a mapping with `files`."""
     pixel: Pixel = Pixel()
     """The pixel and its readout."""
     lights: Annotated[
         LightsSection,
         BeforeValidator(builtin, json_schema_input_type=LIGHTS_NAME | LightsSection),
     ]
-    """Traffic lights: `tl16`, a built-in surrogate, a file, or a mapping with `files`."""
+    """Traffic lights: `tl16`, a built-in surrogate, a file, what a package offers, or a mapping with `files`."""
     scenarios: Annotated[
         dict[Name, Scenario],
         BeforeValidator(expanded, json_schema_input_type=dict[Name, ScenarioTemplate]),

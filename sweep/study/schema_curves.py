@@ -8,7 +8,6 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, model_validator
 
 from ..curves.builtin.registry import BUILT_IN_LIGHTS
-from ..curves.files import CURVE_FILE
 from ..curves.scan import MOST_CURVES
 from ..curves.spectrum import Outside, Resampling
 from ..designs.technology import Stated
@@ -101,15 +100,9 @@ class LightsSection(Documented):
         return self
 
 
-def named(names: Iterable[str], *, or_file: bool = False) -> Any:
-    """The type of built-in names, as editors complete them; what is not among them is refused with the nearest.
-
-    `or_file`: or the name of a file of curves.
-    """
-    schemas: list[dict[str, Any]] = [{"type": "string", "enum": list(names)}]
-    if or_file:
-        schemas.append({"type": "string", "pattern": CURVE_FILE})
-    return Annotated[str, WithJsonSchema(schemas[0] if len(schemas) == 1 else {"anyOf": schemas})]
+def named(names: Iterable[str]) -> Any:
+    """The type of built-in names, as editors complete them; installed packages may offer others."""
+    return Annotated[str, WithJsonSchema({"anyOf": [{"type": "string", "enum": list(names)}, {"type": "string"}]})]
 
 
 def builtin(value: Any) -> Any:
@@ -117,7 +110,7 @@ def builtin(value: Any) -> Any:
     return {"builtin": value} if isinstance(value, str) else value
 
 
-LIGHTS_NAME: Any = named(BUILT_IN_LIGHTS, or_file=True)
+LIGHTS_NAME: Any = named(BUILT_IN_LIGHTS)
 """The type of lights that are named alone."""
 
 

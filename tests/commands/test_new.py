@@ -63,7 +63,11 @@ def test_files_fill_in_sensor_and_lights(tmp_path: Path, rgbw: Path, leds: Path)
     study = load_study(path)
     (sensor,), (lights,) = study.section.sensor.files, study.section.lights.files
     assert sensor.columns == {"R": "red", "G": "QE green", "B": "B", "C": "Clear"}
-    assert (sensor.file, lights.file) == ("../data/curves.csv", "../leds.csv")
+    assert (sensor.file, lights.file) == (rgbw.resolve().as_posix(), leds.resolve().as_posix())
+    elsewhere = tmp_path / "moved" / "study.yaml"
+    elsewhere.parent.mkdir()
+    elsewhere.write_text(path.read_text())
+    np.testing.assert_array_equal(load_study(elsewhere).lights.photons, study.lights.photons)
     assert sensor.scale == 0.01
     assert lights.signals == {"green": ["gn"], "yellow": ["yes"], "orange": ["or"], "red": ["rd: 1"]}
     assert "# left out: royal, blue: xy" in path.read_text()

@@ -6,12 +6,13 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from joblib.externals.loky import get_reusable_executor
 
 from sweep.errors import StudyError
-from sweep.report import read_output
+from sweep.report import read_output, study_of
 from sweep.run import run_study
 from sweep.study import Study, load_study
 
@@ -25,7 +26,20 @@ OFFERS = """\
 band = cfa_extras.filters:Band
 [sweep.metrics]
 spread = cfa_extras.metrics:Spread
+[sweep.sensors]
+mine = cfa_extras.curves:SENSOR
+[sweep.lights]
+leds = cfa_extras.curves:leds
 """
+CURVES = """\
+SENSOR = {"files": [{"file": "qe.csv", "columns": {"R": "R", "G": "G", "B": "B", "Y": "Y"}}], "clear": "Y"}
+
+
+def leds():
+    return {"files": [{"file": "leds.csv", "quantity": "photons", "signals": {"yellow": ["amber"], "red": ["ruby"]}}]}
+"""
+NM = np.arange(400, 701)
+MIDDLES = {"R": 630, "G": 540, "B": 460}
 STUDY = OWN_FAMILY.replace("filters.py:Band", "band").replace("search:\n  space: edges\n", "metrics: [spread]\n")
 
 
@@ -38,6 +52,11 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     (own / "__init__.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w').close()\n")
     (own / "filters.py").write_text(STOPBAND)
     (own / "metrics.py").write_text(CODE)
+    (own / "curves.py").write_text(CURVES)
+    table = pd.DataFrame({name: 0.8 * np.exp(-(((NM - at) / 40) ** 2)) for name, at in MIDDLES.items()}, index=NM)
+    table.assign(Y=table.G + table.R).rename_axis("nm").to_csv(own / "qe.csv")
+    leds = {name: np.exp(-(((NM - at) / 12) ** 2)) for name, at in (("amber", 592), ("ruby", 636))}
+    pd.DataFrame(leds, index=NM).rename_axis("nm").to_csv(own / "leds.csv")
     found = root / "cfa_extras-1.2.dist-info"
     found.mkdir()
     (found / "METADATA").write_text("Metadata-Version: 2.1\nName: cfa-extras\nVersion: 1.2\n")
@@ -117,6 +136,53 @@ def test_code_that_changed_since_it_was_loaded_is_told(package: Path, tmp_path: 
     (package / "metrics.py").write_text(CODE + "# other\n")
     with pytest.raises(StudyError, match=r"the code of cfa-extras 1.2 is not that with which .* a new process"):
         study(tmp_path)
+
+
+PACKED = """\
+study: packed
+sensor: mine
+lights: leds
+cfas: [RGGB, RYYB]
+"""
+
+
+def test_curves_of_a_package_are_those_of_its_files(package: Path, tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match="what an installed package offers, whose code would run"):
+        study(tmp_path, PACKED, allow=False)
+    assert not (tmp_path / "ran").exists()
+    made = study(tmp_path, PACKED)
+    table = pd.read_csv(package / "qe.csv", index_col="nm")
+    np.testing.assert_allclose(made.sensor.qe["R"], table["R"].to_numpy())
+    assert (made.sensor.clear, made.sensor.name, made.lights.classes) == ("Y", "mine", ("yellow", "red"))
+    run_study(made, tmp_path / "packed", 1, lambda *_: None)
+    kept = read_output(tmp_path / "packed").provenance
+    assert {"qe.csv", "leds.csv", "code of cfa-extras 1.2 (sweep.sensors: mine)"} <= kept.data_sha256.keys()
+    again = study_of(read_output(tmp_path / "packed"), None, allow_code=True)  # with the curves that the run kept
+    np.testing.assert_array_equal(again.sensor.qe["Y"], made.sensor.qe["Y"])
+    with_own = PACKED.replace(
+        "sensor: mine", "sensor: {builtin: mine, files: [{file: qe.csv, columns: {W: R}}], clear: G}"
+    )
+    own = study(tmp_path, with_own).sensor
+    assert (own.clear, [*own.qe]) == ("G", ["R", "G", "B", "Y", "W"])
+    with pytest.raises(StudyError, match=r"lights: unknown built-in lights \(got 'leds2'\)"):
+        study(tmp_path, PACKED.replace("leds", "leds2"))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("SENSOR = 3\nleds = {}", "mine says nothing of curves (got 3); allowed: a mapping with `files`"),
+        (CURVES.replace("columns", "column"), "no such section: files.0.columns: Field required (got 'mine')"),
+        (CURVES.replace("    return", "    return 1 / 0 or"), "leds: ZeroDivisionError: division by zero"),
+        (CURVES.replace("leds.csv", "led.csv"), "no such file (got 'led.csv')"),
+    ],
+)
+def test_faults_of_curves_of_a_package_are_lines(package: Path, tmp_path: Path, text: str, said: str) -> None:
+    (package / "curves.py").write_text(text)
+    with pytest.raises(StudyError) as caught:
+        study(tmp_path, PACKED)
+    assert said in str(caught.value)
+    assert len(caught.value.faults) == 1
 
 
 def test_two_packages_with_one_name_are_told(package: Path, tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from scipy.optimize import linprog
 from sweep.camera.linear import smooth_imager
 from sweep.camera.methods import REFERENCE
 from sweep.camera.scenario import Scenario
+from sweep.errors import SweepError
 from sweep.metrics.bound import Bound
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth_noise import smooth_detectability
@@ -53,6 +54,20 @@ def filters(problem: Problem, n: int) -> np.ndarray:
         if (share @ base) / base.sum() >= 0.9:
             found.append(share * base)
     return np.array(found)
+
+
+def test_of_each_error_without_a_limit_it_is_said_why() -> None:
+    problem = problem_in("chart")
+    without = [q for q in problem.quantities.values() if q.states and q.goal and not q.has_limit]
+    assert {q.metric for q in without} == {"cnr", "error", "error_bound", "state_error", "state_error_bound"}
+    for quantity in without:
+        rule = "least" if quantity.wanted == "less" else "minimum"
+        asked = replace(problem, objective=Objective.model_validate({rule: {quantity.name: 1.0}}))
+        why = "is not convex in the filter: its noise grows with the light; d' has a limit"
+        assert why_not(asked) == f"{quantity.name} {why}"
+        with pytest.raises(SweepError, match="no limit: "):
+            limit_of(asked)
+    assert why_not(problem) is None
 
 
 @pytest.mark.parametrize("scene", SCENES)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -254,3 +255,20 @@ def test_the_filter_of_the_noise_study_is_what_a_search_finds() -> None:
     assert not isinstance(own, str)
     best = searched(problem_of("stopband", 30, 0.95, Objective(least={"state_error": 1.0})), 4)
     np.testing.assert_allclose(best.x[:4], list(own.values()), atol=0.006)
+
+
+def test_a_search_refuses_what_has_no_smooth_rows(tmp_path: Path) -> None:
+    every = quantities_of(Asked(STATES, STATES, probabilities=True, vision=True))
+    without = [q.name for q in every.values() if q.ends and q.smooth is None]
+    assert {q.metric for q in map(every.get, without) if q is not None} == {"cdp", "csp", "vision_error"}
+    text = (STUDIES / "stopband.yaml").read_text().replace("search:", "recognition: {probabilities: true}\nsearch:", 1)
+    path = tmp_path / "asked.yaml"
+    for name in ("cdp_yellow_red", "csp_green_red"):
+        constrained = re.sub(r"^constraints:\n", f"constraints:\n  {name}: {{min: 0.9}}\n", text, flags=re.MULTILINE)
+        path.write_text(constrained.replace("level: 0.95}", "level: 0.95}\n    noise: true", 1))
+        with pytest.raises(StudyError) as caught:
+            load_study(path)
+        (fault,) = caught.value.faults
+        assert str(fault).endswith(
+            f"constraints.{name}: the search does not know {name}; allowed: a study without `search`"
+        )

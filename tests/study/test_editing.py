@@ -75,6 +75,7 @@ FILTER = {"cfa": "RYNCy", "channel": "N", "base": "Y", "to": "G"}
         {"boxes": {"x": FILTER | {"channel": ["Na", "Nb"], "to": 0.1, "box": {"left_nm": {"min": 1, "max": 2}}}}},
         {"objective": ["csd_yellow_red", "csd_orange_red"]},
         {"objective": {"sum": {"csd_yellow_red": 2}}},
+        {"sensor": "of_a_package"},
     ],
 )
 def test_short_forms_fit_the_schema(more: dict[str, Any]) -> None:
@@ -85,7 +86,7 @@ def test_short_forms_fit_the_schema(more: dict[str, Any]) -> None:
     "more",
     [
         {"sensr": "ar0820"},
-        {"sensor": "ar0821"},
+        {"sensor": {"bultin": "ar0820"}},
         {"pixel": {"wel_e": 1}},
         {"scenarios": {"x": {"nois": True}}},
         {"scenarios": {"x": NEAR}},

@@ -78,19 +78,20 @@ def checked_name(name: str) -> str:
     raise StudyError(Fault("not the name of a study", None, None, "NAME", name, allowed, better or None))
 
 
-def _relative(file: Path, folder: Path) -> str:
-    """A file's path as seen from the folder of the study."""
-    try:
-        return Path(os.path.relpath(file.resolve(), folder.resolve())).as_posix()
-    except ValueError:  # on another drive
-        return file.resolve().as_posix()
+def _path_of(file: Path, folder: Path) -> str:
+    """A file's path as the study in a folder says it: its name where it lies beside or below it, else from the root.
+
+    So the study can be moved: alone, or with the files beside it.
+    """
+    file, folder = file.resolve(), folder.resolve()
+    return (file.relative_to(folder) if file.is_relative_to(folder) else file).as_posix()
 
 
 def _sensor(path: Path, folder: Path) -> SensorText:
     taken = sensor_file(path)
     return SensorText(
         layout=layout_of(taken.totals),
-        file=_relative(path, folder),
+        file=_path_of(path, folder),
         name=taken.name,
         channels=taken.channels,
         scale=taken.scale,
@@ -106,7 +107,7 @@ def _lights(path: Path, folder: Path, quantity: LightUnit, start_nm: float, stop
     taken = lights_file(path, quantity, start_nm, stop_nm)
     return LightsText(
         types=taken.types,
-        file=_relative(path, folder),
+        file=_path_of(path, folder),
         name=taken.name,
         quantity=quantity,
         left_out=taken.left_out,
