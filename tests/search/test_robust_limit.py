@@ -14,13 +14,15 @@ from scipy.optimize import linprog
 from sweep.camera.sensor_field import SensorField
 from sweep.camera.sensor_places import SensorPlaces
 from sweep.metrics.evaluate import designed_quantities
-from sweep.metrics.smooth import smooth_csd
+from sweep.metrics.smooth import smooth_csd, smooth_response
 from sweep.search.limit import Limit, limit_of, why_not
-from sweep.search.problem import Problem
+from sweep.search.problem import Problem, best_feasible, starting_points
+from sweep.search.solver import search_from
 from sweep.study import load_study
 
 from ..conftest import STUDIES
 from .test_limit import random_filters
+from .test_limit_sides import agrees, is_mixed, largest, random_problem, write_study
 
 STUDY = load_study(STUDIES / "angle.yaml")
 assert STUDY.search is not None
@@ -146,6 +148,60 @@ def test_no_random_feasible_filter_beats_the_robust_limit() -> None:
         tried += len(curves)
         best = max(best, float(smooth_csd(problem().view, curves, YELLOW_RED).max()))
     assert 0.5 * limit().proven < best <= limit().proven
+
+
+@pytest.fixture(scope="module")
+def moving(tmp_path_factory: pytest.TempPathFactory) -> Problem:
+    """A coarse problem whose filters move, at three places of the sensor."""
+    path = write_study(tmp_path_factory.mktemp("moving"), 10)
+    text = path.read_text().replace("base: Y\n", "base: Y\n    technology: {interference: {effective_index: 1.8}}\n")
+    path.write_text(text + "scenarios: {lens: {optics: {f_number: 1.6}, field: {cra_deg: [0, 12, 22]}}}\n")
+    study = load_study(path)
+    assert study.search is not None
+    return study.problem(study.search)
+
+
+def agrees_over_the_sensor(template: Problem, seed: int) -> bool:
+    """Whether pairs of the best filter lie on both sides; a MILP with a binary per pair and place has the same limit."""
+    problem = random_problem(template, seed)
+    found = agrees(problem)
+    assert len(smooth_response(problem.view, problem.view.base_qe[None])[0]) == 3
+    if seed % 2 == 0:  # the other channels tell nothing apart, so the MILP's margin is what is left to the limit
+        assert largest(problem, found.proven) == pytest.approx(found.proven, abs=1e-3)
+    return is_mixed(problem, found.curve)
+
+
+def test_sides_at_every_place_are_those_of_a_milp(moving: Problem) -> None:
+    assert any(agrees_over_the_sensor(moving, seed) for seed in range(8))
+
+
+@pytest.mark.slow
+def test_sides_at_every_place_are_those_of_a_milp_in_sixty_problems(moving: Problem) -> None:
+    assert sum(agrees_over_the_sensor(moving, seed) for seed in range(8, 68)) >= 6
+
+
+FREE_FORM = (
+    "{cfa: RYNCy, channel: N, base: Y, technology: {interference: {effective_index: 1.8}}, family: free_form, "
+    "options: {nodes: {start_nm: 560, stop_nm: 700, step_nm: 4}}}"
+)
+
+
+def test_free_form_filters_come_near_the_limit_over_the_whole_sensor() -> None:
+    """`sweep run angle --set boxes.edges=FREE_FORM`: the figure of the documentation, at all places of the sensor."""
+    study = load_study(STUDIES / "angle.yaml", changes={"boxes.edges": FREE_FORM})
+    assert study.search is not None
+    searched = study.problem(study.search)
+    best = best_feasible(search_from(searched, 0, starting_points(searched, 1, 1)[0], "SLSQP", 200).log)
+    assert best is not None
+    curves = searched.family.curves(best.x[None])
+    worst = SensorPlaces(searched.view, 1e-3, Counter()).worst(curves[0], (YELLOW_RED,))[YELLOW_RED]
+    assert worst is not None
+    proven = limit_of(searched).proven
+    assert worst.distance_dn <= proven
+    text = " ".join((STUDIES / "README.md").read_text(encoding="utf-8").split())
+    below = 1 - worst.distance_dn / proven
+    assert f"Free-form filters reach {worst.distance_dn:.0f} DN, {below:.1%} below the limit".replace("%", " %") in text
+    assert below <= 0.1
 
 
 def test_the_table_of_the_documentation() -> None:

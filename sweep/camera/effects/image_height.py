@@ -19,7 +19,7 @@ HEIGHTS = "field"
 NAMED = "named places"
 _WITHIN_DN = {"within 10 DN": 10.0, "within 1 DN": 1.0, "within 0.1 DN": 0.1, "within 0.01 DN": 0.01}
 _PLACES = dict(zip(_WITHIN_DN, (10.0, 12.0, 16.0, 24.0), strict=True))
-"""Places that a search looks at, about, for one design; `tests/bench_work.py` counts them."""
+"""Places that a search looks at, about, for one design and up to three pairs of types."""
 _SLOWEST = 100.0
 
 
