@@ -7,6 +7,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from ..camera.registry import EFFECTS
 from ..metrics.quantity import Column
 
 
@@ -35,7 +36,7 @@ class EffectFacts(_Facts):
     @property
     def is_computed(self) -> bool:
         """Whether it was more than left out."""
-        return self.method not in ("skip", "one")
+        return self.effect not in EFFECTS or self.method != EFFECTS[self.effect].off
 
 
 class PlanFacts(_Facts):

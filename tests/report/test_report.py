@@ -94,6 +94,13 @@ def test_what_keeps_the_objective_is_around_the_best_value() -> None:
     assert profile.drop == 90.0
 
 
+def test_what_is_off_is_not_told_as_simulated(finished: Finished) -> None:
+    from sweep.report import summary_lines
+
+    line = next(line for line in summary_lines(read_output(finished("stopband"))) if line.startswith("Simulated: "))
+    assert line.startswith("Simulated: quantization, quadrature; all else changes a CSD by at most 0 of 0.1 DN")
+
+
 def test_the_history_ends_at_the_answer(finished: Finished) -> None:
     folder = finished("stopband")
     output = read_output(folder)
