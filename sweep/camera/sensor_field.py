@@ -51,13 +51,14 @@ class SensorField(Section):
     profile: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
     corner_mm: Annotated[float, Field(ge=1e-3, le=1e4)] | None = None
     heights: Annotated[
-        tuple[_Height, ...] | None, BeforeValidator(_listed, json_schema_input_type=Annotated[list[_Height], _SIZE])
+        tuple[_Height, ...] | None,
+        BeforeValidator(_listed, json_schema_input_type=Annotated[list[_Height], _SIZE] | None),
     ] = None
     cra_deg: Annotated[
-        tuple[_Cra, ...] | None, BeforeValidator(_listed, json_schema_input_type=Annotated[list[_Cra], _SIZE])
+        tuple[_Cra, ...] | None, BeforeValidator(_listed, json_schema_input_type=Annotated[list[_Cra], _SIZE] | None)
     ] = None
     places: Annotated[
-        Literal["any"] | int | None, BeforeValidator(_places, json_schema_input_type=Literal["any"] | _Count)
+        Literal["any"] | int | None, BeforeValidator(_places, json_schema_input_type=Literal["any"] | _Count | None)
     ] = None
 
     @model_validator(mode="after")
