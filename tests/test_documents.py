@@ -110,7 +110,11 @@ def test_the_table_of_the_readme_is_that_of_its_command(finished: Finished) -> N
     names = ("RGGB", "RYYCy", "N_4", "nominal", "best stopband")
     lines = [line for line in README.splitlines() if line.endswith(" % |")]
     assert len(lines) == len(names)
+    cells = pd.read_parquet(folder / "regions.parquet").groupby("design_id")[["separated", "pairs"]].sum()
+    told_apart = 100 * cells["separated"] / cells["pairs"]
     for line, name in zip(lines, names, strict=True):
         row = rows.loc[name]
+        share = told_apart[row["design_id"]]
+        assert line.endswith(f"| {share:.{2 if 99.95 < share < 100 else 1}f} % |"), name
         own = f"{row['csd_yellow_red']:.0f} DN | {row['worst_csd_yellow_red']:.0f} DN | {100 * row['yield']:.1f} %"
         assert own in line, name

@@ -201,7 +201,8 @@ class Making:
         if PRICE in names:
             self.inventory.write_table(PRICE, price_table(self.answer))
         if LEFT_OUT in names:
-            given = self.study, self.answer.search, self.answer.best, self.crew, self.progress
+            kept = Kept(self.crew, self.journal, f"{self.sweep.fingerprint} left out")
+            given = self.study, self.answer.search, self.answer.best, kept, self.progress
             self.inventory.write_table(LEFT_OUT, left_out_table(*given))
 
     def _write_drawn(self, names: set[str]) -> None:

@@ -14,9 +14,11 @@ from sweep.camera.imager import imager_of
 from sweep.errors import StudyError
 from sweep.report import make_report, read_output, summary_lines
 from sweep.results.identity import fingerprint
+from sweep.run import held_out, run_study
 from sweep.study import load_study
 
 from ..build import faults, load, ran
+from ..mischief import StoppedError
 
 FILE = "files: [{file: FILE.csv, quantity: photons, signals: {green: [g1], yellow: [y1], red: REDS}}]"
 SWEEP = """\
@@ -83,10 +85,24 @@ def test_other_lights_read_as_in_a_study_of_their_own(folder: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("plain_pictures")
-def test_a_search_without_a_light_finds_no_less(folder: Path) -> None:
-    """Fewer pairs of lights cannot lower the optimum; the same design with the light is at most the study's optimum."""
+def test_a_search_without_a_light_finds_no_less(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fewer pairs of lights cannot lower the optimum; the same design with the light is at most the study's optimum.
+
+    A kill among them loses none.
+    """
     asked = "search: {starts: 4, max_evaluations: 400}\nvalidate: {leave_one_out: true}\n"
-    ran(load(folder, text("one", "own", after=asked)), folder / "one", 1)
+    study = load(folder, text("one", "own", after=asked))
+
+    def stop(phase: str, done: int, _total: int) -> None:
+        if phase == "lights left out" and done == 1:
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        run_study(study, folder / "one", 1, stop)
+    counted, search = [], held_out.search_from
+    monkeypatch.setattr(held_out, "search_from", lambda *call: counted.append(call[0]) or search(*call))
+    ran(study, folder / "one", 1)
+    assert len({id(problem) for problem in counted}) == 1  # of two lights one was searched before the kill
     found = pd.read_parquet(folder / "one" / "leave_one_out.parquet")
     assert list(found["signal"]) == ["own:r1", "own:r2"]  # one yellow light alone cannot be left out
     optimum = json.loads((folder / "one" / "provenance.json").read_text())["search"]["best_smooth_objective"]
