@@ -6,6 +6,7 @@ import re
 
 from .tables import (
     AUDIT,
+    CROSSINGS,
     CURVES,
     FRONT,
     LEFT_OUT,
@@ -36,6 +37,7 @@ TABLES = (
     LEFT_OUT,
     ROBUSTNESS,
     RECOGNITION,
+    CROSSINGS,
     TRADED,
     RENDERED,
     *VISION_TABLES,

@@ -28,6 +28,7 @@ from .inventory import Inventory, no_run
 from .profiles import ParameterProfile, Profiles
 from .tables import (
     AUDIT,
+    CROSSINGS,
     CURVES,
     FEW,
     FOUND,
@@ -54,7 +55,19 @@ from .tables import (
 )
 from .thinning import Counts, thinned
 
-_OPTIONAL = (FRONT, RECOGNITION, SEARCH_LOG, AUDIT, VALIDATED, ROBUSTNESS, LEFT_OUT, TRADED, RENDERED, *VISION_TABLES)
+_OPTIONAL = (
+    FRONT,
+    CROSSINGS,
+    RECOGNITION,
+    SEARCH_LOG,
+    AUDIT,
+    VALIDATED,
+    ROBUSTNESS,
+    LEFT_OUT,
+    TRADED,
+    RENDERED,
+    *VISION_TABLES,
+)
 """Files that some runs alone have."""
 _MOST_SHOWN = 10
 _ALWAYS_WRITTEN = ("study", "seed", "wavelengths", "scenarios", "objective")
@@ -82,6 +95,7 @@ class Output:
     points: pd.DataFrame
     front: pd.DataFrame | None
     recognition: pd.DataFrame | None
+    crossings: pd.DataFrame | None
     searched: pd.DataFrame | None
     audited: pd.DataFrame | None
     left_out: pd.DataFrame | None
@@ -215,6 +229,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         points=points,
         front=more.get(FRONT),
         recognition=more.get(RECOGNITION),
+        crossings=more.get(CROSSINGS),
         searched=more.get(SEARCH_LOG),
         audited=more.get(AUDIT),
         left_out=more.get(LEFT_OUT),

@@ -20,6 +20,7 @@ from ..results.inventory import Inventory
 from ..results.journal import Journal
 from ..results.names import TABLES
 from ..results.tables import (
+    CROSSINGS,
     CURVES,
     FRONT,
     LEFT_OUT,
@@ -42,9 +43,11 @@ from ..results.tables import (
 )
 from ..search.limit import Limit
 from ..study import Study
+from ..study.axes import series_of
 from ..types import Progress
 from .answers import Kept
 from .colors import rendered_table, traded_table
+from .crossings import crossings_table
 from .curves import kept_curves, points_table
 from .front import Front, Gathered, few_of
 from .held_out import held_out_table, left_out_table
@@ -56,6 +59,9 @@ from .rows import Rules, detours_of, with_local_front
 from .search import SearchAnswer, answer_row, front_table, limit_alone, run_search, search_facts, search_log
 from .sweep import Sweep
 from .workers import Workers
+
+_OF_ROWS = {CURVES, POINTS, LIMITED_BY, VALIDATED, ROBUSTNESS, CROSSINGS, RECOGNITION, TRADED, RENDERED}
+"""Made of the rows that the report can show."""
 
 
 def files_of(study: Study) -> set[str]:
@@ -69,6 +75,7 @@ def files_of(study: Study) -> set[str]:
     names |= {TRADED, RENDERED} if study.tasks is not None and "color" in study.tasks.by_name else set()
     names |= {*VISION_TABLES} if study.section.vision is not None else set()
     asked = study.section.recognition
+    names |= {CROSSINGS} if asked is not None and series_of(study.scenarios) else set()
     return names | ({RECOGNITION} if asked is not None and asked.patches else set())
 
 
@@ -103,7 +110,7 @@ class Making:
                 self._sweep()
             if todo & {SEARCH_LOG, FRONT, LEFT_OUT}:
                 self._write_search(todo)
-            if todo & {CURVES, POINTS, LIMITED_BY, VALIDATED, ROBUSTNESS, RECOGNITION, TRADED, RENDERED}:
+            if todo & _OF_ROWS:
                 self._write_drawn(todo)
             if todo & {*VISION_TABLES}:
                 self._write_vision(todo)
@@ -200,6 +207,8 @@ class Making:
             from .robustness import robustness_table  # noqa: PLC0415  (only where lights have a population)
 
             self.inventory.write_table(ROBUSTNESS, robustness_table(self.study, rows, self.crew, self.progress))
+        if CROSSINGS in names:
+            self.inventory.write_table(CROSSINGS, crossings_table(self.study, rows, self.crew, self.progress))
         if RECOGNITION in names:
             table = recognition_table(self.study, rows, self.crew, self.progress)
             assert table is not None
