@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -10,9 +11,10 @@ import pandas as pd
 from ..metrics.columns.confusion import D_PRIME, STATE_ERROR, STATE_ERROR_BOUND
 from ..metrics.recognition import CLASSIFIERS, MOST_LIKELY
 from ..results.output import Output
-from ..types import FloatArray
-from .series import Line, SeriesFigure
-from .values import over_series, scenario_series, series_figures
+from ..study.axes import series_of
+from ..types import BoolArray, FloatArray
+from .series import Line, SeriesFigure, quantity_of
+from .values import over_series, series_figures
 
 _LEAST = 1e-12
 _RULE_NAMES = {MOST_LIKELY: "most likely signal", "nearest_centroid": "nearest centroid", "lda": "LDA"}
@@ -35,7 +37,7 @@ def noise_figures(output: Output) -> Iterator[SeriesFigure]:
     if allowed is None:
         return
     rows = output.few
-    for (base, key), scenarios in scenario_series(output).items():
+    for (base, key), scenarios in series_of(output.scenarios).items():
         x = np.array(list(scenarios.values()))
         title = f"{output.study.study}: {base}"
         errors = {n: Line(np.maximum(y, _LEAST), None) for n, y in over_series(rows, scenarios, STATE_ERROR).items()}
@@ -58,13 +60,14 @@ def usable_lines(output: Output) -> Iterator[str]:
     allowed = _allowed(output)
     if allowed is None:
         return
-    for series in noise_figures(output):
-        if series.level is None:
-            continue
-        name, unit = series.quantity
+    rows = output.few
+    for (base, key), scenarios in series_of(output.scenarios).items():
+        name, unit = quantity_of(key)
+        x = np.array(list(scenarios.values()))
         ranges: dict[str, list[str]] = {}
-        for design, line in series.lines.items():
-            ranges.setdefault(_range(series.x, line.y, allowed, unit), []).append(design)
+        for design, errors in over_series(rows, scenarios, STATE_ERROR).items():
+            where = _range(x, errors <= allowed, unit, _crossing(output, base, key, design))
+            ranges.setdefault(where, []).append(design)
         found = [f"{_listed(designs)} {where}" for where, designs in ranges.items()]
         if found:
             yield f"Over {name}, noise confuses states at most {allowed:g} of the time: {'; '.join(found)}."
@@ -74,34 +77,40 @@ def _listed(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
-def _range(x: FloatArray, errors: FloatArray, allowed: float, unit: str) -> str:
+def _range(x: FloatArray, usable: BoolArray, unit: str, crossing: float | None) -> str:
     """Where among the numbers `x` (ascending) a design is usable, in words.
 
-    Where that ends once, about where: by the logarithms of error and number, linear between the two scenarios.
+    Where that ends once, by the computed `crossing`, rounded to the side where it is usable; without one, by the two
+    numbers between which it ends.
     """
-    usable = errors <= allowed
     if usable.all():
         return "everywhere"
     if not usable.any():
         return "nowhere"
     ends = np.flatnonzero(np.diff(usable))
-    if len(ends) == 1:
-        at, of = ends[0], f" {unit}".rstrip()
-        about = float(f"{_crossing(x[at : at + 2], errors[at : at + 2], allowed):.2g}")
-        if usable[0]:
-            return f"up to about {float(f'{about:.2g}'):g}{of} (at {x[at]:g}, not at {x[at + 1]:g})"
-        return f"from about {float(f'{about:.2g}'):g}{of} (at {x[at + 1]:g}, not at {x[at]:g})"
-    return f"at {' '.join(f'{v:g}' for v in x[usable])} {unit}".rstrip()
+    of = f" {unit}".rstrip()
+    if len(ends) > 1:
+        return f"at {' '.join(f'{v:g}' for v in x[usable])}{of}"
+    low, high = x[ends[0] : ends[0] + 2]
+    word = "up to" if usable[0] else "from"
+    if crossing is None:
+        return f"{word} a number between {low:g} and {high:g}{of}"
+    return f"{word} {_rounded(crossing, up=not usable[0]):g}{of}"
 
 
-def _crossing(x: FloatArray, errors: FloatArray, allowed: float) -> float:
-    """Where between two numbers the error is what is allowed; one of them where it is told no smaller."""
-    logarithms = np.log(np.maximum(errors, _LEAST))
-    share = (np.log(allowed) - logarithms[0]) / (logarithms[1] - logarithms[0])
-    share = min(max(float(share), 0.0), 1.0)
-    if not x[0] > 0:
-        return float(x[0] + share * (x[1] - x[0]))
-    return float(x[0] * (x[1] / x[0]) ** share)
+def _rounded(value: float, *, up: bool) -> float:
+    """Three digits of a number, to one side."""
+    unit = 10.0 ** (math.floor(math.log10(abs(value))) - 2) if value else 1.0
+    return float(f"{(math.ceil if up else math.floor)(value / unit * (1 - 1e-12)) * unit:.3g}")
+
+
+def _crossing(output: Output, series: str, key: str, design: str) -> float | None:
+    """The number at which a design's error is what is allowed, as the run has computed it."""
+    table = output.crossings
+    if table is None:
+        return None
+    own = table[(table["series"] == series) & (table["key"] == key) & (table["name"] == design)]["at"].dropna()
+    return float(own.iloc[0]) if len(own) == 1 else None
 
 
 def told_apart_table(output: Output) -> pd.DataFrame:

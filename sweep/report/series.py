@@ -67,13 +67,18 @@ class SeriesFigure:
     @property
     def quantity(self) -> tuple[str, str]:
         """Name and unit of the scenarios' number; the unit may be empty."""
-        name, _, unit = self.x_label.partition(" / ")
-        return name, unit.strip("()")
+        return quantity_of(self.key)
 
     @property
     def log_x(self) -> bool:
         """Whether the numbers span more than a decade."""
         return bool(self.x.min() > 0 and self.x.max() / self.x.min() > _WIDE)
+
+
+def quantity_of(key: str) -> tuple[str, str]:
+    """Name and unit of the number that scenarios differ in by its key; the unit may be empty."""
+    name, _, unit = _LABELS.get(key, key).partition(" / ")
+    return name, unit.strip("()")
 
 
 def lead_sentence(series: SeriesFigure) -> str:

@@ -15,6 +15,7 @@ from ..metrics.quantity import Column
 from ..results.facts import Origin
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
+from ..study.axes import series_of
 from ..study.schema import Modification
 from .figures import TYPE_COLORS, CurvesFigure, ParetoFigure, Points
 from .names import label
@@ -93,28 +94,6 @@ def _points(output: Output, rows: pd.DataFrame, labels: Sequence[str] = ()) -> P
     return Points(x, rows[separation.name].to_numpy(dtype=float), tuple(map(str, labels)))
 
 
-def scenario_series(output: Output) -> dict[tuple[str, str], dict[str, float]]:
-    """Sets of scenarios that differ in one number: (name, key) -> scenario -> number, in order of the numbers."""
-    groups: dict[tuple[str, str], dict[str, float]] = {}
-    for name in output.scenarios:
-        base, _, last = str(name).rpartition(" ")
-        key, equals, number = last.partition("=")
-        value = _number(number)
-        if base and equals and "=" not in base and value is not None:
-            groups.setdefault((base, key), {})[name] = value
-    ordered = {group: dict(sorted(found.items(), key=lambda item: item[1])) for group, found in groups.items()}
-    return {group: found for group, found in ordered.items() if len(found) > 1}
-
-
-def _number(text: str) -> float | None:
-    """A finite number, or None: a scenario that a person named may have an `=` followed by anything."""
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    return value if np.isfinite(value) else None
-
-
 def over_series(rows: pd.DataFrame, scenarios: Mapping[str, float], column: str) -> dict[str, np.ndarray]:
     """Values of a column over a series' numbers for every design that has them all, ndarray[n_scenarios] each."""
     found = {}
@@ -130,7 +109,7 @@ def series_figures(output: Output) -> list[SeriesFigure]:
     best_place = next(
         (c.name for c in output.columns.values() if (c.extreme, c.of) == ("best place", separation.name)), ""
     )
-    figures, series = [], scenario_series(output)
+    figures, series = [], series_of(output.scenarios)
     for (base, key), scenarios in series.items():
         upper = over_series(rows, scenarios, best_place) if best_place in rows else {}
         upper = {name: values for name, values in upper.items() if np.isfinite(values).all()}

@@ -12,6 +12,7 @@ from .names import FIGURES, REPORT, RUN, SUMS
 from .price import price_schema
 from .tables import (
     AUDIT,
+    CROSSINGS,
     CURVES,
     FRONT,
     LEFT_OUT,
@@ -117,6 +118,9 @@ FILES = {
     CURVES: "a row per curve and wavelength: " + ", ".join(SCHEMA.names),
     POINTS: "what the clouds draw: design_id, signal_type, signal, channel, dn",
     RECOGNITION: "raw patches told apart by classifiers, where a study asks for them, with 95 % intervals",
+    CROSSINGS: "where a study with `recognition` has scenarios that differ in one number: the number `at` which a "
+    "plain CFA, named design or answer of the search has the allowed error, between those of two scenarios (`low`, "
+    "`high`), with everything on, and the `error` there; null where no study may have a scene between the two",
     TRADED: "where a study has the task `color`: mean color error against luminance SNR, a row per design, light and "
     "regularization of the color matrix",
     RENDERED: "there, too: colors (XYZ over white) and noise of the areas of two rendered pictures",

@@ -6,6 +6,7 @@ import re
 
 from .tables import (
     AUDIT,
+    CROSSINGS,
     CURVES,
     FRONT,
     LEFT_OUT,
@@ -42,6 +43,7 @@ TABLES = (
     REGIONS_MAP,
     SENSOR_MAP,
     RECOGNITION,
+    CROSSINGS,
     TRADED,
     RENDERED,
     *VISION_TABLES,

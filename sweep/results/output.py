@@ -3,31 +3,29 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
-from pydantic import BaseModel
 from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from ..errors import Fault, OutputError
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective
 from ..metrics.quantity import Column
 from ..study import StudySection
+from .checks import check_columns, checked_facts, lacking_in, read_mapping
 from .curves import SCHEMA as CURVES_SCHEMA
 from .curves import KeptCurves
-from .facts import Provenance, lacking
+from .facts import Provenance
 from .inventory import Inventory, no_run
 from .profiles import ParameterProfile, Profiles
 from .tables import (
     AUDIT,
+    CROSSINGS,
     CURVES,
     FEW,
     FOUND,
@@ -60,6 +58,7 @@ from .thinning import Counts, thinned
 _OPTIONAL = (
     FRONT,
     PRICE,
+    CROSSINGS,
     RECOGNITION,
     SEARCH_LOG,
     AUDIT,
@@ -73,10 +72,8 @@ _OPTIONAL = (
     *VISION_TABLES,
 )
 """Files that some runs alone have."""
-_MOST_SHOWN = 10
 _ALWAYS_WRITTEN = ("study", "seed", "wavelengths", "scenarios", "objective")
 """Keys of every resolved study: it has its defaults, too, so that one that lacks them was cut."""
-_Model = TypeVar("_Model", bound=BaseModel)
 
 
 @dataclass(frozen=True)
@@ -100,6 +97,7 @@ class Output:
     points: pd.DataFrame
     front: pd.DataFrame | None
     recognition: pd.DataFrame | None
+    crossings: pd.DataFrame | None
     searched: pd.DataFrame | None
     audited: pd.DataFrame | None
     left_out: pd.DataFrame | None
@@ -210,20 +208,20 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
     if not audited and AUDIT in optional:
         optional.remove(AUDIT)
     inventory.require([RESULTS, CURVES, POINTS, LIMITED_BY, RESOLVED, PROVENANCE, *optional])
-    resolved = _mapping(folder / RESOLVED, lambda text: YAML(typ="safe").load(text))
+    resolved = read_mapping(folder / RESOLVED, lambda text: YAML(typ="safe").load(text))
     if lacks := [key for key in _ALWAYS_WRITTEN if key not in resolved]:
-        raise _lacking(folder / RESOLVED, lacks)
-    study = _checked(folder / RESOLVED, StudySection, resolved)
-    provenance = _checked(folder / PROVENANCE, Provenance, _mapping(folder / PROVENANCE, json.loads))
-    _check_columns(folder / RESULTS, [*ROW_COLUMNS, *provenance.parameters, *(c.name for c in provenance.quantities)])
-    _check_columns(folder / LIMITED_BY, ["design_id"])
-    _check_columns(folder / POINTS, ["design_id", "signal_type", "signal", "channel", "dn"])
+        raise lacking_in(folder / RESOLVED, lacks)
+    study = checked_facts(folder / RESOLVED, StudySection, resolved)
+    provenance = checked_facts(folder / PROVENANCE, Provenance, read_mapping(folder / PROVENANCE, json.loads))
+    check_columns(folder / RESULTS, [*ROW_COLUMNS, *provenance.parameters, *(c.name for c in provenance.quantities)])
+    check_columns(folder / LIMITED_BY, ["design_id"])
+    check_columns(folder / POINTS, ["design_id", "signal_type", "signal", "channel", "dn"])
     if FRONT in optional:
-        _check_columns(folder / FRONT, front_schema(()).names)
+        check_columns(folder / FRONT, front_schema(()).names)
     if LEFT_OUT in optional:
-        _check_columns(folder / LEFT_OUT, ["objective", "signal_type", "signal", "fall"])
+        check_columns(folder / LEFT_OUT, ["objective", "signal_type", "signal", "fall"])
     if ROBUSTNESS in optional:
-        _check_columns(folder / ROBUSTNESS, ["design_id", "breaks_at", "breaks_thickness"])
+        check_columns(folder / ROBUSTNESS, ["design_id", "breaks_at", "breaks_thickness"])
     objective = study.objective.column
     profiles = Profiles(objective, next(iter(study.scenarios)), provenance.parameters)
     table, counts = thinned(folder / RESULTS, [objective, *provenance.trade_off], provenance.trade_off[0], profiles.add)
@@ -240,6 +238,7 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         points=points,
         front=more.get(FRONT),
         recognition=more.get(RECOGNITION),
+        crossings=more.get(CROSSINGS),
         searched=more.get(SEARCH_LOG),
         audited=more.get(AUDIT),
         left_out=more.get(LEFT_OUT),
@@ -261,40 +260,8 @@ def _joined(table: pd.DataFrame, *others: pd.DataFrame | None) -> pd.DataFrame:
 
 
 def _kept_curves(path: Path) -> KeptCurves:
-    _check_columns(path, CURVES_SCHEMA.names)
+    check_columns(path, CURVES_SCHEMA.names)
     try:
         return KeptCurves.of_table(read_table(path))
     except ValueError as error:
         raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
-
-
-def _mapping(path: Path, parse: Callable[[str], Any]) -> dict[str, Any]:
-    try:
-        found = parse(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError, YAMLError) as error:
-        raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
-    if not isinstance(found, dict):
-        raise OutputError(Fault("not a mapping", str(path)))
-    return found
-
-
-def _checked(path: Path, kind: type[_Model], data: Mapping[str, Any]) -> _Model:
-    """The data as an object; raises OutputError that names what is missing or no such thing."""
-    if lacks := lacking(kind, data):
-        raise _lacking(path, lacks[:_MOST_SHOWN])
-    return kind.model_validate(data)
-
-
-def _lacking(path: Path, what: Sequence[str]) -> OutputError:
-    again = "delete it, and `sweep run` of the study makes it again"
-    return OutputError(Fault(f"lacks {', '.join(what)}; {again}", str(path)))
-
-
-def _check_columns(path: Path, wanted: Sequence[str]) -> None:
-    try:
-        names = pq.read_schema(path).names
-    except (OSError, pa.ArrowException) as error:
-        raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
-    lacking = [name for name in dict.fromkeys(wanted) if name not in names]
-    if lacking:
-        raise _lacking(path, lacking)

@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from statistics import median
 
 import pyarrow as pa
 from threadpoolctl import threadpool_limits
@@ -99,15 +100,15 @@ def _sampled(sweep: Sweep, todo: list[Job]) -> tuple[float, float]:
         firsts.setdefault(kind, job)
     ordered = sorted(firsts, key=lambda kind: -rows[kind])  # the largest first
     tables: list[pa.Table] = []
-    total, measured, first_s = 0.0, 0, 0.0
+    total, measured, first_s = 0.0, 0, list[float]()
     with threadpool_limits(1):
         for first, per_row, table, kind in _measured(sweep, [(kind, firsts[kind]) for kind in ordered]):
-            first_s += first
+            first_s.append(first)
             total += per_row * rows[kind]
             measured += rows[kind]
             tables.append(table)
-    # A scene's kernel is made for its rows, and again for what is drawn of them.
-    kernels_s = _TIMES_MADE * first_s * len(ordered) / len(tables)
+    # A scene's kernel is made for its rows, and again for what is drawn of them; the first one is made already.
+    kernels_s = _TIMES_MADE * median(first_s[1:] or first_s) * len(ordered)
     sample = pa.concat_tables(tables).unify_dictionaries()
     bytes_per_row = (len(encoded(sample)) - len(encoded(sample.slice(0, 1)))) / max(1, sample.num_rows - 1)
     return total * sum(rows.values()) / measured + kernels_s, bytes_per_row
@@ -115,6 +116,8 @@ def _sampled(sweep: Sweep, todo: list[Job]) -> tuple[float, float]:
 
 def _measured(sweep: Sweep, kinds: list[tuple[_Kind, Job]]) -> Iterator[tuple[float, float, pa.Table, _Kind]]:
     """Seconds of the first design and of each other one, sampled rows and kind, until the budget is spent."""
+    job = kinds[0][1]
+    sweep.compute(replace(job, stop=job.start + 1))  # compiles what is not compiled yet
     begun = time.monotonic()
     for kind, job in kinds:
         few = replace(job, stop=min(job.stop, job.start + _SAMPLE))

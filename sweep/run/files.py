@@ -20,23 +20,13 @@ from ..results.inventory import Inventory
 from ..results.journal import Journal
 from ..results.names import TABLES
 from ..results.tables import (
-    CURVES,
     FRONT,
     LEFT_OUT,
-    LIMITED_BY,
-    POINTS,
     PRICE,
     PROVENANCE,
-    RECOGNITION,
-    REGIONS_MAP,
-    RENDERED,
     RESOLVED,
     RESULTS,
-    ROBUSTNESS,
     SEARCH_LOG,
-    SENSOR_MAP,
-    TRADED,
-    VALIDATED,
     VISION_TABLES,
     holds,
     json_of,
@@ -47,13 +37,10 @@ from ..search.limit import Limit
 from ..study import Study
 from ..types import Progress
 from .answers import Kept
-from .colors import rendered_table, traded_table
-from .curves import kept_curves, points_table
 from .front import Front, Gathered, few_of
-from .held_out import held_out_table, left_out_table
-from .limiting import limited_by_table
+from .held_out import left_out_table
+from .of_rows import ROW_TABLES, Shown
 from .provenance import plan_facts, provenance, resolved_yaml
-from .recognition import recognition_table
 from .routes import Detours, detours_in_words
 from .rows import Rules, detours_of, with_local_front
 from .search import (
@@ -69,25 +56,15 @@ from .search import (
 from .sweep import Sweep
 from .workers import Workers
 
-_DRAWN = {CURVES, POINTS, LIMITED_BY, VALIDATED, ROBUSTNESS, REGIONS_MAP, SENSOR_MAP, RECOGNITION, TRADED, RENDERED}
-"""Tables of the few designs that a report draws."""
-
 
 def files_of(study: Study) -> set[str]:
     """Names of the files that a run of the study makes."""
-    names = {RESULTS, CURVES, POINTS, LIMITED_BY, RESOLVED, PROVENANCE}
+    names = {RESULTS, RESOLVED, PROVENANCE, *(name for name, table in ROW_TABLES.items() if table.asked(study))}
     if study.search is not None:
         names |= {SEARCH_LOG, FRONT} if study.search.levels else {SEARCH_LOG}
-    names |= {PRICE} if study.search is not None and study.search.nominal_levels else set()
-    names |= {VALIDATED} if study.held_out is not None else set()
+        names |= {PRICE} if study.search.nominal_levels else set()
     names |= {LEFT_OUT} if study.leaves_one_out else set()
-    names |= {ROBUSTNESS} if study.pair_over_population is not None else set()
-    names |= {REGIONS_MAP} if study.section.regions is not None else set()
-    names |= {SENSOR_MAP} if any(s.field is not None for s in study.scenarios.values()) else set()
-    names |= {TRADED, RENDERED} if study.tasks is not None and "color" in study.tasks.by_name else set()
-    names |= {*VISION_TABLES} if study.section.vision is not None else set()
-    asked = study.section.recognition
-    return names | ({RECOGNITION} if asked is not None and asked.patches else set())
+    return names | ({*VISION_TABLES} if study.section.vision is not None else set())
 
 
 @dataclass
@@ -121,8 +98,8 @@ class Making:
                 self._sweep()
             if todo & {SEARCH_LOG, FRONT, PRICE, LEFT_OUT}:
                 self._write_search(todo)
-            if todo & _DRAWN:
-                self._write_drawn(todo)
+            if todo & ROW_TABLES.keys():
+                self._write_of_rows(todo)
             if todo & {*VISION_TABLES}:
                 self._write_vision(todo)
             if RESOLVED in todo:
@@ -201,48 +178,25 @@ class Making:
         if PRICE in names:
             self.inventory.write_table(PRICE, price_table(self.answer))
         if LEFT_OUT in names:
-            kept = Kept(self.crew, self.journal, f"{self.sweep.fingerprint} left out")
+            kept = self._kept("left out")
             given = self.study, self.answer.search, self.answer.best, kept, self.progress
             self.inventory.write_table(LEFT_OUT, left_out_table(*given))
 
-    def _write_drawn(self, names: set[str]) -> None:
+    def _write_of_rows(self, names: set[str]) -> None:
         rows, on_front = self.gathered.frame(), self.gathered.front_frame()
-        if CURVES in names:
-            self.inventory.write_table(CURVES, kept_curves(self.study, rows, on_front, self._limit()).table())
-        if POINTS in names:
-            self.inventory.write_table(POINTS, points_table(self.study, rows, on_front))
-        if LIMITED_BY in names:
-            table = limited_by_table(self.study, rows, on_front, self.crew, self.progress)
-            self.inventory.write_table(LIMITED_BY, table)
-        if VALIDATED in names:
-            table = held_out_table(self.study, rows, on_front, self.crew, self.progress)
-            self.inventory.write_table(VALIDATED, table)
-        if ROBUSTNESS in names:
-            from .robustness import robustness_table  # noqa: PLC0415  (only where lights have a population)
+        shown = Shown(self.study, rows, on_front, self._limit, self.crew, self._kept, self.progress)
+        for name, table in ROW_TABLES.items():
+            if name in names:
+                self.inventory.write_table(name, table.made(shown))
 
-            kept = Kept(self.crew, self.journal, f"{self.sweep.fingerprint} robustness")
-            self.inventory.write_table(ROBUSTNESS, robustness_table(self.study, rows, kept, self.progress))
-        if REGIONS_MAP in names:
-            from .allowed_lamps import regions_table  # noqa: PLC0415  (only where a study asks for it)
-
-            self.inventory.write_table(REGIONS_MAP, regions_table(self.study, rows, self.crew, self.progress))
-        if SENSOR_MAP in names:
-            from .sensor_map import sensor_map_table  # noqa: PLC0415  (only where a scene has places of the sensor)
-
-            self.inventory.write_table(SENSOR_MAP, sensor_map_table(self.study, rows, self.crew, self.progress))
-        if RECOGNITION in names:
-            table = recognition_table(self.study, rows, self.crew, self.progress)
-            assert table is not None
-            self.inventory.write_table(RECOGNITION, table)
-        if TRADED in names:
-            self.inventory.write_table(TRADED, traded_table(self.study, rows))
-        if RENDERED in names:
-            self.inventory.write_table(RENDERED, rendered_table(self.study, rows))
+    def _kept(self, what: str) -> Kept:
+        """Calls whose results the journal keeps."""
+        return Kept(self.crew, self.journal, f"{self.sweep.fingerprint} {what}")
 
     def _write_vision(self, names: set[str]) -> None:
         from .vision import vision_tables  # noqa: PLC0415  (only where a study asks for images)
 
-        parallel = Kept(self.crew, self.journal, f"{self.sweep.fingerprint} vision")
+        parallel = self._kept("vision")
         tables = vision_tables(self.study, self.gathered.frame(), parallel, self.progress)
         for name in names & tables.keys():
             self.inventory.write_table(name, tables[name])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from copy import deepcopy
 from itertools import product
 from typing import Annotated, Any
@@ -139,3 +140,25 @@ def _set(mapping: dict[str, Any], path: list[str], number: float) -> None:
         if not isinstance(mapping, dict):
             raise ValueError(f"each: {key} is no mapping")
     mapping[path[-1]] = number
+
+
+def series_of(scenarios: Iterable[str]) -> dict[tuple[str, str], dict[str, float]]:
+    """Sets of scenarios that differ in one number: (name, key) -> scenario -> number, in order of the numbers."""
+    groups: dict[tuple[str, str], dict[str, float]] = {}
+    for name in scenarios:
+        base, _, last = str(name).rpartition(" ")
+        key, equals, number = last.partition("=")
+        value = _number(number)
+        if base and equals and "=" not in base and value is not None:
+            groups.setdefault((base, key), {})[name] = value
+    ordered = {group: dict(sorted(found.items(), key=lambda item: item[1])) for group, found in groups.items()}
+    return {group: found for group, found in ordered.items() if len(found) > 1}
+
+
+def _number(text: str) -> float | None:
+    """A finite number, or None: a scenario that a person named may have an `=` followed by anything."""
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None

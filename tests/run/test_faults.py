@@ -177,6 +177,20 @@ def test_dry_run_counts_what_is_finished(plain: Study, tmp_path: Path) -> None:
     )
 
 
+def test_a_dry_run_counts_evaluations_of_search_front_and_lights_left_out(tmp_path: Path) -> None:
+    path = study_file(tmp_path, 2)
+    text = path.read_text()
+    counts = []
+    for asked in (
+        "starts: 4, max_evaluations: 40",
+        "starts: 4, max_evaluations: 40, front: {min: 0.8, max: 0.9, count: 3}",
+    ):
+        path.write_text(text.replace("starts: 4, max_evaluations: 200", asked))
+        counts.append(estimate(load_study(path), tmp_path / "out", 1, lambda *_: None).evaluations)
+    assert counts == [40, 40 + 3 * 40]  # a level has four starts with as many evaluations each
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_changed_study_goes_beside_the_old_one(plain: Study, tmp_path: Path) -> None:
     base = tmp_path / "tiny"
     assert output_folder(base, plain) == (base, None)

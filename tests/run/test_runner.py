@@ -23,13 +23,13 @@ from sweep.designs.space import Filter, Space
 from sweep.errors import OutputError, StudyError
 from sweep.metrics.evaluate import evaluate
 from sweep.report import make_report, read_output
-from sweep.report.values import scenario_series
 from sweep.results.identity import CHUNK
 from sweep.results.journal import Journal
 from sweep.results.lock import locked
 from sweep.run import run_study
 from sweep.run.rows import Job, jobs_of, rules_of, run_job
 from sweep.study import Study, load_study
+from sweep.study.axes import series_of
 
 from ..build import STUDY, ran, study_file
 
@@ -269,7 +269,7 @@ def test_a_scenario_may_have_any_name(tmp_path: Path) -> None:
     ran(load_study(path), tmp_path / "out", 1)
     output = read_output(tmp_path / "out")
     make_report(output)
-    assert scenario_series(output) == {}
+    assert series_of(output.scenarios) == {}
 
 
 @pytest.mark.parametrize(

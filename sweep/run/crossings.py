@@ -1,0 +1,157 @@
+"""Up to where designs are usable: the number between two scenarios at which the error of states is what is allowed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+from pydantic import ValidationError
+
+from ..camera.imager import Imager
+from ..camera.methods import REFERENCE
+from ..camera.pixel import Pixel
+from ..camera.scenario import Scenario
+from ..camera.view import View
+from ..metrics.columns.confusion import STATE_ERROR
+from ..metrics.evaluate import evaluate
+from ..results.designs import row_curves
+from ..results.tables import FEW
+from ..study import Study
+from ..study.axes import series_of
+from ..types import FloatArray, Parallel, Progress, delayed
+
+_LEAST = 1e-300
+_CLOSE = 1e-3
+"""The number is found so closely, relative."""
+_FIELDS = [
+    ("design_id", pa.int64()),
+    *((name, pa.string()) for name in ("name", "series", "key")),
+    *((name, pa.float64()) for name in ("low", "high", "at", "error")),
+]
+
+
+@dataclass(frozen=True)
+class ScenesBetween:
+    """Scenes between two that differ in one number: the keys to it, what all of them say, and the pixel of the study.
+
+    `view`: of the lower one, as a CFA sees it.
+    """
+
+    view: View
+    pixel: Pixel
+    said: Mapping[str, Any]
+    path: tuple[str, ...]
+
+    def at(self, number: float) -> View:
+        """The scene with another number, everything on. Raises ValidationError where a study may not have it."""
+        said = _with(self.said, self.path, number)
+        scene = Scenario.model_validate(said)
+        pixel = self.pixel if scene.noise is None else scene.noise.of(self.pixel)
+        return replace(self.view, scenario=scene, pixel=pixel, methods=REFERENCE)
+
+
+def crossings_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
+    """A row per series of scenarios and plain CFA, named design or answer whose error passes what is allowed once.
+
+    `series`, `key`: of scenarios that differ in one number; `low`, `high`: the numbers of the two between which it
+    passes, `at`: where, with everything on, and the `error` there. `design_id`: of the row at `low`.
+    """
+    asked = study.section.recognition
+    assert asked is not None
+    few = rows[rows["kind"].isin(FEW) & (rows["status"] == "ok")]
+    found: list[dict[str, Any]] = []
+    calls = []
+    for (series, key), scenarios in series_of(study.scenarios).items():
+        for row, ends, errors in _passing(few, scenarios, asked.error_max):
+            space, curves = row_curves(study, row)
+            between = _between(study, study.view(space, ends[0]), ends)
+            if between is not None:
+                numbers = tuple(scenarios[end] for end in ends)
+                calls.append(delayed(_crossing, between, curves, study.states, numbers, errors, asked.error_max))
+                own = {"design_id": row["design_id"], "name": row["name"], "series": series, "key": key}
+                found.append(own | {"low": numbers[0], "high": numbers[1]})
+    for number, (row, values) in enumerate(zip(found, parallel(iter(calls)), strict=True), 1):
+        row.update(values)
+        progress("where designs stop being usable", number, len(found))
+    return pa.Table.from_pylist(found, schema=pa.schema(_FIELDS))
+
+
+def _passing(
+    few: pd.DataFrame, scenarios: Mapping[str, float], allowed: float
+) -> Iterator[tuple[dict[Any, Any], tuple[str, str], tuple[float, float]]]:
+    """Designs whose error passes what is allowed once: the row before, both scenarios, and the errors in them."""
+    for _, own in few[few["scenario"].isin(list(scenarios))].groupby("name", observed=True, sort=False):
+        by_scene = {str(row["scenario"]): row for row in own.to_dict("records")}
+        if by_scene.keys() != scenarios.keys():
+            continue
+        errors = {name: float(by_scene[name][STATE_ERROR]) for name in scenarios}
+        turns = [(a, b) for a, b in pairwise(scenarios) if (errors[a] <= allowed) != (errors[b] <= allowed)]
+        if len(turns) == 1:
+            a, b = turns[0]
+            yield by_scene[a], (a, b), (errors[a], errors[b])
+
+
+def _between(study: Study, view: View, ends: tuple[str, str]) -> ScenesBetween | None:
+    """The scenes between two of a study, seen as `view` sees the first; None where more than a number differs."""
+    first, second = (study.scenarios[name].model_dump(mode="json", by_alias=True, exclude_none=True) for name in ends)
+    one, other = dict(_leaves(first)), dict(_leaves(second))
+    paths = [path for path in {**one, **other} if one.get(path) != other.get(path)]
+    if len(paths) != 1 or not all(isinstance(leaves.get(paths[0]), int | float) for leaves in (one, other)):
+        return None
+    return ScenesBetween(view, study.pixel, first, paths[0])
+
+
+def _leaves(said: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    if isinstance(said, Mapping):
+        for key, inner in said.items():
+            yield from _leaves(inner, (*path, key))
+    else:
+        yield path, said
+
+
+def _with(said: Mapping[str, Any], path: tuple[str, ...], number: float) -> dict[str, Any]:
+    inner = number if len(path) == 1 else _with(said[path[0]], path[1:], number)
+    return {**said, path[0]: inner}
+
+
+def state_error_of(view: View, curves: FloatArray, states: tuple[str, ...]) -> float:
+    """How often noise confuses the worst two states of a filter; `curves`: ndarray[1, n_modified, n_wavelengths]."""
+    return float(evaluate(Imager(view, once=True), curves, states)[STATE_ERROR][0])
+
+
+def _crossing(
+    between: ScenesBetween,
+    curves: FloatArray,
+    states: tuple[str, ...],
+    ends: tuple[float, float],
+    errors: tuple[float, float],
+    allowed: float,
+) -> dict[str, float]:
+    """Where the error is what is allowed, and what it is there; nothing where no scene between the two can be had.
+
+    The logarithms of both numbers are nearly on a line; `errors`: at the ends, as the run has them.
+    """
+    from scipy.optimize import brentq  # noqa: PLC0415  (few studies ask for it)
+
+    known = dict(zip(ends, errors, strict=True))
+    by_ratio = min(ends) > 0
+
+    def decades(place: float) -> float:
+        number = float(np.exp(place)) if by_ratio else place
+        number = min(ends, key=lambda end: abs(end - number)) if place in places else number
+        if number not in known:
+            known[number] = state_error_of(between.at(number), curves, states)
+        return float(np.log10(max(known[number], _LEAST) / allowed))
+
+    places = tuple(float(np.log(end)) if by_ratio else end for end in ends)
+    try:
+        place = brentq(decades, *places, xtol=_CLOSE * (1.0 if by_ratio else abs(ends[1] - ends[0])))
+        at = float(np.exp(place)) if by_ratio else float(place)
+        return {"at": at, "error": state_error_of(between.at(at), curves, states)}
+    except ValidationError:
+        return {}
