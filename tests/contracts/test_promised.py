@@ -17,10 +17,14 @@ _MANY = 1040
 _FEW = 20
 
 
-def keep_a_plan(seed: int) -> tuple[int, float, float, float, str]:
+_BUDGET_S = 0.05
+"""What a limited planner may spend here: some of the bounds that it would like to have."""
+
+
+def keep_a_plan(seed: int, budget_s: float = np.inf) -> tuple[int, float, float, float, str]:
     """(seed, tolerance, promised, largest realized error, its column) of the plan for a random scene."""
     made = random_scene(seed)
-    plan = Planner([made.box]).plan(made.name, made.tolerance_dn)
+    plan = Planner([made.box], budget_s=budget_s).plan(made.name, made.tolerance_dn)
     planned, exact = columns(made, plan.methods), columns(made, REFERENCE)
     assert planned.keys() == exact.keys()
     realized = {name: float(np.abs(planned[name] - exact[name]).max()) for name in exact}
@@ -42,6 +46,12 @@ def check(seeds: range, processes: int) -> None:
 
 def test_plans_of_random_scenes_keep_their_promise() -> None:
     check(range(_FEW), 1)
+
+
+def test_plans_that_are_found_in_haste_keep_their_promise() -> None:
+    found = [keep_a_plan(seed, _BUDGET_S) for seed in range(_FEW, 2 * _FEW)]
+    assert [row for row in found if not row[2] <= row[1]] == []
+    assert [row for row in found if not row[3] <= row[2] * (1 + 1e-9) + _ARITHMETIC_DN] == []
 
 
 @pytest.mark.slow

@@ -9,18 +9,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 
-from ..effects.base import Effect, Stage
+from ..effects.base import Effect, KernelEffect, ReadoutEffect, Stage
+from ..effects.blur import Blur
 from ..field import over_field
 from ..kernel import colorless
-from ..methods import REFERENCE, Methods
+from ..methods import REFERENCE, Methods, switched
 from ..registry import EFFECTS
 from .bounds import Box
 from .promises import Promises
 from .scene_kernels import SceneKernels
-from .work import PLANNED_PATCH, PLANNED_TARGET
+from .work import NOISE_S, READOUT_S, LOOKING_SHARE, in_all
 
 _NOTHING_DN = 1e-9
-_NOT_ASKED = "to find out whether it matters takes longer"
+NOT_ASKED = "to find out whether it matters takes longer"
 _LIMITS = tuple(name for name, effect in EFFECTS.items() if effect.is_limit)
 
 
@@ -36,7 +37,8 @@ class Choice:
 
 @dataclass(frozen=True)
 class Plan:
-    """How one scene is simulated; `work` estimates the operations for all designs, `reference_work` everything on.
+    """How one scene is simulated; `work` estimates the seconds of all designs (see `work`), `reference_work` those of
+    everything on.
 
     Everything on is a mathematical limit. What no method reaches (the last of all places of a light, and how a readout
     in whole numbers moves the worst of them) is part of every promise, so that `promised_dn` may be above
@@ -79,12 +81,19 @@ class Plan:
 class Planner:
     """Finds the plan of a scene for all its boxes of designs."""
 
-    def __init__(self, boxes: Sequence[Box], *, for_noise: bool = False) -> None:
-        """`for_noise`: metrics of noise are asked for, which need every pixel and what the readout does to it."""
-        self._for_noise = for_noise
-        self._scenes = _promises(boxes)
+    def __init__(self, boxes: Sequence[Box], *, for_noise: bool = False, budget_s: float = math.inf) -> None:
+        """`for_noise`: metrics of noise are asked for, which need every pixel and what the readout does to it.
+
+        `budget_s`: after so many counted seconds the best plan so far is taken; then, too, no method is looked at that
+        saves less than it takes to look. Without it the cheapest plan of all is found.
+        """
+        self._for_noise, self._budget_s = for_noise, budget_s
+        self._kernels: dict[tuple[tuple[int, ...], ...], SceneKernels] = {}
+        self._scenes = _promises(boxes, self._kernels)
         self._asked = list(self._scenes)
         self._exact = {name: self._why_exact(effect) for name, effect in EFFECTS.items()}
+        self._works: dict[Methods, float] = {}
+        self._noise_s, self._without_kernels = 0.0, False
 
     def _why_exact(self, effect: Effect) -> str | None:
         """The reason when skipping an effect changes nothing in any box."""
@@ -95,6 +104,8 @@ class Planner:
     def promise(self, effect: str, before: Methods, after: Methods, enough_dn: float = math.inf) -> float:
         """What switching an effect changes in any CSD of any box, DN; above `enough_dn`, in some of them at least."""
         found = 0.0
+        if isinstance(EFFECTS[effect], ReadoutEffect) or EFFECTS[effect].is_limit:
+            self._noise_s = self._first_noise_s
         for at, scene in enumerate(self._asked):
             found = max(found, scene.promise(effect, before, after))
             if found > enough_dn:
@@ -108,8 +119,17 @@ class Planner:
         Where no plan does, one that keeps it but for what the places of a light leave open.
         """
         tried: dict[tuple[str, str], float] = {}
-        kept = self._cheapest(tolerance_dn, tried) or self._cheapest(tolerance_dn, tried, besides=True)
-        assert kept is not None  # everything on changes nothing but what is left open
+        self._without_kernels = self._limited
+        kept = self._cheapest(tolerance_dn, tried)
+        if kept is None:
+            kept = self._cheapest(tolerance_dn, tried, besides=True)
+        elif self._limited:  # no more may still be saved than this plan takes
+            self._budget_s = min(self._budget_s, self.spent_s + LOOKING_SHARE * self._work(kept[0]))
+            self._without_kernels = False
+            kept = self._cheapest(tolerance_dn, tried, kept)
+        if kept is None:  # everything on changes nothing but what is left open: the budget was too small for any other
+            assert self._limited
+            kept = self._start, {e: self.promise(e, self._start, self._start) for e in _LIMITS}
         methods, promises = kept
         choices = tuple(
             Choice(e, method, promises.get(e, 0.0), self._reason(e, method, promises.get(e, 0.0), tried))
@@ -119,31 +139,41 @@ class Planner:
         return Plan(scenario, tolerance_dn, choices, self._work(methods), self._work(REFERENCE), rejected)
 
     def _work(self, methods: Methods) -> float:
-        return sum(scene.work_of(methods).of(scene.box.n_designs) for scene in self._scenes)
+        if methods not in self._works:
+            self._works[methods] = in_all([(scene.work_of(methods), scene.box.n_designs) for scene in self._scenes])
+        return self._works[methods]
 
     @property
-    def pays(self) -> bool:
-        """Whether everything on takes more than to look for what can be left out, both estimated in multiplications.
+    def _limited(self) -> bool:
+        return math.isfinite(self._budget_s)
 
-        How many places a light at any place needs is not known before, so that a plan is looked for there.
+    @property
+    def spent_s(self) -> float:
+        """Seconds that were spent on looking, counted."""
+        looked = sum(scene.spent_s for scene in self._scenes)
+        return self._noise_s + looked + sum(kernels.spent_s for kernels in self._kernels.values())
+
+    @cached_property
+    def _first_noise_s(self) -> float:
+        """Seconds that the first bound of a noisy readout takes, counted."""
+        return NOISE_S * self._noisy
+
+    def _look_s(self, effect: Effect) -> float:
+        """Seconds that it takes to bound what a method of an effect changes, counted."""
+        if isinstance(effect, ReadoutEffect):
+            return READOUT_S * len(self._scenes) + self._first_noise_s - self._noise_s
+        return sum(scene.linear_s for scene in self._scenes)
+
+    def _worth(self, effect: Effect, methods: Methods, after: Methods, rest: Sequence[str]) -> bool:
+        """Whether a method may save more than it takes to look at it: beside the others at their cheapest, or all on.
+
+        `rest`: the effects of which nothing is chosen yet.
         """
-        methods = self._start
-        if any(scene.is_anywhere(methods) for scene in self._scenes):
-            return True
-        works = [scene.work_of(methods) for scene in self._scenes]
-        once = max((work.kernel for work in works), default=0.0)
-        every = sum(work.each * scene.box.n_designs for work, scene in zip(works, self._scenes, strict=True))
-        is_patch = all(scene.view.scenario.target is None for scene in self._scenes)
-        return once + every > len(works) * (PLANNED_PATCH if is_patch else PLANNED_TARGET)
-
-    def everything(self, scenario: str, tolerance_dn: float) -> Plan:
-        """Everything on but what changes nothing: exact, for scenes whose light is not at any place (see `pays`)."""
-        methods = self._start
-        choices = tuple(
-            Choice(e, method, 0.0, _NOT_ASKED if (exact := self._exact[e]) is None else exact)
-            for e, method in asdict(methods).items()
-        )
-        return Plan(scenario, tolerance_dn, choices, self._work(methods), self._work(REFERENCE))
+        look_s = self._look_s(effect)
+        if self.spent_s + look_s > self._budget_s or (self._without_kernels and self._needs_kernels(effect, after)):
+            return False
+        saved = self._work(methods) - self._work(after)
+        return max(saved, self._work(_with_cheapest(methods, rest)) - self._work(_with_cheapest(after, rest))) > look_s
 
     @property
     def _start(self) -> Methods:
@@ -155,7 +185,12 @@ class Planner:
         return sum(self.promise(e, methods, replace(methods, **{e: EFFECTS[e].reference})) for e in _LIMITS)
 
     def _cheapest(
-        self, tolerance_dn: float, tried: dict[tuple[str, str], float], *, besides: bool = False
+        self,
+        tolerance_dn: float,
+        tried: dict[tuple[str, str], float],
+        known: tuple[Methods, dict[str, float]] | None = None,
+        *,
+        besides: bool = False,
     ) -> tuple[Methods, dict[str, float]] | None:
         """Branch and bound over the effects, cheapest methods first.
 
@@ -167,19 +202,21 @@ class Planner:
         """
         start = self._start
         active = [e for e in EFFECTS if self._exact[e] is None]
-        best: list[tuple[float, Methods, dict[str, float]]] = []
+        best = [] if known is None else [(self._work(known[0]), *known)]
 
         def deeper(at: int, methods: Methods, promises: dict[str, float]) -> None:
             # Every further effect at its cheapest: no completion of these methods costs less.
-            least = self._work(replace(methods, **{e: EFFECTS[e].methods[0] for e in active[at:]}))
-            if best and least >= best[0][0]:
+            least = self._work(_with_cheapest(methods, active[at:]))
+            if best and least >= best[0][0] - self._too_little_s:
                 return
             if at == len(active):
                 best[:] = [(least, methods, promises)]
                 return
             name, effect = active[at], EFFECTS[active[at]]
             for method in effect.methods:
-                after = replace(methods, **{name: method})
+                after = switched(methods, name, method)
+                if self._limited and after != methods and not self._worth(effect, methods, after, active[at + 1 :]):
+                    continue
                 endless = besides and effect.is_limit and effect.limit_dn(method) is None
                 if endless or not self._allowed(name, after):
                     continue
@@ -190,15 +227,26 @@ class Planner:
                 if besides and not exactly and (effect.is_limit or any(e in promises for e in _LIMITS)):
                     allowed += self._left_over(after)
                 left_dn = allowed - sum(promises.values())
-                known = (name, method) in tried
+                seen = (name, method) in tried
                 promised = self.promise(name, methods, after, left_dn)
-                if not known or promised <= left_dn:
+                if not seen or promised <= left_dn:
                     tried[name, method] = min(promised, tried.get((name, method), promised))
                 if sum(promises.values()) + promised <= allowed:
                     deeper(at + 1, after, promises | {name: promised})
 
         deeper(0, start, {})
         return best[0][1:] if best else None
+
+    @staticmethod
+    def _needs_kernels(effect: Effect, methods: Methods) -> bool:
+        """Whether the bound of a method compares the light of pixels: those are looked at when all others have been."""
+        compared = isinstance(effect, KernelEffect) and effect.limit_dn(getattr(methods, effect.name)) is None
+        return compared and not (isinstance(effect, Blur) and methods.blur != effect.off)
+
+    @property
+    def _too_little_s(self) -> float:
+        """What no plan is looked for to save, s."""
+        return min(map(self._look_s, EFFECTS.values())) if self._limited else 0.0
 
     @property
     def _noisy(self) -> bool:
@@ -224,14 +272,20 @@ class Planner:
             return f"changes a CSD by at most {promised:.2g} DN"
         cheaper = {m: tried[effect, m] for m in methods[: methods.index(method)] if (effect, m) in tried}
         if not cheaper:
-            return "what else is chosen needs it"
+            return NOT_ASKED if self._limited else "what else is chosen needs it"
         nearest = min(cheaper, key=lambda m: cheaper[m])
         return f"else ({nearest}) a CSD may change by {cheaper[nearest]:.2g} DN or more"
 
 
-def _promises(boxes: Sequence[Box]) -> list[Promises]:
+def _with_cheapest(methods: Methods, rest: Sequence[str]) -> Methods:
+    """The methods with the cheapest one of each effect of which nothing is chosen yet."""
+    for name in rest:
+        methods = switched(methods, name, EFFECTS[name].methods[0])
+    return methods
+
+
+def _promises(boxes: Sequence[Box], kernels: dict[tuple[tuple[int, ...], ...], SceneKernels]) -> list[Promises]:
     """Those of each box; boxes whose CFAs have the same tile share their kernels."""
-    kernels: dict[tuple[tuple[int, ...], ...], SceneKernels] = {}
     for box in boxes:
         if (tile := box.view.mosaic.tile) not in kernels:
             kernels[tile] = SceneKernels(colorless(over_field(box.view)[0]))
