@@ -8,7 +8,6 @@ from ..camera.plan.plan import Plan
 from ..camera.registry import EFFECTS
 from ..study import Study
 
-
 _LEAST_S = 1e-6
 
 

@@ -10,7 +10,6 @@ import pandas as pd
 from ..results.facts import EffectFacts
 from ..results.output import Output
 
-
 _LEAST_S = 1e-6
 
 

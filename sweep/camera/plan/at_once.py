@@ -10,7 +10,7 @@ from ..methods import REFERENCE, Methods
 from ..registry import EFFECTS
 from .bounds import Box
 from .plan import NOT_ASKED, Choice, Plan
-from .work import LEAST_LOOK_S, NOISE_S, LOOKING_SHARE, estimated_work, in_all
+from .work import LEAST_LOOK_S, LOOKING_SHARE, NOISE_S, estimated_work, in_all
 
 
 def everything_on(boxes: Sequence[Box], scenario: str, tolerance_dn: float) -> Plan | float:

@@ -18,7 +18,7 @@ from ..registry import EFFECTS
 from .bounds import Box
 from .promises import Promises
 from .scene_kernels import SceneKernels
-from .work import NOISE_S, READOUT_S, LOOKING_SHARE, in_all
+from .work import LOOKING_SHARE, NOISE_S, READOUT_S, in_all
 
 _NOTHING_DN = 1e-9
 NOT_ASKED = "to find out whether it matters takes longer"
