@@ -15,6 +15,7 @@ from ...types import BoolArray, FloatArray, IndexArray
 from ..mosaic import Mosaic
 from ..shot import Shot
 from .base import Chosen, KernelEffect, Load, Part, Stage
+from .flicker import goes_dark
 
 LATTICES = ("one", "pixel", "half pixel", "quarter pixel")
 _WITHIN_DN = {
@@ -196,8 +197,8 @@ class Phase(KernelEffect):
         if shot.scenario.target is None or methods.sampling == "skip":
             return load
         cases = float(n_places(shot, methods.phase))
-        if not all_count(shot, methods):
-            return replace(load, cases=cases)
+        if not all_count(shot, methods) or (methods.flicker != "skip" and goes_dark(shot)):
+            return replace(load, cases=cases)  # of a light that may be dark all distances are 0, and none is looked for
         deep = decades(methods.phase)
         return replace(
             load, cases=cases, searched=cases * PER_DECADE * deep**2, search_s=SEARCH_S + SEARCH_DECADE_S * deep

@@ -18,7 +18,7 @@ from ..registry import EFFECTS
 from .bounds import Box
 from .promises import Promises
 from .scene_kernels import SceneKernels
-from .work import LOOKING_SHARE, NOISE_S, READOUT_S, in_all
+from .work import LOOKING_SHARE, READOUT_S, in_all, noise_s
 
 _NOTHING_DN = 1e-9
 NOT_ASKED = "to find out whether it matters takes longer"
@@ -156,7 +156,7 @@ class Planner:
     @cached_property
     def _first_noise_s(self) -> float:
         """Seconds that the first bound of a noisy readout takes, counted."""
-        return NOISE_S * self._noisy
+        return max((noise_s(scene.view) for scene in self._scenes), default=0.0)
 
     def _look_s(self, effect: Effect) -> float:
         """Seconds that it takes to bound what a method of an effect changes, counted."""

@@ -20,12 +20,19 @@ BOX_S, TABLED_S, FOLDED_S = 2.5e-3, 3e-9, 1.4e-8
 REACH_S, READOUT_S, LINEAR_S, COMPARED_S, KERNEL_S = 1e-3, 2.5e-3, 1.5e-3, 5e-9, 0.01
 """Seconds of a planner: for the reach of a box, a bound of the readout, one of the optics and each value that it
 compares, and a kernel of a light at a distance; `tests/bench_work.py` measures what they come to."""
-NOISE_S = 0.06
-"""Seconds of the first bound of a noisy readout, whose pixel is then known; `tests/bench_work.py` measures them."""
+NOISE_S, UNEVEN_NOISE_S = 4e-3, 0.08
+"""Seconds of the first bounds of a noisy readout, without PRNU and with it; `tests/bench_work.py` measures them."""
 LEAST_LOOK_S = 2 * REACH_S
 """Seconds for each CFA, with which hardly anything can be found."""
 LOOKING_SHARE = 0.05
 """Of the time that everything on takes, what looking for a plan may take at most."""
+
+
+def noise_s(view: View) -> float:
+    """Seconds of the first bounds of a scene's readout, counted: its pixel is then known."""
+    if view.scenario.noise is None:
+        return 0.0
+    return UNEVEN_NOISE_S if view.pixel.prnu else NOISE_S
 
 
 class Work(NamedTuple):
