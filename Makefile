@@ -34,7 +34,7 @@ slow: $(VENV)/.ready-dev
 
 accuracy: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest tests/hard/test_hard_cases.py -m "slow or not slow" --hard-cases outputs/accuracy/hard_cases.json
-	$(ONE_THREAD) $(BIN)/sweep accuracy studies/accuracy.yaml $(ARGS)
+	$(ONE_THREAD) $(BIN)/sweep accuracy studies/accuracy.yaml --shipped $(ARGS)
 
 check: $(VENV)/.ready-dev
 	$(BIN)/ruff check sweep tests

@@ -1,145 +1,224 @@
-"""The costs by which plans are compared, measured: `make bench`, or `python tests/bench_work.py`, on one thread.
+"""The seconds by which plans are compared, and whether plans pay: `make bench`, or `python tests/bench_work.py [STUDY ...]`.
 
-Prints each constant of the effects' `work` beside what it is here, in multiplications of the response of a design, or
-in places of the light per place of the lattice. Plans only compare these; a factor of 3 changes hardly any.
+On one thread. Prints each constant of the effects' `work` and of `camera/plan/work.py` beside what it is here; a factor of 3
+either way is said. Then every scene of every shipped study (or of those named), at its study's tolerance, for one design
+and for all: everything on, and as a run does it, with the time to find its plan. Writes outputs/bench/plans.json, and
+fails where plan and run take more than 1.1 times everything on.
 """
 
 from __future__ import annotations
 
+import json
+import sys
 import time
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 
-from sweep.camera.effects import blur, noise, phase, quantization, saturation
-from sweep.camera.effects.base import Load
-from sweep.camera.kernel import make_kernel
+from sweep.camera.effects import base, blur, noise, phase, quantization, sampling, saturation
+from sweep.camera.forget import forget_scenes
+from sweep.camera.kernel import pixels_per_place
 from sweep.camera.methods import REFERENCE
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.noisy import table
 from sweep.camera.pixel import Optics, Pixel
-from sweep.camera.places import AnyPlace, forget_geometries
+from sweep.camera.places import AnyPlace
 from sweep.camera.plan import work
 from sweep.camera.plan.bounds import Box
-from sweep.camera.plan.plan import Planner
+from sweep.camera.plan.promises import Promises
+from sweep.camera.plan.scene_kernels import SceneKernels
 from sweep.camera.scenario import Scenario
 from sweep.camera.scene import FixedExposure, Noise, Target
 from sweep.camera.sensor import BUILT_IN_SENSORS
 from sweep.camera.view import View, per_photon, signal_irradiance
+from sweep.commands.accuracy.payments import Payment, payments
 from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.products import row_products
+from sweep.errors import StudyError
+from sweep.study import load_study
+from sweep.study.shipped import shipped_names, study_path
+from sweep.types import FloatArray
 
-REPEATS = 15
-GRID = WavelengthGrid(step_nm=5)
+REPEATS = 5
+MOST = 1.1
+"""Plan and run may take this many times everything on."""
+OFF = 3.0
+OUTPUT = Path(__file__).parent.parent / "outputs" / "bench" / "plans.json"
+GRID = WavelengthGrid(step_nm=1)
 SENSOR = BUILT_IN_SENSORS["ar0820"](GRID)
 PIXEL = Pixel(read_noise_e=2.0, offset_dn=64.0)
-LIMITS = ("within 10 DN", "within 1 DN", "within 0.1 DN")
+LIMITS = ("within 1 DN", "within 0.01 DN", "within 0.0001 DN")
 
 
-def shortest_s(work: Callable[[], object]) -> float:
-    """Shortest wall time of `work`, once warm: what else runs on the machine only adds to it."""
-    work()
+def shortest_s(run: Callable[[], object], *, cold: bool = False) -> float:
+    """Shortest CPU time of `run`, once warm, but for what scenes keep where it is to be `cold`."""
+    run()
     times = []
     for _ in range(REPEATS):
-        start = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - start)
+        if cold:
+            forget_scenes()
+        start = time.process_time()
+        run()
+        times.append(time.process_time() - start)
     return min(times)
 
 
-def view(target: Target, pixel: Pixel = PIXEL) -> View:
+def view(distance_m: float, phase_px: str | tuple[float, float] = "any", *, noisy: bool = False) -> View:
     """RGGB before a light at a distance."""
     mosaic = Mosaic.from_name("RGGB")
-    scenario = Scenario(target=target, optics=Optics(f_number=2.0), exposure=FixedExposure(exposure_s=2e-3))
+    scenario = Scenario(
+        target=Target(distance_m=distance_m, fov_deg=60, phase_px=phase_px),
+        optics=Optics(f_number=2.0),
+        exposure=FixedExposure(exposure_s=2e-3),
+        noise=Noise() if noisy else None,
+    )
     return View(
-        GRID, mosaic, SENSOR.mosaic_qe(mosaic), (), SENSOR.qe["C"], BUILT_IN_LIGHTS["tl16"](GRID), pixel, scenario
+        GRID, mosaic, SENSOR.mosaic_qe(mosaic), (), SENSOR.qe["C"], BUILT_IN_LIGHTS["tl16"](GRID), PIXEL, scenario
     )
 
 
-def multiplication_s() -> float:
-    """One multiplication of the product of curves and scene."""
+def of_values() -> Iterator[tuple[str, float, float]]:
+    """A multiplication, and a value of the readout."""
     rng = np.random.default_rng(1)
     qe, scene = rng.uniform(size=(1000, GRID.size)), rng.uniform(size=(GRID.size, 500))
-    return shortest_s(lambda: row_products(qe, scene)) / (qe.size * scene.shape[1])
+    electrons = rng.uniform(0, 12_000, 1_000_000)
+    each = 1 / electrons.size
+    product_s = shortest_s(lambda: row_products(qe, scene)) / (qe.size * scene.shape[1])
+    yield "a multiplication", base.MULTIPLICATION_S, product_s
+    clipped_s = shortest_s(lambda: saturation.clipped(electrons, PIXEL)) * each
+    yield "a value that is clipped", saturation.CLIPPED_S, clipped_s
+    rounded_s = shortest_s(lambda: quantization.rounded(electrons, PIXEL)) * each
+    yield "a value that is rounded", quantization.ROUNDED_S, rounded_s
+    looked_up_s = shortest_s(lambda: table.mean_rounded(electrons, PIXEL)) * each
+    yield "a value through the table of noise", noise.LOOKED_UP_S, looked_up_s
+    yield "the table of noise", noise.TABLE_S, shortest_s(lambda: table.mean_rounded(np.ones(1), PIXEL), cold=True)
 
 
-def readout_s() -> tuple[float, float, float]:
-    """A pixel that is clipped, one that is rounded, and one that is looked up in the table of noise."""
-    electrons = np.random.default_rng(1).uniform(0, 12_000, 1_000_000)
-    clipped = shortest_s(lambda: saturation.clipped(electrons, PIXEL)) / electrons.size
-    rounded = shortest_s(lambda: quantization.rounded(electrons, PIXEL)) / electrons.size
-    return clipped, rounded, shortest_s(lambda: table.mean_rounded(electrons, PIXEL)) / electrons.size
+def of_images() -> Iterator[tuple[str, float, float]]:
+    """The image of a light, and the mean over a readout."""
+    wave_um = GRID.nodes_nm * 1e-3
+    made = blur.Profile(7.7, 20.0, wave_um, 2.0, 0.0)
+    made_s = shortest_s(lambda: blur.Profile(7.7, 20.0, wave_um, 2.0, 0.0))
+    yield "a radius, frequency and wavelength of an image", blur.PROFILE_S, made_s / made.work
+    whole_s = shortest_s(lambda: blur.mean_over_disc(7.7, 7.7, wave_um, 2.0, 0.0)) / wave_um.size
+    yield "a wavelength of the mean over a readout", blur.WHOLE_IMAGE_S, whole_s
 
 
-def image_s() -> tuple[float, float]:
-    """A wavelength of a blurred image: for each pixel that is looked at, and for the mean over a whole readout."""
-    made = view(Target(distance_m=100, fov_deg=60))
-    load = Load(units=3.0, nodes=GRID.size)
-    methods = replace(REFERENCE, blur="every 5 nm")
-    for effect in (blur.Blur(), phase.Phase()):
-        load = effect.work(made, methods, load)
-
-    def kernel(method: str) -> None:
-        blur.PROFILES.clear()
-        chosen = replace(methods, blur=method)
-        make_kernel(made, chosen, GRID.nodes_nm, by_pixel=False, work=Counter(), cases=phase.cases(made, "one"))
-
-    across = max(made.scenario.target.object_resolution_px + 1, 4.0)  # type: ignore[union-attr]
-    more_s = shortest_s(lambda: kernel("every 5 nm")) - shortest_s(lambda: kernel("skip"))
-    knots_um = GRID.nodes_nm * 1e-3
-    whole_s = shortest_s(lambda: blur.mean_over_disc(7.7, 7.7, knots_um, 2.0, 0.0))
-    return more_s / (across**2 * load.knots), whole_s / GRID.size
+def search(made: View, light_dn: FloatArray, counted: Counter[str] | None = None) -> None:
+    """The worst of all places of a design."""
+    AnyPlace(made, Counter() if counted is None else counted).extremes(light_dn)
 
 
-def planning_s() -> tuple[float, float]:
-    """A plan of one CFA on a patch, and before a light at one place."""
-    far = view(Target(distance_m=100, fov_deg=60, phase_px=(0.0, 0.0)))
-    patch = replace(far, scenario=Scenario(noise=Noise()))
-    boxes = (Box(replace(made, pixel=PIXEL), made.qe, made.qe, 1) for made in (patch, far))
-    times = [shortest_s(lambda box=box: Planner([box]).plan("", 1.0)) for box in boxes]
-    return times[0], times[1]
-
-
-def places_per_decade() -> list[float]:
-    """What a search adds for each decade below 100 DN, in places of the lattice, for some limits."""
-    made = view(Target(distance_m=300, fov_deg=60, phase_px="any"))
-    found = []
-    for method in LIMITS:
-        forget_geometries()
-        work = Counter[str]()
-        chosen = replace(made, methods=replace(REFERENCE, phase=method, blur="every 10 nm"))
+def of_searches() -> Iterator[tuple[str, float, float]]:
+    """The worst of all places of a light that is near or far: for each new place, and again for each design."""
+    for distance_m in (60.0, 300.0):
+        made = view(distance_m)
         light_dn = signal_irradiance(made)[:, None] * made.qe * per_photon(made) * 2e-3 * PIXEL.dn_per_e
-        AnyPlace(chosen, work).extremes(light_dn)
-        decades = 2 - np.log10(phase.within_dn(method) or np.nan)
-        found.append((work["places"] / len(phase.places_px(made, method)) - 1) / decades)
-    return found
+        across = 2 * sampling.radii_px(made, made.scenario.target)[1] + 7  # type: ignore[arg-type]
+        for method in LIMITS:
+            chosen, counted, deep = (
+                replace(made, methods=replace(REFERENCE, phase=method)),
+                Counter[str](),
+                phase.decades(method),
+            )
+            forget_scenes()
+            start = time.process_time()
+            search(chosen, light_dn, counted)
+            first_s = time.process_time() - start
+            again_s = shortest_s(partial(search, chosen, light_dn))
+            place_s = sampling.PLACE_S + sampling.PLACE_PIXEL_S * across**2 * 32
+            at = f"{method}, {distance_m:g} m"
+            places = phase.PER_DECADE * deep**2
+            yield (
+                f"places per place of the lattice, {at}",
+                places,
+                counted["places"] / len(phase.places_px(made, method)),
+            )
+            yield f"a place, {at}", place_s, (first_s - again_s) / counted["places"]
+            yield f"a design, {at}", phase.SEARCH_S + phase.SEARCH_DECADE_S * deep, again_s
 
 
-def main() -> None:
-    """Print the table."""
-    unit_s = multiplication_s()
-    (clipped_s, rounded_s, looked_up_s), (pixel_s, whole_s) = readout_s(), image_s()
-    rows = [
-        ("a pixel that is clipped, in multiplications", saturation.CLIPPED, clipped_s / unit_s),
-        ("a pixel that is rounded, in multiplications", quantization.ROUNDED, rounded_s / unit_s),
-        ("a pixel through the table of noise, in pixels that are clipped", noise.LOOKED_UP, looked_up_s / clipped_s),
-        ("a wavelength of the image of a pixel, in multiplications", blur.IMAGE, pixel_s / unit_s),
-        ("a wavelength of the mean over a readout, in multiplications", blur.WHOLE_IMAGE, whole_s / unit_s),
-    ]
-    per_decade = places_per_decade()
-    planned_s = planning_s()
-    rows += [
-        ("a plan of a patch, in multiplications", work.PLANNED_PATCH, planned_s[0] / unit_s),
-        ("a plan before a light at a distance, in multiplications", work.PLANNED_TARGET, planned_s[1] / unit_s),
-    ]
-    rows += [(f"places per decade of {m}", phase.PER_DECADE, n) for m, n in zip(LIMITS, per_decade, strict=True)]
-    print(f"a multiplication takes {unit_s * 1e9:.3g} ns")
-    for name, constant, measured in rows:
-        print(f"{name:<66} {constant:>8.3g}  measured {measured:>8.3g}  ratio {measured / constant:>6.2f}")
+def of_plans() -> Iterator[tuple[str, float, float]]:
+    """What bounds take."""
+    far, patch = view(250.0, (0.0, 0.0), noisy=True), replace(view(250.0), scenario=Scenario())
+    uneven = replace(far, pixel=PIXEL.model_copy(update={"prnu": 0.01}))
+
+    def promises(made: View) -> Promises:
+        return Promises(Box(made, made.qe, made.qe, 1), SceneKernels(made))
+
+    yield "the reach of a box", work.REACH_S, shortest_s(lambda: promises(patch).reach.brightest_pixels_dn)
+    skipped = replace(REFERENCE, noise="skip")
+    unrounded = replace(skipped, quantization="skip")
+
+    def readout(made: View) -> None:
+        looked = promises(made)
+        looked.promise("noise", REFERENCE, skipped)
+        looked.promise("quantization", skipped, unrounded)
+
+    yield "the first bounds of a noisy readout", work.NOISE_S, shortest_s(lambda: readout(far), cold=True)
+    yield "the same with PRNU", work.UNEVEN_NOISE_S, shortest_s(lambda: readout(uneven), cold=True)
+    straight = replace(unrounded, saturation="skip")
+
+    def optics(*methods: str) -> None:
+        looked = promises(far)
+        for method in methods:
+            looked.promise("blur", straight, replace(straight, blur=method))
+
+    one_s = shortest_s(lambda: optics("every 10 nm"), cold=True)
+    corners = pixels_per_place(far)
+    yield f"a kernel and a bound of the optics, {corners} pixels", work.KERNEL_S + work.LINEAR_S, one_s
+    more_s = shortest_s(lambda: optics("every 10 nm", "every 5 nm", "every 2 nm")) - shortest_s(
+        lambda: optics("every 10 nm")
+    )
+    yield "a further bound of the optics", work.LINEAR_S, more_s / 2
+
+
+def constants() -> None:
+    """Print the table of constants."""
+    for part in (of_values(), of_images(), of_searches(), of_plans()):
+        for name, constant, measured in part:
+            ratio = measured / constant
+            said = "" if 1 / OFF <= ratio <= OFF else f"  off by more than {OFF:g} times"
+            print(f"{name:<58} {constant:>9.3g}  measured {measured:>9.3g}  ratio {ratio:>6.2f}{said}", flush=True)
+
+
+def paid(names: list[str]) -> Iterator[Payment]:
+    """Every scene of some studies."""
+    for name in names:
+        try:
+            study = load_study(study_path(Path(name)))
+        except StudyError as error:
+            print(f"{name} is left out: {error.faults[0]}")
+            continue
+        if any(space.size for space in study.spaces):
+            yield from payments(study, list(study.scenarios), [study.tolerance_dn()], REPEATS)
+
+
+def main() -> int:
+    """Print both tables; 1 where a plan does not pay."""
+    constants()
+    found = []
+    for one in paid(sys.argv[1:] or shipped_names()):
+        found.append(one)
+        off = one.estimated_s / one.everything_s
+        said = "" if 1 / OFF <= off <= OFF else f"  estimated {one.estimated_s:.3g} s"
+        print(
+            f"{one.study:<10} {one.scenario:<28} {one.n_designs:>7} designs: everything on {one.everything_s:8.4f} s, "
+            f"plan {one.plan_s:7.4f}, run {one.run_s:8.4f}, {one.factor:6.2f} times faster{said}",
+            flush=True,
+        )
+    OUTPUT.parent.mkdir(parents=True, exist_ok=True)
+    OUTPUT.write_text(json.dumps([asdict(one) | {"factor": one.factor} for one in found], indent=1))
+    lost = [one for one in found if one.factor < 1 / MOST]
+    for one in lost:
+        print(f"{one.study}, {one.scenario}, {one.designs}: plan and run take more than {MOST:g} times everything on")
+    return int(bool(lost))
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

@@ -24,7 +24,7 @@ from .registry import factor_of_light
 from .seen import SeenFilters
 from .view import View, background_irradiance, per_photon, signal_irradiance
 
-_KEPT = 15_000_000
+KEPT = 15_000_000
 """Largest table of signals times kernel that is kept."""
 
 
@@ -95,7 +95,7 @@ class Electrons:
         self._touched = np.flatnonzero((kernel.light[:, :, modified] != 0).any(axis=(0, 2, 3)))
         self._modified = kernel.light[:, self._touched][:, :, modified]
         size = self._modified[..., 0].size * len(self.signals) * self._nodes.size
-        self._kept = self._table().astype(dtype) if 0 < size <= _KEPT and not once else None
+        self._kept = self._table().astype(dtype) if 0 < size <= KEPT and not once else None
 
     def _looked_at(self, qe: FloatArray, channels: Sequence[int], place: int = 0) -> FloatArray:
         """QE of some channels as the quadrature sees it (itself, or linear between its nodes), and then the rays."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
-from dataclasses import make_dataclass
+from dataclasses import make_dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from ..errors import Fault, SweepError, nearest
@@ -41,6 +42,12 @@ def _refuse_unknown(what: str, names: Iterable[str], known: Collection[str]) -> 
             raise SweepError(
                 Fault(f"unknown {what}", value=name, allowed=", ".join(known), nearest=nearest(name, known))
             )
+
+
+@lru_cache(maxsize=65_536)
+def switched(methods: Methods, effect: str, method: str) -> Methods:
+    """The methods with another one of an effect, remembered: a search for a plan asks for the same ones again."""
+    return replace(methods, **{effect: method})
 
 
 REFERENCE = Methods()

@@ -87,7 +87,7 @@ def known_at(carrier: FloatArray) -> IndexArray:
     return np.flatnonzero(carrier > _LEAST_BASE * carrier.max())
 
 
-_matrices: Cache[bytes, csr_matrix] = Cache(32)
+MATRICES: Cache[bytes, csr_matrix] = Cache(32)
 
 
 def _matrix(wavelength_nm: FloatArray, carrier: FloatArray, index: float, cone: Cone, method: str) -> csr_matrix:
@@ -105,7 +105,7 @@ def _matrix(wavelength_nm: FloatArray, carrier: FloatArray, index: float, cone: 
         inverse[known] = 1 / carrier[known]
         return csr_matrix(diags_array(carrier) @ mean @ diags_array(inverse))
 
-    return _matrices.get(hashlib.sha256(key).digest(), made)
+    return MATRICES.get(hashlib.sha256(key).digest(), made)
 
 
 def _means(wavelength_nm: FloatArray, knots_nm: FloatArray, index: float, cone: Cone, method: str) -> _Entries:

@@ -8,6 +8,8 @@ from ..camera.plan.plan import Plan
 from ..camera.registry import EFFECTS
 from ..study import Study
 
+_LEAST_S = 1e-6
+
 
 def plan_lines(study: Study, *, explain: bool) -> Iterator[str]:
     """Every scene's effects with method, promised error, reason and work; scenes of one plan are told at once."""
@@ -19,8 +21,8 @@ def plan_lines(study: Study, *, explain: bool) -> Iterator[str]:
     computed = sum(plan.work for plan in study.plans.values())
     whole = sum(plan.reference_work for plan in study.plans.values())
     yield (
-        f"{len(study.plans)} scenes, {len(groups)} different plans; about {computed:.2g} operations, "
-        f"{whole / max(computed, 1.0):.1f} times fewer than with everything on."
+        f"{len(study.plans)} scenes, {len(groups)} different plans; about {computed:.2g} s on one core, "
+        f"{whole / max(computed, _LEAST_S):.1f} times less than with everything on (estimated)."
     )
 
 
@@ -31,7 +33,7 @@ def _lines(plans: list[Plan], *, explain: bool) -> Iterator[str]:
     work, whole = (sum(w) for w in zip(*((p.work, p.reference_work) for p in plans), strict=True))
     yield (
         f"{names}: promised {max(p.promised_dn for p in plans):.2g} of {plans[0].tolerance_dn:g} DN, "
-        f"about {work:.2g} operations (everything on: {whole:.2g})"
+        f"about {work:.2g} s (everything on: {whole:.2g})"
     )
     if not_kept := [p for p in plans if not p.kept]:
         yield (

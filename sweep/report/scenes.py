@@ -10,12 +10,14 @@ import pandas as pd
 from ..results.facts import EffectFacts
 from ..results.output import Output
 
+_LEAST_S = 1e-6
+
 
 @dataclass(frozen=True)
 class SceneGroup:
     """Scenes that were simulated by the same methods. `effects`: rows of effect, method, promised error, reason.
 
-    `realized_dn`: the largest error that an audit found, None without one; `work`: counted operations, `whole_work`:
+    `realized_dn`: the largest error that an audit found, None without one; `work`: estimated seconds, `whole_work`:
     those with every effect on.
     """
 
@@ -83,9 +85,9 @@ def scene_table(groups: Sequence[SceneGroup]) -> pd.DataFrame:
                 "promised / DN": f"{group.promised_dn:.2g}",
                 "realized / DN": "not audited" if group.realized_dn is None else f"{group.realized_dn:.2g}",
                 "tolerance / DN": f"{group.tolerance_dn:g}",
-                "operations": f"{group.work:.2g}",
-                "with everything on": f"{group.whole_work:.2g}",
-                "times fewer": f"{group.whole_work / max(group.work, 1.0):.3g}",
+                "estimated / s": f"{group.work:.2g}",
+                "with everything on / s": f"{group.whole_work:.2g}",
+                "times less": f"{group.whole_work / max(group.work, _LEAST_S):.3g}",
             }
             for group in groups
         ]

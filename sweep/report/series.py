@@ -165,25 +165,32 @@ def draw_series(series: SeriesFigure) -> Figure:
 
 
 def draw_work_precision(table: pd.DataFrame, name: str) -> Figure:
-    """Error against time for each scenario's ladder of tolerances: realized (full line) and promised (dashed).
+    """Error against time for each scenario's ladder of tolerances, a panel for each number of designs.
 
-    `table`: columns scenario, tolerance_dn, seconds, reference_s, promised_dn, realized_dn. Errors below 1e-6 DN are
-    drawn there.
+    Realized errors are full lines, promised ones dashed; the time is that of plan and run, and from the run alone a
+    thin line leads to it: the share of planning. `table`: columns scenario, designs, tolerance_dn, plan_s, seconds (of
+    the run), reference_s, promised_dn, realized_dn. Errors below 1e-6 DN are drawn there.
     """
-    figure, axes = canvas(8.5, 5.0)
-    for (scenario, rows), color in zip(table.groupby("scenario", sort=False), CURVE_CYCLE * 4, strict=False):
-        ladder = rows.sort_values("tolerance_dn")
-        for column, style in (("realized_dn", "o-"), ("promised_dn", "x--")):
-            label = str(scenario) if column == "realized_dn" else None
-            errors = ladder[column].clip(lower=_LEAST_DN)
-            axes.plot(ladder["seconds"], errors, style, color=color, label=label, linewidth=1.3, markersize=4)
-        axes.axvline(float(rows["reference_s"].iloc[0]), color=color, linestyle=":", linewidth=1.0)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.set_xlabel("time / s (dotted: everything on)")
-    axes.set_ylabel("error of a CSD / DN (full: realized, dashed: promised)")
-    axes.set_title(f"{name}: what accuracy costs")
-    axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0, frameon=False)
+    counts = sorted(table["designs"].unique())
+    figure, panels = canvas_grid(1, len(counts), 4.2 * len(counts) + 1.6, 4.6)
+    colors = dict(zip(table["scenario"].unique(), CURVE_CYCLE * 4, strict=False))
+    for axes, designs in zip(panels, counts, strict=True):
+        for scenario, rows in table[table["designs"] == designs].groupby("scenario", sort=False):
+            ladder, color = rows.sort_values("tolerance_dn"), colors[scenario]
+            for column, style in (("realized_dn", "o-"), ("promised_dn", "x--")):
+                label = str(scenario) if column == "realized_dn" else None
+                errors, seconds = ladder[column].clip(lower=_LEAST_DN), ladder["plan_s"] + ladder["seconds"]
+                axes.plot(seconds, errors, style, color=color, label=label, linewidth=1.3, markersize=4)
+                if column == "realized_dn":
+                    axes.hlines(errors, ladder["seconds"], seconds, color=color, linewidth=0.6, alpha=0.6)
+            axes.axvline(float(rows["reference_s"].iloc[0]), color=color, linestyle=":", linewidth=1.0)
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_xlabel("plan + run / s (dotted: everything on)", fontsize=8)
+        axes.set_title("1 design" if designs == 1 else f"{designs:,} designs", fontsize=9)
+    panels[0].set_ylabel("error of a CSD / DN (full: realized, dashed: promised)", fontsize=8)
+    panels[-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0, frameon=False)
+    figure.suptitle(f"{name}: what accuracy costs (thin: the share of planning)")
     return figure
 
 

@@ -40,7 +40,7 @@ class EffectFacts(_Facts):
 
 
 class PlanFacts(_Facts):
-    """How a scene was simulated; `work`: estimated operations, `reference_work`: with every effect on."""
+    """How a scene was simulated; `work`: estimated seconds, `reference_work`: with every effect on."""
 
     key: str
     tolerance_dn: float

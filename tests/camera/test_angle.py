@@ -12,7 +12,7 @@ import pytest
 from sweep.camera.imager import Imager
 from sweep.camera.linear import smooth_imager
 from sweep.camera.methods import REFERENCE
-from sweep.camera.plan.plan import Planner
+from sweep.camera.plan.planner import Planner
 from sweep.camera.rays import Cone, rays
 from sweep.camera.scenario import Scenario
 from sweep.camera.seen import METHODS, RAYS, SeenFilters, cone_of

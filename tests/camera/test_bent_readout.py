@@ -10,7 +10,7 @@ import pytest
 from sweep.camera.methods import REFERENCE
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.plan.bounds import Box
-from sweep.camera.plan.plan import Planner
+from sweep.camera.plan.planner import Planner
 
 from ..hard.scenes import SENSOR, Scene, columns, scene, target
 

@@ -20,7 +20,7 @@ from sweep.camera.linear import smooth_imager
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Optics, Pixel, irradiance_factor
 from sweep.camera.plan.bounds import Box
-from sweep.camera.plan.plan import Planner
+from sweep.camera.plan.planner import Planner
 from sweep.camera.scenario import Scenario
 from sweep.camera.scene import FixedExposure
 from sweep.camera.view import View

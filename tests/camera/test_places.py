@@ -21,7 +21,8 @@ from sweep.camera.imager import Imager
 from sweep.camera.kernel import make_kernel
 from sweep.camera.methods import REFERENCE, Methods
 from sweep.camera.place_kernels import PlaceKernels
-from sweep.camera.plan.plan import Plan, Planner
+from sweep.camera.plan.plan import Plan
+from sweep.camera.plan.planner import Planner
 from sweep.camera.view import View
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.quantity import BEST_PLACE

@@ -14,7 +14,7 @@ from sweep.camera.bent_chords import Steepest, edge_of_cone
 from sweep.camera.effects.image_height import ImageHeight
 from sweep.camera.imager import Imager
 from sweep.camera.methods import REFERENCE
-from sweep.camera.plan.plan import Planner
+from sweep.camera.plan.planner import Planner
 from sweep.camera.rays import Cone
 from sweep.camera.scenario import Scenario
 from sweep.camera.seen import SeenFilters

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sweep.camera.methods import REFERENCE
-from sweep.camera.plan.plan import Planner
+from sweep.camera.plan.planner import Planner
 from sweep.camera.seen import METHODS
 
 from ..crew import side_by_side
@@ -21,10 +21,14 @@ _MANY, _STILL_EVERY = 1340, 4
 _FEW = 20
 
 
-def keep_a_plan(seed: int) -> tuple[int, float, float, float, str]:
+_BUDGET_S = 0.05
+"""What a limited planner may spend here: some of the bounds that it would like to have."""
+
+
+def keep_a_plan(seed: int, budget_s: float = np.inf) -> tuple[int, float, float, float, str]:
     """(seed, tolerance, promised, largest realized error, its column) of the plan for a random scene."""
     made = random_scene(seed, moved=seed % _STILL_EVERY > 0 and seed >= _FEW)
-    plan = Planner([made.box]).plan(made.name, made.tolerance_dn)
+    plan = Planner([made.box], budget_s=budget_s).plan(made.name, made.tolerance_dn)
     planned, exact = columns(made, plan.methods), columns(made, REFERENCE)
     assert planned.keys() == exact.keys()
     realized = {name: float(np.abs(planned[name] - exact[name]).max()) for name in exact}
@@ -77,6 +81,12 @@ def test_plans_of_random_scenes_keep_their_promise() -> None:
 
 def test_ways_to_look_at_the_rays_of_random_scenes_keep_their_promise() -> None:
     check_angles(range(_FEW), 1)
+
+
+def test_plans_that_are_found_in_haste_keep_their_promise() -> None:
+    found = [keep_a_plan(seed, _BUDGET_S) for seed in range(_FEW, 2 * _FEW)]
+    assert [row for row in found if not row[2] <= row[1]] == []
+    assert [row for row in found if not row[3] <= row[2] * (1 + 1e-9) + _ARITHMETIC_DN] == []
 
 
 @pytest.mark.slow

@@ -254,7 +254,7 @@ import sweep.camera.effects as room
 room.__path__.append(sys.argv[1])
 from dataclasses import replace
 from sweep.camera.methods import REFERENCE
-from sweep.camera.plan.plan import Planner
+from sweep.camera.plan.planner import Planner
 from tests.hard.scenes import DARK, F2, FAR, columns, scene
 lit = {"intensity_cd": 200, "background_cd_m2": 2000, "windshield_transmittance": 0.7}
 timed = [{**lit, "exposure": {"kind": "fixed", "exposure_s": exposure_s}} for exposure_s in (1e-3, 4e-3)]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sweep.camera.plan.plan import Plan, Planner
+from sweep.camera.plan.plan import Plan
 from sweep.results.kept_plans import KeptPlans, plan_key
 from sweep.run import with_plans
 from sweep.study import Study, load_study
@@ -29,15 +29,13 @@ def found(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[str]:
     monkeypatch.setenv("SWEEP_CACHE", str(tmp_path / "cache"))
     scenes: list[str] = []
 
-    def noted(find: Callable[[Planner, str, float], Plan]) -> Callable[[Planner, str, float], Plan]:
-        def plan(self: Planner, scenario: str, tolerance_dn: float) -> Plan:
-            scenes.append(scenario)
-            return find(self, scenario, tolerance_dn)
+    find = Study.plan
 
-        return plan
+    def plan(self: Study, scenario: str, tolerance_dn: float | None = None, *, always: bool = False) -> Plan:
+        scenes.append(scenario)
+        return find(self, scenario, tolerance_dn, always=always)
 
-    for name in ("plan", "everything"):
-        monkeypatch.setattr(Planner, name, noted(getattr(Planner, name)))
+    monkeypatch.setattr(Study, "plan", plan)
     return scenes
 
 

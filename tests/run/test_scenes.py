@@ -124,10 +124,15 @@ def test_accuracy_measures_a_ladder_of_tolerances(tmp_path: Path, place: str, di
         most_designs=designs,
     )
     table = pd.read_parquet(tmp_path / "out" / "accuracy.parquet")
-    assert len(table) == len(distances.split(",")) * len(TOLERANCES_DN)
+    counts = len(distances.split(",")) * len(TOLERANCES_DN)
+    assert list(table.groupby("designs").size()) == [counts] * 2  # one, and all
+    assert (table["plan_s"] > 0).all()
+    paid = pd.read_parquet(tmp_path / "out" / "plans.parquet")
+    assert list(paid["designs"]) == ["one"] * len(paid[paid["designs"] == "one"]) + ["all"] * (len(paid) // 2)
+    assert (paid["factor"] > 0).all()
     assert (table["promised_dn"] <= table["tolerance_dn"]).all()
     assert (table["realized_dn"] <= table["promised_dn"] * (1 + 1e-9) + 1e-9).all()
-    for _, rows in table.groupby("scenario"):
+    for _, rows in table.groupby(["scenario", "designs"]):
         assert list(rows["work"]) == sorted(rows["work"])  # from the coarsest tolerance to the finest
         assert (rows["work"] < rows["reference_work"]).all()
         assert rows["plan"].nunique() >= 2

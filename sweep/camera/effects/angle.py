@@ -9,7 +9,7 @@ from ..rays import Stretches
 from ..scene import Scene
 from ..seen import CHIEF, CONE, METHODS, RAYS, SKIP, SeenFilters, cone_of, moves
 from ..shot import Shot
-from .base import Change, Chosen, Designs, FilterChange, FilterEffect, Load, Stage
+from .base import MULTIPLICATION_S, Change, Chosen, Designs, FilterChange, FilterEffect, Load, Stage
 
 _STEEPEST_RAD = math.radians(85.0)
 
@@ -56,4 +56,4 @@ class Angle(FilterEffect):
             stretches = Stretches(cone_of(shot.scenario), min(moved))
             looked = math.ceil((stretches.most - stretches.least) * shot.grid.stop_nm / shot.grid.step_nm) + 1
         values = load.cases * load.units * len(shot.lights.photons) * shot.grid.size
-        return replace(load, kernel=load.kernel + values * len(moved) * 2 * looked)
+        return replace(load, own_s=load.own_s + values * len(moved) * 2 * looked * MULTIPLICATION_S)

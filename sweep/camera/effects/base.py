@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
 
+MULTIPLICATION_S = 1.2e-10
+"""Seconds of a multiplication of the response of designs; `tests/bench_work.py` measures them."""
+
+
 class SceneOptions(Section):
     """What a scene says for one effect. Every option has a default that means that there is none of it."""
 
@@ -131,22 +135,24 @@ Change = KernelChange | ShareChange | LightChange | CurveChange | FilterChange
 
 @dataclass(frozen=True)
 class Load:
-    """How much there is to compute, in multiplications; each effect adds its own.
+    """How long there is to compute, in the seconds of `tests/bench_work.py`; each effect adds its own.
 
-    `cases`: places of the light; `scales`: moments of a pulse; `units`: pixels or channels that are read; `nodes`:
-    wavelengths at which QE is looked at; `knots`: those of the kernel; `image`: what a pixel's light costs at each of
-    them; `kernel`: what is computed once for all designs; `clip`, `rounding`: what they cost for each unit.
+    `cases`: places of the light; `searched`: those of a search for the worst of all, and `search_s` what it takes for
+    each design; `scales`: moments of a pulse; `units`: pixels or channels that are read; `nodes`: wavelengths at which
+    QE is looked at; `knots`: those of the kernel; `shared_s`: what CFAs share whose tiles are alike; `own_s`: once for
+    each CFA; `value_s`: for each value that is read.
     """
 
     units: float
     nodes: int
     cases: float = 1.0
+    searched: float = 0.0
+    search_s: float = 0.0
     scales: int = 1
     knots: int = 1
-    image: float = 0.0
-    kernel: float = 0.0
-    clip: float = 0.0
-    rounding: float = 0.0
+    shared_s: float = 0.0
+    own_s: float = 0.0
+    value_s: float = 0.0
 
 
 class Effect(ABC):

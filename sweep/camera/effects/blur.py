@@ -29,8 +29,8 @@ COARSE = "every 10 nm"
 """The interpolated method on whose wavelengths kernels are compared when a plan is made."""
 _SPACING_NM = {"every 10 nm": 10.0, "every 5 nm": 5.0, "every 2 nm": 2.0}
 _SHORTEST_UM = 0.4
-IMAGE, WHOLE_IMAGE = 3e4, 1.2e5
-"""Multiplications that a wavelength of the image is taken to cost: for each pixel, and for the mean over a readout
+PROFILE_S, WHOLE_IMAGE_S = 2.5e-10, 1.4e-5
+"""Seconds: of a radius, a frequency and a wavelength of the image, and of a wavelength of its mean over a readout
 without pixels; `tests/bench_work.py` measures them."""
 _PANEL_NODES = 32
 _CYCLES_PER_PANEL = 4.0
@@ -269,5 +269,9 @@ class Blur(KernelEffect):
             return load
         n_knots = knots(shot.grid.nodes_nm, methods.blur).size
         if methods.sampling == "skip":
-            return replace(load, kernel=load.kernel + WHOLE_IMAGE * n_knots)
-        return replace(load, knots=n_knots, image=IMAGE)
+            return replace(load, own_s=load.own_s + WHOLE_IMAGE_S * n_knots)
+        highest = 1e3 / (shot.grid.nodes_nm[0] * shot.scenario.optics.f_number)
+        across_um = (shot.scenario.target.object_resolution_px + 4) * shot.pixel.pitch_um
+        radii = max(8.0, _SPLINE_PER_CYCLE * highest * across_um)
+        frequencies = _PANEL_NODES * (8 + highest * across_um / _CYCLES_PER_PANEL)
+        return replace(load, knots=n_knots, shared_s=load.shared_s + PROFILE_S * radii * frequencies * n_knots)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...types import FloatArray
-from ..scene import Drive
+from ..scene import Drive, FixedExposure
 from ..shot import Shot
 from .base import Change, Chosen, Designs, LinearEffect, Load, ShareChange, Stage
 
@@ -55,6 +55,14 @@ def scales(shot: Shot, method: str, exposure_s: FloatArray) -> FloatArray:
     least, most = extremes(drive, exposure_s)
     share = np.linspace(0.0, 1.0, 2 if method == "ends" else _FINE)
     return np.asarray(least[:, None] + share * (most - least)[:, None], dtype=float)
+
+
+def goes_dark(shot: Shot) -> bool:
+    """Whether a scene's fixed exposure may fall between two pulses."""
+    drive, exposure = shot.scenario.drive, shot.scenario.exposure
+    if drive is None or not isinstance(exposure, FixedExposure):
+        return False
+    return smallest(drive, exposure.exposure_s, exposure.exposure_s) == 0
 
 
 def missed(method: str, least: float, most: float, *, straight: bool) -> float:

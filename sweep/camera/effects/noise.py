@@ -17,8 +17,8 @@ from ..shot import Shot
 from .base import Chosen, Load, ReadoutEffect
 from .saturation import top_e
 
-LOOKED_UP = 150.0
-"""Pixels that are clipped while one is looked up in the table of noise, about; `tests/bench_work.py` measures it."""
+LOOKED_UP_S, TABLE_S = 5e-8, 0.04
+"""Seconds of looking a value up in the table of noise, and of making the table; `tests/bench_work.py` measures them."""
 _MOST_POISSON_E = 1e18
 """NumPy's Poisson generator takes no larger mean."""
 
@@ -60,6 +60,7 @@ class NoisyMean(ReadoutEffect):
         return min(float(added + max(lost + added, 0.0)), float(pixel.full_scale_dn))
 
     def work(self, shot: Shot, methods: Chosen, load: Load) -> Load:
-        """What clips is looked up in a table, which costs more than to clip."""
-        noisy = shot.scenario.noise is not None and methods.noise != "skip"
-        return replace(load, clip=load.clip * LOOKED_UP) if noisy else load
+        """What clips or rounds is looked up in a table, which costs more."""
+        if shot.scenario.noise is None or not load.value_s or (methods.noise == methods.quantization == "skip"):
+            return load
+        return replace(load, shared_s=load.shared_s + TABLE_S, value_s=LOOKED_UP_S)

@@ -15,6 +15,7 @@ from ...types import BoolArray, FloatArray, IndexArray
 from ..mosaic import Mosaic
 from ..shot import Shot
 from .base import Chosen, KernelEffect, Load, Part, Stage
+from .flicker import goes_dark
 
 LATTICES = ("one", "pixel", "half pixel", "quarter pixel")
 _WITHIN_DN = {
@@ -28,9 +29,10 @@ MOST = 1024
 """Places of a lattice on a tile, at most."""
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
 """A cell's corners from its center (column, row), in units of its half width."""
-PER_DECADE = 3
-"""Places of a search for each decade of its limit below 100 DN, in those of the lattice, about; `tests/bench_work.py`
-counts them."""
+PER_DECADE = 1.3
+"""Places of a search, in those of the lattice, for the square of its limit's decades below 100 DN, about."""
+SEARCH_S, SEARCH_DECADE_S = 0.05, 0.02
+"""Seconds that a search takes for each design, at all and for each decade; `tests/bench_work.py` measures all three."""
 PER_PIXEL = 4
 """Places per pixel, along a row and a column, of the finest lattice."""
 _PER_PIXEL = {"one": 0, "pixel": 1, "half pixel": 2, "quarter pixel": PER_PIXEL} | dict.fromkeys(_WITHIN_DN, PER_PIXEL)
@@ -70,13 +72,14 @@ def all_count(shot: Shot, methods: Chosen) -> bool:
 
 
 def n_places(shot: Shot, method: str) -> float:
-    """About how many places a method looks at: a search divides most where its limit is tight."""
-    if one_is_enough(shot) is not None:
-        return 1
-    lattice, within = max(1, _PER_PIXEL[method] ** 2 * shot.mosaic.indices.size), within_dn(method)
-    if within is None:
-        return lattice
-    return lattice * (1 + PER_DECADE * (2 - math.log10(within)))
+    """How many places the lattice of a method has."""
+    return 1 if one_is_enough(shot) is not None else max(1, _PER_PIXEL[method] ** 2 * shot.mosaic.indices.size)
+
+
+def decades(method: str) -> float:
+    """How many decades the limit of a search is below 100 DN; 0 for a lattice."""
+    within = within_dn(method)
+    return 0.0 if within is None else 2 - math.log10(within)
 
 
 def places_px(shot: Shot, method: str) -> FloatArray:
@@ -195,5 +198,12 @@ class Phase(KernelEffect):
 
     def work(self, shot: Shot, methods: Chosen, load: Load) -> Load:
         """All is done at every place."""
-        placed = shot.scenario.target is not None and methods.sampling != "skip"
-        return replace(load, cases=load.cases * n_places(shot, methods.phase)) if placed else load
+        if shot.scenario.target is None or methods.sampling == "skip":
+            return load
+        cases = load.cases * n_places(shot, methods.phase)
+        if not all_count(shot, methods) or (methods.flicker != "skip" and goes_dark(shot)):
+            return replace(load, cases=cases)  # of a light that may be dark all distances are 0, and none is looked for
+        deep = decades(methods.phase)
+        return replace(
+            load, cases=cases, searched=cases * PER_DECADE * deep**2, search_s=SEARCH_S + SEARCH_DECADE_S * deep
+        )

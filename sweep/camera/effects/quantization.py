@@ -15,8 +15,8 @@ from ..pixel import Pixel
 from ..shot import Shot
 from .base import Chosen, Load, ReadoutEffect
 
-ROUNDED = 25.0
-"""Multiplications that rounding a value is taken to cost; `tests/bench_work.py` measures it."""
+ROUNDED_S = 3e-9
+"""Seconds of rounding a value; `tests/bench_work.py` measures them."""
 _CURVATURE = 4 * math.e
 """Second derivative of a Poisson mean in the root of the electrons, at most, for values between -1 and 1.
 
@@ -41,11 +41,11 @@ def rounded(dn: FloatArray, pixel: Pixel) -> FloatArray:
 
 def steepness(pixel: Pixel) -> float:
     """Largest slope of the mean rounded value under noise, relative to that of the readout before it."""
-    return 1 + _under_noise(pixel, math.inf)[1]
+    return 1 + under_noise(pixel, math.inf)[1]
 
 
 @lru_cache(maxsize=64)
-def _under_noise(pixel: Pixel, brightest_e: float) -> tuple[float, float]:
+def under_noise(pixel: Pixel, brightest_e: float) -> tuple[float, float]:
     """Range of the shift by rounding, DN, over the numbers of electrons; its largest slope, DN per DN.
 
     Shifts at a table's nodes, with what they may miss in between; from the last counted electron on those of a
@@ -86,8 +86,8 @@ class Quantization(ReadoutEffect):
     def range_dn(self, shot: Shot, brightest_dn: float, methods: Chosen) -> float:
         """See `ReadoutEffect`: 1 at most; under noise the range of the mean's shift."""
         pixel = shot.pixel
-        return 1.0 if shot.scenario.noise is None else min(1.0, _under_noise(pixel, brightest_dn / pixel.dn_per_e)[0])
+        return 1.0 if shot.scenario.noise is None else min(1.0, under_noise(pixel, brightest_dn / pixel.dn_per_e)[0])
 
     def work(self, shot: Shot, methods: Chosen, load: Load) -> Load:
         """Every value is rounded."""
-        return load if methods.quantization == "skip" else replace(load, rounding=ROUNDED)
+        return load if methods.quantization == "skip" else replace(load, value_s=load.value_s + ROUNDED_S)

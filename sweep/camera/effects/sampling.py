@@ -15,6 +15,13 @@ from ..shot import Shot
 from .base import Chosen, KernelEffect, Load, Part, Stage
 from .blur import Profile
 
+PIXEL_S = 6e-8
+"""Seconds of a pixel at a place of the light, through a channel's filter, at a wavelength."""
+SEARCHED_S, PLACE_S, PLACE_PIXEL_S = 0.1, 2.2e-4, 4.7e-8
+"""Seconds that a search for the worst of all places takes: to begin with, for each place, and for each of its pixels
+and the functions of the image; `tests/bench_work.py` measures all of these."""
+_AROUND_PX, _MOST_FUNCTIONS = 6.0, 32
+"""How many more pixels a search looks at than are read, across, and of how many functions an image is a sum, about."""
 _AT_ONCE = 200
 
 
@@ -176,5 +183,12 @@ class Sampling(KernelEffect):
             return load
         across = 2 * radii_px(shot, target)[1] + 1
         pixels = max(across, 2.0 * max(shot.mosaic.indices.shape)) ** 2
-        kernel = load.cases * pixels * len(shot.mosaic.channels) * load.knots + load.image * pixels * load.knots
-        return replace(load, units=load.units if methods.straight else pixels, kernel=kernel)
+        apart = shot.grid.size if not methods.straight else load.knots
+        shared_s, own_s = load.shared_s, PIXEL_S * load.cases * pixels * len(shot.mosaic.channels) * apart
+        if load.searched:
+            around = (across + _AROUND_PX) ** 2 * min(load.knots, _MOST_FUNCTIONS)
+            places_s = load.searched * (PLACE_S + PLACE_PIXEL_S * around)
+            own_s += SEARCHED_S + places_s / 2
+            shared_s += places_s / 2  # CFAs whose tiles are alike look at about half of their places together
+        units = load.units if methods.straight else pixels
+        return replace(load, units=units, own_s=load.own_s + own_s, shared_s=shared_s)

@@ -37,7 +37,7 @@ def variance(electrons: FloatArray, pixel: Pixel) -> FloatArray:
 @lru_cache(maxsize=64)
 def unclipped_e(pixel: Pixel) -> tuple[float, float]:
     """From and up to how many electrons neither end takes more from the mean than 1e-5 of the noise."""
-    table = _tables(pixel)[moments.UNROUNDED]
+    table = tables(pixel)[moments.UNROUNDED]
     electrons = (np.sinh(pixel.prnu * table.x) / pixel.prnu if pixel.prnu else table.x) ** 2
     sigma = pixel.dn_per_e * np.sqrt(electrons + (pixel.prnu * electrons) ** 2 + pixel.read_noise_e**2)
     inside = np.abs(table(table.x) - pixel.dn_per_e * electrons - pixel.offset_dn) <= _CUT * sigma + 1e-9
@@ -46,14 +46,14 @@ def unclipped_e(pixel: Pixel) -> tuple[float, float]:
 
 
 def _looked_up(electrons: FloatArray, pixel: Pixel, row: int) -> FloatArray:
-    table = _tables(pixel)[row]
+    table = tables(pixel)[row]
     root = np.sqrt(np.minimum(electrons, moments.Ends.of(pixel).last_e))
     at = np.arcsinh(pixel.prnu * root) / pixel.prnu if pixel.prnu else root
     return np.asarray(table(at), dtype=float)
 
 
 @lru_cache(maxsize=8)
-def _tables(pixel: Pixel) -> tuple[PPoly, ...]:
+def tables(pixel: Pixel) -> tuple[PPoly, ...]:
     """A cubic for each of `moments.moments` over twice the standard deviations of the electrons from 0 up.
 
     That is the root of the electrons, or with PRNU the inverse hyperbolic sine of PRNU times the root, over PRNU.

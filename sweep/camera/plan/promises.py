@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -28,13 +28,13 @@ from ..effects.base import (
     Stage,
 )
 from ..effects.image_height import all_heights_count
-from ..methods import Methods
+from ..methods import REFERENCE, Methods
 from ..registry import EFFECTS
 from .bounds import Box, Reach
 from .pixelwise import Moves
 from .scene_kernels import SceneKernels
 from .steps import Step, Steps
-from .work import Work
+from .work import COMPARED_S, LINEAR_S, REACH_S, READOUT_S, Work
 
 _OF_READOUT = tuple(name for name, effect in EFFECTS.items() if effect.stage is Stage.READOUT)
 
@@ -57,7 +57,7 @@ class Promises:
     """One box of designs: what each step changes in it, remembered."""
 
     def __init__(self, box: Box, kernels: SceneKernels) -> None:
-        """`kernels`: of the box's view."""
+        """`kernels`: of the box's view. `spent_s`: seconds that all bounds took, counted, but for the kernels."""
         self.box = box
         self.view = box.view
         self.reach = Reach(box)
@@ -67,6 +67,8 @@ class Promises:
         self._ranges: dict[tuple[str, ...], float] = {}
         self._readouts: dict[tuple[str, ...], float] = {}
         self._moves = Moves(self.view, self.reach)
+        self._works: dict[Methods, Work] = {}
+        self.spent_s = REACH_S
 
     def promise(self, name: str, before: Methods, after: Methods) -> float:
         """What switching the effect of a name from its reference changes in any CSD, DN."""
@@ -84,6 +86,7 @@ class Promises:
             return math.inf  # named places of the sensor say nothing of those between them
         key = (name, *_seen(name, before, after))
         if key not in self._promises:
+            self.spent_s += self.linear_s
             self._promises[key] = self._linear_promise(effect, *key[1:])
         return self._promises[key]
 
@@ -91,6 +94,7 @@ class Promises:
         """Ranges of the change in each channel, put together over the channels."""
         key = (effect.name, *(getattr(after, name) for name in _OF_READOUT))
         if key not in self._ranges:
+            self.spent_s += READOUT_S
             each = [effect.range_dn(self.view, float(top), after) for top in self.reach.brightest_pixels_dn]
             self._ranges[key] = float(np.linalg.norm(each))
         return self._ranges[key]
@@ -177,5 +181,13 @@ class Promises:
         return self._kernels.anywhere(methods)
 
     def work_of(self, methods: Methods) -> Work:
-        """Estimated operations."""
-        return self._kernels.work(self.view, methods)
+        """Estimated seconds."""
+        if methods not in self._works:
+            self._works[methods] = self._kernels.work(self.view, methods)
+        return self._works[methods]
+
+    @cached_property
+    def linear_s(self) -> float:
+        """Seconds of a bound of the optics, counted."""
+        corners = 1 if not self._kernels.anywhere(REFERENCE) else self._kernels.corners[1].size
+        return LINEAR_S + COMPARED_S * corners * len(self.view.mosaic.channels) * len(self.reach.first)

@@ -12,26 +12,27 @@ from ...types import FloatArray, IndexArray
 from ..between import Between, Deviation
 from ..effects import blur, phase, sampling
 from ..effects.base import Change, KernelChange, KernelEffect, Part
-from ..kernel import make_kernel
+from ..kernel import make_kernel, pixels_per_place
 from ..methods import REFERENCE, Methods
 from ..place_kernels import PlaceKernels
 from ..registry import EFFECTS, WHOLE_LIGHT
 from ..view import View
 from .bounds import Spread
-from .work import Work, estimated_work
+from .work import KERNEL_S, Work, estimated_work
 
 
 class SceneKernels:
     """Kernels of a scene's methods at the wavelengths at which plans compare them, remembered."""
 
     def __init__(self, view: View) -> None:
-        """`view`: `colorless`."""
+        """`view`: `colorless`. `spent_s`: seconds that the kernels took, counted."""
         self._view, self._knots_nm = view, blur.knots(view.grid.nodes_nm, blur.COARSE)
         self._wanted: dict[Methods, Methods] = {}
         self._kernels: dict[Methods, FloatArray] = {}
         self._deviations: dict[Methods, Deviation] = {}
         self._gaps: dict[tuple[str, float], float] = {}
         self._works: dict[tuple[object, ...], Work] = {}
+        self.spent_s = 0.0
 
     def work(self, view: View, methods: Methods) -> Work:
         """`estimated_work` of a view of this tile, remembered for those with equally many changed channels."""
@@ -70,6 +71,7 @@ class SceneKernels:
         """
         wanted, nodes = self.wanted(methods), self._knots_nm
         if wanted not in self._kernels:
+            self.spent_s += self._seconds(wanted)
             if phase.one_is_enough(self._view) is None and wanted.sampling != "skip":
                 cases = self.corners[0] if self.anywhere(wanted) else phase.cases(self._view, wanted.phase)
                 made = PlaceKernels(self._view, wanted, nodes)
@@ -78,6 +80,14 @@ class SceneKernels:
                 light = make_kernel(self._view, wanted, nodes, by_pixel=False, work=Counter()).light
             self._kernels[wanted] = np.ascontiguousarray(np.broadcast_to(light, (*light.shape[:3], nodes.size)))
         return self._kernels[wanted]
+
+    def _seconds(self, wanted: Methods) -> float:
+        """Of a kernel, counted."""
+        if self._view.scenario.target is None or wanted.sampling == "skip":
+            return 0.0
+        n_cases = len(self.corners[0].places_px) if self.anywhere(wanted) else phase.n_places(self._view, wanted.phase)
+        functions = pixels_per_place(self._view) * self._knots_nm.size
+        return KERNEL_S + n_cases * (sampling.PLACE_S + sampling.PLACE_PIXEL_S * functions)
 
     def nearest(self, methods: Methods) -> FloatArray:
         """The kernel at the place of a lattice that is nearest to the center of each cell."""

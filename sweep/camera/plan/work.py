@@ -1,28 +1,55 @@
-"""How much computing a scene takes."""
+"""How long computing a scene takes, and looking for a plan: counted work times measured constants.
+
+The seconds are those of one core of the machine by which `tests/bench_work.py` measured the constants, here and in the
+effects. They come from the scene alone: no clock is read, so that the same plan is found on every machine.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
-from ..effects.base import Load
+from ..effects.base import MULTIPLICATION_S, Load
+from ..electrons import KEPT
 from ..methods import Methods
 from ..registry import EFFECTS
 from ..view import View
 
-PLANNED_PATCH, PLANNED_TARGET = 2e8, 4e8
-"""Multiplications that it takes to find a plan, for each CFA: of a patch, and of a light at a distance;
-`tests/bench_work.py` measures them."""
+BOX_S, TABLED_S, FOLDED_S = 2.5e-3, 3e-9, 1.4e-8
+"""Seconds: of the imager of a CFA, and of a value of its table at a wavelength, on the grid and between fewer nodes."""
+REACH_S, READOUT_S, LINEAR_S, COMPARED_S, KERNEL_S = 1e-3, 2.5e-3, 1.5e-3, 5e-9, 0.01
+"""Seconds of a planner: for the reach of a box, a bound of the readout, one of the optics and each value that it
+compares, and a kernel of a light at a distance; `tests/bench_work.py` measures what they come to."""
+NOISE_S, UNEVEN_NOISE_S = 4e-3, 0.08
+"""Seconds of the first bounds of a noisy readout, without PRNU and with it; `tests/bench_work.py` measures them."""
+LEAST_LOOK_S = 2 * REACH_S
+"""Seconds for each CFA, with which hardly anything can be found."""
+LOOKING_SHARE = 0.05
+"""Of the time that everything on takes, what looking for a plan may take at most."""
+
+
+def noise_s(view: View) -> float:
+    """Seconds of the first bounds of a scene's readout, counted: its pixel is then known."""
+    if view.scenario.noise is None:
+        return 0.0
+    return UNEVEN_NOISE_S if view.pixel.prnu else NOISE_S
 
 
 class Work(NamedTuple):
-    """Multiplications: `kernel` once, for CFAs whose tiles have one size; `each` for every design."""
+    """Seconds: `shared` once, for CFAs whose tiles are alike; `own` for each CFA, `each` for every design."""
 
-    kernel: float
+    shared: float
+    own: float
     each: float
 
     def of(self, n_designs: int) -> float:
         """Of a run of some designs."""
-        return self.kernel + n_designs * self.each
+        return self.own + n_designs * self.each
+
+
+def in_all(works: Sequence[tuple[Work, int]]) -> float:
+    """Seconds of the CFAs of a scene, each with its number of designs."""
+    return max((work.shared for work, _ in works), default=0.0) + sum(work.of(n) for work, n in works)
 
 
 def estimated_work(view: View, methods: Methods) -> Work:
@@ -31,9 +58,12 @@ def estimated_work(view: View, methods: Methods) -> Work:
     load = Load(units=float(channels), nodes=view.grid.size)
     for effect in reversed(EFFECTS.values()):
         load = effect.work(view, methods, load)
-    touched = load.units * max(len(view.modified), 1) / channels
-    values = load.cases * load.scales * signals
-    each = values / load.scales * touched * load.nodes + values * channels * signals / 2
-    each += values * load.units * load.clip
-    each += values * load.units * load.rounding
-    return Work(load.kernel, each)
+    changed = load.units * len(view.modified) / channels
+    lights = load.cases * signals
+    products = lights * load.units * channels * view.grid.size * MULTIPLICATION_S
+    table, tabled_s = lights * changed * load.nodes, 0.0
+    if 0 < table <= KEPT:
+        tabled_s = lights * changed * view.grid.size * (TABLED_S if load.nodes == view.grid.size else FOLDED_S)
+    each = table * MULTIPLICATION_S + load.scales * lights * (channels * signals / 2 * MULTIPLICATION_S)
+    each += load.scales * lights * load.units * load.value_s + load.search_s
+    return Work(load.shared_s, BOX_S + load.own_s + products + tabled_s, each)

@@ -20,13 +20,14 @@ _HARD_COLUMNS = ("case", "oracle", "error", "allowed", "why")
 
 @dataclass(frozen=True)
 class AccuracyReport:
-    """What the report shows: pictures by name, and the tables of tolerances, settings and hard cases."""
+    """What the report shows: pictures by name, and the tables of tolerances, plans, settings and hard cases."""
 
     name: str
     question: str
     lines: Sequence[str]
     images: Mapping[str, bytes]
     ladder: pd.DataFrame
+    payments: pd.DataFrame
     knobs: pd.DataFrame
     hard_cases: pd.DataFrame | None
 
@@ -46,16 +47,20 @@ def read_hard_cases(folder: Path) -> pd.DataFrame | None:
 def make_accuracy_report(folder: Path, report: AccuracyReport) -> None:
     """Write `accuracy.html` into the folder; errors as for `tables.atomic`."""
     ladder = report.ladder.assign(
-        faster=(report.ladder["reference_s"] / report.ladder["seconds"]).map("{:.3g}x".format)
+        run_s=report.ladder["seconds"],
+        faster=(report.ladder["reference_s"] / (report.ladder["plan_s"] + report.ladder["seconds"])).map(
+            "{:.3g}x".format
+        ),
     )
-    shown = ["scenario", "tolerance_dn", "promised_dn", "realized_dn", "seconds", "faster", "work", "computed"]
+    shown = ["scenario", "designs", "tolerance_dn", "promised_dn", "realized_dn", "plan_s", "run_s", "faster"]
     content = page(
         "accuracy.html.j2",
         title=report.name,
         question=report.question,
         lines=report.lines,
         images={name: inlined(png) for name, png in report.images.items()},
-        ladder=rows(_rounded(ladder[shown])),
+        ladder=rows(_rounded(ladder[[*shown, "work", "computed"]])),
+        payments=rows(_rounded(report.payments)),
         knobs=rows(_rounded(report.knobs)),
         hard_cases=[] if report.hard_cases is None else rows(_rounded(report.hard_cases)),
     )
