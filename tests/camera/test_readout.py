@@ -89,7 +89,7 @@ def test_what_rounding_changes_is_within_its_promise_and_its_steepness(seed: int
     brightest = 1.2 * moments.Ends.of(pixel).full_e + 50
     electrons = np.linspace(0, np.sqrt(brightest), 7001) ** 2
     shift = table.mean_rounded(electrons, pixel) - table.mean_unrounded(electrons, pixel)
-    promised, slope = quantization._under_noise(pixel, brightest)
+    promised, slope = quantization.under_noise(pixel, brightest)
     assert np.ptp(shift) <= promised + 1e-9
     assert promised <= 1.02 * np.ptp(shift) + 1e-3
     steepest = np.abs(np.diff(shift) / np.diff(electrons * pixel.dn_per_e)).max()
