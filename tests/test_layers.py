@@ -145,6 +145,18 @@ def test_imports_point_downward() -> None:
     assert breaches(PACKAGE) == []
 
 
+def test_no_test_module_imports_another() -> None:
+    """What several of them need has a module of its own."""
+    root, found = Path(__file__).parent, []
+    for path in root.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom):
+                names = [*(node.module or "").split("."), *(alias.name for alias in node.names)]
+                if any(name.startswith("test_") for name in names):
+                    found.append(f"{path.relative_to(root)}:{node.lineno}")
+    assert found == []
+
+
 @pytest.mark.parametrize(
     ("file", "text"),
     [

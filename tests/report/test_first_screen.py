@@ -14,10 +14,9 @@ from sweep.study import load_study
 
 from ..build import ran
 from ..conftest import Finished
-from . import test_report_page as pages
+from .pages import needs_browser
 
-browser, opened, standing = pages.browser, pages.opened, pages.standing
-pytestmark = pages.pytestmark
+pytestmark = needs_browser
 
 SCREENS = [
     *(("stopband", width) for width in (1440, 400)),

@@ -5,9 +5,6 @@ from __future__ import annotations
 import base64
 import csv
 import io
-import shutil
-from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,106 +17,9 @@ from sweep.study import load_study
 
 from ..build import ran
 from ..conftest import Finished
+from .pages import Opened, needs_browser, through
 
-BROWSER = next((p for n in ("chromium", "chromium-browser", "google-chrome") if (p := shutil.which(n))), None)
-playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-pytestmark = pytest.mark.skipif(BROWSER is None, reason="there is no Chromium on this machine")
-
-
-@dataclass
-class Opened:
-    """An open page, and what it said and asked for."""
-
-    page: Any
-    errors: list[str] = field(default_factory=list)
-    requests: list[str] = field(default_factory=list)
-
-    def number_of_points(self) -> int:
-        count = "document.getElementById('pareto').data.reduce((n, t) => n + (t.customdata ? t.x.length : 0), 0)"
-        return int(self.page.evaluate(count))
-
-    def point_at(self, trace: str) -> tuple[float, float, int]:
-        """Place on the page of a trace's first point, and its row in the page's data."""
-        found = self.page.evaluate(
-            """(name) => {
-                const box = document.getElementById('pareto') || document.getElementById('cfas');
-                box.scrollIntoView();
-                const layout = box._fullLayout, place = box.getBoundingClientRect();
-                const trace = box.data.find((t) => t.name.startsWith(name));
-                return [place.left + layout._size.l + layout.xaxis.d2p(trace.x[0]),
-                        place.top + layout._size.t + layout.yaxis.d2p(trace.y[0]), trace.customdata[0]];
-            }""",
-            trace,
-        )
-        return float(found[0]), float(found[1]), int(found[2])
-
-    def details(self) -> dict[str, str]:
-        """What the page says of the chosen design."""
-        pairs = self.page.eval_on_selector_all(
-            "#details dl div", "(all) => all.map((d) => [d.children[0].textContent, d.children[1].textContent])"
-        )
-        return dict(pairs)
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as started:
-        found = started.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
-        yield found
-        found.close()
-
-
-def open_report(browser: Any, folder: Path, width: int) -> Opened:
-    page = browser.new_page(viewport={"width": width, "height": 1000})
-    seen = Opened(page)
-    page.on("console", lambda m: seen.errors.append(m.text) if m.type == "error" else None)
-    page.on("pageerror", lambda error: seen.errors.append(str(error)))
-    page.on("dialog", lambda dialog: seen.errors.append(f"dialog {dialog.message}") or dialog.dismiss())
-    page.on("request", lambda request: seen.requests.append(request.url))
-    page.goto((folder / "report.html").as_uri())
-    page.wait_for_selector("body[data-ready-ms]")
-    if page.locator("#pareto").count():
-        page.evaluate("document.getElementById('pareto').scrollIntoView()")
-        page.wait_for_function("document.getElementById('pareto').data")
-    return seen
-
-
-@pytest.fixture
-def opened(browser: Any) -> Iterator[Any]:
-    """Opens a report for a test that clicks, or wants to see it from its first moment."""
-    pages: list[Opened] = []
-
-    def one(folder: Path, width: int = 1280) -> Opened:
-        pages.append(open_report(browser, folder, width))
-        return pages[-1]
-
-    yield one
-    for seen in pages:
-        seen.page.close()
-
-
-@pytest.fixture(scope="module")
-def standing(browser: Any) -> Iterator[Any]:
-    """A report for tests that only look, or leave all as it was: opened once for all of them."""
-    pages: dict[tuple[Path, int], Opened] = {}
-
-    def one(folder: Path, width: int = 1280) -> Opened:
-        if (folder, width) not in pages:
-            pages[folder, width] = open_report(browser, folder, width)
-        return pages[folder, width]
-
-    yield one
-    for seen in pages.values():
-        seen.page.close()
-
-
-def through(seen: Opened) -> None:
-    """Scroll through the whole page, so that everything is drawn."""
-    height = seen.page.evaluate("document.documentElement.scrollHeight")
-    for top in range(0, height, 700):
-        seen.page.evaluate(f"window.scrollTo(0, {top})")
-        seen.page.wait_for_timeout(60)
-    seen.page.evaluate("window.scrollTo(0, 0)")
+pytestmark = needs_browser
 
 
 def ids(seen: Opened) -> list[int]:

@@ -19,6 +19,7 @@ from sweep.study import load_study
 
 from ..build import faults, load, ran
 from ..mischief import StoppedError
+from .lamps import lights
 
 FILE = "files: [{file: FILE.csv, quantity: photons, signals: {green: [g1], yellow: [y1], red: REDS}}]"
 SWEEP = """\
@@ -42,17 +43,6 @@ constraints: {sensitivity: {min: 0.85}}
 def text(study: str, file: str, ratio: str = "", reds: str = "[r1, r2]", after: str = "") -> str:
     lights = FILE.replace("FILE", file).replace("REDS", reds)
     return SWEEP.replace("STUDY", study).replace("RATIO", ratio).replace("LIGHTS", lights) + after
-
-
-def lights(folder: Path, name: str, yellow_nm: float, red_nm: float) -> None:
-    """A file of Gaussian lights; r2 is much wider than the others."""
-    wave = np.arange(400.0, 701.0)
-
-    def bump(center: float, width: float) -> np.ndarray:
-        return np.asarray(np.exp(-0.5 * ((wave - center) / width) ** 2))
-
-    columns = {"g1": bump(505, 15), "y1": bump(yellow_nm, 8), "r1": bump(red_nm, 9), "r2": bump(red_nm + 8, 25)}
-    pd.DataFrame({"wavelength_nm": wave, **columns}).to_csv(folder / f"{name}.csv", index=False)
 
 
 @pytest.fixture

@@ -17,9 +17,7 @@ from sweep.run import run_study
 from sweep.study import Study, load_study
 
 from ..commanded import commanded
-from .test_own_family import OWN as OWN_FAMILY
-from .test_own_family import STOPBAND
-from .test_own_metric import CODE, rows_of
+from .own_codes import CODE, OWN_FAMILY, STOPBAND, rows_of
 
 OFFERS = """\
 [sweep.families]

@@ -18,37 +18,10 @@ from sweep.study import Study, load_study
 from ..build import BASE, ran
 from ..commanded import commanded
 from ..conftest import ROOT
-
-STOPBAND = """\
-import numpy as np
-
-SPAN = 1 / (1 - 2 * 0.2466364532884666)
+from .own_codes import BUILT_IN, OWN_FAMILY, STOPBAND
 
 
-class Band:
-    below_base = True
-    parameters = [("left_nm", 400, 700), ("left_width_nm", 0, 100), ("right_nm", 400, 700), ("right_width_nm", 0, 100)]
-
-    def __init__(self, wavelength_nm, base, target):
-        self.wave, self.base, self.change = wavelength_nm, base, target - base
-
-    def edge(self, center, width):
-        t = np.clip((self.wave - center[:, None]) / (width[:, None] * SPAN) + 0.5, 0, 1)
-        return t**3 * (t * (6 * t - 15) + 10)
-
-    def curves(self, x):
-        return self.base + self.change * (self.edge(x[:, 0], x[:, 1]) - self.edge(x[:, 2], x[:, 3]))
-
-    def violation(self, x):
-        half = SPAN / 2
-        ends = [x[:, 0] + s * half * x[:, 1] - x[:, 2] - s * half * x[:, 3] for s in (-1, 1)]
-        return np.stack(ends, axis=1)
-"""
-BUILT_IN = BASE.replace("min: 0.9", "min: 0.8")
-OWN = BUILT_IN.replace("    cfa: RYNCy\n", "    cfa: RYNCy\n    family: filters.py:Band\n")
-
-
-def study(folder: Path, text: str = OWN, code: str = STOPBAND, *, allow: bool = True) -> Study:
+def study(folder: Path, text: str = OWN_FAMILY, code: str = STOPBAND, *, allow: bool = True) -> Study:
     (folder / "filters.py").write_text(code)
     path = folder / f"{'own' if 'family' in text else 'plain'}.yaml"
     path.write_text(text)
@@ -163,7 +136,7 @@ def test_bounds_and_gradients_hold(tmp_path: Path) -> None:
 
 def test_edges_of_a_family_of_ones_own_are_not_shifted(tmp_path: Path) -> None:
     with pytest.raises(SweepError, match="has no edges that production could shift"):
-        study(tmp_path, OWN + "production: {edge_shift_nm: 2}\n")
+        study(tmp_path, OWN_FAMILY + "production: {edge_shift_nm: 2}\n")
 
 
 @pytest.mark.slow

@@ -23,49 +23,17 @@ from sweep.run import run_study
 from sweep.study import Study, load_study
 from sweep.study.own_metrics import RESERVED
 
-from ..build import BASE, ran
+from ..build import ran
 from ..commanded import commanded
 from ..hard.scenes import FAMILY, scene
-
-CODE = """\
-import numpy as np
+from .own_codes import CODE, OWN_METRIC, PLAIN, rows_of
 
 
-def apart(readings):
-    one, other = readings.of("yellow"), readings.of("red")
-    return np.linalg.norm(one[:, :, None] - other[:, None], axis=-1).reshape(len(one), -1)
-
-
-apart.unit, apart.label, apart.digits = "DN", "yellow/red gap", 1
-
-
-class Spread:
-    name, wanted = "red_spread", "less"
-
-    def of(self, readings):
-        return np.ptp(readings.of("red"), axis=1).max(axis=1)
-
-
-def below_zero(readings):
-    return apart(readings) - 1e4
-
-
-def only_n(readings):
-    return readings.dn[:, :, readings.channels.index("N")].min(axis=1) if "N" in readings.channels else None
-"""
-PLAIN = BASE.replace("min: 0.9", "min: 0.8").replace("space: edges", "{space: edges, starts: 4, max_evaluations: 800}")
-OWN = PLAIN.replace("constraints:", "metrics: [mine.py:apart, mine.py:Spread]\nobjective: apart\nconstraints:")
-
-
-def study(folder: Path, text: str = OWN, code: str = CODE, *, allow: bool = True) -> Study:
+def study(folder: Path, text: str = OWN_METRIC, code: str = CODE, *, allow: bool = True) -> Study:
     (folder / "mine.py").write_text(code)
     path = folder / "own.yaml"
     path.write_text(text)
     return load_study(path, allow_code=allow)
-
-
-def rows_of(folder: Path) -> pd.DataFrame:
-    return pd.read_parquet(folder / "results.parquet")
 
 
 def test_a_csd_written_again_has_the_same_numbers_and_the_same_optimum(tmp_path: Path) -> None:
@@ -129,7 +97,7 @@ def test_less_is_searched_for_constrained_and_below_zero(tmp_path: Path) -> None
 
 def test_slopes_are_those_of_the_metric(tmp_path: Path) -> None:
     """Beside the exact slopes of the squared distances."""
-    made = study(tmp_path, OWN.replace("cfas: [RGGB, RYNCy]", "cfas: [RYNCy]"))
+    made = study(tmp_path, OWN_METRIC.replace("cfas: [RGGB, RYNCy]", "cfas: [RYNCy]"))
     own = made.quantities["apart"]
     exact = made.quantities["csd_yellow_red"]
     view, free = scene("chart", "RYNCy", {}).view, np.arange(5)
@@ -147,7 +115,7 @@ def test_slopes_are_those_of_the_metric(tmp_path: Path) -> None:
 
 
 def test_a_run_that_is_stopped_goes_on_and_other_code_is_another_study(tmp_path: Path) -> None:
-    made = study(tmp_path, OWN.replace("count: 3}", "count: 1100}"))
+    made = study(tmp_path, OWN_METRIC.replace("count: 3}", "count: 1100}"))
 
     def stop(phase: str, done: int, _: int) -> None:
         if phase == "designs" and 0 < done < 4400:
@@ -164,7 +132,7 @@ def test_a_run_that_is_stopped_goes_on_and_other_code_is_another_study(tmp_path:
 
 
 def test_own_filters_and_plain_cfas_have_it_in_python(tmp_path: Path) -> None:
-    study(tmp_path, OWN.replace("mine.py:apart,", "mine.py:apart, mine.py:only_n,"))
+    study(tmp_path, OWN_METRIC.replace("mine.py:apart,", "mine.py:apart, mine.py:only_n,"))
     made = sweep.load_study(tmp_path / "own.yaml", allow_code=True)
     table = made.evaluate(N=0.9 * made.curve("Y"))
     assert table["apart"][0] == pytest.approx(table["csd_yellow_red"][0], rel=1e-12)
@@ -222,14 +190,17 @@ def test_faults_of_a_metric_are_one_line_before_any_work(tmp_path: Path, old: st
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (OWN.replace("objective: apart", "objective: red_spread"), "less of red_spread is better; allowed: `{least:"),
         (
-            OWN.replace("constraints:", "constraints:\n  apart: {max: 3}"),
+            OWN_METRIC.replace("objective: apart", "objective: red_spread"),
+            "less of red_spread is better; allowed: `{least:",
+        ),
+        (
+            OWN_METRIC.replace("constraints:", "constraints:\n  apart: {max: 3}"),
             "apart has no `max` (got 3.0); allowed: `min`",
         ),
-        (OWN.replace("mine.py:Spread", "mine.py:apart"), "another column has this name"),
-        (OWN.replace("mine.py:Spread", "spreads"), "unknown metric (got 'spreads')"),
-        (OWN.replace("mine.py:Spread", "other.py:Spread"), "no such file (got 'other.py')"),
+        (OWN_METRIC.replace("mine.py:Spread", "mine.py:apart"), "another column has this name"),
+        (OWN_METRIC.replace("mine.py:Spread", "spreads"), "unknown metric (got 'spreads')"),
+        (OWN_METRIC.replace("mine.py:Spread", "other.py:Spread"), "no such file (got 'other.py')"),
     ],
 )
 def test_what_a_study_says_of_it_is_checked(tmp_path: Path, text: str, said: str) -> None:
@@ -247,14 +218,14 @@ def test_a_design_that_the_metric_fails_on_costs_a_row(tmp_path: Path) -> None:
         "    def of(",
         "    def bad(self, readings):\n        return self.name and abs(readings.dn[:, 0, -1] - EDGE).min() < 1e-9\n\n    def of(",
     )
-    made = study(tmp_path, OWN.partition("search:")[0])
+    made = study(tmp_path, OWN_METRIC.partition("search:")[0])
     run_study(made, tmp_path / "all", 1, lambda *_: None)
     space = next(space for space in made.spaces if space.kind == "sweep")
     view = made.plan("chart") and made.view(space, "chart")
     from sweep.camera.imager import imager_of
 
     edge = imager_of(view).read(space.curves(space.points(3, 4), made.grid.size))[0][0, 0, 0, -1]
-    bad = study(tmp_path, OWN.partition("search:")[0], f"EDGE = {edge!r}\n".replace("np.float64(", "(") + code)
+    bad = study(tmp_path, OWN_METRIC.partition("search:")[0], f"EDGE = {edge!r}\n".replace("np.float64(", "(") + code)
     run_study(bad, tmp_path / "some", 1, lambda *_: None)
     found = rows_of(tmp_path / "some")
     failed = found[found["status"] != "ok"]

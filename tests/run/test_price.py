@@ -15,7 +15,7 @@ from sweep.report import make_report, read_output, summary_lines
 from sweep.study import Study, load_study
 
 from ..build import faults, ran
-from .test_held_out import lights
+from .lamps import lights
 
 TEXT = """\
 study: price

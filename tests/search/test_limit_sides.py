@@ -2,69 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.optimize import Bounds, LinearConstraint, milp
 
-from sweep.designs.families.free_form import FreeForm
-from sweep.metrics.bound import FEASIBLE, Bound, total_violation
-from sweep.metrics.evaluate import designed_quantities
+from sweep.metrics.bound import Bound
 from sweep.metrics.objective import Objective
-from sweep.metrics.separation import separation
 from sweep.metrics.smooth import smooth_response
-from sweep.search.limit import Limit, limit_of
+from sweep.search.limit import limit_of
 from sweep.search.problem import Problem, best_feasible, starting_points
 from sweep.search.sides import _NEAR
 from sweep.search.solver import search_from
 from sweep.study import Study, load_study
 
-TEXT = """\
-study: sides
-sensor: {files: [{file: qe.csv, columns: {Y: Y, R: R, C: C}}], clear: C}
-lights:
-  files:
-    - {file: lights.csv, quantity: photons, signals: {yellow: [a], red: [b, c]}}
-wavelengths: {start_nm: 400, stop_nm: 700, step_nm: STEP}
-cfas:
-  RYNC: {tile: [[R, Y], [N, C]]}
-boxes:
-  nodes:
-    cfa: RYNC
-    family: free_form
-    channel: N
-    base: Y
-    options: {nodes: {start_nm: 520, stop_nm: 700, step_nm: 10}}
-objective: csd_yellow_red
-constraints:
-  sensitivity: {min: 0.9}
-  slope_per_nm: {max: 0.06}
-search: {starts: 4, max_evaluations: 400}
-"""
-
-
-def write_study(folder: Path, step_nm: float) -> Path:
-    """Yellow at 600 nm between two reds at 560 and 640 nm, seen through a ramp from 520 to 680 nm."""
-    wave = np.arange(400, 701)
-    ramp = np.interp(wave, [520, 680], [0.02, 0.82])
-    lights = [np.exp(-0.5 * ((wave - center) / 6) ** 2) for center in (600, 560, 640)]
-    for name, columns in (
-        ("qe", {"Y": ramp, "R": 0 * wave + 0.5, "C": 0 * wave + 0.9}),
-        ("lights", dict(zip("abc", lights, strict=True))),
-    ):
-        header = ",".join(["wavelength_nm", *columns])
-        np.savetxt(
-            folder / f"{name}.csv",
-            np.column_stack([wave, *columns.values()]),
-            delimiter=",",
-            header=header,
-            comments="",
-        )
-    path = folder / "sides.yaml"
-    path.write_text(TEXT.replace("STEP", f"{step_nm:g}"))
-    return path
+from .sides_milp import agrees, is_mixed, largest, random_problem, smallest, write_study
 
 
 @pytest.fixture(scope="module")
@@ -77,136 +30,6 @@ def coarse(tmp_path_factory: pytest.TempPathFactory) -> Problem:
     study = load_study(write_study(tmp_path_factory.mktemp("coarse"), 10))
     assert study.search is not None
     return study.problem(study.search)
-
-
-def smallest(problem: Problem, curve: np.ndarray, name: str) -> float:
-    """A CSD of the smooth response, the smallest over the places of the light."""
-    first, second = (problem.view.members[kind] for kind in problem.pairs[name])
-    response = smooth_response(problem.view, curve[None, None])[0]
-    return min(float(separation(place[None], first, second)[0]) for place in response)
-
-
-def check_attained(problem: Problem, limit: Limit) -> None:
-    """The filter of the limit meets everything, and reaches what is said."""
-    assert limit.curve is not None
-    curves = limit.curve[None, None]
-    amounts = designed_quantities(problem.view, curves)
-    amounts |= {n: np.array([smallest(problem, limit.curve, n)]) for n in problem.constraints if n in problem.pairs}
-    assert total_violation(amounts, problem.constraints, np.zeros(1))[0] <= FEASIBLE
-    assert ((limit.curve >= 0) & (limit.curve <= problem.view.base_qe[0])).all()
-    reached = min(w * smallest(problem, limit.curve, name) for name, w in problem.objective.weights.items())
-    assert reached == pytest.approx(limit.attained, rel=1e-12)
-
-
-@dataclass
-class Pairs:
-    """Every pair of signals, found by probing: its difference per QE of N, its squared distance in the other channels, the
-    CSD that it must have, and the CSD that it must have per unit of the objective.
-    """
-
-    apart: np.ndarray
-    squared: np.ndarray
-    least: np.ndarray
-    rate: np.ndarray
-
-
-def pairs_of(problem: Problem) -> Pairs:
-    view, size, channel = problem.view, problem.view.grid.size, problem.view.modified[0]
-    dark = smooth_response(view, np.zeros((1, 1, size)))[0]
-    gain = smooth_response(view, np.eye(size)[:, None])[..., channel] - dark[..., channel]
-    found = []
-    for name, kinds in problem.pairs.items():
-        weight, bound = problem.objective.weights.get(name), problem.constraints.get(name)
-        if weight is None and bound is None:
-            continue
-        for one in view.members[kinds[0]]:
-            for other in view.members[kinds[1]]:
-                for place in range(len(dark)):
-                    rest = np.delete(dark[place, one] - dark[place, other], channel)
-                    least, rate = 0.0 if bound is None else bound.min, 0.0 if weight is None else 1 / weight
-                    found.append((gain[:, place, one] - gain[:, place, other], rest @ rest, least, rate))
-    return Pairs(*(np.array(column) for column in zip(*found, strict=True)))
-
-
-def is_mixed(problem: Problem, curve: np.ndarray | None) -> bool:
-    """Whether pairs of a CSD lie on both sides."""
-    assert curve is not None
-    apart = pairs_of(problem).apart @ curve
-    return bool((apart > 0).any() and (apart < 0).any())
-
-
-def largest(problem: Problem, t: float) -> float:
-    """t and the largest margin above it, by a MILP with a binary per pair; exactly the limit where the other channels do
-    not matter, and below t where no filter reaches t.
-    """
-    pairs, base = pairs_of(problem), problem.view.base_qe[0]
-    needed = np.sqrt(np.maximum(np.maximum(pairs.least, t * pairs.rate) ** 2 - pairs.squared, 0))
-    asked = needed > 0
-    apart, needed, rate = pairs.apart[asked], needed[asked], pairs.rate[asked, None]
-    size, n = base.size, len(apart)
-    # Variables N, a binary per pair, the margin. Above: apart @ N >= needed + rate margin - (1 - z) big; else below.
-    most = needed + rate[:, 0] * (t + 1)
-    above, below = most - np.minimum(apart, 0) @ base, most + np.maximum(apart, 0) @ base
-    step, none = np.diff(np.eye(size), axis=0), np.zeros((size - 1, n + 1))
-    slope = problem.constraints["slope_per_nm"].max * problem.view.grid.step_nm
-    found = milp(
-        np.append(np.zeros(size + n), -1.0),
-        constraints=[
-            LinearConstraint(np.hstack([apart, -np.diag(above), -rate]), needed - above, np.inf),
-            LinearConstraint(np.hstack([-apart, np.diag(below), -rate]), needed, np.inf),
-            LinearConstraint(np.hstack([step, none]), -slope, slope),
-            LinearConstraint(
-                np.concatenate([np.ones(size), np.zeros(n + 1)]),
-                problem.constraints["sensitivity"].min * base.sum(),
-                np.inf,
-            ),
-        ],
-        integrality=np.concatenate([np.zeros(size), np.ones(n), [0]]),
-        bounds=Bounds(np.concatenate([np.zeros(size + n), [-t - 1]]), np.concatenate([base, np.ones(n), [t + 1]])),
-        options={"mip_rel_gap": 0.0},
-    )
-    assert found.status in (0, 2)  # solved, or proven that not even the margin of -t - 1 is in reach
-    return t + float(found.x[-1]) if found.status == 0 else -np.inf
-
-
-def agrees(problem: Problem) -> Limit:
-    """The limit, once it was compared with the MILP."""
-    limit = limit_of(problem)
-    check_attained(problem, limit)
-    assert limit.open_parts == 0
-    assert 0 <= limit.proven - limit.attained <= 1e-3
-    assert largest(problem, limit.proven + 1e-3) < limit.proven + 1e-3
-    return limit
-
-
-def random_problem(template: Problem, seed: int) -> Problem:
-    """3 to 8 lights of each type anywhere, under a random curve; the other channels are flat, or nearly."""
-    rng = np.random.default_rng(seed)
-    wave = template.view.grid.nodes_nm
-    counts = 3 + rng.binomial(5, 0.2, 2)
-    photons = np.concatenate(
-        [
-            np.exp(-0.5 * ((wave - rng.uniform(*ends, (count, 1))) / rng.uniform(8, 25, (count, 1))) ** 2)
-            for count, ends in zip(counts, ((480, 640), (500, 680)), strict=True)
-        ]
-    )
-    photons /= photons.sum(axis=1, keepdims=True) * template.view.grid.step_nm
-    types = ("yellow",) * counts[0] + ("red",) * counts[1]
-    lights = replace(template.view.lights, names=tuple(map(str, range(counts.sum()))), types=types, photons=photons)
-    base = np.interp(wave, np.linspace(400, 700, 7), rng.uniform(0.05, 0.85, 7))
-    qe = template.view.qe.copy()
-    qe[template.view.modified[0]] = base
-    qe[0] = 0.5 + (seed % 2) * 0.02 * np.interp(wave, [500, 680], [0, 1])
-    qe[1] = 0.3
-    family = FreeForm(wave, base, np.arange(400.0, 701.0, 20.0))
-    return replace(
-        template,
-        view=replace(template.view, lights=lights, qe=qe),
-        family=family,
-        low=np.zeros(family.nodes_nm.size),
-        high=np.ones(family.nodes_nm.size),
-        constraints={"sensitivity": Bound(min=rng.uniform(0.5, 0.95)), "slope_per_nm": Bound(max=0.06)},
-    )
 
 
 def test_a_filter_between_two_kinds_of_light_is_within_the_limit(study: Study) -> None:

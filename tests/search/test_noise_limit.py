@@ -19,7 +19,7 @@ from sweep.search.least_noise import least_variance
 from sweep.search.limit import limit_of, why_not
 from sweep.search.problem import Problem
 
-from .test_under_noise import problem_of, searched
+from .noisy_problems import problem_of, searched
 
 GOAL = Objective(minimum={"dprime_yellow_red": 1.0})
 SCENES = {

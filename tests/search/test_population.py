@@ -21,7 +21,7 @@ from sweep.search.problem import Problem, SearchRun, starting_points
 from sweep.study import load_study
 
 from ..conftest import STUDIES
-from .test_limit import random_filters
+from .stopband_filters import random_filters
 
 STUDY = load_study(STUDIES / "stopband.yaml")
 

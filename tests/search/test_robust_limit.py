@@ -21,8 +21,8 @@ from sweep.search.solver import search_from
 from sweep.study import load_study
 
 from ..conftest import STUDIES
-from .test_limit import random_filters
-from .test_limit_sides import agrees, is_mixed, largest, random_problem, write_study
+from .sides_milp import agrees, is_mixed, largest, random_problem, write_study
+from .stopband_filters import random_filters
 
 STUDY = load_study(STUDIES / "angle.yaml")
 assert STUDY.search is not None

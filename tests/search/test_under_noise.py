@@ -13,8 +13,6 @@ from sweep.camera.effects import noise
 from sweep.camera.imager import Imager
 from sweep.camera.linear import smooth_imager
 from sweep.camera.methods import REFERENCE, Methods
-from sweep.camera.pixel import Pixel
-from sweep.camera.scenario import Scenario
 from sweep.designs.families.dual import Dual
 from sweep.designs.families.free_form import FreeForm
 from sweep.designs.families.stopband import MultiStopband
@@ -29,15 +27,15 @@ from sweep.metrics.quantity import Asked
 from sweep.metrics.registry import quantities_of
 from sweep.metrics.smooth import Rows, SmoothDesign
 from sweep.search.gradients import Model
-from sweep.search.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
-from sweep.search.solver import best_reachable, search_from, smooth_objective
+from sweep.search.problem import Problem, SearchRun, best_feasible, starting_points
+from sweep.search.solver import best_reachable, smooth_objective
 from sweep.study import load_study
 
 from ..conftest import STUDIES
 from ..hard.random_scenes import random_scene
 from ..hard.scenes import FAMILY, GRID, SENSOR
+from .noisy_problems import STATES, problem_of, searched
 
-STATES = ("green", "yellow", "red")
 FAMILIES: tuple[Family, ...] = (
     FAMILY,
     MultiStopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"], 2),
@@ -45,24 +43,6 @@ FAMILIES: tuple[Family, ...] = (
     Dual(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["C"]),
 )
 NOISY = [q for q in quantities_of(Asked(STATES, STATES)).values() if q.states]
-
-
-def problem_of(name: str, read_noise_e: float, level: float, objective: Objective) -> Problem:
-    """The search of a study of the project, of a chart under noise."""
-    study = load_study(STUDIES / f"{name}.yaml")
-    assert study.search is not None
-    problem = study.problem(study.search)
-    scenario = Scenario.model_validate({"noise": True, "exposure": {"kind": "white_patch", "level": level}})
-    pixel = Pixel(read_noise_e=read_noise_e, prnu=0.01, offset_dn=168)
-    view = replace(problem.view, scenario=scenario, pixel=pixel)
-    return replace(problem, view=view, states=STATES, objective=objective)
-
-
-def searched(problem: Problem, starts: int = 2, algorithm: str = "SLSQP") -> Evaluation:
-    points = starting_points(problem, starts, 1)
-    found = best_feasible([e for i, u in enumerate(points) for e in search_from(problem, i, u, algorithm, 120).log])
-    assert found is not None
-    return found
 
 
 def family_of(seed: int, n_modified: int) -> tuple[Family, np.ndarray, np.ndarray]:

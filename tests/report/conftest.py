@@ -1,0 +1,49 @@
+"""A browser and open reports."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from .pages import BROWSER, Opened, open_report
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    with playwright.sync_playwright() as started:
+        found = started.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        yield found
+        found.close()
+
+
+@pytest.fixture
+def opened(browser: Any) -> Iterator[Any]:
+    """Opens a report for a test that clicks, or wants to see it from its first moment."""
+    pages: list[Opened] = []
+
+    def one(folder: Path, width: int = 1280) -> Opened:
+        pages.append(open_report(browser, folder, width))
+        return pages[-1]
+
+    yield one
+    for seen in pages:
+        seen.page.close()
+
+
+@pytest.fixture(scope="module")
+def standing(browser: Any) -> Iterator[Any]:
+    """A report for tests that only look, or leave all as it was: opened once for all of them."""
+    pages: dict[tuple[Path, int], Opened] = {}
+
+    def one(folder: Path, width: int = 1280) -> Opened:
+        if (folder, width) not in pages:
+            pages[folder, width] = open_report(browser, folder, width)
+        return pages[folder, width]
+
+    yield one
+    for seen in pages.values():
+        seen.page.close()
