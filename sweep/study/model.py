@@ -211,7 +211,7 @@ class Study:
         return self.section.tolerance_dn if wanted_dn is None else wanted_dn
 
     def plan(self, scenario: str, tolerance_dn: float | None = None, *, always: bool = False) -> Plan:
-        """A plan of a scenario that holds for all designs of the study, found in a twentieth of what it may save.
+        """A plan of a scenario that holds for all designs of the study, looked for in about a twentieth of the time of everything on.
 
         Where everything on takes less than to look for one, that is the plan. The cheapest plan of all, however long
         it takes to find, if it is looked for `always`.
