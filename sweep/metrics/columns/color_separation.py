@@ -51,8 +51,8 @@ class ColorSeparation(ReadoutMetric):
                 name=BEST_PLACE + each.name,
                 metric="best_place_csd",
                 meaning="where a scene asks for `any` place of the light on the mosaic: the largest CSD over all real "
-                "places, and over those of a `field`, each at its worst moment of a pulsed light; `csd_<a>_<b>` is then "
-                "the smallest",
+                "places, and over those of a `field`, each at its worst moment of a pulsed light; `csd_<a>_<b>` is "
+                "then the smallest",
                 label=f"{each.words} at its best place",
                 extreme="best place",
                 of=each.name,
