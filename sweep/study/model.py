@@ -213,8 +213,9 @@ class Study:
     def plan(self, scenario: str, tolerance_dn: float | None = None, *, always: bool = False) -> Plan:
         """A plan of a scenario that holds for all designs of the study.
 
-        It is looked for in about a twentieth of the time that everything on takes, as counted. Where everything on takes less than to look for one, that is the plan. The cheapest plan of all, however long
-        it takes to find, if it is looked for `always`.
+        It is looked for in about a twentieth of the time that everything on takes, as counted. Where everything on
+        takes less than to look for one, that is the plan. The cheapest plan of all, however long it takes to find, if
+        it is looked for `always`.
 
         Raises StudyError as `boxes` does.
         """
