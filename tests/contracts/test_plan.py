@@ -274,7 +274,7 @@ def test_a_tighter_tolerance_costs_more_and_is_kept() -> None:
     exact, whole = run({})
     works, keys = [], []
     for tolerance in (100.0, 10.0, 1.0, 0.1, 0.01):
-        plans = {name: study.plan(name, tolerance) for name in names}
+        plans = {name: study.plan(name, tolerance, always=True) for name in names}
         found, work = run(plans)
         assert np.abs(found - exact).max() <= max(plan.promised_dn for plan in plans.values()) <= tolerance
         works.append(work)
