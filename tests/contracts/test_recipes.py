@@ -85,6 +85,7 @@ search: {starts: 2, max_evaluations: 60}
 WINDSHIELD = '''\
 """A windshield of tinted glass."""
 
+from dataclasses import replace
 from typing import Annotated
 
 from pydantic import Field
@@ -110,6 +111,9 @@ class Windshield(LightEffect):
     def transmittance(self, shot, method, wavelength_nm):
         at_550_nm = 1.0 if method == "skip" else Options.of(shot.scenario).windshield_transmittance
         return at_550_nm ** (550.0 / wavelength_nm)
+
+    def work(self, shot, methods, load):
+        return load if methods.windshield == "skip" else replace(load, own_s=load.own_s + 0.2)
 '''
 DRIVEN = """\
 study: NAME
