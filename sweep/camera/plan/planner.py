@@ -122,8 +122,15 @@ class Planner:
         look_s = self._look_s(effect)
         if self.spent_s + look_s > self._budget_s or (self._without_kernels and self._needs_kernels(effect, after)):
             return False
+        if isinstance(effect, ReadoutEffect) and self._anywhere:
+            return True  # behind a straight readout the search for the worst place is much shorter, as no count tells
         saved = self._work(methods) - self._work(after)
         return max(saved, self._work(_with_cheapest(methods, rest)) - self._work(_with_cheapest(after, rest))) > look_s
+
+    @cached_property
+    def _anywhere(self) -> bool:
+        """Whether more than a lattice of places is looked at in any scene."""
+        return any(scene.is_anywhere(self._start) for scene in self._scenes)
 
     def _over_sensor(self, scenario: str, tolerance_dn: float) -> Plan:
         """Everything on but what changes nothing: exact, but for how closely all places of the sensor are looked at."""
