@@ -48,6 +48,6 @@ def check_columns(path: Path, wanted: Sequence[str]) -> None:
         names = pq.read_schema(path).names
     except (OSError, pa.ArrowException) as error:
         raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
-    lacking = [name for name in dict.fromkeys(wanted) if name not in names]
-    if lacking:
-        raise lacking_in(path, lacking)
+    missing = [name for name in dict.fromkeys(wanted) if name not in names]
+    if missing:
+        raise lacking_in(path, missing)

@@ -19,6 +19,7 @@ from ..results.journal import Journal
 from ..results.tables import RESULTS, encoded
 from ..study import Study
 from ..types import Progress
+from .of_rows import ROW_TABLES
 from .plans import with_plans
 from .rows import Job, rules_of
 from .search_estimate import search_seconds
@@ -84,10 +85,10 @@ def estimate(study: Study, output: Path, n_jobs: int, progress: Progress) -> Est
 
 def _on_top(study: Study) -> tuple[str, ...]:
     """What is not timed."""
-    asked = study.section.recognition
-    patches = asked is not None and asked.patches
-    drawn = {"raw patches": patches, "images of signal heads": study.section.vision, "yields": study.section.population}
-    return tuple(what for what, given in drawn.items() if given)
+    tables = [table.long for table in ROW_TABLES.values() if table.long and table.asked(study)]
+    levels = study.search is not None and study.search.nominal_levels
+    others = {"images of signal heads": study.section.vision, "searches at nominal levels": levels}
+    return (*tables, *(what for what, given in others.items() if given))
 
 
 def _sampled(sweep: Sweep, todo: list[Job]) -> tuple[float, float]:

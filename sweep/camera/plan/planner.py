@@ -1,4 +1,4 @@
-"""The search for a plan: the cheapest methods whose proven errors sum to at most the study's tolerance."""
+"""The search for a plan: methods that cost little, and whose proven errors sum to at most the study's tolerance."""
 
 from __future__ import annotations
 
@@ -62,7 +62,9 @@ class Planner:
         return found
 
     def plan(self, scenario: str, tolerance_dn: float) -> Plan:
-        """The cheapest plan whose promises sum to at most `tolerance_dn`; of equally cheap ones, what skips more.
+        """The cheapest plan found of those whose promises sum to at most `tolerance_dn`; without a budget, of all.
+
+        Of equally cheap ones, what skips more.
 
         Where no plan does, one that keeps it but for what the places of a light leave open.
         """

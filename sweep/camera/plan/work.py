@@ -25,7 +25,7 @@ NOISE_S, UNEVEN_NOISE_S = 4e-3, 0.08
 LEAST_LOOK_S = 2 * REACH_S
 """Seconds for each CFA, with which hardly anything can be found."""
 LOOKING_SHARE = 0.05
-"""Of the time that everything on takes, what looking for a plan may take at most."""
+"""Of the time that everything on takes, after which nothing more is looked at: what is begun is finished."""
 
 
 def noise_s(view: View) -> float:
