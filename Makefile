@@ -15,6 +15,8 @@ ARGS ?=
 # A study of vision needs the extra of that name, and no other study does.
 EXTRA = $(if $(shell grep -s "^vision:" studies/$(NAME).yaml),-vision)
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
+# Tests start hundreds of processes, which would each compile the package's source anew.
+unexport PYTHONDONTWRITEBYTECODE
 TESTS := $(ONE_THREAD) $(BIN)/python -m pytest -n logical --dist
 
 .PHONY: study report test slow accuracy check documents bench clean
