@@ -89,7 +89,12 @@ class Sources:
     def lights(self, section: LightsSection, at: tuple[Key, ...] = ("lights",)) -> Lights | None:
         """The lights of the section at a place of the study, or None after adding faults."""
         if section.builtin is not None:
-            return self.built_in(at, section.builtin, BUILT_IN_LIGHTS)
+            own = sorted(section.model_fields_set - {"builtin", "files"})
+            for key in own:
+                self.add(
+                    (*at, key), "a built-in data set has its own", getattr(section, key), "this key beside `files`"
+                )
+            return None if own else self.built_in(at, section.builtin, BUILT_IN_LIGHTS)
         before = len(self.faults)
         used = [len(columns) for entry in section.files for columns in entry.signals.values()]
         if not self.fits((*at, "files"), "lights", sum(used)):
