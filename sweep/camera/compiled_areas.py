@@ -74,7 +74,8 @@ def areas(
                     continue
                 if math.hypot(abs(dx) + h + half, abs(dy) + h + half) <= radius:
                     high[cell, row, column] = 1.0
-                    corners[:, own] += 1.0
+                    for corner in range(4):
+                        corners[corner, own] += 1.0
                     continue
                 high[cell, row, column] = covered_share(max(abs(dx) - h, 0.0), max(abs(dy) - h, 0.0), half, radius)
                 slope_x[cell, row, column], one = slope_of_disc(dx, dy, half, radius, h)
@@ -85,7 +86,9 @@ def areas(
                     to_x, to_y = h * (2 * (corner % 2) - 1), h * (2 * (corner // 2) - 1)
                     corners[corner, own] += covered_share(dx - to_x, dy - to_y, half, radius)
         for own in range(n_channels):
-            lowest, highest = corners[:, own].min(), corners[:, own].max()
+            lowest = highest = corners[0, own]
+            for corner in range(1, 4):
+                lowest, highest = min(lowest, corners[corner, own]), max(highest, corners[corner, own])
             least[cell, own] = max(lowest - sums[own], 1e-300)
             tilt[cell, own] = (highest - lowest) / max(lowest, 1e-300)
     return CellWeights(high, slope_x, slope_y, jump, least), tilt

@@ -117,16 +117,19 @@ def _bends_of_pixels(
 
 
 @njit(cache=True, nogil=True)
-def _mixed(values: FloatArray, channel: IndexArray, row: int, column: int, share: float, found: FloatArray) -> None:
-    """Put what of a pixel's light is in the value of each channel into `found`; its neighbors' weights count, too."""
+def _mixed(values: FloatArray, channel: IndexArray, row: int, column: int, share: float, found: FloatArray) -> bool:
+    """Put what of a pixel's light is in each channel's value into `found`, neighbors' weights, too; whether any is."""
     found[:] = 0.0
     found[channel[row, column]] += (1 - share) * values[row, column]
-    if share == 0:
-        return
-    rows, columns = values.shape
-    for to_row, to_column in ((row - 1, column), (row + 1, column), (row, column - 1), (row, column + 1)):
-        if 0 <= to_row < rows and 0 <= to_column < columns:
-            found[channel[to_row, to_column]] += share / 4 * values[to_row, to_column]
+    if share > 0:
+        rows, columns = values.shape
+        for to_row, to_column in ((row - 1, column), (row + 1, column), (row, column - 1), (row, column + 1)):
+            if 0 <= to_row < rows and 0 <= to_column < columns:
+                found[channel[to_row, to_column]] += share / 4 * values[to_row, to_column]
+    some = False
+    for value in found:
+        some = some or value > 0
+    return some
 
 
 class Light(NamedTuple):
@@ -159,8 +162,9 @@ def _light_in_cell(dx: float, dy: float, h: float, light: Light, slopes: FloatAr
     _slope_between_edges(dy, dx, half, h, images, slopes[1])
     near_x, near_y = max(ax - half - h, 0.0), max(ay - half - h, 0.0)
     far_x, far_y = ax + half + h, ay + half + h
-    seen[0] = images.below[_node(math.sqrt(far_x * far_x + far_y * far_y), images)]
-    seen[1] = images.above[_node(math.sqrt(near_x * near_x + near_y * near_y), images)]
+    seen[:] = 0.0
+    add(seen[0], 1.0, images.below[_node(math.sqrt(far_x * far_x + far_y * far_y), images)])
+    add(seen[1], 1.0, images.above[_node(math.sqrt(near_x * near_x + near_y * near_y), images)])
 
 
 @njit(cache=True, nogil=True)
@@ -179,10 +183,9 @@ def _bends(x: FloatArray, y: FloatArray, wanted: BoolArray, h: float, light: Lig
 @njit(cache=True, nogil=True)
 def _at_rim(own: CellWeights, channel: IndexArray, row: int, column: int, share: float, of_rim: FloatArray) -> bool:
     """Whether the weights of a pixel's light change in a cell; their slopes and jump go to ndarray[3, n_channels]."""
-    _mixed(own.slope_x, channel, row, column, share, of_rim[0])
-    _mixed(own.slope_y, channel, row, column, share, of_rim[1])
-    _mixed(own.jump, channel, row, column, share, of_rim[2])
-    return bool(of_rim.max() > 0)
+    along_x = _mixed(own.slope_x, channel, row, column, share, of_rim[0])
+    along_y = _mixed(own.slope_y, channel, row, column, share, of_rim[1])
+    return _mixed(own.jump, channel, row, column, share, of_rim[2]) or along_x or along_y
 
 
 @njit(cache=True, nogil=True)
@@ -192,8 +195,7 @@ def _looked_at(own: CellWeights, channel: IndexArray, share: float, wanted: Bool
     for row in range(channel.shape[0]):
         for column in range(channel.shape[1]):
             sums[channel[row, column]] += own.jump[row, column]
-            _mixed(own.high, channel, row, column, share, weight)
-            wanted[row, column] = weight.max() > 0
+            wanted[row, column] = _mixed(own.high, channel, row, column, share, weight)
     return sums
 
 
@@ -245,14 +247,16 @@ def _of_cell(
                 _light_in_cell(x[column], y[row], h, light, slopes, seen)
                 for u in range(n_channels):
                     own_share = 1 / light.taken[u, to] if light.taken[u, to] > 0 else 0.0
-                    ratio[:] = corners[:, u, to] * own_share
+                    ratio[:] = 0.0
+                    for end in range(2):
+                        add(ratio[end], own_share, corners[end, u, to])
                     _add_rim(of_rim[:, u], slopes, seen, ratio, h, found[u, to])
     for u in range(n_channels):
         for c in range(n_channels):
-            if light.taken[u, c] > 0:
-                largest = np.maximum(np.abs(corners[0, u, c]), np.abs(corners[1, u, c]))
-                found[u, c] += largest * (light.uneven[u, c] / light.taken[u, c] * sums[u] * h / 2)
-        found[u] /= own.least[u]
+            uneven = light.uneven[u, c] / light.taken[u, c] * sums[u] * h / 2 if light.taken[u, c] > 0 else 0.0
+            for part in range(n_parts):
+                largest = max(abs(corners[0, u, c, part]), abs(corners[1, u, c, part]))
+                found[u, c, part] = (found[u, c, part] + largest * uneven) / own.least[u]
 
 
 @njit(cache=True, nogil=True)

@@ -67,7 +67,7 @@ def spans(edges: FloatArray) -> IndexArray:
             begin += 1
         while end > 0 and edges[e, end - 1] == 1.0:
             end -= 1
-        found[e] = begin, end
+        found[e, 0], found[e, 1] = begin, end
     return found
 
 
@@ -76,7 +76,8 @@ def _outside(base: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple[F
     """`_shape` of the base curve's first w wavelengths, and of those from w on: two ndarray[n_wavelengths + 1, 2]."""
     n = base.size
     before, after = np.empty((n + 1, 2)), np.empty((n + 1, 2))
-    before[0] = after[n] = 0.0, np.inf
+    before[0, 0] = after[n, 0] = 0.0
+    before[0, 1] = after[n, 1] = np.inf
     for w in range(n):
         rise = abs(base[w] - base[w - 1]) if w > 0 else 0.0
         before[w + 1, 0] = larger(before[w, 0], rise)

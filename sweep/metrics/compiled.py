@@ -161,9 +161,11 @@ def channel_numbers(
         starts[i + 1] = starts[i] + high - low
         if starts[i + 1] > values.size:
             grown = np.empty(2 * starts[i + 1])
-            grown[: starts[i]] = values[: starts[i]]
+            for k in range(starts[i]):
+                grown[k] = values[k]
             values = grown
-        values[starts[i] : starts[i + 1]] = shares[low:high]
+        for k in range(low, high):
+            values[starts[i] + k - low] = shares[k]
     return firsts, starts, values[: starts[-1]]
 
 
@@ -275,9 +277,14 @@ def largest_error(
         for b in range(second.size):
             bound[a * second.size + b] = overlap[first[a], second[b]]
     found = 0.0
-    for at in np.argsort(-bound):
-        if 0.5 * bound[at] <= found:
+    while bound.size:  # few are looked at, so that sorting them all is not worth it
+        at = 0
+        for k in range(bound.size):
+            if bound[k] > bound[at]:
+                at = k
+        if not 0.5 * bound[at] > found:
             break
         a, b = first[at // second.size], second[at % second.size]
         found = max(found, _least_error(firsts, starts, roots, rows, a, b, step))
+        bound[at] = 0.0
     return found

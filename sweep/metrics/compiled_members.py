@@ -107,7 +107,10 @@ def nearest_members(
     corners, weights = np.empty((3, response.shape[1])), np.empty(3)
     steps = np.empty(response.shape[0] - 1)
     for row in range(steps.size):
-        steps[row] = np.sqrt(((response[row + 1] - response[row]) ** 2).sum())
+        squared = 0.0
+        for c in range(response.shape[1]):
+            squared += (response[row + 1, c] - response[row, c]) ** 2
+        steps[row] = np.sqrt(squared)
     out[:] = np.inf
     least = np.inf
     for i in range(first.size):
@@ -129,4 +132,6 @@ def nearest_members(
                     least = min(least, found)
                     for k in range(2):
                         at[i, j, p, k] = cells[triangle, k]
-                        where[i, j, p, k] = (weights * shares[triangle, :, k]).sum()
+                        where[i, j, p, k] = 0.0
+                        for corner in range(3):
+                            where[i, j, p, k] += weights[corner] * shares[triangle, corner, k]

@@ -150,7 +150,9 @@ def nearest_along_squared(
     """
     lanes, best, doubt = np.zeros((order.size, LANES)), np.empty(LANES), np.empty(LANES)
     low, high = np.empty(order.size), np.empty(order.size)
-    most = np.max(starts[1:] - starts[:-1])
+    most = 0
+    for pair in range(starts.size - 1):
+        most = max(most, starts[pair + 1] - starts[pair])
     bound, some = np.empty(most), np.empty(most + 3, np.intp)
     computed = 0
     for begin in range(0, values.shape[0], LANES):
@@ -162,7 +164,9 @@ def nearest_along_squared(
             best[:] = np.inf
             some[:4] = lead
             _nearest_in_lanes(lanes, fixed[own], first[own], second[own], some[:4], best)
-            enough, left = best.max(), 0
+            enough, left = best[0], 0
+            for lane in range(1, LANES):
+                enough = larger(enough, best[lane])
             for k in range(count):
                 some[left] = k
                 left += bound[k] < enough

@@ -71,7 +71,7 @@ def largest_change(
     `moves`: of `longest_moves`; `after`: what is left. `ends`: where each group of pairs begins, and the end.
     `shortened`: how much shorter the smallest possible distance is.
     """
-    low, high = np.zeros((2, first.size))
+    low, high = np.zeros(first.size), np.zeros(first.size)
     worst = least
     for cell in range(corners.shape[0]):
         far = moves[cell]
