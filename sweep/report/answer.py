@@ -102,6 +102,7 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     if plain is not None:
         text += _times(output, best, plain)
     yield f"{text}."
+    yield from _of_least(output, best, plain)
     if filter_told := assumed(output, best):
         yield filter_told
     lights = best.get(limited_by_name(separation.pair)) if separation.pair else None
@@ -117,6 +118,18 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     if parts:
         yield " ".join(parts)
     yield from unseen_lines(output, best)
+
+
+def _of_least(output: Output, best: Row, plain: Row | None) -> Iterator[str]:
+    """What is to be the least, in its own unit, where the objective says it in decades."""
+    if output.objective.rule.wanted == "more":
+        return
+    for name in output.objective.weights:
+        told = [
+            f"{float(row[name]):.3g} {output.columns[name].unit}".rstrip() for row in (best, plain) if row is not None
+        ]
+        beside = f" ({plain['name']} {told[1]})" if plain is not None else ""
+        yield f"Its {output.words(name)} is {told[0]}{beside}."
 
 
 def _band(row: Row) -> str:

@@ -21,7 +21,7 @@ from ..errors import MOST_FAULTS, DataError, Fault, SweepError, nearest
 from ..types import FloatArray
 from .document import Document
 from .schema import MOST_TYPES
-from .schema_curves import CurveFile, LightFile, LightsSection
+from .schema_curves import CurveFile, LightFile, LightsSection, TaskFile
 from .yaml_tree import Key
 
 _Made = TypeVar("_Made", SensorCurves, Lights)
@@ -32,14 +32,19 @@ _CUT_OFF = 0.01
 
 
 _Key = TypeVar("_Key")
+_Entry = CurveFile | LightFile | TaskFile
+"""A file of curves as a study names it."""
 
 
 @dataclass(frozen=True)
 class KeptSources:
-    """Curves to take instead of those in files, on the study's grid: QE by name, photons by type and name."""
+    """Curves to take instead of those in files, on the study's grid: QE by name, photons by type and name, spectra of
+    own tasks by class and name.
+    """
 
     sensor: Mapping[str, FloatArray]
     lights: Mapping[tuple[str, str], FloatArray]
+    tasks: Mapping[tuple[str, str], FloatArray] = field(default_factory=dict)
 
 
 @dataclass
@@ -110,7 +115,7 @@ class Sources:
                     if self.kept is not None:
                         photons = self.kept_curve(place, self.kept.lights, (signal_type, label))
                     else:
-                        photons = self._photons(place, curves, column, entry)
+                        photons = self.photons(place, curves, column, entry)
                     if photons is not None:
                         by_type.setdefault(signal_type, []).append((label, signal_type, photons))
         if len(self.faults) > before:
@@ -156,8 +161,8 @@ class Sources:
             return None
         return known[name](self.grid)
 
-    def _photons(
-        self, path: tuple[Key, ...], curves: Curves | None, column: str, entry: LightFile
+    def photons(
+        self, path: tuple[Key, ...], curves: Curves | None, column: str, entry: LightFile | TaskFile
     ) -> FloatArray | None:
         """A light's photon spectrum on the grid; says so when photons are cut off."""
         values = self.column(path, curves, column, entry)
@@ -178,9 +183,7 @@ class Sources:
             )
         return values
 
-    def column(
-        self, path: tuple[Key, ...], curves: Curves | None, column: str, entry: CurveFile | LightFile
-    ) -> FloatArray | None:
+    def column(self, path: tuple[Key, ...], curves: Curves | None, column: str, entry: _Entry) -> FloatArray | None:
         """A column of a file on the grid, ndarray[n_wavelengths], or None after adding faults."""
         if curves is None:
             return None
@@ -201,7 +204,7 @@ class Sources:
             self.add(path, "the run kept no such curve", name)
         return curves.get(name)
 
-    def curves(self, path: tuple[Key, ...], entry: CurveFile | LightFile) -> Curves | None:
+    def curves(self, path: tuple[Key, ...], entry: _Entry) -> Curves | None:
         """All curves of a file, which is read once, or None after adding faults."""
         if self.kept is not None:
             return None
