@@ -58,18 +58,24 @@ $(VENV)/bin/python:
 	@test -n "$(PYTHON)" || { echo "make: Python 3.11 or newer with venv was not found; set PYTHON=/path/to/python3" >&2; exit 2; }
 	$(PYTHON) -m venv $(VENV)
 
+INSTALLING := @echo "Installing into $(VENV): once, which takes a minute or two."
+
 $(VENV)/.ready: pyproject.toml | $(VENV)/bin/python
+	$(INSTALLING)
 	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
 	@touch $@
 
 $(VENV)/.ready-vision: pyproject.toml | $(VENV)/bin/python
+	$(INSTALLING)
 	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[vision]'
 	@touch $@ $(VENV)/.ready
 
 $(VENV)/.ready-dev: pyproject.toml | $(VENV)/bin/python
+	$(INSTALLING)
 	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
 	@touch $@ $(VENV)/.ready $(VENV)/.ready-vision
 
 $(VENV)/.ready-bench: pyproject.toml | $(VENV)/bin/python
+	$(INSTALLING)
 	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev,bench]'
 	@touch $@ $(VENV)/.ready $(VENV)/.ready-vision $(VENV)/.ready-dev

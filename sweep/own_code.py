@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -100,10 +101,12 @@ def _loaded(code: OwnCode) -> Any:
 def _of_file(name: str, source: str) -> Any:
     """Run the text of a file, and give what is named in it."""
     file, own = file_of(name), own_name(name)
-    module = ModuleType(Path(file).stem)
+    module = ModuleType(f"sweep_own_{hashlib.sha256(source.encode()).hexdigest()[:16]}")
+    sys.modules[module.__name__] = module  # a dataclass looks there for the types that its fields name
     try:
-        exec(compile(source, file, "exec"), module.__dict__)  # what `--allow-code` allows
+        exec(compile(source, file, "exec", dont_inherit=True), module.__dict__)  # what `--allow-code` allows
     except (Exception, SystemExit) as error:
+        del sys.modules[module.__name__]
         raise SweepError(Fault(f"the code cannot be run: {_told(error)}", file)) from None
     found = getattr(module, own, None)
     if not callable(found):

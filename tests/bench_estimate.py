@@ -2,7 +2,7 @@
 
     python -m tests.bench_estimate [STUDY ...]
 
-The numbers of evaluations, programs and pictures in `run/search_estimate.py` and `report/estimate.py` are from here.
+The numbers of evaluations in `run/search_estimate.py` are from here.
 Plans are found before, as by a dry run.
 """
 

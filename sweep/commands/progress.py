@@ -7,6 +7,9 @@ import time
 from types import TracebackType
 
 _EVERY_S = 10.0
+_TELLING_SHARE, _TELLING_S = 0.01, 60.0
+"""No time left is told before this share of a phase is done, or this time has passed: the first jobs are often small,
+and wait for code that is being compiled."""
 
 
 class ProgressDisplay:
@@ -53,6 +56,12 @@ class ProgressDisplay:
             self._bars.update(self._task, completed=done)
         elif now - self._last_line >= _EVERY_S:
             self._last_line = now
-            rate = (done - self._first) / max(now - self._started, 1e-9)
-            eta = f"{(total - done) / rate:.0f} s left" if rate > 0 else "unknown time left"
-            print(f"{phase}: {done:,} of {total:,}, {rate:,.3g}/s, {eta}", file=sys.stderr, flush=True)
+            print(f"{phase}: {done:,} of {total:,}, {self._pace(now, done, total)}", file=sys.stderr, flush=True)
+
+    def _pace(self, now: float, done: int, total: int) -> str:
+        """The rate and the time left, where what is done says something of what is left."""
+        elapsed, new = now - self._started, done - self._first
+        if new <= 0 or (new < _TELLING_SHARE * total and elapsed < _TELLING_S):
+            return "time left not known yet"
+        rate = new / max(elapsed, 1e-9)
+        return f"{rate:,.3g}/s, {(total - done) / rate:.0f} s left"

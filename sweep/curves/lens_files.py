@@ -22,6 +22,8 @@ _UNITS = {
     "relative": re.compile(r"\brel|\bnorm"),
 }
 _CRA = re.compile(r"\bcra\b|\bchief")
+_ANGLE = re.compile(r"\bcra\b|\bchief|\bdeg|°|\bangle|\brad\b|radian")
+"""What a lone column is called."""
 _STEEPEST_DEG = 60.0
 _MOST_ROWS = 1000
 
@@ -75,7 +77,7 @@ def _columns(table: TextTable) -> tuple[str, int]:
             Fault("the first column does not say the unit of image heights", file, line, header[0], None, _ALLOWED)
         )
     angles = [at for at in range(1, len(header)) if _CRA.search(plain[at])]
-    if len(header) == 2:
+    if len(header) == 2 and _ANGLE.search(plain[1]):
         angles = [1]
     if len(angles) != 1:
         raise DataError(Fault("which column has chief ray angles?", file, line, None, ", ".join(header), _ALLOWED))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -100,10 +100,14 @@ class Conditions:
 
 @dataclass(frozen=True)
 class StudyTasks:
-    """The tasks of a study, each once, and their conditions."""
+    """The tasks of a study, each once, and their conditions.
+
+    `from_files`: (task and class, file and column) -> a spectrum of the study's own files, ndarray[n_wavelengths].
+    """
 
     conditions: Conditions
     tasks: tuple[GriddedTask, ...]
+    from_files: Mapping[tuple[str, str], FloatArray] = field(default_factory=dict)
 
     @property
     def keys(self) -> tuple[TaskName, ...]:

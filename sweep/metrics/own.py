@@ -97,14 +97,14 @@ class OwnMetric:
     @property
     def digits(self) -> int:
         """After the point. Raises SweepError for what is no such number."""
-        found = getattr(self._made, "digits", 4)
+        found = self.code.called(getattr, self._made, "digits", 4)
         if isinstance(found, bool) or not isinstance(found, int) or not 0 <= found <= _MOST_DIGITS:
             allowed = f"a whole number, 0 to {_MOST_DIGITS}"
             raise SweepError(Fault(f"{self.code.name}: no such `digits`", value=found, allowed=allowed))
         return found
 
     def _said(self, what: str, usual: str) -> str:
-        found = getattr(self._made, what, usual)
+        found = self.code.called(getattr, self._made, what, usual)
         if not isinstance(found, str) or len(found) > 100 or not found.isprintable():
             raise SweepError(Fault(f"{self.code.name}: `{what}` is no short text", value=found))
         return found
@@ -116,7 +116,7 @@ class OwnMetric:
         """
         made, n = self._made, len(readings.dn)
         with np.errstate(all="ignore"):
-            found = self.code.called(getattr(made, "of", made), readings)
+            found = self.code.called(self.code.called(getattr, made, "of", made), readings)
         if found is None:
             return None
         values = self.code.called(np.asarray, found)

@@ -105,17 +105,18 @@ class Quantity(Column):
     `ends`: ends of a constraint on it. `goal`: a search may make it large, or small where less is wanted, and it has a
     worst case unless it is `nominal`. `needs`: it exists only with a modified channel, in a family that has it, or in
     CFAs of which an own metric says something.
-    `infinite`: it may be so. `promised`: a plan's promise holds for it. `rows`: what its smooth rows are: its values,
-    their squares, or their number of decades below 1, -log10. `apart`: it is the smallest distance of two signals, in
-    DN or in units of the noise. `most`: no filter reaches more. `share`: it is the smallest ratio of N to the curve
-    that N replaces. `states`: the signal types that noise may confuse in it. `smooth_members`: its smooth rows over the
-    population of the lights.
+    `infinite`: it may be so. `signed`: it may be below 0. `promised`: a plan's promise holds for it. `rows`: what its
+    smooth rows are: its values, their squares, or their number of decades below 1, -log10. `apart`: it is the smallest
+    distance of two signals, in DN or in units of the noise. `most`: no filter reaches more. `share`: it is the smallest
+    ratio of N to the curve that N replaces. `states`: the signal types that noise may confuse in it. `smooth_members`:
+    its smooth rows over the population of the lights.
     """
 
     ends: tuple[End, ...] = ()
     goal: bool = False
     needs: Literal["modified", "family", "own", ""] = ""
     infinite: bool = False
+    signed: bool = False
     promised: bool = False
     nominal: bool = False
     rows: Literal["values", "squares", "decades"] = "values"

@@ -17,7 +17,7 @@ from ..results.tables import PLAIN
 from ..types import FloatArray
 from .figures import empty_figure
 from .leaders import Row, leaders_of
-from .names import full_name, label
+from .names import capital, full_name, label
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -96,19 +96,15 @@ def lamp_lines(output: Output) -> Iterator[str]:
             f"apart{rival}; its nearest are {_led(near, 'yellow')} and {_led(near, 'red')}, {_dn(near['least_dn'])}."
         )
     if maps:
-        yield f"{_capital(_grid(_asked(output)))}."
+        yield f"{capital(_grid(_asked(output)))}."
 
 
 def _share(share: float) -> str:
     """Percent; not rounded to none or to all."""
-    text = f"{share:.1%}"
-    return (
-        text
-        if 0 < share < 1 and text not in ("0.0%", "100.0%")
-        else f"{share:.3%}"
-        if 0 < share < 1
-        else f"{share:.0%}"
-    )
+    if share in (0, 1):
+        return f"{share:.0%}"
+    digits = next((few for few in (1, 3, 6) if 0 < round(share, few + 2) < 1), 9)
+    return f"{share:.{digits}%}"
 
 
 def _dn(value: float) -> str:
@@ -134,10 +130,6 @@ def _grid(asked: RegionMap) -> str:
     )
 
 
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
-
-
 def lamp_table(output: Output) -> pd.DataFrame:
     """A row per norm and design; empty where none are asked for."""
     return pd.DataFrame(
@@ -161,8 +153,10 @@ def lamp_drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
     maps = lamp_maps(output)
     for number, norm in enumerate(dict.fromkeys(each.norm for each in maps), 1):
         own = [each for each in maps if each.norm == norm]
-        shown = own[-_MOST_MAPS:] if len(own) > _MOST_MAPS else own
+        shown = own[-_MOST_MAPS:]
         caption = f"{NORM_NAMES[norm]}: the smallest CSD over all widths of a yellow and a red LED, {_MODELED}"
+        if len(own) > len(shown):
+            caption += f"; the last {len(shown)} of {len(own)} designs"
         yield f"regions-{number}", caption, _draw(shown, caption, _asked(output).wanted_dn)
 
 

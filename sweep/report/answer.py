@@ -18,7 +18,7 @@ from ..results.thinning import per_light
 from .allowed_lamps import lamp_lines
 from .assumed import assumed, moves_with_light
 from .leaders import Leaders, Row, leaders_of
-from .names import full_name
+from .names import capital, full_name
 from .noise import usable_lines
 from .robustness import over_population, robustness_lines, worst_over
 from .series import SeriesFigure, lead_sentence, leads_of
@@ -92,7 +92,7 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     if best is None:
         return
     under = _under(output).removeprefix(" with ")
-    text = f"Under {under}, {full_name(best)}" if under else _capital(full_name(best))
+    text = f"Under {under}, {full_name(best)}" if under else capital(full_name(best))
     text += _band(best)
     if output.goal.name not in (separation.name, separation.of):
         text += f" has the best {output.goal.words}, {output.goal.amount(best[output.goal.name])}, and"
@@ -102,6 +102,7 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     if plain is not None:
         text += _times(output, best, plain)
     yield f"{text}."
+    yield from _of_least(output, best, plain)
     if filter_told := assumed(output, best):
         yield filter_told
     lights = best.get(limited_by_name(separation.pair)) if separation.pair else None
@@ -117,6 +118,18 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     if parts:
         yield " ".join(parts)
     yield from unseen_lines(output, best)
+
+
+def _of_least(output: Output, best: Row, plain: Row | None) -> Iterator[str]:
+    """What is to be the least, in its own unit, where the objective says it in decades."""
+    if output.objective.rule.wanted == "more":
+        return
+    for name in output.objective.weights:
+        told = [
+            f"{float(row[name]):.3g} {output.columns[name].unit}".rstrip() for row in (best, plain) if row is not None
+        ]
+        beside = f" ({plain['name']} {told[1]})" if plain is not None else ""
+        yield f"Its {output.words(name)} is {told[0]}{beside}."
 
 
 def _band(row: Row) -> str:
@@ -155,7 +168,7 @@ def _others(output: Output, leaders: Leaders) -> Iterator[str]:
     more = most is not None and (best is None or most[separation.name] > best[separation.name])
     if most is not None and more:
         verb = "separates most" if per_time else "has the most"
-        yield f"{_capital(full_name(most))} {verb} of all: {_figures(output, most)}{_missed(output, most)}."
+        yield f"{capital(full_name(most))} {verb} of all: {_figures(output, most)}{_missed(output, most)}."
     if rate is None or not per_time:
         return
     measure = per_light(separation.name)
@@ -165,7 +178,7 @@ def _others(output: Output, leaders: Leaders) -> Iterator[str]:
     others = {full_name(r): _rate_told(r[measure]) for r in rivals}
     tied = [name for name, value in others.items() if value == told]
     who = " and ".join(["it" if same else full_name(rate), *tied])
-    text = f"{_capital(who)} separate{'' if tied else 's'} most per light{', too' if same else ''}: "
+    text = f"{capital(who)} separate{'' if tied else 's'} most per light{', too' if same else ''}: "
     text += f"{told} {separation.unit} per ms of exposure"
     against = ", ".join(f"{name} {value}" for name, value in others.items() if name not in tied)
     yield text + (f" ({against})" if against else "") + ("" if same else _missed(output, rate)) + "."
@@ -189,10 +202,6 @@ def _missed(output: Output, row: Row) -> str:
 def _rate_told(rate: float) -> str:
     """A separation per light, DN/ms."""
     return f"{rate:.{0 if rate >= 100 else 1}f}"
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def large_numbers(output: Output) -> list[LargeNumber]:

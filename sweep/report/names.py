@@ -13,6 +13,11 @@ def label(row: Mapping[Any, Any]) -> str:
     return str(row["name"]) if isinstance(row["name"], str) else f"design {row['design_id']}"
 
 
+def capital(text: str) -> str:
+    """A sentence's beginning, in upper case."""
+    return text[:1].upper() + text[1:]
+
+
 def full_name(row: Mapping[Any, Any]) -> str:
     """Its name in a sentence: a CFA or named design by its name, others with the CFA that they are made in."""
     if row["kind"] in (PLAIN, NAMED):

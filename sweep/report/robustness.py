@@ -10,7 +10,7 @@ from ..metrics.quantity import WORST
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN
 from .leaders import Row
-from .names import full_name
+from .names import capital, full_name
 from .price import price_lines
 
 
@@ -81,7 +81,7 @@ def _breaks(output: Output, row: Row, few: list[Row]) -> str:
     edges += f", films {row['breaks_thickness']:+.2%}" if row["breaks_thickness"] else ""
     return (
         f"{_named(row)} falls below {plain['name']} at {row['breaks_at']:.2f} times the stated range of lamps and "
-        f"edges: {' and '.join(each)}{warm}{edges}, {separation.told(row['breaks_dn'])}."
+        f"production: {' and '.join(each)}{warm}{edges}, {separation.told(row['breaks_dn'])}."
     )
 
 
@@ -95,8 +95,7 @@ def _name(row: Row) -> str:
 
 
 def _named(row: Row) -> str:
-    text = full_name(row)
-    return text[:1].upper() + text[1:]
+    return capital(full_name(row))
 
 
 def _share(row: Row) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..results.output import Output
-from ..results.tables import FOUND, PLAIN
+from ..results.tables import FOUND, PLAIN, SENSOR_MAP
 from ..types import FloatArray
 from .figures import empty_figure
 
@@ -51,6 +51,16 @@ class SensorFigure:
     maps: Sequence[SensorMap]
     level: tuple[str, float] | None
     corner_deg: float
+    left_out: int
+
+    @property
+    def lined(self) -> bool:
+        """Whether some map passes the level, so that a line is drawn there."""
+        return any(self.passes(each) for each in self.maps)
+
+    def passes(self, each: SensorMap) -> bool:
+        """Whether a map has values on both sides of the level."""
+        return self.level is not None and bool(each.dn.min() < self.level[1] < each.dn.max())
 
 
 def _where(height: float) -> str:
@@ -60,7 +70,7 @@ def _where(height: float) -> str:
 
 
 def sensor_figures(output: Output) -> Iterator[SensorFigure]:
-    """A figure's data for each scene with a field: named designs and the search's answer, best everywhere last."""
+    """A figure's data for each scene with a field: named designs and the search's answer, the last nine."""
     separation = output.trade_off[0]
     name = separation.of or separation.name
     if output.places is None or separation.pair is None or name not in output.places:
@@ -80,22 +90,26 @@ def sensor_figures(output: Output) -> Iterator[SensorFigure]:
                 (plain if row["kind"] == PLAIN else others).append(made)
         best = max(plain, key=lambda each: float(each.dn.min()), default=None)
         level = None if best is None else (best.name, float(best.dn.min()))
-        maps = (others or plain)[-_MOST:]
-        if maps:
-            yield SensorFigure(scenario, output.columns[name].words, maps, level, float(own["cra_deg"].iloc[-1]))
+        shown = others or plain
+        if shown:
+            corner, left_out = float(own["cra_deg"].iloc[-1]), max(0, len(shown) - _MOST)
+            yield SensorFigure(scenario, output.columns[name].words, shown[-_MOST:], level, corner, left_out)
 
 
 def told_map(figure: SensorFigure) -> str:
     """What a map shows, and how it was computed."""
     points = figure.maps[0].heights.size
-    line = (
-        "" if figure.level is None else f" On a white line it is that of {figure.level[0]}, {figure.level[1]:.0f} DN."
-    )
+    line = ""
+    if figure.level is not None:
+        called, dn = figure.level
+        line = f" {called} keeps {dn:.0f} DN everywhere" + ("; a white line is there." if figure.lined else ".")
     smallest = " A title names the smallest of these values."
+    if figure.left_out:
+        smallest += f" {figure.left_out} more designs are in {SENSOR_MAP}."
     return (
-        f"The {figure.words} over the sensor, in {figure.scenario}, before clipping and rounding; light falls in at "
-        f"{figure.corner_deg:g} degrees in the corner. Computed at {points} image heights, linear in between, drawn on "
-        f"a sensor of {_WIDE}:{_HIGH}.{smallest}{line}"
+        f"The {figure.words} over the sensor, in {figure.scenario}, before clipping and rounding; the chief ray "
+        f"falls in at {figure.corner_deg:g} degrees in the corner. Computed at {points} image heights, linear in "
+        f"between, drawn on a sensor of {_WIDE}:{_HIGH}.{smallest}{line}"
     )
 
 
@@ -113,7 +127,7 @@ def draw_map(figure: SensorFigure) -> Figure:
         values = np.interp(radius, each.heights, each.dn)
         extent = (-_WIDE, _WIDE, -_HIGH, _HIGH)
         image = axes.imshow(values, cmap="cividis", vmin=0.0, vmax=top, extent=extent, interpolation="nearest")
-        if figure.level is not None and each.dn.min() < figure.level[1] < each.dn.max():
+        if figure.level is not None and figure.passes(each):
             axes.contour(x, y, values, levels=[figure.level[1]], colors="white", linewidths=1.4)
         axes.set_title(f"{each.name}: {each.worst}", fontsize=9)
         axes.set_xticks([])

@@ -37,11 +37,13 @@ def study_of(output: Output, data: Path | None, *, allow_code: bool = False) -> 
         problem = f"it was made with the code of {whose}"
         raise OutputError(Fault(problem, str(output.folder), allowed=f"{where}--allow-code, if you trust it"))
     if data is None and digests.keys() - code:
-        return load_study(path, kept=KeptSources(output.curves.sensor, output.curves.lights), allow_code=code)
+        own = output.curves
+        return load_study(path, kept=KeptSources(own.sensor, own.lights, own.tasks), allow_code=code)
     study = load_study(path, data, allow_code=code)
     lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
     check_kept(output, output.curves.sensor, study.sensor.qe)
     check_kept(output, output.curves.lights, {(kind, name): values for kind, name, values in lights})
+    check_kept(output, output.curves.tasks, {} if study.tasks is None else study.tasks.from_files)
     return study
 
 

@@ -10,9 +10,9 @@ import pyarrow as pa
 
 from ..types import FloatArray
 
-QE, LIGHT, DESIGN, ON_FRONT, LIMIT = "qe", "light", "design", "front", "limit"
-"""Kinds: of the sensor; of a signal; a modified channel of a design that is drawn, or of one on the front; of the
-limit."""
+QE, LIGHT, TASK, DESIGN, ON_FRONT, LIMIT = "qe", "light", "task", "design", "front", "limit"
+"""Kinds: of the sensor; of a signal; of an own task's file; a modified channel of a design that is drawn, or of one on
+the front; of the limit."""
 _WORD = pa.dictionary(pa.int32(), pa.string())
 SCHEMA = pa.schema(
     [
@@ -25,15 +25,17 @@ SCHEMA = pa.schema(
         pa.field("channel", _WORD),
     ]
 )
-"""`curve`: its name, the CFA's of a limit, `<design_id> <channel>` of a design."""
+"""`curve`: its name, the CFA's of a limit, `<design_id> <channel>` of a design. `signal_type`: of a task's spectrum its
+task and class."""
 FilterCurves = dict[str, FloatArray]
 """Modified channel -> QE, ndarray[n_wavelengths]."""
 
 
 @dataclass(frozen=True)
 class KeptCurves:
-    """ndarray[n_wavelengths] each: QE of the sensor by name, photons per nm by type and name of the signal, QE of the
-    designs that are drawn and of others on the front by `design_id` and channel, of the limit's filter by CFA.
+    """ndarray[n_wavelengths] each: QE of the sensor by name, photons per nm by type and name of the signal, spectra of
+    own tasks that are from files by task and class, and by file and column, QE of the designs that are drawn and of
+    others on the front by `design_id` and channel, of the limit's filter by CFA.
     """
 
     wavelength_nm: FloatArray
@@ -42,6 +44,7 @@ class KeptCurves:
     drawn: dict[int, FilterCurves] = field(default_factory=dict)
     on_front: dict[int, FilterCurves] = field(default_factory=dict)
     limits: dict[str, FloatArray] = field(default_factory=dict)
+    tasks: dict[tuple[str, str], FloatArray] = field(default_factory=dict)
 
     @property
     def designs(self) -> dict[int, FilterCurves]:
@@ -59,6 +62,7 @@ class KeptCurves:
     def _rows(self) -> Iterator[tuple[str, str, FloatArray, str | None, int | None, str | None]]:
         yield from ((QE, name, values, None, None, None) for name, values in self.sensor.items())
         yield from ((LIGHT, name, values, kind, None, None) for (kind, name), values in self.lights.items())
+        yield from ((TASK, name, values, owner, None, None) for (owner, name), values in self.tasks.items())
         for what, designs in ((DESIGN, self.drawn), (ON_FRONT, self.on_front)):
             for design_id, channels in designs.items():
                 for channel, values in channels.items():
@@ -105,6 +109,8 @@ class KeptCurves:
             self.sensor[name] = curve
         elif kind == LIGHT:
             self.lights[str(row["signal_type"]), name] = curve
+        elif kind == TASK:
+            self.tasks[str(row["signal_type"]), name] = curve
         elif kind == LIMIT:
             self.limits[name] = curve
         else:

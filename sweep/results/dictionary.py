@@ -98,8 +98,9 @@ FILES = {
     "`limited_by_<a>_<b>` (of a light at any place, at the worst one of the lattice that was computed)",
     VALIDATED: "where a study validates on other lights: `design_id` and `held_out_csd_<a>_<b>`, their CSDs, DN",
     ROBUSTNESS: "where the lights have a population, for each plain CFA, named design and answer of the search: "
-    "`design_id`; how many times as large population and edge shift must be for the worst CSD to fall below that of "
-    "the best plain CFA (`breaks_at`; null: not up to 3 times), and the CSD, lights, shifts and temperatures there; "
+    "`design_id`; how many times as large population and production tolerances must be for the worst CSD to fall below "
+    "that of the best plain CFA (`breaks_at`; null: not up to 3 times), and the CSD, lights, shifts and temperatures "
+    "there; "
     "`yield`, the share of random lamps and cameras with the wanted CSD, with its 95 % interval",
     REGIONS_MAP: "where a study asks for maps of color regions, for each plain CFA, named design and answer of the "
     "search: design_id, norm, peak of the yellow LED (yellow_nm) and of the red one (red_nm), how many pairs of widths "
@@ -113,8 +114,8 @@ FILES = {
     FRONT: "what the search found at each level of sensitivity, and the limit there; between two levels rows with the "
     "limit alone: " + ", ".join(front_schema(["<parameters>"]).names),
     PRICE: "where a search asks for `nominal_levels` of an objective that is a worst case: the search's answer, the "
-    "filter with the largest worst case at each nominal level, and the one with the most nominally, all before "
-    "clipping and rounding: " + ", ".join(price_schema(["<parameters>"]).names),
+    "filter with the largest worst case that the search finds at each nominal level, and the one with the most "
+    "nominally that it finds, all before clipping and rounding: " + ", ".join(price_schema(["<parameters>"]).names),
     CURVES: "a row per curve and wavelength: " + ", ".join(SCHEMA.names),
     POINTS: "what the clouds draw: design_id, signal_type, signal, channel, dn",
     RECOGNITION: "raw patches told apart by classifiers, where a study asks for them, with 95 % intervals",

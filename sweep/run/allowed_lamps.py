@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +14,7 @@ from ..camera.imager import Imager
 from ..camera.methods import REFERENCE
 from ..camera.view import View
 from ..curves.lights import Lights
-from ..curves.single_leds import RegionMap, SingleLeds, every_led
+from ..curves.single_leds import Norm, SingleLeds, every_led
 from ..results.designs import row_curves
 from ..results.tables import FEW
 from ..study import Study
@@ -40,11 +41,14 @@ def regions_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
     """
     asked = study.section.regions
     assert asked is not None
+    leds = every_led(asked)
+    allowed = {norm: (leds.allowed(norm, "yellow"), leds.allowed(norm, "red")) for norm in asked.norms}
     shown = rows[rows["kind"].isin(FEW) & (rows["status"] == "ok")].to_dict("records")
     calls = []
     for row in shown:
         space, curves = row_curves(study, row)
-        calls.append(delayed(_cells, replace(study.view(space, row["scenario"]), methods=REFERENCE), curves, asked))
+        view = replace(study.view(space, row["scenario"]), methods=REFERENCE)
+        calls.append(delayed(_cells, view, curves, allowed, asked.wanted_dn))
     found: list[dict[str, Any]] = []
     for done, (row, cells) in enumerate(zip(shown, parallel(calls), strict=True), 1):
         found += [{"design_id": row["design_id"], **cell} for cell in cells]
@@ -52,10 +56,12 @@ def regions_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
     return pa.Table.from_pylist(found, schema=_SCHEMA)
 
 
-def _cells(view: View, curves: FloatArray, asked: RegionMap) -> list[dict[str, Any]]:
-    leds, found = every_led(asked), list[dict[str, Any]]()
-    for norm in asked.norms:
-        yellow, red = leds.allowed(norm, "yellow"), leds.allowed(norm, "red")
+def _cells(
+    view: View, curves: FloatArray, allowed: Mapping[Norm, tuple[SingleLeds, SingleLeds]], wanted_dn: float
+) -> list[dict[str, Any]]:
+    """The rows of a design; `allowed`: the yellow and the red LEDs of each norm."""
+    found = list[dict[str, Any]]()
+    for norm, (yellow, red) in allowed.items():
         yellow_dn, red_dn = (_read(view, curves, each) for each in (yellow, red))
         for one in np.unique(yellow.peak_nm):
             of_one = np.flatnonzero(yellow.peak_nm == one)
@@ -70,7 +76,7 @@ def _cells(view: View, curves: FloatArray, asked: RegionMap) -> list[dict[str, A
                         "yellow_nm": float(one),
                         "red_nm": float(other),
                         "pairs": own.size,
-                        "separated": int((own >= asked.wanted_dn).sum()),
+                        "separated": int((own >= wanted_dn).sum()),
                         "least_dn": float(own[at]),
                         "yellow_fwhm_nm": float(yellow.fwhm_nm[of_one[at[0]]]),
                         "red_fwhm_nm": float(red.fwhm_nm[of_other[at[1]]]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -14,7 +15,6 @@ from pydantic import ValidationError
 
 from ..camera.imager import Imager
 from ..camera.methods import REFERENCE
-from ..camera.pixel import Pixel
 from ..camera.scenario import Scenario
 from ..camera.view import View
 from ..metrics.columns.confusion import STATE_ERROR
@@ -37,13 +37,13 @@ _FIELDS = [
 
 @dataclass(frozen=True)
 class ScenesBetween:
-    """Scenes between two that differ in one number: the keys to it, what all of them say, and the pixel of the study.
+    """Scenes of a study between two that differ in one number: the keys to it, and what all of them say.
 
     `view`: of the lower one, as a CFA sees it.
     """
 
     view: View
-    pixel: Pixel
+    study: Study
     said: Mapping[str, Any]
     path: tuple[str, ...]
 
@@ -51,8 +51,7 @@ class ScenesBetween:
         """The scene with another number, everything on. Raises ValidationError where a study may not have it."""
         said = _with(self.said, self.path, number)
         scene = Scenario.model_validate(said)
-        pixel = self.pixel if scene.noise is None else scene.noise.of(self.pixel)
-        return replace(self.view, scenario=scene, pixel=pixel, methods=REFERENCE)
+        return replace(self.view, scenario=scene, pixel=self.study.pixel_in(scene), methods=REFERENCE)
 
 
 def crossings_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
@@ -69,9 +68,9 @@ def crossings_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progre
     for (series, key), scenarios in series_of(study.scenarios).items():
         for row, ends, errors in _passing(few, scenarios, asked.error_max):
             space, curves = row_curves(study, row)
-            between = _between(study, study.view(space, ends[0]), ends)
+            numbers = (scenarios[ends[0]], scenarios[ends[1]])
+            between = _between(study, study.view(space, ends[0]), ends, numbers)
             if between is not None:
-                numbers = tuple(scenarios[end] for end in ends)
                 calls.append(delayed(_crossing, between, curves, study.states, numbers, errors, asked.error_max))
                 own = {"design_id": row["design_id"], "name": row["name"], "series": series, "key": key}
                 found.append(own | {"low": numbers[0], "high": numbers[1]})
@@ -96,14 +95,23 @@ def _passing(
             yield by_scene[a], (a, b), (errors[a], errors[b])
 
 
-def _between(study: Study, view: View, ends: tuple[str, str]) -> ScenesBetween | None:
-    """The scenes between two of a study, seen as `view` sees the first; None where more than a number differs."""
+def _between(study: Study, view: View, ends: tuple[str, str], numbers: tuple[float, float]) -> ScenesBetween | None:
+    """The scenes between two of a study, seen as `view` sees the first.
+
+    None where more than a number differs, or this number is not the one in their names (`numbers`).
+    """
     first, second = (study.scenarios[name].model_dump(mode="json", by_alias=True, exclude_none=True) for name in ends)
     one, other = dict(_leaves(first)), dict(_leaves(second))
     paths = [path for path in {**one, **other} if one.get(path) != other.get(path)]
-    if len(paths) != 1 or not all(isinstance(leaves.get(paths[0]), int | float) for leaves in (one, other)):
+    if len(paths) != 1:
         return None
-    return ScenesBetween(view, study.pixel, first, paths[0])
+    values = [leaves.get(paths[0]) for leaves in (one, other)]
+    if not all(
+        isinstance(value, int | float) and math.isclose(value, number, rel_tol=1e-9)
+        for value, number in zip(values, numbers, strict=True)
+    ):
+        return None
+    return ScenesBetween(view, study, first, paths[0])
 
 
 def _leaves(said: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:

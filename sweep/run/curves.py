@@ -17,8 +17,8 @@ from ..study import Study
 
 
 def kept_curves(study: Study, rows: pd.DataFrame, on_front: pd.DataFrame, limit: Limit | None) -> KeptCurves:
-    """Curves of the sensor, the lights, the drawn designs, those rows of the front that are not drawn anyway, the
-    limit.
+    """Curves of the sensor, the lights, own tasks' files, the drawn designs, those rows of the front that are not drawn
+    anyway, the limit.
     """
     drawn = _drawn(study, rows)
     lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
@@ -32,6 +32,7 @@ def kept_curves(study: Study, rows: pd.DataFrame, on_front: pd.DataFrame, limit:
         _channels(study, drawn),
         _channels(study, _others(on_front, drawn)),
         limits,
+        {} if study.tasks is None else dict(study.tasks.from_files),
     )
 
 

@@ -84,12 +84,6 @@ def _sensor_map(shown: Shown) -> pa.Table:
     return sensor_map_table(shown.study, shown.rows, shown.parallel, shown.progress)
 
 
-def _recognition(shown: Shown) -> pa.Table:
-    table = recognition_table(shown.study, shown.rows, shown.parallel, shown.progress)
-    assert table is not None
-    return table
-
-
 def _has_crossings(study: Study) -> bool:
     return study.section.recognition is not None and bool(series_of(study.scenarios))
 
@@ -120,7 +114,9 @@ ROW_TABLES = {
         lambda s: crossings_table(s.study, s.rows, s.parallel, s.progress),
         "where an allowed error ends",
     ),
-    RECOGNITION: RowTable(_has_patches, _recognition, "raw patches"),
+    RECOGNITION: RowTable(
+        _has_patches, lambda s: recognition_table(s.study, s.rows, s.parallel, s.progress), "raw patches"
+    ),
     TRADED: RowTable(_has_colors, lambda s: traded_table(s.study, s.rows)),
     RENDERED: RowTable(_has_colors, lambda s: rendered_table(s.study, s.rows)),
 }

@@ -17,16 +17,13 @@ from ..study import Study
 from ..types import FloatArray, Parallel, Progress, delayed
 
 
-def recognition_table(
-    study: Study, highlights: pd.DataFrame, parallel: Parallel, progress: Progress
-) -> pa.Table | None:
-    """Columns `design_id`, those of a design's name, `patches` and `recognition.columns`; None where none are drawn.
+def recognition_table(study: Study, highlights: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
+    """Columns `design_id`, those of a design's name, `patches` and `recognition.columns`.
 
     The random numbers of a row follow from the study's seed and its id.
     """
     asked = study.section.recognition
-    if asked is None or not asked.patches:
-        return None
+    assert asked is not None
     keys = ["design_id", "kind", "name", "cfa", "scenario"]
     rows = highlights[highlights["kind"].isin(FEW) & (highlights["status"] == "ok")].to_dict("records")
     tasks = []

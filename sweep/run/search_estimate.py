@@ -1,7 +1,7 @@
 """What a search, its front, its limits and what is searched again will take: a little of each is tried and timed.
 
-How many evaluations a start takes, and how many linear programs a limit, differs from study to study; the numbers here
-are those of the studies that come with the package (`python -m tests.bench_estimate`).
+How many evaluations a start takes differs from study to study; the numbers here are those of the studies that come
+with the package (`python -m tests.bench_estimate`).
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 
 from ..search.limit import limit_of, why_not
+from ..search.price import has_nominal
 from ..search.problem import Problem, starting_points
 from ..search.solver import GRADIENT, search_from
 from ..study import Search, Study
@@ -19,7 +20,7 @@ from .held_out import LEFT_OUT_STARTS, left_out_signals
 PER_START, PER_LEVEL = 55, 190
 """Evaluations of a start with derivatives, and of all starts at a level of the front."""
 _TRIED, _PROGRAMS = 20, 20
-"""Evaluations that are timed, and linear programs at most; a limit of the built-in studies takes 10 to 20 of these."""
+"""Evaluations that are timed, and linear programs at most."""
 
 
 def search_seconds(study: Study, search: Search) -> tuple[float, int]:
@@ -33,8 +34,9 @@ def search_seconds(study: Study, search: Search) -> tuple[float, int]:
     evaluations = len(starts) * usual
     evaluations += len(search.levels) * (min(4 * each, PER_LEVEL) if gradient else 4 * each)
     if study.leaves_one_out:
-        fewer = len(left_out_signals(problem))
-        evaluations += fewer * LEFT_OUT_STARTS * min(search.max_evaluations // LEFT_OUT_STARTS, usual)
+        optima = 2 if has_nominal(problem) else 1
+        searches = optima * len(left_out_signals(problem)) + optima - 1
+        evaluations += searches * LEFT_OUT_STARTS * min(search.max_evaluations // LEFT_OUT_STARTS, usual)
     seconds = evaluations * per_evaluation
     if why_not(problem) is None:
         seconds += (1 + len(search.levels)) * _took(lambda: limit_of(problem, most_programs=_PROGRAMS))

@@ -54,8 +54,9 @@ class AnyHeight:
     def more(self, curve: FloatArray) -> bool:
         """Add the worst heights for a filter; False where they are no worse than the known ones."""
         known, view = len(self._heights), self.problem.view
-        for name, pair in self._pairs.items():
-            worst = self._places.worst(curve[None], (pair,))[pair]
-            if worst is not None and self.least(curve)[name] < smooth_csd(view, curve[None, None], pair)[0] - _WORSE_DN:
+        for pair, worst in self._places.worst(curve[None], tuple(self._pairs.values())).items():
+            if worst is None:
+                continue
+            if worst.distance_dn - _WITHIN_DN < smooth_csd(view, curve[None, None], pair)[0] - _WORSE_DN:
                 self._heights.add(worst.height)
         return known < len(self._heights) <= _MOST_HEIGHTS

@@ -41,8 +41,8 @@ _CONDITION_NM = 100.0
 class Point:
     """Everything that one simulation gives.
 
-    `terms`: the objective's weighted quantities as rows, squared, as they are where an own metric is among them, or as
-    decades below 1 of what is to be the least; `power`: 2 or 1. `term`: ndarray[n], the term that each row belongs to
+    `terms`: the objective's weighted quantities as rows, squared, as they are where one may be below 0, or as decades
+    below 1 of what is to be the least; `power`: 2 or 1. `term`: ndarray[n], the term that each row belongs to
     (all 0 for a minimum). `conditions`: met where <= 0. `quantities`: rows of each constrained quantity.
     """
 
@@ -96,7 +96,7 @@ class Model:
         over = any(problem.over_population(name) for name in wanted)
         self._members = _members_of(problem.view) if over else None
         self._power = (
-            1 if problem.own_goal or problem.objective.rule.wanted == "less" else 2
+            1 if problem.signed_goal or problem.objective.rule.wanted == "less" else 2
         )  # what may be below 0 has no root
         self._back_off = {name: _back_off(problem, name, bound) for name, bound in problem.constraints.items()}
         self._seen: dict[bytes, Point] = {}

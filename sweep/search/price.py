@@ -60,7 +60,8 @@ def worst_case_price(
 ) -> tuple[PricePoint, ...]:
     """The answer, the largest worst case at `count` levels between, and the filter with the largest nominal quantity.
 
-    Each level is searched from both ends. Raises BrokenProofError, see `check_proof`.
+    Each level is searched from both ends and from what was found at the level above, which keeps it, too. Raises
+    BrokenProofError, see `check_proof`.
     """
     nominal = nominal_problem(problem)
     top = best_nominal(problem, answer, effort, parallel)
@@ -71,15 +72,18 @@ def worst_case_price(
     first = point(None, answer)
     if top is None or not top.objective > first.nominal:
         return (first,)
-    found = [first]
-    starts = [problem.to_unit(each.x) for each in (answer, top)]
+    found, above = [point(None, top)], top
     levels = np.linspace(first.nominal, top.objective, count + 2)[1:-1]
-    for done, level in enumerate(map(float, levels), 1):
-        best = _best(with_least(problem, nominal.objective.column, level), starts, effort, parallel)
+    for done, level in enumerate(map(float, levels[::-1]), 1):
+        asked = with_least(problem, nominal.objective.column, level)
+        ends = (answer, top) if above is top else (answer, top, above)
+        best = _best(asked, [problem.to_unit(each.x) for each in ends], effort, parallel)
         check_proof(best, limit, f" at a nominal {level:g} and more")
-        found += [] if best is None else [point(level, best)]
+        if best is not None:
+            above = best
+            found.append(point(level, best))
         progress("price of the worst case", done, count)
-    return (*found, point(None, top))
+    return (first, *found[::-1])
 
 
 def _best(problem: Problem, starts: Sequence[FloatArray], effort: Effort, parallel: Parallel) -> Evaluation | None:

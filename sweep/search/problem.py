@@ -62,6 +62,11 @@ class Problem:
         return any(self.quantities[name].needs == "own" for name in self.objective.weights)
 
     @property
+    def signed_goal(self) -> bool:
+        """Whether the objective may be below 0, and of any size."""
+        return any(self.quantities[name].signed for name in self.objective.weights)
+
+    @property
     def pairs(self) -> dict[str, Pair]:
         """The pair of signal types of each distance, be it in DN or in units of the noise."""
         own = [q for q in self.quantities.values() if q.apart and not q.extreme]

@@ -40,9 +40,9 @@ _X_TOLERANCE = 1e-9
 _FAR = 1e4
 """So many times its value at the start a term under noise may reach; a number that no design comes near."""
 _LEAST_SCALE = 1e-6
-"""Of an own metric, whose size is not known."""
+"""Of what may be below 0, whose size is not known."""
 _UNKNOWN = 1e9
-"""So many times its value at the start an own metric may reach to either side."""
+"""So many times its value at the start what may be below 0 may reach to either side."""
 
 
 def search_from(
@@ -91,7 +91,7 @@ def _epigraph(
     z = (u, t); each t_k is in units of its term's first value. Rows that are no squares are >= t_k.
     """
     values, rule, power = first.term_values, problem.objective.rule, first.power
-    scale = np.maximum(np.abs(values), _LEAST_SCALE if problem.own_goal else 1.0)
+    scale = np.maximum(np.abs(values), _LEAST_SCALE if problem.signed_goal else 1.0)
     n_free, n_rows = u0.size, first.terms.values.size
     alone = scale.size == 1
     unit = 1.0 if alone else float(rule.of(scale))
@@ -120,7 +120,7 @@ def _epigraph(
     noisy = any(problem.quantities[name].states for name in problem.objective.weights)
     far = _FAR * scale if noisy else max(problem.objective.weights.values()) * problem.view.longest_distance_dn
     least, most = [0.0 if power == 2 else -_FAR] * scale.size, [max(float(r), 1.0) for r in far / scale]
-    if problem.own_goal:  # nothing is known of it
+    if problem.signed_goal:  # nothing is known of it
         least, most = [-_UNKNOWN] * scale.size, [_UNKNOWN] * scale.size
     opt.set_lower_bounds([0.0] * n_free + least)
     opt.set_upper_bounds([1.0] * n_free + most)

@@ -150,7 +150,10 @@ def field_names(model: type[BaseModel], path: Sequence[Key], data: Any) -> list[
         node = _child(node, key)
         choices = [option for option in _options(annotation) if _accepts(option, key)]
         annotation = _inner(choices[0], key) if choices else None
-    for option in _options(annotation):
+    alone = [
+        inner for option in _options(annotation) if get_origin(option) is list for inner in _options(_inner(option, 0))
+    ]
+    for option in (*_options(annotation), *(alone if isinstance(node, dict) else ())):
         if isinstance(option, type) and issubclass(option, BaseModel):
             kinds = option.model_fields.get("kind")
             if kinds is None or not isinstance(node, dict) or node.get("kind", kinds.default) == kinds.default:
@@ -183,7 +186,7 @@ def _options(annotation: Any) -> list[Any]:
     origin = get_origin(annotation)
     if origin in (Union, UnionType):
         return [inner for option in get_args(annotation) for inner in _options(option)]
-    return [] if annotation in (None, type(None)) else [annotation]
+    return [] if annotation in (None, type(None)) else [_unannotated(annotation)]
 
 
 def _accepts(annotation: Any, key: Key) -> bool:

@@ -37,7 +37,8 @@ def _read(lights: LightsSection, path: tuple[Key, ...], section: StudySection, s
         sources.faults.extend(error.faults)
         return lights
     sources.warnings.append(f"{name}: read as energy; {_said(taken)}")
-    return LightsSection.model_validate(taken.keys(name))
+    own = lights.model_dump(exclude_unset=True, exclude={"builtin", "files"})
+    return LightsSection.model_validate(taken.keys(name) | own)
 
 
 def _said(taken: LightsFile) -> str:

@@ -176,12 +176,16 @@ class Study:
             modified=modified,
             clear_qe=self.sensor.curve(self.sensor.clear),
             lights=self.lights,
-            pixel=self.pixel if scene.noise is None else scene.noise.of(self.pixel),
+            pixel=self.pixel_in(scene),
             scenario=scene,
             technologies=tuple(technologies) if any(technologies) else (),
             tasks=self.tasks,
             methods=self.plans[scenario].methods if scenario in self.plans else REFERENCE,
         )
+
+    def pixel_in(self, scene: Scenario) -> Pixel:
+        """The study's pixel, with a scene's noise where it states one."""
+        return self.pixel if scene.noise is None else scene.noise.of(self.pixel)
 
     def box(self, space: Space, scenario: str) -> Box:
         """What the designs of `space` can be, for a plan of the scenario."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, model_validator
 
@@ -75,6 +75,21 @@ class LightFile(Documented):
     quantity: Annotated[str, Field(pattern="^(energy|photons)$"), WithJsonSchema({"enum": ["energy", "photons"]})]
     """What the file's numbers are."""
     signals: Annotated[dict[Name, FileColumns], Field(min_length=1)]
+    resampling: Resampling = "linear"
+    """`mean` over each bin keeps the integral of lines that are finer than the grid."""
+    outside: Outside = "refuse"
+    """`zero` takes 0 where the samples end inside the grid."""
+
+
+class TaskFile(Documented):
+    """Spectra of a task's class from one file. Only their shape counts: all spectra of a task have the same photons."""
+
+    file: FilePath
+    """Path of a file of curves, relative to the study or to the folder of --data."""
+    quantity: Literal["energy", "photons", "reflectance"]
+    """What the file's numbers are: of lamps `energy` or `photons`, of surfaces `reflectance`, in any unit."""
+    columns: FileColumns | None = None
+    """Columns of the file; left out, all of them."""
     resampling: Resampling = "linear"
     """`mean` over each bin keeps the integral of lines that are finer than the grid."""
     outside: Outside = "refuse"

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from ..camera.pixel import ReadNoise
 from ..curves.tasks import SHIPPED
 from ..types import Seconds
-from .schema_curves import Documented, Name
+from .schema_curves import Documented, Name, TaskFile
 
 _MOST_OWN = 20
 _MOST_CLASSES = 40
@@ -17,22 +17,26 @@ _TaskName = Annotated[str, Field(min_length=1, max_length=40, pattern="^[a-z][a-
 
 
 def _listed(value: Any) -> Any:
-    return [value] if isinstance(value, str) else value
+    return value if isinstance(value, list) else [value]
+
+
+def _kind_of(value: Any) -> str:
+    return "<group>" if isinstance(value, str) else "<file>"
+
+
+_Spectra = Annotated[Annotated[Name, Tag("<group>")] | Annotated[TaskFile, Tag("<file>")], Discriminator(_kind_of)]
+_ClassSpectra = Annotated[
+    list[_Spectra],
+    BeforeValidator(_listed, json_schema_input_type=list[_Spectra] | _Spectra),
+    Field(min_length=1, max_length=_MOST_CLASSES),
+]
 
 
 class OwnTask(Documented):
-    """Classes of spectra to tell apart, from the groups that `sweep list data` shows."""
+    """Classes of spectra to tell apart: from the groups that `sweep list data` shows, and from files."""
 
-    classes: Annotated[
-        dict[
-            Name,
-            Annotated[
-                list[Name], BeforeValidator(_listed, json_schema_input_type=list[Name] | Name), Field(min_length=1)
-            ],
-        ],
-        Field(min_length=2, max_length=_MOST_CLASSES),
-    ]
-    """Class -> a group of spectra, or a list of groups; all are lamps, or all are surfaces."""
+    classes: Annotated[dict[Name, _ClassSpectra], Field(min_length=2, max_length=_MOST_CLASSES)]
+    """Class -> a group of spectra, {file: ..., quantity: ...}, or a list of these; all are lamps, or all surfaces."""
     under: Annotated[list[Name], BeforeValidator(_listed, json_schema_input_type=list[Name] | Name)] = []
     """Lights of a task of surfaces: d65, d50, a (a filament), led, hps, lps (sodium of high and low pressure)."""
 

@@ -21,7 +21,7 @@ from ..errors import MOST_FAULTS, DataError, Fault, SweepError, nearest
 from ..types import FloatArray
 from .document import Document
 from .schema import MOST_TYPES
-from .schema_curves import CurveFile, LightFile, LightsSection
+from .schema_curves import CurveFile, LightFile, LightsSection, TaskFile
 from .yaml_tree import Key
 
 _Made = TypeVar("_Made", SensorCurves, Lights)
@@ -32,14 +32,19 @@ _CUT_OFF = 0.01
 
 
 _Key = TypeVar("_Key")
+_Entry = CurveFile | LightFile | TaskFile
+"""A file of curves as a study names it."""
 
 
 @dataclass(frozen=True)
 class KeptSources:
-    """Curves to take instead of those in files, on the study's grid: QE by name, photons by type and name."""
+    """Curves to take instead of those in files, on the study's grid: QE by name, photons by type and name, spectra of
+    own tasks by class and name.
+    """
 
     sensor: Mapping[str, FloatArray]
     lights: Mapping[tuple[str, str], FloatArray]
+    tasks: Mapping[tuple[str, str], FloatArray] = field(default_factory=dict)
 
 
 @dataclass
@@ -89,7 +94,12 @@ class Sources:
     def lights(self, section: LightsSection, at: tuple[Key, ...] = ("lights",)) -> Lights | None:
         """The lights of the section at a place of the study, or None after adding faults."""
         if section.builtin is not None:
-            return self.built_in(at, section.builtin, BUILT_IN_LIGHTS)
+            own = sorted(section.model_fields_set - {"builtin", "files"})
+            for key in own:
+                self.add(
+                    (*at, key), "a built-in data set has its own", getattr(section, key), "this key beside `files`"
+                )
+            return None if own else self.built_in(at, section.builtin, BUILT_IN_LIGHTS)
         before = len(self.faults)
         used = [len(columns) for entry in section.files for columns in entry.signals.values()]
         if not self.fits((*at, "files"), "lights", sum(used)):
@@ -105,7 +115,7 @@ class Sources:
                     if self.kept is not None:
                         photons = self.kept_curve(place, self.kept.lights, (signal_type, label))
                     else:
-                        photons = self._photons(place, curves, column, entry)
+                        photons = self.photons(place, curves, column, entry)
                     if photons is not None:
                         by_type.setdefault(signal_type, []).append((label, signal_type, photons))
         if len(self.faults) > before:
@@ -151,8 +161,8 @@ class Sources:
             return None
         return known[name](self.grid)
 
-    def _photons(
-        self, path: tuple[Key, ...], curves: Curves | None, column: str, entry: LightFile
+    def photons(
+        self, path: tuple[Key, ...], curves: Curves | None, column: str, entry: LightFile | TaskFile
     ) -> FloatArray | None:
         """A light's photon spectrum on the grid; says so when photons are cut off."""
         values = self.column(path, curves, column, entry)
@@ -173,9 +183,7 @@ class Sources:
             )
         return values
 
-    def column(
-        self, path: tuple[Key, ...], curves: Curves | None, column: str, entry: CurveFile | LightFile
-    ) -> FloatArray | None:
+    def column(self, path: tuple[Key, ...], curves: Curves | None, column: str, entry: _Entry) -> FloatArray | None:
         """A column of a file on the grid, ndarray[n_wavelengths], or None after adding faults."""
         if curves is None:
             return None
@@ -196,7 +204,7 @@ class Sources:
             self.add(path, "the run kept no such curve", name)
         return curves.get(name)
 
-    def curves(self, path: tuple[Key, ...], entry: CurveFile | LightFile) -> Curves | None:
+    def curves(self, path: tuple[Key, ...], entry: _Entry) -> Curves | None:
         """All curves of a file, which is read once, or None after adding faults."""
         if self.kept is not None:
             return None

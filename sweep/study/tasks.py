@@ -10,14 +10,14 @@ from ..camera.pixel import Pixel, irradiance_factor
 from ..camera.scene import Scene
 from ..camera.sensor import SensorCurves
 from ..curves.builtin.surrogate import BUILT_IN_RANGE_NM
-from ..curves.builtin.task_sets import is_surface, own_task, shipped, task_groups
-from ..curves.tasks import ILLUMINANTS, SHIPPED, Conditions, GriddedTask, StudyTasks
+from ..curves.builtin.task_sets import shipped
+from ..curves.tasks import SHIPPED, Conditions, GriddedTask, StudyTasks
 from ..designs.space import Space
 from ..types import FloatArray
 from .schema import StudySection
-from .schema_tasks import OwnTask, TasksSection
+from .schema_tasks import TasksSection
 from .sources import Sources
-from .yaml_tree import Key
+from .task_files import OwnTasks
 
 _AT = ("tasks",)
 
@@ -26,7 +26,7 @@ def tasks_of(asked: TasksSection, sources: Sources) -> StudyTasks | None:
     """The tasks of a study, or None after adding faults."""
     before, grid = len(sources.faults), sources.grid
     low, high = BUILT_IN_RANGE_NM
-    if not low <= grid.start_nm < grid.stop_nm <= high:
+    if _shipped_spectra(asked) and not low <= grid.start_nm < grid.stop_nm <= high:
         asked_nm = f"{grid.start_nm:g} to {grid.stop_nm:g} nm"
         sources.add(
             ("wavelengths",), "the spectra of the tasks end before the grid", asked_nm, f"{low:g} to {high:g} nm"
@@ -34,37 +34,23 @@ def tasks_of(asked: TasksSection, sources: Sources) -> StudyTasks | None:
     for name in asked.shipped:
         if name not in SHIPPED:
             sources.unknown((*_AT, "shipped"), "task", name, list(SHIPPED))
-    for name, task in asked.own.items():
-        _check_own(name, task, sources)
+    if len(sources.faults) > before:
+        return None
+    own = OwnTasks(sources)
+    made = [own.task(name, task, (*_AT, "own", name)) for name, task in asked.own.items()]
     if len(sources.faults) > before:
         return None
     conditions = Conditions(asked.exposure_s, asked.read_noise_e, asked.illuminance_lx)
-    own = (own_task(grid, name, task.classes, task.under) for name, task in asked.own.items())
-    return StudyTasks(conditions, (*(shipped(grid, name) for name in asked.shipped), *own))
+    found = (*(shipped(grid, name) for name in asked.shipped), *(task for task in made if task is not None))
+    return StudyTasks(conditions, found, own.from_files)
 
 
-def _check_own(name: str, task: OwnTask, sources: Sources) -> None:
-    """Its groups and lights are known, and its classes are all lamps, or all surfaces."""
-    path: tuple[Key, ...] = (*_AT, "own", name)
-    known = task_groups()
-    if name in SHIPPED:
-        sources.add(path, "a task of the package has this name", name, "another name")
-    for kind, named in task.classes.items():
-        for group in named:
-            if group not in known:
-                sources.unknown((*path, "classes", kind), "group of spectra", group, list(known))
-    for light in task.under:
-        if light not in ILLUMINANTS:
-            sources.unknown((*path, "under"), "light", light, list(ILLUMINANTS))
-    if len(set(task.under)) < len(task.under):
-        sources.add((*path, "under"), "a light is named twice", task.under)
-    kinds = {is_surface(group) for named in task.classes.values() for group in named if group in known}
-    if len(kinds) > 1:
-        sources.add((*path, "classes"), "a task is of lamps, or of surfaces", list(task.classes), "one of both")
-    elif kinds == {True} and not task.under:
-        sources.add((*path, "under"), "surfaces need light", None, ", ".join(ILLUMINANTS))
-    elif kinds == {False} and task.under:
-        sources.add((*path, "under"), "lamps are seen by their own light", task.under, "leave it out")
+def _shipped_spectra(asked: TasksSection) -> bool:
+    """Whether any spectrum of the package is needed: all that the study has may be lamps from files."""
+    named = (each for task in asked.own.values() for spectra in task.classes.values() for each in spectra)
+    return (
+        bool(asked.shipped) or any(task.under for task in asked.own.values()) or any(isinstance(e, str) for e in named)
+    )
 
 
 def check_seen(

@@ -260,3 +260,23 @@ def test_a_study_begins_with_a_shipped_one(tmp_path: Path, monkeypatch: pytest.M
     ):
         code, _, err = commanded("new", *asked)
         assert (code, expected in err) == (2, True)
+
+
+def test_a_study_begins_with_the_files_of_another(tmp_path: Path) -> None:
+    """Those of its tasks, too; what lies outside its folder has no place beside the copy."""
+    (tmp_path / "a" / "paints").mkdir(parents=True)
+    (tmp_path / "a" / "paints" / "mine.csv").write_text("nm,white\n390,0.5\n710,0.6\n")
+    own = "{classes: {mine: {file: FILE, quantity: reflectance}, road: asphalt}, under: d65}"
+    text = f"study: a\nsensor: ar0820\nlights: tl16\ncfas: [RGGB]\ntasks: {{shipped: [], own: {{paint: {own}}}}}\n"
+    (tmp_path / "a" / "a.yaml").write_text(text.replace("FILE", "paints/mine.csv"))
+    begin = ("new", "b", "--from", tmp_path / "a" / "a.yaml", "--folder", tmp_path / "b")
+    code, _, err = commanded(*begin)
+    assert (code, "no such file" in err) == (2, True)
+    assert not (tmp_path / "b" / "b.yaml").exists()
+    assert commanded(*begin, "--copy")[0] == 0
+    tasks = load_study(tmp_path / "b" / "b.yaml").tasks
+    assert tasks is not None
+    assert tasks.from_files.keys() == {("paint mine", "paints/mine.csv:white")}
+    (tmp_path / "a" / "a.yaml").write_text(text.replace("FILE", "../a/paints/mine.csv"))
+    code, _, err = commanded("new", "c", *begin[2:], "--copy")
+    assert (code, "lies outside the folder of the study" in err) == (2, True)

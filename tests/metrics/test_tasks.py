@@ -18,7 +18,7 @@ from scipy.stats import norm
 
 from sweep.camera.linear import smooth_imager
 from sweep.camera.view import View
-from sweep.curves.builtin.task_sets import own_task, shipped
+from sweep.curves.builtin.task_sets import group, separation_task, shipped
 from sweep.curves.tasks import SHIPPED, Conditions, StudyTasks
 from sweep.designs.block import CurveBlock
 from sweep.metrics.discrimination import detectability, pairwise_error
@@ -60,7 +60,7 @@ def scene() -> tuple[View, object]:
     assert space.filter is not None
     made = (
         *(shipped(study.grid, name) for name in SHIPPED),
-        own_task(study.grid, "own", {"a": ["soil"], "b": ["canopy"]}, ["d65"]),
+        separation_task(study.grid, "own", {"a": group(study.grid, "soil"), "b": group(study.grid, "canopy")}, ["d65"]),
     )
     return replace(study.view(space, "chart"), tasks=StudyTasks(CONDITIONS, made)), space.filter.family
 

@@ -139,6 +139,10 @@ def test_another_light_changes_no_reading_of_a_resolved_study(folder: Path) -> N
         ("validate: {leav_one_out: true}\n", "did you mean 'leave_one_out'?"),
         ("validat: {leave_one_out: true}\n", "did you mean 'validate'?"),
         ("validate: {lights: tl17}\n", "validate.lights: unknown built-in lights (got 'tl17')"),
+        (
+            "validate: {lights: {builtin: tl16, photon_ratio: 3}}\n",
+            "validate.lights.photon_ratio: a built-in data set has its own (got 3.0)",
+        ),
         ("validate: {lights: tl16}\n", "unknown signal type (got 'orange')"),
     ],
 )
@@ -165,6 +169,9 @@ def test_a_file_alone_is_told_apart_by_its_colors(folder: Path) -> None:
     assert alone.held_out is not None
     assert named.held_out is not None
     assert alone.held_out.names == named.held_out.names
+    keyed = load(folder, text("one", "own", after="validate: {lights: {builtin: third.csv, name: street}}\n"))
+    assert keyed.held_out is not None
+    assert keyed.held_out.name == "street"
     np.testing.assert_array_equal(alone.held_out.photons, named.held_out.photons)
     ran(alone, folder / "out", 1)
     kept = (folder / "out" / "study.resolved.yaml").read_text()

@@ -168,6 +168,7 @@ def test_code_of_a_metric_runs_only_when_it_is_allowed(tmp_path: Path) -> None:
         ("    one, other = readings", "    readings.dn[:] = 0\n    one, other = readings", "read-only"),
         (".reshape(len(one), -1)", ".reshape(len(one), -1) + len(one)", "depends on the designs beside it"),
         ('"DN", "yellow', '3, "yellow', "`unit` is no short text (got 3)"),
+        ('"red_spread", "less"', 'property(lambda self: 1 / 0), "less"', "mine.py:Spread: ZeroDivisionError"),
         ('"less"', '"fewer"', "no such `wanted` (got 'fewer'); allowed: more, less"),
         (
             '"red_spread"',
@@ -237,6 +238,16 @@ def test_a_design_that_the_metric_fails_on_costs_a_row(tmp_path: Path) -> None:
 
 def test_no_verdict_is_left_out_of_the_reserved_names() -> None:
     assert {name for name in KEYS if name.isidentifier()} <= {*RESERVED}
+
+
+def test_a_file_may_have_dataclasses_and_types(tmp_path: Path) -> None:
+    typed = "from __future__ import annotations\nfrom dataclasses import dataclass\n" + CODE.replace(
+        "class Spread:", "@dataclass\nclass Spread:\n    times: float = 1.0"
+    )
+    assert "mine.py:Spread" in study(tmp_path, code=typed).section.metrics
+    plain = typed.replace("from __future__ import annotations\n", "")
+    made = OwnCode("mine.py:apart", plain.replace("def apart(readings)", "def apart(readings: np.ndarray)")).loaded
+    assert made.__annotations__ == {"readings": np.ndarray}
 
 
 def test_metrics_of_one_text_are_one() -> None:

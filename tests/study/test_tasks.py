@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import json
+import re
 import subprocess
 import sys
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from sweep.curves.spectrum import Curves
-from sweep.errors import StudyError
-from sweep.study.load import study_of_keys
+from sweep.curves.builtin import task_sets
+from sweep.curves.spectrum import Curves, WavelengthGrid
+from sweep.errors import OutputError, StudyError
+from sweep.report import read_output, study_of
+from sweep.study.load import load_study, study_of_keys
+
+from ..commanded import commanded
 
 KEYS: dict[str, Any] = {"study": "tasks", "sensor": "ar0820", "lights": "tl16", "cfas": ["RGGB"]}
 LEAF = {"classes": {"leaf": "canopy", "ground": ["soil", "asphalt"]}, "under": "d65"}
@@ -38,7 +45,8 @@ FAULTS: list[tuple[dict[str, Any], str]] = [
     ),
     ({"tasks": {"exposure_s": 0.1}}, "a patch of a task fills the well"),
     ({"tasks": ["color"], "constraints": {"color_delta_e_mean_d65": {"min": 1}}}, "has no `min`"),
-    ({"tasks": ["color"], "objective": "color_delta_e_mean_d65"}, "unknown objective"),
+    ({"tasks": ["color"], "objective": "color_delta_e_mean_d65"}, "allowed: `{least: {color_delta_e_mean_d65: 1}}`"),
+    ({"tasks": ["color"], "objective": {"least": {"color_smi": 1}}}, "more of color_smi is better"),
     ({"tasks": ["low_light"], "constraints": {"color_smi": {"min": 80}}}, "unknown quantity"),
 ]
 
@@ -107,3 +115,97 @@ assert not {"sweep.study.tasks", "sweep.curves.builtin.spectra", "sweep.curves.b
 assert not any(name.startswith("task") or "delta" in name for name in study.quantities)
 """
     subprocess.run([sys.executable, "-c", script], check=True)
+
+
+PAINTS = "nm,white,yellow,black\n390,0.5,0.1,0\n550,0.6,0.1,0\n560,0.6,0.5,0\n710,0.6,0.5,0\n"
+OWN = {"file": "paints.csv", "quantity": "reflectance"}
+FILES: list[tuple[dict[str, Any], str]] = [
+    ({"file": "paint.csv"}, "no such file (got 'paint.csv')"),
+    ({"file": "paint.csv"}, "did you mean 'paints.csv'"),
+    ({"quantity": "transmission"}, "'energy', 'photons' or 'reflectance'"),
+    ({"columns": ["white", "yelow"]}, "paints.csv has no such column (got 'yelow'); allowed: white, yellow, black"),
+    ({"columns": ["white", "white"]}, "a column is named twice"),
+    ({"columns": ["black"]}, "the surface reflects nothing on the wavelength grid (got 'black')"),
+    ({"quantity": "energy"}, "a task is of lamps, or of surfaces"),
+    ({"quantty": "energy"}, "quantty: unknown key; allowed: file, quantity, columns"),
+    ({"file": "short.csv", "columns": ["a"]}, "short.csv, column a: the curve is truncated"),
+]
+
+
+def with_paints(folder: Path, entry: Any, under: str = "d65") -> dict[str, Any]:
+    (folder / "paints.csv").write_text(PAINTS)
+    (folder / "short.csv").write_text("nm,a\n500,1\n600,1\n")
+    own = {"paint": {"classes": {"mine": entry, "road": "asphalt"}, "under": under}}
+    return {**KEYS, "tasks": {"shipped": [], "own": own}}
+
+
+@pytest.mark.parametrize(("change", "said"), FILES)
+def test_a_fault_of_a_file_is_a_line(tmp_path: Path, change: dict[str, Any], said: str) -> None:
+    with pytest.raises(StudyError) as found:
+        study_of_keys(with_paints(tmp_path, {**OWN, "columns": ["white"], **change}), tmp_path)
+    assert len(found.value.faults) == 1
+    assert said in str(found.value)
+    assert "tasks.own.paint.classes" in str(found.value)
+
+
+def test_a_file_needs_its_quantity_and_is_named_once(tmp_path: Path) -> None:
+    for entry, said in (
+        ("paints.csv", "allowed: {file: paints.csv, quantity: reflectance}, or energy, or photons"),
+        ([{**OWN, "columns": ["white"]}, {**OWN, "columns": ["yellow"]}], "the class has this file already"),
+    ):
+        with pytest.raises(StudyError, match=re.escape(said)):
+            study_of_keys(with_paints(tmp_path, entry), tmp_path)
+
+
+def test_spectra_of_a_file_are_judged_as_those_of_a_group(tmp_path: Path) -> None:
+    """A group written to a file, in percent, is that group; a lamp's energy are its photons times 1 / wavelength."""
+    grid = WavelengthGrid()
+    road = task_sets.group(grid, "asphalt")
+    lamps = task_sets.group(grid, "brake red") * 1e3
+    for name, spectra in (("road", road * 100), ("lamps", lamps / grid.nodes_nm)):
+        table = np.column_stack([grid.nodes_nm, spectra.T])
+        header = ",".join(["nm", *(f"s{at}" for at in range(len(spectra)))])
+        np.savetxt(tmp_path / f"{name}.csv", table, delimiter=",", header=header, comments="", fmt="%.17g")
+    files = {
+        "surface": {"classes": {"a": {"file": "road.csv", "quantity": "reflectance"}, "b": "canopy"}, "under": "hps"},
+        "lamp": {"classes": {"a": {"file": "lamps.csv", "quantity": "energy"}, "b": "turn amber"}},
+    }
+    groups = {
+        "surface": {"classes": {"a": "asphalt", "b": "canopy"}, "under": "hps"},
+        "lamp": {"classes": {"a": "brake red", "b": "turn amber"}},
+    }
+    for mixed in ({}, {"lamp": {**files["lamp"], "classes": {**files["lamp"]["classes"], "b": ["turn amber"]}}}):
+        made = study_of_keys({**KEYS, "tasks": {"shipped": [], "own": {**files, **mixed}}}, tmp_path)
+        same = study_of_keys({**KEYS, "tasks": {"shipped": [], "own": groups}}, tmp_path)
+        assert made.tasks is not None
+        assert same.tasks is not None
+        for name in groups:
+            one, other = made.tasks.by_name[name], same.tasks.by_name[name]
+            assert one.types == other.types
+            np.testing.assert_allclose(one.photons, other.photons, rtol=1e-12, atol=0)
+        assert made.digests.keys() == {"road.csv", "lamps.csv"}
+
+
+def test_a_run_keeps_the_spectra_of_its_own_tasks(tmp_path: Path) -> None:
+    """It is made again without the file; with another file of that name it is refused."""
+    study = {
+        **with_paints(tmp_path, {**OWN, "columns": ["white", "yellow"]}),
+        "objective": {"least": {"paint_error_d65": 1}},
+    }
+    (tmp_path / "own.yaml").write_text(json.dumps(study))
+    code, told, said = commanded("run", tmp_path / "own.yaml", "--output", tmp_path, "--jobs", 1)
+    assert code == 0, said
+    output = read_output(tmp_path / "tasks")
+    error = output.table["paint_error_d65"].iloc[0]
+    assert f"Its paint pairwise error D65 is {error:.3g}" in told
+    assert list(output.curves.tasks) == [("paint mine", "paints.csv:white"), ("paint mine", "paints.csv:yellow")]
+    assert output.provenance.data_sha256["paints.csv"] == sha256(PAINTS.encode()).hexdigest()
+    first = load_study(tmp_path / "own.yaml").tasks
+    (tmp_path / "paints.csv").unlink()
+    again = study_of(output, None).tasks
+    assert first is not None
+    assert again is not None
+    np.testing.assert_array_equal(first.tasks[0].photons, again.tasks[0].photons)
+    (tmp_path / "paints.csv").write_text(PAINTS.replace("0.5", "0.4"))
+    with pytest.raises(OutputError, match=r"these are not what the run has: .*paints.csv:yellow"):
+        study_of(output, tmp_path)

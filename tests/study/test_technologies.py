@@ -179,6 +179,7 @@ def test_a_lens_file_says_the_chief_ray_angles(tmp_path: Path) -> None:
         ("h_mm,cra,x\n0,0\n", "", "lens.csv:2: wrong number of columns (got 2); allowed: 3"),
         ("h_mm,cra\n0,0\n", "", "lens.csv:2: a lens needs two rows or more (got 1)"),
         ("h_mm,a,b\n0,0,0\n", "", "lens.csv:1: which column has chief ray angles? (got 'h_mm, a, b')"),
+        ("h_mm,distortion\n0,0\n1,2\n", "", "lens.csv:1: which column has chief ray angles? (got 'h_mm, distortion')"),
         ("h_mm,cra_rad\n0,0\n1,0.3\n", "", "lens.csv:1: cra_rad: chief ray angles are in radians; allowed: degrees"),
         ("h_mm,cra\n0,0\n1,-9\n", "", "lens.csv:3: cra: negative value (got '-9')"),
         ("h_mm,cra\n0,0\n1,nan\n", "", "lens.csv:3: cra: not a usable number (got 'nan')"),

@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import re
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from ...curves.scan import MOST_BYTES
 from ...disk import read_input
 from ...errors import DataError, Fault, OutputError, StudyError, SweepError
+from ...own_code import is_code
 from ...results.tables import atomic, write_bytes, write_text
 from ...study import load_study
 from ...study.editors import SCHEMA_FILE, schema_text
@@ -41,20 +42,31 @@ def study_from(name: str, folder: Path, source: Path) -> list[str]:
     return [said, f"Next: sweep run {shlex.quote(str(path))}"]
 
 
+def curve_files_of(source: Path) -> list[str]:
+    """Files of curves that a study names by paths below it; those by whole paths are found from everywhere.
+
+    Raises StudyError where the study does not load, or names a file by a path that leads out of its folder.
+    """
+    names = [name for name in load_study(source).digests if not is_code(name) and not Path(name).is_absolute()]
+    for name in names:
+        if ".." in Path(name).parts:
+            raise StudyError(
+                Fault("lies outside the folder of the study", str(source), value=name, allowed="a whole path")
+            )
+    return names
+
+
 @contextmanager
-def beside(folder: Path, *files: Path | None) -> Iterator[list[Path | None]]:
-    """Copies of files in a folder; where the block fails, those that were made go again.
+def copied(pairs: Iterable[tuple[Path, Path]]) -> Iterator[None]:
+    """Copies of files, from and to; where the block fails, those that were made go again.
 
     Raises OutputError where another file of that name is there.
     """
     made: list[Path] = []
-    copies: list[Path | None] = []
     try:
-        for file in files:
-            copies.append(None if file is None else folder / file.name)
-            if file is not None:
-                made += _copied(file, folder / file.name)
-        yield copies
+        for file, to in pairs:
+            made += _copied(file, to)
+        yield
     except SweepError:
         for path in made:
             path.unlink(missing_ok=True)

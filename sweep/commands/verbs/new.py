@@ -24,20 +24,23 @@ def new(
         str | None, typer.Option("--from", help="A study, or the name of one, to begin with.", show_default=False)
     ] = None,
     copy: Annotated[
-        bool, typer.Option("--copy", help="Copy the files beside the study, so that both can be moved.")
+        bool, typer.Option("--copy", help="Copy the files of curves beside the study, so that all can be moved.")
     ] = False,
 ) -> None:
     """Write a commented study that runs as it is, for the built-in curves or for files of your own."""
     from ...study.shipped import study_path
     from ..new import new_study
-    from ..new.begin import beside, study_from
+    from ..new.begin import copied, curve_files_of, study_from
 
     if source is not None:
-        if qe or lights or copy:
+        if qe or lights:
             raise StudyError(Fault("a study that is copied has its own curves", key="--from", value=source))
-        lines = study_from(name, folder, study_path(Path(source)))
+        begun = study_path(Path(source))
+        with copied((begun.parent / own, folder / own) for own in (curve_files_of(begun) if copy else ())):
+            lines = study_from(name, folder, begun)
     elif copy:
-        with beside(folder, qe, lights) as (own_qe, own_lights):
+        own_qe, own_lights = (None if file is None else folder / file.name for file in (qe, lights))
+        with copied((file, folder / file.name) for file in (qe, lights) if file is not None):
             lines = new_study(name, folder, own_qe, own_lights, quantity)
     else:
         lines = new_study(name, folder, qe, lights, quantity)

@@ -77,14 +77,6 @@ def separation_task(
     return GriddedTask(TaskName(name, "separation", tuple(lights) or ("",)), types, photons)
 
 
-def own_task(
-    grid: WavelengthGrid, name: str, classes: Mapping[str, Sequence[str]], lights: Sequence[str]
-) -> GriddedTask:
-    """A task of groups that the package ships."""
-    found = {kind: np.concatenate([group(grid, each) for each in names]) for kind, names in classes.items()}
-    return separation_task(grid, name, found, lights)
-
-
 def _color(grid: WavelengthGrid, name: str) -> GriddedTask:
     lights = _STREET
     index = chart(grid, group(grid, "iso_17321")[:18], ["d50"])

@@ -35,6 +35,7 @@ class OwnColumns(Metric):
                 ends=("min",) if metric.wanted == "more" else ("max",),
                 goal=True,
                 needs="own",
+                signed=True,
                 smooth=partial(_rows, metric=metric),
             )
             for metric in asked.own

@@ -39,7 +39,8 @@ class TaskFigures(DesignMetric):
                 digits=figure.digits,
                 wanted=figure.wanted,
                 ends=("min",) if figure.wanted == "more" else ("max",),
-                goal=figure.wanted == "more" and not figure.signed,
+                goal=True,
+                signed=figure.signed,
                 smooth=partial(_rows, task=task.name, what=figure.what, case=case),
             )
             for task in asked.tasks

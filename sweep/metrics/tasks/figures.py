@@ -18,7 +18,7 @@ LUX, SNR_AT_1_LX = "lux", "snr_at_1_lx"
 class Figure:
     """A figure of a task. `each`: it has a value for each of the task's lights. `first`: a scorecard shows it.
 
-    `signed`: it may be negative, so that no search maximizes it.
+    `signed`: it may be negative.
     """
 
     what: str

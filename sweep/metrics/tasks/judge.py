@@ -23,7 +23,8 @@ from .looks import Looks
 LUMINANCE_RATIO = 10.0
 """The luminance SNR that low light is judged by."""
 _BLOCK = 128
-"""Designs that are judged at once, so that their arrays stay small."""
+_MOST_DISTANCES = 2_000_000
+"""Designs that are judged at once, and their pairs of spectra, so that arrays stay small."""
 
 
 class JudgedTask:
@@ -137,8 +138,10 @@ def task_columns(view: View, block: Block) -> Columns:
     assert tasks is not None
     curves = block.curves()
     parts: list[dict[str, FloatArray]] = []
-    for start in range(0, len(curves), _BLOCK):
-        looks = Looks(view, curves[start : start + _BLOCK])
+    pairs = max((len(task.pairs[0]) for task in tasks.tasks if task.photons is not None), default=1)
+    size = max(1, min(_BLOCK, _MOST_DISTANCES // pairs))
+    for start in range(0, len(curves), size):
+        looks = Looks(view, curves[start : start + size])
         found: dict[str, FloatArray] = {}
         for task in tasks.tasks:
             judged = JudgedTask(task, looks, tasks.conditions)

@@ -1,0 +1,49 @@
+"""Up to where designs are usable: between which scenarios that is looked for, and what is found there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+import sweep
+from sweep.metrics.columns.confusion import STATE_ERROR
+from sweep.run import run_study
+from sweep.study import load_study
+
+STUDY = """
+study: noisy
+sensor: ar0820
+lights: tl16
+pixel: {read_noise_e: 2}
+scenarios:
+  SCENES
+cfas: [RGGB]
+recognition: {states: [yellow, red], error_max: 1.0e-3}
+"""
+LEVEL = "noise: true, exposure: {kind: white_patch, level: %s}"
+
+
+def crossings(folder: Path, *scenes: str) -> pd.DataFrame:
+    path = folder / "noisy.yaml"
+    path.write_text(STUDY.replace("SCENES", "\n  ".join(scenes)))
+    run_study(load_study(path), folder / "out", 1, lambda *_: None)
+    found = folder / "out" / "crossings.parquet"
+    return pd.read_parquet(found)
+
+
+def test_where_an_allowed_error_ends_the_error_is_the_allowed_one(tmp_path: Path) -> None:
+    scenes = "dim: {noise: true, exposure: {kind: white_patch}, each: {exposure.level: [0.5, 0.02]}}"
+    found = crossings(tmp_path, scenes).iloc[0]
+    assert (found["low"], found["high"]) == (0.02, 0.5)
+    assert found["error"] == pytest.approx(1e-3, rel=0.05)
+    alone = STUDY.replace("SCENES", f"there: {{{LEVEL % found['at']}}}")
+    path = tmp_path / "there.yaml"
+    path.write_text(alone)
+    assert sweep.load_study(path).evaluate()[STATE_ERROR].iloc[0] == pytest.approx(found["error"], rel=1e-9)
+
+
+def test_numbers_of_names_are_those_of_the_scenes_or_nothing_is_looked_for(tmp_path: Path) -> None:
+    named = [f'"dim percent={name}": {{{LEVEL % level}}}' for name, level in ((50, 0.5), (2, 0.02))]
+    assert crossings(tmp_path, *named).empty
