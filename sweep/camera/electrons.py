@@ -17,7 +17,7 @@ from ..designs.block import Block
 from ..designs.products import row_products
 from ..types import BoolArray, FloatArray
 from .effects import flicker, quadrature
-from .exposure import exposure_times, white_irradiance
+from .exposure import exposure_times, fixed_white, white_irradiance
 from .field import over_field
 from .kernel import Kernel
 from .registry import factor_of_light
@@ -80,6 +80,7 @@ class Electrons:
         self._hats = None if at_all else quadrature.between_nodes(view.grid.size, self._nodes)
         self.signals = signal_irradiance(view) * per_photon(view)
         self.white = white_irradiance(view) * per_photon(view)
+        self._fixed_white = fixed_white(view)
         fixed, modified = list(view.fixed), list(view.modified)
         places = over_field(view)
         self.seen = [SeenFilters(place, view.methods.angle) for place in places]
@@ -154,7 +155,7 @@ class Electrons:
 
     def exposure_s(self, curves: FloatArray) -> FloatArray:
         """Exposure of each design, s, ndarray[n_designs]."""
-        return exposure_times(self.view, curves @ self.white)
+        return exposure_times(self.view, curves @ self.white, self._fixed_white)
 
     def scales(self, exposure_s: FloatArray) -> FloatArray:
         """Light relative to its mean in the cases of a pulsed light, ndarray[n_designs, n_scales]."""

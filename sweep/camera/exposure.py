@@ -20,21 +20,22 @@ def white_irradiance(view: View) -> FloatArray:
     return np.full(grid.size, radiance / (ratio * grid.size * grid.step_nm))
 
 
-def _fixed_white(view: View) -> float:
+def fixed_white(view: View) -> float:
     """Electrons/s on the white patch of the brightest channel that no design modifies."""
     rates = view.qe[list(view.fixed)] @ white_irradiance(view) * per_photon(view)
     return float(rates.max(initial=0.0))
 
 
-def exposure_times(view: View, modified_white: FloatArray) -> FloatArray:
+def exposure_times(view: View, modified_white: FloatArray, fixed: float | None = None) -> FloatArray:
     """Exposure of each design, s, ndarray[n_designs]; infinite where a white-patch exposure sees no light.
 
-    `modified_white`: electrons/s of the modified channels on the white patch, ndarray[n_designs, n_modified].
+    `modified_white`: electrons/s of the modified channels on the white patch, ndarray[n_designs, n_modified]. `fixed`:
+    `fixed_white` of the view, where it is known.
     """
     exposure = view.scenario.exposure
     if not isinstance(exposure, WhitePatchExposure):
         return np.full(len(modified_white), exposure.exposure_s)
-    brightest = np.maximum(modified_white.max(axis=1, initial=0.0), _fixed_white(view))
+    brightest = np.maximum(modified_white.max(axis=1, initial=0.0), fixed_white(view) if fixed is None else fixed)
     full_e = exposure.level * view.pixel.full_scale_dn / view.pixel.dn_per_e
     found = np.full(len(brightest), np.inf)
     return np.asarray(np.divide(full_e, brightest, out=found, where=brightest > 0), dtype=float)
@@ -51,13 +52,13 @@ def may_set_exposure(view: View) -> bool:
     return of_white and not (kept.size and kept.max() >= modified.max(initial=0.0))
 
 
-def relative_slope(view: View, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
+def relative_slope(view: View, white: FloatArray, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
     """Derivative of one design's exposure over that exposure, ndarray[n_parameters].
 
-    `curves`: QE of the modified channels, ndarray[n_modified, n_wavelengths]; `curves_gradient`: its derivative,
-    ndarray[n_parameters, n_modified, n_wavelengths].
+    `white`: electrons/s for each QE of the white patch, ndarray[n_wavelengths]; `curves`: QE of the modified channels,
+    ndarray[n_modified, n_wavelengths]; `curves_gradient`: its derivative, ndarray[n_parameters, n_modified,
+    n_wavelengths].
     """
-    white = white_irradiance(view) * per_photon(view)
     # By the same products: a filter that leaves its base as it is, beside a pixel of that curve, sets nothing.
     rates, kept = curves @ white, view.qe[list(view.fixed)] @ white
     of_white = isinstance(view.scenario.exposure, WhitePatchExposure)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..cache import Cache
 from ..errors import Fault, SweepError
-from ..types import FloatArray
+from ..types import FloatArray, IndexArray
 from .exposure import relative_slope
 from .imager import Imager
 from .methods import REFERENCE
@@ -39,7 +39,13 @@ class LinearImager(Imager):
         `curves`: ndarray[n_modified, n_wavelengths]; `curves_gradient`: ndarray[n_parameters, n_modified,
         n_wavelengths]. Returns DN per unit of parameter, ndarray[n_parameters, n_cases, n_signals, n_channels].
         """
-        return self.readout.folded(self._slope(curves, curves_gradient) * self.view.pixel.dn_per_e)
+        return self.smooth_with_gradient(curves, curves_gradient)[1]
+
+    def smooth_with_gradient(self, curves: FloatArray, curves_gradient: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """`smooth` of one design, ndarray[n_cases, n_signals, n_channels], and its `gradient`."""
+        whole, slope = self._with_slope(curves, curves_gradient)
+        response = self.readout.folded(unquantized(whole, self.readout.pixel))
+        return response, self.readout.folded(slope * self.view.pixel.dn_per_e)
 
     def variance(self, curves: FloatArray) -> FloatArray:
         """Variance of the noise, DN^2, of the shape of `smooth`."""
@@ -50,8 +56,9 @@ class LinearImager(Imager):
     def variance_gradient(self, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
         """Exact derivative of `variance` at one design, DN^2 per unit of parameter; see `gradient`."""
         pixel = self.readout.pixel
-        per_e = pixel.dn_per_e**2 * (1 + 2 * pixel.prnu**2 * self.by_pixel._expected(curves[None])[0])
-        return self.by_pixel.readout.spread(per_e * self.by_pixel._slope(curves, curves_gradient))
+        whole, slope = self.by_pixel._with_slope(curves, curves_gradient)
+        per_e = pixel.dn_per_e**2 * (1 + 2 * pixel.prnu**2 * whole)
+        return self.by_pixel.readout.spread(per_e * slope)
 
     def spread_electrons(self, curves: FloatArray) -> FloatArray:
         """Expected electrons of the pixels, each with its share of a channel's variance, of the shape of `smooth`."""
@@ -62,6 +69,11 @@ class LinearImager(Imager):
         kernel = self.by_pixel.electrons.kernel
         repeats = self.by_pixel._expected(self.view.base_qe[None]).shape[1] // len(kernel.spread)
         return np.repeat(kernel.spread.sum(axis=1), repeats, axis=0)
+
+    @cached_property
+    def members(self) -> dict[str, IndexArray]:
+        """Signal type -> indices of its signals."""
+        return self.view.members
 
     @cached_property
     def by_pixel(self) -> LinearImager:
@@ -82,8 +94,8 @@ class LinearImager(Imager):
         exposure_s = self.electrons.exposure_s(curves)
         return self.electrons.expected(curves, self.electrons.scales(exposure_s), exposure_s)
 
-    def _slope(self, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
-        """Exact derivative of `_expected` at one design, electrons per unit of parameter; see `gradient`."""
+    def _with_slope(self, curves: FloatArray, curves_gradient: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """`_expected` of one design, and its exact derivative, electrons per unit of parameter; see `gradient`."""
         own, n = self.electrons, len(curves_gradient)
         one = curves[None]
         exposure_s = own.exposure_s(one)
@@ -92,8 +104,8 @@ class LinearImager(Imager):
         light = (own.rates(curves_gradient) - own.fixed)[:, :, None] * scales[0][None, None, :, None, None]
         uniform = own.through_filters(own.of_background(curves_gradient))
         slope = (light + uniform[:, :, None, None, :]).reshape(n, *whole.shape) * exposure_s
-        relative = relative_slope(self.view, curves, curves_gradient)
-        return np.asarray(slope + relative[:, None, None, None] * whole, dtype=float)
+        relative = relative_slope(self.view, own.white, curves, curves_gradient)
+        return whole, np.asarray(slope + relative[:, None, None, None] * whole, dtype=float)
 
     def per_qe(self, modified: int, curves: FloatArray) -> FloatArray:
         """DN per QE of one modified channel at every wavelength, with the exposure of the design `curves`.

@@ -17,7 +17,7 @@ from .tolerance import Off
 _HALF = SPAN_PER_WIDTH / 2
 _PER_BAND = 5
 _FEW = 64
-"""Edges of fewer designs are computed one by one."""
+"""Edges of fewer designs are all computed."""
 LEFT, LEFT_WIDTH, RIGHT, RIGHT_WIDTH, DEPTH = range(_PER_BAND)
 
 
@@ -50,13 +50,16 @@ class Bands:
 
     def gradient(self, x: FloatArray) -> FloatArray:
         """Derivative of `shape` at one design: ndarray[5 k] -> ndarray[5 k, n_wavelengths]."""
-        rows = []
-        for band in range(self._count):
-            left, left_width, right, right_width, depth = x[band * _PER_BAND : (band + 1) * _PER_BAND]
-            rows += [depth * d for d in edge_gradient(self._wave, left, left_width)]
-            rows += [-depth * d for d in edge_gradient(self._wave, right, right_width)]
-            rows.append(self._open(x[None], band)[0])
-        return np.stack(rows)
+        bands = x.reshape(self._count, _PER_BAND)
+        ends = bands[:, :DEPTH].reshape(-1, 2)
+        slopes = edge_gradient(self._wave, ends[:, :1], ends[:, 1:])
+        signs = np.repeat(bands[:, DEPTH], 2) * np.tile([1.0, -1.0], self._count)
+        both = self.edges(ends).reshape(self._count, 2, -1)
+        rows = np.empty((self._count, _PER_BAND, self._wave.size))
+        for at, slope in enumerate(slopes):  # by centers, and by widths
+            rows[:, at:DEPTH:2] = (signs[:, None] * slope).reshape(self._count, 2, -1)
+        rows[:, DEPTH] = both[:, 0] - both[:, 1]
+        return rows.reshape(-1, self._wave.size)
 
     def reach(self, low: FloatArray, high: FloatArray) -> FloatArray:
         """1 where a band of the box `low`..`high` can be open, else 0: ndarray[n_wavelengths]."""
@@ -121,13 +124,14 @@ class Bands:
 
     def _open(self, x: FloatArray, band: int) -> FloatArray:
         at = band * _PER_BAND
+        if len(x) < _FEW:
+            both = self.edges(x[:, at : at + DEPTH].reshape(-1, 2)).reshape(len(x), 2, -1)
+            return np.asarray(both[:, 0] - both[:, 1], dtype=float)
         left, right = (self._each_once(x[:, at + i : at + i + 2]) for i in (LEFT, RIGHT))
         return np.asarray(left - right, dtype=float)
 
     def _each_once(self, centers_and_widths: FloatArray) -> FloatArray:
         """`edges`, where the designs of a grid share many: each is computed once."""
-        if len(centers_and_widths) < _FEW:
-            return self.edges(centers_and_widths)
         unique, which = np.unique(centers_and_widths, axis=0, return_inverse=True)
         return self.edges(unique)[which.ravel()]
 

@@ -44,7 +44,8 @@ class Bound(Section):
         """How far `values` are outside, relative to `scale`, >= 0; 0 where the quantity does not exist (NaN)."""
         below = 0.0 if self.min is None else self.min - values
         above = 0.0 if self.max is None else values - self.max
-        return np.nan_to_num(np.maximum(0.0, np.maximum(below, above)) / self.scale, nan=0.0)
+        outside = np.maximum(below, above)
+        return np.where(outside > 0, outside, 0.0) / self.scale
 
     def __str__(self) -> str:
         ends = [f">= {self.min:g}"] if self.min is not None else []

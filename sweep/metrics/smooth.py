@@ -100,7 +100,7 @@ class SmoothDesign:
 
     @cached_property
     def _response(self) -> tuple[FloatArray, FloatArray]:
-        return self._imager.smooth(self.curves[None])[0], self._imager.gradient(self.curves, self.by_u)
+        return self._imager.smooth_with_gradient(self.curves, self.by_u)
 
     @property
     def response(self) -> FloatArray:
@@ -128,7 +128,7 @@ class SmoothDesign:
 
     def squared_distances(self, pair: Pair) -> Rows:
         """Squared distances of all pairs of signals of two types, in every case, DN^2."""
-        first, second = (self.view.members[name] for name in pair)
+        first, second = (self._imager.members[name] for name in pair)
         response, by_u = self._response
         apart = (response[:, first, None] - response[:, None, second]).reshape(-1, response.shape[-1])
         apart_by_u = (by_u[:, :, first, None] - by_u[:, :, None, second]).reshape(len(by_u), *apart.shape)
@@ -155,7 +155,7 @@ class SmoothDesign:
     def _response_of_members(self) -> tuple[FloatArray, FloatArray]:
         assert self._members is not None
         imager = self._members.imager
-        return imager.smooth(self.curves[None])[0], imager.gradient(self.curves, self.by_u)
+        return imager.smooth_with_gradient(self.curves, self.by_u)
 
 
 def smooth_response(view: View, curves: FloatArray) -> FloatArray:

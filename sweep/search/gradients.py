@@ -8,6 +8,7 @@ rows, so nothing that it sees has a kink.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -16,10 +17,9 @@ import numpy as np
 
 from ..camera.linear import smooth_imager
 from ..camera.view import View
-from ..designs.block import CurveBlock
 from ..designs.tolerance import AS_DESIGNED, Off
 from ..metrics.bound import FEASIBLE, Bound
-from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY, Sensitivity
+from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY, light_of
 from ..metrics.quantity import Quantity
 from ..metrics.rule import Rule
 from ..metrics.smooth import Rows, SmoothDesign
@@ -33,6 +33,10 @@ BACK_OFF = 1e-8
 """The search keeps this far (relative) inside each bound, so that rounding does not leave its answer outside."""
 _ON_BOUND = -0.5 * FEASIBLE
 """The same where nothing lies inside, such as a slope of 0: half of what still counts as feasible."""
+_SETTLED, _SETTLED_EVALUATIONS = 1e-6, 16
+"""A search whose latest evaluations all lie within this share of the box has arrived: what it still does is to look for
+less than rounding leaves. SLSQP's line searches take ten steps, so it has begun anew without coming away from there.
+"""
 _CONDITION_NM = 100.0
 """Scale of the families' own conditions, so that they weigh like the others."""
 
@@ -89,15 +93,18 @@ class Model:
         self._run = run
         self._budget = budget
         self.stop: Callable[[], object] | None = None
+        self._latest: deque[FloatArray] = deque(maxlen=_SETTLED_EVALUATIONS)
         self._span = (problem.high - problem.low)[problem.free]
-        wanted = (*problem.objective.weights, *problem.constraints)
-        places = dict.fromkeys((AS_DESIGNED, *(off for name in wanted for off in problem.produced(name))))
+        self._free = problem.free
+        self._rule, self._weights = problem.objective.rule, problem.objective.weights
+        wanted = (*self._weights, *problem.constraints)
+        self._produced = {name: problem.produced(name) for name in wanted}
+        places = dict.fromkeys((AS_DESIGNED, *(off for every in self._produced.values() for off in every)))
         self._families = {off: problem.family.produced(off) if any(off) else problem.family for off in places}
         over = any(problem.over_population(name) for name in wanted)
         self._members = _members_of(problem.view) if over else None
-        self._power = (
-            1 if problem.signed_goal or problem.objective.rule.wanted == "less" else 2
-        )  # what may be below 0 has no root
+        wanted_less = self._rule.wanted == "less"
+        self._power = 1 if problem.signed_goal or wanted_less else 2  # what may be below 0 has no root
         self._back_off = {name: _back_off(problem, name, bound) for name, bound in problem.constraints.items()}
         self._seen: dict[bytes, Point] = {}
 
@@ -115,10 +122,19 @@ class Model:
             with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
                 self._seen = {key: _finite(self._simulate(u))}
             self._run.log.append(self._seen[key].evaluation)
+            self._latest.append(u)
         return self._seen[key]
 
+    @property
+    def settled(self) -> bool:
+        """Whether the latest evaluations all lie in one place."""
+        latest = self._latest
+        if len(latest) < _SETTLED_EVALUATIONS or (np.abs(latest[-1] - latest[0]) > _SETTLED).any():
+            return False
+        return bool((np.ptp(np.stack(self._latest), axis=0) <= _SETTLED).all())
+
     def _simulate(self, u: FloatArray) -> Point:
-        problem, free = self._problem, self._problem.free
+        problem, free = self._problem, self._free
         x = problem.from_unit(u)
         made = {
             off: SmoothDesign(self._imager, family, x, free, self._span, self._members)
@@ -133,21 +149,21 @@ class Model:
             rows = quantities[name] = self._rows(name, made)
             conditions += _conditions(self._quantities[name], bound, rows, self._back_off[name])
             worst = max(worst, float(bound.violation(np.array([self._quantities[name].value(rows)]))[0]))
-        light = Sensitivity().of_designs(problem.view, CurveBlock(made[AS_DESIGNED].curves[None]))
+        light = light_of(made[AS_DESIGNED])
         own, whole = (float(light[name][0]) for name in (SENSITIVITY, CFA_SENSITIVITY))
         evaluation = Evaluation(x, objective, own, whole, worst)
-        own_term = np.arange(len(terms)) * (not problem.objective.rule.smallest)  # what is smallest needs one bound
+        own_term = np.arange(len(terms)) * (not self._rule.smallest)  # what is smallest needs one bound
         term = np.repeat(own_term, [rows.values.size for rows in terms])
         return Point(evaluation, Rows.joined(terms), self._power, term, Rows.joined(conditions), quantities)
 
     def _terms(self, made: Mapping[Off, SmoothDesign]) -> tuple[list[Rows], float]:
         """The rows of each weighted quantity of the objective, see `Point`, and the objective's value."""
         terms, columns = [], {}
-        for name, weight in self._problem.objective.weights.items():
+        for name, weight in self._weights.items():
             quantity, rows = self._quantities[name], self._rows(name, made)
             columns[name] = np.array([quantity.value(rows)])
-            terms.append(_term(quantity, rows, weight, self._problem.objective.rule, self._power))
-        if self._problem.objective.rule.wanted == "less":  # by the decades, which do not end where numbers do
+            terms.append(_term(quantity, rows, weight, self._rule, self._power))
+        if self._rule.wanted == "less":  # by the decades, which do not end where numbers do
             return terms, float(min(rows.values.min() for rows in terms))
         return terms, float(self._problem.objective.of(columns)[0])
 
@@ -155,7 +171,7 @@ class Model:
         """The rows from which the quantity follows, see `Quantity.value`."""
         smooth = self._quantities[name].smooth
         assert smooth is not None
-        return Rows.joined([smooth(made[off]) for off in self._problem.produced(name)])
+        return Rows.joined([smooth(made[off]) for off in self._produced[name]])
 
 
 def _term(quantity: Quantity, rows: Rows, weight: float, rule: Rule, power: int) -> Rows:

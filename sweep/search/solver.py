@@ -50,8 +50,9 @@ def search_from(
 ) -> SearchRun:
     """Search from one starting point with at most `max_evaluations` simulations.
 
-    `u0`: ndarray[n_free], in units of the box. The status is nlopt's word for how it ended; an early end is no
-    error, since the log keeps every evaluation. `seed` and `start` set the random numbers of the algorithms that use
+    `u0`: ndarray[n_free], in units of the box. The status is nlopt's word for how it ended, or `settled`, where a
+    search by gradients no longer came away from where it was; an early end is no error, since the log keeps every
+    evaluation. `seed` and `start` set the random numbers of the algorithms that use
     them (ISRES).
     """
     run = SearchRun(start)
@@ -72,7 +73,7 @@ def search_from(
     except nlopt.RoundoffLimited:
         run.status = "roundoff_limited"
     except nlopt.ForcedStop:
-        run.status = "maxeval_reached"
+        run.status = "settled" if model.settled else "maxeval_reached"
     except (RuntimeError, nlopt.runtime_error):  # its own class; what it carries cannot leave this process
         run.status = "failed"
     return run
@@ -100,6 +101,8 @@ def _epigraph(
 
     def objective(z: FloatArray, gradient: FloatArray) -> float:
         model.at(z[:n_free])
+        if model.settled:
+            opt.force_stop()
         if gradient.size:
             gradient[:n_free] = 0.0
             gradient[n_free:] = 1.0 if alone else rule.gradient(scale * z[n_free:]) * scale / unit

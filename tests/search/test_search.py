@@ -105,6 +105,23 @@ def test_budget_counts_simulations(study: Study) -> None:
         assert run.status == "maxeval_reached"
 
 
+def test_settled_search_misses_nothing(study: Study, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What SLSQP would do after its evaluations lie in one place is rounding: the answer is the same to 1e-9."""
+    assert study.search is not None
+    problem = study.problem(study.search)
+    starts = starting_points(problem, 4, 1)
+    ended = [search_from(problem, i, u, "SLSQP", 125) for i, u in enumerate(starts)]
+    assert "settled" in {run.status for run in ended}
+    monkeypatch.setattr("sweep.search.gradients._SETTLED_EVALUATIONS", 1000)
+    for i, u in enumerate(starts):
+        whole, best = search_from(problem, i, u, "SLSQP", 125), best_feasible(ended[i].log)
+        assert [e.objective for e in whole.log[: len(ended[i].log)]] == [e.objective for e in ended[i].log]
+        more = best_feasible(whole.log)
+        assert best is not None
+        assert more is not None
+        assert more.objective <= best.objective * (1 + 1e-9)
+
+
 def test_same_seed_same_log(study: Study) -> None:
     assert study.search is not None
     problem = study.problem(study.search)

@@ -86,9 +86,15 @@ def cfa_sensitivity_at(view: View, sensitivity: float) -> float | None:
     return float(whole.rows.toarray()[0] @ view.base_qe[0] * sensitivity + whole.constant)
 
 
+def light_of(design: SmoothDesign) -> Columns:
+    """Both sensitivities of one design, ndarray[1] each."""
+    block = CurveBlock(design.curves[None])
+    return design.once("light", lambda: Sensitivity().of_designs(design.view, block))
+
+
 def _row(design: SmoothDesign, *, name: str) -> Rows:
-    value = Sensitivity().of_designs(design.view, CurveBlock(design.curves[None]))[name]
-    return Rows(value, sensitivities_gradient(design.view, design.by_u)[name][None])
+    slopes = design.once("slopes of light", lambda: sensitivities_gradient(design.view, design.by_u))
+    return Rows(light_of(design)[name], slopes[name][None])
 
 
 def _own_share(view: View) -> LinearRows:
