@@ -82,6 +82,15 @@ class Family(Protocol):
 
 
 @runtime_checkable
+class MovedFamily(Protocol):
+    """A family whose filter is fixed + carrier x shape: production moves the shape, and nothing else."""
+
+    @property
+    def moved(self) -> tuple[FloatArray, FloatArray]:
+        """What is fixed, and the carrier of the shape, ndarray[n_wavelengths] each."""
+
+
+@runtime_checkable
 class SeparableFamily(Protocol):
     """A family whose filter is base + depth change (e(left) - e(right)).
 

@@ -153,7 +153,7 @@ class LoadedStudy:
         """What no filter in a channel exceeds: `.proven`, and `.curve`, the QE of a filter that attains `.attained`.
 
         It is for filters between the least transmission and the curve that they replace, under the study's constraints
-        (but bounds on widths and shifts of edges, which `.left_out` names), before clipping and quantization;
+        (but those that `.left_out` names, such as bounds on widths of edges), before clipping and quantization;
         `sensitivity` asks for at least so much of it. Raises SweepError where there is no such limit, and says why.
         """
         space = self._modified(cfa, channel)

@@ -120,6 +120,8 @@ def _limit_line(output: Output, search: SearchFacts) -> str:
     levels = search.front_limits_open
     technology = (output.study.sweeps | output.study.boxes)[search.space].technology
     moved = "" if technology is None else f", as {technology.told}"
+    if output.goal.extreme and output.study.production.tolerance and "edge shifts" not in search.limit_left_out:
+        moved += ", whose whole shape production moves"
     return (
         f"Limit of any filter: {proof}; {gap}. This is for filters between the least transmission and the curve that "
         f"they replace{moved}, under the same constraints{without}, before clipping and quantization."

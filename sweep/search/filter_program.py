@@ -24,6 +24,7 @@ from ..types import FloatArray, IndexArray
 from .certificate import Certificate, Sides, Solved
 from .least_noise import least_variance
 from .problem import Problem
+from .produced import Distances
 
 if TYPE_CHECKING:
     from .member_pairs import MemberPairs
@@ -60,16 +61,17 @@ class _Rows:
 
 
 class FilterProgram:
-    """The filters of a problem without edge shifts, and every pair of signals that may come too near.
+    """The filters of a problem, and every pair of signals that may come too near.
 
     `apart`: ndarray[n_pairs, n_wavelengths], DN per QE, the difference of each pair in the modified channel; a pair is
-    that of two signals, or known members of their population, in one place of the light. `reach`: ndarray[n_pairs, 2]:
-    no filter with the first signal above the other, or below it, reaches more. `top`: no filter at all reaches more
-    (-inf: there is none). `solved` counts the linear programs.
+    that of two signals, or known members of their population, in one place of the light. `added`: how much more that is
+    at most with the first signal above the other, or below it (`Distances`), ndarray[n_pairs, 2]. `reach`, of the same
+    shape: no filter with the first signal above the other, or below it, reaches more. `top`: no filter at all reaches
+    more (-inf: there is none). `solved` counts the linear programs.
     """
 
     def __init__(self, problem: Problem, members: MemberPairs | None = None) -> None:
-        """`members`: those of worst cases over a population."""
+        """`members`: those of worst cases."""
         self.problem = problem
         self._members = members
         self.base = problem.view.base_qe[0]
@@ -83,7 +85,8 @@ class FilterProgram:
         ends = (self._rows.matrix @ self._box[1] + self._rows.constant)[objective] / self._rows.rate[objective]
         self.top = float(min(ends.min(initial=np.inf), self.reach.max(axis=1, initial=-np.inf).min(initial=np.inf)))
         self._keep(np.flatnonzero(self.needed(max(self.top, 0.0)) > 0))
-        self._sizes = abs(self._rows.matrix) @ self.base, np.abs(self.apart) @ self.base
+        own_sizes = np.abs(self.apart) @ self.base + np.abs(self.added).max(axis=1, initial=0.0)
+        self._sizes = abs(self._rows.matrix) @ self.base, own_sizes
         self.solved = 0
 
     def _fixed_rows(self) -> tuple[_Rows, FloatArray]:
@@ -114,8 +117,8 @@ class FilterProgram:
         *own_columns, per_sensitivities = np.concatenate(columns).T
         return _Rows(vstack(matrices).tocsr(), *own_columns), per_sensitivities
 
-    def _distances(self) -> Iterator[tuple[str, FloatArray, FloatArray]]:
-        """Each distance's name; of its pairs the difference in the modified channel, and the squared one in others."""
+    def _distances(self) -> Iterator[tuple[str, Distances]]:
+        """Each distance's name, and its pairs."""
         view = self.problem.view
         imager, channel = smooth_imager(view), view.modified[0]
         # Exposure does not depend on N, so the response to a filter is linear, plus what does not depend on it.
@@ -129,27 +132,31 @@ class FilterProgram:
             if noise is not None and self.problem.quantities[name].apart == "noise":
                 own_noise, others = ((each[:, first, None] + each[:, None, second]) / 2 for each in noise)
                 apart, squares = apart / np.sqrt(own_noise)[..., None], squares / others
-            yield name, apart.reshape(-1, self.base.size), squares.sum(axis=3).ravel()
+            others_squared = squares.sum(axis=3).ravel()
+            rows = apart.reshape(-1, self.base.size)
+            yield name, Distances(rows, others_squared, np.zeros((others_squared.size, 2)))
         if self._members is not None:
             for name in self._members.names:
-                yield name, *self._members.rows(name)
+                yield name, self._members.distances(name)
 
     def _set_pairs(self) -> None:
         problem = self.problem
-        apart, columns = [np.empty((0, self.base.size))], [np.empty((0, 4))]
-        for name, difference, squared in self._distances():
+        apart, columns = [np.empty((0, self.base.size))], [np.empty((0, 6))]
+        for name, found in self._distances():
             bound, weight = problem.constraints.get(name), problem.objective.weights.get(name)
             if weight is None and (bound is None or bound.min is None):
                 continue
-            apart.append(difference)
+            apart.append(found.rows)
             least, slack = (0.0, 0.0) if bound is None else (bound.min or 0.0, FEASIBLE * bound.scale)
             own = [least, slack, 0.0 if weight is None else 1 / weight]
-            columns.append(np.column_stack([squared, np.tile(own, (squared.size, 1))]))
+            columns.append(np.column_stack([found.added, found.squared, np.tile(own, (found.squared.size, 1))]))
         self.apart = np.concatenate(apart)
-        self._squared, self._least, self._slack, self._rate = np.concatenate(columns).T
+        *added, self._squared, self._least, self._slack, self._rate = np.concatenate(columns).T
+        self.added = np.stack(added, axis=1)
         low, high = self._box
         ends = [np.maximum(part, 0) @ high + np.minimum(part, 0) @ low for part in (self.apart, -self.apart)]
-        most = np.sqrt(self._squared[:, None] + np.maximum(np.stack(ends, axis=1), 0.0) ** 2) * (1 + _SUM_ROUNDING)
+        apart_by = np.maximum(np.stack(ends, axis=1) + self.added, 0.0)
+        most = np.sqrt(self._squared[:, None] + apart_by**2) * (1 + _SUM_ROUNDING)
         reach = np.divide(most, self._rate[:, None], out=np.full(most.shape, np.inf), where=self._rate[:, None] > 0)
         self.reach = np.where(most < (self._least - self._slack)[:, None], -np.inf, reach)
 
@@ -176,7 +183,7 @@ class FilterProgram:
         return float(min(self.top, far.min(initial=np.inf), linear.min(initial=np.inf)))
 
     def _keep(self, wanted: IndexArray) -> None:
-        self.apart, self.reach = self.apart[wanted], self.reach[wanted]
+        self.apart, self.added, self.reach = self.apart[wanted], self.added[wanted], self.reach[wanted]
         self._squared, self._least = self._squared[wanted], self._least[wanted]
         self._slack, self._rate = self._slack[wanted], self._rate[wanted]
 
@@ -198,7 +205,8 @@ class FilterProgram:
         some = self.needed(t)[pairs] > 0
         pairs, signs = pairs[some], signs[some]
         rows = vstack([self._rows.matrix, csr_matrix(signs[:, None] * self.apart[pairs])]).tocsr()
-        floor = np.concatenate([self._rows.needed(t), self.needed(t)[pairs]])
+        own_added = self._added(pairs, signs)
+        floor = np.concatenate([self._rows.needed(t), self.needed(t)[pairs] - own_added])
         rate = np.concatenate([self._rows.rate, self._rate[pairs]])
         status, weights, found = self._best_margin(rows, floor, rate)
         if status == _INFEASIBLE:  # what does not depend on t cannot be met: the least that all rows must give up
@@ -210,11 +218,19 @@ class FilterProgram:
         weights[weights < _LEAST_WEIGHT * weights.max(initial=0.0)] = 0.0
         used = weights[-pairs.size :] > 0 if pairs.size else some[:0]
         needs = Sides().joined(pairs[used], signs[used])
-        certificate = self._certificate(weights, rows, pairs)
+        certificate = self._certificate(weights, rows, pairs, own_added)
         beyond = self.beyond(certificate)
         if found is None:
             return Solved(beyond, needs=needs, certificate=certificate)
         return Solved(beyond, float(found[-1]), found[:-1], needs, certificate)
+
+    def _added(self, pairs: IndexArray, signs: FloatArray) -> FloatArray:
+        """How much more each of some pairs differs at most on its side, DN."""
+        return np.asarray(self.added[pairs, (signs < 0).astype(np.intp)], dtype=float)
+
+    def differ(self, curve: FloatArray, side: float) -> FloatArray:
+        """By how much at most each pair differs for a filter, with the first signal above (1) or below (-1), DN."""
+        return np.asarray(side * (self.apart @ curve) + self.added[:, int(side < 0)], dtype=float)
 
     def _best_margin(
         self, rows: csr_matrix, floor: FloatArray, rate: FloatArray
@@ -234,12 +250,13 @@ class FilterProgram:
             return int(found.status), None, None
         return _SOLVED, np.maximum(0.0, -found.ineqlin.marginals), found.x
 
-    def _certificate(self, weights: FloatArray, rows: csr_matrix, pairs: IndexArray) -> Certificate:
+    def _certificate(self, weights: FloatArray, rows: csr_matrix, pairs: IndexArray, added: FloatArray) -> Certificate:
         low, high = self._box
         summed = weights @ rows
         most = float(np.maximum(summed * low, summed * high).sum())
         most += _SUM_ROUNDING * float(weights @ np.concatenate([self._sizes[0], self._sizes[1][pairs]]))
         n_fixed = len(weights) - pairs.size
+        most += float(weights[n_fixed:] @ added)
         used, apart = np.flatnonzero(weights[:n_fixed]), np.flatnonzero(weights[n_fixed:])
         return Certificate(used, weights[used], pairs[apart], weights[n_fixed:][apart], most)
 

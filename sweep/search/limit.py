@@ -4,8 +4,10 @@ All filters means: every N between the least transmission and the base curve tha
 sensitivities and CSDs, whichever of two signals it makes the brighter one. The limit is that of the response before
 clipping and quantization, in the scene of the search. Of d' it is a bound with the least noise (`least_noise.py`), near
 which no filter need be. The certificate is a bracket: a filter that attains the lower
-end, and linear programs that no filter above the upper end could meet. What only some families have (edges and bands,
-and their shifts in production) is left out: that makes the set of filters larger, so the upper end stays true for them.
+end, and linear programs that no filter above the upper end could meet. Worst cases of CSDs are over the population of
+the lights, and over production where that moves the whole shape of a filter, as it does the family's (`produced.py`).
+What only some families have (widths of edges and bands) is left out, and so are other worst cases: that makes the set
+of filters larger, so the upper end stays true for them.
 """
 
 from __future__ import annotations
@@ -31,6 +33,7 @@ from ..metrics.smooth_noise import smooth_detectability
 from ..types import FloatArray
 from .filter_program import ROUNDING, FilterProgram
 from .problem import Problem
+from .produced import all_ways, ways_of
 from .sides import Proof, SideSearch
 
 if TYPE_CHECKING:
@@ -83,7 +86,7 @@ def limit_of(
     heights = _any_height_of(relaxed) if all_heights_count(relaxed.view) else None
     distances = any(relaxed.quantities[name].apart for name in relaxed.objective.weights)
     tolerance = tolerance_dn if distances else _SENSITIVITY_TOLERANCE
-    over = [n for n in dict.fromkeys((*relaxed.objective.weights, *relaxed.constraints)) if relaxed.over_population(n)]
+    over = [n for n in dict.fromkeys((*relaxed.objective.weights, *relaxed.constraints)) if relaxed.worst_distance(n)]
     members, solved = _members_of(relaxed, over) if over else None, 0
     while True:
         relaxed = relaxed if heights is None else heights.problem
@@ -157,11 +160,13 @@ def why_not(problem: Problem) -> str | None:
 def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
     """The problem without what only families of edges have, and what was left out.
 
-    Worst cases over a population stay; others become nominal ones.
+    Worst cases of CSDs over a population or production stay; others become nominal ones.
     """
     quantities = problem.quantities
     asked = (*problem.constraints, *problem.objective.weights)
-    plains = {name: name if problem.over_population(name) else quantities[name].of or name for name in asked}
+    moves = len(ways_of(problem)) > 1
+    stay = {name for name in asked if problem.worst_distance(name) and (problem.population or moves)}
+    plains = {name: name if name in stay else quantities[name].of or name for name in asked}
     known = {name for name, plain in plains.items() if quantities[plain].has_limit}
     left_out = [name for name in problem.constraints if name not in known]
     kept: dict[str, Bound] = {}
@@ -176,11 +181,16 @@ def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
         plain = plains[name]
         weights[plain] = min(weight, weights.get(plain, weight))
     if any(quantities[name].extreme for name in asked) and problem.tolerance:
-        left_out.append("edge shifts")
-    plain_problem = replace(
-        problem, objective=Objective(minimum=weights), constraints=kept, edge_shift_nm=0.0, thickness=0.0
-    )
-    return plain_problem, tuple(left_out)
+        left_out += _shifts_left_out([plains[name] for name in asked if plains[name] != name], problem)
+    return replace(problem, objective=Objective(minimum=weights), constraints=kept), tuple(left_out)
+
+
+def _shifts_left_out(nominal: Sequence[str], problem: Problem) -> list[str]:
+    """What production does that the limit does not know; `nominal`: quantities whose worst cases it takes for them."""
+    if len(ways_of(problem)) == 1:
+        return ["edge shifts"]
+    some = [] if all_ways(problem) else ["some edge shifts"]
+    return [*some, *(f"edge shifts of {name}" for name in dict.fromkeys(nominal))]
 
 
 def _top(problem: Problem) -> FloatArray:
@@ -201,13 +211,13 @@ def _inside(
 ) -> tuple[float, FloatArray]:
     """A solver's filter, moved by its tolerance toward the base curve or one that is `inside`; and what it attains.
 
-    Of worst cases over a population by the members that are known.
+    Of worst cases by the members that are known, as the program counts them.
     """
     base = problem.view.base_qe[0]
     for end in (base,) if inside is None else (base, inside):
         for share in _SHARES:
             moved = np.asarray(curve + share * (end - curve), dtype=float)
-            over = {} if members is None else {name: members.least_known(name, moved) for name in members.names}
+            over = {} if members is None else {name: members.counted(name, moved) for name in members.names}
             attained = _attained(problem, moved, over)
             if attained > -np.inf:
                 return attained, moved
@@ -217,7 +227,7 @@ def _inside(
 def _attained(problem: Problem, curve: FloatArray, over: Mapping[str, float]) -> float:
     """The objective for a filter as the search evaluates it; -inf when it does not meet the constraints.
 
-    `over`: worst cases over a population, or distances of which a scene has no smaller ones.
+    `over`: worst cases, or distances of which a scene has no smaller ones.
     """
     curves = curve[None, None]
     found = designed_quantities(problem.view, curves) | {name: np.array([value]) for name, value in over.items()}

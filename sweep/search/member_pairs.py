@@ -1,20 +1,23 @@
-"""Members of a population of lights that come too near, as a limit's linear programs know them: only those that bind.
+"""Worst cases of CSDs, as a limit's linear programs know them: only those members that bind.
 
-A filter must keep every two members apart, and there are endlessly many. A program that knows some of them has no fewer
-filters, so that what no filter of it exceeds holds for all members, too. Its best filter says which members to add: the
-nearest ones, found exactly; until they are no nearer than those that the program knows.
+A filter must keep every two members of a population of lights apart, however production makes it, and there are
+endlessly many. A program that knows some of them has no fewer filters, so that what no filter of it exceeds holds for
+all, too. Its best filter says which to add: the nearest ones, found exactly; until they are no nearer than those that
+the program knows.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..curves.population import Population
 from ..metrics.members import population_imager
 from ..types import BoolArray, FloatArray, IndexArray
 from .problem import Problem
+from .produced import Distances, Produced, ways_of
 
 _NEARER_DN = 0.01
 """Members that are nearer than all known ones by no more than this are not added."""
@@ -22,8 +25,12 @@ _NEARER_DN = 0.01
 
 @dataclass(frozen=True)
 class _Known:
-    """Two members each: place of the field, the spectra below their shifts, and the shares above, ndarray[n, 2]."""
+    """Two members each: how the filter comes out, place of the field, the spectra below their shifts, the shares above.
 
+    The last two are ndarray[n, 2].
+    """
+
+    way: IndexArray
     case: IndexArray
     below: IndexArray
     share: FloatArray
@@ -31,6 +38,7 @@ class _Known:
     def joined(self, others: _Known, some: BoolArray) -> _Known:
         """These and some of others."""
         return _Known(
+            np.concatenate([self.way, others.way[some]]),
             np.concatenate([self.case, others.case[some]]),
             np.concatenate([self.below, others.below[some]]),
             np.concatenate([self.share, others.share[some]]),
@@ -44,28 +52,45 @@ class _Known:
 
 
 class MemberPairs:
-    """The members that are known of each worst case over the population; first, the nearest ones of the base curve."""
+    """The members that are known of each worst case; first, the nearest ones of the base curve.
+
+    Without a population each light is its own only member.
+    """
 
     def __init__(self, problem: Problem, names: Sequence[str]) -> None:
-        self._seen, self.names = population_imager(problem.view), tuple(names)
+        view = problem.view
+        if view.lights.population is None:
+            alone = Population.model_validate({"drift_nm_per_k": 0.0})
+            view = replace(view, lights=replace(view.lights, population=alone))
+        self._seen, self.names, self._ways = population_imager(view), tuple(names), ways_of(problem)
         self._types = {name: pair for name in names if (pair := problem.quantities[name].pair) is not None}
         imager, channel, base = self._seen.imager, problem.view.modified[0], problem.view.base_qe
         self._gain = imager.per_qe(0, base)[:, :, channel]
         self._others = np.delete(imager.smooth(base[None])[0], channel, axis=2)
-        self._known = {name: self._nearest(name, base[0])[0] for name in names}
+        self._made: dict[str, Distances] = {}
+        self._known = {name: self._nearest(name, base[0], self._ways[:1])[0] for name in names}
 
-    def rows(self, name: str) -> tuple[FloatArray, FloatArray]:
-        """Of each two known members: difference in the modified channel, DN per QE, ndarray[n, n_wavelengths].
-
-        Second, their squared distance in the other channels, ndarray[n].
-        """
+    def distances(self, name: str) -> Distances:
+        """Those of each two known members, for every filter."""
         known = self._known[name]
-        return known.difference(self._gain), (known.difference(self._others) ** 2).sum(axis=1)
+        if name not in self._made:
+            rows, added = known.difference(self._gain), np.zeros((known.case.size, 2))
+            for way in np.unique(known.way):
+                some = known.way == way
+                rows[some], added[some] = self._ways[way].rows(rows[some])
+            self._made[name] = Distances(rows, (known.difference(self._others) ** 2).sum(axis=1), added)
+        return self._made[name]
+
+    def counted(self, name: str, curve: FloatArray) -> float:
+        """The smallest distance of known members for a filter as the program counts it, ndarray[n_wavelengths]; DN."""
+        return self.distances(name).least(curve)
 
     def least_known(self, name: str, curve: FloatArray) -> float:
-        """The smallest distance of known members for a filter, ndarray[n_wavelengths]; DN."""
-        apart, squared = self.rows(name)
-        return float(np.sqrt(((apart @ curve) ** 2 + squared).min()))
+        """The same, as the filter comes out."""
+        known = self._known[name]
+        produced = np.stack([way.curve(curve) for way in self._ways])[known.way]
+        apart = (known.difference(self._gain) * produced).sum(axis=1)
+        return float(np.sqrt((apart**2 + (known.difference(self._others) ** 2).sum(axis=1)).min()))
 
     def least(self, name: str, curve: FloatArray) -> float:
         """The smallest distance of all members for a filter, DN."""
@@ -80,17 +105,23 @@ class MemberPairs:
             if nearer.any():
                 added, known = True, self._known[name]
                 self._known[name] = known.joined(found, nearer)
+                self._made.pop(name, None)
         return added
 
-    def _nearest(self, name: str, curve: FloatArray) -> tuple[_Known, FloatArray]:
-        """The nearest members of each two lights and part of their shifts for a filter, and their squared distances."""
-        response = self._seen.imager.smooth(curve[None, None])[0]
+    def _nearest(self, name: str, curve: FloatArray, ways: Sequence[Produced] = ()) -> tuple[_Known, FloatArray]:
+        """The nearest members of each two lights and part of their shifts for a filter, and their squared distances.
+
+        For each of the first `ways` that the filter may come out, or all of them, and each place of the field.
+        """
         parts = []
-        for case, values in enumerate(response):
-            near = self._seen.nearest(values, self._types[name], parts=self._seen.parts)
-            one, other, part = np.nonzero(np.isfinite(near.squared))
-            below = near.steps[one, other, part] + np.stack([near.first[one], near.second[other]], axis=1)
-            share = near.shares[one, other, part]
-            parts.append((np.full(one.size, case), below, share, near.squared[one, other, part]))
-        cases, spectra, shares, squared = (np.concatenate(each) for each in zip(*parts, strict=True))
-        return _Known(cases, spectra, shares), squared
+        for number, way in enumerate(ways or self._ways):
+            response = self._seen.imager.smooth(way.curve(curve)[None, None])[0]
+            for case, values in enumerate(response):
+                near = self._seen.nearest(values, self._types[name], parts=self._seen.parts)
+                one, other, part = np.nonzero(np.isfinite(near.squared))
+                below = near.steps[one, other, part] + np.stack([near.first[one], near.second[other]], axis=1)
+                share = near.shares[one, other, part]
+                where = np.full(one.size, number), np.full(one.size, case)
+                parts.append((*where, below, share, near.squared[one, other, part]))
+        outs, cases, spectra, shares, squared = (np.concatenate(each) for each in zip(*parts, strict=True))
+        return _Known(outs, cases, spectra, shares), squared

@@ -54,8 +54,12 @@ class Problem:
 
     def over_population(self, quantity: str) -> bool:
         """Whether a quantity is a worst case over the population of the lights."""
+        return self.population and self.worst_distance(quantity)
+
+    def worst_distance(self, quantity: str) -> bool:
+        """Whether a quantity is the worst case of a CSD."""
         asked = self.quantities[quantity]
-        return self.population and asked.extreme == WORST_CASE and asked.apart == DN
+        return asked.extreme == WORST_CASE and asked.apart == DN
 
     @property
     def own_goal(self) -> bool:

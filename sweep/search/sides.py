@@ -187,8 +187,8 @@ class SideSearch:
             )  # it closes other parts of its sides, too
         if solved.curve is None or beyond <= self._closing:
             return beyond, part, []
-        apart = self._program.apart @ solved.curve
-        lacks = self._program.needed(t, solved.margin) - np.abs(apart)
+        differ = np.maximum(*(self._program.differ(solved.curve, side) for side in (1.0, -1.0)))
+        lacks = self._program.needed(t, solved.margin) - differ
         lacks[list(sides.pairs)] = -np.inf
         pair = int(np.argmax(lacks)) if lacks.size else -1
         if pair < 0 or lacks[pair] <= _MET:
@@ -214,8 +214,7 @@ class SideSearch:
             if solved.curve is None:
                 return
             self._offer(solved.curve)
-            apart = program.apart @ solved.curve
-            lacks = program.needed(t, solved.margin) - side * apart
+            lacks = program.needed(t, solved.margin) - program.differ(solved.curve, side)
             lacks[list(sides.pairs)] = -np.inf
             worst = np.argsort(-lacks, kind="stable")[:_DIVE_PAIRS]
             worst = worst[lacks[worst] > _MET]

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from sweep.designs.families.dual import Dual
 from sweep.designs.families.free_form import FreeForm
 from sweep.designs.families.stopband import MultiStopband, Stopband
-from sweep.designs.family import Family
+from sweep.designs.family import Family, MovedFamily
 from sweep.designs.registry import FAMILIES as REGISTERED
 from sweep.designs.registry import FamilyOptions, build_family
 from sweep.designs.tolerance import Off
@@ -126,6 +126,16 @@ def test_a_shifted_family_moves_every_edge(name: str) -> None:
     moved[2::5] += 3.0
     np.testing.assert_allclose(family.produced(Off(3.0)).curves(x[None]), family.curves(moved[None]), rtol=1e-13)
     np.testing.assert_allclose(family.produced(Off(3.0)).gradient(x), family.gradient(moved), rtol=1e-10, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", ["stopband", "multi_stopband", "free_form"])
+def test_production_moves_the_shape_that_a_family_names(name: str) -> None:
+    family, x = FAMILIES[name]
+    assert isinstance(family, MovedFamily)
+    fixed, carrier = family.moved
+    shape = (family.curves(x[None])[0, 0] - fixed) / carrier
+    came_out = (family.produced(Off(-4.0)).curves(x[None])[0, 0] - fixed) / carrier
+    np.testing.assert_allclose(came_out[:-4], shape[4:], rtol=1e-12, atol=1e-14)
 
 
 @pytest.mark.parametrize("name", ["stopband", "multi_stopband", "dual"])

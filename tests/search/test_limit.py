@@ -172,7 +172,7 @@ def test_the_limit_leaves_out_what_only_edges_have() -> None:
     extra = {"edge_width_nm": Bound(min=20.0), "worst_sensitivity": Bound(min=0.93)}
     asked = replace(PROBLEM, constraints={**PROBLEM.constraints, **extra}, edge_shift_nm=2.0)
     found = limit_of(asked)
-    assert found.left_out == ("edge_width_nm", "edge shifts")
+    assert found.left_out == ("edge_width_nm", "edge shifts of sensitivity")
     nominal = limit_of(replace(PROBLEM, constraints={**PROBLEM.constraints, "sensitivity": Bound(min=0.93)}))
     assert found.proven == pytest.approx(nominal.proven, abs=1e-9)
 

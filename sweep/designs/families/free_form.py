@@ -116,6 +116,12 @@ class FreeForm:
         """The whole transmission moved; see `Family.produced`."""
         return FreeForm(*self._made_of, self.nodes_nm, off)
 
+    @property
+    def moved(self) -> tuple[FloatArray, FloatArray]:
+        """Nothing, and the base, which the transmission is on; see `MovedFamily`."""
+        base = self._made_of[1]
+        return np.zeros_like(base), base
+
     def start(self, points: FloatArray) -> FloatArray:
         """Smooth dips of different place, breadth and depth: random nodes would be a filter of spikes."""
         span = self.nodes_nm[-1] - self.nodes_nm[0]

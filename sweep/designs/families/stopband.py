@@ -61,6 +61,11 @@ class MultiStopband(Banded):
         """Derivative by each parameter, ndarray[n_parameters, 1, n_wavelengths]; see `Family.gradient`."""
         return (self._change * self._bands.gradient(x))[:, None, :]
 
+    @property
+    def moved(self) -> tuple[FloatArray, FloatArray]:
+        """Base and change: bands move, the curves between which they go stay; see `MovedFamily`."""
+        return self._base, self._change
+
 
 class Stopband(MultiStopband):
     """One band: the paper's N_x with base Y and target G."""

@@ -1,0 +1,149 @@
+"""The limit over what production does to a filter: rows of the program, a program of its own, the figures that are told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from sweep.designs.tolerance import Off
+from sweep.metrics.members import population_imager
+from sweep.metrics.objective import Objective
+from sweep.search.limit import Limit, limit_of
+from sweep.search.problem import Problem, best_feasible, starting_points
+from sweep.search.produced import all_ways, ways_of
+from sweep.search.solver import search_from
+from sweep.study import load_study
+
+from ..conftest import STUDIES
+
+STUDY = load_study(STUDIES / "stopband.yaml")
+SHIFTS = (-2, -1, 0, 1, 2)
+FREE_FORM = (
+    "{cfa: RYNCy, channel: N, base: Y, technology: {interference: {effective_index: 1.8}}, family: free_form, "
+    "options: {nodes: {start_nm: 560, stop_nm: 700, step_nm: 5}}}"
+)
+
+
+@cache
+def problem() -> Problem:
+    assert STUDY.search is not None
+    plain = STUDY.problem(STUDY.search)
+    return replace(plain, edge_shift_nm=2.0, objective=Objective(minimum={"worst_csd_yellow_red": 1.0}))
+
+
+@cache
+def limit() -> Limit:
+    return limit_of(problem())
+
+
+def test_a_way_is_the_family_as_production_has_it() -> None:
+    """Of random stopbands: the curve where it is known, and sums over it between the ends that rows have."""
+    rng, base, family = np.random.default_rng(5), problem().view.base_qe[0], problem().family
+    points = problem().from_unit(starting_points(problem(), 64, 1))
+    curves = family.curves(points)[:, 0]
+    apart = rng.normal(size=(7, base.size))
+    ways = ways_of(problem())
+    assert all_ways(problem())
+    for way, shift in zip(ways, (0, -2, -1, 1, 2), strict=True):
+        came_out = family.produced(Off(shift)).curves(points)[:, 0]
+        assert way.known.sum() >= 295
+        rows, added = way.rows(apart)
+        for curve, out in zip(curves, came_out, strict=True):
+            np.testing.assert_allclose(way.curve(curve)[way.known], out[way.known], rtol=1e-12, atol=1e-14)
+            assert (apart @ out <= rows @ curve + added[:, 0] + 1e-9).all()
+            assert (-(apart @ out) <= -(rows @ curve) + added[:, 1] + 1e-9).all()
+
+
+def test_what_no_row_can_say_is_left_out_and_told() -> None:
+    """Moves by part of a step, films that are too thick, a field of all places."""
+    assert not all_ways(replace(problem(), edge_shift_nm=1.5))
+    assert len(ways_of(replace(problem(), edge_shift_nm=1.5))) == 1
+    found = limit_of(replace(problem(), edge_shift_nm=1.0))
+    assert found.left_out == ("some edge shifts",)  # half a nanometer is no whole step
+    assert found.proven > limit().proven
+    assert limit().left_out == ()
+    thick = limit_of(replace(problem(), thickness=0.003))
+    assert thick.left_out == ("edge shifts",)
+    assert thick.proven == pytest.approx(limit_of(replace(problem(), edge_shift_nm=0.0)).proven, abs=1e-3)
+
+
+def moved(curve: np.ndarray, shift: int) -> np.ndarray:
+    """A filter of RYNCy whose shape between Y and G stands so many nanometers, the steps of the grid, farther."""
+    base, target = STUDY.sensor.qe["Y"], STUDY.sensor.qe["G"]
+    wave = STUDY.grid.nodes_nm
+    shape = np.interp(wave - shift, wave, (curve - base) / (target - base))
+    return np.asarray(base + (target - base) * shape)
+
+
+def apart(curve: np.ndarray) -> np.ndarray:
+    """By how much each yellow light is above each red one in N, DN, in closed form; ndarray[n_yellow * n_red]."""
+    qe, lights, grid = STUDY.sensor.qe, STUDY.lights, STUDY.grid
+    brightest = max(qe[name].sum() for name in ("R", "Y", "Cy"))
+    dn = 0.95 * 4095 * lights.photon_ratio * grid.size * grid.step_nm / brightest
+    yellow, red = (lights.photons[lights.members[kind]] @ curve * dn for kind in ("yellow", "red"))
+    return np.asarray((yellow[:, None] - red).ravel())
+
+
+def others() -> np.ndarray:
+    """Squared distance of each pair in the other channels, DN^2."""
+    return np.asarray(sum(apart(STUDY.sensor.qe[name]) ** 2 for name in ("R", "Y", "Cy")))
+
+
+def test_its_filter_has_it_however_it_comes_out() -> None:
+    found = limit()
+    assert found.curve is not None
+    assert 0 <= found.proven - found.attained <= 0.02
+    least = min(np.sqrt(apart(moved(found.curve, shift)) ** 2 + others()).min() for shift in SHIFTS)
+    assert least == pytest.approx(found.attained, abs=0.01)
+
+
+def margin(t: float, sign: float) -> float:
+    """By how much all pairs can be further apart than t asks, with one color brighter in N of all of them; DN."""
+    base = STUDY.sensor.qe["Y"]
+    rows, least = [], []
+    for shift in SHIFTS:
+        start = apart(moved(base, shift))
+        by_qe = np.stack([apart(moved(base + unit, shift)) - start for unit in np.eye(base.size)], axis=1)
+        rows.append(sign * by_qe)
+        least.append(np.sqrt(np.maximum(0.0, t**2 - others())) - sign * (start - by_qe @ base))
+    step = np.diff(np.eye(base.size), axis=0)
+    fixed = np.concatenate([np.ones((1, base.size)), step, -step])
+    matrix = np.concatenate(
+        [
+            np.column_stack([-np.concatenate(rows), np.ones(len(SHIFTS) * rows[0].shape[0])]),
+            np.pad(-fixed, ((0, 0), (0, 1))),
+        ]
+    )
+    right = -np.concatenate([*least, [0.9 * base.sum()], np.full(2 * len(step), -0.06)])
+    ends = [*zip(np.zeros(base.size), base, strict=True), (None, None)]
+    found = linprog(np.append(np.zeros(base.size), -1.0), matrix, right, bounds=ends)
+    return float(found.x[-1]) if found.status == 0 else -np.inf
+
+
+@pytest.mark.slow
+def test_a_program_of_its_own_agrees() -> None:
+    """One color brighter in all pairs, however the filter comes out: below the limit there is one, above none."""
+    assert max(margin(limit().attained - 0.02, sign) for sign in (1.0, -1.0)) >= 0
+    assert max(margin(limit().proven + 0.02, sign) for sign in (1.0, -1.0)) < 0
+
+
+@pytest.mark.slow
+def test_free_form_filters_come_near_the_limit_over_lamps_and_edges() -> None:
+    """`sweep run robust --set boxes.edges=FREE_FORM`: the figures of the documentation."""
+    text = " ".join((STUDIES / "README.md").read_text(encoding="utf-8").split())
+    study = load_study(STUDIES / "robust.yaml", changes={"boxes.edges": FREE_FORM})
+    assert study.search is not None
+    searched = study.problem(study.search)
+    best = best_feasible(search_from(searched, 0, starting_points(searched, 1, 1)[0], "SLSQP", 100).log)
+    assert best is not None
+    came_out = [searched.family.produced(Off(shift)).curves(best.x[None]) for shift in SHIFTS]
+    worst = population_imager(searched.view).worst(np.concatenate(came_out))["csd_yellow_red"].min()
+    assert worst == pytest.approx(best.objective, rel=1e-9)
+    proven = limit_of(searched).proven
+    below = f"{1 - worst / proven:.1%}".replace("%", " %")
+    assert f"Free-form filters reach {worst:.0f} DN in the worst case, {below} below the limit" in text
+    assert 0.9 * proven <= worst <= proven
