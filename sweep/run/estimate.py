@@ -11,7 +11,6 @@ from pathlib import Path
 from statistics import median
 
 import pyarrow as pa
-from threadpoolctl import threadpool_limits
 
 from ..results.folder import held_by
 from ..results.inventory import Inventory
@@ -25,7 +24,7 @@ from .rows import Job, rules_of
 from .search_estimate import search_seconds
 from .stop import Stop
 from .sweep import Sweep
-from .workers import Workers
+from .workers import Workers, one_thread
 
 _SAMPLE = 256
 _BUDGET_S = 10.0
@@ -102,7 +101,7 @@ def _sampled(sweep: Sweep, todo: list[Job]) -> tuple[float, float]:
     ordered = sorted(firsts, key=lambda kind: -rows[kind])  # the largest first
     tables: list[pa.Table] = []
     total, measured, first_s = 0.0, 0, list[float]()
-    with threadpool_limits(1):
+    with one_thread():
         for first, per_row, table, kind in _measured(sweep, [(kind, firsts[kind]) for kind in ordered]):
             first_s.append(first)
             total += per_row * rows[kind]

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import os
+import sys
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import islice
 from multiprocessing import get_context
 from typing import Any
 
 import joblib
 from joblib.externals.loky import ProcessPoolExecutor
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from ..errors import SweepError
 from ..types import Call
@@ -161,7 +163,7 @@ def workers(how: Workers) -> Iterator[Workers]:
         elif how.backend == "loky":
             settings = {"inner_max_num_threads": 1, "initializer": preparing(os.getpid())}
         # This process computes, too; and a thread that ends gives back what it found, also to those beside it.
-        stack.enter_context(threadpool_limits(1))
+        stack.enter_context(one_thread())
         stack.enter_context(joblib.parallel_config(how.backend, **settings))
         yield how
 
@@ -182,9 +184,21 @@ def alone(call: Call) -> Any:
         process.shutdown(kill_workers=not ended)
 
 
+@lru_cache(maxsize=1)
+def _libraries(_n_modules: int) -> ThreadpoolController:
+    """Libraries of this process that have threads. They are looked for again where modules were imported since."""
+    return ThreadpoolController()
+
+
+def one_thread() -> AbstractContextManager[Any]:
+    """While this is open, libraries use one thread."""
+    limits: AbstractContextManager[Any] = _libraries(len(sys.modules)).limit(limits=1)
+    return limits
+
+
 def _one_threaded(function: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
     """A call whose libraries use one thread: the same sums in the same order with any number of workers."""
-    with threadpool_limits(1):
+    with one_thread():
         return function(*arguments, **named)
 
 

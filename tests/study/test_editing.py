@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -25,9 +26,15 @@ FILES = sorted(STUDIES.glob("*.yaml"))
 HEAVY = ["matplotlib", "pandas", "numba", "colour", "pyarrow", "scipy", "sklearn", "pydantic"]
 
 
+@cache
+def validator() -> jsonschema.Draft7Validator:
+    schema = study_schema()
+    jsonschema.Draft7Validator.check_schema(schema)
+    return jsonschema.Draft7Validator(schema)
+
+
 def errors(data: Any) -> list[str]:
-    jsonschema.Draft7Validator.check_schema(study_schema())
-    return [error.message for error in jsonschema.Draft7Validator(study_schema()).iter_errors(data)]
+    return [error.message for error in validator().iter_errors(data)]
 
 
 def test_the_schema_beside_the_studies_is_what_the_command_makes(tmp_path: Path) -> None:
