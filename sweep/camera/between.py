@@ -120,7 +120,10 @@ class Between:
         if self.n_parts == 1:
             return np.asarray(whole, dtype=float)
         band = np.searchsorted(self._knots_nm[self._ends[1:-1]], self._view.grid.nodes_nm)
-        return np.concatenate([whole, np.abs(light) @ np.eye(self.n_parts - 1)[band]], axis=-1)
+        held, starts = np.unique(band, return_index=True)
+        found = np.zeros((*light.shape[:-1], self.n_parts))
+        found[..., :1], found[..., 1 + held] = whole, np.add.reduceat(np.abs(light), starts, axis=-1)
+        return found
 
     def ranges(self, kernels: FloatArray) -> FloatArray:
         """Range of each part of kernels, ndarray[n, n_channels, n_channels, n_knots or 1] -> ndarray[2, n,

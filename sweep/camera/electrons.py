@@ -96,7 +96,7 @@ class Electrons:
         self._touched = np.flatnonzero((kernel.light[:, :, modified] != 0).any(axis=(0, 2, 3)))
         self._modified = kernel.light[:, self._touched][:, :, modified]
         size = self._modified[..., 0].size * len(self.signals) * self._nodes.size
-        self._kept = self._table().astype(dtype) if 0 < size <= KEPT and not once else None
+        self._kept = self._table().astype(dtype, copy=False) if 0 < size <= KEPT and not once else None
 
     def _looked_at(self, qe: FloatArray, channels: Sequence[int], place: int = 0) -> FloatArray:
         """QE of some channels as the quadrature sees it (itself, or linear between its nodes), and then the rays."""
@@ -130,11 +130,16 @@ class Electrons:
 
     def _table(self) -> FloatArray:
         """Signals times kernel on the quadrature's nodes, [channels x nodes, n_cases x n_signals x n_units]."""
+        cases, units, channels, size = self._modified.shape
+        if self._hats is None and not any(seen.matrices for seen in self.seen):
+            found = np.empty((channels, size, cases, len(self.signals), units))
+            kernel = np.ascontiguousarray(np.transpose(self._modified, (2, 3, 0, 1)))
+            np.multiply(kernel[:, :, :, None], self.signals.T[:, None, :, None], out=found)
+            return found.reshape(channels * size, -1)
         product = self._modified[:, None] * self.signals[:, None, None, :]
         product = self.at_each_place(product, self.view.modified)
         on_nodes = product if self._hats is None else product @ self._hats.T
-        channels, nodes = on_nodes.shape[-2:]
-        return np.ascontiguousarray(on_nodes.reshape(-1, channels * nodes).T)
+        return np.ascontiguousarray(on_nodes.reshape(-1, channels * on_nodes.shape[-1]).T)
 
     def rates(self, curves: FloatArray) -> FloatArray:
         """Electrons/s of each signal, ndarray[n_designs, n_cases, n_signals, n_units].

@@ -32,7 +32,8 @@ class Encircled:
 
     def __init__(self, profile: Profile) -> None:
         self._profile = profile
-        _, sizes, shares = np.linalg.svd(profile.values, full_matrices=False)
+        # The triangle of a QR decomposition has the same singular values, and is small.
+        _, sizes, shares = np.linalg.svd(np.linalg.qr(profile.values, mode="r"), full_matrices=False)
         # The rest of any row is at most the first size that is left out.
         kept = max(1, int((sizes > _RESIDUAL).sum()))
         self.shares = np.zeros((-(-kept // _LANES) * _LANES, shares.shape[1]))
@@ -58,9 +59,9 @@ class Encircled:
         return np.ascontiguousarray(spline.c[_BEYOND - 2 : -2])
 
 
-_ENCIRCLED: Cache[Profile, Encircled] = Cache(8)
+ENCIRCLED: Cache[Profile, Encircled] = Cache(8)
 
 
 def encircled(profile: Profile) -> Encircled:
     """That of a profile, kept."""
-    return _ENCIRCLED.get(profile, lambda: Encircled(profile))
+    return ENCIRCLED.get(profile, lambda: Encircled(profile))

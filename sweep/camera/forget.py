@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from .effects import blur, quantization
+from .encircled import ENCIRCLED
+from .kernel import KERNELS
 from .noisy import moments, table
-from .places import forget_geometries
+from .place_cells import forget_cells
 from .seen import MATRICES
 
 
 def forget_scenes() -> None:
     """Let the next scene compute its kernels, its filters and the table of its noisy pixel anew."""
-    for cache in (blur.PROFILES, MATRICES):
+    for cache in (blur.PROFILES, ENCIRCLED, KERNELS, MATRICES):
         cache.clear()
     for found in (blur.interpolation_bound, quantization.under_noise, moments.table_without_prnu, table.tables):
         found.cache_clear()
     table.unclipped_e.cache_clear()
-    forget_geometries()
+    forget_cells()

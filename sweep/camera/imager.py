@@ -23,7 +23,7 @@ from ..types import FloatArray
 from .effects import phase
 from .electrons import Changing, Electrons
 from .field import over_field
-from .kernel import blocks, make_kernel
+from .kernel import blocks, kept_kernel, make_kernel
 from .noisy_readout import NoisyReadout
 from .places import AnyPlace
 from .readout import Readout
@@ -59,7 +59,10 @@ class Imager:
         # Where the kernels of all places would be too large to hold, those of the others are made as they are read.
         self._others = every[1:] if by_pixel and methods.sampling != "skip" else []
         cases = every[0] if self._others else cases
-        kernel = make_kernel(view, methods, grid.nodes_nm, by_pixel=by_pixel, work=self.work, cases=cases)
+        if cases is None:
+            kernel = kept_kernel(view, by_pixel=by_pixel, work=self.work)
+        else:
+            kernel = make_kernel(view, methods, grid.nodes_nm, by_pixel=by_pixel, work=self.work, cases=cases)
         self.n_cases, self.n_units = kernel.light.shape[:2]
         each = len(over_field(view))
         self.n_places = self.n_cases + each * sum(len(block.places_px) for block in self._others)

@@ -6,12 +6,15 @@ for each unit of the readout (a channel's mean, or a single pixel) and each chan
 
 from __future__ import annotations
 
+import hashlib
+import pickle
 from collections import Counter
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
+from ..cache import Cache
 from ..curves.hats import hats
 from ..types import FloatArray
 from .effects import blur, crosstalk, demosaic, phase, sampling
@@ -25,6 +28,8 @@ _HELD = 8_000_000
 """Values of pixels that are held at once."""
 MOST_KERNEL_BYTES = 2 * 2**30
 """What the images of a scene may take of a worker's memory."""
+_KEPT_BYTES = 16 * 2**20
+"""Kernels that take more are not kept."""
 _COPIES = 4
 """So many arrays of the size of a kernel are held while it is made."""
 
@@ -89,6 +94,29 @@ def make_kernel(
             made = _joined([_pixels(view, methods, knots, block, by_pixel=False, work=work) for block in blocks])
         light = made.light if knots is wavelength_nm else _interpolated(made.light, knots, wavelength_nm)
     return replace(made, light=light * factor_of_light(view, methods, wavelength_nm))
+
+
+KERNELS: Cache[bytes, tuple[Kernel, Counter[str]]] = Cache(8)
+"""The latest kernels of channels: CFAs with tiles of one pattern share theirs."""
+
+
+def kept_kernel(view: View, *, by_pixel: bool, work: Counter[str]) -> Kernel:
+    """`make_kernel` of a view at every wavelength, for all places of its method; kept where it is small.
+
+    `work` counts a kept one as if it was made.
+    """
+    wave = view.grid.nodes_nm
+    places = phase.n_places(view, view.methods.phase) * len(over_field(view))
+    if by_pixel or 8 * places * len(view.mosaic.channels) ** 2 * wave.size > _KEPT_BYTES:
+        return make_kernel(view, view.methods, wave, by_pixel=by_pixel, work=work)
+
+    def made() -> tuple[Kernel, Counter[str]]:
+        own: Counter[str] = Counter()
+        return make_kernel(view, view.methods, wave, by_pixel=False, work=own), own
+
+    kernel, own = KERNELS.get(hashlib.sha256(pickle.dumps(colorless(view))).digest(), made)
+    work.update(own)
+    return kernel
 
 
 def _interpolated(light: FloatArray, knots: FloatArray, wavelength_nm: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ from collections import Counter
 import numpy as np
 
 from ..types import FloatArray
-from . import compiled_light
+from . import compiled_light, legendre
 from .effects import crosstalk, demosaic, phase, sampling
 from .encircled import encircled
 from .kernel import pixels_per_place, profile_of
@@ -36,14 +36,14 @@ class PlaceKernels:
         self._radii = sampling.radii_px(view, target)
         self._share = crosstalk.share(view, methods.crosstalk)
         profile = profile_of(view, methods, knots_nm)
-        self._table, self._rule = _SHARP, np.polynomial.legendre.leggauss(1)
+        self._table, self._rule = _SHARP, legendre.rule(1)
         self.shares = np.ones((1, knots_nm.size))
         if profile is not None:
             light = encircled(profile)
             self._table = light.coefficients, pixel.pitch_um / float(profile.r_um[1])
             self.shares = light.shares
             order = profile.order(2 * self._half * pixel.pitch_um) - _EDGE_LESS
-            self._rule = np.polynomial.legendre.leggauss(order)
+            self._rule = legendre.rule(order)
 
     def at(self, cases: phase.Cases, work: Counter[str]) -> FloatArray:
         """What each channel gets through each channel's filter of each function of the light, ndarray[n_cases,

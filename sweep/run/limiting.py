@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from ..camera.imager import imager_of
+from ..camera.imager import Imager, imager_of
 from ..camera.view import View
 from ..metrics.limiting import BETWEEN, limited_by_name, limiting_lights
 from ..results.designs import row_curves
@@ -14,6 +14,8 @@ from ..study import Study
 from ..types import FloatArray, Parallel, Progress, delayed
 
 _AT_ONCE = 64
+_FEW = 4
+"""Designs for which no table is made."""
 
 
 def limited_by_table(
@@ -44,7 +46,7 @@ def limited_by_table(
 
 def _limited(view: View, designs: list[tuple[int, FloatArray]]) -> list[dict[str, object]]:
     """A row per design."""
-    imager = imager_of(view)
+    imager = imager_of(view) if len(designs) > _FEW else Imager(view, once=True)
     rows = []
     for design_id, curves in designs:
         pairs = limiting_lights(imager, np.asarray(curves, dtype=float))

@@ -113,7 +113,7 @@ class Windshield(LightEffect):
         return at_550_nm ** (550.0 / wavelength_nm)
 
     def work(self, shot, methods, load):
-        return load if methods.windshield == "skip" else replace(load, own_s=load.own_s + 0.2)
+        return load if methods.windshield == "skip" else load._replace(own_s=load.own_s + 0.2)
 '''
 DRIVEN = """\
 study: NAME

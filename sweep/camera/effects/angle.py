@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from ..rays import Stretches
 from ..scene import Scene
@@ -56,4 +55,4 @@ class Angle(FilterEffect):
             stretches = Stretches(cone_of(shot.scenario), min(moved))
             looked = math.ceil((stretches.most - stretches.least) * shot.grid.stop_nm / shot.grid.step_nm) + 1
         values = load.cases * load.units * len(shot.lights.photons) * shot.grid.size
-        return replace(load, own_s=load.own_s + values * len(moved) * 2 * looked * MULTIPLICATION_S)
+        return load._replace(own_s=load.own_s + values * len(moved) * 2 * looked * MULTIPLICATION_S)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from enum import Enum, IntEnum
-from typing import TYPE_CHECKING, ClassVar, Protocol, Self
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol, Self
 
 from ...types import FloatArray, Section
 from ..scene import Scene
@@ -133,8 +133,7 @@ class FilterChange:
 Change = KernelChange | ShareChange | LightChange | CurveChange | FilterChange
 
 
-@dataclass(frozen=True)
-class Load:
+class Load(NamedTuple):
     """How long there is to compute, in the seconds of `tests/bench_work.py`; each effect adds its own.
 
     `cases`: places of the light; `searched`: those of a search for the worst of all, and `search_s` what it takes for

@@ -10,16 +10,16 @@ ISETCam's, is that of tan = 1 / 2N; they differ by 0.8 % at f/4). OTF with defoc
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import csr_matrix
 from scipy.special import j0, j1
 
 from ...cache import Cache
 from ...types import FloatArray
+from .. import legendre
+from ..compiled_splines import sums_of_cubic
 from ..pixel import Pixel
 from ..scene import Scene
 from ..shot import Shot
@@ -89,7 +89,7 @@ def transfer(nu_per_um: FloatArray, wavelength_um: FloatArray, f_number: float, 
         return np.asarray((2 / math.pi) * (angle - s * np.sqrt((1 - s) * (1 + s))), dtype=float)
     phase = 8 * math.pi * w20_um * f_number * nu_per_um
     panels = 1 + int(phase.max(initial=0.0) / _PANEL_NODES)
-    nodes, weights = np.polynomial.legendre.leggauss(_PANEL_NODES)
+    nodes, weights = legendre.rule(_PANEL_NODES)
     shares = ((np.arange(panels)[:, None] + (nodes + 1) / 2) / panels).ravel()
     found = np.zeros_like(s)
     for node, weight in zip(shares, np.tile(weights / 2 / panels, panels), strict=True):
@@ -102,7 +102,7 @@ def _frequencies(reach_um: float, wavelength_um: FloatArray, f_number: float) ->
     """Nodes and weights up to the highest frequency, for phases up to 2 pi nu reach: Gauss-Legendre on panels."""
     highest = 1 / (wavelength_um.min() * f_number)
     panels = 8 + int(highest * reach_um / _CYCLES_PER_PANEL)
-    nodes, weights = np.polynomial.legendre.leggauss(_PANEL_NODES)
+    nodes, weights = legendre.rule(_PANEL_NODES)
     starts = np.arange(panels)[:, None]
     nu = (starts + (nodes + 1) / 2) * (highest / panels)
     return nu.ravel(), np.tile(weights / 2 * (highest / panels), panels)
@@ -144,22 +144,9 @@ class Profile:
 
         The weights go to the spline's coefficients first, so that no more is done at each wavelength than one product.
         """
-        from scipy.interpolate import BSpline  # noqa: PLC0415  (slow to import: kept off the start-up path)
-
-        n, size = len(r_um), len(self._spline.c)
-        # Four values for each radius. SciPy looks for radii outside number by number, if it is not told to extrapolate.
-        basis = BSpline.design_matrix(r_um.ravel(), self._spline.t, 3, extrapolate=True)
-        indices = basis.indices.reshape(n, -1)
-        first, last = indices.min(axis=1), indices.max(axis=1)
-        width = int((last - first).max(initial=0)) + 1
-        first = np.minimum(first, size - width)
-        each = (basis.data.reshape(*r_um.shape, 4) * weights[:, None]).reshape(n, -1)
-        at = indices + (np.arange(n) * width - first)[:, None]
-        folded = np.bincount(at.ravel(), each.ravel(), minlength=n * width)
-        columns = first[:, None] + np.arange(width)
-        # A sparse product sums each row by itself: the same values in whatever company a radius is asked for.
-        rows = csr_matrix((folded, columns.ravel(), np.arange(n + 1) * width), shape=(n, size))
-        return np.asarray(rows @ self._spline.c, dtype=float)
+        found = np.empty((len(r_um), self.n_wavelengths))
+        sums_of_cubic(r_um, weights, self._spline.t, self._spline.c, found)
+        return found
 
     @cached_property
     def slopes(self) -> FloatArray:
@@ -210,18 +197,19 @@ def interpolation_bound(
     but
     for the pixel aperture, whose transfer falls with nu, where the longer end does.
     """
-    u, weight = np.polynomial.legendre.leggauss(200)
+    u, weight = legendre.rule(200)
     u, weight = (u + 1) * math.pi / 4, weight * math.pi / 4
     s = np.sin(u)
-    theta = (np.arange(64) + 0.5) / 64 * (math.pi / 2)
+    theta = (np.arange(32) + 0.5) / 64 * (math.pi / 2)  # what is beyond 45 degrees is a mirror image
+    axes = np.cos(theta), np.sin(theta)
     worst = 0.0
     for short, long in pairwise(knots_um):
         nu = s / (short * f_number)
         aperture = 1.0
         if aperture_um > 0:
             across = math.pi * aperture_um * s[:, None] / (long * f_number)
-            falls = [1 / np.maximum(1.0, across * np.abs(axis(theta))) for axis in (np.cos, np.sin)]
-            aperture = (falls[0] * falls[1]).mean(axis=1)
+            falls = [np.maximum(1.0, across * axis) for axis in axes]
+            aperture = (1 / (falls[0] * falls[1])).mean(axis=1)
         common = 2 * math.pi * radius_um * _envelope(2 * math.pi * radius_um * nu) * aperture / (short * f_number)
         step = long - short
         if w20_um == 0:
@@ -269,9 +257,9 @@ class Blur(KernelEffect):
             return load
         n_knots = knots(shot.grid.nodes_nm, methods.blur).size
         if methods.sampling == "skip":
-            return replace(load, own_s=load.own_s + WHOLE_IMAGE_S * n_knots)
+            return load._replace(own_s=load.own_s + WHOLE_IMAGE_S * n_knots)
         highest = 1e3 / (shot.grid.nodes_nm[0] * shot.scenario.optics.f_number)
         across_um = (shot.scenario.target.object_resolution_px + 4) * shot.pixel.pitch_um
         radii = max(8.0, _SPLINE_PER_CYCLE * highest * across_um)
         frequencies = _PANEL_NODES * (8 + highest * across_um / _CYCLES_PER_PANEL)
-        return replace(load, knots=n_knots, shared_s=load.shared_s + PROFILE_S * radii * frequencies * n_knots)
+        return load._replace(knots=n_knots, shared_s=load.shared_s + PROFILE_S * radii * frequencies * n_knots)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ...types import FloatArray
@@ -93,4 +91,4 @@ class Flicker(LinearEffect):
 
     def work(self, shot: Shot, methods: Chosen, load: Load) -> Load:
         """Every moment is read."""
-        return replace(load, scales=scales(shot, methods.flicker, np.ones(1)).shape[1])
+        return load._replace(scales=scales(shot, methods.flicker, np.ones(1)).shape[1])

@@ -6,8 +6,6 @@ is between them until no place there can have a smaller distance by more (see `s
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from ..scene import Scene
 from ..seen import moves
 from ..shot import Shot
@@ -70,4 +68,4 @@ class ImageHeight(Effect):
 
     def work(self, shot: Shot, methods: Chosen, load: Load) -> Load:
         """All is done at every place."""
-        return replace(load, cases=load.cases * _PLACES[methods.field]) if self.all_count(shot, methods) else load
+        return load._replace(cases=load.cases * _PLACES[methods.field]) if self.all_count(shot, methods) else load

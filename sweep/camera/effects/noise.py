@@ -6,7 +6,7 @@ the ends of the ADC and at the steps of its quantization. Mean and variance are 
 
 from __future__ import annotations
 
-from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -31,6 +31,17 @@ def draws_dn(electrons: FloatArray, pixel: Pixel, rng: np.random.Generator) -> F
     return np.clip(np.floor(dn + 0.5), 0, pixel.full_scale_dn)
 
 
+@lru_cache(maxsize=1024)
+def _range_dn(pixel: Pixel, brightest_dn: float) -> float:
+    """See `NoisyMean.range_dn`; scenes of one exposure share it."""
+    gain, read_dn = pixel.dn_per_e, pixel.dn_per_e * pixel.read_noise_e
+    at_e = min(brightest_dn / gain, top_e(pixel))
+    mean = moments.moments(np.array([at_e]), pixel)[moments.UNROUNDED, 0]
+    added = read_dn * float(gaussian.ramp(np.array(-pixel.offset_dn / read_dn))) if read_dn else 0.0
+    lost = gain * at_e + pixel.offset_dn - mean
+    return min(float(added + max(lost + added, 0.0)), float(pixel.full_scale_dn))
+
+
 class NoisyMean(ReadoutEffect):
     """The mean of noisy readouts in place of the readout of the mean."""
 
@@ -51,16 +62,10 @@ class NoisyMean(ReadoutEffect):
         no electron more is worth more than the gain, and falls beyond, where the hard readout stands still. So both
         extremes are single numbers.
         """
-        pixel = shot.pixel
-        gain, read_dn = pixel.dn_per_e, pixel.dn_per_e * pixel.read_noise_e
-        at_e = min(brightest_dn / gain, top_e(pixel))
-        mean = moments.moments(np.array([at_e]), pixel)[moments.UNROUNDED, 0]
-        added = read_dn * float(gaussian.ramp(np.array(-pixel.offset_dn / read_dn))) if read_dn else 0.0
-        lost = gain * at_e + pixel.offset_dn - mean
-        return min(float(added + max(lost + added, 0.0)), float(pixel.full_scale_dn))
+        return _range_dn(shot.pixel, brightest_dn)
 
     def work(self, shot: Shot, methods: Chosen, load: Load) -> Load:
         """What clips or rounds is looked up in a table, which costs more."""
         if shot.scenario.noise is None or not load.value_s or (methods.noise == methods.quantization == "skip"):
             return load
-        return replace(load, shared_s=load.shared_s + TABLE_S, value_s=LOOKED_UP_S)
+        return load._replace(shared_s=load.shared_s + TABLE_S, value_s=LOOKED_UP_S)

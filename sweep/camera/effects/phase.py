@@ -7,7 +7,7 @@ starts from the lattice of quarter pixels and divides its cells until no place b
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -202,8 +202,8 @@ class Phase(KernelEffect):
             return load
         cases = load.cases * n_places(shot, methods.phase)
         if not all_count(shot, methods) or (methods.flicker != "skip" and goes_dark(shot)):
-            return replace(load, cases=cases)  # of a light that may be dark all distances are 0, and none is looked for
+            return load._replace(cases=cases)  # of a light that may be dark all distances are 0, and none is looked for
         deep = decades(methods.phase)
-        return replace(
-            load, cases=cases, searched=cases * PER_DECADE * deep**2, search_s=SEARCH_S + SEARCH_DECADE_S * deep
+        return load._replace(
+            cases=cases, searched=cases * PER_DECADE * deep**2, search_s=SEARCH_S + SEARCH_DECADE_S * deep
         )

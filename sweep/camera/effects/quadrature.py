@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ...curves.hats import hats
@@ -54,4 +52,4 @@ class Quadrature(LinearEffect):
 
     def work(self, shot: Shot, methods: Chosen, load: Load) -> Load:
         """A product at every node."""
-        return replace(load, nodes=nodes(shot.grid.size, methods.quadrature).size)
+        return load._replace(nodes=nodes(shot.grid.size, methods.quadrature).size)

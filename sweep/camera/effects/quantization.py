@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -90,4 +89,4 @@ class Quantization(ReadoutEffect):
 
     def work(self, shot: Shot, methods: Chosen, load: Load) -> Load:
         """Every value is rounded."""
-        return load if methods.quantization == "skip" else replace(load, value_s=load.value_s + ROUNDED_S)
+        return load if methods.quantization == "skip" else load._replace(value_s=load.value_s + ROUNDED_S)

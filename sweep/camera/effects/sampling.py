@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...types import BoolArray, FloatArray, IndexArray
+from .. import legendre
 from ..compiled_light import covered_by_disc, covered_shares
 from ..mosaic import Mosaic
 from ..scene import Target
@@ -147,7 +148,7 @@ def light_on_pixels(
 
 def _means(apart: FloatArray, half: float, profile: Profile, pitch_um: float) -> FloatArray:
     """Mean of the profile over pixels at `apart` (ndarray[n, 2]) from its center, ndarray[n, n_wavelengths]."""
-    nodes, weights = np.polynomial.legendre.leggauss(profile.order(2 * half * pitch_um))
+    nodes, weights = legendre.rule(profile.order(2 * half * pitch_um))
     u, v = (a.ravel() * half for a in np.meshgrid(nodes, nodes))
     both = np.outer(weights, weights).ravel() / 4
     values = np.empty((len(apart), profile.n_wavelengths))
@@ -191,4 +192,4 @@ class Sampling(KernelEffect):
             own_s += SEARCHED_S + places_s / 2
             shared_s += places_s / 2  # CFAs whose tiles are alike look at about half of their places together
         units = load.units if methods.straight else pixels
-        return replace(load, units=units, own_s=load.own_s + own_s, shared_s=shared_s)
+        return load._replace(units=units, own_s=load.own_s + own_s, shared_s=shared_s)

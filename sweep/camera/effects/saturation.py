@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ...types import FloatArray
@@ -70,4 +68,4 @@ class Saturation(ReadoutEffect):
 
     def work(self, shot: Shot, methods: Chosen, load: Load) -> Load:
         """Every value is compared with the end of the range."""
-        return load if methods.saturation == "skip" else replace(load, value_s=load.value_s + CLIPPED_S)
+        return load if methods.saturation == "skip" else load._replace(value_s=load.value_s + CLIPPED_S)

@@ -1,0 +1,63 @@
+"""Compiled inner loop of sums over a cubic spline. It releases the GIL."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from ..types import FloatArray
+
+
+@njit(cache=True, nogil=True)
+def _basis(x: float, first: int, knots: FloatArray, found: FloatArray) -> None:
+    """Put the four cubic B-splines that are not 0 between `knots[first]` and the next one into `found`."""
+    found[0] = 1.0
+    for order in range(1, 4):
+        saved = 0.0
+        for at in range(order):
+            right, left = knots[first + at + 1], knots[first + at + 1 - order]
+            part = found[at] / (right - left)
+            found[at] = saved + (right - x) * part
+            saved = (x - left) * part
+        found[order] = saved
+
+
+@njit(cache=True, nogil=True)
+def _inner_basis(t: float, found: FloatArray) -> None:
+    """`_basis` where all knots around are equidistant, at a share `t` of the way to the next one."""
+    s = 1.0 - t
+    found[0] = s * s * s / 6
+    found[1] = (1 + s * (3 + s * (3 - 3 * s))) / 6
+    found[2] = (1 + t * (3 + t * (3 - 3 * t))) / 6
+    found[3] = t * t * t / 6
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def sums_of_cubic(
+    x: FloatArray, weights: FloatArray, knots: FloatArray, coefficients: FloatArray, out: FloatArray
+) -> None:
+    """Sums of a spline's values over the last axis of `x`, ndarray[n, m], by their weights, ndarray[m].
+
+    `knots`: from 0 on, equidistant but for the second and the last but one, which a spline that is not a knot there
+    leaves out; `coefficients`: ndarray[n_knots - 4, n_values]; `out`: ndarray[n, n_values]. Beyond the end the last
+    piece goes on. Each row is summed by itself: the same values in whatever company it is asked for.
+    """
+    last, step = len(coefficients) - 1, knots[5] - knots[4]
+    four, folded = np.empty(4), np.zeros(len(coefficients))
+    for row in range(len(x)):
+        low, high = last, 3
+        for at in range(weights.size):
+            first = min(max(int(x[row, at] / step) + 2, 3), last)
+            if 6 <= first <= last - 3:
+                _inner_basis((x[row, at] - knots[first]) / step, four)
+            else:
+                _basis(x[row, at], first, knots, four)
+            for part in range(4):
+                folded[first - 3 + part] += weights[at] * four[part]
+            low, high = min(low, first), max(high, first)
+        out[row] = 0.0
+        for node in range(low - 3, high + 1):
+            share = folded[node]
+            for value in range(out.shape[1]):
+                out[row, value] += share * coefficients[node, value]
+            folded[node] = 0.0
