@@ -18,6 +18,9 @@ def new(
     name: Annotated[str, typer.Argument(help="Name of the study and of its file.", show_default=False)],
     qe: Annotated[Path | None, typer.Option(help="A file of QE curves of a sensor.", show_default=False)] = None,
     lights: Annotated[Path | None, typer.Option(help="A file of spectra of lights.", show_default=False)] = None,
+    pixel: Annotated[
+        Path | None, typer.Option(help="EMVA 1288 results (XML) of the sensor's pixel.", show_default=False)
+    ] = None,
     quantity: Annotated[LightUnit, typer.Option(help="What the lights' numbers are.")] = "energy",
     folder: Annotated[Path, typer.Option(help="Folder of the studies.")] = Path("studies"),
     source: Annotated[
@@ -33,13 +36,13 @@ def new(
     from ..new.begin import beside, study_from
 
     if source is not None:
-        if qe or lights or copy:
-            raise StudyError(Fault("a study that is copied has its own curves", key="--from", value=source))
+        if qe or lights or pixel or copy:
+            raise StudyError(Fault("a study that is copied has its own curves and pixel", key="--from", value=source))
         lines = study_from(name, folder, study_path(Path(source)))
     elif copy:
         with beside(folder, qe, lights) as (own_qe, own_lights):
-            lines = new_study(name, folder, own_qe, own_lights, quantity)
+            lines = new_study(name, folder, own_qe, own_lights, quantity, pixel)
     else:
-        lines = new_study(name, folder, qe, lights, quantity)
+        lines = new_study(name, folder, qe, lights, quantity, pixel)
     for line in lines:
         typer.echo(line)
