@@ -26,6 +26,12 @@ def delayed(function: Callable[..., Any], *arguments: Any) -> Call:
     return function, arguments, {}
 
 
+def in_turn(calls: Iterable[Call]) -> Iterator[Any]:
+    """Answers of calls, one after the other in this process."""
+    for function, arguments, named in calls:
+        yield function(*arguments, **named)
+
+
 class Section(BaseModel):
     """A frozen section; unknown keys, NaN, infinity and quoted numbers are refused."""
 

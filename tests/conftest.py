@@ -119,6 +119,6 @@ def plain_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports and descriptions whose pictures take no time: for tests of the files and of the text."""
     names = ("pareto", "sensor", "signals", "chart")
     monkeypatch.setattr("sweep.report.page._drawings", lambda _: ((name, name, None) for name in names))
-    monkeypatch.setattr("sweep.report.page.rendered", lambda _, kind: kind.encode())
+    monkeypatch.setattr("sweep.report.page.pictures_of", lambda _, kinds: {kind: kind.encode() for kind in kinds})
     monkeypatch.setattr("sweep.commands.describe.draw", lambda *_: None)
     monkeypatch.setattr("sweep.commands.describe.rendered", lambda _, kind: kind.encode())

@@ -6,6 +6,7 @@ Each result is an element of a section, with its `Value` and `Unit`. Source: EMV
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element
@@ -38,8 +39,27 @@ _RESULTS = (
 )
 
 
+@dataclass(frozen=True)
+class PixelFigures:
+    """Keys of `pixel:` with what a file says of them, and those that it says nothing of."""
+
+    given: Mapping[str, float]
+    missing: tuple[str, ...]
+
+
 def pixel_lines(path: Path) -> list[str]:
-    """`pixel:` of a study with what the file says of it, and what it does not say.
+    """`pixel:` of a study with what the file says of it, and what it does not say; errors as for `pixel_figures`."""
+    found = pixel_figures(path)
+    told = ", ".join(f"{key}: {value:.12g}" for key, value in found.given.items())
+    return [
+        f"{path}: {_WHAT}. In a study:",
+        f"pixel: {{{told}}}",
+        f"Not in the file, and to be added: {', '.join(found.missing)}.",
+    ]
+
+
+def pixel_figures(path: Path) -> PixelFigures:
+    """What the file says of a pixel.
 
     Raises DataError for a file without such results, a result of another unit, and a figure that no pixel has.
     """
@@ -62,9 +82,7 @@ def pixel_lines(path: Path) -> list[str]:
         raise DataError(
             Fault("not a pixel's figure", file, key=key, value=first["input"], allowed=first["msg"])
         ) from None
-    told = ", ".join(f"{key}: {value:.12g}" for key, value in found.items())
-    absent = ", ".join([*missing, "bits", "offset_dn", "pitch_um"])
-    return [f"{path}: {_WHAT}. In a study:", f"pixel: {{{told}}}", f"Not in the file, and to be added: {absent}."]
+    return PixelFigures(found, (*missing, "bits", "offset_dn", "pitch_um"))
 
 
 def _value(file: str, elements: list[Element], result: _Result) -> float | None:

@@ -7,15 +7,18 @@ from pathlib import Path
 
 import typer
 
+from ..types import Parallel, in_turn
 
-def finish(folder: Path, began_s: float, *, mend: bool = False) -> None:
+
+def finish(folder: Path, began_s: float, *, mend: bool = False, parallel: Parallel = in_turn) -> None:
     """Draw figures and report of a finished run, and say what it found; `mend`: only what is missing or damaged.
 
-    `began_s`: when the command began, by the monotonic clock: a user waits for the report, too.
+    `began_s`: when the command began, by the monotonic clock: a user waits for the report, too. `parallel` makes the
+    pictures.
     """
     from ..report import make_report, read_output, summary_lines
 
     found = read_output(folder)
-    make_report(found, mend=mend)
+    make_report(found, mend=mend, parallel=parallel)
     for line in summary_lines(found, time.monotonic() - began_s):
         typer.echo(line)

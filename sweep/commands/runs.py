@@ -6,6 +6,7 @@ import os
 import sys
 import time
 import webbrowser
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +15,9 @@ import typer
 from .. import run as runner
 from ..errors import Fault, InterruptedRunError, SweepError
 from ..results.names import REPORT
+from ..run.workers import Workers, workers
 from ..study import Study, folder_name, load_study
+from ..types import Parallel, in_turn
 from .audit import mend_audit
 from .endings import end_now
 from .finish import finish
@@ -69,7 +72,12 @@ def run_one(path: Path, manner: Manner, began_s: float) -> None:
             if not made:
                 typer.echo(f"Note: {folder} holds this very study, finished; nothing was computed.", err=True)
             mend_audit(folder, manner.data)
-            finish(folder, began_s, mend=True)
+            with ExitStack() as stack:
+                # The run's worker processes draw, too; threads must not, and to start some takes as long as drawing.
+                drawn: Parallel = in_turn
+                if made and kind == "loky" and manner.workers > 1:
+                    drawn = stack.enter_context(workers(Workers(manner.workers, stop)))
+                finish(folder, began_s, mend=True, parallel=drawn)
     except InterruptedRunError as error:
         if kind == "threading":  # what its threads are at cannot be broken off
             end_now(error)

@@ -237,6 +237,11 @@ def decorate(axes: Axes) -> None:
         axes.spines[side].set_visible(False)
 
 
+def pictures_of(figure: Figure, kinds: Sequence[str]) -> dict[str, bytes]:
+    """A drawn figure as files of some kinds: kind -> what the file holds."""
+    return {kind: rendered(figure, kind) for kind in kinds}
+
+
 def rendered(figure: Figure, kind: str) -> bytes:
     """A drawn figure as the bytes of a `png` or `svg` file; the same figure gives the same bytes."""
     import matplotlib as mpl  # noqa: PLC0415

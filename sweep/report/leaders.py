@@ -58,8 +58,6 @@ def _first(rows: pd.DataFrame) -> Row | None:
 
 def _most(rows: pd.DataFrame, column: str) -> Row | None:
     """The row with the largest value; of equal ones a CFA or design with a name, then the first one."""
-    kept = rows[rows[column].notna()]
-    if kept.empty:
-        return None
-    named = kept["name"].notna()
-    return _first(kept.assign(_named=named).sort_values([column, "_named"], ascending=False, kind="stable"))
+    most = rows[rows[column] == rows[column].max()]
+    named = most[most["name"].notna()]
+    return _first(most if named.empty else named)

@@ -16,12 +16,13 @@ from ..results.names import FIGURES, REPORT, VISION_FIGURES, is_drawn
 from ..results.output import Output
 from ..results.profiles import profile_table
 from ..results.tables import FOUND, NAMED, PLAIN, csv_of, encoded
+from ..types import Parallel, delayed, in_turn
 from . import tables
 from . import values as content
 from .allowed_lamps import lamp_drawings, lamp_table
 from .answer import answer_sentences, large_numbers
 from .colors import color_drawings
-from .figures import draw_curves, draw_pareto, rendered
+from .figures import draw_curves, draw_pareto, pictures_of
 from .filter_figures import filters_figure
 from .leaders import leaders_of
 from .noise import all_series, told_apart_table
@@ -51,11 +52,11 @@ _OF_TASKS = ("scorecard", "color-noise", "rendered")
 _OF_REGIONS, _OF_PRICE = "regions", "price"
 
 
-def make_report(output: Output, *, mend: bool = False) -> None:
+def make_report(output: Output, *, mend: bool = False, parallel: Parallel = in_turn) -> None:
     """Write `pareto.png`/`.svg`, `figures/*`, the comparison with published figures and `report.html`.
 
-    `mend`: those alone that are missing, damaged or out of date. Raises OutputError where a file of others has the name
-    of one of them or the disk refuses.
+    `mend`: those alone that are missing, damaged or out of date. `parallel` makes the pictures. Raises OutputError
+    where a file of others has the name of one of them or the disk refuses.
     """
     with locked(output.folder):
         inventory = Inventory(output.folder)
@@ -64,21 +65,23 @@ def make_report(output: Output, *, mend: bool = False) -> None:
         if mend and not wrong:
             return
         some = wrong if mend and REPORT not in wrong else None
-        contents = _contents(output, some)
+        contents = _contents(output, some, parallel)
         inventory.write({n: made for n, made in contents.items() if not mend or n in wrong or n not in listed})
         inventory.remove(n for n in listed if n not in contents and (some is None or n in some))
 
 
-def _contents(output: Output, some: Iterable[str] | None) -> dict[str, bytes]:
+def _contents(output: Output, some: Iterable[str] | None, parallel: Parallel) -> dict[str, bytes]:
     """The files of the report -> what they hold; `some` of them, or all, since the page has every picture in it."""
-    images, contents = [], dict[str, bytes]()
+    images, contents, wanted = [], dict[str, bytes](), []
     for name, caption, figure in (*_drawings(output), *_vision_drawings(output)):
         where = name if name.startswith(("cfas", "pareto")) else f"{FIGURES}/{name}"
-        for kind in ("png", "svg"):
-            if some is None or {f"{where}.png", f"{where}.svg"} & {*some}:
-                contents[f"{where}.{kind}"] = rendered(figure, kind)
+        if some is None or {f"{where}.png", f"{where}.svg"} & {*some}:
+            wanted.append((name, caption, where, figure))
+    calls = [delayed(pictures_of, figure, ("png", "svg")) for *_, figure in wanted]
+    for (name, caption, where, _), made in zip(wanted, parallel(calls), strict=True):
+        contents |= {f"{where}.{kind}": content for kind, content in made.items()}
         if some is None and name.startswith((*_PICTURES, *_OF_TASKS, _OF_REGIONS, _OF_PRICE, _MAPS, VISION_FIGURES)):
-            images.append((name, caption, inlined(contents[f"{where}.png"])))
+            images.append((name, caption, inlined(made["png"])))
     published = comparison_with_published(output)
     if len(published):
         contents[PUBLISHED_CSV] = csv_of(published).encode("utf-8")

@@ -47,7 +47,7 @@ def payload(output: Output) -> dict[str, Any]:
         "design_id": _packed(rows["design_id"], "f8"),
         "scenario": _words(rows["scenario"]),
         "cfa": _words(rows["cfa"]),
-        "names": {str(at): _names(output, row) for at, row in enumerate(rows.to_dict("records")) if _is_named(row)},
+        "names": {str(at): _names(output, row) for at, row in _records(rows, rows["name"].map(_is_word))},
         "overviews": [_overview(output, scenario) for scenario in output.scenarios],
         "views": list(_views(output, rows)),
         "curves": _curves(output),
@@ -94,8 +94,14 @@ def _groups(rows: pd.DataFrame) -> np.ndarray:
     return np.select([*kinds, front, rows["feasible"]], [5, 4, 3, 2, 1], default=0)
 
 
-def _is_named(row: Mapping[Any, Any]) -> bool:
-    return isinstance(row["name"], str)
+def _is_word(value: Any) -> bool:
+    return isinstance(value, str)
+
+
+def _records(rows: pd.DataFrame, wanted: pd.Series) -> Iterator[tuple[int, dict[Any, Any]]]:
+    """The number and the values of each row that is wanted."""
+    some = rows[wanted.to_numpy(dtype=bool)]
+    yield from zip(map(int, some.index), some.to_dict("records"), strict=True)
 
 
 def _names(output: Output, row: Mapping[Any, Any]) -> dict[str, str]:
@@ -169,11 +175,10 @@ def _limited(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
         if c.metric == CSD and c.pair is not None
     }
     found = {}
-    for row in rows.to_dict("records"):
-        texts = {words: row[name] for name, words in columns.items() if isinstance(row.get(name), str)}
-        if texts:
-            near = content.nearest_lights(output, row)
-            found[str(row["design_id"])] = {"texts": texts, "nearest": None if near is None else near}
+    told = rows[[name for name in columns if name in rows]]
+    for _, row in _records(rows, told.map(_is_word).any(axis=1)):
+        texts = {words: row[name] for name, words in columns.items() if _is_word(row.get(name))}
+        found[str(row["design_id"])] = {"texts": texts, "nearest": content.nearest_lights(output, row)}
     return found
 
 

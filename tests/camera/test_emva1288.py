@@ -8,6 +8,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from sweep.camera.pixel import Pixel
+from sweep.study import load_study
 
 from ..commanded import commanded
 
@@ -39,6 +40,23 @@ def test_a_summary_is_a_pixel_of_a_study(tmp_path: Path) -> None:
     assert (pixel.well_e, pixel.gain_dn_per_e, pixel.read_noise_e) == (13972.6302563, 0.280769280926, 10.8980275235)
     assert pixel.prnu == pytest.approx(0.0075, rel=1e-12)
     assert "dark_e_per_s, bits, offset_dn" in absent
+
+
+def test_a_new_study_has_the_pixel(tmp_path: Path) -> None:
+    file, folder = written(tmp_path, GIVEN), tmp_path / "studies"
+    code, said, wrong = commanded("new", "mine", "--pixel", file, "--folder", folder)
+    assert code == 0, wrong
+    assert "Pixel: well_e, gain_dn_per_e, read_noise_e, prnu from" in said
+    assert "not in it: dark_e_per_s, bits" in said
+    text = (folder / "mine.yaml").read_text()
+    assert "# EMVA 1288 results: results.xml" in text
+    pixel = load_study(folder / "mine.yaml").pixel
+    assert (pixel.well_e, pixel.gain_dn_per_e, pixel.bits) == (13972.6302563, 0.280769280926, Pixel().bits)
+    assert pixel.prnu == pytest.approx(0.0075, rel=1e-12)
+    (tmp_path / "curves.csv").write_text("wavelength_nm,R\n400,1\n700,1\n")
+    code, _, wrong = commanded("new", "other", "--pixel", tmp_path / "curves.csv", "--folder", folder)
+    assert (code, len(wrong.splitlines())) == (2, 1), wrong
+    assert not (folder / "other.yaml").exists()
 
 
 @pytest.mark.parametrize(

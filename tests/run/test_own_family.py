@@ -18,7 +18,7 @@ from sweep.study import Study, load_study
 from ..build import BASE, ran
 from ..commanded import commanded
 from ..conftest import ROOT
-from .own_codes import BUILT_IN, OWN_FAMILY, STOPBAND
+from .own_codes import BUILT_IN, CODE, OWN_FAMILY, STOPBAND
 
 
 def study(folder: Path, text: str = OWN_FAMILY, code: str = STOPBAND, *, allow: bool = True) -> Study:
@@ -141,10 +141,13 @@ def test_edges_of_a_family_of_ones_own_are_not_shifted(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
-def test_a_cluster_whose_workers_have_no_such_file_gives_the_same_rows(tmp_path: Path) -> None:
+def test_a_cluster_whose_workers_have_no_such_files_gives_the_same_rows(tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
-    made = study(tmp_path)
-    (tmp_path / "filters.py").unlink()  # workers get the text
+    (tmp_path / "mine.py").write_text(CODE)
+    own_metric = "metrics: [mine.py:apart]\nobjective: apart\nconstraints:"
+    made = study(tmp_path, OWN_FAMILY.replace("constraints:", own_metric))
+    for name in ("filters.py", "mine.py"):
+        (tmp_path / name).unlink()  # workers get the text
     ran(made, tmp_path / "one", 1)
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
@@ -153,6 +156,8 @@ def test_a_cluster_whose_workers_have_no_such_file_gives_the_same_rows(tmp_path:
     for name in ("results", "search"):
         tables = [pd.read_parquet(tmp_path / folder / f"{name}.parquet") for folder in ("one", "many")]
         pd.testing.assert_frame_equal(*tables, check_exact=True)
+    one = pd.read_parquet(tmp_path / "one" / "results.parquet")
+    np.testing.assert_allclose(one["apart"], one["csd_yellow_red"], rtol=1e-12)
 
 
 def test_the_family_of_the_guide_runs(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+from ...camera.emva1288 import pixel_figures
 from ...curves.light_files import lights_file
 from ...curves.light_unit import LightUnit
 from ...door.channels import Layout, layout_of
@@ -17,16 +18,19 @@ from ...errors import DataError, Fault, OutputError, StudyError, SweepError
 from ...results.tables import atomic, write_text
 from ...study import Study, folder_name, load_study
 from ...study.editors import SCHEMA_FILE, schema_text
-from .template import TYPICAL_NM, LightsText, SensorText, one_line, study_text
+from .template import TYPICAL_NM, LightsText, PixelText, SensorText, one_line, study_text
 
 _MOST_LETTERS = 100
 _BUILT_IN_CFAS = ("RGGB", "RCCC", "RCCB", "RYYCy")
 
 
-def new_study(name: str, folder: Path, qe: Path | None, lights: Path | None, quantity: LightUnit) -> list[str]:
+def new_study(
+    name: str, folder: Path, qe: Path | None, lights: Path | None, quantity: LightUnit, pixel: Path | None = None
+) -> list[str]:
     """Write `folder`/<name>.yaml, and the schema that editors complete it with where the folder has none.
 
-    `qe`, `lights`: files of curves, which stay where they are; None takes what is built in. Returns lines to print.
+    `qe`, `lights`: files of curves, which stay where they are; None takes what is built in. `pixel`: EMVA 1288 results,
+    whose figures go into the study. Returns lines to print.
     Raises StudyError for a bad name, OutputError where the file exists or cannot be written, DataError for curves that
     a study cannot use.
     """
@@ -36,9 +40,10 @@ def new_study(name: str, folder: Path, qe: Path | None, lights: Path | None, qua
     sensor = SensorText(Layout(_BUILT_IN_CFAS, "RYNCy", "Y", "G")) if qe is None else _sensor(qe, folder)
     start_nm, stop_nm = sensor.range_nm
     chosen = _built_in_lights() if lights is None else _lights(lights, folder, quantity, start_nm, stop_nm)
+    own_pixel = PixelText() if pixel is None else _pixel(pixel)
     new_folders = [place for place in (folder, *folder.parents) if not os.path.lexists(place)]
     try:
-        made = _write(path, lambda ratio: study_text(name, sensor, replace(chosen, photon_ratio=ratio)))
+        made = _write(path, lambda ratio: study_text(name, sensor, replace(chosen, photon_ratio=ratio), own_pixel))
     except SweepError:
         with suppress(OSError):  # one that something else is in by now stays
             for place in new_folders:
@@ -46,6 +51,8 @@ def new_study(name: str, folder: Path, qe: Path | None, lights: Path | None, qua
         raise
     lines = [f"{path}: {made.n_designs:,} designs on {', '.join(made.mosaics)}; objective {made.objective}."]
     lines += _said(sensor, chosen)
+    if own_pixel.given:
+        lines.append(f"Pixel: {', '.join(own_pixel.given)} from {pixel}; not in it: {', '.join(own_pixel.missing)}.")
     lines += [f"Note: {warning}." for warning in made.warnings]
     return [*lines, f"Next: sweep run {shlex.quote(str(path))}"]
 
@@ -114,6 +121,11 @@ def _lights(path: Path, folder: Path, quantity: LightUnit, start_nm: float, stop
         ends_early=taken.ends_early,
         fine=taken.fine,
     )
+
+
+def _pixel(path: Path) -> PixelText:
+    figures = pixel_figures(path)
+    return PixelText(path.name, figures.given, figures.missing)
 
 
 def _said(sensor: SensorText, lights: LightsText) -> list[str]:

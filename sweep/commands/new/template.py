@@ -49,7 +49,16 @@ class LightsText:
     photon_ratio: float | None = None
 
 
-def study_text(name: str, sensor: SensorText, lights: LightsText) -> str:
+@dataclass(frozen=True)
+class PixelText:
+    """What a study says of its pixel, out of a `file`; nothing without one. `missing`: what the file does not say."""
+
+    file: str = ""
+    given: Mapping[str, float] = field(default_factory=dict)
+    missing: Sequence[str] = ()
+
+
+def study_text(name: str, sensor: SensorText, lights: LightsText, pixel: PixelText) -> str:
     """A commented study that runs as it is."""
     pair = nearest_pair(list(lights.types))
     layout = sensor.layout
@@ -67,7 +76,7 @@ question: >-
 seed: 1
 
 {_sensor(sensor)}
-{_lights(lights)}
+{_lights(lights)}{_pixel(pixel)}
 scenarios:
   chart:                # every signal fills the field; exposed for a white patch, per CFA
     exposure: {{kind: white_patch, level: 0.95}}
@@ -163,6 +172,14 @@ def _lights(lights: LightsText) -> str:
         lines += [f"          - {scalar(name):<{wide}}  # {_why(color)}" for name, color in columns.items() if color]
     lines += _left_out("        ", lights.left_out)
     return "\n".join(lines) + "\n"
+
+
+def _pixel(pixel: PixelText) -> str:
+    if not pixel.given:
+        return ""
+    lines = ["", f"pixel:                  # EMVA 1288 results: {one_line(pixel.file)}"]
+    lines += [f"  {key}: {value:.12g}" for key, value in pixel.given.items()]
+    return "\n".join([*lines, f"  # not in the file, so the defaults hold: {', '.join(pixel.missing)}"]) + "\n"
 
 
 def _why(color: LightColor) -> str:
