@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from ..camera.effects import blur
@@ -76,11 +77,12 @@ def _check_pixel(section: StudySection, sources: Sources) -> None:
 def _check_memory(vision: Vision, lights: Lights, mosaics: Mapping[str, Mosaic], sources: Sources) -> None:
     """Lamps at all places, and all cases of the observer at one distance and level, fit into memory."""
     pixels = vision.crop_px**2
+    n_lenses = len(vision.lenses)
     test_lamps = sum(max(1, len(lights.members.get(lens, ())) // 4) for lens in vision.lenses)
     for name, mosaic in mosaics.items():
         places = mosaic.indices.size * vision.places_per_pixel**2
-        lamps = 8 * places * 3 * len(lights.names) * pixels * len(vision.distances_m)
-        cases = 8 * places * 2 * 6 * (1 + test_lamps * len(vision.intensities_cd)) * pixels
+        lamps = 8 * places * n_lenses * len(lights.names) * pixels * len(vision.distances_m)
+        cases = 8 * places * 2 * math.factorial(n_lenses) * (1 + test_lamps * len(vision.intensities_cd)) * pixels
         if (every := max(lamps, cases)) > MOST_KERNEL_BYTES:
             problem = f"{places} places of the head take too much memory (CFA {name})"
             allowed = f"at most {MOST_KERNEL_BYTES / 2**30:g} GiB: smaller images, fewer places, lamps or distances"

@@ -58,7 +58,7 @@ def cases_on_table(
         kind, lamp, order, sunny, place = cases[case]
         for p in range(unlit.shape[1]):
             electrons = unlit[place, p]
-            for position in range(3):
+            for position in range(orders.shape[1]):
                 own = orders[order, position]
                 if sunny:
                     electrons += phantoms[place, position, own, p]

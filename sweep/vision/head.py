@@ -1,7 +1,7 @@
 """A signal head on the pixels: how much of each part every pixel sees, blurred, at each wavelength and place.
 
-Three round lenses stand one above the other in a housing before a backplate (all rectangles), as EN 12368's heads of
-200 mm: lenses 1.5 diameters apart, the housing 1.6 x 4.6 diameters, the backplate 3 x 6.
+Round lenses stand one above the other in a housing before a backplate (all rectangles), as EN 12368's heads of 200 mm:
+lenses 1.5 diameters apart, the housing of three 1.6 x 4.6 diameters, the backplate 3 x 6.
 """
 
 from __future__ import annotations
@@ -20,8 +20,10 @@ from ..camera.view import View
 from ..types import FloatArray
 from .section import Vision
 
-SPACING, HOUSING, BACKPLATE = 1.5, (1.6, 4.6), (3.0, 6.0)
-"""In diameters of a lens: from lens to lens; width and height."""
+SPACING = 1.5
+"""From lens to lens, in diameters."""
+_HOUSING, _BACKPLATE = (1.6, 1.6), (3.0, 3.0)
+"""Width and height around one lens, in diameters."""
 _KNOTS = "every 10 nm"
 MARGIN = 1
 """Pixels around the image whose light crosstalk brings into it."""
@@ -33,8 +35,9 @@ _PERIOD_PX = 160
 class HeadMaps:
     """Light of each part relative to a uniform field of its radiance.
 
-    `lenses`: ndarray[n_places, 3, side, side, n_knots], `housing` and `backplate` (what lies before them counts as
-    theirs): ndarray[n_places, side, side, n_knots]; the side has `MARGIN` at both ends. `knots_nm`: ndarray[n_knots].
+    `lenses`: ndarray[n_places, n_lenses, side, side, n_knots], `housing` and `backplate` (what lies before them counts
+    as theirs): ndarray[n_places, side, side, n_knots]; the side has `MARGIN` at both ends. `knots_nm`:
+    ndarray[n_knots].
     """
 
     knots_nm: FloatArray
@@ -43,8 +46,14 @@ class HeadMaps:
     backplate: FloatArray
 
 
+def heights(vision: Vision) -> FloatArray:
+    """Of the lenses' centers from the head's, downward from the top lens, in diameters, ndarray[n_lenses]."""
+    n = len(vision.lenses)
+    return np.asarray(SPACING * (np.arange(n) - (n - 1) / 2), dtype=float)
+
+
 def head_places_px(vision: Vision, mosaic: Mosaic) -> FloatArray:
-    """Where the middle lens's center may be, from the image's first pixel: ndarray[n_places, 2] as (column, row)."""
+    """Where the head's center may be, from the image's first pixel: ndarray[n_places, 2] as (column, row)."""
     rows, columns = mosaic.indices.shape
     n = vision.places_per_pixel
     middle = [(vision.crop_px // 2 // size) * size - size / 2 for size in (columns, rows)]
@@ -61,15 +70,17 @@ def head_maps(view: View, vision: Vision) -> HeadMaps:
     assert target is not None
     optics = vision.optics
     key = (target, optics, pixel.pitch_um, pixel.fill_factor, view.grid, vision.crop_px, vision.places_per_pixel)
-    return _maps.get((*key, view.mosaic.indices.shape), lambda: _made(view, vision, target))
+    return _maps.get((*key, view.mosaic.indices.shape, len(vision.lenses)), lambda: _made(view, vision, target))
 
 
 def _made(view: View, vision: Vision, target: Target) -> HeadMaps:
     knots = blur.knots(view.grid.nodes_nm, _KNOTS)
     places, across = head_places_px(vision, view.mosaic), target.object_resolution_px
-    lenses = [_disc(view, vision, places + np.array([0, SPACING * across * up]), knots) for up in (-1, 0, 1)]
+    lenses = [_disc(view, vision, places + np.array([0, across * height]), knots) for height in heights(vision)]
+    more = SPACING * (len(vision.lenses) - 1)
     housing, backplate = (
-        _rectangle(view, vision, places, (size[0] * across, size[1] * across), knots) for size in (HOUSING, BACKPLATE)
+        _rectangle(view, vision, places, (wide * across, (high + more) * across), knots)
+        for wide, high in (_HOUSING, _BACKPLATE)
     )
     return HeadMaps(knots, np.stack(lenses, axis=1), housing, backplate)
 

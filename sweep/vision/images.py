@@ -22,7 +22,7 @@ from .compiled_images import draw_numbers
 from .head import MARGIN, HeadMaps, head_maps
 from .materials import ambient_light, phantom, reflectance
 from .pixel_table import PixelTable, pixel_table
-from .scenes import ORDER_OF_LENSES, Scenes, uniforms
+from .scenes import Scenes, orders_of_lenses, uniforms
 from .section import LightLevel, Vision
 
 Numbers = NDArray[np.int16]
@@ -46,8 +46,8 @@ class HeadElectrons:
     """Expected electrons of the parts of a head at one distance and level.
 
     `unlit`: ndarray[n_places, n_backgrounds, n_pixels], all lenses off. What is added: `phantoms`, ndarray[n_places,
-    3 positions, 3 types, n_pixels], and for each candela and second `lamps`, ndarray[n_places, 3 positions, n_signals,
-    n_pixels].
+    n_lenses, n_lenses, n_pixels] by position and type, and for each candela and second `lamps`, ndarray[n_places,
+    n_lenses, n_signals, n_pixels] by position.
     """
 
     unlit: FloatArray
@@ -69,8 +69,7 @@ class HeadElectrons:
         """
         found = self.unlit[place, background]
         sunny = np.flatnonzero(phantom_on)
-        for position in range(3):
-            kinds = ORDER_OF_LENSES[order, position]
+        for position, kinds in enumerate(orders_of_lenses(self.lamps.shape[1])[order].T):
             found[sunny] += self.phantoms[place[sunny], position, kinds[sunny]]
             on = np.flatnonzero(lit[0] == kinds)
             found[on] += (self.time_s * lit[2][on, None]) * self.lamps[place[on], position, lit[1][on]]
@@ -147,7 +146,7 @@ class HeadCamera:
         return self._lamps[distance]
 
     def _of_lenses(self, maps: HeadMaps, spectra: FloatArray) -> FloatArray:
-        """Spectra on each lens: ndarray[n_places, 3, n_spectra, n_pixels]."""
+        """Spectra on each lens: ndarray[n_places, n_lenses, n_spectra, n_pixels]."""
         places, positions = maps.lenses.shape[:2]
         seen = self._seen(maps, maps.lenses.reshape(-1, *maps.lenses.shape[2:]), spectra)
         return np.maximum(seen.reshape(places, positions, *seen.shape[1:]), 0.0)

@@ -18,9 +18,9 @@ _PARTS = (TRAIN, CHECK, TEST)
 
 @dataclass(frozen=True)
 class Lamps:
-    """Lamps of each lens that a part of the images shows: for each of the three signal types the indices of signals."""
+    """Lamps of each lens that a part of the images shows: for each signal type the indices of signals."""
 
-    of_lens: tuple[IndexArray, IndexArray, IndexArray]
+    of_lens: tuple[IndexArray, ...]
 
     def digests(self, lights: Lights) -> set[str]:
         """Digests of their spectra."""
@@ -48,7 +48,7 @@ def split_lamps(lights: Lights, vision: Vision, seed: tuple[int, int]) -> dict[s
         few = max(1, len(groups) // 4)
         for part, some in ((TEST, order[:few]), (CHECK, order[few : 2 * few]), (TRAIN, order[2 * few :])):
             parts[part].append(np.array([i for at in some for i in groups[at]], dtype=np.intp))
-    found = {part: Lamps((own[0], own[1], own[2])) for part, own in parts.items()}
+    found = {part: Lamps(tuple(own)) for part, own in parts.items()}
     seen = found[TRAIN].digests(lights) | found[CHECK].digests(lights)
     if seen & found[TEST].digests(lights):
         raise SweepError(Fault("a lamp of the test has the spectrum of one to learn from", key="vision"))

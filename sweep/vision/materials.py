@@ -27,7 +27,12 @@ _PATCHES: dict[Material, str] = {
     "black": "black 2 (1.5 D)",
     "white": "white 9.5 (.05 D)",
 }
-_LENS_EDGES_NM: dict[str, tuple[float, float]] = {"red": (600.0, 1e4), "yellow": (565.0, 1e4), "green": (470.0, 560.0)}
+_LENS_EDGES_NM: dict[str, tuple[float, float]] = {
+    "red": (600.0, 1e4),
+    "orange": (582.0, 1e4),
+    "yellow": (565.0, 1e4),
+    "green": (470.0, 560.0),
+}
 _LENS_WIDTH_NM = 6.0
 
 
@@ -54,7 +59,7 @@ def phantom(grid: WavelengthGrid, kind: str) -> FloatArray:
     """Photons of daylight that comes back through a colored lens, which integrate to 1, ndarray[n_wavelengths].
 
     The lens is modeled, not measured: a band with logistic edges, passed twice. A lens of another signal type than
-    red, yellow and green is clear.
+    red, orange, yellow and green is clear.
     """
     nodes = grid.nodes_nm
     passed = np.ones(nodes.size)

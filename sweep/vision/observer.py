@@ -19,7 +19,7 @@ from .compiled_images import cases_on_table, log_likelihoods
 from .images import HeadCamera, HeadElectrons, Numbers
 from .lamps import Lamps
 from .pixel_table import ROOT_STEP
-from .scenes import ORDER_OF_LENSES, PHANTOM_SHARE, SHUFFLED, Scenes, states_of
+from .scenes import PHANTOM_SHARE, SHUFFLED, Scenes, orders_of_lenses, states_of
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class _Cases:
 
 def _cases(camera: HeadCamera, lamps: Lamps, order: str, sunny: bool) -> _Cases:
     intensities, n_places = camera.vision.intensities_cd, camera.n_places()
-    orders = range(len(ORDER_OF_LENSES) if order == SHUFFLED else 1)
+    orders = range(len(orders_of_lenses(len(lamps.of_lens))) if order == SHUFFLED else 1)
     rest = np.array([(o, sun, at) for o in orders for sun in range(1 + sunny) for at in range(n_places)])
     sun_share = np.where(rest[:, 1] == 1, PHANTOM_SHARE, 1 - PHANTOM_SHARE) if sunny else np.ones(len(rest))
     lit = [(-1, -1, 0.0, 1.0)]
@@ -75,7 +75,8 @@ def _of_states(camera: HeadCamera, images: Numbers, heads: HeadElectrons, backgr
     node = np.empty((n_cases, telling.size), dtype=np.int32)
     share = np.empty(node.shape, dtype=np.float32)
     light, last = cases.candelas * heads.time_s, camera.table.last
-    cases_on_table(dark, sun, lamp, cases.table, light, ORDER_OF_LENSES, ROOT_STEP, last, node, share)
+    orders = orders_of_lenses(len(camera.vision.lenses))
+    cases_on_table(dark, sun, lamp, cases.table, light, orders, ROOT_STEP, last, node, share)
     likelihood = np.empty((len(images), n_cases))
     log_likelihoods(np.ascontiguousarray(images[:, telling]), node, share, camera.table.shares, likelihood)
     weights = np.exp(likelihood - likelihood.max(axis=1, keepdims=True)) * cases.share

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import convolve
+from scipy.ndimage import convolve1d
 
 from ..camera.mosaic import Mosaic
 from ..types import FloatArray
@@ -17,22 +17,28 @@ def tile_planes(images: FloatArray, mosaic: Mosaic) -> FloatArray:
     return np.ascontiguousarray(np.moveaxis(parts, 2, 3).reshape(n, high // rows, wide // columns, rows * columns))
 
 
-def demosaicked(image: FloatArray, mosaic: Mosaic) -> FloatArray:
-    """Every channel at every pixel, ndarray[n_channels, rows, columns], of a tile of any size.
+def demosaicked(images: FloatArray, mosaic: Mosaic) -> FloatArray:
+    """Every channel at every pixel, of a tile of any size: [..., rows, columns] -> [..., rows, columns, n_channels].
 
     Normalized convolution with a tent as wide as the tile, the product's own rule (`camera/effects/demosaic.py`).
     """
     tile = mosaic.indices
-    rows, columns = tile.shape
-    channel = tile[np.ix_(np.arange(image.shape[0]) % rows, np.arange(image.shape[1]) % columns)]
-    tents = [1 - np.abs(np.arange(-size + 1, size)) / size for size in (rows, columns)]
-    tent = np.outer(*tents)
-    found = np.empty((len(mosaic.channels), *image.shape))
+    high, wide = images.shape[-2:]
+    channel = tile[np.ix_(*(np.arange(side) % size for side, size in zip((high, wide), tile.shape, strict=True)))]
+    tents = [1 - np.abs(np.arange(-size + 1, size)) / size for size in tile.shape]
+    found = np.empty((*images.shape, len(mosaic.channels)))
     for number in range(len(mosaic.channels)):
         own = (channel == number).astype(float)
         # Beyond the border is nothing; at a border one channel may lack a neighbor, and never all of them.
-        weight = convolve(own, tent, mode="constant")
-        found[number] = convolve(own * image, tent, mode="constant") / np.maximum(weight, 1e-12)
+        found[..., number] = _convolved(own * images, tents) / np.maximum(_convolved(own, tents), 1e-12)
+    return found
+
+
+def _convolved(images: FloatArray, tents: list[FloatArray]) -> FloatArray:
+    """With the product of a tent along the rows' axis and one along the columns'."""
+    found = images
+    for axis, tent in zip((-2, -1), tents, strict=True):
+        found = convolve1d(found, tent, axis=axis, mode="constant")
     return found
 
 
@@ -44,5 +50,5 @@ def false_colors(image: FloatArray, mosaic: Mosaic, mean_nm: FloatArray, offset_
     """
     planes = np.maximum(demosaicked(image, mosaic) - offset_dn, 0.0)
     order = np.argsort(-mean_nm)
-    shown = np.stack([planes[order[at]] for at in (0, len(order) // 2, -1)], axis=-1)
+    shown = np.stack([planes[..., order[at]] for at in (0, len(order) // 2, -1)], axis=-1)
     return np.asarray(np.sqrt(shown / max(float(shown.max()), 1.0)), dtype=float)

@@ -11,7 +11,7 @@ from ..types import FloatArray
 from .images import HeadCamera, Numbers
 from .lamps import CHECK, TEST, TRAIN, Lamps, split_lamps
 from .observer import posteriors
-from .planes import false_colors, tile_planes
+from .planes import demosaicked, false_colors, tile_planes
 from .scenes import ORDERS, Scenes, draw_scenes, states_of
 from .section import Vision
 
@@ -92,10 +92,17 @@ def _drawn(camera: HeadCamera, lamps: Lamps, order: str, count: int, key: tuple[
 
 
 def planes_of(camera: HeadCamera, images: Numbers) -> FloatArray:
-    """What the network sees: roots of the digital numbers above the pedestal, whose noise is even, by tile position."""
-    pixel = camera.pixel
-    light = np.maximum(images - pixel.offset_dn, 0.0) / (pixel.full_scale_dn - pixel.offset_dn)
-    return tile_planes(np.sqrt(light), camera.view.mosaic)
+    """What the network sees: roots of the digital numbers above the pedestal, whose noise is even.
+
+    Raw pixels by tile position, ndarray[n, rows / tile, columns / tile, positions], or as a study asks for it every
+    channel at every pixel, ndarray[n, rows, columns, n_channels].
+    """
+    pixel, mosaic = camera.pixel, camera.view.mosaic
+    whole = camera.vision.input == "demosaicked"
+    raw = images.astype(float)
+    numbers = demosaicked(raw, mosaic) if whole else tile_planes(raw, mosaic)
+    light = np.maximum(numbers - pixel.offset_dn, 0.0) / (pixel.full_scale_dn - pixel.offset_dn)
+    return np.asarray(np.sqrt(light), dtype=float)
 
 
 def _none() -> tuple[list[FloatArray], list[FloatArray], int]:

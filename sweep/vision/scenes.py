@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import cache
 from itertools import permutations
 
 import numpy as np
@@ -18,9 +19,13 @@ ORDERS = (FIXED, SHUFFLED)
 """Whether the lenses stand as in the street, so that the place of the lit one says its color, or in any order."""
 SEEN, UNSEEN = "seen", "unseen"
 """Whether the network has learned from the lamps of an image; never from the image itself."""
-ORDER_OF_LENSES = np.array(list(permutations(range(3))))
-"""Signal type of the lens at each of the three positions, from the top; the first row is the street's."""
 PHANTOM_SHARE = 0.5
+
+
+@cache
+def orders_of_lenses(n_lenses: int) -> IndexArray:
+    """Signal type of the lens at each position from the top, ndarray[n_orders, n_lenses]; the street's is first."""
+    return np.array(list(permutations(range(n_lenses))), dtype=np.intp)
 
 
 def states_of(vision: Vision) -> tuple[str, ...]:
@@ -33,7 +38,7 @@ class Scenes:
     """Scenes one by one, ndarray[n] each.
 
     `state`: index into `states_of`; `lamp`: index of the lit signal; `intensity`, `background`, `distance`, `level`:
-    index into the study's lists; `order`: into `ORDER_OF_LENSES`; `phantom`: 1 with sun on the lenses; `place`: where
+    index into the study's lists; `order`: into `orders_of_lenses`; `phantom`: 1 with sun on the lenses; `place`: where
     the head stands, as a share of all places; `key`: from which the photons are drawn.
     """
 
@@ -62,7 +67,7 @@ def draw_scenes(vision: Vision, lamps: Lamps, order: str, count: int, key: tuple
     They follow from `key` alone: all CFAs see the same ones.
     """
     rng = np.random.default_rng(key)
-    levels, at = list(vision.levels.values()), np.arange(count)
+    levels, at, n_orders = list(vision.levels.values()), np.arange(count), len(orders_of_lenses(len(vision.lenses)))
     n_distances, n_levels = len(vision.distances_m), len(levels)
     state = rng.permutation(at % (1 + len(vision.lenses)))
     condition = at % (n_distances * n_levels)
@@ -78,7 +83,7 @@ def draw_scenes(vision: Vision, lamps: Lamps, order: str, count: int, key: tuple
         background=rng.integers(len(vision.backgrounds), size=count),
         distance=distance,
         level=level,
-        order=rng.integers(len(ORDER_OF_LENSES), size=count) if order == SHUFFLED else np.zeros(count, dtype=int),
+        order=rng.integers(n_orders, size=count) if order == SHUFFLED else np.zeros(count, dtype=int),
         phantom=((rng.random(count) < PHANTOM_SHARE) & sunny[level]).astype(np.intp),
         place=rng.random(count),
         key=rng.integers(2**62, size=count),

@@ -11,6 +11,7 @@ from ..camera.scene import DIAMETER_M, Target
 from ..types import Fraction, Meters, Seconds, Section
 
 Illuminant = Literal["daylight", "LED street light", "sodium street light"]
+Seen = Literal["raw", "demosaicked"]
 Material = Literal["foliage", "sky", "gray", "dark gray", "black", "white"]
 _Intensity = Annotated[float, Field(ge=1e-3, le=1e6)]
 _Text = Annotated[str, Field(min_length=1, max_length=100)]
@@ -37,14 +38,16 @@ class LightLevel(Section):
 class Vision(Section):
     """A benchmark of vision: images of signal heads, read by the ideal observer and by a small network.
 
-    `lenses`: the signal types of the head's three lenses, from the top. `distances_m`: of the heads; `levels`: of
+    `lenses`: the signal types of the head's two to four lenses, from the top. `distances_m`: of the heads; `levels`: of
     light. `intensities_cd`: of a lit lamp, all equally frequent. `crop_px`: side of an image, even. `places_per_pixel`:
     places of the head along a pixel, over the CFA's tile. `train_images`, `check_images` (for early stopping) and
     `test_images`: of each seed, order of lenses and CFA. `epochs`: passes over the training images at most.
     `unknown_cost`: of the answer "unknown", where a wrong one costs 1. `network`: false leaves the network out.
+    `input`: what the network sees, the `raw` pixels, a plane for each of the tile, or every channel at every pixel,
+    `demosaicked` by a tent as wide as the tile. The observer reads raw pixels: no reader of either errs less.
     """
 
-    lenses: Annotated[list[_Text], Field(min_length=3, max_length=3)] = ["red", "yellow", "green"]
+    lenses: Annotated[list[_Text], Field(min_length=2, max_length=4)] = ["red", "yellow", "green"]
     distances_m: Annotated[list[Meters], Field(min_length=1, max_length=20)]
     levels: Annotated[dict[_Text, LightLevel], Field(min_length=1, max_length=10)]
     intensities_cd: Annotated[list[_Intensity], Field(min_length=1, max_length=6)] = [20.0, 60.0, 200.0]
@@ -61,6 +64,7 @@ class Vision(Section):
     epochs: int = Field(default=12, ge=1, le=1000)
     unknown_cost: Fraction = 0.2
     network: bool = True
+    input: Seen = "raw"
 
     @model_validator(mode="after")
     def _fits(self) -> Vision:

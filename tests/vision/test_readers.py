@@ -18,11 +18,14 @@ from sweep.vision.installed import require_network
 from sweep.vision.lamps import CHECK, TEST, TRAIN, split_lamps
 from sweep.vision.observer import posteriors
 from sweep.vision.pixel_table import pixel_table
+from sweep.vision.readers import planes_of, read_images
 from sweep.vision.scenes import FIXED, ORDERS, SHUFFLED, draw_scenes
 from sweep.vision.scores import confusion_matrix, costs, macro_f1, mean_of, nested_weights
 
 from ..build import BASE, faults
 from .heads import NO_FILTERS, head_view, vision
+
+THREE = ["red", "yellow", "green"]
 
 
 def test_the_likelihood_errs_as_two_gaussians_do() -> None:
@@ -66,10 +69,11 @@ def test_the_network_errs_as_two_gaussians_do() -> None:
     assert least - 0.01 < error < least + 0.01
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_the_observer_is_as_often_wrong_as_it_says(order: str) -> None:
+@pytest.mark.parametrize(("order", "lenses"), [(FIXED, THREE), (SHUFFLED, THREE), (SHUFFLED, ["red", "orange"])])
+def test_the_observer_is_as_often_wrong_as_it_says(order: str, lenses: list[str]) -> None:
     """A likelihood that left something random out, or counted it wrongly, would be too sure, or not sure enough."""
-    asked, view = vision(distances_m=[500.0], intensities_cd=[3.0, 10.0]), head_view("RCCC")
+    asked = vision(distances_m=[500.0], intensities_cd=[3.0, 10.0], lenses=lenses)
+    view = head_view("RCCC")
     camera, lamps = HeadCamera(view, NO_FILTERS, asked), split_lamps(view.lights, asked, (1, 0))[TEST]
     scenes = draw_scenes(asked, lamps, order, 600, (8, ORDERS.index(order)))
     found = posteriors(camera, scenes, camera.images(scenes), lamps, order)
@@ -77,7 +81,7 @@ def test_the_observer_is_as_often_wrong_as_it_says(order: str) -> None:
     doubt = 1 - found.max(axis=1)
     assert 0.05 < wrong.mean() < 0.6
     assert abs((wrong - doubt).mean()) < 4 * (wrong - doubt).std() / np.sqrt(600)
-    for state in range(4):  # each probability is the share of its state, not the largest alone
+    for state in range(1 + len(lenses)):  # each probability is the share of its state, not the largest alone
         off = (scenes.state == state) - found[:, state]
         assert abs(off.mean()) < 4 * off.std() / np.sqrt(600)
 
@@ -126,6 +130,21 @@ def test_scenes_are_the_same_for_all_cfas() -> None:
         scenes = draw_scenes(asked, lamps, SHUFFLED, 8, (2,))
         seen.append(HeadCamera(view, NO_FILTERS, asked).images(scenes)[:, 0::2, 1::2])
     np.testing.assert_array_equal(*seen)
+
+
+@pytest.mark.slow
+def test_a_network_reads_demosaicked_images() -> None:
+    """A plane for each channel, the same scenes and photons for the observer; with some training it is no guess."""
+    asked = vision(distances_m=[100.0], input="demosaicked", train_images=600, test_images=100, epochs=8, crop_px=16)
+    view = head_view("RCCC")
+    camera = HeadCamera(view, NO_FILTERS, asked)
+    lamps = split_lamps(view.lights, asked, (1, 0))[TEST]
+    images = camera.images(draw_scenes(asked, lamps, SHUFFLED, 3, (1,)))
+    assert planes_of(camera, images).shape == (3, 16, 16, len(view.qe))
+    told = read_images(view, NO_FILTERS, asked, (1, 0)).unseen[SHUFFLED]
+    raw = read_images(view, NO_FILTERS, asked.model_copy(update={"input": "raw", "network": False}), (1, 0))
+    np.testing.assert_array_equal(told.observer, raw.unseen[SHUFFLED].observer)
+    assert (told.network.argmax(axis=1) == told.scenes.state).mean() > 0.45
 
 
 def test_scores() -> None:
