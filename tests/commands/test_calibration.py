@@ -36,7 +36,7 @@ def comparison(paper: Path) -> pd.DataFrame:
     from sweep.report import make_report, read_output
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sweep.report.page.rendered", lambda _, kind: kind.encode())
+        patch.setattr("sweep.report.figures.rendered", lambda _, kind: kind.encode())
         make_report(read_output(paper))
     found = pd.read_parquet(paper / "paper_comparison.parquet")
     pd.testing.assert_frame_equal(found, pd.read_csv(paper / "paper_comparison.csv"), check_dtype=False)
