@@ -37,7 +37,7 @@ def _lines(plans: list[Plan], *, explain: bool) -> Iterator[str]:
     )
     if not_kept := [p for p in plans if not p.kept]:
         yield (
-            f"  The tolerance of {plans[0].tolerance_dn:g} DN cannot be promised over all places of the light; "
+            f"  The tolerance of {plans[0].tolerance_dn:g} DN cannot be promised over all places; "
             f"what can is {max(p.promised_dn for p in not_kept):.2g} DN."
         )
     width = max(map(len, EFFECTS))
