@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .effects import blur, quantization
+from .effects import blur, noise, quantization
 from .encircled import ENCIRCLED
 from .kernel import KERNELS
 from .noisy import moments, table
@@ -14,7 +14,13 @@ def forget_scenes() -> None:
     """Let the next scene compute its kernels, its filters and the table of its noisy pixel anew."""
     for cache in (blur.PROFILES, ENCIRCLED, KERNELS, MATRICES):
         cache.clear()
-    for found in (blur.interpolation_bound, quantization.under_noise, moments.table_without_prnu, table.tables):
+    for found in (
+        blur.interpolation_bound,
+        noise.range_of_pixel,
+        quantization.under_noise,
+        moments.table_without_prnu,
+        table.tables,
+    ):
         found.cache_clear()
     table.unclipped_e.cache_clear()
     forget_cells()

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import groupby
 from pathlib import Path
 
 import pyarrow as pa
@@ -23,6 +24,8 @@ from .routes import Detours
 from .rows import Job, Rules, detours_of, failed_rows, job_key, jobs_of, joined, run_job, with_local_front
 from .workers import WorkerKilledError, Workers, alone
 
+_SCENES_PER_WORKER, _FEW = 2, 64
+"""From how many scenes for each worker on, and up to how many designs, one worker computes all jobs of a scene."""
 KILLED = "error: its worker died twice"
 
 
@@ -105,17 +108,37 @@ class Sweep:
         todo = [index for index, key in enumerate(self.keys) if key not in entries]
         done = sum(entries[key].rows for key in self.keys if key in entries)
         progress("designs", done, self.study.n_designs)
-        calls = (delayed(_shard, self.jobs[i], self._view(self.jobs[i]), self.rules) for i in todo)
+        batches = self._batches(todo)
+        calls = (
+            delayed(_shards, [(self.jobs[i], self._view(self.jobs[i])) for i in batch], self.rules) for batch in batches
+        )
 
-        def keep(at: int, found: tuple[Shard, pa.Table]) -> None:
-            self.journal.save(self.keys[todo[at]], todo[at], found[0])
+        def keep(at: int, found: list[tuple[Shard, pa.Table]]) -> None:
+            for index, (shard, _) in zip(batches[at], found, strict=True):
+                self.journal.save(self.keys[index], index, shard)
 
-        for shard, few in self.crew(calls, _quarantined, keep):
-            gathered.add(few)
-            done += shard.rows
+        for found in self.crew(calls, _quarantined, keep):
+            for shard, few in found:
+                gathered.add(few)
+                done += shard.rows
+                if shard.failed and fail_fast:
+                    raise _first_failure(shard.table())
             progress("designs", done, self.study.n_designs)
-            if shard.failed and fail_fast:
-                raise _first_failure(shard.table())
+
+    def _batches(self, todo: list[int]) -> list[list[int]]:
+        """Jobs by the calls that they are computed in.
+
+        Jobs of few designs of one scene go to one worker, since they share its kernels, where there are so many scenes
+        that no worker waits long for the last one.
+        """
+        scenes = [list(own) for _, own in groupby(todo, lambda index: self.jobs[index].scenario)]
+        if len(scenes) < _SCENES_PER_WORKER * self.crew.count:
+            return [[index] for index in todo]
+        found: list[list[int]] = []
+        for own in scenes:
+            few = sum(self.jobs[index].stop - self.jobs[index].start for index in own) <= _FEW
+            found += [own] if few else [[index] for index in own]
+        return found
 
     def tables(self) -> Iterator[pa.Table]:
         """All finished chunks in order; one whose file is damaged is computed again. Counts failures and detours."""
@@ -123,7 +146,7 @@ class Sweep:
         for index, (job, key) in enumerate(zip(self.jobs, self.keys, strict=True)):
             table = self._kept(index)
             if table is None:
-                shard, _ = _shard(job, self._view(job), self.rules)
+                ((shard, _),) = _shards([(job, self._view(job))], self.rules)
                 self.journal.save(key, index, shard)
                 table = shard.table()
             self.failed += self.journal.entries[key].failed
@@ -139,33 +162,44 @@ class Sweep:
         return table
 
 
-def _shard(job: Job, view: View, rules: Rules) -> tuple[Shard, pa.Table]:
-    """A job's rows as a file's content, and the few that `Gathered` takes in."""
-    started = time.monotonic()
-    table = run_job(job, view, rules)
-    return Shard.of(table, time.monotonic() - started), few_of(table, rules)
+def _shards(batch: Sequence[tuple[Job, View]], rules: Rules) -> list[tuple[Shard, pa.Table]]:
+    """Each job's rows as a file's content, and the few that `Gathered` takes in."""
+    found = []
+    for job, view in batch:
+        started = time.monotonic()
+        table = run_job(job, view, rules)
+        found.append((Shard.of(table, time.monotonic() - started), few_of(table, rules)))
+    return found
 
 
-def _quarantined(call: Call) -> tuple[Shard, pa.Table]:
-    """A job whose worker died twice: by halves, down to the design that kills, which becomes a row with its status."""
-    started = time.monotonic()
-    table = _halved(call)
-    return Shard.of(table, time.monotonic() - started), few_of(table, call[1][2])
+def _quarantined(call: Call) -> list[tuple[Shard, pa.Table]]:
+    """Jobs whose worker died twice: one by one, and of those that kill again by halves, down to the design that does,
+    which becomes a row with its status.
+    """
+    batch, rules = call[1]
+    found = []
+    for job, view in batch:
+        started = time.monotonic()
+        table = _halved(job, view, rules) if len(batch) == 1 else _table_alone(job, view, rules)
+        found.append((Shard.of(table, time.monotonic() - started), few_of(table, rules)))
+    return found
 
 
-def _halved(call: Call) -> pa.Table:
-    job, view, rules = call[1]
+def _table_alone(job: Job, view: View, rules: Rules) -> pa.Table:
+    """Rows of a job, in a process of its own; by halves if that dies."""
+    try:
+        return alone((_shards, ([(job, view)], rules), {}))[0][0].table()
+    except WorkerKilledError:
+        return _halved(job, view, rules)
+
+
+def _halved(job: Job, view: View, rules: Rules) -> pa.Table:
+    """Rows of a job that kills its worker."""
     if job.stop - job.start == 1:
         return failed_rows(job, rules, KILLED)
     middle = (job.start + job.stop) // 2
-    tables = []
-    for half in (replace(job, stop=middle), replace(job, start=middle, first_id=job.first_id + middle - job.start)):
-        part: Call = (call[0], (half, view, rules), {})
-        try:
-            tables.append(alone(part)[0].table())
-        except WorkerKilledError:
-            tables.append(_halved(part))
-    return joined(tables)
+    halves = replace(job, stop=middle), replace(job, start=middle, first_id=job.first_id + middle - job.start)
+    return joined([_table_alone(half, view, rules) for half in halves])
 
 
 def _first_failure(table: pa.Table) -> FailedDesignError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -189,7 +190,7 @@ class Study:
 
     def box(self, space: Space, scenario: str) -> Box:
         """What the designs of `space` can be, for a plan of the scenario."""
-        view = replace(self.view(space, scenario), methods=REFERENCE)
+        view = self._everything_on(space, scenario)
         low, high = view.qe.copy(), view.qe.copy()
         if space.filter is not None:
             ends = [np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max)]
@@ -197,9 +198,21 @@ class Study:
             lows, highs = zip(*(family.hull(*ends) for family in families), strict=True)
             low[list(view.modified)] = np.min(lows, axis=0)
             high[list(view.modified)] = np.max(highs, axis=0)
+        return Box(view, low, high, self._evaluated(space, scenario))
+
+    def _everything_on(self, space: Space, scenario: str) -> View:
+        """`view` by the methods of the reference, whatever plans there are."""
+        return replace(self.view(space, scenario), methods=REFERENCE)
+
+    def _evaluated(self, space: Space, scenario: str) -> int:
+        """How many designs of a space are looked at in a scenario, at most: its own, and those of a search."""
         searched = self.search is not None and self.search.space is space and self.search.scenario == scenario
-        evaluations = self.search.max_evaluations if searched and self.search is not None else 0
-        return Box(view, low, high, space.size + evaluations)
+        return space.size + (self.search.max_evaluations if searched and self.search is not None else 0)
+
+    def _asked(self, scenario: str) -> list[tuple[Space, int]]:
+        """The spaces that count in a scenario, each with `_evaluated`: all of them where none has a design."""
+        spaces = [(space, self._evaluated(space, scenario)) for space in self.spaces]
+        return [(space, n) for space, n in spaces if n] or spaces
 
     def boxes(self, scenario: str) -> list[Box]:
         """What the designs of all spaces can be; spaces without a design count where there are no others.
@@ -207,8 +220,7 @@ class Study:
         Raises StudyError for numbers that are allowed one by one, but that no float can hold together.
         """
         with _holding(scenario):
-            boxes = [self.box(space, scenario) for space in self.spaces]
-        return [box for box in boxes if box.n_designs] or boxes
+            return [self.box(space, scenario) for space, _ in self._asked(scenario)]
 
     def tolerance_dn(self, wanted_dn: float | None = None) -> float:
         """How far a plan may be from everything on, DN: as wanted, or else as the study says."""
@@ -223,14 +235,16 @@ class Study:
 
         Raises StudyError as `boxes` does.
         """
-        boxes, tolerance = self.boxes(scenario), self.tolerance_dn(tolerance_dn)
+        tolerance, budget_s = self.tolerance_dn(tolerance_dn), math.inf
         with _holding(scenario):
-            if always:
-                return Planner(boxes, for_noise=bool(self.states)).plan(scenario, tolerance)
-            found = everything_on(boxes, scenario, tolerance)
-            if isinstance(found, Plan):
-                return found
-            return Planner(boxes, for_noise=bool(self.states), budget_s=found).plan(scenario, tolerance)
+            if not always:
+                views = [(self._everything_on(space, scenario), n) for space, n in self._asked(scenario)]
+                found = everything_on(views, scenario, tolerance)
+                if isinstance(found, Plan):
+                    return found
+                budget_s = found
+            planner = Planner(self.boxes(scenario), for_noise=bool(self.states), budget_s=budget_s)
+            return planner.plan(scenario, tolerance)
 
     def problem(self, search: Search) -> Problem:
         """The search as a mathematical problem."""

@@ -172,9 +172,8 @@ def test_a_plan_says_how_closely_all_places_are_looked_at() -> None:
     assert 10 <= wide.promised_dn <= 20
     # Behind a readout that is not straight, something stays open however closely is looked.
     assert tight.methods.field == "within 0.1 DN"
-    assert isinstance(
-        everything_on([made.box], "", 0.5), float
-    )  # what stays open is looked for, however little is saved
+    # What stays open is looked for, however little is saved.
+    assert isinstance(everything_on([(made.view, 1)], "", 0.5), float)
     assert tight.methods.angle == "cone"
     assert not planner._allowed("angle", replace(tight.methods, angle="skip"))
     assert planner.promise("field", REFERENCE, replace(REFERENCE, field="named places")) == math.inf

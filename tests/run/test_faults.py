@@ -57,17 +57,19 @@ def test_a_worker_that_is_killed_once_costs_nothing(fewer: Study, unharmed: pd.D
 
 
 @pytest.mark.slow
-def test_a_design_that_kills_its_worker_is_a_row(plain: Study, tmp_path: Path) -> None:
+@pytest.mark.parametrize("scenes", ["a", "abcd"])
+def test_a_design_that_kills_its_worker_is_a_row(plain: Study, tmp_path: Path, scenes: str) -> None:
+    """Of four scenes or more, two workers compute whole ones."""
     wish = tmp_path / "wish"
     wish.write_text("kill 1000000 ")
-    few = replace(plain, scenarios={"chart": plain.scenarios["chart"]})
+    few = replace(plain, scenarios=dict.fromkeys(scenes, plain.scenarios["chart"]))
     sweep = few.spaces[-1]
     few = replace(few, spaces=(replace(sweep, axes=((590.0, 600.0, 610.0), (5.0,), (660.0,), (5.0,), (1.0,))),))
     ran(mischievous(few, tmp_path / "missing"), tmp_path / "fine", 1)
     ran(mischievous(few, wish), tmp_path / "out", 2)
     found, fine = rows(tmp_path / "out"), rows(tmp_path / "fine")
     killed = found["left_nm"] == 590
-    assert list(found.loc[killed, "status"]) == [KILLED]
+    assert list(found.loc[killed, "status"]) == [KILLED] * len(scenes)
     assert found.loc[killed, "csd_yellow_red"].isna().all()
     assert not found.loc[killed, ["feasible", "pareto"]].any(axis=None)
     same = [name for name in found.columns if name != "pareto"]

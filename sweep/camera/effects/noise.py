@@ -32,7 +32,7 @@ def draws_dn(electrons: FloatArray, pixel: Pixel, rng: np.random.Generator) -> F
 
 
 @lru_cache(maxsize=1024)
-def _range_dn(pixel: Pixel, brightest_dn: float) -> float:
+def range_of_pixel(pixel: Pixel, brightest_dn: float) -> float:
     """See `NoisyMean.range_dn`; scenes of one exposure share it."""
     gain, read_dn = pixel.dn_per_e, pixel.dn_per_e * pixel.read_noise_e
     at_e = min(brightest_dn / gain, top_e(pixel))
@@ -62,7 +62,7 @@ class NoisyMean(ReadoutEffect):
         no electron more is worth more than the gain, and falls beyond, where the hard readout stands still. So both
         extremes are single numbers.
         """
-        return _range_dn(shot.pixel, brightest_dn)
+        return range_of_pixel(shot.pixel, brightest_dn)
 
     def work(self, shot: Shot, methods: Chosen, load: Load) -> Load:
         """What clips or rounds is looked up in a table, which costs more."""

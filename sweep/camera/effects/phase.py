@@ -31,7 +31,7 @@ CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
 """A cell's corners from its center (column, row), in units of its half width."""
 PER_DECADE = 1.3
 """Places of a search, in those of the lattice, for the square of its limit's decades below 100 DN, about."""
-SEARCH_S, SEARCH_DECADE_S = 0.05, 0.02
+SEARCH_S, SEARCH_DECADE_S = 0.01, 0.009
 """Seconds that a search takes for each design, at all and for each decade; `tests/bench_work.py` measures all three."""
 PER_PIXEL = 4
 """Places per pixel, along a row and a column, of the finest lattice."""

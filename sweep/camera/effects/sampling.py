@@ -18,7 +18,7 @@ from .blur import Profile
 
 PIXEL_S = 6e-8
 """Seconds of a pixel at a place of the light, through a channel's filter, at a wavelength."""
-SEARCHED_S, PLACE_S, PLACE_PIXEL_S = 0.1, 2.2e-4, 4.7e-8
+SEARCHED_S, PLACE_S, PLACE_PIXEL_S = 0.1, 1e-4, 4.7e-8
 """Seconds that a search for the worst of all places takes: to begin with, for each place, and for each of its pixels
 and the functions of the image; `tests/bench_work.py` measures all of these."""
 _AROUND_PX, _MOST_FUNCTIONS = 6.0, 32

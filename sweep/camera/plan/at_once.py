@@ -10,19 +10,20 @@ from ..effects.image_height import all_heights_count
 from ..field import over_field
 from ..methods import REFERENCE
 from ..registry import EFFECTS
-from .bounds import Box
+from ..view import View
 from .plan import NOT_ASKED, Choice, Plan
 from .work import LEAST_LOOK_S, LOOKING_SHARE, estimated_work, in_all, noise_s
 
 
-def everything_on(boxes: Sequence[Box], scenario: str, tolerance_dn: float) -> Plan | float:
+def everything_on(views: Sequence[tuple[View, int]], scenario: str, tolerance_dn: float) -> Plan | float:
     """Everything on, where to look for a plan takes longer than it may; else how many seconds that may take.
 
+    `views`: each CFA before the scene, and its number of designs, by the methods of the reference.
     Only what the scene says by itself is left out. Of a light at any place no more is promised of the worst place than
     that its distance, as any, ends with the readout's range.
     """
-    views = [(place, box.n_designs) for box in boxes for place in over_field(box.view)]
-    everywhere = any(all_heights_count(box.view) for box in boxes)
+    everywhere = any(all_heights_count(view) for view, _ in views)
+    views = [(place, n) for view, n in views for place in over_field(view)]
     everything_s = in_all([(estimated_work(view, REFERENCE), n) for view, n in views])
     least_s = LEAST_LOOK_S * len(views) + max((noise_s(view) for view, _ in views), default=0.0)
     if everywhere or least_s <= LOOKING_SHARE * everything_s:  # what all places of the sensor leave open must be known
