@@ -131,11 +131,16 @@ def whole(plain: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFram
     return pd.read_parquet(folder / "results.parquet")
 
 
-@pytest.fixture
-def plain_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+def draw_nothing(patch: pytest.MonkeyPatch) -> None:
     """Reports and descriptions whose pictures take no time: for tests of the files and of the text."""
     names = ("pareto", "sensor", "signals", "chart")
-    monkeypatch.setattr("sweep.report.page._drawings", lambda _: ((name, name, None) for name in names))
-    monkeypatch.setattr("sweep.report.page.rendered", lambda _, kind: kind.encode())
-    monkeypatch.setattr("sweep.commands.describe.draw", lambda *_: None)
-    monkeypatch.setattr("sweep.commands.describe.rendered", lambda _, kind: kind.encode())
+    patch.setattr("sweep.report.page._drawings", lambda _: ((name, name, None) for name in names))
+    patch.setattr("sweep.report.page.rendered", lambda _, kind: kind.encode())
+    patch.setattr("sweep.commands.describe.draw", lambda *_: None)
+    patch.setattr("sweep.commands.describe.rendered", lambda _, kind: kind.encode())
+
+
+@pytest.fixture
+def plain_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """See `draw_nothing`."""
+    draw_nothing(monkeypatch)
