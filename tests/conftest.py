@@ -34,8 +34,25 @@ FEWER = {
         "starts: 16": "starts: 4",
         "front: {min: 0.80, max: 1.0, count: 21}": "front: {min: 0.80, max: 1.0, count: 4}",
     },
+    "distance": {"[20, 40, 60, 80, 100, 125, 150, 175, 200, 225, 250, 275, 300]": "[20, 100, 300]"},
+    "noise": {
+        "[1, 2, 4, 8, 16, 32, 64, 128]": "[1, 8, 128]",
+        "[0.95, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01]": "[0.95, 0.1, 0.01]",
+        "[50, 100, 200, 400]": "[50, 400]",
+        "patches: 200": "patches: 50",
+        "[RGGB, RCCC, RCCB, RYYCy, RYNCy]": "[RGGB, RYYCy, RYNCy]",
+    },
+    "night": {"[1.0e-3, 2.0e-3, 3.0e-3, 4.0e-3, 5.0e-3, 6.0e-3, 8.0e-3, 1.1e-2]": "[1.0e-3, 4.0e-3, 1.1e-2]"},
+    "exposure": {
+        "1.0e-4, 1.5e-4, 2.0e-4, 2.5e-4, 3.0e-4, 3.5e-4, 4.0e-4, 5.0e-4, 6.0e-4, 8.0e-4, 1.0e-3, 1.5e-3, 2.0e-3, ": "3.0e-4, "
+    },
+    "angle": {"[0, 5, 10, 15, 20, 25, 30]": "[0, 15, 30]", "starts: 8": "starts: 2"},
+    "producible": {"starts: 32": "starts: 4"},
+    "freeform": {"starts: 4": "starts: 2"},
+    "dual": {"starts: 8": "starts: 2"},
+    "rccb": {"front: {min: 0.80, max: 1.0, count: 11}": "front: {min: 0.80, max: 1.0, count: 3}"},
 }
-"""Scenes, starts or levels of a study of the project, and those of them that its finished run has: all take half a minute."""
+"""Scenes, starts or levels of a study of the project, and those of them that its finished run has: all take minutes."""
 Finished = Callable[[str], Path]
 """Name of a study of the project -> folder of its finished run."""
 ROWS = pytest.StashKey[list[dict[str, Any]]]()
@@ -114,11 +131,16 @@ def whole(plain: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFram
     return pd.read_parquet(folder / "results.parquet")
 
 
-@pytest.fixture
-def plain_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+def draw_nothing(patch: pytest.MonkeyPatch) -> None:
     """Reports and descriptions whose pictures take no time: for tests of the files and of the text."""
     names = ("pareto", "sensor", "signals", "chart")
-    monkeypatch.setattr("sweep.report.page._drawings", lambda _: ((name, name, None) for name in names))
-    monkeypatch.setattr("sweep.report.page.pictures_of", lambda _, kinds: {kind: kind.encode() for kind in kinds})
-    monkeypatch.setattr("sweep.commands.describe.draw", lambda *_: None)
-    monkeypatch.setattr("sweep.commands.describe.rendered", lambda _, kind: kind.encode())
+    patch.setattr("sweep.report.page._drawings", lambda _: ((name, name, None) for name in names))
+    patch.setattr("sweep.report.page.pictures_of", lambda _, kinds: {kind: kind.encode() for kind in kinds})
+    patch.setattr("sweep.commands.describe.draw", lambda *_: None)
+    patch.setattr("sweep.commands.describe.rendered", lambda _, kind: kind.encode())
+
+
+@pytest.fixture
+def plain_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """See `draw_nothing`."""
+    draw_nothing(monkeypatch)

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import chdir
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -19,25 +20,26 @@ from sweep.study import load_study
 
 from ..build import stopband_study
 from ..commanded import commanded, sweep
+from ..conftest import draw_nothing
 
-STUDY = stopband_study(
+GRID = "{left_nm: [590, 600, 610], left_width_nm: 5, right_nm: {min: 640, max: 690, count: 51}, right_width_nm: 5}"
+LIMITS = "constraints:\n  sensitivity: {min: 0.9}\n"
+PUBLISHED = "published:\n  Table 2:\n    RGGB: {csd_yellow_red: 138}\n"
+EVERY_TABLE = stopband_study(
     "small",
-    "{left_nm: [590, 600, 610], left_width_nm: 5, right_nm: {min: 640, max: 690, count: 51}, right_width_nm: 5}",
+    GRID,
     before="""\
 scenarios:
   chart: {exposure: {kind: white_patch}, noise: true}
 pixel: {read_noise_e: 2}
 """,
-    after="""\
-constraints:
-  sensitivity: {min: 0.9}
-search: {starts: 1, max_evaluations: 20, front: {min: 0.8, max: 0.9, count: 2}}
-recognition: {states: [green, yellow, red], patches: 20}
-published:
-  Table 2:
-    RGGB: {csd_yellow_red: 138}
-""",
+    after=f"""\
+{LIMITS}search: {{starts: 1, max_evaluations: 20, front: {{min: 0.8, max: 0.9, count: 2}}}}
+recognition: {{states: [green, yellow, red], patches: 20}}
+{PUBLISHED}""",
 )
+FEW_PICTURES = stopband_study("small", GRID, after=LIMITS + PUBLISHED)
+"""Pictures that are compared are drawn, which takes seconds; elsewhere a word stands in their place."""
 LISTS = ("run.json", "SHA256SUMS")
 READ = (
     *("results.parquet", "search.parquet", "front.parquet", "curves.parquet", "points.parquet", "recognition.parquet"),
@@ -96,28 +98,41 @@ def cases() -> list[object]:
 
 
 @pytest.fixture(scope="module")
-def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("study") / "small.yaml"
-    path.write_text(STUDY)
-    return path
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Callable[[bool], Path]:
+    """Whether pictures are drawn -> a folder with a study and its finished run."""
 
+    @cache
+    def base_of(drawn: bool) -> Path:
+        base, folder = tmp_path_factory.mktemp("finished"), Path("outputs/small")
+        (base / "small.yaml").write_text(FEW_PICTURES if drawn else EVERY_TABLE)
+        with chdir(base), pytest.MonkeyPatch.context() as patch:  # the report names the folder as the command does
+            draw_nothing(patch)
+            run_study(load_study(Path("small.yaml")), folder, 1, lambda *_: None, ["sweep", "run"])
+            assert commanded("audit", folder)[0] == 0
+            assert (sweep("report", str(folder)).returncode if drawn else commanded("report", folder)[0]) == 0
+            made = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+            assert made >= {*LISTS, *DRAWN, *(() if drawn else READ)}
+            assert made - {".lock", *LISTS} == Inventory(folder).files.keys()
+        return base
 
-@pytest.fixture(scope="module")
-def finished(study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    with chdir(tmp_path_factory.mktemp("finished")):  # the report names the folder as the command does
-        run_study(load_study(study), Path("outputs/small"), 1, lambda *_: None, ["sweep", "run"])
-        assert commanded("audit", "outputs/small")[0] == 0
-        assert sweep("report", "outputs/small").returncode == 0
-        folder = Path("outputs/small").absolute()
-    made = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    assert made >= {*LISTS, *READ, *DRAWN}
-    assert made - {".lock", *LISTS} == Inventory(folder).files.keys()
-    return folder
+    return base_of
 
 
 @pytest.fixture
-def folder(finished: Path, tmp_path: Path) -> Iterator[Path]:
-    shutil.copytree(finished, tmp_path / "outputs" / "small")
+def study() -> Path:
+    """In the folder of the test, as that of the run is."""
+    return Path("small.yaml").absolute()
+
+
+@pytest.fixture
+def folder(
+    request: pytest.FixtureRequest,
+    finished: Callable[[bool], Path],
+    tmp_path: Path,
+    plain_pictures: None,  # noqa: ARG001  (in this process)
+) -> Iterator[Path]:
+    case = getattr(request.node, "callspec", None)
+    shutil.copytree(finished(case is not None and case.params["file"] in PICTURED), tmp_path, dirs_exist_ok=True)
     with chdir(tmp_path):
         yield Path("outputs/small")
 
@@ -138,7 +153,7 @@ def named_in(said: str, folder: Path) -> list[str]:
 
 @pytest.mark.parametrize(("file", "damage"), cases())
 def test_a_damage_is_named_and_mended_alone(
-    study: Path, folder: Path, file: str, damage: Callable[[Path], None]
+    folder: Path, study: Path, file: str, damage: Callable[[Path], None]
 ) -> None:
     before = state(folder)
     damage(folder / file)
@@ -174,7 +189,7 @@ def test_the_lists_are_in_the_form_of_sha256sum(folder: Path) -> None:
     assert len(done.stdout.splitlines()) == len(state(folder)) - 1
 
 
-def test_an_intact_run_is_not_touched_again(study: Path, folder: Path) -> None:
+def test_an_intact_run_is_not_touched_again(folder: Path, study: Path) -> None:
     before = state(folder)
     code, _, said = commanded("run", study, "--output", folder.parent, "--jobs", 1)
     assert code == 0
@@ -182,7 +197,7 @@ def test_an_intact_run_is_not_touched_again(study: Path, folder: Path) -> None:
     assert state(folder) == before
 
 
-def test_what_stands_in_a_file_s_place_is_not_removed(study: Path, folder: Path) -> None:
+def test_what_stands_in_a_file_s_place_is_not_removed(folder: Path, study: Path) -> None:
     (folder / "curves.parquet").unlink()
     (folder / "curves.parquet").mkdir()
     (folder / "curves.parquet" / "mine.txt").write_text("mine")
@@ -191,7 +206,7 @@ def test_what_stands_in_a_file_s_place_is_not_removed(study: Path, folder: Path)
     assert (folder / "curves.parquet" / "mine.txt").read_text() == "mine"
 
 
-def test_without_both_lists_nothing_is_replaced(study: Path, folder: Path) -> None:
+def test_without_both_lists_nothing_is_replaced(folder: Path, study: Path) -> None:
     for name in LISTS:
         (folder / name).unlink()
     before = state(folder)

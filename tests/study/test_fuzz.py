@@ -88,7 +88,7 @@ def jobs(study: Study) -> list[Any]:
 def light(study: Study) -> str | None:
     """A scene that is planned and computed in a second, if there is one: a patch, or a light at a given place."""
     quick = study.grid.size <= 401 and all(len(m.channels) < 8 for m in study.mosaics.values())
-    fewer = len(study.spaces) <= 20 and study.section.recognition is None
+    fewer = len(study.spaces) <= 20 and study.section.recognition is None and study.section.vision is None
     names = [n for n, s in study.scenarios.items() if s.target is None or s.target.phase_px != "any"]
     return names[0] if names and quick and fewer else None
 
