@@ -33,9 +33,12 @@ def in_turn(calls: Iterable[Call]) -> Iterator[Any]:
 
 
 class Section(BaseModel):
-    """A frozen section; unknown keys, NaN, infinity and quoted numbers are refused."""
+    """A frozen section; unknown keys, NaN, infinity and quoted numbers are refused.
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
+    What checks it is built for the first that is read: most sections of the language are in no study.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True, defer_build=True)
 
 
 def from_to(value: Any) -> Any:

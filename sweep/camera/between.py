@@ -15,7 +15,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
 from ..types import FloatArray
 from . import kernel
@@ -103,6 +102,8 @@ class Between:
         if self._is_sharp:
             return SHARP
         if h not in self._nearby:
+            from scipy.ndimage import maximum_filter1d  # noqa: PLC0415  (slow to import)
+
             piece = 2 * self._half / SEGMENTS
             width = 3 + 2 * math.ceil(math.hypot(h, h + piece / 2) * self._images.per_px)
             steep = maximum_filter1d(self._images.steep, width, axis=0, mode="nearest")

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
-from ..types import Parallel, in_turn
+if TYPE_CHECKING:
+    from ..types import Parallel
 
 
-def finish(folder: Path, began_s: float, *, mend: bool = False, parallel: Parallel = in_turn) -> None:
+def finish(folder: Path, began_s: float, *, mend: bool = False, parallel: Parallel | None = None) -> None:
     """Draw figures and report of a finished run, and say what it found; `mend`: only what is missing or damaged.
 
     `began_s`: when the command began, by the monotonic clock: a user waits for the report, too. `parallel` makes the
-    pictures.
+    pictures, without it they are made one after the other.
     """
     from ..report import make_report, read_output, summary_lines
+    from ..types import in_turn
 
     found = read_output(folder)
-    make_report(found, mend=mend, parallel=parallel)
+    make_report(found, mend=mend, parallel=parallel or in_turn)
     for line in summary_lines(found, time.monotonic() - began_s):
         typer.echo(line)

@@ -17,7 +17,7 @@ from ..errors import Fault, InterruptedRunError, SweepError
 from ..results.names import REPORT
 from ..run.workers import Workers, workers
 from ..study import Study, folder_name, load_study
-from ..types import Parallel, in_turn
+from ..types import Parallel
 from .audit import mend_audit
 from .endings import end_now
 from .finish import finish
@@ -74,7 +74,7 @@ def run_one(path: Path, manner: Manner, began_s: float) -> None:
             mend_audit(folder, manner.data)
             with ExitStack() as stack:
                 # The run's worker processes draw, too; threads must not, and to start some takes as long as drawing.
-                drawn: Parallel = in_turn
+                drawn: Parallel | None = None
                 if made and kind == "loky" and manner.workers > 1:
                     drawn = stack.enter_context(workers(Workers(manner.workers, stop)))
                 finish(folder, began_s, mend=True, parallel=drawn)

@@ -15,8 +15,6 @@ from ..types import BoolArray, FloatArray, IndexArray
 
 _NUMBERS = {"nnan", "nsz"}
 """Lets the compiler take the smaller of several numbers at once; callers hand in no NaN."""
-CHANNELS = 4
-"""Channels that `nearest_squared` takes; fewer are filled up with zeros."""
 LANES = 64
 """Designs that `nearest_along_squared` takes side by side."""
 
@@ -25,7 +23,8 @@ LANES = 64
 def nearest_squared(response: FloatArray, bounds: IndexArray, out: FloatArray) -> None:
     """Smallest squared distance of each pair of classes.
 
-    `response`: C-ordered ndarray[n_designs, CHANNELS, n_signals], finite, one class of signals after the other;
+    `response`: C-ordered ndarray[n_designs, 4, n_signals], finite, one class of signals after the other, in which fewer
+    channels are filled up with zeros;
     `bounds`: ndarray[n_classes + 1], where each class begins. `out`: ndarray[n_designs, n_pairs], pairs in the order of
     `curves.lights.class_pairs`.
     """

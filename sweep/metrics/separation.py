@@ -14,6 +14,8 @@ from ..types import FloatArray, IndexArray
 
 _BLOCK_PAIRS = 262_144
 """Pair distances held at once per channel: 2 MiB, so that a block stays in cache."""
+_MANY, _MOST_CHANNELS = 64, 4
+"""From so many designs of so few channels on, the compiled pass saves more time than it takes to load."""
 _SMALLEST = 1e-140
 """Distances below this, and above its inverse, are computed without squares."""
 
@@ -88,14 +90,14 @@ def _all_pairs(first: IndexArray, second: IndexArray) -> tuple[IndexArray, Index
 
 def separations(response: FloatArray, members: Mapping[str, IndexArray]) -> dict[Pair, FloatArray]:
     """CSD of every pair of signal types; `members` maps a type to its signal indices. Shapes as in `separation`."""
-    from .nearest import CHANNELS, nearest_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
-
     n_designs, _, n_channels = response.shape
     pairs = class_pairs(list(members))
-    if n_channels > CHANNELS or not np.isfinite(response).all():
+    if n_designs < _MANY or n_channels > _MOST_CHANNELS or not np.isfinite(response).all():
         return {(a, b): separation(response, members[a], members[b]) for a, b in pairs}
+    from .nearest import nearest_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
+
     order, bounds = _in_order(members)
-    filled = np.zeros((n_designs, CHANNELS, order.size))
+    filled = np.zeros((n_designs, _MOST_CHANNELS, order.size))
     filled[:, :n_channels] = np.moveaxis(response[:, order], 1, 2)
     squared = np.empty((n_designs, len(pairs)))
     nearest_squared(filled, bounds, squared)

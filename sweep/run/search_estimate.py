@@ -17,7 +17,7 @@ from ..study import Search, Study
 from ..types import FloatArray
 from .held_out import LEFT_OUT_STARTS, left_out_signals
 
-PER_START, PER_LEVEL = 55, 190
+PER_START, PER_LEVEL = 35, 120
 """Evaluations of a start with derivatives, and of all starts at a level of the front."""
 _TRIED, _PROGRAMS = 20, 20
 """Evaluations that are timed, and linear programs at most."""
