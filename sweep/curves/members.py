@@ -82,7 +82,8 @@ class Members:
         """By how much a spectrum is shifted so many steps after the first shift."""
         return (self._first + cell + share) * self._step_nm
 
-    def _of(self, signal: int) -> tuple[float, tuple[float, float]]:
+    def drift_and_own(self, signal: int) -> tuple[float, tuple[float, float]]:
+        """nm/K of a signal, and from and to where binning and ageing shift it."""
         return _drift_and_own(self._lights, self.population, signal)
 
     def regions(self, pair: Pair) -> tuple[list[ShiftRegion], IndexArray]:
@@ -102,7 +103,7 @@ class Members:
 
     def region(self, one: int, other: int) -> ShiftRegion:
         """The shifts of two signals that occur together."""
-        (a, own_a), (b, own_b) = self._of(one), self._of(other)
+        (a, own_a), (b, own_b) = self.drift_and_own(one), self.drift_and_own(other)
         key = (a, *own_a, b, *own_b)
         if key not in self._regions:
             corners = _corners(self.population, (a, b), (own_a, own_b))

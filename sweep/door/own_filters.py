@@ -11,11 +11,12 @@ from pandas.arrays import BooleanArray
 
 from ..camera.imager import imager_of
 from ..camera.view import View
+from ..curves.lights import class_pairs
 from ..errors import DataError, Fault, nearest
 from ..metrics.bound import FEASIBLE, total_violation
 from ..metrics.evaluate import evaluate, family_quantities, image_quantities
 from ..metrics.objective import COMBINED
-from ..metrics.quantity import WORST, Column, Columns
+from ..metrics.quantity import WORST, YIELD, Column, Columns
 from ..study import Study
 from ..types import FloatArray
 
@@ -102,6 +103,12 @@ def judged(study: Study, view: View, curves: FloatArray) -> Columns:
         from ..metrics.members import population_imager  # noqa: PLC0415  (only where lights have a population)
 
         found |= {WORST + name: values for name, values in population_imager(view).worst(curves).items()}
+        if asked.wanted_yield:
+            from ..metrics.drawn import LampsAndCameras  # noqa: PLC0415
+
+            drawn = LampsAndCameras(population_imager(view), study.tolerance, study.section.seed)
+            kept = drawn.columns(lambda _: curves, class_pairs(view.lights.classes))
+            found |= {YIELD + name: values for name, values in kept.items()}
     found |= family_quantities(None, np.empty((len(curves), 0)))
     found |= image_quantities(view, curves, study.section.vision, study.section.seed)
     lacking = np.full(len(curves), np.nan)

@@ -27,6 +27,9 @@ WORST = "worst_"
 """How the name of a quantity's worst case begins: over shifts of the edges in production, and over the population of
 the lights."""
 WORST_CASE: Literal["worst case"] = "worst case"
+YIELD = "yield_"
+"""How the name of what the wanted share of random lamps and cameras has begins."""
+OF_A_SHARE: Literal["yield"] = "yield"
 BEST_PLACE = "best_place_"
 """How the name of a CSD's largest value over the places where the light may fall on the mosaic begins, each at its
 worst moment of a pulsed light."""
@@ -57,7 +60,7 @@ class Column:
     digits: int = 4
     wanted: Literal["more", "less", ""] = ""
     role: Literal["separation", "light", ""] = ""
-    extreme: Literal["worst case", "best place", ""] = ""
+    extreme: Literal["worst case", "best place", "yield", ""] = ""
     of: str = ""
     pair: Pair | None = None
 
@@ -109,7 +112,7 @@ class Quantity(Column):
     smooth rows are: its values, their squares, or their number of decades below 1, -log10. `apart`: it is the smallest
     distance of two signals, in DN or in units of the noise. `most`: no filter reaches more. `share`: it is the smallest
     ratio of N to the curve that N replaces. `states`: the signal types that noise may confuse in it. `smooth_members`:
-    its smooth rows over the population of the lights.
+    its smooth rows over the population of the lights; `smooth_drawn`: over random lamps and cameras.
     """
 
     ends: tuple[End, ...] = ()
@@ -126,6 +129,7 @@ class Quantity(Column):
     states: tuple[str, ...] = ()
     smooth: Callable[[SmoothDesign], Rows] | None = field(default=None, repr=False)
     smooth_members: Callable[[SmoothDesign], Rows] | None = field(default=None, repr=False)
+    smooth_drawn: Callable[[SmoothDesign], Rows] | None = field(default=None, repr=False)
     linear: Callable[[View], LinearRows] | None = field(default=None, repr=False)
 
     @property
@@ -146,6 +150,18 @@ class Quantity(Column):
             self, name=WORST + self.name, meaning=meaning, label=label, extreme=WORST_CASE, of=self.name, goal=True
         )
 
+    def of_share(self, share: float) -> Quantity:
+        """What a share of random lamps and cameras has of it: no linear program knows that."""
+        told = f"{100 * share:.10g} %"
+        meaning = (
+            f"at least {told} of random lamps and cameras (`population`, `production`) have this `{self.name}`: the "
+            "mean of those draws that rank right below, before clipping and rounding, with everything on"
+        )
+        label = f"{self.words} of {told} of lamps and cameras"
+        named = replace(self, name=YIELD + self.name, meaning=meaning, label=label, extreme=OF_A_SHARE, of=self.name)
+        unknown = replace(named, apart="", linear=None, promised=False, smooth_members=None)
+        return replace(unknown, rows="values", smooth=self.smooth_drawn, smooth_drawn=None)
+
     def value(self, rows: Rows) -> float:
         """The quantity from its smooth rows."""
         most = self.wanted == "less" and self.rows != "decades"
@@ -165,7 +181,8 @@ class Quantity(Column):
 @dataclass(frozen=True)
 class Asked:
     """What a study asks for: signal types, states that noise may confuse, any place of the light, shifts of edges, a
-    population of its lights, probabilities of detection and separation, tasks, a benchmark of vision, and own metrics.
+    population of its lights and a share of random ones (0: none), probabilities of detection and separation, tasks, a
+    benchmark of vision, and own metrics.
     """
 
     classes: tuple[str, ...]
@@ -173,6 +190,7 @@ class Asked:
     any_place: bool = False
     edge_shift: bool = False
     population: bool = False
+    wanted_yield: float = 0.0
     tasks: tuple[TaskName, ...] = ()
     probabilities: bool = False
     vision: bool = False

@@ -17,9 +17,11 @@ METRICS = tuple(sorted(made_in(columns, Metric), key=lambda metric: metric.order
 
 
 def listed(asked: Asked) -> list[Quantity]:
-    """The columns of a study in order, worst cases last; names of pairs may coincide."""
+    """The columns of a study in order, worst cases and those of a share last; names of pairs may coincide."""
     found = [quantity for metric in METRICS for quantity in metric.quantities(asked)]
-    return found + [worst for quantity in found if (worst := _worst(quantity, asked)) is not None]
+    worst = [own for quantity in found if (own := _worst(quantity, asked)) is not None]
+    drawn = [quantity for quantity in found if asked.wanted_yield and quantity.smooth_drawn is not None]
+    return [*found, *worst, *(quantity.of_share(asked.wanted_yield) for quantity in drawn)]
 
 
 def _worst(quantity: Quantity, asked: Asked) -> Quantity | None:

@@ -17,6 +17,7 @@ from ..types import FloatArray, IndexArray
 from .separation import separation
 
 if TYPE_CHECKING:
+    from .drawn import LampsAndCameras
     from .members import PopulationImager
 
 Made = TypeVar("Made")
@@ -81,10 +82,11 @@ class SmoothDesign:
         free: IndexArray,
         span: FloatArray,
         members: PopulationImager | None = None,
+        drawn: LampsAndCameras | None = None,
     ) -> None:
-        """`members`: the scene with the population of its lights, where quantities over it are asked for."""
+        """`members`, `drawn`: the population of the scene's lights, and draws of it, where quantities ask for them."""
         self.view: View = imager.view
-        self._members = members
+        self._members, self._drawn = members, drawn
         self.family, self.x = family, x
         self.curves = family.curves(x[None])[0]
         self.by_u = family.gradient(x)[free] * span[:, None, None]
@@ -150,6 +152,25 @@ class SmoothDesign:
             values.append(near.squared[some])
             slopes.append(2 * (slope * apart).sum(axis=-1)[:, some])
         return Rows(np.concatenate(values), np.concatenate(slopes, axis=1).T)
+
+    def distance_of_a_share(self, pair: Pair) -> Rows:
+        """What the wanted share of random lamps and cameras has, DN, one row; see `LampsAndCameras.kept`."""
+        assert self._drawn is not None
+        draws, imager = self._drawn.draws(pair), self._drawn.seen.imager
+        made = [self.family.produced(off) if any(off) else self.family for off in draws.offs]
+        curves = np.stack([family.curves(self.x[None])[0] for family in made])
+        value, chosen = self._drawn.kept(curves, pair)
+        slope = np.zeros(self._free.size)
+        if np.isfinite(value):
+            which = np.searchsorted(draws.starts, chosen, side="right") - 1
+            for off in np.unique(which):
+                some, own = chosen[which == off], curves[off]
+                apart = draws.apart(some, imager.smooth(own[None])[0])
+                by_u = made[off].gradient(self.x)[self._free] * self._span[:, None, None]
+                slopes = (draws.apart(some, imager.gradient(own, by_u)) * apart).sum(axis=-1)
+                length = np.linalg.norm(apart, axis=-1)
+                slope += np.divide(slopes, length, out=np.zeros_like(slopes), where=length > 0).sum(axis=1)
+        return Rows(np.array([value]), slope[None] / chosen.size)
 
     @cached_property
     def _response_of_members(self) -> tuple[FloatArray, FloatArray]:

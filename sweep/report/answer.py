@@ -11,7 +11,7 @@ from ..metrics.bound import FEASIBLE
 from ..metrics.columns.confusion import CNR, D_PRIME
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.limiting import limited_by_name
-from ..metrics.quantity import DECADES
+from ..metrics.quantity import DECADES, OF_A_SHARE, WORST_CASE
 from ..results.output import Output
 from ..results.tables import FOUND, PLAIN, SWEPT
 from ..results.thinning import per_light
@@ -82,7 +82,9 @@ def said_separation(output: Output, row: Row) -> str:
     light = f"at {row[CFA_SENSITIVITY]:.3f} {_OF_CLEAR}"
     if separation.pair is None or separation.metric in _BY_NOISE:
         return f"reaches {separation.words} {told} {light}"
-    worst = f" in the worst case of {worst_over(output)}" if separation.extreme else ""
+    worst = f" in the worst case of {worst_over(output)}" if separation.extreme == WORST_CASE else ""
+    if separation.extreme == OF_A_SHARE:
+        worst = separation.words.removeprefix(output.columns[separation.of].words).replace(" of ", " for ", 1)
     return f"separates {' from '.join(separation.pair)} by {told}{worst} {light}"
 
 
@@ -113,7 +115,7 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
         most = separation.told_bound(proven)
         alike = " and moves like it" if moves_with_light(output, best) else ""
         parts.append(f"No filter in its place that meets the same{alike} exceeds {most} (proven, before quantization).")
-    if isinstance(lights, str) and not over_population(output):
+    if isinstance(lights, str) and separation.extreme != OF_A_SHARE and not over_population(output):
         parts.append(f"The two lights that limit it are {lights}.")
     if parts:
         yield " ".join(parts)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..metrics.quantity import WORST
+from ..metrics.quantity import WORST, WORST_CASE
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN
 from .leaders import Row
@@ -17,7 +17,7 @@ from .price import price_lines
 def over_population(output: Output) -> bool:
     """Whether the separation of the trade-off is a worst case over a population of lights."""
     separation = output.trade_off[0]
-    return output.study.population is not None and bool(separation.extreme) and separation.pair is not None
+    return output.study.population is not None and separation.extreme == WORST_CASE and separation.pair is not None
 
 
 def worst_over(output: Output) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import get_args
 
 from ..curves.tasks import Measure, TaskName
-from ..metrics.quantity import Asked
+from ..metrics.quantity import DN, Asked
 from ..metrics.registry import listed
 from .curves import SCHEMA
 from .names import FIGURES, REPORT, RUN, SUMS
@@ -70,6 +70,11 @@ _WORST = (
     "and of a CSD over the population of the lights: then that of the response before clipping and rounding, with "
     "everything on, over all members exactly"
 )
+_OF_A_SHARE = (
+    "the CSD that at least the share `population.wanted_yield` of random lamps and cameras has: the mean of those "
+    "draws that rank right below it, a tenth of all that may have less, before clipping and rounding, with everything "
+    "on"
+)
 _OWN = (
     "a metric of the study's `metrics`, the worst over moments and places of the lattice; nothing is promised of it: "
     "the tolerance in DN is of CSDs"
@@ -88,6 +93,7 @@ def columns_table() -> list[str]:
         rows.append(_row((quantity.name,), quantity.unit, quantity.meaning))
     rows.append(_row(("<own metric>",), "its own", _OWN))
     rows.append(_row(("worst_<quantity>",), "", _WORST))
+    rows.append(_row(("yield_csd_<a>_<b>",), DN, _OF_A_SHARE))
     rows += [_row(names, "", meaning) for names, meaning in _VERDICTS.items()]
     return ["| column | unit | meaning |", "| --- | --- | --- |", *rows]
 

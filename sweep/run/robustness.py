@@ -15,17 +15,16 @@ from ..camera.view import View
 from ..curves.lights import Pair
 from ..designs.space import Space
 from ..designs.tolerance import AS_DESIGNED, Off, Tolerance
+from ..metrics.drawn import draws_of
 from ..metrics.members import PopulationImager, population_imager
 from ..metrics.separation import csd_name
 from ..results.designs import row_space
 from ..results.tables import FEW, PLAIN
 from ..study import Study
-from ..types import FloatArray, IndexArray, Parallel, Progress, delayed
+from ..types import FloatArray, Parallel, Progress, delayed
 
 _LARGEST, _STEP, _HALVINGS = 3.0, 0.25, 6
 """Times the population that are looked at, the steps in which, and how often the last of these is halved."""
-_PARTS, _PARTS_OF_BOTH = 101, 25
-"""Equal parts of the range of a tolerance, and of each where there are two; what is drawn is the middle of one."""
 _Z = 1.959963984540054
 """Of a two-sided 95 % interval of a normal distribution."""
 _FIELDS = [
@@ -162,54 +161,13 @@ def drawn_dn(design: Candidate, pair: Pair, seed: int) -> FloatArray:
 
     Every number is drawn whatever the design, so that all designs see the same lamps and cameras.
     """
-    lights, population = design.view.lights, design.view.lights.population
-    assert population is not None
     imager = population_imager(design.view)
-    members = imager.members
-    rng, n = np.random.default_rng([seed, 1]), population.draws
-    ambient, heating, u, chosen, edge, place, film = (rng.random((n, k)) for k in (2, 2, 2, 4, 1, 1, 1))
-    if population.temperatures == "common":
-        ambient, heating = (np.repeat(values[:, :1], 2, axis=1) for values in (ambient, heating))
-    low, high = population.temperature_c
-    warmer = low + ambient * (high - low) + heating * population.self_heating_k - population.reference_c
-    rows, shifts = [], []
-    for side, kind in enumerate(pair):
-        signals, starts = lights.members[kind], members.rows[kind]
-        at = np.minimum((chosen[:, side] * signals.size).astype(int), signals.size - 1)
-        width = np.minimum((chosen[:, 2 + side] * len(population.width)).astype(int), len(population.width) - 1)
-        drifts = np.array([population.drift(kind, lights.names[s]) for s in signals], dtype=float)
-        own = np.array([population.own_nm(kind, lights.names[s]) for s in signals])
-        rows.append(starts[at * len(population.width) + width])
-        shifts.append(drifts[at] * warmer[:, side] + own[at, 0] + u[:, side] * (own[at, 1] - own[at, 0]))
-    offs, which = _drawn_offs(design, edge[:, 0], film[:, 0])
-    found = np.empty(n)
-    for number in np.unique(which):
-        response = imager.imager.smooth(design.curves(offs[number]))[0]
-        some = np.flatnonzero(which == number)
-        case = np.minimum((place[some, 0] * len(response)).astype(int), len(response) - 1)
-        sides = [_at(response, case, rows[k][some], members.steps_of(shifts[k][some])) for k in range(2)]
-        found[some] = np.linalg.norm(sides[0] - sides[1], axis=1)
-    return found
-
-
-def _drawn_offs(design: Candidate, edge: FloatArray, film: FloatArray) -> tuple[list[Off], IndexArray]:
-    """How filters come out, and which of these each draw is: from numbers in 0..1, ndarray[n_draws] each."""
     tolerance = design.tolerance if design.space.filter is not None else Tolerance()
-    kinds = tolerance.edge_shift_nm > 0, tolerance.thickness > 0
-    parts = _PARTS_OF_BOTH if all(kinds) else _PARTS
-    edges, films = (parts if kind else 1 for kind in kinds)
-    middles = [[(2 * number + 1) / count - 1 for number in range(count)] for count in (edges, films)]
-    places = [np.minimum((drawn * count).astype(np.intp), count - 1) for drawn, count in ((edge, edges), (film, films))]
-    return [tolerance.at(one, other) for one in middles[0] for other in middles[1]], places[0] * films + places[1]
-
-
-def _at(response: FloatArray, case: Any, rows: Any, steps: FloatArray) -> FloatArray:
-    """What spectra give that are shifted by so many steps from the first of their rows, ndarray[n, n_channels]."""
-    below = np.floor(steps).astype(int)
-    share = (steps - below)[:, None]
-    last = response.shape[1] - 1
-    low, high = response[case, rows + below], response[case, np.minimum(rows + below + 1, last)]
-    return np.asarray(low + share * (high - low), dtype=float)
+    draws = draws_of(imager.members, pair, tolerance, (seed, 1))
+    found = np.empty(draws.size)
+    for number, off in enumerate(draws.offs):
+        draws.distances(number, imager.imager.smooth(design.curves(off))[0], found)
+    return found
 
 
 def yield_interval(kept: int, n: int) -> tuple[float, float]:

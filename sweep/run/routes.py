@@ -19,7 +19,7 @@ from ..designs.tolerance import AS_DESIGNED, Tolerance
 from ..metrics.evaluate import evaluate, family_quantities, image_quantities
 from ..metrics.objective import COMBINED, Objective, columns_of
 from ..metrics.own import OwnMetric
-from ..metrics.quantity import WORST_CASE, Asked, Columns, Quantity
+from ..metrics.quantity import OF_A_SHARE, WORST_CASE, YIELD, Asked, Columns, Quantity
 from ..types import FloatArray
 from ..vision.section import Vision
 
@@ -97,6 +97,8 @@ def _columns(space: Space, view: View, points: FloatArray, request: Request, blo
     worst = [quantity for quantity in request.quantities.values() if quantity.extreme == WORST_CASE]
     if worst:
         columns |= worst_cases(space, imager, points, columns, worst, request.tolerance, asked.own)
+    if request.asked.wanted_yield:
+        columns |= of_a_share(space, view, points, request)
     if request.objective.column == COMBINED:
         columns[COMBINED] = request.objective.of(columns)
     return columns
@@ -125,6 +127,18 @@ def worst_cases(
         members = population_imager(view)
         cases = [case | members.worst(shifted) for case, shifted in zip(cases, curves, strict=True)]
     return {quantity.name: quantity.worse([case[quantity.of] for case in cases]) for quantity in worst}
+
+
+def of_a_share(space: Space, view: View, points: FloatArray, request: Request) -> Columns:
+    """What the wanted share of random lamps and cameras has of each design, see `LampsAndCameras`."""
+    from ..metrics.drawn import LampsAndCameras  # noqa: PLC0415  (only where a share of lamps and cameras counts)
+    from ..metrics.members import population_imager  # noqa: PLC0415
+
+    tolerance = request.tolerance if space.filter is not None else Tolerance()
+    drawn = LampsAndCameras(population_imager(view), tolerance, request.seed)
+    pairs = [q.pair for q in request.quantities.values() if q.extreme == OF_A_SHARE and q.pair is not None]
+    found = drawn.columns(lambda off: space.curves(points, view.grid.size, off), pairs)
+    return {YIELD + name: values for name, values in found.items()}
 
 
 def _one_by_one(

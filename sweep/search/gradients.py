@@ -27,6 +27,7 @@ from ..types import FloatArray, IndexArray
 from .problem import Evaluation, Problem, SearchRun
 
 if TYPE_CHECKING:
+    from ..metrics.drawn import LampsAndCameras
     from ..metrics.members import PopulationImager
 
 BACK_OFF = 1e-8
@@ -70,6 +71,12 @@ def _members_of(view: View) -> PopulationImager:
     return population_imager(view)
 
 
+def _drawn_of(problem: Problem) -> LampsAndCameras:
+    from ..metrics.drawn import LampsAndCameras  # noqa: PLC0415  (only where a share of lamps and cameras counts)
+
+    return LampsAndCameras(_members_of(problem.view), problem.tolerance, problem.seed)
+
+
 def _finite(point: Point) -> Point:
     """The point as it is, or with zeros for what is not a number: a NaN would end the search; it is never feasible."""
     if point.terms.finite and point.conditions.finite and np.isfinite(point.evaluation.objective):
@@ -103,6 +110,7 @@ class Model:
         self._families = {off: problem.family.produced(off) if any(off) else problem.family for off in places}
         over = any(problem.over_population(name) for name in wanted)
         self._members = _members_of(problem.view) if over else None
+        self._drawn = _drawn_of(problem) if any(problem.of_a_share(name) for name in wanted) else None
         wanted_less = self._rule.wanted == "less"
         self._power = 1 if problem.signed_goal or wanted_less else 2  # what may be below 0 has no root
         self._back_off = {name: _back_off(problem, name, bound) for name, bound in problem.constraints.items()}
@@ -137,7 +145,7 @@ class Model:
         problem, free = self._problem, self._free
         x = problem.from_unit(u)
         made = {
-            off: SmoothDesign(self._imager, family, x, free, self._span, self._members)
+            off: SmoothDesign(self._imager, family, x, free, self._span, self._members, self._drawn)
             for off, family in self._families.items()
         }
         terms, objective = self._terms(made)

@@ -15,7 +15,7 @@ from ..designs.tolerance import AS_DESIGNED, Off, Tolerance
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.objective import Objective
 from ..metrics.own import OwnMetric
-from ..metrics.quantity import DN, WORST_CASE, Asked, Quantity
+from ..metrics.quantity import DN, OF_A_SHARE, WORST_CASE, Asked, Quantity
 from ..metrics.registry import quantities_of
 from ..types import FloatArray, IndexArray
 
@@ -26,7 +26,7 @@ class Problem:
 
     Quantities are those of `metrics.registry` with smooth rows; the worst ones are over edges that come out up to
     `edge_shift_nm` and films that come out up to the share `thickness` off, and over the population of the view's
-    lights. `states`: signal types that noise may confuse.
+    lights. `states`: signal types that noise may confuse; `seed`: of random lamps and cameras.
     """
 
     view: View
@@ -39,13 +39,16 @@ class Problem:
     states: tuple[str, ...] = ()
     thickness: float = 0.0
     own: tuple[OwnMetric, ...] = ()
+    seed: int = 0
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
         """What objective and constraints may name."""
         tasks = () if self.view.tasks is None else self.view.tasks.keys
         asked = Asked(self.view.lights.classes, self.states, edge_shift=True, tasks=tasks, own=self.own)
-        return quantities_of(replace(asked, population=self.population))
+        population = self.view.lights.population
+        wanted = 0.0 if population is None else population.wanted_yield or 0.0
+        return quantities_of(replace(asked, population=self.population, wanted_yield=wanted))
 
     @property
     def population(self) -> bool:
@@ -55,6 +58,10 @@ class Problem:
     def over_population(self, quantity: str) -> bool:
         """Whether a quantity is a worst case over the population of the lights."""
         return self.population and self.worst_distance(quantity)
+
+    def of_a_share(self, quantity: str) -> bool:
+        """Whether a quantity is what a share of random lamps and cameras has."""
+        return self.quantities[quantity].extreme == OF_A_SHARE
 
     def worst_distance(self, quantity: str) -> bool:
         """Whether a quantity is the worst case of a CSD."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from ..metrics.bound import Bound
-from ..metrics.quantity import DN, WORST_CASE, Asked, Quantity
+from ..metrics.quantity import DN, OF_A_SHARE, WORST_CASE, Asked, Quantity
 from ..metrics.registry import quantities_of
 from .schema import StudySection
 from .sources import Sources
@@ -72,6 +72,8 @@ def _is_known(
     if shifted is not None and shifted.extreme == WORST_CASE and not section.production.tolerance:
         needed = "`production.edge_shift_nm`" + (" or `population`" if shifted.apart == DN else "")
         sources.add(path, f"{name} needs {needed}", None, "a shift above 0")
+    elif name in {n for n, q in quantities_of(replace(asked, wanted_yield=1.0)).items() if q.extreme == OF_A_SHARE}:
+        sources.add(path, f"{name} needs `population.wanted_yield`", None, "a share, such as 0.99")
     elif not asked.states and name in {*quantities_of(replace(asked, states=asked.classes))} - {*quantities_of(asked)}:
         sources.add(path, f"{name} needs `recognition`", None, "`recognition: {}`, and noise in every scenario")
     else:

@@ -110,6 +110,7 @@ class Study:
             edge_shift=bool(self.tolerance),
             probabilities=recognition is not None and recognition.probabilities,
             population=self.section.population is not None,
+            wanted_yield=self.section.wanted_yield,
             tasks=() if self.tasks is None else self.tasks.keys,
             vision=self.section.vision is not None,
             own=self.own,
@@ -260,6 +261,7 @@ class Study:
             states=self.states,
             thickness=self.tolerance.thickness,
             own=self.own,
+            seed=self.section.seed,
         )
 
 

@@ -155,6 +155,7 @@ class _Resolver:
             edge_shift=shifts,
             probabilities=recognition is not None and recognition.probabilities,
             population=self.section.population is not None,
+            wanted_yield=self.section.wanted_yield,
             tasks=() if self.tasks is None else self.tasks.keys,
             vision=self.section.vision is not None,
             own=self.own,

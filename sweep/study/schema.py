@@ -289,3 +289,8 @@ class StudySection(Documented):
     """How designs do on lights that they have not seen."""
     published: dict[Name, dict[Name, dict[Name, Number]]] = {}
     """Printed figures to compare with: table -> CFA, design or geometry -> quantity -> value."""
+
+    @property
+    def wanted_yield(self) -> float:
+        """The share of random lamps and cameras of which quantities tell what it has; 0: none."""
+        return 0.0 if self.population is None else self.population.wanted_yield or 0.0

@@ -42,6 +42,7 @@ class ColorSeparation(ReadoutMetric):
                 apart="DN",
                 smooth=partial(_squared, pair=pair),
                 smooth_members=partial(_squared_of_members, pair=pair),
+                smooth_drawn=partial(_of_a_share, pair=pair),
             )
             for pair in class_pairs(asked.classes)
         ]
@@ -62,6 +63,7 @@ class ColorSeparation(ReadoutMetric):
                 apart="",
                 smooth=None,
                 smooth_members=None,
+                smooth_drawn=None,
             )
             for each in nearest
         ]
@@ -78,3 +80,7 @@ def _squared(design: SmoothDesign, *, pair: tuple[str, str]) -> Rows:
 
 def _squared_of_members(design: SmoothDesign, *, pair: tuple[str, str]) -> Rows:
     return design.squared_distances_of_members(pair)
+
+
+def _of_a_share(design: SmoothDesign, *, pair: tuple[str, str]) -> Rows:
+    return design.distance_of_a_share(pair)

@@ -1,0 +1,165 @@
+"""Random lamps and cameras: draws of two lights and of how a filter comes out, the same for all designs.
+
+The distance that the wanted share of them has is an order statistic, whose derivative is that of a single draw. What is
+told and searched is the mean of the draws that rank right below it instead, a tenth of those that may have less: its
+derivative is the mean of theirs, which changes little as draws pass one another, and it is never above the order
+statistic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..curves.lights import Pair
+from ..curves.members import Members
+from ..designs.tolerance import Off, Tolerance
+from ..types import FloatArray, IndexArray
+from .members import PopulationImager
+from .separation import csd_name
+
+_PARTS, _PARTS_OF_BOTH = 101, 25
+"""Equal parts of the range of a tolerance, and of each where there are two; what is drawn is the middle of one."""
+_NEAR = 0.1
+"""Of the draws that may have less: the share of them whose mean is taken."""
+_HELD = 4_000_000
+"""Values of responses that are held at once."""
+
+
+@dataclass(frozen=True)
+class Draws:
+    """Two lights and a camera each, those whose filters come out alike one after the other.
+
+    `offs`: how filters come out; `starts`: where the draws of each begin, and the end. `below`, `share`: of both lights
+    the spectrum below their shift, and how far above it, ndarray[n, 2]; `place`: of the field, 0 to 1, ndarray[n].
+    """
+
+    offs: tuple[Off, ...]
+    starts: IndexArray
+    below: IndexArray
+    share: FloatArray
+    place: FloatArray
+
+    @property
+    def size(self) -> int:
+        """How many there are."""
+        return int(self.place.size)
+
+    def of(self, off: int) -> slice:
+        """Those whose filter comes out in one of the ways."""
+        return slice(int(self.starts[off]), int(self.starts[off + 1]))
+
+    def cases(self, some: slice | IndexArray, n_cases: int) -> IndexArray:
+        """The place of the field of some draws."""
+        return np.minimum((self.place[some] * n_cases).astype(np.intp), n_cases - 1)
+
+    def distances(self, off: int, response: FloatArray, out: FloatArray) -> None:
+        """Puts the distances of those whose filter comes out in one of the ways into `out`, DN, ndarray[n].
+
+        `response`: of that filter to every spectrum, ndarray[n_cases, n_spectra, n_channels].
+        """
+        from .compiled_members import drawn_distances  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+        own = self.of(off)
+        cases = self.cases(own, len(response))
+        drawn_distances(np.ascontiguousarray(response), cases, self.below[own], self.share[own], out[own])
+
+    def apart(self, some: IndexArray, response: FloatArray) -> FloatArray:
+        """First minus second light of some draws: ndarray[..., n_cases, n_spectra, n] -> ndarray[..., n_some, n]."""
+        case, below, share = self.cases(some, response.shape[-3]), self.below[some], self.share[some]
+        low, high = (response[..., case[:, None], below + step, :] for step in (0, 1))
+        both = low + share[..., None] * (high - low)
+        return np.asarray(both[..., 0, :] - both[..., 1, :], dtype=float)
+
+
+def draws_of(members: Members, pair: Pair, tolerance: Tolerance, seed: Sequence[int]) -> Draws:
+    """The draws of two types, evenly; every number is drawn whatever the design, so that all see the same."""
+    population = members.population
+    rng, n = np.random.default_rng(seed), population.draws
+    ambient, heating, u, chosen, edge, place, film = (rng.random((n, k)) for k in (2, 2, 2, 4, 1, 1, 1))
+    if population.temperatures == "common":
+        ambient, heating = (np.repeat(values[:, :1], 2, axis=1) for values in (ambient, heating))
+    low, high = population.temperature_c
+    warmer = low + ambient * (high - low) + heating * population.self_heating_k - population.reference_c
+    rows, steps, widths = [], [], len(population.width)
+    for side, kind in enumerate(pair):
+        starts = members.rows[kind]
+        signals = starts.size // widths
+        at = np.minimum((chosen[:, side] * signals).astype(int), signals - 1)
+        width = np.minimum((chosen[:, 2 + side] * widths).astype(int), widths - 1)
+        known = [members.drift_and_own(members.signal(int(row))) for row in starts[::widths]]
+        drifts, own = np.array([drift for drift, _ in known]), np.array([ends for _, ends in known])
+        nm = drifts[at] * warmer[:, side] + own[at, 0] + u[:, side] * (own[at, 1] - own[at, 0])
+        rows.append(starts[at * widths + width])
+        steps.append(members.steps_of(nm))
+    first, shifts = np.stack(rows, axis=1), np.stack(steps, axis=1)
+    below = np.minimum(np.floor(shifts).astype(np.intp), members.n_steps - 2)
+    offs, which = _offs(tolerance, edge[:, 0], film[:, 0])
+    order = np.argsort(which, kind="stable")
+    starts = np.searchsorted(which[order], np.arange(len(offs) + 1))
+    return Draws(offs, starts, (first + below)[order], (shifts - below)[order], place[order, 0])
+
+
+def _offs(tolerance: Tolerance, edge: FloatArray, film: FloatArray) -> tuple[tuple[Off, ...], IndexArray]:
+    """How filters come out, and which of these each draw is: from numbers in 0..1, ndarray[n_draws] each."""
+    kinds = tolerance.edge_shift_nm > 0, tolerance.thickness > 0
+    parts = _PARTS_OF_BOTH if all(kinds) else _PARTS
+    edges, films = (parts if kind else 1 for kind in kinds)
+    middles = [[(2 * number + 1) / count - 1 for number in range(count)] for count in (edges, films)]
+    places = [np.minimum((drawn * count).astype(np.intp), count - 1) for drawn, count in ((edge, edges), (film, films))]
+    offs = tuple(tolerance.at(one, other) for one in middles[0] for other in middles[1])
+    return offs, places[0] * films + places[1]
+
+
+class LampsAndCameras:
+    """The draws of a scene, made once for each two types; others than those by which a yield is counted in the end."""
+
+    def __init__(self, seen: PopulationImager, tolerance: Tolerance, seed: int) -> None:
+        """`seen`: the scene with all members of its lights, of which a share is wanted."""
+        self.seen, self._tolerance, self._seed = seen, tolerance, seed
+        self._draws: dict[Pair, Draws] = {}
+
+    def draws(self, pair: Pair) -> Draws:
+        """Those of two types."""
+        if pair not in self._draws:
+            self._draws[pair] = draws_of(self.seen.members, pair, self._tolerance, (self._seed, 2))
+        return self._draws[pair]
+
+    def kept(self, curves: FloatArray, pair: Pair) -> tuple[float, IndexArray]:
+        """What the wanted share of lamps and cameras has of a design, DN, and the draws of which that is the mean.
+
+        `curves`: how it comes out, in the order of the draws' `offs`, ndarray[n_offs, n_modified, n_wavelengths]. NaN
+        where a response is no number.
+        """
+        draws, imager = self.draws(pair), self.seen.imager
+        found = np.empty(draws.size)
+        step = max(1, _HELD // (imager.n_cases * self.seen.view.lights.photons.shape[0] * len(self.seen.view.qe)))
+        for start in range(0, len(curves), step):
+            for off, response in enumerate(imager.smooth(curves[start : start + step]), start):
+                draws.distances(off, response, found)
+        below, count = self._ranks
+        chosen = np.argsort(found, kind="stable")[below - count : below]
+        return (float(found[chosen].mean()) if np.isfinite(found).all() else np.nan), chosen
+
+    def columns(self, made: Callable[[Off], FloatArray], pairs: Sequence[Pair]) -> dict[str, FloatArray]:
+        """The same of several designs for each pair, by the name of its CSD, ndarray[n_designs].
+
+        `made`: how designs come out, ndarray[n_designs, n_modified, n_wavelengths].
+        """
+        curves = [made(off) for off in self.draws(pairs[0]).offs]
+        return {
+            csd_name(pair): np.array(
+                [self.kept(np.stack([each[at] for each in curves]), pair)[0] for at in range(len(curves[0]))]
+            )
+            for pair in pairs
+        }
+
+    @property
+    def _ranks(self) -> tuple[int, int]:
+        """How many draws may have less than what the wanted share has, and of how many of these the mean is taken."""
+        population = self.seen.members.population
+        assert population.wanted_yield is not None
+        below = population.draws_below(population.wanted_yield)
+        return below, max(1, round(_NEAR * below))

@@ -1,0 +1,147 @@
+"""The CSD that a share of random lamps and cameras has: as a column, an objective, a constraint."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from sweep.errors import StudyError
+from sweep.metrics.objective import Objective
+from sweep.report.summary import summary_lines
+from sweep.results.output import read_output
+from sweep.results.tables import RESULTS
+from sweep.run.robustness import Candidate, drawn_dn, yield_interval
+from sweep.search.gradients import Model
+from sweep.search.limit import why_not
+from sweep.search.problem import Problem, SearchRun, best_feasible, starting_points
+from sweep.search.solver import search_from
+from sweep.study import Search, Study, load_study
+
+from ..build import ran
+from ..conftest import STUDIES
+
+TEXT = """\
+study: share
+sensor: ar0820
+lights: tl16
+cfas: [RGGB, RYNCy]
+population: {temperature_c: [-40, 85], self_heating_k: 20, binning_nm: 2, wanted_yield: 0.99, draws: 4000}
+production: {edge_shift_nm: 2}
+sweeps:
+  edges:
+    {cfa: RYNCy, channel: N, base: Y, to: G, grid: {left_nm: [612, 620], left_width_nm: 6, right_nm: [650, 658], right_width_nm: 6}}
+objective: sensitivity
+constraints: {yield_csd_yellow_red: {min: 190}}
+search: {starts: 2, max_evaluations: 60}
+"""
+YELLOW_RED = ("yellow", "red")
+
+
+def study(folder: Path) -> Study:
+    path = folder / "share.yaml"
+    path.write_text(TEXT)
+    return load_study(path)
+
+
+@cache
+def lamps() -> tuple[Study, Search]:
+    """The stopbands of `stopband.yaml`, for random lamps and cameras."""
+    changes = {
+        "population": "{temperature_c: [-40, 85], self_heating_k: 20, binning_nm: 2, wanted_yield: 0.99, draws: 4000}",
+        "production": "{edge_shift_nm: 2}",
+        "objective": "yield_csd_yellow_red",
+    }
+    loaded = load_study(STUDIES / "stopband.yaml", changes=changes)
+    assert loaded.search is not None
+    return loaded, loaded.search
+
+
+def problem(objective: str = "yield_csd_yellow_red") -> Problem:
+    loaded, search = lamps()
+    return replace(loaded.problem(search), objective=Objective(minimum={objective: 1.0}))
+
+
+@pytest.mark.parametrize("thickness", [0.0, 0.004])
+def test_its_derivative_is_exact(thickness: float) -> None:
+    model = Model(replace(problem(), thickness=thickness), SearchRun(0), 1000)
+    for u in starting_points(problem(), 2, 5)[: 2 if not thickness else 1]:
+        slopes = model.at(u).terms.by_u[0] / (2 * model.at(u).evaluation.objective)  # its terms are squares
+        for free, slope in enumerate(slopes):
+            step = np.zeros(u.size)
+            step[free] = 1e-6
+            above, below = (model.at(u + sign * step).evaluation.objective for sign in (1, -1))
+            assert (above - below) / 2e-6 == pytest.approx(slope, rel=1e-6, abs=1e-6 * np.abs(slopes).max())
+
+
+def share_with(x: np.ndarray, wanted_dn: float, draws: int = 200_000) -> tuple[float, float]:
+    """The 95 % interval of the share of other draws that has a distance."""
+    study, search = lamps()
+    view = study.view(search.space, search.scenario)
+    assert view.lights.population is not None
+    many = replace(view.lights, population=view.lights.population.model_copy(update={"draws": draws}))
+    design = Candidate(replace(view, lights=many), search.space, x[None], study.tolerance)
+    return yield_interval(int((drawn_dn(design, YELLOW_RED, 77) >= wanted_dn).sum()), draws)
+
+
+@pytest.mark.slow
+def test_the_best_by_yield_has_the_share_and_no_other_optimum_has_a_larger_one() -> None:
+    found = {}
+    for name in ("yield_csd_yellow_red", "worst_csd_yellow_red", "csd_yellow_red"):
+        asked = problem(name)
+        log = [e for i, u in enumerate(starting_points(asked, 2, 1)) for e in search_from(asked, i, u, "SLSQP", 80).log]
+        best = best_feasible(log)
+        assert best is not None
+        found[name] = best
+    best, *others = found.values()
+    low, high = share_with(best.x, best.objective)
+    assert high >= 0.99
+    assert low <= 0.995  # ranks right below, not far below
+    for other in others:
+        assert share_with(other.x, best.objective)[0] <= high
+    assert share_with(found["csd_yellow_red"].x, best.objective)[1] < low - 0.01
+
+
+@pytest.mark.slow
+def test_as_column_and_constraint_any_number_of_workers_gives_the_same(tmp_path: Path) -> None:
+    given = study(tmp_path)
+    tables = []
+    for jobs in (1, 2):
+        ran(given, tmp_path / f"out{jobs}", jobs)
+        tables.append(pq.read_table(tmp_path / f"out{jobs}" / RESULTS))
+    assert tables[0].equals(tables[1])
+    rows = tables[0].to_pandas()
+    assert (rows["yield_csd_yellow_red"] > rows["worst_csd_yellow_red"]).all()
+    filters = rows[rows["cfa"] == "RYNCy"]
+    assert (filters["feasible"] == (filters["violation"] <= 1e-6)).all()
+    assert 0 < filters["feasible"].sum() < len(filters)
+    answer = filters[filters["kind"] == "search"].iloc[0]
+    assert answer["feasible"]
+    assert answer["yield_csd_yellow_red"] == pytest.approx(190.0, rel=1e-4)  # it binds: more light costs yield
+    said = "\n".join(summary_lines(read_output(tmp_path / "out1")))
+    assert re.search(r"separates yellow from red by 190 DN for 99 % of lamps and cameras at 0\.\d+ of a clear", said)
+    assert why_not(problem()) == "yield_csd_yellow_red is not linear in the filter"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        (
+            "wanted_yield: 0.99, ",
+            "",
+            "yield_csd_yellow_red needs `population.wanted_yield`; allowed: a share, such as 0.99",
+        ),
+        ("draws: 4000", "draws: 500", "wanted_yield 0.99 needs at least 1,000 `draws`, not 500"),
+        ("wanted_yield: 0.99", "wanted_yield: 99", "population.wanted_yield"),
+    ],
+)
+def test_what_does_not_fit_is_told(tmp_path: Path, old: str, new: str, told: str) -> None:
+    path = tmp_path / "share.yaml"
+    path.write_text(TEXT.replace(old, new))
+    with pytest.raises(StudyError, match=re.escape(told)):
+        load_study(path)
