@@ -14,6 +14,7 @@ from ..camera.view import View
 from ..curves.lights import Pair
 from ..designs.family import Family
 from ..types import FloatArray, IndexArray
+from ..vision.section import SeededVision
 from .separation import separation
 
 if TYPE_CHECKING:
@@ -81,8 +82,12 @@ class SmoothDesign:
         free: IndexArray,
         span: FloatArray,
         members: PopulationImager | None = None,
+        images: SeededVision | None = None,
     ) -> None:
-        """`members`: the scene with the population of its lights, where quantities over it are asked for."""
+        """`members`: the scene with the population of its lights, where quantities over it are asked for; `images`: the
+        same of images of signal heads.
+        """
+        self.images = images
         self.view: View = imager.view
         self._members = members
         self.family, self.x = family, x

@@ -121,7 +121,7 @@ class Model:
         problem, free = self._problem, self._problem.free
         x = problem.from_unit(u)
         made = {
-            off: SmoothDesign(self._imager, family, x, free, self._span, self._members)
+            off: SmoothDesign(self._imager, family, x, free, self._span, self._members, problem.vision)
             for off, family in self._families.items()
         }
         terms, objective = self._terms(made)

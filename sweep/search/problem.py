@@ -17,6 +17,7 @@ from ..metrics.own import OwnMetric
 from ..metrics.quantity import DN, WORST_CASE, Asked, Quantity
 from ..metrics.registry import quantities_of
 from ..types import FloatArray, IndexArray
+from ..vision.section import SeededVision
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class Problem:
 
     Quantities are those of `metrics.registry` with smooth rows; the worst ones are over edges that come out up to
     `edge_shift_nm` and films that come out up to the share `thickness` off, and over the population of the view's
-    lights. `states`: signal types that noise may confuse.
+    lights. `states`: signal types that noise may confuse. `vision`: images that readers of signal heads are shown.
     """
 
     view: View
@@ -38,13 +39,14 @@ class Problem:
     states: tuple[str, ...] = ()
     thickness: float = 0.0
     own: tuple[OwnMetric, ...] = ()
+    vision: SeededVision | None = None
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
         """What objective and constraints may name."""
         tasks = () if self.view.tasks is None else self.view.tasks.keys
         asked = Asked(self.view.lights.classes, self.states, edge_shift=True, tasks=tasks, own=self.own)
-        return quantities_of(replace(asked, population=self.population))
+        return quantities_of(replace(asked, population=self.population, vision=self.vision is not None))
 
     @property
     def population(self) -> bool:

@@ -32,6 +32,7 @@ from ..metrics.own import OwnMetric
 from ..metrics.quantity import Asked, Quantity
 from ..metrics.separation import csd_name
 from ..search.problem import Problem
+from ..vision.section import SeededVision
 from .schema import StudySection
 
 
@@ -242,7 +243,14 @@ class Study:
             states=self.states,
             thickness=self.tolerance.thickness,
             own=self.own,
+            vision=self.images,
         )
+
+    @property
+    def images(self) -> SeededVision | None:
+        """The benchmark of vision, where the study asks for one."""
+        vision = self.section.vision
+        return None if vision is None else SeededVision(vision, self.section.seed)
 
 
 @contextmanager
