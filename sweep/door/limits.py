@@ -33,6 +33,7 @@ def any_filter(study: Study, view: View) -> Problem:
         states=study.states,
         thickness=study.tolerance.thickness,
         own=study.own,
+        vision=study.images,
     )
 
 

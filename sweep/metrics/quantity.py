@@ -111,8 +111,9 @@ class Quantity(Column):
     `infinite`: it may be so. `signed`: it may be below 0. `promised`: a plan's promise holds for it. `rows`: what its
     smooth rows are: its values, their squares, or their number of decades below 1, -log10. `apart`: it is the smallest
     distance of two signals, in DN or in units of the noise. `most`: no filter reaches more. `share`: it is the smallest
-    ratio of N to the curve that N replaces. `states`: the signal types that noise may confuse in it. `smooth_members`:
-    its smooth rows over the population of the lights; `smooth_drawn`: over random lamps and cameras.
+    ratio of N to the curve that N replaces. `states`: the signal types that noise may confuse in it. `slopes`: its rows
+    have derivatives, else only searches without these know it. `smooth_members`: its smooth rows over the population of
+    the lights; `smooth_drawn`: over random lamps and cameras.
     """
 
     ends: tuple[End, ...] = ()
@@ -127,6 +128,7 @@ class Quantity(Column):
     most: float = np.inf
     share: bool = False
     states: tuple[str, ...] = ()
+    slopes: bool = True
     smooth: Callable[[SmoothDesign], Rows] | None = field(default=None, repr=False)
     smooth_members: Callable[[SmoothDesign], Rows] | None = field(default=None, repr=False)
     smooth_drawn: Callable[[SmoothDesign], Rows] | None = field(default=None, repr=False)

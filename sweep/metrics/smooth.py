@@ -14,6 +14,7 @@ from ..camera.view import View
 from ..curves.lights import Pair
 from ..designs.family import Family
 from ..types import FloatArray, IndexArray
+from ..vision.section import SeededVision
 from .separation import separation
 
 if TYPE_CHECKING:
@@ -83,8 +84,13 @@ class SmoothDesign:
         span: FloatArray,
         members: PopulationImager | None = None,
         drawn: LampsAndCameras | None = None,
+        images: SeededVision | None = None,
     ) -> None:
-        """`members`, `drawn`: the population of the scene's lights, and draws of it, where quantities ask for them."""
+        """`members`, `drawn`: the population of the scene's lights, and draws of it, where quantities ask for them.
+
+        `images`: the same of images of signal heads.
+        """
+        self.images = images
         self.view: View = imager.view
         self._members, self._drawn = members, drawn
         self.family, self.x = family, x

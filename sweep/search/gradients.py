@@ -145,7 +145,7 @@ class Model:
         problem, free = self._problem, self._free
         x = problem.from_unit(u)
         made = {
-            off: SmoothDesign(self._imager, family, x, free, self._span, self._members, self._drawn)
+            off: SmoothDesign(self._imager, family, x, free, self._span, self._members, self._drawn, problem.vision)
             for off, family in self._families.items()
         }
         terms, objective = self._terms(made)

@@ -18,6 +18,7 @@ from ..metrics.own import OwnMetric
 from ..metrics.quantity import DN, OF_A_SHARE, WORST_CASE, Asked, Quantity
 from ..metrics.registry import quantities_of
 from ..types import FloatArray, IndexArray
+from ..vision.section import SeededVision
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,8 @@ class Problem:
 
     Quantities are those of `metrics.registry` with smooth rows; the worst ones are over edges that come out up to
     `edge_shift_nm` and films that come out up to the share `thickness` off, and over the population of the view's
-    lights. `states`: signal types that noise may confuse; `seed`: of random lamps and cameras.
+    lights. `states`: signal types that noise may confuse; `seed`: of random lamps and cameras; `vision`: images that
+    readers of signal heads are shown.
     """
 
     view: View
@@ -40,6 +42,7 @@ class Problem:
     thickness: float = 0.0
     own: tuple[OwnMetric, ...] = ()
     seed: int = 0
+    vision: SeededVision | None = None
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
@@ -48,7 +51,8 @@ class Problem:
         asked = Asked(self.view.lights.classes, self.states, edge_shift=True, tasks=tasks, own=self.own)
         population = self.view.lights.population
         wanted = 0.0 if population is None else population.wanted_yield or 0.0
-        return quantities_of(replace(asked, population=self.population, wanted_yield=wanted))
+        asked = replace(asked, population=self.population, wanted_yield=wanted, vision=self.vision is not None)
+        return quantities_of(asked)
 
     @property
     def population(self) -> bool:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from ..metrics.bound import Bound
 from ..metrics.quantity import DN, OF_A_SHARE, WORST_CASE, Asked, Quantity
 from ..metrics.registry import quantities_of
+from ..search.solver import DIRECT, GRADIENT
 from .schema import StudySection
 from .sources import Sources
 from .yaml_tree import Key
@@ -30,6 +31,7 @@ def check_goals(section: StudySection, sources: Sources, asked: Asked) -> None:
             continue
         if known[name].smooth is None and section.search is not None:
             sources.add(path, f"the search does not know {name}", None, "a study without `search`")
+        _check_slopes(path, known[name], section, sources)
         _check_ends(path, known[name], bound, sources)
 
 
@@ -41,9 +43,17 @@ def _check_objective(section: StudySection, sources: Sources, asked: Asked, know
         path: tuple[Key, ...] = ("objective", rule.name, name) if isinstance(given, dict) else ("objective",)
         if not _is_known(path, "objective", name, goals, section, sources, asked):
             continue
+        _check_slopes(path, known[name], section, sources)
         if known[name].wanted != rule.wanted:
             right = f"`{{least: {{{name}: 1}}}}`" if rule.wanted == "more" else "`minimum` or `sum`"
             sources.add(path, f"{known[name].wanted} of {name} is better", None, right)
+
+
+def _check_slopes(path: tuple[Key, ...], quantity: Quantity, section: StudySection, sources: Sources) -> None:
+    """A search by gradients needs those of all that it looks at."""
+    if section.search is not None and section.search.algorithm in GRADIENT and not quantity.slopes:
+        allowed = f"`search: {{algorithm: ...}}`: {', '.join(DIRECT)}"
+        sources.add(path, f"{quantity.name} has no derivatives, which {section.search.algorithm} needs", None, allowed)
 
 
 def _check_ends(path: tuple[Key, ...], quantity: Quantity, bound: Bound, sources: Sources) -> None:

@@ -33,6 +33,7 @@ from ..metrics.own import OwnMetric
 from ..metrics.quantity import Asked, Quantity
 from ..metrics.separation import csd_name
 from ..search.problem import Problem
+from ..vision.section import SeededVision
 from .schema import StudySection
 
 
@@ -262,7 +263,14 @@ class Study:
             thickness=self.tolerance.thickness,
             own=self.own,
             seed=self.section.seed,
+            vision=self.images,
         )
+
+    @property
+    def images(self) -> SeededVision | None:
+        """The benchmark of vision, where the study asks for one."""
+        vision = self.section.vision
+        return None if vision is None else SeededVision(vision, self.section.seed)
 
 
 @contextmanager

@@ -1,6 +1,7 @@
-"""Spectra of surfaces and of what lights them, from CIE and the ColorChecker (through colour-science).
+"""Spectra of surfaces and of what lights them: of CIE, of the ColorChecker (through colour-science), and measured ones.
 
-Surfaces are patches of the ColorChecker (N. Ohta, 1997): `foliage`, `blue sky` and its neutral row. Street light is
+Surfaces are patches of the ColorChecker (N. Ohta, 1997): `foliage`, `blue sky` and its neutral row; or the mean of a
+group that the package ships (`sweep list data`): measured soil, asphalt and concrete, modeled canopies. Street light is
 CIE's LED-B3 (a phosphor LED of 4100 K) or HP1 (high-pressure sodium), CIE 015:2018.
 """
 
@@ -10,6 +11,7 @@ from functools import cache
 
 import numpy as np
 
+from ..curves.builtin.task_sets import group
 from ..curves.spectrum import WavelengthGrid
 from ..types import FloatArray
 from .section import Illuminant, Material
@@ -48,7 +50,12 @@ def ambient_light(grid: WavelengthGrid, name: Illuminant) -> FloatArray:
 
 @cache
 def reflectance(grid: WavelengthGrid, name: Material) -> FloatArray:
-    """Share of the light that a surface sends back, ndarray[n_wavelengths]; beyond the measured range as at its end."""
+    """Share of the light that a surface sends back, ndarray[n_wavelengths]; beyond its range as at its end.
+
+    Those of a group are 0 there.
+    """
+    if name not in _PATCHES:
+        return np.asarray(group(grid, name).mean(axis=0), dtype=float)
     from colour import SDS_COLOURCHECKERS  # noqa: PLC0415  (more than a second to import)
 
     held = SDS_COLOURCHECKERS["ColorChecker N Ohta"][_PATCHES[name]]

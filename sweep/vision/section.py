@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field, model_validator
 
@@ -12,7 +12,7 @@ from ..types import Fraction, Meters, Seconds, Section
 
 Illuminant = Literal["daylight", "LED street light", "sodium street light"]
 Seen = Literal["raw", "demosaicked"]
-Material = Literal["foliage", "sky", "gray", "dark gray", "black", "white"]
+Material = Literal["foliage", "sky", "gray", "dark gray", "black", "white", "canopy", "soil", "asphalt", "concrete"]
 _Intensity = Annotated[float, Field(ge=1e-3, le=1e6)]
 _Text = Annotated[str, Field(min_length=1, max_length=100)]
 MOST_IMAGES = 100_000
@@ -79,3 +79,10 @@ class Vision(Section):
     def target(self, distance_m: float) -> Target:
         """A lens of the head at a distance, as the target of a scene."""
         return Target(distance_m=distance_m, fov_deg=self.fov_deg, diameter_m=self.diameter_m)
+
+
+class SeededVision(NamedTuple):
+    """A study's benchmark with the study's seed."""
+
+    vision: Vision
+    seed: int

@@ -240,7 +240,7 @@ def test_the_filter_of_the_noise_study_is_what_a_search_finds() -> None:
 def test_a_search_refuses_what_has_no_smooth_rows(tmp_path: Path) -> None:
     every = quantities_of(Asked(STATES, STATES, probabilities=True, vision=True))
     without = [q.name for q in every.values() if q.ends and q.smooth is None]
-    assert {q.metric for q in map(every.get, without) if q is not None} == {"cdp", "csp", "vision_error"}
+    assert {q.metric for q in map(every.get, without) if q is not None} == {"cdp", "csp"}
     text = (STUDIES / "stopband.yaml").read_text().replace("search:", "recognition: {probabilities: true}\nsearch:", 1)
     path = tmp_path / "asked.yaml"
     for name in ("cdp_yellow_red", "csp_green_red"):

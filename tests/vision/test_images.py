@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import combinations, permutations, product
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -17,7 +18,9 @@ from sweep.camera.imager import Imager
 from sweep.camera.methods import Methods
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.noisy import table
+from sweep.curves.builtin.spectra import shipped_groups
 from sweep.curves.color import luminance_per_photon_radiance
+from sweep.curves.spectrum import WavelengthGrid
 from sweep.vision.head import head_places_px
 from sweep.vision.images import HeadCamera, view_at
 from sweep.vision.lamps import TEST, split_lamps
@@ -25,7 +28,7 @@ from sweep.vision.materials import ambient_light, phantom, reflectance
 from sweep.vision.pixel_table import pixel_table
 from sweep.vision.planes import demosaicked, tile_planes
 from sweep.vision.scenes import SHUFFLED, Scenes, draw_scenes
-from sweep.vision.section import Vision
+from sweep.vision.section import Material, Vision
 
 from .heads import NO_FILTERS, head_view, vision
 
@@ -124,6 +127,18 @@ def test_scenes_are_those_of_a_brute_force_simulation(lenses: list[str], count: 
     for at in range(count):
         wanted = brute_force(asked, scenes, at)
         np.testing.assert_allclose(found[at].reshape(wanted.shape), wanted, atol=0.01 * wanted.max())
+
+
+@pytest.mark.parametrize("name", get_args(Material))
+def test_a_surface_sends_back_a_share_of_the_light(name: Material) -> None:
+    """Those of the shipped groups are the mean of their spectra."""
+    grid = WavelengthGrid()
+    found = reflectance(grid, name)
+    assert found.min() > 0
+    assert found.max() < 1
+    if name in shipped_groups():
+        seen = [np.interp(grid.nodes_nm, each.wavelength_nm, each.value) for each in shipped_groups()[name]]
+        np.testing.assert_allclose(found, np.mean(seen, axis=0), rtol=1e-9)
 
 
 def test_the_table_is_the_product_s_noise() -> None:

@@ -1,6 +1,6 @@
 """Surrogates of vehicle lamps, of lamps that no search has seen and of sign sheeting: modeled, not measured.
 
-No open spectra of them exist. Each lies inside its regulation's color region, which `tests/curves/test_stand_ins.py`
+No open spectra of them exist. Each lies inside its regulation's color region, which `tests/curves/test_tasks_data.py`
 tests: lamps by their own light, sheeting under D65.
 """
 

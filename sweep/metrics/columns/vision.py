@@ -8,6 +8,7 @@ from ...camera.view import View
 from ...types import FloatArray
 from ...vision.section import Vision
 from ..quantity import Asked, Columns, Quantity, VisionMetric
+from ..smooth import Rows, SmoothDesign
 
 VISION_ERROR = "vision_error"
 
@@ -23,10 +24,28 @@ class ImageReading(VisionMetric):
             "expected share of images of signal heads that the ideal observer reads wrongly, where a study has "
             "`vision`: over all its distances and levels, the lenses in any order, unseen lamps of the first seed"
         )
-        return (Quantity(VISION_ERROR, VISION_ERROR, meaning, wanted="less", ends=("max",)),) if asked.vision else ()
+        found = Quantity(
+            VISION_ERROR,
+            VISION_ERROR,
+            meaning,
+            wanted="less",
+            ends=("max",),
+            goal=True,
+            nominal=True,
+            smooth=_rows,
+            slopes=False,
+        )
+        return (found,) if asked.vision else ()
 
     def of_images(self, view: View, curves: FloatArray, vision: Vision, seed: int) -> Columns:
         """The mean of what each image leaves in doubt: one less the probability of its most probable state."""
         from ...vision.readers import observer_error  # noqa: PLC0415  (only where a study asks for images)
 
         return {VISION_ERROR: np.array([observer_error(view, each, vision, (seed, 0)) for each in curves])}
+
+
+def _rows(design: SmoothDesign) -> Rows:
+    """Its value, of the same scenes and random numbers for all designs: it changes with whole digital numbers."""
+    assert design.images is not None
+    found = ImageReading().of_images(design.view, design.curves[None], *design.images)[VISION_ERROR]
+    return Rows(found, np.zeros((1, len(design.by_u))))
