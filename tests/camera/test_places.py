@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from sweep.camera import places
 from sweep.camera.between import Between
 from sweep.camera.effects import phase
 from sweep.camera.imager import Imager
@@ -380,3 +381,16 @@ def test_cfas_of_one_tile_share_kernels_and_others_do_not() -> None:
     assert kernels[1].light.shape[1:3] == (2, 2)
     fresh = make_kernel(views[2], LATTICE, views[2].grid.nodes_nm, by_pixel=False, work=Counter())
     np.testing.assert_array_equal(kernels[0].light, fresh.light)
+
+
+def test_cells_block_by_block_give_the_same_extremes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Cell by cell, in blocks in which some pairs of types have none, the bits of all at once."""
+    made = scene("", "RGGB", {"target": FAR | {"phase_px": "any"}, "optics": F2})
+    straight = dict.fromkeys(("noise", "quantization", "saturation"), "skip")
+    view = replace(made.view, methods=replace(REFERENCE, phase="within 1 DN", blur="every 10 nm", **straight))
+    found = []
+    for at_once in (places._AT_ONCE, 1):
+        monkeypatch.setattr(places, "_AT_ONCE", at_once)
+        found.append(evaluate(Imager(view), made.curves))
+    for name, values in found[0].items():
+        np.testing.assert_array_equal(values, found[1][name], err_msg=name)
