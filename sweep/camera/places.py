@@ -92,7 +92,8 @@ class AnyPlace:
             seen = np.ascontiguousarray(kernels @ light.T)
             for search, own in zip(searches, cells, strict=True):
                 some = np.flatnonzero((own >= at) & (own < at + step))
-                search.take(some, own[some] - at, seen, known)
+                if some.size:
+                    search.take(some, own[some] - at, seen, known)
 
 
 def _together(every: Sequence[phase.Cells]) -> tuple[phase.Cells, list[IndexArray]]:

@@ -98,6 +98,21 @@ def test_mean_over_the_disc_is_that_of_its_profile(w20_um: float) -> None:
         np.testing.assert_allclose(blur.mean_over_disc(radius, wide, waves, 2.0, w20_um), exact, atol=1e-7)
 
 
+@pytest.mark.parametrize("reach_um", [0.02, 0.3, 40.0])
+def test_sums_over_a_profile_are_those_of_its_values(reach_um: float) -> None:
+    """SciPy's own spline, radius by radius; at both ends of the table, between them and a little beyond, too."""
+    rng = np.random.default_rng(3)
+    profile = blur.Profile(3.0, reach_um, np.linspace(0.4, 0.7, 5), 2.0, 0.0)
+    end = float(profile.r_um[-1])
+    r_um = np.concatenate(
+        [rng.uniform(0, end, (40, 9)), rng.uniform(0, end / 50, (5, 9)), [np.linspace(0, 1.01, 9) * end]]
+    )
+    weights = rng.uniform(-1, 1, 9)
+    np.testing.assert_allclose(
+        profile.sums(r_um, weights), np.einsum("nmk,m->nk", profile.at(r_um), weights), atol=1e-12
+    )
+
+
 def test_the_envelope_is_above_the_bessel_function() -> None:
     x = np.concatenate([np.linspace(1e-6, 50, 500_001), np.geomspace(50, 1e5, 200_001)])
     assert (np.abs(j1(x)) <= blur._envelope(x) * (1 + 1e-12)).all()

@@ -15,10 +15,11 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from sweep.camera import places
 from sweep.camera.between import Between
 from sweep.camera.effects import phase
 from sweep.camera.imager import Imager
-from sweep.camera.kernel import make_kernel
+from sweep.camera.kernel import kept_kernel, make_kernel
 from sweep.camera.methods import REFERENCE, Methods
 from sweep.camera.place_kernels import PlaceKernels
 from sweep.camera.plan.plan import Plan
@@ -32,6 +33,7 @@ from ..hard.random_scenes import random_scene
 from ..hard.scenes import DARK, F2, FAR, NEAR, TILES, Scene, scene, target
 
 CSDS = ("csd_yellow_red", "csd_green_yellow")
+LATTICE = replace(REFERENCE, phase="half pixel")
 
 
 def at_place(made: Scene, x: float, y: float, methods: Methods = REFERENCE) -> dict[str, float]:
@@ -366,3 +368,29 @@ def test_the_pixels_of_a_large_light_at_any_place_fit_into_memory(tmp_path: Any)
     assert ended.returncode == 0, ended.stderr
     assert int(ended.stdout) == 64
     assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < 3 * 2**20  # KiB
+
+
+def test_cfas_of_one_tile_share_kernels_and_others_do_not() -> None:
+    """What each channel gets through each filter depends on where the channels are, not on their curves."""
+    asked = {"target": FAR | {"phase_px": "any"}, "optics": F2}
+    views = [scene("", name, asked).view for name in ("RGGB", "RCCC", "RGGB")]
+    views[2] = replace(views[2], qe=views[2].qe[::-1].copy())
+    kernels = [kept_kernel(replace(view, methods=LATTICE), by_pixel=False, work=Counter()) for view in views]
+    assert kernels[0] is kernels[2]
+    assert kernels[0].light.shape[1:3] == (3, 3)
+    assert kernels[1].light.shape[1:3] == (2, 2)
+    fresh = make_kernel(views[2], LATTICE, views[2].grid.nodes_nm, by_pixel=False, work=Counter())
+    np.testing.assert_array_equal(kernels[0].light, fresh.light)
+
+
+def test_cells_block_by_block_give_the_same_extremes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Cell by cell, in blocks in which some pairs of types have none, the bits of all at once."""
+    made = scene("", "RGGB", {"target": FAR | {"phase_px": "any"}, "optics": F2})
+    straight = dict.fromkeys(("noise", "quantization", "saturation"), "skip")
+    view = replace(made.view, methods=replace(REFERENCE, phase="within 1 DN", blur="every 10 nm", **straight))
+    found = []
+    for at_once in (places._AT_ONCE, 1):
+        monkeypatch.setattr(places, "_AT_ONCE", at_once)
+        found.append(evaluate(Imager(view), made.curves))
+    for name, values in found[0].items():
+        np.testing.assert_array_equal(values, found[1][name], err_msg=name)

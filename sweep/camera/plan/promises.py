@@ -34,7 +34,7 @@ from .bounds import Box, Reach
 from .pixelwise import Moves
 from .scene_kernels import SceneKernels
 from .steps import Step, Steps
-from .work import COMPARED_S, LINEAR_S, REACH_S, READOUT_S, Work
+from .work import COMPARED_S, LINEAR_S, REACH_S, READOUT_S, Work, estimated_work
 
 _OF_READOUT = tuple(name for name, effect in EFFECTS.items() if effect.stage is Stage.READOUT)
 
@@ -67,7 +67,7 @@ class Promises:
         self._ranges: dict[tuple[str, ...], float] = {}
         self._readouts: dict[tuple[str, ...], float] = {}
         self._moves = Moves(self.view, self.reach)
-        self._works: dict[Methods, Work] = {}
+        self._works = kernels.works(self.view)
         self.spent_s = REACH_S
 
     def promise(self, name: str, before: Methods, after: Methods) -> float:
@@ -183,7 +183,7 @@ class Promises:
     def work_of(self, methods: Methods) -> Work:
         """Estimated seconds."""
         if methods not in self._works:
-            self._works[methods] = self._kernels.work(self.view, methods)
+            self._works[methods] = estimated_work(self.view, methods)
         return self._works[methods]
 
     @cached_property

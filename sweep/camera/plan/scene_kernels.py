@@ -18,7 +18,7 @@ from ..place_kernels import PlaceKernels
 from ..registry import EFFECTS, WHOLE_LIGHT
 from ..view import View
 from .bounds import Spread
-from .work import KERNEL_S, Work, estimated_work
+from .work import KERNEL_S, Work
 
 
 class SceneKernels:
@@ -31,15 +31,13 @@ class SceneKernels:
         self._kernels: dict[Methods, FloatArray] = {}
         self._deviations: dict[Methods, Deviation] = {}
         self._gaps: dict[tuple[str, float], float] = {}
-        self._works: dict[tuple[object, ...], Work] = {}
+        self._works: dict[tuple[object, ...], dict[Methods, Work]] = {}
         self.spent_s = 0.0
 
-    def work(self, view: View, methods: Methods) -> Work:
-        """`estimated_work` of a view of this tile, remembered for those with equally many changed channels."""
-        key = (methods, len(view.modified), len(view.mosaic.channels), view.technologies, view.scenario)
-        if key not in self._works:
-            self._works[key] = estimated_work(view, methods)
-        return self._works[key]
+    def works(self, view: View) -> dict[Methods, Work]:
+        """`estimated_work` as far as it is known: of all views of this tile with equally many changed channels."""
+        key = (len(view.modified), len(view.mosaic.channels), view.technologies, view.scenario)
+        return self._works.setdefault(key, {})
 
     def anywhere(self, methods: Methods) -> bool:
         """Whether the light may fall anywhere, and more than a lattice of places is looked at."""
