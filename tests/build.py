@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from sweep.commands.new import new_study
-from sweep.errors import StudyError
+from sweep.errors import StudyError, SweepError
 from sweep.run import run_study
 from sweep.study import Study, load_study
 
@@ -140,6 +142,17 @@ def faults(tmp_path: Path, text: str) -> list[str]:
     with pytest.raises(StudyError) as caught:
         load(tmp_path, text)
     return [str(fault).replace(f"{tmp_path}/", "") for fault in caught.value.faults]
+
+
+@contextmanager
+def one_line(*said: str, alone: bool = True) -> Iterator[None]:
+    """What is done here is refused with one fault, on one line, which has these words; or with others beside it."""
+    with pytest.raises(SweepError) as caught:
+        yield
+    lines = [str(fault) for fault in caught.value.faults]
+    assert len(lines) == 1 or not alone, lines
+    assert not any("\n" in line for line in lines)
+    assert any(all(words in line for words in said) for line in lines), lines
 
 
 def made(folder: Path, name: str = "mine", qe: Path | None = None, lights: Path | None = None) -> Path:

@@ -3,8 +3,8 @@
     python tests/same_results.py save FOLDER            # runs every study and its plan into FOLDER, audits distance
     python tests/same_results.py compare BEFORE AFTER   # two such folders, cell by cell; exit code 1 where they differ
 
-Numbers count as equal within 1e-12 of their size, or of the largest of their column for what is nearly nothing; the
-summary says where they are equal bit for bit. `measured.yaml` needs its curve files: `save --data FOLDER`, else it is
+Plans with their promises and the audit are compared word by word. Numbers count as equal within 1e-12 of the largest
+finite one of their column; the summary says where they are equal bit for bit. `measured.yaml` needs its curve files: `save --data FOLDER`, else it is
 left out.
 """
 
@@ -64,6 +64,10 @@ def differences(before: Path, after: Path) -> tuple[str, bool]:
         one, other = a.to_numpy(), b.to_numpy()
         if not np.array_equal(np.isnan(one), np.isnan(other)):
             return f"{name}: other cells are empty", True
+        infinite = np.isinf(one) | np.isinf(other)
+        if not np.array_equal(one[infinite], other[infinite]):
+            return f"{name}: other cells are infinite", True
+        one, other = one[~infinite], other[~infinite]
         size = np.nanmax(np.abs(one), initial=0.0)
         off = float(np.nanmax(np.abs(one - other), initial=0.0)) / size if size else float(np.nansum(np.abs(other)))
         if off > worst:

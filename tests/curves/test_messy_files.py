@@ -14,6 +14,7 @@ from sweep.curves.files import read_curves, scan_curves
 from sweep.errors import SweepError
 from sweep.study import load_study
 
+from ..build import one_line
 from ..commanded import commanded
 from ..curve_texts import WAVE, bell
 
@@ -165,9 +166,8 @@ def test_a_spectrum_of_tm_27(tmp_path: Path) -> None:
 def test_what_two_readers_could_read_in_two_ways_is_refused(tmp_path: Path, file: str, content: str, said: str) -> None:
     path = tmp_path / file
     path.write_text(content)
-    with pytest.raises(SweepError) as caught:
+    with one_line(said):
         read_curves(path)
-    assert said in str(caught.value)
 
 
 def mutated(rng: np.random.Generator) -> str:

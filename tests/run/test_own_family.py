@@ -15,7 +15,7 @@ from sweep.report import make_report, read_output
 from sweep.run import run_study
 from sweep.study import Study, load_study
 
-from ..build import BASE, ran
+from ..build import BASE, one_line, ran
 from ..commanded import commanded
 from ..conftest import ROOT
 from .own_codes import BUILT_IN, CODE, OWN_FAMILY, STOPBAND
@@ -105,10 +105,8 @@ def test_code_runs_only_when_it_is_allowed(tmp_path: Path) -> None:
 )
 def test_faults_of_the_code_are_lines(tmp_path: Path, old: str, new: str, said: str) -> None:
     assert old in STOPBAND
-    with pytest.raises(SweepError) as caught:
+    with one_line(said):
         run_study(study(tmp_path, code=STOPBAND.replace(old, new)), tmp_path / "out", 1, lambda *_: None)
-    assert said in str(caught.value)
-    assert all("\n" not in str(fault) for fault in caught.value.faults)
 
 
 def test_bounds_and_gradients_hold(tmp_path: Path) -> None:

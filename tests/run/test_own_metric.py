@@ -23,7 +23,7 @@ from sweep.run import run_study
 from sweep.study import Study, load_study
 from sweep.study.own_metrics import RESERVED
 
-from ..build import ran
+from ..build import one_line, ran
 from ..commanded import commanded
 from ..hard.scenes import FAMILY, scene
 from .own_codes import CODE, OWN_METRIC, PLAIN, rows_of
@@ -181,11 +181,8 @@ def test_code_of_a_metric_runs_only_when_it_is_allowed(tmp_path: Path) -> None:
 )
 def test_faults_of_a_metric_are_one_line_before_any_work(tmp_path: Path, old: str, new: str, said: str) -> None:
     assert old in CODE
-    with pytest.raises(StudyError) as caught:
+    with one_line("own.yaml:", said):
         study(tmp_path, code=CODE.replace(old, new))
-    assert said in str(caught.value)
-    assert len(caught.value.faults) == 1
-    assert "own.yaml:" in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -205,9 +202,8 @@ def test_faults_of_a_metric_are_one_line_before_any_work(tmp_path: Path, old: st
     ],
 )
 def test_what_a_study_says_of_it_is_checked(tmp_path: Path, text: str, said: str) -> None:
-    with pytest.raises(StudyError) as caught:
+    with one_line(said):
         study(tmp_path, text)
-    assert said in str(caught.value)
 
 
 def test_a_design_that_the_metric_fails_on_costs_a_row(tmp_path: Path) -> None:
