@@ -119,8 +119,9 @@ FILES = {
     FRONT: "what the search found at each level of sensitivity, and the limit there; between two levels rows with the "
     "limit alone: " + ", ".join(front_schema(["<parameters>"]).names),
     PRICE: "where a search asks for `nominal_levels` of an objective that is a worst case: the search's answer, the "
-    "filter with the largest worst case at each nominal level, and the one with the most nominally, all before "
-    "clipping and rounding: " + ", ".join(price_schema(["<parameters>"]).names),
+    "filter with the largest worst case at each nominal level, and the one with the most nominally; then, with a "
+    "`front`, at each of its levels (`sensitivity_min`) the one with the largest worst case and the one with the most "
+    "nominally; all before clipping and rounding: " + ", ".join(price_schema(["<parameters>"]).names),
     CURVES: "a row per curve and wavelength: " + ", ".join(SCHEMA.names),
     POINTS: "what the clouds draw: design_id, signal_type, signal, channel, dn",
     RECOGNITION: "raw patches told apart by classifiers, where a study asks for them, with 95 % intervals",
