@@ -145,17 +145,20 @@ class SmoothDesign:
     def squared_distances_of_members(self, pair: Pair) -> Rows:
         """Squared distances of the nearest members of each two lights, in every case and part of their shifts, DN^2.
 
-        The nearest members change with the design; where they do not jump, that adds nothing to the derivative.
+        The nearest members change with the design; where they do not jump, that adds nothing to the derivative. NaN
+        where the response is no number.
         """
         assert self._members is not None
         response, by_u = self._response_of_members
         values, slopes = [], []
         for case in range(len(response)):
-            near = self._members.nearest(response[case], pair, parts=self._members.parts)
+            known = bool(np.isfinite(response[case]).all())
+            own = response[case] if known else np.zeros_like(response[case])
+            near = self._members.nearest(own, pair, parts=self._members.parts)
             apart = near.of(response[case], 0) - near.of(response[case], 1)
             slope = near.of(by_u[:, case], 0) - near.of(by_u[:, case], 1)
             some = np.isfinite(near.squared)
-            values.append(near.squared[some])
+            values.append(near.squared[some] if known else np.full(int(some.sum()), np.nan))
             slopes.append(2 * (slope * apart).sum(axis=-1)[:, some])
         return Rows(np.concatenate(values), np.concatenate(slopes, axis=1).T)
 

@@ -117,7 +117,7 @@ def _html(output: Output, images: Sequence[tuple[str, str, str]], published: pd.
         group_rows=[rows(effect_table(group)) for group in groups],
         audited=output.audited is not None,
         images=[(caption, uri) for name, caption, uri in images if name in _PICTURES],
-        price_images=[(caption, uri) for name, caption, uri in images if name == _OF_PRICE],
+        price_images=[(caption, uri) for name, caption, uri in images if name.startswith(_OF_PRICE)],
         lamps=rows(lamp_table(output)),
         lamp_images=[(caption, uri) for name, caption, uri in images if name.startswith(_OF_REGIONS)],
         vision=_vision(output),

@@ -18,9 +18,10 @@ if TYPE_CHECKING:
 
 def price_lines(output: Output) -> Iterator[str]:
     """What the largest worst case that the search finds is at both ends of the trade-off."""
-    if output.price is None or len(output.price) < 2:
+    found, _ = _parts(output)
+    if len(found) < 2:
         return
-    worst, first, last = output.goal, output.price.iloc[0], output.price.iloc[-1]
+    worst, first, last = output.goal, found.iloc[0], found.iloc[-1]
     nominal = output.columns[worst.of]
     yield (
         f"The largest {worst.words} that the search finds falls from {worst.told(first['worst'])} to "
@@ -30,10 +31,22 @@ def price_lines(output: Output) -> Iterator[str]:
 
 
 def price_drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
-    """(file name, caption, figure) of the trade-off; nothing where no levels are asked for."""
-    if output.price is not None:
+    """(file name, caption, figure) of the trade-offs; nothing where no levels are asked for."""
+    found, light = _parts(output)
+    if len(found):
         caption = "What the worst case costs: the largest one that the search finds at each nominal level"
-        yield "price", caption, _draw(output, caption)
+        yield "price", caption, _draw(output, found, caption)
+    if len(light):
+        caption = "Nominal and worst case against light: what the search finds at each level of sensitivity"
+        yield "price-light", caption, _draw_light(output, light, caption)
+
+
+def _parts(output: Output) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The rows of nominal levels, and those of levels of light."""
+    if output.price is None:
+        return pd.DataFrame(), pd.DataFrame()
+    of_light = output.price["sensitivity_min"].notna()
+    return output.price[~of_light], output.price[of_light]
 
 
 def _told_light(found: pd.DataFrame) -> str:
@@ -41,13 +54,27 @@ def _told_light(found: pd.DataFrame) -> str:
     return f"found by the search, sensitivity {low if low == high else f'{low} to {high}'}"
 
 
-def _draw(output: Output, title: str) -> Figure:
+def _draw_light(output: Output, found: pd.DataFrame, title: str) -> Figure:
+    """Nominal and worst case of the filters with most of either, against the light of the whole CFA."""
+    worst = output.goal
+    figure, axes = canvas(7.0, 4.6)
+    for at, (most, color) in enumerate((("worst case", COLORS["front"]), ("nominal", COLORS["named"]))):
+        own = found.iloc[at::2]  # at each level first the largest worst case, then the most nominally
+        for column, told, line in (("nominal", "nominal", "o--"), ("worst", "worst case", "o-")):
+            axes.plot(own["cfa_sensitivity"], own[column], line, color=color, label=f"largest {most}: its {told}")
+    axes.set_ylim(0, 1.3 * found["nominal"].max())  # room for the legend
+    axes.set_xlabel(output.columns["cfa_sensitivity"].axis)
+    axes.set_ylabel(output.columns[worst.of].axis)
+    axes.set_title(title, fontsize=10)
+    axes.legend(fontsize=8, frameon=False, loc="upper right", ncols=2)
+    return figure
+
+
+def _draw(output: Output, found: pd.DataFrame, title: str) -> Figure:
     """A point per level; CFAs and named designs of the same scenario beside them."""
-    assert output.price is not None
     worst = output.goal
     nominal = output.columns[worst.of]
     figure, axes = canvas(7.0, 4.6)
-    found = output.price
     axes.plot(found["nominal"], found["worst"], "o-", color=COLORS["front"], label=_told_light(found), zorder=3)
     rows = output.named[output.named["scenario"] == leaders_of(output).scenario]
     for kind, color, marker in ((PLAIN, COLORS["reference"], "s"), (NAMED, COLORS["named"], "D")):

@@ -121,7 +121,9 @@ FILES = {
     "limit alone: " + ", ".join(front_schema(["<parameters>"]).names),
     PRICE: "where a search asks for `nominal_levels` of an objective that is a worst case: the search's answer, the "
     "filter with the largest worst case that the search finds at each nominal level, and the one with the most "
-    "nominally that it finds, all before clipping and rounding: " + ", ".join(price_schema(["<parameters>"]).names),
+    "nominally that it finds; then, with a `front`, at each of its levels (`sensitivity_min`) what it finds with the "
+    "largest worst case and with the most nominally; all before clipping and rounding: "
+    + ", ".join(price_schema(["<parameters>"]).names),
     CURVES: "a row per curve and wavelength: " + ", ".join(SCHEMA.names),
     POINTS: "what the clouds draw: design_id, signal_type, signal, channel, dn",
     RECOGNITION: "raw patches told apart by classifiers, where a study asks for them, with 95 % intervals",

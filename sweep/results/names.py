@@ -53,7 +53,7 @@ MADE_BY_RUN = frozenset((*TABLES, RESOLVED, PROVENANCE))
 _DRAWN = re.compile(
     r"report\.html|cfas\.(png|svg)|pareto(-\d+)?\.(png|svg)|paper_comparison\.(csv|parquet)"
     r"|figures/((filters|series|places)-\d+|tiles|sensor|signals|chart|scorecard|(color-noise|rendered)-\d+"
-    r"|price|regions-\d+|clouds-(cfas|designs)|vision-(errors|ranks|misread))\.(png|svg)"
+    r"|price(-light)?|regions-\d+|clouds-(cfas|designs)|vision-(errors|ranks|misread))\.(png|svg)"
 )
 
 

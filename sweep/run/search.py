@@ -16,7 +16,7 @@ from ..own_code import kind_in_words
 from ..results.price import price_schema
 from ..results.tables import front_schema, search_schema
 from ..search.limit import Limit, limit_of, why_not
-from ..search.price import PricePoint, worst_case_price
+from ..search.price import PricePoint, price_of_light, worst_case_price
 from ..search.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
 from ..search.solver import best_reachable, search_from
 from ..search.trade_off import Effort, FrontPoint, check_proof, gap_of, trade_off
@@ -73,6 +73,7 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     price: tuple[PricePoint, ...] = ()
     if search.nominal_levels:
         price = worst_case_price(problem, best, limit, search.nominal_levels, effort, parallel, progress)
+        price += price_of_light(problem, front, effort, parallel, progress)
     return SearchAnswer(search, tuple(runs), best, limit, no_limit, front, price)
 
 
@@ -178,11 +179,15 @@ def front_table(study: Study, answer: SearchAnswer) -> pa.Table:
 
 
 def price_table(answer: SearchAnswer) -> pa.Table:
-    """A row per filter of the price of the worst case, from the search's answer to the best nominal filter."""
+    """A row per filter of the price of the worst case, from the search's answer to the best nominal filter.
+
+    Then two rows for each level of the front: the largest worst case there, and the most nominally.
+    """
     names = answer.search.space.parameters
     rows = [
         {
             "nominal_min": point.level,
+            "sensitivity_min": point.least_sensitivity,
             "nominal": point.nominal,
             "worst": point.worst,
             "sensitivity": point.best.sensitivity,

@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..metrics.columns.sensitivity import SENSITIVITY
 from ..metrics.objective import Objective
 from ..metrics.quantity import WORST_CASE
 from ..types import FloatArray, Parallel, Progress, delayed
 from .limit import Limit
 from .problem import Evaluation, Problem, best_feasible
 from .solver import search_from, smooth_objective
-from .trade_off import Effort, check_proof, with_least
+from .trade_off import Effort, FrontPoint, check_proof, with_least
 
 _STARTS = 4
 
@@ -23,12 +24,14 @@ class PricePoint:
     """A filter with its nominal quantity and its worst case; `level`: what the search kept the nominal one above.
 
     None for the ends: the search's answer, and the filter with the largest nominal quantity that a search found.
+    `least_sensitivity`: the level of the front that both are asked for at; None: what the study asks for.
     """
 
     level: float | None
     best: Evaluation
     nominal: float
     worst: float
+    least_sensitivity: float | None = None
 
 
 def has_nominal(problem: Problem) -> bool:
@@ -84,6 +87,22 @@ def worst_case_price(
             found.append(point(level, best))
         progress("price of the worst case", done, count)
     return (first, *found[::-1])
+
+
+def price_of_light(
+    problem: Problem, front: Sequence[FrontPoint], effort: Effort, parallel: Parallel, progress: Progress
+) -> tuple[PricePoint, ...]:
+    """At each level of the front the filter with the largest worst case, and then the one with the most nominally."""
+    nominal, found = nominal_problem(problem), list[PricePoint]()
+    for done, point in enumerate(front, 1):
+        if point.best is not None:
+            own = with_least(problem, SENSITIVITY, point.level)
+            top = best_nominal(own, point.best, effort, parallel)
+            for best in (point.best, top or point.best):
+                values = smooth_objective(nominal, best.x), smooth_objective(problem, best.x)
+                found.append(PricePoint(None, best, *values, point.level))
+        progress("the nominal front", done, len(front))
+    return tuple(found)
 
 
 def _best(problem: Problem, starts: Sequence[FloatArray], effort: Effort, parallel: Parallel) -> Evaluation | None:

@@ -32,7 +32,7 @@ boxes:
     box: {left_nm: [580, 640], left_width_nm: 8, right_nm: [630, 690], right_width_nm: 8, depth: 1}
 objective: worst_csd_yellow_red
 constraints: {sensitivity: {min: 0.85}}
-search: {starts: 2, max_evaluations: 120, nominal_levels: 2}
+search: {starts: 2, max_evaluations: 120, nominal_levels: 2, front: {min: 0.85, max: 0.95, count: 2}}
 validate: {leave_one_out: true}
 """
 
@@ -52,10 +52,11 @@ def test_the_price_of_a_worst_case(tmp_path: Path) -> None:
     (tmp_path / "price.yaml").write_text(TEXT)
     study = load_study(tmp_path / "price.yaml")
     ran(study, tmp_path / "out", 1)
-    found = pd.read_parquet(tmp_path / "out" / "price.parquet")
-    nominal, worst, _ = both(study, found)
-    np.testing.assert_allclose(found["nominal"], nominal, rtol=1e-9)
-    np.testing.assert_allclose(found["worst"], worst, rtol=1e-9)
+    every = pd.read_parquet(tmp_path / "out" / "price.parquet")
+    nominal, worst, _ = both(study, every)
+    np.testing.assert_allclose(every["nominal"], nominal, rtol=1e-9)
+    np.testing.assert_allclose(every["worst"], worst, rtol=1e-9)
+    found, of_light = every[every["sensitivity_min"].isna()], every[every["sensitivity_min"].notna()]
     assert len(found) == 4
     assert (found["nominal"].iloc[1:3] >= found["nominal_min"].iloc[1:3] - 1e-6).all()
     assert (found["worst"].diff().iloc[1:] < 0).all()
@@ -68,6 +69,17 @@ def test_the_price_of_a_worst_case(tmp_path: Path) -> None:
     for row in found.to_dict("records"):
         rivals = worst[(light >= 0.85) & (nominal >= row["nominal"])]
         assert rivals.max(initial=0.0) <= row["worst"] + 0.5
+    assert list(of_light["sensitivity_min"]) == [0.85, 0.85, 0.95, 0.95]
+    for at, (first, last) in enumerate(
+        zip(of_light.iloc[::2].itertuples(), of_light.iloc[1::2].itertuples(), strict=True)
+    ):
+        enough = light >= (0.85, 0.95)[at]
+        assert enough.sum() > 50
+        assert worst[enough].max() <= first.worst + 0.5
+        assert nominal[enough].max() <= last.nominal + 0.5
+        assert last.worst <= first.worst
+        assert first.nominal <= last.nominal
+        assert min(first.sensitivity, last.sensitivity) >= first.sensitivity_min - 1e-9
     assert (light >= 0.85).sum() > 200
     left_out = pd.read_parquet(tmp_path / "out" / "leave_one_out.parquet")
     assert list(left_out["objective"]) == ["worst_csd_yellow_red"] * 2 + ["csd_yellow_red"] * 2
@@ -82,6 +94,7 @@ def test_the_price_of_a_worst_case(tmp_path: Path) -> None:
     assert "The largest worst-case yellow/red CSD that the search finds falls from" in said
     for words in ("worst-case yellow/red CSD", "yellow/red CSD"):
         assert f"A light that the search of the {words} has not seen costs" in said
+    assert (tmp_path / "out" / "figures" / "price-light.svg").exists()
     assert "Price of the worst case" in (tmp_path / "out" / "report.html").read_text()
 
 

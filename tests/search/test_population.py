@@ -54,6 +54,15 @@ def test_rows_over_the_population_have_their_derivative() -> None:
     assert checked >= 12
 
 
+def test_a_point_that_is_no_number_has_as_many_rows_and_is_never_feasible() -> None:
+    """Solvers step there, and go on."""
+    model = Model(problem(), SearchRun(0), 1000)
+    usual, odd = (model.at(u).terms for u in (starting_points(problem(), 1, 3)[0], np.full(4, np.nan)))
+    assert odd.values.shape == usual.values.shape
+    assert np.isfinite(odd.values).all()
+    assert model.at(np.full(4, np.nan)).evaluation.violation == np.inf
+
+
 @cache
 def limit() -> Limit:
     assert why_not(problem(binning_nm=1)) is None
