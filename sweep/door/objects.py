@@ -36,8 +36,8 @@ class LoadedStudy:
     >>> import sweep
     >>> study = sweep.load_study("stopband")
     >>> table = study.evaluate(N=0.9 * study.curve("Y"))
-    >>> f"{table.csd_yellow_red[0]:.0f} DN at {table.sensitivity[0]:.2f} of Y's light"
-    "35 DN at 0.90 of Y's light"
+    >>> f"{table.csd_yellow_red[0]:.0f} DN at a sensitivity of {table.sensitivity[0]:.2f}"
+    '35 DN at a sensitivity of 0.90'
 
     `study`: the same as the other rooms of the package know it.
     """

@@ -1,4 +1,4 @@
-"""By what technology filters are taken to work, and in which light, in sentences."""
+"""By what technology filters are taken to work, and by which rays, in sentences."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN
 from .leaders import Row
 
-NOT_STATED = "No technology is stated of the filters: they are taken as in light on axis, by parallel rays."
+NOT_STATED = "No technology is stated of the filters: they are taken as on axis, in parallel rays."
 
 
 def technologies_of(output: Output, row: Row) -> list[Technology | None]:
@@ -24,14 +24,26 @@ def technologies_of(output: Output, row: Row) -> list[Technology | None]:
     return list({repr(made.technology): made.technology for made in study.sweeps.values()}.values())
 
 
+def technology_of(output: Output, row: Row) -> str:
+    """Of what technology a row's filter is, to go behind its name; empty if not stated."""
+    stated = _the_one(output, row)
+    return "" if stated is None else f" ({stated.told})"
+
+
 def assumed(output: Output, row: Row) -> str:
-    """Of what technology a row's filter is, and of a filter that moves the light that it is in; empty if not stated."""
-    stated = technologies_of(output, row)
-    if len(stated) != 1 or stated[0] is None:
+    """Whether a row's filter moves with the angle of the light, and in which light it then is; empty if not stated."""
+    stated = _the_one(output, row)
+    if stated is None:
         return ""
-    if stated[0].interference is None:
-        return "Its filter is a pigment, which does not move with the angle of the light."
-    return f"Its filter works by {stated[0].told}, {told_light(output.study.scenarios[row['scenario']])}."
+    if stated.interference is None:
+        return "A pigment does not move with the angle of the light."
+    rays = told_light(output.study.scenarios[row["scenario"]])
+    return f"Such a filter moves with the angle of the light; the figures are {rays}."
+
+
+def _the_one(output: Output, row: Row) -> Technology | None:
+    stated = technologies_of(output, row)
+    return stated[0] if len(stated) == 1 else None
 
 
 def moves_with_light(output: Output, row: Row) -> bool:

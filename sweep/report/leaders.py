@@ -1,8 +1,8 @@
-"""Who leads in a scenario: under the constraints, in separation, and per light."""
+"""Who leads in a scenario: under the constraints, in separation, and for its exposure."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,7 @@ import pandas as pd
 
 from ..results.output import Output
 from ..results.tables import FOUND, PLAIN, SWEPT
-from ..results.thinning import per_light
+from ..results.thinning import per_exposure
 
 Row = Mapping[Any, Any]
 
@@ -20,16 +20,18 @@ class Leaders:
     """Rows of a scenario.
 
     `chosen`: the best design that the study swept or searched and that meets all constraints; without such designs the
-    CFA or named design that does and separates most; None where none does. `separates`, `per_light`: who separates
-    most of all rows, and most for each millisecond of exposure, whatever the constraints. `plain`: the other
-    plain CFA that separates most, with which the chosen one is compared.
+    CFA or named design that does and separates most; None where none does. `separates`, `per_exposure`: who
+    separates most of all rows, and most for each millisecond of exposure, whatever the constraints. `plain`: the other
+    plain CFA that separates most, with which the chosen one is compared. `others`: the best design of each other CFA
+    whose designs the study swept or searched.
     """
 
     scenario: str
     chosen: Row | None
     separates: Row | None
-    per_light: Row | None
+    per_exposure: Row | None
     plain: Row | None
+    others: tuple[Row, ...]
 
 
 def leaders_of(output: Output, scenario: str | None = None) -> Leaders:
@@ -47,9 +49,17 @@ def leaders_of(output: Output, scenario: str | None = None) -> Leaders:
         scenario,
         chosen,
         _most(rows, separation),
-        _most(rows, per_light(separation)),
+        _most(rows, per_exposure(separation)),
         _most(others[others["kind"] == PLAIN], separation),
+        () if chosen is None else tuple(_best_of_others(own, str(chosen["cfa"]))),
     )
+
+
+def _best_of_others(best: pd.DataFrame, cfa: str) -> Iterator[Row]:
+    """The first row of each CFA but `cfa`."""
+    for name, rows in best[best["cfa"].astype(str) != cfa].groupby("cfa", sort=False, observed=True):
+        del name
+        yield rows.iloc[0].to_dict()
 
 
 def _first(rows: pd.DataFrame) -> Row | None:

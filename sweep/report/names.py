@@ -7,6 +7,9 @@ from typing import Any
 
 from ..results.tables import FOUND, NAMED, PLAIN
 
+OF_CLEAR = "of a clear sensor's light"
+"""What the light of a whole CFA is told in."""
+
 
 def label(row: Mapping[Any, Any]) -> str:
     """A design's name, or its number."""
@@ -23,3 +26,8 @@ def full_name(row: Mapping[Any, Any]) -> str:
     if row["kind"] in (PLAIN, NAMED):
         return label(row)
     return f"the {label(row)} of {row['cfa']}" if row["kind"] == FOUND else f"{label(row)} of {row['cfa']}"
+
+
+def rate_told(rate: float) -> str:
+    """A separation for each millisecond of exposure."""
+    return f"{rate:.{0 if rate >= 100 else 1}f}"

@@ -20,10 +20,11 @@ from ..types import Parallel, delayed, in_turn
 from . import tables
 from . import values as content
 from .allowed_lamps import lamp_drawings, lamp_table
-from .answer import answer_sentences, large_numbers
+from .answer import answer_sentences
 from .colors import color_drawings
 from .figures import draw_curves, draw_pareto, pictures_of
 from .filter_figures import filters_figure
+from .large_numbers import large_numbers
 from .leaders import leaders_of
 from .noise import all_series, told_apart_table
 from .overview import draw_overview, overview_figure
@@ -43,7 +44,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-_FIRST_LINES = 3
+_FIRST_LINES = 1
 """Of the answer, above the first plot; the others stand below it."""
 _PICTURES = ("tiles", "sensor", "signals", "chart")
 """Figures that the page shows as pictures; it draws all others itself, but for those of tasks."""

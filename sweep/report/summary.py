@@ -7,6 +7,7 @@ from ..results.facts import SearchFacts
 from ..results.output import Output
 from .answer import answer_sentences
 from .assumed import assumed_line
+from .names import OF_CLEAR
 from .published import comparison_lines, comparison_with_published
 from .scorecard import score_lines, scorecard
 from .tables import geometry_table
@@ -18,7 +19,8 @@ _MOST_SCENARIOS = 8
 def _scene_lines(output: Output) -> list[str]:
     """CFAs and named designs in each scenario; of many scenarios the first and the last ones."""
     shown = output.trade_off[0]
-    title = f"{shown.words[:1].upper()}{shown.words[1:]} of the named CFAs and designs:"
+    title = f"{shown.words[:1].upper()}{shown.words[1:]} of the named CFAs and designs"
+    title += f", and their share {OF_CLEAR}:" if len(output.scenarios) == 1 else ":"
     rows, scenarios = output.named, output.scenarios
     lines = []
     for name in scenarios if len(scenarios) <= _MOST_SCENARIOS else [*scenarios[:4], "", *scenarios[-2:]]:

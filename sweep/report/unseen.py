@@ -14,13 +14,15 @@ from .leaders import Row
 _RESAMPLES = 10_000
 
 
-def unseen_lines(output: Output, best: Row) -> Iterator[str]:
-    """What the best one has on other lights, and what its search loses on lights that are left out of it."""
+def unseen_told(output: Output, row: Row) -> str:
+    """What a row has on lights that it has not seen, to go behind what it has on its own; empty without such lights."""
     separation = output.trade_off[0]
-    held_out = float(best.get(HELD_OUT + (separation.of or separation.name), np.nan))
-    if np.isfinite(held_out):
-        own = separation.told(best[separation.name])
-        yield f"On lights that it has not seen it has {separation.told(held_out)} (on its own lights {own})."
+    held_out = float(row.get(HELD_OUT + (separation.of or separation.name), np.nan))
+    return f" ({separation.told(held_out)} on lights that it has not seen)" if np.isfinite(held_out) else ""
+
+
+def unseen_lines(output: Output) -> Iterator[str]:
+    """What the search loses on lights that are left out of it."""
     if output.left_out is None:
         return
     several = output.left_out["objective"].nunique() > 1

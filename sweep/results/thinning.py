@@ -33,7 +33,7 @@ class Counts:
     left_out: int
 
 
-def per_light(separation: str) -> str:
+def per_exposure(separation: str) -> str:
     """A derived column of the table to show: a separation for each millisecond of exposure."""
     return f"{separation}_per_ms"
 
@@ -44,8 +44,9 @@ def thinned(
     """The table to show and the counts of the whole one; no more than a row group and what is kept are in memory.
 
     Kept are all rows that are no sweep, the whole Pareto front, the best feasible designs by `order` (columns, all
-    maximized), the designs of each scenario that have most of `separation`, and most of it per light, whatever the
-    constraints, and of the others every n-th. `see` is handed every row group of the whole table.
+    maximized), the best of each CFA in each scenario, the designs of each scenario that have most of `separation`, and
+    most of it for their exposure, whatever the constraints, and of the others every n-th. `see` is handed every row
+    group of the whole table.
     """
     try:
         total = int(pq.read_metadata(path).num_rows)
@@ -66,18 +67,18 @@ def thinned(
         if every > 1:
             few = table.filter(pa.array(ok & ~always))
             best = best_rows(few if best is None else pa.concat_tables([best, few]), order, _BEST)
-            kept.append(_leading(table, separation))
+            kept += [_leading(table, separation), _best_of_each(few, order)]
         release_memory()
     if best is not None:
         kept.append(best)
     frame: pd.DataFrame = pa.concat_tables(kept).unify_dictionaries().to_pandas()
     frame = frame.drop_duplicates("design_id").sort_values("design_id", ignore_index=True)
-    frame[per_light(separation)] = frame[separation] / (frame[EXPOSURE] * _MS)
+    frame[per_exposure(separation)] = frame[separation] / (frame[EXPOSURE] * _MS)
     return frame, Counts(total, feasible, front, failed, total - len(frame))
 
 
 def _leading(table: pa.Table, separation: str) -> pa.Table:
-    """In each scenario the design that separates most, and the one that separates most per light."""
+    """In each scenario the design that separates most, and the one that separates most for its exposure."""
     rate = pc.divide(table[separation], table[EXPOSURE])
     rated = table.append_column(_RATE, rate)
     found = []
@@ -85,3 +86,13 @@ def _leading(table: pa.Table, separation: str) -> pa.Table:
         own = rated.filter(pa.array(holds(rated, "scenario", scenario)))
         found += [best_rows(own, [measure], 1) for measure in (separation, _RATE)]
     return pa.concat_tables(found).drop_columns([_RATE])
+
+
+def _best_of_each(table: pa.Table, order: Sequence[str]) -> pa.Table:
+    """The best design of each CFA in each scenario."""
+    found = [table.slice(0, 0)]
+    for scenario in table["scenario"].unique().to_pylist():
+        own = table.filter(pa.array(holds(table, "scenario", scenario)))
+        for cfa in own["cfa"].unique().to_pylist():
+            found.append(best_rows(own.filter(pa.array(holds(own, "cfa", cfa))), order, 1))
+    return pa.concat_tables(found)

@@ -13,7 +13,8 @@ from sweep.camera.imager import imager_of
 from sweep.metrics.columns.sensitivity import cfa_sensitivity_at
 from sweep.metrics.limiting import limiting_lights
 from sweep.report import make_report, read_output
-from sweep.report.answer import answer_sentences, large_numbers
+from sweep.report.answer import answer_sentences
+from sweep.report.large_numbers import large_numbers
 from sweep.report.leaders import leaders_of
 from sweep.report.series import Line, SeriesFigure, lead_sentence
 from sweep.results.names import REPORT
@@ -62,9 +63,9 @@ def test_the_headline_names_the_best_of_all_rows(finished: Finished, name: str) 
     assert leaders.chosen[output.goal.name] == allowed[output.goal.name].max()
     assert leaders.separates is not None
     assert leaders.separates[separation] == rows[separation].max()
-    assert leaders.per_light is not None
+    assert leaders.per_exposure is not None
     rate = rows[separation] / rows["exposure_s"]
-    assert leaders.per_light[separation] / leaders.per_light["exposure_s"] == pytest.approx(rate.max())
+    assert leaders.per_exposure[separation] / leaders.per_exposure["exposure_s"] == pytest.approx(rate.max())
     text = " ".join(answer_sentences(output))
     if " leads" not in text:
         assert output.trade_off[0].told(leaders.chosen[separation]) in text

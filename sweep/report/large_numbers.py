@@ -1,0 +1,94 @@
+"""The large numbers of the first screen: separation, light, and what is left up to the limit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..metrics.columns.confusion import CNR, D_PRIME
+from ..metrics.columns.sensitivity import CFA_SENSITIVITY
+from ..metrics.quantity import DECADES
+from ..results.output import Output
+from ..results.thinning import per_exposure
+from .leaders import Row, leaders_of
+from .names import OF_CLEAR, rate_told
+from .series import SeriesFigure, leads_of
+from .values import series_figures
+
+
+@dataclass(frozen=True)
+class LargeNumber:
+    """A large number of the first screen: `value` with its unit, what it is, and what it compares with."""
+
+    value: str
+    name: str
+    comparison: str
+
+
+def large_numbers(output: Output) -> list[LargeNumber]:
+    """Separation, light and distance to the limit of the best one; without a limit what it separates for its exposure.
+
+    Over scenarios that differ in one number: who leads first, its light, and up to where.
+    """
+    figures = sorted(series_figures(output), key=lambda series: len(leads_of(series)) < 2)
+    if figures and output.best.empty:
+        return list(_numbers_over(output, figures[0]))
+    leaders = leaders_of(output)
+    best, plain, separation = leaders.chosen, leaders.plain, output.trade_off[0]
+    if best is None:
+        return []
+    value, measure = float(best[separation.name]), per_exposure(separation.name)
+    against = _beside(plain, separation.name, value, separation.told)
+    if plain is not None and separation.unit == DECADES:
+        against = f"{plain['name']} {separation.told(float(plain[separation.name]))}"
+    numbers = [
+        LargeNumber(separation.told(value), separation.words, against),
+        LargeNumber(
+            f"{best[CFA_SENSITIVITY]:.3f}",
+            OF_CLEAR,
+            _beside(plain, CFA_SENSITIVITY, float(best[CFA_SENSITIVITY]), "{:.3f}".format),
+        ),
+    ]
+    search = output.provenance.search
+    if search is not None and search.limit_proven is not None and output.goal.name == separation.name:
+        left = separation.told(max(0.0, search.limit_proven - value))
+        limit = f"{separation.told_bound(search.limit_proven)}: no filter exceeds it before quantization"
+        numbers.append(LargeNumber(left, "below the limit of any filter", limit))
+    elif best[measure] == best[measure] and separation.unit != DECADES and separation.metric not in (D_PRIME, CNR):
+        rate = float(best[measure])
+        beside = _beside(plain, measure, rate, rate_told)
+        numbers.append(LargeNumber(f"{rate_told(rate)} {separation.unit}", "per ms of exposure", beside))
+    return numbers
+
+
+def _numbers_over(output: Output, series: SeriesFigure) -> Iterator[LargeNumber]:
+    """Of the first one that leads in a series: separation, light, and where its lead ends."""
+    separation, (_, unit) = output.trade_off[0], series.quantity
+    leads = leads_of(series)
+    name, start, stop = next((lead for lead in leads if lead[0] is not None), (None, 0, 0))
+    if name is None:
+        return
+    others = {other: line.y for other, line in series.lines.items() if other != name}
+
+    def at(place: int) -> str:
+        return f"{series.x[place]:g} {unit}".rstrip()
+
+    def rival(place: int) -> str:
+        ranked = sorted(others, key=lambda other: -np.nan_to_num(others[other][place], nan=-np.inf))
+        return "" if not ranked else f"{ranked[0]} {separation.told(others[ranked[0]][place])}"
+
+    own = series.lines[name].y
+    yield LargeNumber(separation.told(own[start]), f"{name} at {at(start)}", rival(start))
+    rows = output.few[output.few["name"] == name]
+    yield LargeNumber(f"{rows[CFA_SENSITIVITY].iloc[0]:.3f}", OF_CLEAR, name)
+    figures = ", ".join(part for part in (f"{separation.told(own[stop])}", rival(stop)) if part)
+    yield LargeNumber(at(stop), f"{name} leads up to here" if leads[-1][2] != stop else "and still leads here", figures)
+
+
+def _beside(other: Row | None, column: str, value: float, told: Callable[[float], str]) -> str:
+    """A value as a multiple of that of a plain CFA."""
+    if other is None or not float(other[column]) > 0:
+        return ""
+    return f"{value / float(other[column]):.2f} times {other['name']} ({told(float(other[column]))})"
