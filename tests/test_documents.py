@@ -85,12 +85,12 @@ FIGURES: dict[str, Callable[[dict[str, pd.Series]], str]] = {
 }
 """Figures of the README -> the same from a run of `make study NAME=stopband`."""
 FIGURES_AT_AN_ANGLE: dict[str, tuple[str, str]] = {
-    "the best stopband above 32 DN": ("nominal", "the best stopband above {:.0f} DN"),
-    "RGGB 139 DN": ("RGGB", "RGGB {:.0f} DN"),
+    "layers keeps 32 DN": ("nominal", "layers keeps {:.0f} DN"),
+    "of pigments, keeps 139 DN": ("RGGB", "of pigments, keeps {:.0f} DN"),
     "keeps 182 DN": ("robust", "keeps {:.0f} DN"),
 }
 """Figures of the README -> the filter of `make study NAME=angle` that has them at the worst of all places."""
-NO_RESULTS = ("Python 3.11", "cos^4", "EN 12368", "0 to 20 degrees, f/1.6")
+NO_RESULTS = ("Python 3.11", "cos^4", "EN 12368", "f/1.6", "up to 20 degrees")
 """Numbers of the README's prose that are no results."""
 
 
