@@ -242,10 +242,8 @@ def test_forty_kills_in_every_phase(tmp_path: Path, undisturbed: Path) -> None:
     """Parents and workers, by three signals, at random moments; the rows are those of an undisturbed run each time."""
     rng = np.random.default_rng(17)
     kills, whole, out = {"run": 0, "worker": 0}, 0, tmp_path / "out" / "tiny"
-    longest_s = 8.0
     noisy_study(tmp_path)
     while sum(kills.values()) < 40:
-        fresh = not out.exists()
         with (tmp_path / "said").open("w") as said:
             run = subprocess.Popen(
                 command(tmp_path, "--jobs", "2"),
@@ -255,18 +253,13 @@ def test_forty_kills_in_every_phase(tmp_path: Path, undisturbed: Path) -> None:
                 env=os.environ | {"SWEEP_MARK": str(tmp_path)},
             )
         wait_for(tmp_path / "out" / "tiny" / "run.json", run, tmp_path)
-        begun = time.monotonic()
-        with suppress(subprocess.TimeoutExpired):
-            run.wait(timeout=float(rng.uniform(0, longest_s)))
-            if fresh:
-                longest_s = min(longest_s, time.monotonic() - begun)  # a whole run takes no longer here
+        time.sleep(float(rng.uniform(0, 8)))
         number = [signal.SIGKILL, signal.SIGTERM, signal.SIGINT][int(rng.integers(3))]
         if rng.random() < 0.3 and run.poll() is None:
             for process in psutil.Process(run.pid).children(recursive=True)[-1:]:
                 process.kill()
                 kills["worker"] += 1
-            with suppress(subprocess.TimeoutExpired):
-                run.wait(timeout=float(rng.uniform(0, longest_s / 2)))
+            time.sleep(float(rng.uniform(0, 4)))
         if run.poll() is None:
             os.kill(run.pid, number)
             kills["run"] += 1
