@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,9 +11,11 @@ from ..metrics.columns.confusion import CNR, D_PRIME
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.quantity import DECADES
 from ..results.output import Output
+from ..results.tables import PLAIN
 from ..results.thinning import per_exposure
 from .leaders import Row, leaders_of
 from .names import OF_CLEAR, rate_told
+from .noise import UsableEnds, usable_ends
 from .series import SeriesFigure, leads_of
 from .values import series_figures
 
@@ -30,8 +32,12 @@ class LargeNumber:
 def large_numbers(output: Output) -> list[LargeNumber]:
     """Separation, light and distance to the limit of the best one; without a limit what it separates for its exposure.
 
-    Over scenarios that differ in one number: who leads first, its light, and up to where.
+    Over scenarios that differ in one number: who leads first, its light, and up to where. Where the question is of
+    noise: how much the one bears that bears most, and its light.
     """
+    ends = list(usable_ends(output))
+    if ends and output.best.empty:
+        return list(_numbers_under_noise(output, ends))
     figures = sorted(series_figures(output), key=lambda series: len(leads_of(series)) < 2)
     if figures and output.best.empty:
         return list(_numbers_over(output, figures[0]))
@@ -61,6 +67,28 @@ def large_numbers(output: Output) -> list[LargeNumber]:
         beside = _beside(plain, measure, rate, rate_told)
         numbers.append(LargeNumber(f"{rate_told(rate)} {separation.unit}", "per ms of exposure", beside))
     return numbers
+
+
+def _numbers_under_noise(output: Output, ends: Sequence[UsableEnds]) -> Iterator[LargeNumber]:
+    """Of the one that stays usable longest in the first series: its ends, beside the best plain CFA, and its light."""
+    name = next(iter(ends[0].at))
+    rows = {str(row["name"]): row for row in output.few.to_dict("records")}
+    plain = next((other for other in ends[0].at if rows[other]["kind"] == PLAIN and other != name), None)
+    numbers = [
+        LargeNumber(
+            f"{end.told(name)}{'' if ' ' in end.unit else f' {end.unit}'}".rstrip(),
+            f"{f'{end.unit}: ' if ' ' in end.unit else ''}{'most' if end.more else 'least'} {end.name} "
+            f"for an error of {end.error_max:g}, {name}",
+            f"{plain} {end.told(plain)} {end.unit}".rstrip() if plain is not None and plain in end.at else "",
+        )
+        for end in ends
+        if name in end.at
+    ]
+    light = float(rows[name][CFA_SENSITIVITY])
+    beside = _beside(None if plain is None else rows[plain], CFA_SENSITIVITY, light, "{:.3f}".format)
+    yield numbers[0]
+    yield LargeNumber(f"{light:.3f}", OF_CLEAR, beside)
+    yield from numbers[1:2]
 
 
 def _numbers_over(output: Output, series: SeriesFigure) -> Iterator[LargeNumber]:

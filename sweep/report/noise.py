@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -17,6 +18,16 @@ from .series import Line, SeriesFigure, quantity_of
 from .values import over_series, series_figures
 
 _LEAST = 1e-12
+_COMPUTED = (
+    "Computed, not drawn: how often noise makes one of two signals of different states look like the other, for the "
+    "two that are confused most. The dashed line is the error that the study allows; a ring marks where a design "
+    "passes it."
+)
+_COUNTED = (
+    "Counted: of raw patches drawn with noise, of all signals, the share whose state a classifier says that was "
+    "trained on others. It is of all signals, the error above of the two that are confused most: neither follows from "
+    "the other."
+)
 _RULE_NAMES = {MOST_LIKELY: "most likely signal", "nearest_centroid": "nearest centroid", "lda": "LDA"}
 
 
@@ -40,13 +51,23 @@ def noise_figures(output: Output) -> Iterator[SeriesFigure]:
     for (base, key), scenarios in series_of(output.scenarios).items():
         x = np.array(list(scenarios.values()))
         title = f"{output.study.study}: {base}"
-        errors = {n: Line(np.maximum(y, _LEAST), None) for n, y in over_series(rows, scenarios, STATE_ERROR).items()}
+        errors = {
+            n: Line(np.maximum(y, _LEAST), None, _crossing(output, base, key, n))
+            for n, y in over_series(rows, scenarios, STATE_ERROR).items()
+        }
         label = f"error of the worst pair of states ({_LEAST:g}: or less)"
-        yield SeriesFigure(title, key, label, x, errors, "", log_y=True, level=allowed)
+        yield SeriesFigure(title, key, label, x, errors, "", log_y=True, level=allowed, note=_COMPUTED)
         for rule in CLASSIFIERS if output.recognition is not None else ():
             lines = {n: Line(y, None) for n, y in _accuracies(output, scenarios, rule).items()}
             yield SeriesFigure(
-                title, key, f"accuracy of {_RULE_NAMES[rule]} on raw patches", x, lines, "", from_zero=False
+                title,
+                key,
+                f"accuracy of {_RULE_NAMES[rule]} on raw patches",
+                x,
+                lines,
+                "",
+                from_zero=False,
+                note=_COUNTED,
             )
 
 
@@ -66,11 +87,13 @@ def usable_lines(output: Output) -> Iterator[str]:
         x = np.array(list(scenarios.values()))
         ranges: dict[str, list[str]] = {}
         for design, errors in over_series(rows, scenarios, STATE_ERROR).items():
-            where = _range(x, errors <= allowed, unit, _crossing(output, base, key, design))
+            crossing = _crossing(output, base, key, design)
+            where = _range(x, errors <= allowed, unit, None if crossing is None else crossing[0])
             ranges.setdefault(where, []).append(design)
         found = [f"{_listed(designs)} {where}" for where, designs in ranges.items()]
         if found:
-            yield f"Over {name}, noise confuses states at most {allowed:g} of the time: {'; '.join(found)}."
+            what = f"noise confuses the worst two states at most {allowed:g} of the time"
+            yield f"Over {name}, {what}: {'; '.join(found)}."
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -104,13 +127,46 @@ def _rounded(value: float, *, up: bool) -> float:
     return float(f"{(math.ceil if up else math.floor)(value / unit * (1 - 1e-12)) * unit:.3g}")
 
 
-def _crossing(output: Output, series: str, key: str, design: str) -> float | None:
-    """The number at which a design's error is what is allowed, as the run has computed it."""
+def _crossing(output: Output, series: str, key: str, design: str) -> tuple[float, float] | None:
+    """The number at which a design's error is what is allowed, and its error there, as the run has computed them."""
     table = output.crossings
     if table is None:
         return None
-    own = table[(table["series"] == series) & (table["key"] == key) & (table["name"] == design)]["at"].dropna()
-    return float(own.iloc[0]) if len(own) == 1 else None
+    own = table[(table["series"] == series) & (table["key"] == key) & (table["name"] == design)]
+    own = own.dropna(subset=["at", "error"])
+    return (float(own["at"].iloc[0]), float(own["error"].iloc[0])) if len(own) == 1 else None
+
+
+@dataclass(frozen=True)
+class UsableEnds:
+    """Where designs reach the largest error that is allowed over one number of the scenarios; the best one first.
+
+    `name`, `unit`: of the number. `more`: the best one bears the largest number, else it needs the smallest.
+    """
+
+    name: str
+    unit: str
+    error_max: float
+    more: bool
+    at: dict[str, float]
+
+    def told(self, design: str) -> str:
+        """Where a design stops being usable, rounded to the side where it is usable; without its unit."""
+        return f"{_rounded(self.at[design], up=not self.more):g}"
+
+
+def usable_ends(output: Output) -> Iterator[UsableEnds]:
+    """For each series of scenarios where designs stop being usable; none where one is usable everywhere."""
+    allowed = _allowed(output)
+    for series in noise_figures(output):
+        ends = {name: line.passes[0] for name, line in series.lines.items() if line.passes is not None}
+        if allowed is None or not ends or any((line.y <= allowed).all() for line in series.lines.values()):
+            continue
+        sides = {bool(series.lines[name].y[0] <= allowed) for name in ends}
+        if len(sides) == 1:
+            more = sides.pop()
+            ordered = sorted(ends, key=lambda name: -ends[name] if more else ends[name])
+            yield UsableEnds(*series.quantity, allowed, more, {name: ends[name] for name in ordered})
 
 
 def told_apart_table(output: Output) -> pd.DataFrame:

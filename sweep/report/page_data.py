@@ -258,22 +258,20 @@ def _finite(values: np.ndarray) -> list[float | None]:
     return [float(value) if np.isfinite(value) else None for value in values]
 
 
+_OF_SERIES = ("title", "x_label", "y_label", "band", "note", "log_x", "log_y", "from_zero", "level")
+
+
 def _series(series: SeriesFigure) -> dict[str, Any]:
-    return {
-        "title": series.title,
-        "x_label": series.x_label,
-        "y_label": series.y_label,
-        "x": series.x.tolist(),
-        "lines": {
-            name: {"y": _finite(line.y), "upper": None if line.upper is None else _finite(line.upper)}
-            for name, line in series.lines.items()
-        },
-        "band": series.band,
-        "log_x": series.log_x,
-        "log_y": series.log_y,
-        "from_zero": series.from_zero,
-        "level": series.level,
+    lines = {
+        name: {
+            "y": _finite(line.y),
+            "upper": None if line.upper is None else _finite(line.upper),
+            "passes": line.passes,
+            "drawn": [_finite(values) for values in line.over(series.x)],
+        }
+        for name, line in series.lines.items()
     }
+    return {**{key: getattr(series, key) for key in _OF_SERIES}, "x": series.x.tolist(), "lines": lines}
 
 
 def _front(output: Output, rows: pd.DataFrame) -> dict[str, Any]:

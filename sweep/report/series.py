@@ -35,17 +35,28 @@ _LABELS = {
 
 @dataclass(frozen=True)
 class Line:
-    """A design: values over the numbers, ndarray[n], and, where it has one, the upper end of its band."""
+    """A design: values over the numbers, ndarray[n], and, where it has one, the upper end of its band.
+
+    `passes`: where it passes the level of the figure, between two of the numbers, and its value there.
+    """
 
     y: FloatArray
     upper: FloatArray | None
+    passes: tuple[float, float] | None = None
+
+    def over(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What is drawn: its values over the numbers `x` (ascending), and where it passes the level among them."""
+        if self.passes is None:
+            return x, self.y
+        at = np.searchsorted(x, self.passes[0])
+        return np.insert(x, at, self.passes[0]), np.insert(self.y, at, self.passes[1])
 
 
 @dataclass(frozen=True)
 class SeriesFigure:
     """A line per design over `x` (ndarray[n]), the number `key` of the scenarios; `level` is marked.
 
-    `among`: which scenarios they are, where there are others over the same number.
+    `among`: which scenarios they are, where there are others over the same number. `note`: what the values are.
     """
 
     title: str
@@ -58,6 +69,7 @@ class SeriesFigure:
     from_zero: bool = True
     level: float | None = None
     among: str = ""
+    note: str = ""
 
     @property
     def x_label(self) -> str:
@@ -145,7 +157,11 @@ def draw_series(series: SeriesFigure) -> Figure:
     """Draw a line with its band per design; numbers over more than a decade are drawn on a logarithmic axis."""
     figure, axes = canvas(8.0, 4.8)
     for (name, line), color in zip(series.lines.items(), CURVE_CYCLE * 4, strict=False):
-        axes.plot(series.x, line.y, "o-", color=color, label=name, linewidth=1.5, markersize=3.5)
+        axes.plot(*line.over(series.x), "-", color=color, linewidth=1.5)
+        axes.plot(series.x, line.y, "o", color=color, markersize=3.5)
+        axes.plot([], [], "o-", color=color, label=name, linewidth=1.5, markersize=3.5)
+        if line.passes is not None:
+            axes.plot(*line.passes, "o", markerfacecolor="none", markeredgecolor=color, markersize=9)
         if line.upper is not None:
             axes.fill_between(series.x, line.y, line.upper, color=color, alpha=0.2, linewidth=0)
     if series.log_x:

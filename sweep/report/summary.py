@@ -78,7 +78,7 @@ def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
     workers = output.provenance.workers
     computed = f"{output.provenance.duration_s:.1f} s by {workers} worker{'s' if workers > 1 else ''}"
     lines.append(f"Computed in {computed}." if took_s is None else f"Took {took_s:.1f} s; computed in {computed}.")
-    lines.append(f"Files: {output.folder}/: results.parquet, report.html, pareto.png, provenance.json.")
+    lines.append(f"Files: {output.folder}/: results.parquet, report.html, provenance.json.")
     return lines
 
 

@@ -100,7 +100,9 @@ def columns_table() -> list[str]:
 
 FILES = {
     RESULTS: "a row per design and scenario; its columns are below",
-    LIMITED_BY: "the two lights that limit each CSD of the designs that the report can show: `design_id`, "
+    LIMITED_BY: "the two lights that limit each CSD, of plain CFAs, named designs, answers of the search, "
+    "and of each CFA the best swept "
+    "designs and up to 200 of its front in the first scenario; not of other swept designs: `design_id`, "
     "`limited_by_<a>_<b>` (of a light at any place, at the worst one of the lattice that was computed)",
     VALIDATED: "where a study validates on other lights: `design_id` and `held_out_csd_<a>_<b>`, their CSDs, DN",
     ROBUSTNESS: "where the lights have a population, for each plain CFA, named design and answer of the search: "

@@ -199,3 +199,13 @@ def test_the_noise_report_begins_with_the_error(finished: Finished, opened: Any)
     assert (axis["type"], axis["exponentformat"]) == ("log", "power")
     ticks = seen.page.evaluate("[...document.querySelectorAll('#series-0 .ytick')].map((e) => e.textContent)")
     assert not any("µ" in tick for tick in ticks)
+    table = pd.read_parquet(finished("noise") / "crossings.parquet")
+    own = table[table["key"] == "read_noise_e"].dropna(subset=["at"]).set_index("name")["at"]
+    assert len(own) > 1
+    rings = seen.page.evaluate(
+        """Object.fromEntries(document.getElementById('series-0').data.map((t) =>
+            [t.name, Array.from(t.x).filter((_, i) => t.marker.symbol[i] === 'circle-open')]).filter((t) => t[1].length))"""
+    )
+    assert {name: pytest.approx(x) for name, x in rings.items()} == {name: [at] for name, at in own.items()}
+    first = seen.page.locator(".numbers b").first.inner_text()
+    assert abs(float(first.removesuffix(" e")) - own.max()) < 0.005 * own.max()

@@ -182,6 +182,12 @@ def test_a_study_of_plain_cfas_has_an_answer(tmp_path: Path) -> None:
     assert not (tmp_path / "out" / "pareto.png").exists()
 
 
+def test_where_a_line_passes_the_level_is_drawn_among_its_values() -> None:
+    line = Line(np.array([1e-6, 1e-2]), None, (8.0, 1e-3))
+    x, y = line.over(np.array([1.0, 10.0]))
+    assert (x.tolist(), y.tolist()) == ([1.0, 8.0, 10.0], [1e-6, 1e-3, 1e-2])
+
+
 BETTER = """\
 study: better
 sensor: ar0820
@@ -202,3 +208,30 @@ def test_a_plain_cfa_that_is_better_is_named_first(tmp_path: Path) -> None:
     assert ratio is not None
     assert float(ratio[1]) < 1
     assert "RGGB separates most of all: 139 DN" in " ".join(said)
+
+
+TWO_TILES = """\
+study: two
+sensor: ar0820
+lights: tl16
+cfas: [RGGB, RYNCy, RCNB]
+sweeps:
+  y: {cfa: RYNCy, channel: N, base: Y, to: G, grid: {left_nm: [600, 610], left_width_nm: 6, right_nm: 650, right_width_nm: 6}}
+  c: {cfa: RCNB, channel: N, base: C, to: G, grid: {left_nm: [600, 610, 620], left_width_nm: 6, right_nm: [650, 655], right_width_nm: 6}}
+constraints: {sensitivity: {min: 0.5}}
+"""
+
+
+def test_the_best_of_each_other_cfa_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "two.yaml"
+    path.write_text(TWO_TILES)
+    ran(load_study(path), tmp_path / "out", 1)
+    table = whole(tmp_path / "out")
+    made = table[(table["kind"] == "sweep") & table["feasible"]]
+    most = made.loc[made.groupby("cfa", observed=True)["csd_yellow_red"].idxmax()].sort_values("csd_yellow_red")
+    assert len(most) == 2
+    other, best = most.iloc[0], most.iloc[1]
+    said = answer_sentences(read_output(tmp_path / "out"))
+    assert f"design {best['design_id']} of {best['cfa']} separates yellow from red by" in said[0]
+    told = f"The best of {other['cfa']} that meets the same, design {other['design_id']}, separates yellow from red by "
+    assert [line for line in said if line.startswith(f"{told}{other['csd_yellow_red']:.0f} DN at ")]

@@ -369,8 +369,11 @@ function drawSeries(series, box) {
       found.push(Object.assign({mode: "lines", y: line.y, line: {width: 0}, showlegend: false, hoverinfo: "skip"}, shared));
       found.push(Object.assign({mode: "lines", y: line.upper, line: {width: 0}, fill: "tonexty", fillcolor: `${color}33`, showlegend: false, hoverinfo: "skip"}, shared));
     }
-    found.push(Object.assign({mode: "lines+markers", y: line.y, name: plain(name), line: {color, width: 2},
-      marker: {size: 6, symbol: ["circle", "square", "diamond", "triangle-up", "x", "star"][i % 6]}}, shared));
+    const [x, y] = line.drawn, ring = line.passes ? x.indexOf(line.passes[0]) : -1;
+    const symbol = ["circle", "square", "diamond", "triangle-up", "x", "star"][i % 6];
+    const marker = ring < 0 ? {size: 6, symbol} : {color, opacity: 1, line: {color, width: x.map((_, at) => at === ring ? 2 : 0)},
+      size: x.map((_, at) => at === ring ? 13 : 6), symbol: x.map((_, at) => at === ring ? "circle-open" : symbol)};
+    found.push(Object.assign({}, shared, {mode: "lines+markers", x, y, name: plain(name), line: {color, width: 2}, marker}));
   });
   const shapes = series.level === null ? [] : [{type: "line", xref: "paper", x0: 0, x1: 1, y0: series.level, y1: series.level,
     line: {color: "#666666", width: 1, dash: "dash"}}];
