@@ -69,7 +69,7 @@ def test_other_lights_read_as_in_a_study_of_their_own(folder: Path) -> None:
     make_report(output)
     best = output.best.iloc[0]
     said = output.trade_off[0].told(own.loc[best["design_id"], "csd_yellow_red"])
-    assert f"On lights that it has not seen it has {said}" in "\n".join(summary_lines(output))
+    assert f"({said} on lights that it has not seen)" in "\n".join(summary_lines(output))
     assert "yellow/<wbr>red CSD, other lights" in (folder / "one" / "report.html").read_text()
 
 
