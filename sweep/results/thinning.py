@@ -90,7 +90,7 @@ def _leading(table: pa.Table, separation: str) -> pa.Table:
 
 def _best_of_each(table: pa.Table, order: Sequence[str]) -> pa.Table:
     """The best design of each CFA in each scenario."""
-    found = [table.slice(0, 0)]
+    found = [table.schema.empty_table()]
     for scenario in table["scenario"].unique().to_pylist():
         own = table.filter(pa.array(holds(table, "scenario", scenario)))
         for cfa in own["cfa"].unique().to_pylist():
