@@ -106,7 +106,8 @@ def kept_kernel(view: View, *, by_pixel: bool, work: Counter[str]) -> Kernel:
     `work` counts a kept one as if it was made.
     """
     wave = view.grid.nodes_nm
-    places = phase.n_places(view, view.methods.phase) * len(over_field(view))
+    over = len(over_field(view))  # filters that move need more places than those that do not
+    places = phase.n_places(view, view.methods.phase) * over
     if by_pixel or 8 * places * len(view.mosaic.channels) ** 2 * wave.size > _KEPT_BYTES:
         return make_kernel(view, view.methods, wave, by_pixel=by_pixel, work=work)
 
@@ -114,7 +115,7 @@ def kept_kernel(view: View, *, by_pixel: bool, work: Counter[str]) -> Kernel:
         own: Counter[str] = Counter()
         return make_kernel(view, view.methods, wave, by_pixel=False, work=own), own
 
-    kernel, own = KERNELS.get(hashlib.sha256(pickle.dumps(colorless(view))).digest(), made)
+    kernel, own = KERNELS.get(hashlib.sha256(pickle.dumps((over, colorless(view)))).digest(), made)
     work.update(own)
     return kernel
 

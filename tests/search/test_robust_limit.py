@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+from sweep.camera.kernel import KERNELS
+from sweep.camera.linear import LinearImager, smooth_imager
 from sweep.camera.sensor_field import SensorField
 from sweep.camera.sensor_places import SensorPlaces
 from sweep.metrics.evaluate import designed_quantities
@@ -202,6 +204,17 @@ def test_free_form_filters_come_near_the_limit_over_the_whole_sensor() -> None:
     below = 1 - worst.distance_dn / proven
     assert f"Free-form filters reach {worst.distance_dn:.0f} DN, {below:.1%} below the limit".replace("%", " %") in text
     assert below <= 0.1
+
+
+def test_kernels_of_filters_that_move_are_their_own() -> None:
+    """Those of a still filter in the same scene are of fewer places."""
+    (space,) = [each for each in STUDY.spaces if each.name == "robust"]
+    view, curves = STUDY.view(space, "field"), space.curves(space.points(0, 1), STUDY.grid.size)
+    KERNELS.clear()
+    still, moving = smooth_imager(replace(view, technologies=())), smooth_imager(view)
+    assert still.n_cases == 1 < moving.n_cases
+    KERNELS.clear()
+    np.testing.assert_array_equal(moving.smooth(curves), LinearImager(moving.view).smooth(curves))
 
 
 def test_the_table_of_the_documentation() -> None:
