@@ -32,7 +32,7 @@ _HOMES = {
     "Dual": "designs.families.dual:Dual",
     "FreeForm": "designs.families.free_form:FreeForm",
     "Quantity": "metrics.quantity:Quantity",
-    "SweepError": "errors:SweepError",
+    "SweepError": "base.errors:SweepError",
 }
 """Public name -> the module of the package that defines it, and its name there."""
 

@@ -1,3 +1,4 @@
+from .base.errors import SweepError
 from .camera.pixel import Optics, Pixel
 from .camera.scenario import Scenario
 from .camera.scene import Target
@@ -14,7 +15,6 @@ from .door.opening import opened_study as load_study
 from .door.opening import own_lights as lights
 from .door.opening import own_sensor as sensor
 from .door.opening import studies
-from .errors import SweepError
 from .metrics.quantity import Quantity
 
 __version__: str

@@ -19,6 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
+from sweep.base.errors import StudyError
+from sweep.base.types import FloatArray
 from sweep.camera.effects import base, blur, noise, phase, quantization, sampling, saturation
 from sweep.camera.forget import forget_scenes
 from sweep.camera.kernel import pixels_per_place
@@ -39,10 +41,8 @@ from sweep.commands.accuracy.payments import Payment, payments
 from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.products import row_products
-from sweep.errors import StudyError
 from sweep.study import load_study
 from sweep.study.shipped import shipped_names, study_path
-from sweep.types import FloatArray
 
 REPEATS = 5
 MOST = 1.1

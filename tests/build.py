@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from sweep.base.errors import StudyError, SweepError
 from sweep.commands.new import new_study
-from sweep.errors import StudyError, SweepError
 from sweep.run import run_study
 from sweep.study import Study, load_study
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sweep.disk import digest_of
+from sweep.base.disk import digest_of
 from sweep.results.inventory import Inventory
 from sweep.results.records import to_json
 from sweep.search.problem import Evaluation, SearchRun

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..types import FloatArray
+from ..base.types import FloatArray
 from . import kernel
 from .compiled_areas import CellWeights, areas
 from .compiled_cells import SEGMENTS, SHARP, Envelopes, Light, deviations, ranges

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ..types import FloatArray
+from ..base.types import FloatArray
 
 _TAIL = 9.5
 """Standard deviations beyond which a Gaussian is left out: less than 1e-20 of it."""

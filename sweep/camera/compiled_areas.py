@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from ..types import FloatArray, IndexArray
+from ..base.types import FloatArray, IndexArray
 from .compiled_light import covered_share
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from ..types import BoolArray, FloatArray, IndexArray
+from ..base.types import BoolArray, FloatArray, IndexArray
 from .compiled_areas import CellWeights, slope_of_disc
 from .compiled_light import add, covered_share
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ..types import FloatArray, IndexArray
+from ..base.types import FloatArray, IndexArray
 
 
 @njit(cache=True, nogil=True)

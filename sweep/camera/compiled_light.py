@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ..types import BoolArray, FloatArray, IndexArray
+from ..base.types import BoolArray, FloatArray, IndexArray
 
 Table = tuple[FloatArray, float]
 """Coefficients of a uniform spline of the fifth order, ndarray[n, n_functions], from the second node before a radius of

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ..types import FloatArray
+from ..base.types import FloatArray
 
 
 @njit(cache=True, nogil=True)

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import DTypeLike
 
+from ..base.types import BoolArray, FloatArray
 from ..designs.block import Block
 from ..designs.products import row_products
-from ..types import BoolArray, FloatArray
 from .effects import flicker, quadrature
 from .exposure import exposure_times, fixed_white, white_irradiance
 from .field import over_field

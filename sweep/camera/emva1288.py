@@ -13,8 +13,8 @@ from xml.etree.ElementTree import Element
 
 from pydantic import ValidationError
 
+from ..base.errors import DataError, Fault
 from ..curves.instrument_files import read_xml
-from ..errors import DataError, Fault
 from .pixel import Pixel
 
 _WHAT = "EMVA 1288 results"

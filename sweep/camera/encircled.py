@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 from scipy.special import j1
 
-from ..cache import Cache
-from ..types import FloatArray
+from ..base.cache import Cache
+from ..base.types import FloatArray
 from .effects.blur import Profile
 
 _RESIDUAL = 1e-10

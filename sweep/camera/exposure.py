@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..types import FloatArray
+from ..base.types import FloatArray
 from .pixel import irradiance_factor
 from .scene import WhitePatchExposure
 from .view import View, per_photon

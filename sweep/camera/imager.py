@@ -16,10 +16,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import DTypeLike
 
-from ..cache import Cache
+from ..base.cache import Cache
+from ..base.errors import Fault, SweepError
+from ..base.types import FloatArray
 from ..designs.block import Block
-from ..errors import Fault, SweepError
-from ..types import FloatArray
 from .effects import phase
 from .electrons import Changing, Electrons
 from .field import over_field

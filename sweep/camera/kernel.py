@@ -14,9 +14,9 @@ from functools import partial
 
 import numpy as np
 
-from ..cache import Cache
+from ..base.cache import Cache
+from ..base.types import FloatArray
 from ..curves.hats import hats
-from ..types import FloatArray
 from .effects import blur, crosstalk, demosaic, phase, sampling
 from .field import over_field
 from .methods import REFERENCE, Methods

@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..types import FloatArray
+from ..base.types import FloatArray
 
 
 @lru_cache(maxsize=64)

@@ -13,9 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ..cache import Cache
-from ..errors import Fault, SweepError
-from ..types import FloatArray, IndexArray
+from ..base.cache import Cache
+from ..base.errors import Fault, SweepError
+from ..base.types import FloatArray, IndexArray
 from .exposure import relative_slope
 from .imager import Imager
 from .methods import REFERENCE

@@ -7,7 +7,7 @@ from dataclasses import make_dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from ..errors import Fault, SweepError, nearest
+from ..base.errors import Fault, SweepError, nearest
 from .registry import EFFECTS
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import Fault, SweepError
-from ..types import IndexArray
+from ..base.errors import Fault, SweepError
+from ..base.types import IndexArray
 
 _TOKEN = re.compile(r"[A-Z][a-z0-9]*")
 

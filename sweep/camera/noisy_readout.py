@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..types import BoolArray, FloatArray
+from ..base.types import BoolArray, FloatArray
 from .noisy import table
 from .pixel import Pixel
 

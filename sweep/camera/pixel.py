@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from ..types import FloatArray, Meters, NonNegative, Section, Share
+from ..base.types import FloatArray, Meters, NonNegative, Section, Share
 
 ReadNoise = Annotated[float, Field(ge=0, le=1e4)]
 """Electrons; sensors have 1 to 100."""

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cache import Cache
+from ..base.cache import Cache
+from ..base.types import FloatArray, IndexArray
 from ..curves.hats import hats
-from ..types import FloatArray, IndexArray
 from .between import Between, Deviation
 from .effects import blur, phase
 from .effects.base import KernelEffect

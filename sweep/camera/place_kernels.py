@@ -10,7 +10,7 @@ from collections import Counter
 
 import numpy as np
 
-from ..types import FloatArray
+from ..base.types import FloatArray
 from . import compiled_light, legendre
 from .effects import crosstalk, demosaic, phase, sampling
 from .encircled import encircled

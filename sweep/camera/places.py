@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.types import FloatArray, IndexArray
 from ..curves.lights import Pair, class_pairs
-from ..types import FloatArray, IndexArray
 from .compiled_distances import distances
 from .effects import phase
 from .place_cells import CellKernels, kept_cells

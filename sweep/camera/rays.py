@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..types import FloatArray
+from ..base.types import FloatArray
 
 _PANELS, _ORDER = 96, 8
 """Panels of each arc of the cone at least, and points of the Gauss-Legendre rule in each."""

@@ -10,7 +10,7 @@ from collections import Counter
 
 import numpy as np
 
-from ..types import BoolArray, FloatArray, IndexArray
+from ..base.types import BoolArray, FloatArray, IndexArray
 from .effects import quantization, saturation
 from .kernel import Kernel
 from .noisy import table

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..found import made_in
-from ..types import FloatArray
+from ..base.found import made_in
+from ..base.types import FloatArray
 from . import effects
 from .effects.base import Chosen, Effect, LightEffect
 from .shot import Shot

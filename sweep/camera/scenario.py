@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import create_model, model_validator
 
-from ..types import Section
+from ..base.types import Section
 from .registry import EFFECTS
 from .scene import Scene
 

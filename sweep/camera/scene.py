@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..types import Meters, Ratio, Seconds, Section, Share
+from ..base.types import Meters, Ratio, Seconds, Section, Share
 from .pixel import DarkCurrent, Optics, Pixel, Prnu, ReadNoise
 from .sensor_field import SensorField
 

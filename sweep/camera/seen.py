@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..cache import Cache
-from ..types import FloatArray, IndexArray
+from ..base.cache import Cache
+from ..base.types import FloatArray, IndexArray
 from .rays import Cone, Stretches, half_angle_rad, rays, stretch
 from .scene import Scene
 from .shot import Shot

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..base.errors import DataError, Fault, nearest
+from ..base.types import FloatArray
 from ..curves.builtin.ar0820 import ar0820
 from ..curves.builtin.surrogate import SurrogateParameters, surrogate_parameters
 from ..curves.spectrum import WavelengthGrid
 from ..designs.technology import Technology
-from ..errors import DataError, Fault, nearest
-from ..types import FloatArray
 from .mosaic import Mosaic
 
 _LEAST_QE = 1e-9

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..types import Section
+from ..base.types import Section
 
 PLACES = 9
 """Places of the sensor where a study does not say how many."""

@@ -18,9 +18,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..cache import Cache
+from ..base.cache import Cache
+from ..base.types import FloatArray, IndexArray
 from ..curves.lights import Pair, class_pairs
-from ..types import FloatArray, IndexArray
 from .bent_chords import EdgeOfCone, Steepest, edge_of_cone
 from .effects.illumination import Options
 from .field import scene_at

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..base.types import FloatArray, IndexArray
 from ..curves.lights import Lights
 from ..curves.spectrum import WavelengthGrid
 from ..curves.tasks import StudyTasks
 from ..designs.technology import Technology, index_of
-from ..types import FloatArray, IndexArray
 from .mosaic import Mosaic
 from .pixel import Pixel
 from .scene import Scene

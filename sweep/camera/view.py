@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..base.types import FloatArray
 from ..curves.color import luminance_per_photon_radiance
-from ..types import FloatArray
 from .methods import REFERENCE, Methods
 from .pixel import irradiance_factor
 from .shot import Shot

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..found import files_in
+from ..base.found import files_in
 from . import verbs
 from .endings import ends_in_lines
 from .panels import PANELS

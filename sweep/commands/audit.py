@@ -11,10 +11,11 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from ..base.errors import Fault
+from ..base.types import FloatArray, Progress
 from ..camera.imager import imager_of
 from ..camera.methods import REFERENCE
 from ..designs.space import Space
-from ..errors import Fault
 from ..metrics.evaluate import evaluate
 from ..metrics.quantity import WORST_CASE
 from ..report import read_output, study_of
@@ -24,7 +25,6 @@ from ..results.lock import locked
 from ..results.tables import AUDIT, RESULTS, batches
 from ..run.routes import worst_cases
 from ..study import Study
-from ..types import FloatArray, Progress
 
 SHARE = 0.01
 _COLUMNS = ("design_id", "scenario", "plan", "promised_dn", "realized_dn", "quantity")

@@ -14,13 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ..base.disk import read_input
+from ..base.errors import DataError, Fault, OutputError
 from ..curves.facts import Facts, condensed, facts_of, notes
 from ..curves.files import scan_curves
 from ..curves.light_unit import LightUnit
 from ..curves.mending import mended
 from ..curves.signal_color import LightColor
-from ..disk import read_input
-from ..errors import DataError, Fault, OutputError
 from ..report.figures import rendered
 from ..results.tables import write_bytes, write_text
 from .describe_picture import draw

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.types import FloatArray
 from ..curves.color import REGIONS, display_colors
 from ..curves.facts import Curve, Facts
 from ..curves.signal_color import VISIBLE, LightColor, outline, spectral_locus
 from ..report.figures import CURVE_COLORS, CURVE_CYCLE, TYPE_COLORS, canvas_grid
-from ..types import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

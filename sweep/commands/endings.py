@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 
 import typer
 
-from ..errors import Fault, SweepError
+from ..base.errors import Fault, SweepError
 
 _INTERRUPTED, _BROKEN_PIPE = 130, 141
 """Exit codes of a shell for a command that SIGINT or SIGPIPE ended."""

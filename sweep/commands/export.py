@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from ..base.errors import Fault, OutputError
+from ..base.types import FloatArray
 from ..camera.mosaic import Mosaic
 from ..curves.isetcam import color_hints, csv_text, filter_names, isetcam_mat, unique_names
-from ..errors import Fault, OutputError
 from ..report import Output, check_kept, read_output, study_of
 from ..results.chosen import find_row
 from ..results.designs import row_curves
 from ..results.tables import write_bytes
 from ..study import Study, folder_name
-from ..types import FloatArray
 from .export_also import other_files
 from .options import Also
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from ..base.types import FloatArray
 from ..curves.isetcam import unique_names
 from ..curves.rgb_weights import RgbWeights, rgb_weights
 from ..curves.speos import speos_text
 from ..study import Study, folder_name
-from ..types import FloatArray
 from .options import Also
 
 _RGB = ("R", "G", "B")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 if TYPE_CHECKING:
-    from ..types import Parallel
+    from ..base.types import Parallel
 
 
 def finish(folder: Path, began_s: float, *, mend: bool = False, parallel: Parallel | None = None) -> None:
@@ -18,8 +18,8 @@ def finish(folder: Path, began_s: float, *, mend: bool = False, parallel: Parall
     `began_s`: when the command began, by the monotonic clock: a user waits for the report, too. `parallel` makes the
     pictures, without it they are made one after the other.
     """
+    from ..base.types import in_turn
     from ..report import make_report, read_output, summary_lines
-    from ..types import in_turn
 
     found = read_output(folder)
     make_report(found, mend=mend, parallel=parallel or in_turn)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..disk import is_folder, read_facts
-from ..errors import Fault, StudyError, SweepError
+from ..base.disk import is_folder, read_facts
+from ..base.errors import Fault, StudyError, SweepError
 from ..results.folder import held_by
 from ..results.lock import holder
 from ..results.tables import PROVENANCE

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from ..errors import Fault, StudyError
+from ..base.errors import Fault, StudyError
 from .completion import run_folders, study_files
 
 

@@ -13,11 +13,11 @@ from pathlib import Path
 import typer
 
 from .. import run as runner
-from ..errors import Fault, InterruptedRunError, SweepError
+from ..base.errors import Fault, InterruptedRunError, SweepError
+from ..base.types import Parallel
 from ..results.names import REPORT
 from ..run.workers import Workers, workers
 from ..study import Study, folder_name, load_study
-from ..types import Parallel
 from .audit import mend_audit
 from .endings import end_now
 from .finish import finish

@@ -6,7 +6,7 @@ import json
 import os
 from pathlib import Path
 
-from ..errors import Fault, OutputError
+from ..base.errors import Fault, OutputError
 from ..results.tables import write_text
 from ..study.editors import TITLE, schema_text
 from ..study.schema import StudySection

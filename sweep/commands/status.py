@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..disk import read_facts
-from ..errors import OutputError
+from ..base.disk import read_facts
+from ..base.errors import OutputError
 from ..results.folder import held_by
 from ..results.inventory import Inventory, faults_of, no_run
 from ..results.journal import SHARDS, Entry, Journal

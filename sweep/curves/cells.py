@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import Fault
-from ..types import FloatArray
+from ..base.errors import Fault
+from ..base.types import FloatArray
 from .spectrum import LARGEST
 from .wavelength_names import WAVELENGTH
 

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from ..types import FloatArray
+from ..base.types import FloatArray
 from .spectrum import WavelengthGrid, energy_from_photons
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import Fault
-from ..types import FloatArray
+from ..base.errors import Fault
+from ..base.types import FloatArray
 from .light_unit import LightUnit
 from .scan import Scan, distinct
 from .signal_color import VISIBLE, LightColor, light_color

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..disk import read_input
-from ..errors import DataError, Fault, nearest
+from ..base.disk import read_input
+from ..base.errors import DataError, Fault, nearest
 from .instrument_files import scan_json, scan_spdx
 from .mat_files import DamagedError, read_variables
 from .scan import MOST_BYTES, Scan, check_size

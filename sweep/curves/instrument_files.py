@@ -9,8 +9,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from ..disk import read_input
-from ..errors import DataError, Fault
+from ..base.disk import read_input
+from ..base.errors import DataError, Fault
 from .scan import MOST_BYTES, Scan, check_size, distinct
 from .spectrum import sample_faults
 

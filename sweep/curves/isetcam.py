@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from ..types import FloatArray, IndexArray
+from ..base.types import FloatArray, IndexArray
 from .wavelength_names import WAVELENGTH
 
 HINTS = "rgbcymwiuxzok"

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import DataError, Fault
-from ..types import FloatArray
+from ..base.errors import DataError, Fault
+from ..base.types import FloatArray
 from .cells import TableCells
 from .table_steps import TextTable, evenly
 from .text_tables import text_table

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import DataError, Fault
+from ..base.errors import DataError, Fault
 from .facts import Curve, Facts, condensed, facts_of
 from .files import scan_curves
 from .light_unit import LightUnit

@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ..types import FloatArray, IndexArray
+from ..base.types import FloatArray, IndexArray
 from .population import Population
 from .spectrum import WavelengthGrid, equal_photons
 

@@ -18,7 +18,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..types import FloatArray, IndexArray
+from ..base.types import FloatArray, IndexArray
 from .lights import Lights, Pair
 from .population import Population
 from .spectrum import WavelengthGrid

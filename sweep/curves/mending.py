@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import Fault
-from ..types import FloatArray
+from ..base.errors import Fault
+from ..base.types import FloatArray
 from .isetcam import csv_text
 from .scan import Scan
 from .spectrum import sample_faults

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..types import Section, from_to
+from ..base.types import Section, from_to
 
 _Value = TypeVar("_Value")
 _Celsius = Annotated[float, Field(ge=-100, le=300)]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..types import FloatArray
+from ..base.types import FloatArray
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..errors import DataError, Fault
-from ..types import FloatArray
+from ..base.errors import DataError, Fault
+from ..base.types import FloatArray
 
 MOST_BYTES = 40_000_000
 MOST_CURVES = 2_000

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from ..types import FloatArray
+from ..base.types import FloatArray
 from .color import REGIONS, VISIBLE_NM, chromaticity
 from .spectrum import WavelengthGrid
 

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..types import FloatArray, Section, from_to
+from ..base.types import FloatArray, Section, from_to
 from .builtin.led import led_photons
 from .color import chromaticity
 from .regulations import SIGNAL_REGIONS

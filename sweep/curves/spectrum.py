@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import model_validator
 
-from ..errors import DataError, Fault
-from ..types import FloatArray, Positive, Section
+from ..base.errors import DataError, Fault
+from ..base.types import FloatArray, Positive, Section
 
 Resampling = Literal["linear", "mean"]
 Outside = Literal["refuse", "zero"]

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..disk import read_input
-from ..errors import DataError, Fault
-from ..types import FloatArray
+from ..base.disk import read_input
+from ..base.errors import DataError, Fault
+from ..base.types import FloatArray
 from .scan import MOST_BYTES, MOST_SAMPLES, Scan, check_size
 from .spectrum import sample_faults
 

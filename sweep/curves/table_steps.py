@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from ..errors import Fault
+from ..base.errors import Fault
 from .wavelength_names import WAVELENGTH, is_unit, unit_words, wavelength_unit
 
 TextRow = tuple[int, list[str]]

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..types import FloatArray, IndexArray
+from ..base.types import FloatArray, IndexArray
 
 Measure = Literal["color", "low_light", "separation"]
 Case = str

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..disk import read_input
-from ..errors import DataError, Fault
-from ..types import FloatArray
+from ..base.disk import read_input
+from ..base.errors import DataError, Fault
+from ..base.types import FloatArray
 from .cells import TableCells, number_of
 from .scan import MOST_BYTES, Scan, check_size, distinct
 from .spectrum import sample_faults

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from ..types import FloatArray
+from ..base.types import FloatArray
 from .edge import SPAN_PER_WIDTH, edge, edge_gradient
 from .family import Parameter
 from .products import row_products

@@ -15,8 +15,8 @@ from typing import Protocol
 
 import numpy as np
 
-from ..cache import Cache
-from ..types import FloatArray, IndexArray
+from ..base.cache import Cache
+from ..base.types import FloatArray, IndexArray
 from .family import SeparableFamily
 from .products import row_products
 from .space import Space

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ..types import FloatArray, IndexArray
+from ..base.types import FloatArray, IndexArray
 from .vectorized import larger, smaller
 
 _NUMBERS = {"nnan", "nsz"}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..types import FloatArray
+from ..base.types import FloatArray
 
 _TENTH = 0.2466364532884666
 """Where the quintic 6 t^5 - 15 t^4 + 10 t^3 is 0.1; it is 0.9 at 1 - _TENTH."""

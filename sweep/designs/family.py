@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Protocol, Self, runtime_checkable
 
-from ..types import FloatArray, Section
+from ..base.types import FloatArray, Section
 from .tolerance import Off
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..types import FloatArray
+from ..base.types import FloatArray
 from .family import Family, Parameter
 from .tolerance import Off
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import Fault, SweepError
-from ..own_code import OwnCode
-from ..types import FloatArray
+from ..base.errors import Fault, SweepError
+from ..base.own_code import OwnCode
+from ..base.types import FloatArray
 from .family import Parameter
 from .tolerance import Off
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..types import FloatArray
+from ..base.types import FloatArray
 
 
 def row_products(rows: FloatArray, matrix: FloatArray) -> FloatArray:

@@ -6,9 +6,9 @@ from typing import Any
 
 from pydantic import create_model
 
-from ..errors import Fault, SweepError, nearest
-from ..found import files_in
-from ..types import FloatArray, Section
+from ..base.errors import Fault, SweepError, nearest
+from ..base.found import files_in
+from ..base.types import FloatArray, Section
 from . import families
 from .family import Family
 

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..types import FloatArray, IndexArray
+from ..base.types import FloatArray, IndexArray
 from .family import Family
 from .technology import Technology
 from .tolerance import AS_DESIGNED, Off

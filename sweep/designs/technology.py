@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_serializer
 
-from ..types import Section
+from ..base.types import Section
 
 PIGMENT = "pigment"
 

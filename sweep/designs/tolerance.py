@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ..types import FloatArray
+from ..base.types import FloatArray
 
 SHIFTS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Where in the range of a tolerance the worst case is looked for, in units of its half width."""

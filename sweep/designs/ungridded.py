@@ -7,8 +7,8 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from ..cache import Cache
-from ..types import FloatArray
+from ..base.cache import Cache
+from ..base.types import FloatArray
 
 Axes = tuple[tuple[float, ...], ...]
 Method = Literal["sobol", "lhs"]

@@ -9,6 +9,9 @@ from typing import Any
 
 import pandas as pd
 
+from ..base.disk import is_file, is_folder
+from ..base.errors import DataError, Fault, nearest
+from ..base.types import FloatArray
 from ..camera.mosaic import Mosaic
 from ..camera.sensor import SensorCurves
 from ..curves.facts import qe_scale
@@ -16,9 +19,6 @@ from ..curves.files import read_curves
 from ..curves.light_unit import LightUnit
 from ..curves.lights import Lights
 from ..curves.spectrum import Curves
-from ..disk import is_file, is_folder
-from ..errors import DataError, Fault, nearest
-from ..types import FloatArray
 from .channels import NEW, Layout, layout_of
 from .files import sensor_file
 from .opening import Given, made_study, own_lights, sensor_given

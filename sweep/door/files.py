@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..base.errors import DataError, Fault
 from ..curves.facts import qe_scale
 from ..curves.light_files import MOST_LETTERS, clean_curves
-from ..errors import DataError, Fault
 from .channels import Channels, channels_of
 
 _NEEDED_NM = (450.0, 680.0)

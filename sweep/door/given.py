@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..base.errors import DataError, Fault
+from ..base.types import FloatArray
 from ..curves.files import read_curves
 from ..curves.spectrum import Curves, WavelengthGrid, check_samples, resample
-from ..errors import DataError, Fault
-from ..types import FloatArray
 
 CurveLike = pd.Series | FloatArray | tuple[Any, Any] | Path | str
 """A series whose index is nm, values on a study's grid, (nm, values), or a file with one curve."""

@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 from pandas.arrays import BooleanArray
 
+from ..base.errors import Fault, OutputError, SweepError, nearest
 from ..designs.space import Space
-from ..errors import Fault, OutputError, SweepError, nearest
 from ..metrics.bound import FEASIBLE, total_violation
 from ..metrics.quantity import Column, Quantity
 from ..search.limit import Limit

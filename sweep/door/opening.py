@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 from pydantic import BaseModel
 
+from ..base.disk import is_file
+from ..base.errors import DataError, Fault
 from ..curves.light_files import lights_file
 from ..curves.light_unit import LightUnit
 from ..curves.spectrum import Curves
-from ..disk import is_file
-from ..errors import DataError, Fault
 from ..study import load_study, study_of_keys
 from ..study.shipped import shipped_names, study_path
 from .files import sensor_file

@@ -9,16 +9,16 @@ import numpy as np
 import pandas as pd
 from pandas.arrays import BooleanArray
 
+from ..base.errors import DataError, Fault, nearest
+from ..base.types import FloatArray
 from ..camera.imager import imager_of
 from ..camera.view import View
 from ..curves.lights import class_pairs
-from ..errors import DataError, Fault, nearest
 from ..metrics.bound import FEASIBLE, total_violation
 from ..metrics.evaluate import evaluate, family_quantities, image_quantities
 from ..metrics.objective import COMBINED
 from ..metrics.quantity import WORST, YIELD, Column, Columns
 from ..study import Study
-from ..types import FloatArray
 
 _MOST_QE = 1 + 1e-9
 

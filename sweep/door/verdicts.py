@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..base.errors import DataError, Fault
+from ..base.types import FloatArray
 from ..camera.mosaic import Mosaic
 from ..curves.lights import Pair, class_pairs
 from ..designs.technology import Technology
-from ..errors import DataError, Fault
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.quantity import Column
 from ..metrics.separation import csd_name
 from ..metrics.smooth import smooth_csd
 from ..study import Study
-from ..types import FloatArray
 from .limits import any_filter, at_least, limit_or_reason
 from .opening import Given, made_study
 from .own_filters import judged, table_of, verdict

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from pydantic import model_validator
 
-from ..types import FloatArray, Number, Section
+from ..base.types import FloatArray, Number, Section
 
 FEASIBLE = 1e-9
 """A design is feasible up to this violation (see `Bound.scale`), so that rounding cannot lose one on a bound."""

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numba import njit
 
+from ..base.types import FloatArray, IndexArray
 from ..camera.compiled import poisson_shares
-from ..types import FloatArray, IndexArray
 
 RARE = 1e-40
 """What occurs less often than this, relative to the most frequent, is left out."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ..types import FloatArray, IndexArray
+from ..base.types import FloatArray, IndexArray
 
 _FLAT = 1e-12
 """A triangle whose squared area is a smaller share of its sides' is taken for its sides."""

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.types import FloatArray, IndexArray
 from ..camera.pixel import Pixel
 from ..curves.lights import class_pairs
-from ..types import FloatArray, IndexArray
 from . import compiled as kernels
 
 FLOOR = 1e-18

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from ..types import BoolArray, FloatArray, IndexArray
+from ..base.types import BoolArray, FloatArray, IndexArray
 from .separation import pair_blocks
 
 _LEAST_VARIANCE = 2e-9

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.types import FloatArray, IndexArray
 from ..curves.lights import Pair
 from ..curves.members import Members
 from ..designs.tolerance import Off, Tolerance
-from ..types import FloatArray, IndexArray
 from .members import PopulationImager
 from .separation import csd_name
 

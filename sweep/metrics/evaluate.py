@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..base.types import FloatArray, IndexArray
 from ..camera.effects.image_height import HEIGHTS
 from ..camera.effects.phase import Cases
 from ..camera.electrons import Changing
@@ -19,7 +20,6 @@ from ..camera.view import View
 from ..curves.lights import Pair
 from ..designs.block import Block, CurveBlock
 from ..designs.family import Family
-from ..types import FloatArray, IndexArray
 from ..vision.section import Vision
 from .columns.color_separation import ColorSeparation
 from .columns.exposure import EXPOSURE

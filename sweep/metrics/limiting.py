@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.types import FloatArray
 from ..camera.imager import Imager
 from ..curves.lights import Pair, class_pairs, pair_name
-from ..types import FloatArray
 
 BETWEEN = " / "
 

@@ -14,13 +14,13 @@ from functools import cached_property
 
 import numpy as np
 
-from ..cache import Cache
+from ..base.cache import Cache
+from ..base.types import FloatArray, IndexArray
 from ..camera.linear import LinearImager, smooth_imager
 from ..camera.methods import REFERENCE
 from ..camera.view import View
 from ..curves.lights import Pair, class_pairs
 from ..curves.members import Members
-from ..types import FloatArray, IndexArray
 from .separation import csd_name
 
 _HELD = 4_000_000

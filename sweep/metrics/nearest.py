@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ..base.types import BoolArray, FloatArray, IndexArray
 from ..designs.vectorized import larger, smaller
-from ..types import BoolArray, FloatArray, IndexArray
 
 _NUMBERS = {"nnan", "nsz"}
 """Lets the compiler take the smaller of several numbers at once; callers hand in no NaN."""

@@ -11,8 +11,8 @@ from pydantic import Field, GetJsonSchemaHandler, create_model, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from ..found import made_in
-from ..types import FloatArray, Section
+from ..base.found import made_in
+from ..base.types import FloatArray, Section
 from . import rules
 from .quantity import DECADES, Asked, Quantity
 from .registry import quantities_of

@@ -10,10 +10,10 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..base.errors import Fault, SweepError
+from ..base.own_code import OwnCode, own_name
+from ..base.types import FloatArray
 from ..camera.view import View
-from ..errors import Fault, SweepError
-from ..own_code import OwnCode, own_name
-from ..types import FloatArray
 
 _NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,39}")
 _MOST_DIGITS = 12

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..types import BoolArray, FloatArray
+from ..base.types import BoolArray, FloatArray
 
 
 def hypervolume(values: FloatArray, reference: FloatArray) -> float:

@@ -11,6 +11,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from ..base.types import FloatArray, IndexArray
 from ..camera.imager import Imager
 from ..camera.noisy_readout import NoisyReadout
 from ..camera.view import View
@@ -18,7 +19,6 @@ from ..curves.lights import Pair
 from ..curves.tasks import TaskName
 from ..designs.block import Block
 from ..designs.family import Family
-from ..types import FloatArray, IndexArray
 from ..vision.section import Vision
 from .own import OwnMetric
 from .smooth import Rows, SmoothDesign

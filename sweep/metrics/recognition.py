@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base.types import FloatArray, IndexArray
 from ..camera.effects import noise
 from ..camera.imager import Imager
-from ..types import FloatArray, IndexArray
 
 MOST_LIKELY = "most_likely"
 """Name of the rule that knows mean and variance of every signal's channels."""

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar, Literal
 
-from ..types import FloatArray
+from ..base.types import FloatArray
 
 
 class Rule(ABC):

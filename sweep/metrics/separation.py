@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..cache import Cache
+from ..base.cache import Cache
+from ..base.types import FloatArray, IndexArray
 from ..curves.lights import Pair, class_pairs, pair_name
-from ..types import FloatArray, IndexArray
 
 _BLOCK_PAIRS = 262_144
 """Pair distances held at once per channel: 2 MiB, so that a block stays in cache."""

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from ..base.types import FloatArray, IndexArray
 from ..camera.linear import LinearImager, smooth_imager
 from ..camera.view import View
 from ..curves.lights import Pair
 from ..designs.family import Family
-from ..types import FloatArray, IndexArray
 from ..vision.section import SeededVision
 from .separation import separation
 

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import log_ndtr, logsumexp
 
+from ..base.types import FloatArray
 from ..camera.linear import smooth_imager
 from ..camera.view import View
 from ..curves.lights import Pair, class_pairs
-from ..types import FloatArray
 from .discrimination import detectability
 from .smooth import Rows, SmoothDesign
 

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from ..base.types import FloatArray
 from ..curves.regulations import NORM_NAMES
 from ..curves.single_leds import RegionMap
 from ..metrics.quantity import DN
 from ..results.output import Output
 from ..results.tables import PLAIN
-from ..types import FloatArray
 from .figures import empty_figure
 from .leaders import Row, leaders_of
 from .names import capital, full_name, label

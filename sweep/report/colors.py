@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from ..base.types import FloatArray, IndexArray
 from ..results.output import Output
 from ..results.tables import CHART, NIGHT
-from ..types import FloatArray, IndexArray
 from .figures import CURVE_CYCLE, canvas, empty_figure
 from .series import Line
 

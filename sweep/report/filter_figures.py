@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ..base.types import FloatArray
 from ..designs.glass import IN_FRONT
 from ..results.output import Output
-from ..types import FloatArray
 from .figures import LIMIT_NAME, CurvesFigure
 from .names import label
 from .values import drawn, light_shades, modifications

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from ..base.types import FloatArray, IndexArray
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.pareto import hypervolume
 from ..results.output import Output
-from ..types import FloatArray, IndexArray
 
 _PLACES = 80
 

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from ..base.types import BoolArray, FloatArray
 from ..metrics.columns.confusion import D_PRIME, STATE_ERROR, STATE_ERROR_BOUND
 from ..metrics.recognition import CLASSIFIERS, MOST_LIKELY
 from ..results.output import Output
 from ..study.axes import series_of
-from ..types import BoolArray, FloatArray
 from .series import Line, SeriesFigure, quantity_of
 from .values import over_series, series_figures
 

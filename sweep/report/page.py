@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 import pyarrow as pa
 
+from ..base.types import Parallel, delayed, in_turn
 from ..metrics.objective import COMBINED
 from ..results.inventory import Inventory
 from ..results.lock import locked
@@ -16,7 +17,6 @@ from ..results.names import FIGURES, REPORT, VISION_FIGURES, is_drawn
 from ..results.output import Output
 from ..results.profiles import profile_table
 from ..results.tables import FOUND, NAMED, PLAIN, csv_of, encoded
-from ..types import Parallel, delayed, in_turn
 from . import tables
 from . import values as content
 from .allowed_lamps import lamp_drawings, lamp_table

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.types import FloatArray
 from ..metrics.columns.tasks import PREFIX
 from ..metrics.quantity import Column
 from ..results.output import Output
 from ..results.tables import PLAIN
-from ..types import FloatArray
 from .figures import CURVE_CYCLE, canvas
 from .names import label
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.types import FloatArray
 from ..results.output import Output
 from ..results.tables import FOUND, PLAIN, SENSOR_MAP
-from ..types import FloatArray
 from .figures import empty_figure
 
 if TYPE_CHECKING:

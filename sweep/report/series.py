@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from ..base.types import FloatArray
 from ..metrics.quantity import DN
-from ..types import FloatArray
 from .figures import CURVE_CYCLE, canvas, canvas_grid
 
 if TYPE_CHECKING:

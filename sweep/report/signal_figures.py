@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..types import FloatArray
+from ..base.types import FloatArray
 from .figures import TYPE_COLORS, decorate, empty_figure
 
 if TYPE_CHECKING:

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..base.types import FloatArray
 from ..metrics.quantity import HELD_OUT
 from ..results.output import Output
-from ..types import FloatArray
 from .leaders import Row
 
 _RESAMPLES = 10_000

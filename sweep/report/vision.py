@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from ..cache import Cache
+from ..base.cache import Cache
+from ..base.types import FloatArray
 from ..results.output import Output
 from ..results.tables import VISION, VISION_CONDITIONS
-from ..types import FloatArray
 from ..vision.scenes import UNSEEN, states_of
 from ..vision.scores import Interval, confusion_matrix, mean_of, nested_weights
 from ..vision.section import Vision

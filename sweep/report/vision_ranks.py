@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import rankdata
 
-from ..types import BoolArray, FloatArray
+from ..base.types import BoolArray, FloatArray
 from ..vision.scenes import SHUFFLED
 from ..vision.scores import Interval, interval_around
 from .vision import OBSERVER, Benchmark

@@ -8,11 +8,11 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..errors import Fault, OutputError
-from ..own_code import CODE_OF, is_code
+from ..base.errors import Fault, OutputError
+from ..base.own_code import CODE_OF, is_code
+from ..base.types import FloatArray
 from ..study import Study, load_study
 from ..study.sources import KeptSources
-from ..types import FloatArray
 from .output import Output
 from .tables import RESOLVED
 

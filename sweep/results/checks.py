@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 from pydantic import BaseModel
 from ruamel.yaml.error import YAMLError
 
-from ..errors import Fault, OutputError
+from ..base.errors import Fault, OutputError
 from .facts import lacking
 
 _MOST_SHOWN = 10

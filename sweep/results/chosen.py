@@ -9,7 +9,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from ..errors import Fault, OutputError, SweepError, nearest
+from ..base.errors import Fault, OutputError, SweepError, nearest
 from .output import Output
 from .tables import RESULTS, batches
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pyarrow as pa
 
-from ..types import FloatArray
+from ..base.types import FloatArray
 
 QE, LIGHT, TASK, DESIGN, ON_FRONT, LIMIT = "qe", "light", "task", "design", "front", "limit"
 """Kinds: of the sensor; of a signal; of an own task's file; a modified channel of a design that is drawn, or of one on

@@ -9,7 +9,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from ..errors import Fault, OutputError
+from ..base.errors import Fault, OutputError
 from ..study import Study
 from .identity import fingerprint, identity
 from .inventory import Inventory

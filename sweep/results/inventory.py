@@ -18,8 +18,8 @@ from typing import Any
 
 import pyarrow as pa
 
-from ..disk import MOST_FACTS, Digest, digest_of, is_link, is_real_folder, parsed_facts, read_plain
-from ..errors import Fault, OutputError
+from ..base.disk import MOST_FACTS, Digest, digest_of, is_link, is_real_folder, parsed_facts, read_plain
+from ..base.errors import Fault, OutputError
 from .names import FIGURES, RUN, SUMS, is_drawn, is_own
 from .tables import AUDIT, Seal, json_of, write_bytes, write_table
 

@@ -20,8 +20,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from ..disk import is_link, is_real_folder, opened, read_plain
-from ..errors import Fault, OutputError
+from ..base.disk import is_link, is_real_folder, opened, read_plain
+from ..base.errors import Fault, OutputError
 from .tables import decoded, encoded, holds, write_bytes
 
 SHARDS = "shards"

@@ -19,9 +19,9 @@ import numpy as np
 from platformdirs import user_cache_path
 from pydantic import BaseModel
 
+from ..base.disk import read_plain
+from ..base.errors import OutputError
 from ..camera.plan.plan import Choice, Plan
-from ..disk import read_plain
-from ..errors import OutputError
 from ..study import Study
 from .identity import MODEL_VERSION, fingerprint
 from .tables import write_bytes

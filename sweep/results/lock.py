@@ -12,8 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
-from ..disk import is_real_folder, opened, read_plain
-from ..errors import Fault, OutputError
+from ..base.disk import is_real_folder, opened, read_plain
+from ..base.errors import Fault, OutputError
 from .journal import SHARDS
 from .names import FIGURES
 

@@ -12,7 +12,7 @@ from typing import Any
 import pandas as pd
 from ruamel.yaml import YAML
 
-from ..errors import Fault, OutputError
+from ..base.errors import Fault, OutputError
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective
 from ..metrics.quantity import Column

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
-from ..types import FloatArray
+from ..base.types import FloatArray
 from .tables import holds
 
 _KEEPS = 0.95

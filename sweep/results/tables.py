@@ -16,8 +16,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from ..errors import Fault, OutputError
-from ..types import BoolArray
+from ..base.errors import Fault, OutputError
+from ..base.types import BoolArray
 
 if TYPE_CHECKING:
     import pandas as pd

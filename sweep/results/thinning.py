@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from ..errors import Fault, OutputError
+from ..base.errors import Fault, OutputError
 from ..metrics.columns.exposure import EXPOSURE
 from .tables import batches, best_rows, holds, release_memory
 

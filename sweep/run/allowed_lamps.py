@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.imager import Imager
 from ..camera.methods import REFERENCE
 from ..camera.view import View
@@ -18,7 +19,6 @@ from ..curves.single_leds import Norm, SingleLeds, every_led
 from ..results.designs import row_curves
 from ..results.tables import FEW
 from ..study import Study
-from ..types import FloatArray, Parallel, Progress, delayed
 
 _TOGETHER = 128
 """LEDs that are read out at once."""

@@ -10,11 +10,11 @@ from typing import Any, get_type_hints
 
 import numpy as np
 
+from ..base.types import Call
 from ..results.journal import Journal
 from ..results.records import from_json, to_json
 from ..search.limit import Limit
 from ..search.problem import Problem, SearchRun
-from ..types import Call
 from .workers import Workers
 
 

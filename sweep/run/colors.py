@@ -10,11 +10,11 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from ..base.types import FloatArray
 from ..curves.tasks import Chart, StudyTasks
 from ..results.designs import row_curves
 from ..results.tables import CHART, FEW, NIGHT
 from ..study import Study
-from ..types import FloatArray
 
 _TOLD = ("design_id", "name", "scenario")
 _DESIGN = [("design_id", pa.int64()), ("name", pa.string()), ("scenario", pa.string())]

@@ -13,6 +13,7 @@ import pandas as pd
 import pyarrow as pa
 from pydantic import ValidationError
 
+from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.imager import Imager
 from ..camera.methods import REFERENCE
 from ..camera.scenario import Scenario
@@ -23,7 +24,6 @@ from ..results.designs import row_curves
 from ..results.tables import FEW
 from ..study import Study
 from ..study.axes import series_of
-from ..types import FloatArray, Parallel, Progress, delayed
 
 _LEAST = 1e-300
 _CLOSE = 1e-3

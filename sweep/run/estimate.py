@@ -12,12 +12,12 @@ from statistics import median
 
 import pyarrow as pa
 
+from ..base.types import Progress
 from ..results.folder import held_by
 from ..results.inventory import Inventory
 from ..results.journal import Journal
 from ..results.tables import RESULTS, encoded
 from ..study import Study
-from ..types import Progress
 from .of_rows import ROW_TABLES
 from .plans import with_plans
 from .rows import Job, rules_of

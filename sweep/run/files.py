@@ -13,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from ..base.types import Progress
 from ..metrics.bound import FEASIBLE
 from ..metrics.pareto import hypervolume
 from ..results.facts import Provenance
@@ -35,7 +36,6 @@ from ..results.tables import (
 )
 from ..search.limit import Limit
 from ..study import Study
-from ..types import Progress
 from .answers import Kept
 from .front import Front, Gathered, few_of
 from .held_out import left_out_table

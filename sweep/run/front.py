@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from ..base.types import BoolArray, FloatArray, IndexArray
 from ..metrics.pareto import non_dominated
 from ..results.tables import FEW, best_rows, holds
-from ..types import BoolArray, FloatArray, IndexArray
 from .rows import Rules
 
 BEST_PER_CFA = 12

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.imager import imager_of
 from ..camera.view import View
 from ..curves.lights import Lights, class_pairs
@@ -22,7 +23,6 @@ from ..search.problem import Evaluation, Problem, best_feasible, starting_points
 from ..search.solver import search_from, smooth_objective
 from ..search.trade_off import Effort
 from ..study import Search, Study
-from ..types import FloatArray, Parallel, Progress, delayed
 
 LEFT_OUT_STARTS = 4
 """Of each search without a light."""

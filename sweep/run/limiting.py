@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.imager import Imager, imager_of
 from ..camera.view import View
 from ..metrics.limiting import BETWEEN, limited_by_name, limiting_lights
 from ..results.designs import row_curves
 from ..study import Study
-from ..types import FloatArray, Parallel, Progress, delayed
 
 _AT_ONCE = 64
 _FEW = 4

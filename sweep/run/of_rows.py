@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import pandas as pd
 import pyarrow as pa
 
+from ..base.types import Parallel, Progress
 from ..results.tables import (
     CROSSINGS,
     CURVES,
@@ -24,7 +25,6 @@ from ..results.tables import (
 from ..search.limit import Limit
 from ..study import Study
 from ..study.axes import series_of
-from ..types import Parallel, Progress
 from .colors import rendered_table, traded_table
 from .crossings import crossings_table
 from .curves import kept_curves, points_table

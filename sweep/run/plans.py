@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from ..base.types import Progress, delayed
 from ..camera.plan.plan import Plan
 from ..results.kept_plans import KeptPlans, plan_key, study_key
 from ..study import Study
-from ..types import Progress, delayed
 from .stop import Stop
 from .workers import Workers, workers
 

@@ -8,13 +8,13 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.imager import imager_of
 from ..camera.view import View
 from ..metrics.recognition import columns, recognize
 from ..results.designs import row_curves
 from ..results.tables import FEW
 from ..study import Study
-from ..types import FloatArray, Parallel, Progress, delayed
 
 
 def recognition_table(study: Study, highlights: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.view import View
 from ..curves.lights import Pair
 from ..designs.space import Space
@@ -21,7 +22,6 @@ from ..metrics.separation import csd_name
 from ..results.designs import row_space
 from ..results.tables import FEW, PLAIN
 from ..study import Study
-from ..types import FloatArray, Parallel, Progress, delayed
 
 _LARGEST, _STEP, _HALVINGS = 3.0, 0.25, 6
 """Times the population that are looked at, the steps in which, and how often the last of these is halved."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.types import FloatArray
 from ..camera.imager import Imager, imager_of
 from ..camera.view import View
 from ..designs.block import Block, CurveBlock, EdgeBlock, edges_of
@@ -20,7 +21,6 @@ from ..metrics.evaluate import evaluate, family_quantities, image_quantities
 from ..metrics.objective import COMBINED, Objective, columns_of
 from ..metrics.own import OwnMetric
 from ..metrics.quantity import OF_A_SHARE, WORST_CASE, YIELD, Asked, Columns, Quantity
-from ..types import FloatArray
 from ..vision.section import Vision
 
 BY_CURVES = "computed from their curves, since the fast way by their edges failed"

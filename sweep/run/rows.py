@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from ..base.types import BoolArray, FloatArray
 from ..camera.plan.plan import Plan
 from ..camera.view import View
 from ..designs.block import by_edges
@@ -21,7 +22,6 @@ from ..metrics.pareto import non_dominated
 from ..results.identity import CHUNK
 from ..results.tables import holds, result_schema
 from ..study import Study
-from ..types import BoolArray, FloatArray
 from .routes import Detours, Found, Request, block_of
 
 _WORDS = pa.dictionary(pa.int32(), pa.string())

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from ..base.errors import Fault, InfeasibleError
+from ..base.own_code import kind_in_words
+from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..designs.space import Space
-from ..errors import Fault, InfeasibleError
 from ..metrics.bound import FEASIBLE
 from ..metrics.columns.sensitivity import cfa_sensitivity_at
-from ..own_code import kind_in_words
 from ..results.price import price_schema
 from ..results.tables import front_schema, search_schema
 from ..search.limit import Limit, limit_of, why_not
@@ -21,7 +22,6 @@ from ..search.problem import Evaluation, Problem, SearchRun, best_feasible, star
 from ..search.solver import best_reachable, search_from
 from ..search.trade_off import Effort, FrontPoint, check_proof, gap_of, trade_off
 from ..study import Search, Study
-from ..types import FloatArray, Parallel, Progress, delayed
 from .rows import Job, Rules, run_job
 
 _REACH_STARTS = 8

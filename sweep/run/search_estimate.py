@@ -9,12 +9,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from ..base.types import FloatArray
 from ..search.limit import limit_of, why_not
 from ..search.price import has_nominal
 from ..search.problem import Problem, starting_points
 from ..search.solver import GRADIENT, search_from
 from ..study import Search, Study
-from ..types import FloatArray
 from .held_out import LEFT_OUT_STARTS, left_out_signals
 
 PER_START, PER_LEVEL = 35, 120

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.field import over_field, scene_at
 from ..camera.view import View
 from ..metrics.separation import csd_name, separations
@@ -15,7 +16,6 @@ from ..metrics.smooth import smooth_response
 from ..results.designs import row_curves
 from ..results.tables import FEW
 from ..study import Study
-from ..types import FloatArray, Parallel, Progress, delayed
 
 _HEIGHTS = 41
 """Image heights at which a map is computed, in equal steps."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from types import FrameType
 
-from ..errors import InterruptedRunError
+from ..base.errors import InterruptedRunError
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 GRACE_S = 2.0

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import pyarrow as pa
 
+from ..base.errors import FailedDesignError, Fault, OutputError
+from ..base.types import Call, Progress, delayed
 from ..camera.view import View
-from ..errors import FailedDesignError, Fault, OutputError
 from ..results.identity import fingerprint
 from ..results.journal import Journal, Shard
 from ..results.tables import sliced
 from ..study import Study
-from ..types import Call, Progress, delayed
 from .front import Gathered, few_of
 from .routes import Detours
 from .rows import Job, Rules, detours_of, failed_rows, job_key, jobs_of, joined, run_job, with_local_front

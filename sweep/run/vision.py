@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.imager import Imager
 from ..camera.view import View
 from ..curves.lights import class_pairs, pair_name
@@ -19,7 +20,6 @@ from ..metrics.separation import csd_name
 from ..results.designs import row_curves
 from ..results.tables import FEW, FOUND, VISION, VISION_CONDITIONS, VISION_MISREAD
 from ..study import Study
-from ..types import FloatArray, Parallel, Progress, delayed
 from ..vision.images import view_at
 from ..vision.readers import Answers, SeedReading, read_images
 from ..vision.scenes import ORDERS, SEEN, UNSEEN, states_of

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..disk import read_facts
-from ..errors import Fault, InfeasibleError, StudyError
+from ..base.disk import read_facts
+from ..base.errors import Fault, InfeasibleError, StudyError
+from ..base.types import Progress
 from ..results.facts import Provenance, lacking
 from ..results.folder import begin
 from ..results.inventory import Inventory
@@ -19,7 +20,6 @@ from ..results.lock import LOCK, locked
 from ..results.tables import PROVENANCE, RESOLVED, RESULTS
 from ..study import Study
 from ..study.reach import out_of_reach
-from ..types import Progress
 from ..vision.installed import require_network
 from .files import Making, files_of, fits
 from .plans import with_plans

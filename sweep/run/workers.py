@@ -19,8 +19,8 @@ import joblib
 from joblib.externals.loky import ProcessPoolExecutor
 from threadpoolctl import ThreadpoolController
 
-from ..errors import SweepError
-from ..types import Call
+from ..base.errors import SweepError
+from ..base.types import Call
 from .stop import Stop, without_interrupts
 from .worker_process import keep_freed_memory, preparing
 

@@ -12,11 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..base.types import FloatArray
 from ..camera.sensor_field import SensorField
 from ..camera.sensor_places import SensorPlaces
 from ..metrics.quantity import DN
 from ..metrics.smooth import smooth_csd
-from ..types import FloatArray
 from .problem import Problem
 
 _WITHIN_DN = 1e-3

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.sparse import csr_matrix, hstack, vstack
 
+from ..base.types import FloatArray, IndexArray
 from ..camera.linear import LinearImager, smooth_imager
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
-from ..types import FloatArray, IndexArray
 from .certificate import Certificate, Sides, Solved
 from .least_noise import least_variance
 from .problem import Problem

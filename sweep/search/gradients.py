@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.types import FloatArray, IndexArray
 from ..camera.linear import smooth_imager
 from ..camera.view import View
 from ..designs.tolerance import AS_DESIGNED, Off
@@ -23,7 +24,6 @@ from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY, light_of
 from ..metrics.quantity import Quantity
 from ..metrics.rule import Rule
 from ..metrics.smooth import Rows, SmoothDesign
-from ..types import FloatArray, IndexArray
 from .problem import Evaluation, Problem, SearchRun
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.types import FloatArray
 from ..camera.linear import LinearImager
-from ..types import FloatArray
 
 _ROUNDING = 1e-12
 """Of the sums over wavelengths, relative."""

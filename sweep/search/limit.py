@@ -18,11 +18,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.errors import Fault, SweepError
+from ..base.types import FloatArray
 from ..camera.effects.image_height import all_heights_count
 from ..camera.effects.saturation import top_e
 from ..camera.exposure import may_set_exposure
 from ..camera.pixel import unquantized
-from ..errors import Fault, SweepError
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
 from ..metrics.evaluate import designed_quantities
@@ -30,7 +31,6 @@ from ..metrics.objective import Objective
 from ..metrics.quantity import DN
 from ..metrics.smooth import smooth_csd, smooth_response
 from ..metrics.smooth_noise import smooth_detectability
-from ..types import FloatArray
 from .filter_program import ROUNDING, FilterProgram
 from .problem import Problem
 from .produced import all_ways, ways_of

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.types import BoolArray, FloatArray, IndexArray
 from ..curves.population import Population
 from ..metrics.members import population_imager
-from ..types import BoolArray, FloatArray, IndexArray
 from .problem import Problem
 from .produced import Distances, Produced, ways_of
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..metrics.columns.sensitivity import SENSITIVITY
 from ..metrics.objective import Objective
 from ..metrics.quantity import WORST_CASE
-from ..types import FloatArray, Parallel, Progress, delayed
 from .limit import Limit
 from .problem import Evaluation, Problem, best_feasible
 from .solver import search_from, smooth_objective

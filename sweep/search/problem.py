@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..base.types import FloatArray, IndexArray
 from ..camera.view import View
 from ..curves.lights import Pair
 from ..designs.family import Family
@@ -17,7 +18,6 @@ from ..metrics.objective import Objective
 from ..metrics.own import OwnMetric
 from ..metrics.quantity import DN, OF_A_SHARE, WORST_CASE, Asked, Quantity
 from ..metrics.registry import quantities_of
-from ..types import FloatArray, IndexArray
 from ..vision.section import SeededVision
 
 

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.types import BoolArray, FloatArray, IndexArray
 from ..camera.effects.image_height import all_heights_count
 from ..designs.family import Family, MovedFamily
 from ..designs.tolerance import AS_DESIGNED
-from ..types import BoolArray, FloatArray, IndexArray
 from .problem import Problem
 
 _LEAST_CARRIER = 1e-3

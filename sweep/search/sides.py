@@ -15,7 +15,7 @@ from itertools import count
 
 import numpy as np
 
-from ..types import FloatArray, IndexArray
+from ..base.types import FloatArray, IndexArray
 from .certificate import Certificate, Sides
 from .filter_program import FilterProgram
 

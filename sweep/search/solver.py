@@ -14,8 +14,8 @@ from dataclasses import replace
 import nlopt
 import numpy as np
 
+from ..base.types import FloatArray
 from ..metrics.bound import FEASIBLE
-from ..types import FloatArray
 from .gradients import Model, Point
 from .problem import Problem, SearchRun
 

@@ -8,10 +8,10 @@ from itertools import islice, pairwise
 
 import numpy as np
 
-from ..errors import BrokenProofError, Fault
+from ..base.errors import BrokenProofError, Fault
+from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..metrics.bound import Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
-from ..types import FloatArray, Parallel, Progress, delayed
 from .limit import Limit, limit_of, why_not
 from .problem import Evaluation, Problem, SearchRun, best_feasible
 from .solver import search_from

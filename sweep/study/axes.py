@@ -10,8 +10,8 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
+from ..base.types import Number, Section
 from ..camera.scenario import Scenario
-from ..types import Number, Section
 from .schema_curves import Name
 
 

@@ -10,8 +10,8 @@ from typing import Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from ..disk import NO_UTF_16, not_utf8, read_input
-from ..errors import MOST_FAULTS, Fault, StudyError, nearest
+from ..base.disk import NO_UTF_16, not_utf8, read_input
+from ..base.errors import MOST_FAULTS, Fault, StudyError, nearest
 from .yaml_tree import Key, Tree, yaml_text
 
 _MOST = (500_000, 50_000)

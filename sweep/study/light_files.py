@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from ..base.errors import DataError, StudyError
 from ..curves.builtin.registry import BUILT_IN_LIGHTS
 from ..curves.files import is_curve_file
 from ..curves.light_files import LightsFile, lights_file
-from ..errors import DataError, StudyError
 from .schema import StudySection
 from .schema_curves import LightsSection
 from .sources import Sources

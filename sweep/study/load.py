@@ -8,9 +8,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from ..base.disk import is_folder
+from ..base.errors import Fault, StudyError
 from ..curves.spectrum import Curves, WavelengthGrid
-from ..disk import is_folder
-from ..errors import Fault, StudyError
 from .document import Document
 from .model import Study
 from .resolve import resolve

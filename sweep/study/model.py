@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..base.errors import Fault, StudyError
 from ..camera.methods import REFERENCE
 from ..camera.mosaic import Mosaic
 from ..camera.pixel import Pixel
@@ -26,7 +27,6 @@ from ..curves.tasks import StudyTasks
 from ..designs.space import Space
 from ..designs.technology import Technology
 from ..designs.tolerance import Tolerance
-from ..errors import Fault, StudyError
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective, columns_of
 from ..metrics.own import OwnMetric

@@ -7,9 +7,9 @@ from typing import TypeVar
 
 from pydantic import ValidationError
 
-from ..disk import is_file
-from ..errors import Fault, StudyError, SweepError
-from ..own_code import CODE_OF, Installed, Offered, OwnCode, file_of, installed, is_in_file, offers, read_code
+from ..base.disk import is_file
+from ..base.errors import Fault, StudyError, SweepError
+from ..base.own_code import CODE_OF, Installed, Offered, OwnCode, file_of, installed, is_in_file, offers, read_code
 from .schema_curves import LightsSection, SensorSection
 from .sources import Sources
 from .yaml_tree import Key

@@ -7,16 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..base.errors import Fault, StudyError, SweepError
+from ..base.own_code import Offered, is_in_file, offers
 from ..camera.methods import REFERENCE
 from ..camera.scenario import Scenario
 from ..camera.view import View
 from ..designs.space import Space
-from ..errors import Fault, StudyError, SweepError
 from ..metrics.own import OwnMetric, Readings
 from ..metrics.quantity import WORST, Asked
 from ..metrics.registry import quantities_of
 from ..metrics.smooth import smooth_response
-from ..own_code import Offered, is_in_file, offers
 from .model import Study
 from .own_codes import allowed, code_of, is_from_outside
 from .schema import StudySection

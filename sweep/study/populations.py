@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..base.errors import StudyError
 from ..camera.effects.saturation import top_e
 from ..camera.field import over_field
 from ..camera.pixel import unquantized
 from ..camera.plan.bounds import Reach
 from ..curves.lights import Lights
 from ..curves.population import DRIFT_NM_PER_K, Population
-from ..errors import StudyError
 from .model import Study
 from .schema import StudySection
 from .sources import Sources

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..base.errors import Fault
 from ..designs.space import Space
-from ..errors import Fault
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY
 from ..metrics.quantity import DN
 from .model import Study

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from ..base.errors import StudyError, SweepError
 from ..camera.effects import blur
 from ..camera.mosaic import Mosaic
 from ..camera.scene import OBJECT_RESOLUTION, WhitePatchExposure
@@ -14,7 +15,6 @@ from ..curves.lights import Lights
 from ..curves.spectrum import Curves
 from ..curves.tasks import StudyTasks
 from ..designs.space import Space
-from ..errors import StudyError, SweepError
 from ..metrics.own import OwnMetric
 from ..metrics.quantity import WORST_CASE, Asked, Quantity
 from ..metrics.registry import listed, quantities_of

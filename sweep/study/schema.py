@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from ..base.types import Number, Section
 from ..camera.pixel import Pixel
 from ..camera.scenario import Scenario
 from ..camera.scene import Geometry
@@ -18,7 +19,6 @@ from ..designs.technology import Stated
 from ..designs.tolerance import Tolerance
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective
-from ..types import Number, Section
 from ..vision.section import Vision
 from .axes import ScenarioTemplate, Span, Values, expanded
 from .schema_curves import LIGHTS_NAME, Documented, LightsSection, Name, SensorSection, Validation, builtin, named

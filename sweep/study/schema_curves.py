@@ -7,11 +7,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, model_validator
 
+from ..base.types import Ratio, Section
 from ..curves.builtin.registry import BUILT_IN_LIGHTS
 from ..curves.scan import MOST_CURVES
 from ..curves.spectrum import Outside, Resampling
 from ..designs.technology import Stated
-from ..types import Ratio, Section
 
 Name = Annotated[str, Field(min_length=1, max_length=100)]
 FileColumns = Annotated[list[Name], Field(min_length=1, max_length=MOST_CURVES)]

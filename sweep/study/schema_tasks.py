@@ -6,9 +6,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
+from ..base.types import Seconds
 from ..camera.pixel import ReadNoise
 from ..curves.tasks import SHIPPED
-from ..types import Seconds
 from .schema_curves import Documented, Name, TaskFile
 
 _MOST_OWN = 20

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from ..base.errors import DataError
+from ..base.types import FloatArray
 from ..camera.sensor import BUILT_IN_SENSORS, SensorCurves, make_sensor
-from ..errors import DataError
-from ..types import FloatArray
 from .schema_curves import CurveFile, SensorSection
 from .sources import Sources
 from .yaml_tree import Key

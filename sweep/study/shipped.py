@@ -8,8 +8,8 @@ from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
-from ..disk import is_file, is_folder
-from ..errors import Fault, StudyError, nearest
+from ..base.disk import is_file, is_folder
+from ..base.errors import Fault, StudyError, nearest
 
 _STUDIES, _SHARED = "studies", "share/cfa-sweep/studies"
 _KINDS = (".yaml", ".yml")

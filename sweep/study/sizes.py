@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from ..base.errors import StudyError
 from ..camera.kernel import too_large
-from ..errors import StudyError
 from .model import Study
 from .sources import Sources
 

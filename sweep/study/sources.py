@@ -9,6 +9,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
 
+from ..base.disk import is_file
+from ..base.errors import MOST_FAULTS, DataError, Fault, SweepError, nearest
+from ..base.types import FloatArray
 from ..camera.sensor import SensorCurves
 from ..curves.builtin.registry import BUILT_IN_LIGHTS
 from ..curves.builtin.surrogate import BUILT_IN_RANGE_NM
@@ -16,9 +19,6 @@ from ..curves.files import digest, read_curves
 from ..curves.lens_files import ChiefRays, read_chief_rays
 from ..curves.lights import Lights, make_lights
 from ..curves.spectrum import Curves, WavelengthGrid, photons_from_energy
-from ..disk import is_file
-from ..errors import MOST_FAULTS, DataError, Fault, SweepError, nearest
-from ..types import FloatArray
 from .document import Document
 from .schema import MOST_TYPES
 from .schema_curves import CurveFile, LightFile, LightsSection, TaskFile

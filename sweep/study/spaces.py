@@ -8,6 +8,9 @@ from typing import cast
 
 import numpy as np
 
+from ..base.errors import SweepError, nearest
+from ..base.own_code import Offered, is_in_file, offers
+from ..base.types import FloatArray
 from ..camera.mosaic import Mosaic
 from ..camera.sensor import SensorCurves
 from ..curves.builtin.surrogate import surrogate_parameters
@@ -18,9 +21,6 @@ from ..designs.registry import FAMILIES, build_family
 from ..designs.space import Filter, Kind, Space
 from ..designs.technology import PIGMENT
 from ..designs.ungridded import Ungridded
-from ..errors import SweepError, nearest
-from ..own_code import Offered, is_in_file, offers
-from ..types import FloatArray
 from .own_codes import allowed, code_of, is_from_outside
 from .schema import DesignSection, Modification, StudySection
 from .sources import Sources

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..base.types import FloatArray
 from ..curves.builtin.task_sets import group, is_surface, separation_task, task_groups
 from ..curves.files import is_curve_file
 from ..curves.tasks import ILLUMINANTS, SHIPPED, GriddedTask
-from ..types import FloatArray
 from .schema_curves import TaskFile
 from .schema_tasks import OwnTask
 from .sources import Sources

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
+from ..base.types import FloatArray
 from ..camera.pixel import Pixel, irradiance_factor
 from ..camera.scene import Scene
 from ..camera.sensor import SensorCurves
@@ -13,7 +14,6 @@ from ..curves.builtin.surrogate import BUILT_IN_RANGE_NM
 from ..curves.builtin.task_sets import shipped
 from ..curves.tasks import SHIPPED, Conditions, GriddedTask, StudyTasks
 from ..designs.space import Space
-from ..types import FloatArray
 from .schema import StudySection
 from .schema_tasks import TasksSection
 from .sources import Sources

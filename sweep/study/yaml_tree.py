@@ -25,7 +25,7 @@ from ruamel.yaml.events import (
 )
 from ruamel.yaml.reader import ReaderError
 
-from ..errors import Fault, StudyError
+from ..base.errors import Fault, StudyError
 
 MOST_DEPTH = 20
 """Levels of nesting; a study needs seven."""

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..cache import Cache
+from ..base.cache import Cache
+from ..base.types import FloatArray
 from ..camera.effects import blur
 from ..camera.effects.sampling import Window, light_on_pixels
 from ..camera.mosaic import Mosaic
 from ..camera.scene import Target
 from ..camera.view import View
-from ..types import FloatArray
 from .section import Vision
 
 SPACING = 1.5

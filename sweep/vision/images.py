@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.types import FloatArray, IndexArray
 from ..camera.effects import crosstalk
 from ..camera.methods import REFERENCE
 from ..camera.pixel import Pixel, irradiance_factor
@@ -17,7 +18,6 @@ from ..camera.seen import SeenFilters
 from ..camera.view import View, per_photon, signal_irradiance
 from ..curves.color import luminance_per_photon_radiance
 from ..curves.hats import hats
-from ..types import FloatArray, IndexArray
 from .compiled_images import draw_numbers
 from .head import MARGIN, HeadMaps, head_maps
 from .materials import ambient_light, phantom, reflectance

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
-from ..errors import Fault, SweepError
+from ..base.errors import Fault, SweepError
 
 
 def require_network() -> None:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.errors import Fault, SweepError
+from ..base.types import FloatArray, IndexArray
 from ..curves.lights import Lights
-from ..errors import Fault, SweepError
-from ..types import FloatArray, IndexArray
 from .section import Vision
 
 TRAIN, CHECK, TEST = "train", "check", "test"

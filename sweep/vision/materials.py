@@ -11,9 +11,9 @@ from functools import cache
 
 import numpy as np
 
+from ..base.types import FloatArray
 from ..curves.builtin.task_sets import group
 from ..curves.spectrum import WavelengthGrid
-from ..types import FloatArray
 from .section import Illuminant, Material
 
 _ILLUMINANTS: dict[Illuminant, str] = {

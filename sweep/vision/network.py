@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ..types import FloatArray, IndexArray
+from ..base.types import FloatArray, IndexArray
 
 # Before JAX is loaded: workers have one thread each, and sums have one order.
 os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..types import FloatArray, IndexArray
+from ..base.types import FloatArray, IndexArray
 from .compiled_images import cases_on_table, log_likelihoods
 from .images import HeadCamera, HeadElectrons, Numbers
 from .lamps import Lamps

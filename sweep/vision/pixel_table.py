@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln, ndtr
 
+from ..base.types import FloatArray
 from ..camera.noisy import gaussian, moments
 from ..camera.pixel import Pixel
-from ..types import FloatArray
 
 ROOT_STEP = 1 / 16
 """Distance of nodes in the root of the expected electrons."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import convolve1d
 
+from ..base.types import FloatArray
 from ..camera.mosaic import Mosaic
-from ..types import FloatArray
 
 
 def tile_planes(images: FloatArray, mosaic: Mosaic) -> FloatArray:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.types import FloatArray
 from ..camera.view import View
-from ..types import FloatArray
 from .images import HeadCamera, Numbers
 from .lamps import CHECK, TEST, TRAIN, Lamps, split_lamps
 from .observer import posteriors

@@ -9,7 +9,7 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..types import FloatArray, IndexArray
+from ..base.types import FloatArray, IndexArray
 from .lamps import Lamps
 from .section import Vision
 

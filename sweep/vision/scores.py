@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..types import BoolArray, FloatArray, IndexArray
+from ..base.types import BoolArray, FloatArray, IndexArray
 
 DRAWS = 1000
 _CONFIDENCE = 0.95

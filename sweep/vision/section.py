@@ -6,9 +6,9 @@ from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field, model_validator
 
+from ..base.types import Fraction, Meters, Seconds, Section
 from ..camera.pixel import Optics
 from ..camera.scene import DIAMETER_M, Target
-from ..types import Fraction, Meters, Seconds, Section
 
 Illuminant = Literal["daylight", "LED street light", "sodium street light"]
 Seen = Literal["raw", "demosaicked"]

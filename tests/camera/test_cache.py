@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sweep.cache import Cache
+from sweep.base.cache import Cache
 from sweep.camera.imager import imager_of
 from sweep.designs.block import Tables, edges_of
 

@@ -327,7 +327,7 @@ _RUN = """\
 import resource, sys
 from pathlib import Path
 resource.setrlimit(resource.RLIMIT_AS, ({most}, {most}))
-from sweep.errors import SweepError
+from sweep.base.errors import SweepError
 from sweep.study import load_study
 from sweep.camera.imager import Imager
 from sweep.metrics.evaluate import evaluate

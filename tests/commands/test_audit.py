@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from sweep.base.errors import BrokenPromiseError
 from sweep.commands import app as cli
 from sweep.commands.audit import Audit, audit_rows, sampled
-from sweep.errors import BrokenPromiseError
 from sweep.run import run_study
 from sweep.study import Study, load_study
 

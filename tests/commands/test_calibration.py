@@ -154,7 +154,7 @@ def test_ranking_leaves_ties_out() -> None:
 
 
 def test_published_names_are_checked(tmp_path: Path) -> None:
-    from sweep.errors import StudyError
+    from sweep.base.errors import StudyError
 
     def loaded(old: str, new: str) -> Study:
         path = tmp_path / "paper.yaml"

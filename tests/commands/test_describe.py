@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from sweep.base.errors import DataError, OutputError
 from sweep.commands.describe import described
 from sweep.commands.schema import write_schema
 from sweep.curves.facts import condensed, facts_of
 from sweep.curves.files import scan_curves
 from sweep.curves.signal_color import VISIBLE, dominant_ranges_nm, light_color, outline
-from sweep.errors import DataError, OutputError
 from sweep.study.editors import schema_text
 
 from ..commanded import commanded

@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 import typer
 
+from sweep.base.errors import InfeasibleError
 from sweep.commands.endings import ends_in_lines
-from sweep.errors import InfeasibleError
 
 from ..build import BASE
 from ..commanded import UNDRAWN, commanded

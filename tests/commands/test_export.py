@@ -10,6 +10,7 @@ import pytest
 from scipy.io import loadmat
 from scipy.spatial.distance import cdist
 
+from sweep.base.errors import OutputError, SweepError
 from sweep.camera.mosaic import Mosaic
 from sweep.commands.audit import audit_output
 from sweep.commands.export import Filters, export_design
@@ -17,7 +18,6 @@ from sweep.commands.options import Also
 from sweep.curves.builtin.surrogate import surrogate_parameters
 from sweep.curves.files import read_curves
 from sweep.curves.isetcam import HINTS, color_hints, csv_text, isetcam_mat, unique_names
-from sweep.errors import OutputError, SweepError
 from sweep.study import load_study
 
 from ..build import ran, stopband_study, study_file

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
+from sweep.base.errors import SweepError
 from sweep.camera.effects import quantization, saturation
 from sweep.camera.imager import Imager
 from sweep.camera.mosaic import Mosaic
@@ -22,7 +23,6 @@ from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.edge import SPAN_PER_WIDTH, edge, edge_gradient
 from sweep.designs.families.stopband import Stopband
-from sweep.errors import SweepError
 from sweep.metrics.pareto import non_dominated
 from sweep.metrics.separation import cfa_sensitivity, separation
 

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sweep.base.errors import SweepError
 from sweep.camera.effects.base import Stage
 from sweep.camera.imager import Imager
 from sweep.camera.methods import REFERENCE, Methods
 from sweep.camera.plan.plan import Plan
 from sweep.camera.plan.planner import Planner
 from sweep.camera.registry import EFFECTS
-from sweep.errors import SweepError
 from sweep.metrics.evaluate import evaluate
 from sweep.study import load_study
 

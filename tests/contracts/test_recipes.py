@@ -26,7 +26,7 @@ GRAY = '''\
 import numpy as np
 
 from sweep.designs.family import Parameter
-from sweep.types import Section
+from sweep.base.types import Section
 
 
 class Gray:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from sweep.base.errors import DataError
 from sweep.curves.files import digest, read_curves
-from sweep.errors import DataError
 
 
 def written(tmp_path: Path, text: str, name: str = "curves.csv") -> Path:

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from sweep.base.errors import DataError, SweepError
 from sweep.commands.describe import described
 from sweep.curves.files import read_curves, scan_curves
 from sweep.curves.scan import MOST_CURVES, MOST_SAMPLES
 from sweep.curves.spectrum import LARGEST, LEAST_PEAK, check_samples
-from sweep.errors import DataError, SweepError
 
 from ..watchdog import within
 

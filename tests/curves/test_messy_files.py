@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sweep.base.errors import SweepError
 from sweep.curves.files import read_curves, scan_curves
-from sweep.errors import SweepError
 from sweep.study import load_study
 
 from ..build import one_line

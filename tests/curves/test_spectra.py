@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from sweep.base.errors import DataError
 from sweep.curves.hats import hats
 from sweep.curves.spectrum import (
     WavelengthGrid,
@@ -15,7 +16,6 @@ from sweep.curves.spectrum import (
     photons_from_energy,
     resample,
 )
-from sweep.errors import DataError
 
 GRID = WavelengthGrid()
 

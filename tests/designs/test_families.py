@@ -10,6 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sweep.base.errors import SweepError
+from sweep.base.types import Section
 from sweep.designs.families.dual import Dual
 from sweep.designs.families.free_form import FreeForm
 from sweep.designs.families.stopband import MultiStopband, Stopband
@@ -17,8 +19,6 @@ from sweep.designs.family import Family, MovedFamily
 from sweep.designs.registry import FAMILIES as REGISTERED
 from sweep.designs.registry import FamilyOptions, build_family
 from sweep.designs.tolerance import Off
-from sweep.errors import SweepError
-from sweep.types import Section
 
 WAVE = np.arange(400.0, 701.0)
 BASE = 0.3 + 0.4 / (1 + np.exp(-(WAVE - 500) / 20))

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 import sweep
-from sweep.errors import SweepError
+from sweep.base.errors import SweepError
 
 from ..build import one_line, study_file
 

@@ -11,6 +11,7 @@ import mpmath as mp
 import numpy as np
 from scipy.io import savemat
 
+from sweep.base.errors import DataError, StudyError, SweepError
 from sweep.camera.sensor import make_sensor
 from sweep.curves.files import read_curves
 from sweep.curves.lights import make_lights
@@ -18,7 +19,6 @@ from sweep.curves.spectrum import WavelengthGrid, check_samples, resample
 from sweep.designs.edge import edge, edge_gradient
 from sweep.designs.families.dual import Dual
 from sweep.designs.families.stopband import Stopband
-from sweep.errors import DataError, StudyError, SweepError
 from sweep.metrics.bound import FEASIBLE
 from sweep.study import load_study
 

@@ -11,8 +11,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from scipy.optimize import brentq
 
+from sweep.base.errors import InfeasibleError
 from sweep.designs.families.stopband import Stopband
-from sweep.errors import InfeasibleError
 from sweep.metrics.bound import FEASIBLE, Bound
 from sweep.metrics.objective import Objective
 from sweep.run.search import run_search

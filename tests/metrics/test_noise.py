@@ -11,10 +11,10 @@ import pandas as pd
 import pytest
 
 import sweep
+from sweep.base.errors import StudyError
 from sweep.camera.effects import noise
 from sweep.camera.imager import Imager
 from sweep.curves.lights import Lights
-from sweep.errors import StudyError
 from sweep.metrics.columns.confusion import D_PRIME, ERROR, STATE_ERROR
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.recognition import DECIDERS, MOST_LIKELY, recognize

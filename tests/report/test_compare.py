@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from sweep.errors import OutputError, SweepError
+from sweep.base.errors import OutputError, SweepError
 from sweep.report import read_output
 from sweep.report.compare import compare_runs
 from sweep.report.compare.differences import study_differences

@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from sweep.errors import OutputError
+from sweep.base.errors import OutputError
 from sweep.metrics.pareto import knee
 from sweep.report import read_output
 from sweep.report.history import history_of

@@ -11,8 +11,8 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
+from sweep.base.errors import OutputError
 from sweep.commands.status import status_lines
-from sweep.errors import OutputError
 from sweep.report import read_output
 from sweep.results.journal import SHARDS, Journal
 from sweep.run import output_folder, with_plans

@@ -17,8 +17,8 @@ import pandas as pd
 import pyarrow as pa
 import pytest
 
+from sweep.base.errors import OutputError
 from sweep.commands.status import status_lines
-from sweep.errors import OutputError
 from sweep.results.inventory import Inventory
 from sweep.results.journal import SHARDS, Entry, Journal
 from sweep.results.records import to_json
@@ -257,7 +257,7 @@ def foreign_names_in_run_json(folder: Path, outside: Path) -> None:
 
 
 def _digest() -> Any:
-    from sweep.disk import Digest
+    from sweep.base.disk import Digest
 
     return Digest("0" * 64, 8)
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from sweep.errors import OutputError
+from sweep.base.errors import OutputError
 from sweep.results.inventory import Inventory
 from sweep.run import output_folder, run_study
 from sweep.study import load_study

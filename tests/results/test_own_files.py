@@ -11,9 +11,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from sweep.base.errors import OutputError
 from sweep.commands.audit import audit_output
 from sweep.commands.status import status_lines
-from sweep.errors import OutputError
 from sweep.report import make_report, read_output
 from sweep.results.inventory import Inventory
 from sweep.results.journal import SHARDS, Journal

@@ -13,10 +13,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sweep.base.types import FloatArray, IndexArray
 from sweep.results.records import from_json, to_json
 from sweep.search.limit import Limit
 from sweep.search.problem import Evaluation, SearchRun
-from sweep.types import FloatArray, IndexArray
 
 from ..tampering import hostile
 

@@ -15,8 +15,8 @@ import pyarrow.parquet as pq
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
+from sweep.base.errors import FailedDesignError, OutputError, SweepError
 from sweep.commands.status import status_lines
-from sweep.errors import FailedDesignError, OutputError, SweepError
 from sweep.report import make_report, read_output
 from sweep.results.identity import CHUNK
 from sweep.results.journal import SHARDS, Journal

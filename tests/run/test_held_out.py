@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from sweep.base.errors import StudyError
 from sweep.camera.imager import imager_of
-from sweep.errors import StudyError
 from sweep.report import make_report, read_output, summary_lines
 from sweep.results.identity import fingerprint
 from sweep.run import held_out, run_study

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from joblib.externals.loky import get_reusable_executor
 
-from sweep.errors import StudyError
+from sweep.base.errors import StudyError
 from sweep.report import read_output, study_of
 from sweep.run import run_study
 from sweep.study import Study, load_study
@@ -61,7 +61,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     (found / "METADATA").write_text("Metadata-Version: 2.1\nName: cfa-extras\nVersion: 1.2\n")
     (found / "entry_points.txt").write_text(OFFERS)
     monkeypatch.syspath_prepend(str(root))
-    monkeypatch.setattr("sweep.own_code._begun", {})
+    monkeypatch.setattr("sweep.base.own_code._begun", {})
     monkeypatch.setenv("PYTHONPATH", str(root))  # for worker processes, which are started anew
     get_reusable_executor().shutdown()
     yield own

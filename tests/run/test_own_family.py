@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 import sweep
+from sweep.base.errors import SweepError
 from sweep.designs.plugin import PluginFamily
-from sweep.errors import SweepError
 from sweep.report import make_report, read_output
 from sweep.run import run_study
 from sweep.study import Study, load_study

@@ -12,11 +12,11 @@ import pytest
 from scipy.spatial.distance import cdist
 
 import sweep
+from sweep.base.errors import StudyError, SweepError
+from sweep.base.own_code import OwnCode
 from sweep.camera.linear import smooth_imager
-from sweep.errors import StudyError, SweepError
 from sweep.metrics.own import OwnMetric
 from sweep.metrics.smooth import SmoothDesign
-from sweep.own_code import OwnCode
 from sweep.report import make_report, read_output
 from sweep.results.dictionary import KEYS
 from sweep.run import run_study

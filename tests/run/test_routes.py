@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from sweep.base.disk import read_facts
 from sweep.designs.block import EdgeBlock
 from sweep.designs.families.stopband import MultiStopband, Stopband
 from sweep.designs.space import Filter
-from sweep.disk import read_facts
 from sweep.report import read_output, summary_lines
 from sweep.results.identity import CHUNK
 from sweep.run import Wishes, run_study

@@ -17,10 +17,10 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
+from sweep.base.errors import OutputError, StudyError
 from sweep.camera.imager import imager_of
 from sweep.designs.families.stopband import Stopband
 from sweep.designs.space import Filter, Space
-from sweep.errors import OutputError, StudyError
 from sweep.metrics.evaluate import evaluate
 from sweep.report import make_report, read_output
 from sweep.results.identity import CHUNK

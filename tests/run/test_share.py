@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from sweep.errors import StudyError
+from sweep.base.errors import StudyError
 from sweep.metrics.objective import Objective
 from sweep.report.summary import summary_lines
 from sweep.results.output import read_output

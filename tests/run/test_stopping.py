@@ -19,7 +19,7 @@ import psutil
 import pyarrow.parquet as pq
 import pytest
 
-from sweep.errors import InterruptedRunError
+from sweep.base.errors import InterruptedRunError
 from sweep.run.stop import GRACE_S, BrokenOffError, Stop, stop_on_signals
 from sweep.run.workers import Workers, workers
 from sweep.study import load_study

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sweep.base.errors import SweepError
 from sweep.camera.scenario import Scenario
 from sweep.camera.scene import FixedExposure
 from sweep.camera.view import View
 from sweep.curves.lights import Lights
 from sweep.designs.families.stopband import Stopband
-from sweep.errors import SweepError
 from sweep.metrics.bound import FEASIBLE, Bound, total_violation
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.objective import Objective

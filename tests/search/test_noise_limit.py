@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+from sweep.base.errors import SweepError
 from sweep.camera.linear import smooth_imager
 from sweep.camera.methods import REFERENCE
 from sweep.camera.scenario import Scenario
-from sweep.errors import SweepError
 from sweep.metrics.bound import Bound
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth_noise import smooth_detectability

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sweep.base.errors import BrokenProofError
 from sweep.commands.app import main
 from sweep.designs.families.free_form import FreeForm
-from sweep.errors import BrokenProofError
 from sweep.metrics.bound import FEASIBLE, Bound, total_violation
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.objective import Objective

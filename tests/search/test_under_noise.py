@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sweep.base.errors import StudyError
 from sweep.camera.effects import noise
 from sweep.camera.imager import Imager
 from sweep.camera.linear import smooth_imager
@@ -18,7 +19,6 @@ from sweep.designs.families.free_form import FreeForm
 from sweep.designs.families.stopband import MultiStopband
 from sweep.designs.family import Family
 from sweep.designs.registry import FAMILIES as REGISTERED
-from sweep.errors import StudyError
 from sweep.metrics.bound import Bound
 from sweep.metrics.discrimination import pairwise_error
 from sweep.metrics.evaluate import evaluate

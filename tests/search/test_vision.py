@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sweep.errors import StudyError
+from sweep.base.errors import StudyError
 from sweep.metrics.evaluate import image_quantities
 from sweep.search.problem import best_feasible, starting_points
 from sweep.search.solver import search_from

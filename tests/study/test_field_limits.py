@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
+from sweep.base.errors import StudyError
 from sweep.curves.color import chromaticity, color_matching, display_colors
 from sweep.curves.spectrum import WavelengthGrid
-from sweep.errors import StudyError
 from sweep.run.rows import Job, rules_of, run_job
 from sweep.study import Study, load_study
 from sweep.study.editors import study_schema

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
+from sweep.base.errors import MOST_FAULTS, Fault, StudyError, SweepError, nearest
 from sweep.commands.list_studies import list_lines
 from sweep.curves.scan import MOST_BYTES, MOST_CURVES, MOST_SAMPLES, MOST_VALUES
-from sweep.errors import MOST_FAULTS, Fault, StudyError, SweepError, nearest
 from sweep.results.tables import RESOLVED
 from sweep.study import load_study
 from sweep.study.document import Document

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sweep.base.errors import OutputError, StudyError
 from sweep.curves.builtin import task_sets
 from sweep.curves.spectrum import Curves, WavelengthGrid
-from sweep.errors import OutputError, StudyError
 from sweep.report import read_output, study_of
 from sweep.study.load import load_study, study_of_keys
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from sweep.errors import SweepError
+from sweep.base.errors import SweepError
 from sweep.vision.compiled_images import draw_numbers, log_likelihoods
 from sweep.vision.images import HeadCamera
 from sweep.vision.installed import require_network

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum
 from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol, Self
 
-from ...types import FloatArray, Section
+from ...base.types import FloatArray, Section
 from ..scene import Scene
 from ..seen import SeenFilters
 from ..shot import Shot

@@ -16,8 +16,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import j0, j1
 
-from ...cache import Cache
-from ...types import FloatArray
+from ...base.cache import Cache
+from ...base.types import FloatArray
 from .. import legendre
 from ..compiled_splines import sums_of_cubic
 from ..pixel import Pixel

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...types import FloatArray
+from ...base.types import FloatArray
 from ..mosaic import Mosaic
 from ..shot import Shot
 from .base import KernelEffect, Part, Stage

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ...types import FloatArray, Meters
+from ...base.types import FloatArray, Meters
 from ..scene import Scene
 from ..shot import Shot
 from .base import LightEffect, SceneOptions

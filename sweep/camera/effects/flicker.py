@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...types import FloatArray
+from ...base.types import FloatArray
 from ..scene import Drive, FixedExposure
 from ..shot import Shot
 from .base import Change, Chosen, Designs, LinearEffect, Load, ShareChange, Stage

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from pydantic import Field
 
-from ...types import FloatArray
+from ...base.types import FloatArray
 from ..shot import Shot
 from .base import Change, Designs, LightEffect, SceneOptions, ShareChange
 

@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...types import FloatArray
+from ...base.types import FloatArray
 from ..noisy import gaussian, moments
 from ..pixel import Pixel
 from ..shot import Shot

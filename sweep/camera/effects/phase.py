@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...types import BoolArray, FloatArray, IndexArray
+from ...base.types import BoolArray, FloatArray, IndexArray
 from ..mosaic import Mosaic
 from ..shot import Shot
 from .base import Chosen, KernelEffect, Load, Part, Stage

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...base.types import FloatArray, IndexArray
 from ...curves.hats import hats
-from ...types import FloatArray, IndexArray
 from ..shot import Shot
 from .base import Change, Chosen, CurveChange, Designs, LinearEffect, Load, Stage
 

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...types import FloatArray
+from ...base.types import FloatArray
 from ..compiled import poisson_means
 from ..noisy import gaussian, moments
 from ..pixel import Pixel

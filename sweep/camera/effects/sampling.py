@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...types import BoolArray, FloatArray, IndexArray
+from ...base.types import BoolArray, FloatArray, IndexArray
 from .. import legendre
 from ..compiled_light import covered_by_disc, covered_shares
 from ..mosaic import Mosaic

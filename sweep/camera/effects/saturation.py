@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...types import FloatArray
+from ...base.types import FloatArray
 from ..pixel import Pixel
 from ..shot import Shot
 from .base import Chosen, Load, ReadoutEffect

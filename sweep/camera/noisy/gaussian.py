@@ -7,7 +7,7 @@ import math
 import numpy as np
 from scipy.special import ndtr
 
-from ...types import FloatArray
+from ...base.types import FloatArray
 from ..compiled import rounded_gaussian
 
 TAILS = 9.0

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...types import BoolArray, FloatArray
+from ...base.types import BoolArray, FloatArray
 from ..compiled import means_over_gains, poisson_means
 from ..pixel import Pixel
 from . import gaussian

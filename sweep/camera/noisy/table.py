@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...types import FloatArray
+from ...base.types import FloatArray
 from ..pixel import Pixel
 from . import moments
 

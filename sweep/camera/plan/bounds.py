@@ -13,9 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
+from ...base.types import FloatArray, IndexArray
 from ...curves.hats import hats
 from ...curves.lights import class_pairs
-from ...types import FloatArray, IndexArray
 from ..effects import blur, flicker
 from ..exposure import exposure_times, white_irradiance
 from ..seen import METHODS, SeenFilters

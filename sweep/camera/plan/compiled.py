@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ...types import FloatArray, IndexArray
+from ...base.types import FloatArray, IndexArray
 
 
 @njit(cache=True, nogil=True)

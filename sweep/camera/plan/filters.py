@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...types import FloatArray
+from ...base.types import FloatArray
 from ..effects.base import FilterChange
 from ..seen import known_at
 from ..view import background_irradiance, per_photon

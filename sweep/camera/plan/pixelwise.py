@@ -22,7 +22,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...types import FloatArray
+from ...base.types import FloatArray
 from ..effects import phase, quantization
 from ..effects.base import Change, FilterChange, KernelChange, LightChange, Part, ShareChange
 from ..kernel import Kernel, make_kernel, pixels_of_tile, pixels_per_place, readout_of

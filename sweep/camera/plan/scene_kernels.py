@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...types import FloatArray, IndexArray
+from ...base.types import FloatArray, IndexArray
 from ..between import Between, Deviation
 from ..effects import blur, phase, sampling
 from ..effects.base import Change, KernelChange, KernelEffect, Part

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...types import FloatArray
+from ...base.types import FloatArray
 from ..effects import blur, phase
 from ..effects.base import Change, CurveChange, FilterChange, KernelChange, LightChange, LinearEffect, Part, ShareChange
 from ..methods import Methods

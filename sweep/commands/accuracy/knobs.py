@@ -11,16 +11,16 @@ from typing import Any
 
 import numpy as np
 
+from ...base.errors import SweepError
+from ...base.types import FloatArray, IndexArray
 from ...camera.effects import blur, noise, phase
 from ...camera.imager import Imager
 from ...camera.linear import LinearImager
 from ...camera.methods import REFERENCE, Methods
 from ...camera.registry import EFFECTS
 from ...camera.view import View
-from ...errors import SweepError
 from ...metrics.separation import separations
 from ...study import Study
-from ...types import FloatArray, IndexArray
 
 STEPS = (10.0, 5.0, 2.0, 1.0, 0.5)
 """Wavelength steps that are compared, in units of the study's own."""

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from ...base.types import FloatArray, Progress
 from ...camera.imager import Imager
 from ...camera.methods import REFERENCE
 from ...camera.plan.plan import Plan
@@ -24,7 +25,6 @@ from ...report.figures import rendered
 from ...report.series import draw_knobs, draw_work_precision
 from ...results.tables import write_bytes, write_table
 from ...study import Study
-from ...types import FloatArray, Progress
 from .knobs import Regridded, Setting, knob_measurements
 from .payments import Payment, cpu_s, one_design, payments
 from .report import AccuracyReport, make_accuracy_report, read_hard_cases

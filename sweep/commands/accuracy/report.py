@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from ...errors import Fault, OutputError
+from ...base.errors import Fault, OutputError
 from ...report.pages import inlined, page, rows
 from ...results.tables import write_text
 

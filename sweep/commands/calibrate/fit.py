@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
+from ...base.types import FloatArray
 from ...curves.builtin.surrogate import SurrogateParameters
-from ...types import FloatArray
 from .model import DISTANCES, Figures, color_violations, crossed_edges, figures
 from .parameters import Free, Path, checked, free_parameters, with_values
 

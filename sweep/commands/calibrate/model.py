@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ...base.types import FloatArray
 from ...camera.mosaic import Mosaic
 from ...camera.pixel import Pixel
 from ...camera.scenario import Scenario
@@ -21,7 +22,6 @@ from ...metrics.columns.sensitivity import SENSITIVITY
 from ...metrics.evaluate import designed_quantities
 from ...metrics.separation import csd_name, separations
 from ...metrics.smooth import smooth_response
-from ...types import FloatArray
 
 GRID = WavelengthGrid()
 MODIFIED_CFA = "RYNCy"

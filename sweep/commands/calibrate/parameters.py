@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ...base.types import FloatArray
 from ...curves.builtin.surrogate import SurrogateParameters
-from ...types import FloatArray
 
 Path = tuple[str | int, ...]
 

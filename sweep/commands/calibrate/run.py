@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
+from ...base.types import Progress, delayed
 from ...curves.builtin.surrogate import parameter_tree
 from ...run.stop import Stop
 from ...run.workers import Workers, workers
-from ...types import Progress, delayed
 from .fit import Fit, Task, best_of, fit_from
 from .model import Figures, figures
 from .parameters import Path as Tree

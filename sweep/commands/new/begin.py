@@ -9,10 +9,10 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from ...base.disk import read_input
+from ...base.errors import DataError, Fault, OutputError, StudyError, SweepError
+from ...base.own_code import is_code
 from ...curves.scan import MOST_BYTES
-from ...disk import read_input
-from ...errors import DataError, Fault, OutputError, StudyError, SweepError
-from ...own_code import is_code
 from ...results.tables import atomic, write_bytes, write_text
 from ...study import load_study
 from ...study.editors import SCHEMA_FILE, schema_text

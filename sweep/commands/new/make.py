@@ -9,12 +9,12 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+from ...base.errors import DataError, Fault, OutputError, StudyError, SweepError
 from ...camera.emva1288 import pixel_figures
 from ...curves.light_files import lights_file
 from ...curves.light_unit import LightUnit
 from ...door.channels import Layout, layout_of
 from ...door.files import sensor_file
-from ...errors import DataError, Fault, OutputError, StudyError, SweepError
 from ...results.tables import atomic, write_text
 from ...study import Study, folder_name, load_study
 from ...study.editors import SCHEMA_FILE, schema_text

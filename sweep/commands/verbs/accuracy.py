@@ -22,7 +22,7 @@ def accuracy(
     ] = False,
 ) -> None:
     """Measure what accuracy costs: tolerances from 100 to 0.001 DN and single settings, with error, time and work."""
-    from ...errors import StudyError
+    from ...base.errors import StudyError
     from ...study import folder_name, load_study
     from ...study.shipped import shipped_names, study_path
     from ..accuracy.ladder import measure_accuracy

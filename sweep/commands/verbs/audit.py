@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from ...errors import BrokenPromiseError
+from ...base.errors import BrokenPromiseError
 from ..options import AllowCode, DataFolder, RunFolder
 from ..panels import OF_RESULTS
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from ...errors import StudyError
+from ...base.errors import StudyError
 from ..options import StudyPath
 from ..panels import OF_TOOL
 

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
+from ...base.errors import DataError
 from ...curves.light_unit import LightUnit
-from ...errors import DataError
 from ..panels import OF_CURVES
 
 PANEL = OF_CURVES

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
+from ...base.errors import Fault, StudyError
 from ...curves.light_unit import LightUnit
-from ...errors import Fault, StudyError
 from ..panels import OF_STUDIES
 
 PANEL = OF_STUDIES

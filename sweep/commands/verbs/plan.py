@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from ...errors import StudyError
+from ...base.errors import StudyError
 from ..options import AllowCode, Changes, DataFolder, StudyPath, changes_of
 from ..panels import OF_STUDIES
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from ...errors import InterruptedRunError, SweepError
+from ...base.errors import InterruptedRunError, SweepError
 from ..endings import say_lines
 from ..options import AllowCode, Changes, DataFolder, Outputs, StudyPaths, changes_of
 from ..panels import OF_STUDIES

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...types import FloatArray
+from ...base.types import FloatArray
 from ..spectrum import Curves, WavelengthGrid
 from .surrogate import LEAK_NODES_NM, ClearPixel, FilterParameters, SurrogateParameters
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...types import FloatArray
+from ...base.types import FloatArray
 
 
 def led_photons(wavelength_nm: FloatArray, peak_nm: float, blue_nm: float, red_nm: float) -> FloatArray:

@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...types import FloatArray
+from ...base.types import FloatArray
 from ..spectrum import Resampling, WavelengthGrid, photons_from_energy, resample
 
 SpectrumKind = Literal["reflectance", "emission"]

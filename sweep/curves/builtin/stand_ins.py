@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...types import FloatArray
+from ...base.types import FloatArray
 from ..color import REGIONS, ColorRegion
 from ..regulations import LAMP_REGIONS, SHEETING_REGIONS
 from ..spectrum import WavelengthGrid

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 from ruamel.yaml import YAML
 
-from ...types import Fraction, NonNegative, Positive, Section
+from ...base.types import Fraction, NonNegative, Positive, Section
 
 BUILT_IN_RANGE_NM = (400.0, 700.0)
 """Wavelengths that the surrogate curves are stated for; an IR cut filter closes the rest."""

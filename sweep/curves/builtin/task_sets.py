@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from ...types import FloatArray
+from ...base.types import FloatArray
 from ..color import color_matching, luminance_per_photon_radiance
 from ..spectrum import WavelengthGrid, energy_from_photons, equal_photons
 from ..tasks import ILLUMINANTS, Chart, GriddedTask, TaskName

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...errors import Fault, SweepError
-from ...types import FloatArray, Section
+from ...base.errors import Fault, SweepError
+from ...base.types import FloatArray, Section
 from ..bands import Banded
 
 

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 from pydantic import model_validator
 
+from ...base.errors import Fault, SweepError
+from ...base.types import FloatArray, Positive, Section
 from ...curves.hats import hats
-from ...errors import Fault, SweepError
-from ...types import FloatArray, Positive, Section
 from ..family import Parameter
 from ..products import row_products
 from ..tolerance import AS_DESIGNED, Off

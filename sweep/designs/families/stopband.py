@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
-from ...types import FloatArray, Section
+from ...base.types import FloatArray, Section
 from ..bands import Banded
 
 

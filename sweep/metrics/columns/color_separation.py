@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
+from ...base.types import FloatArray, IndexArray
 from ...curves.lights import class_pairs
-from ...types import FloatArray, IndexArray
 from ..quantity import BEST_PLACE, DN, Asked, Columns, Quantity, ReadoutMetric
 from ..separation import csd_name, separations
 from ..smooth import Rows, SmoothDesign

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from ...base.types import FloatArray, IndexArray
 from ...camera.imager import Imager
 from ...camera.noisy_readout import NoisyReadout
 from ...curves.lights import Pair, class_pairs, pair_name
-from ...types import FloatArray, IndexArray
 from .. import confusion
 from ..discrimination import (
     NoiseShape,

@@ -6,9 +6,9 @@ from functools import partial
 
 import numpy as np
 
+from ...base.types import FloatArray
 from ...designs.family import Family
 from ...designs.products import row_products
-from ...types import FloatArray
 from ..quantity import Asked, Columns, FamilyMetric, Quantity
 from ..smooth import Rows, SmoothDesign
 

@@ -6,8 +6,8 @@ from functools import partial
 
 import numpy as np
 
-from ...errors import Fault, SweepError
-from ...types import FloatArray
+from ...base.errors import Fault, SweepError
+from ...base.types import FloatArray
 from ..own import OwnMetric, Readings
 from ..quantity import Asked, Metric, Quantity
 from ..smooth import Rows, SmoothDesign

@@ -19,10 +19,10 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.special import ndtr
 
+from ...base.types import FloatArray, IndexArray
 from ...camera.imager import Imager
 from ...camera.noisy_readout import NoisyReadout
 from ...curves.lights import class_pairs, pair_name
-from ...types import FloatArray, IndexArray
 from ..discrimination import NoiseShape, pairwise_error
 from ..quantity import Asked, Columns, NoiseMetric, Quantity
 

@@ -7,9 +7,9 @@ from functools import partial
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from ...base.types import FloatArray
 from ...camera.view import View
 from ...designs.block import Block, CurveBlock
-from ...types import FloatArray
 from ..quantity import Asked, Columns, DesignMetric, LinearRows, Quantity
 from ..separation import cfa_sensitivity
 from ..smooth import Rows, SmoothDesign

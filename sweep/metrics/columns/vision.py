@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...base.types import FloatArray
 from ...camera.view import View
-from ...types import FloatArray
 from ...vision.section import Vision
 from ..quantity import Asked, Columns, Quantity, VisionMetric
 from ..smooth import Rows, SmoothDesign

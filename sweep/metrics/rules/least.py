@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...types import FloatArray
+from ...base.types import FloatArray
 from ..rule import Rule
 
 _SMALLEST = 1e-300

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...types import FloatArray
+from ...base.types import FloatArray
 from .colorimetry import Smooth, delta_e, lab, lab_slope
 
 PIXELS = 4.0

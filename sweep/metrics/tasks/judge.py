@@ -9,11 +9,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ...base.types import FloatArray
 from ...camera.view import View
 from ...curves.color import color_matching
 from ...curves.tasks import Case, Chart, Conditions, GriddedTask
 from ...designs.block import Block
-from ...types import FloatArray
 from ..quantity import Columns
 from . import color, separations
 from .colorimetry import Smooth, delta_e_2000, lab, root

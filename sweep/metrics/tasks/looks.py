@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...base.types import FloatArray
 from ...camera.pixel import irradiance_factor
 from ...camera.view import View, per_photon
-from ...types import FloatArray
 from .color import ChannelNoise
 from .colorimetry import Smooth
 

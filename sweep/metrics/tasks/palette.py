@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...base.types import FloatArray
 from ...curves.tasks import Chart, Conditions
-from ...types import FloatArray
 from .color import ChannelNoise, color_matrix, luminance_noise
 from .judge import color_errors
 from .looks import Looks

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from scipy.special import ndtr
 
-from ...types import IndexArray
+from ...base.types import IndexArray
 from .color import ChannelNoise
 from .colorimetry import Smooth
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...types import FloatArray
+from ...base.types import FloatArray
 from ..figures import CURVE_CYCLE, canvas, rendered
 
 if TYPE_CHECKING:

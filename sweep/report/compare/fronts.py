@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from ...base.types import FloatArray
 from ...metrics.objective import COMBINED
 from ...metrics.pareto import hypervolume
 from ...metrics.quantity import DN, WORST_CASE
 from ...results.tables import FOUND
-from ...types import FloatArray
 from .. import Output
 
 _STEP = 0.01

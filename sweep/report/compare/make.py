@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from ...errors import Fault, OutputError, SweepError
+from ...base.errors import Fault, OutputError, SweepError
 from ...results.tables import write_bytes, write_csv, write_text
 from ...study import folder_name
 from .. import Output, read_output
