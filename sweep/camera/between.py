@@ -16,10 +16,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import FloatArray, IndexArray
 from . import kernel
 from .compiled_areas import CellWeights, areas
 from .compiled_cells import SEGMENTS, SHARP, Envelopes, Light, deviations, ranges
+from .compiled_classes import CellBounds, deviations_of_channels
 from .effects import blur, crosstalk, demosaic, sampling
 from .methods import Methods
 from .view import View
@@ -80,12 +81,14 @@ class Between:
         self._is_sharp = profile is None
         self._images = SHARP if profile is None else self._images_of(profile)
         self._nearby: dict[float, Envelopes] = {}
-        # What each pixel of a channel takes of the light through each channel's filter: mean, and largest deviation.
+        # What each pixel of a channel takes of the light through each channel's filter: mean, and by how much of it
+        # pixels differ.
         whole = (view.mosaic.indices[..., None] == np.arange(n)).astype(float)
         taken = crosstalk.mixed(whole[None], self._share, periodic=True)[0]
         own = [taken[whole[..., to] > 0] for to in range(n)]
         self._taken = np.stack([pixels.mean(axis=0) for pixels in own])
-        self._uneven = np.stack([np.abs(pixels - pixels.mean(axis=0)).max(axis=0) for pixels in own])
+        apart = np.stack([np.abs(pixels - pixels.mean(axis=0)).max(axis=0) for pixels in own])
+        self.uneven = np.divide(apart, self._taken, out=np.zeros_like(apart), where=self._taken > 0)
 
     def _images_of(self, profile: blur.Profile) -> Envelopes:
         """That at the middle wavelength, and what differs from it in each band."""
@@ -135,18 +138,30 @@ class Between:
         return ranges(flat, middle, self._ends).reshape(2, *kernels.shape[:-1], self.n_parts)
 
     def of_cells(self, centers: FloatArray, h: float, homes: FloatArray, corners: FloatArray) -> Deviation:
-        """Bounds for cells of half width `h` around `centers` (ndarray[n, 2]), read out at `homes` (ndarray[n, 2]).
+        """Of cells of half width `h` around `centers` (ndarray[n, 2]), read out at `homes` (ndarray[n, 2]).
 
         `corners`: `ranges` of the kernel at their corners, ndarray[2, n, 4, n_channels, n_channels, n_parts].
+        """
+        bounds = self.bounds(centers, h, homes, corners[0].min(axis=1), corners[1].max(axis=1))
+        every = np.arange(bounds.jumps.shape[1])
+        which = np.tile(every, (len(centers), 1))
+        return deviation(bounds, self.uneven, np.arange(len(centers)), which, every)
+
+    def bounds(self, centers: FloatArray, h: float, homes: FloatArray, low: FloatArray, high: FloatArray) -> CellBounds:
+        """What channels have in cells, before it is related to the sums of their weights.
+
+        `low`, `high`: range of the kernel over the corners, ndarray[n, n_channels, n_channels, n_parts].
         """
         step = max(1, _AT_ONCE // (kernel.pixels_per_place(self._view) * self.n_parts))
         parts = []
         for at in range(0, len(centers), step):
             some = slice(at, at + step)
-            parts.append(self._of_block(centers[some], h, homes[some], corners[:, some]))
-        return Deviation(np.concatenate([p.kernel for p in parts]), np.concatenate([p.tilt for p in parts]))
+            parts.append(self._of_block(centers[some], h, homes[some], low[some], high[some]))
+        return CellBounds(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
-    def _of_block(self, centers: FloatArray, h: float, homes: FloatArray, corners: FloatArray) -> Deviation:
+    def _of_block(
+        self, centers: FloatArray, h: float, homes: FloatArray, low: FloatArray, high: FloatArray
+    ) -> CellBounds:
         """See the head of this file. A ratio k = M / D is that of the interpolations, r, but for dev(M - r D) / D; r is
         a mean of the corners' values, and dev(M - r D) is the sum of dev(weight x (light - r)) over the pixels.
         """
@@ -155,13 +170,24 @@ class Between:
         seen = sampling.window(mosaic, centers, self._reach)
         x, y = seen.columns, seen.rows
         if self._target.readout == "center":  # the weights of a demosaicked pixel are the same in the whole cell
-            high = demosaic.center_weights(seen, homes - centers, self._methods.demosaic, mosaic)
-            nothing = np.zeros_like(high)
-            weights, tilt = CellWeights(high, nothing, nothing, nothing, np.ones((len(x), n))), np.zeros((len(x), n))
+            weighed = demosaic.center_weights(seen, homes - centers, self._methods.demosaic, mosaic)
+            nothing = np.zeros_like(weighed)
+            weights = CellWeights(weighed, nothing, nothing, nothing)
+            sums, jumps = np.ones((len(x), 4, n)), np.zeros((len(x), n))
         else:
-            weights, tilt = areas(x, y, seen.channel, n, self._half, self._radii[1], h)
+            weights, sums, jumps = areas(x, y, seen.channel, n, self._half, self._radii[1], h)
         found = np.empty((len(x), n, n, self.n_parts))
-        over_corners = np.stack([corners[0].min(axis=1), corners[1].max(axis=1)], axis=1)
-        light = Light(self._near(h), self._half, self._radii[0], self._share, self._taken, self._uneven)
-        deviations(x, y, seen.channel, weights, light, h, over_corners, found)
-        return Deviation(found, tilt)
+        light = Light(self._near(h), self._half, self._radii[0], self._share, self._taken)
+        deviations(x, y, seen.channel, weights, light, h, np.stack([low, high], axis=1), found)
+        return CellBounds(found, sums, jumps, low, high)
+
+
+def deviation(
+    bounds: CellBounds, uneven: FloatArray, rows: IndexArray, which: IndexArray, channel: IndexArray
+) -> Deviation:
+    """Of the channels that classes of pixels are in: see `compiled_classes.deviations_of_channels`."""
+    n = int(channel.max()) + 1
+    kernels = np.empty((len(rows), n, n, bounds.sizes.shape[3]))
+    tilt = np.empty((len(rows), n))
+    deviations_of_channels(bounds, uneven, rows, which, channel, kernels, tilt)
+    return Deviation(kernels, tilt)

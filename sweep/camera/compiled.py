@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ..base.types import FloatArray
+from ..base.types import FloatArray, IndexArray
 
 _TAIL = 9.5
 """Standard deviations beyond which a Gaussian is left out: less than 1e-20 of it."""
@@ -152,3 +152,29 @@ def poisson_means(electrons: FloatArray, start: int, values: FloatArray, varianc
     out = np.empty((len(values) + 1, electrons.size))
     poisson_moments(np.ascontiguousarray(electrons), start, values, variance, out)
     return out
+
+
+@njit(cache=True, nogil=True)
+def cubic_of_electrons(
+    electrons: FloatArray,
+    prnu: float,
+    last_e: float,
+    nodes: FloatArray,
+    coefficients: FloatArray,
+    piece: IndexArray,
+    step: float,
+    out: FloatArray,
+) -> None:
+    """Values of a table at expected electrons, ndarray[n]: see `noisy.table.Table`. Beyond `last_e` they stay."""
+    for i in range(electrons.size):
+        held = electrons[i]
+        held = last_e if held > last_e else held
+        at = np.sqrt(held)
+        if prnu > 0:
+            at = math.asinh(prnu * at) / prnu
+        if not at >= 0:  # NaN stays NaN
+            out[i] = at
+            continue
+        k = piece[min(int(at / step), piece.size - 1)]
+        s = at - nodes[k]
+        out[i] = ((coefficients[0, k] * s + coefficients[1, k]) * s + coefficients[2, k]) * s + coefficients[3, k]

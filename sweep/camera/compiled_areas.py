@@ -14,15 +14,13 @@ from .compiled_light import covered_share
 
 class CellWeights(NamedTuple):
     """Weights of pixels in the readout over cells of places: the largest, the largest slope along a row and along a
-    column, and how much of the slope's change is sudden; ndarray[n_cells, n_rows, n_columns] each. `least`: the
-    smallest sum of the weights of each channel, ndarray[n_cells, n_channels].
+    column, and how much of the slope's change is sudden; ndarray[n_cells, n_rows, n_columns] each.
     """
 
     high: FloatArray
     slope_x: FloatArray
     slope_y: FloatArray
     jump: FloatArray
-    least: FloatArray
 
 
 @njit(cache=True, nogil=True)
@@ -55,17 +53,17 @@ def slope_of_disc(along: float, across: float, half: float, radius: float, h: fl
 @njit(cache=True, nogil=True)
 def areas(
     x: FloatArray, y: FloatArray, channel: IndexArray, n_channels: int, half: float, radius: float, h: float
-) -> tuple[CellWeights, FloatArray]:
-    """Of a mean over a disc of `radius`, and how much the sums of weights may differ between a cell's corners, relative
-    to the smallest, ndarray[n_cells, n_channels].
+) -> tuple[CellWeights, FloatArray, FloatArray]:
+    """Of a mean over a disc of `radius`; the sum of each channel's weights at the corners, ndarray[n_cells, 4,
+    n_channels], and how far it may be in a cell from the interpolation of these, ndarray[n_cells, n_channels].
 
     `x`: ndarray[n_cells, n_columns], `y`: ndarray[n_cells, n_rows], pixels from the cells' centers.
     """
     n, rows, columns = len(x), y.shape[1], x.shape[1]
     high, slope_x, slope_y, jump = np.zeros((4, n, rows, columns))
-    least, tilt = np.empty((n, n_channels)), np.empty((n, n_channels))
+    every_corner, jumps = np.zeros((n, 4, n_channels)), np.zeros((n, n_channels))
     for cell in range(n):
-        sums, corners = np.zeros(n_channels), np.zeros((4, n_channels))
+        corners = every_corner[cell]
         for row in range(rows):
             for column in range(columns):
                 dx, dy, own = x[cell, column], y[cell, row], channel[row, column]
@@ -81,14 +79,8 @@ def areas(
                 slope_x[cell, row, column], one = slope_of_disc(dx, dy, half, radius, h)
                 slope_y[cell, row, column], other = slope_of_disc(dy, dx, half, radius, h)
                 jump[cell, row, column] = one + other
-                sums[own] += (one + other) * h / 2
+                jumps[cell, own] += (one + other) * h / 2
                 for corner in range(4):
                     to_x, to_y = h * (2 * (corner % 2) - 1), h * (2 * (corner // 2) - 1)
                     corners[corner, own] += covered_share(dx - to_x, dy - to_y, half, radius)
-        for own in range(n_channels):
-            lowest = highest = corners[0, own]
-            for corner in range(1, 4):
-                lowest, highest = min(lowest, corners[corner, own]), max(highest, corners[corner, own])
-            least[cell, own] = max(lowest - sums[own], 1e-300)
-            tilt[cell, own] = (highest - lowest) / max(lowest, 1e-300)
-    return CellWeights(high, slope_x, slope_y, jump, least), tilt
+    return CellWeights(high, slope_x, slope_y, jump), every_corner, jumps

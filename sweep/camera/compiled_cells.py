@@ -135,8 +135,8 @@ def _mixed(values: FloatArray, channel: IndexArray, row: int, column: int, share
 class Light(NamedTuple):
     """What is known of the light of a cell's pixels. `images`: of a blurred light; a sharp one is a disc of `radius`.
 
-    `half`: of a pixel's side; `share`: of its light that comes through its neighbors' filters. `taken`, `uneven`:
-    ndarray[n_channels, n_channels]; see `Between`.
+    `half`: of a pixel's side; `share`: of its light that comes through its neighbors' filters. `taken`: what a pixel
+    of each channel takes of the light through each channel's filter, ndarray[n_channels, n_channels].
     """
 
     images: Envelopes
@@ -144,7 +144,6 @@ class Light(NamedTuple):
     radius: float
     share: float
     taken: FloatArray
-    uneven: FloatArray
 
 
 @njit(cache=True, nogil=True)
@@ -189,14 +188,12 @@ def _at_rim(own: CellWeights, channel: IndexArray, row: int, column: int, share:
 
 
 @njit(cache=True, nogil=True)
-def _looked_at(own: CellWeights, channel: IndexArray, share: float, wanted: BoolArray) -> FloatArray:
-    """Mark the pixels of whose light something is in any value; the sum of the jumps of each channel's weights."""
-    sums, weight = np.zeros(own.least.size), np.empty(own.least.size)
+def _looked_at(own: CellWeights, channel: IndexArray, share: float, n_channels: int, wanted: BoolArray) -> None:
+    """Mark the pixels of whose light something is in any value."""
+    weight = np.empty(n_channels)
     for row in range(channel.shape[0]):
         for column in range(channel.shape[1]):
-            sums[channel[row, column]] += own.jump[row, column]
             wanted[row, column] = _mixed(own.high, channel, row, column, share, weight)
-    return sums
 
 
 @njit(cache=True, nogil=True)
@@ -231,7 +228,7 @@ def _of_cell(
     n_channels, n_parts = found.shape[0], found.shape[2]
     slopes, seen, ratio = np.empty((3, 2, n_parts))
     weight, of_rim = np.empty(n_channels), np.empty((3, n_channels))
-    sums = _looked_at(own, channel, light.share, wanted)
+    _looked_at(own, channel, light.share, n_channels, wanted)
     _bends(x, y, wanted, h, light, bends)
     found[:] = 0.0
     for row in range(y.size):
@@ -241,22 +238,19 @@ def _of_cell(
             to = channel[row, column]
             _mixed(own.high, channel, row, column, light.share, weight)
             for u in range(n_channels):
-                add(found[u, to], weight[u], bends[row, column])
+                if weight[u] > 0:
+                    add(found[u, to], weight[u], bends[row, column])
             # Elsewhere than at the rim of the readout the weights are the same in the whole cell.
             if _at_rim(own, channel, row, column, light.share, of_rim):
                 _light_in_cell(x[column], y[row], h, light, slopes, seen)
                 for u in range(n_channels):
+                    if weight[u] <= 0:  # no part of the cell gives it one
+                        continue
                     own_share = 1 / light.taken[u, to] if light.taken[u, to] > 0 else 0.0
                     ratio[:] = 0.0
                     for end in range(2):
                         add(ratio[end], own_share, corners[end, u, to])
                     _add_rim(of_rim[:, u], slopes, seen, ratio, h, found[u, to])
-    for u in range(n_channels):
-        for c in range(n_channels):
-            uneven = light.uneven[u, c] / light.taken[u, c] * sums[u] * h / 2 if light.taken[u, c] > 0 else 0.0
-            for part in range(n_parts):
-                largest = max(abs(corners[0, u, c, part]), abs(corners[1, u, c, part]))
-                found[u, c, part] = (found[u, c, part] + largest * uneven) / own.least[u]
 
 
 @njit(cache=True, nogil=True)
@@ -270,7 +264,8 @@ def deviations(
     corners: FloatArray,
     found: FloatArray,
 ) -> None:
-    """How far kernels in cells of half width `h` may be from a mean of those at their corners.
+    """How far the weighted light less that share of the weights which it is at the corners may be, in cells of half
+    width `h`, from the interpolation of its values there.
 
     `corners`: range of each part of the kernel there, ndarray[n_cells, 2, n_channels, n_channels, n_parts]. `found`:
     ndarray[n_cells, n_channels, n_channels, n_parts].
@@ -278,7 +273,7 @@ def deviations(
     bends, wanted = np.empty((*channel.shape, found.shape[3])), np.empty(channel.shape, dtype=np.bool_)
     for cell in range(len(x)):
         slopes = weights.slope_x[cell], weights.slope_y[cell]
-        own = CellWeights(weights.high[cell], *slopes, weights.jump[cell], weights.least[cell])
+        own = CellWeights(weights.high[cell], *slopes, weights.jump[cell])
         _of_cell(x[cell], y[cell], channel, own, light, h, corners[cell], wanted, bends, found[cell])
 
 

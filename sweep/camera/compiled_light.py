@@ -184,6 +184,7 @@ def kernels(
     table: Table,
     rule: EdgeRule,
     out: FloatArray,
+    sums: FloatArray,
 ) -> None:
     """Kernels of places: what each channel gets of each function of the light through each channel's filter.
 
@@ -191,7 +192,7 @@ def kernels(
     ndarray[n_places, n_rows, n_columns] of the pixels in their channel's value, up to a factor for each channel; those
     at the border are nothing. `radius`: of the disc, which is sharp where the table has no function. `share`: of a
     pixel's light that comes through its neighbors' filters. `out`: ndarray[n_places, n_channels, n_channels,
-    n_functions or 1].
+    n_functions or 1]; `sums`: of the weights, ndarray[n_places, n_channels].
     """
     light = np.empty((*channel.shape, out.shape[3]))
     wanted = np.empty(channel.shape, dtype=np.bool_)
@@ -204,3 +205,5 @@ def kernels(
                 for column in range(channel.shape[1]):
                     light[row, column, 0] = covered_share(x[place, column], y[place, row], half, radius)
         _folded(weights[place], total, channel, share, light, out[place])
+        for u in range(total.size):
+            sums[place, u] = total[u]

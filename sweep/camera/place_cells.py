@@ -16,13 +16,17 @@ from numpy.typing import NDArray
 from ..base.cache import Cache
 from ..base.types import FloatArray, IndexArray
 from ..curves.hats import hats
-from .between import Between, Deviation
+from .between import Between, Deviation, deviation
+from .compiled_classes import CellBounds, kernels_of_channels
 from .effects import blur, phase
 from .effects.base import KernelEffect
 from .kernel import colorless
 from .methods import REFERENCE
+from .pixel import Optics, Pixel
+from .place_classes import Classes, classes_of
 from .place_kernels import PlaceKernels
 from .registry import EFFECTS, WHOLE_LIGHT
+from .scenario import Scenario
 from .view import View
 
 _KEPT_BYTES = 200e6
@@ -74,15 +78,80 @@ class CellKernels(NamedTuple):
     deviation: Deviation
 
 
-class KeptCells:
-    """Kernels at places and in cells of places: what designs, spaces and tolerances of one scene share."""
+class ClassCells:
+    """Kernels of classes of pixels, at places and in cells of places: what the CFAs of a scene share."""
 
     def __init__(self, view: View) -> None:
+        """`view`: of a mosaic whose channels are the classes."""
         self._view, wave = view, view.grid.nodes_nm
         knots_nm = wave if view.methods.blur == "skip" else blur.knots(wave, view.methods.blur)
         self.between = Between(view, view.methods, knots_nm)
         self._light = PlaceKernels(view, view.methods, knots_nm)
         self.functions = self._light.shares @ hats(wave, knots_nm)
+        self._places, self._cells = _Kept(), _Kept()
+        self._one_at_a_time = threading.RLock()
+
+    def at_places(self, cases: phase.Cases, classes: Classes, work: Counter[str]) -> FloatArray:
+        """Kernels of channels at places, ndarray[n, n_channels, n_channels, n_functions]."""
+        with self._one_at_a_time:
+            self._forget_many()
+            rows, which = self._rows(cases, classes, work)
+            n = int(classes.channel.max()) + 1
+            found = np.empty((len(rows), n, n, len(self.functions)))
+            kernels, sums = self._places.rows[:2]
+            kernels_of_channels(kernels, sums, rows, which, classes.channel, found)
+        return found
+
+    def in_cells(self, cells: phase.Cells, classes: Classes, work: Counter[str]) -> Deviation:
+        """How far kernels of channels in cells may be from a mean of those at their corners."""
+        images, which = classes.images(cells.centers)
+
+        def made(new: IndexArray) -> _Rows:
+            work["cells"] += len(new)
+            some = phase.Cells(images[new], cells.homes[new], cells.half)
+            low, high = self._ranges(some, classes, work)
+            return tuple(self.between.bounds(some.centers, some.half, some.homes, low, high))
+
+        with self._one_at_a_time:
+            self._forget_many()
+            rows = self._cells.which(names_of(self._view, images, cells.homes), made)
+            return deviation(CellBounds(*self._cells.rows), self.between.uneven, rows, which, classes.channel)
+
+    def _forget_many(self) -> None:
+        if self._places.nbytes + self._cells.nbytes > _KEPT_BYTES:
+            self._places, self._cells = _Kept(), _Kept()
+
+    def _rows(self, cases: phase.Cases, classes: Classes, work: Counter[str]) -> tuple[IndexArray, IndexArray]:
+        """The rows of the kernels at the places that stand for some, and the classes there (`Classes.images`)."""
+        images, which = classes.images(cases.places_px)
+
+        def made(new: IndexArray) -> _Rows:
+            work["places"] += len(new)
+            kernels, sums = self._light.at(phase.Cases(images[new], cases.home_px[new]), work)
+            low, high = self.between.ranges(kernels @ self._light.shares)
+            return kernels, sums, low, high
+
+        return self._places.which(names_of(self._view, images, cases.home_px), made), which
+
+    def _ranges(self, cells: phase.Cells, classes: Classes, work: Counter[str]) -> tuple[FloatArray, FloatArray]:
+        """Range of each part of the kernel over the corners of cells, ndarray[n_cells, n_classes, n_classes, n_parts]
+        both.
+        """
+        rows, which = self._rows(cells.corners, classes, work)
+        to, through = which[:, :, None], which[:, None, :]
+        ends = []
+        for values, end in zip(self._places.rows[2:], (np.min, np.max), strict=True):
+            own = values[rows[:, None, None], to, through]
+            ends.append(end(own.reshape(len(cells.centers), -1, *own.shape[1:]), axis=1))
+        return ends[0], ends[1]
+
+
+class KeptCells:
+    """Kernels at places and in cells of places: what designs, spaces and tolerances of one CFA in a scene share."""
+
+    def __init__(self, shared: ClassCells, view: View, classes: Classes) -> None:
+        self._shared, self._view, self._classes = shared, view, classes
+        self.between, self.functions = shared.between, shared.functions
         self._places, self._cells = _Kept(), _Kept()
         self._one_at_a_time = threading.Lock()
 
@@ -90,62 +159,74 @@ class KeptCells:
         """Of some cells; those that are new are made."""
 
         def in_cells(new: IndexArray) -> _Rows:
-            work["cells"] += len(new)
             some = phase.Cells(cells.centers[new], cells.homes[new], cells.half)
             corners = self._corners(some, work)
-            _, low, high = self._places.rows
-            ranges = np.stack([low[corners], high[corners]])
-            ranges = ranges.reshape(2, len(new), len(phase.CORNERS), *low.shape[1:])
-            found = self.between.of_cells(some.centers, some.half, some.homes, ranges)
+            found = self._shared.in_cells(some, self._classes, work)
             return found.kernel, found.tilt, corners.reshape(len(new), len(phase.CORNERS))
 
         with self._one_at_a_time:
             if self._places.nbytes + self._cells.nbytes > _KEPT_BYTES:
                 self._places, self._cells = _Kept(), _Kept()
-            which = self._cells.which(self._names(cells.centers, cells.homes), in_cells)
-            deviation, tilt, corners = (rows[which] for rows in self._cells.rows)
+            which = self._cells.which(names_of(self._view, cells.centers, cells.homes), in_cells)
+            sizes, tilt, corners = (rows[which] for rows in self._cells.rows)
             places, numbered = np.unique(corners, return_inverse=True)
             kernels = self._places.rows[0][places]
-        return CellKernels(kernels, numbered.reshape(corners.shape), Deviation(deviation, tilt))
+        return CellKernels(kernels, numbered.reshape(corners.shape), Deviation(sizes, tilt))
 
     def _corners(self, cells: phase.Cells, work: Counter[str]) -> IndexArray:
         """The rows of the corners of cells, those of a cell one after the other."""
         corners = cells.corners
 
         def at_places(new: IndexArray) -> _Rows:
-            work["places"] += len(new)
-            kernels = self._light.at(corners.some(new), work)
-            low, high = self.between.ranges(kernels @ self._light.shares)
-            return kernels, low, high
+            return (self._shared.at_places(corners.some(new), self._classes, work),)
 
-        return self._places.which(self._names(corners.places_px, corners.home_px), at_places)
-
-    def _names(self, places: FloatArray, homes: FloatArray) -> list[Hashable]:
-        """A name for each place (ndarray[n, 2]), with the pixel that is read out there, where one is.
-
-        Places are sums of few powers of two, so that no digit is lost. Cells of one size have no center in common with
-        those of another.
-        """
-        target = self._view.scenario.target
-        assert target is not None
-        names = (places + 0.0).view(complex)[:, 0].tolist()  # no -0
-        if target.readout == "center":
-            return list(zip(names, (homes + 0.0).view(complex)[:, 0].tolist(), strict=True))
-        return list(names)
+        return self._places.which(names_of(self._view, corners.places_px, corners.home_px), at_places)
 
 
-_SCENES: Cache[bytes, KeptCells] = Cache(4)
+def names_of(view: View, places: FloatArray, homes: FloatArray) -> list[Hashable]:
+    """A name for each place (ndarray[n, 2]), with the pixel that is read out there, where one is.
+
+    Places are sums of few powers of two, so that no digit is lost. Cells of one size have no center in common with
+    those of another.
+    """
+    target = view.scenario.target
+    assert target is not None
+    names = (places + 0.0).view(complex)[:, 0].tolist()  # no -0
+    if target.readout == "center":
+        return list(zip(names, (homes + 0.0).view(complex)[:, 0].tolist(), strict=True))
+    return list(names)
+
+
+_SHARED: Cache[bytes, ClassCells] = Cache(4)
+_SCENES: Cache[bytes, KeptCells] = Cache(8)
 
 
 def forget_cells() -> None:
     """Let the next scene compute its kernels anew, as one that is the first."""
     _SCENES.clear()
+    _SHARED.clear()
+
+
+def _bare(view: View) -> View:
+    """What the kernels at places depend on: filters, noise, exposure and the light's way to the lens have no part."""
+    own = [name for name, effect in EFFECTS.items() if isinstance(effect, KernelEffect) and not effect.is_limit]
+    methods = replace(REFERENCE, **{name: getattr(view.methods, name) for name in own}, **WHOLE_LIGHT)
+    optics, pixel = view.scenario.optics, view.pixel
+    scenario = Scenario(target=view.scenario.target, optics=Optics(f_number=optics.f_number, focus_m=optics.focus_m))
+    sizes = Pixel(pitch_um=pixel.pitch_um, fill_factor=pixel.fill_factor, crosstalk=pixel.crosstalk)
+    return replace(colorless(view), methods=methods, scenario=scenario, pixel=sizes, tasks=None)
 
 
 def kept_cells(view: View) -> KeptCells:
-    """Those of a scene: filters, noise and the light's way to the lens have no part in it."""
-    own = [name for name, effect in EFFECTS.items() if isinstance(effect, KernelEffect) and not effect.is_limit]
-    kept = {name: getattr(view.methods, name) for name in own}
-    methods = replace(REFERENCE, **kept, **WHOLE_LIGHT)
-    bare = replace(colorless(view), methods=methods)
-    return _SCENES.get(hashlib.sha256(pickle.dumps(bare)).digest(), lambda: KeptCells(bare))
+    """Those of a scene."""
+
+    def named(of: View) -> bytes:
+        return hashlib.sha256(pickle.dumps(of)).digest()
+
+    bare = _bare(view)
+
+    def made() -> KeptCells:
+        apart, classes = classes_of(bare)
+        return KeptCells(_SHARED.get(named(apart), lambda: ClassCells(apart)), bare, classes)
+
+    return _SCENES.get(named(bare), made)

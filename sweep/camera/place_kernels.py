@@ -45,15 +45,18 @@ class PlaceKernels:
             order = profile.order(2 * self._half * pixel.pitch_um) - _EDGE_LESS
             self._rule = legendre.rule(order)
 
-    def at(self, cases: phase.Cases, work: Counter[str]) -> FloatArray:
+    def at(self, cases: phase.Cases, work: Counter[str]) -> tuple[FloatArray, FloatArray]:
         """What each channel gets through each channel's filter of each function of the light, ndarray[n_cases,
-        n_channels, n_channels, n_functions]; times `shares`, ndarray[n_functions, n_knots], at each wavelength.
+        n_channels, n_channels, n_functions]; times `shares`, ndarray[n_functions, n_knots], at each wavelength. And
+        the sum of weights of each channel's pixels, ndarray[n_cases, n_channels].
         """
         step = max(1, _AT_ONCE // pixels_per_place(self._view))
         starts = range(0, len(cases.places_px), step)
-        return np.concatenate([self._of_block(cases.some(slice(at, at + step)), work) for at in starts])
+        blocks = [self._of_block(cases.some(slice(at, at + step)), work) for at in starts]
+        kernels, sums = zip(*blocks, strict=True)
+        return np.concatenate(kernels), np.concatenate(sums)
 
-    def _of_block(self, cases: phase.Cases, work: Counter[str]) -> FloatArray:
+    def _of_block(self, cases: phase.Cases, work: Counter[str]) -> tuple[FloatArray, FloatArray]:
         mosaic = self._view.mosaic
         seen = sampling.window(mosaic, cases.places_px, sampling.reach_px(self._view, self._target))
         x, y = seen.columns, seen.rows
@@ -62,8 +65,8 @@ class PlaceKernels:
         else:
             weights = demosaic.center_weights(seen, cases.home_px - cases.places_px, self._methods.demosaic, mosaic)
         n = len(mosaic.channels)
-        found = np.empty((len(x), n, n, len(self.shares)))
+        found, sums = np.empty((len(x), n, n, len(self.shares))), np.empty((len(x), n))
         sizes = (self._half, self._radii[0], self._share)
-        compiled_light.kernels(x, y, weights, seen.channel, *sizes, self._table, self._rule, found)
+        compiled_light.kernels(x, y, weights, seen.channel, *sizes, self._table, self._rule, found, sums)
         work["sampling"] += weights.size * len(self.shares)
-        return found
+        return found, sums

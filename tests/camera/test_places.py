@@ -194,14 +194,14 @@ def test_kernels_by_the_edges_of_pixels_are_those_by_their_areas(blurred: str) -
         places = rng.uniform(-1, 3, (5, 2))
         cases, methods = phase.Cases(places, np.floor(places + 0.5)), replace(REFERENCE, blur=blurred)
         quick = PlaceKernels(made.view, methods, nodes)
-        found = quick.at(cases, Counter()) @ quick.shares
+        found = quick.at(cases, Counter())[0] @ quick.shares
         # The area's rule reads a cubic spline, which is off by 1e-7 of a uniform field.
         np.testing.assert_allclose(found, kernel_at(made.view, methods, nodes, cases), rtol=0, atol=3e-8)
         assert len(quick.shares) < nodes.size
         # A light that moves by a tile sees the same.
         size = np.array(made.view.mosaic.indices.shape[::-1])
         moved = phase.Cases(cases.places_px + 3 * size, cases.home_px + 3 * size)
-        np.testing.assert_allclose(quick.at(moved, Counter()) @ quick.shares, found, rtol=0, atol=1e-10)
+        np.testing.assert_allclose(quick.at(moved, Counter())[0] @ quick.shares, found, rtol=0, atol=1e-10)
 
 
 def test_a_straight_extreme_is_that_of_a_light_at_its_place() -> None:

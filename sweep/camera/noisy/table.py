@@ -3,20 +3,31 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 
-from ...base.types import FloatArray
+from ...base.types import FloatArray, IndexArray
+from ..compiled import cubic_of_electrons
 from ..pixel import Pixel
 from . import moments
 
-if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
-
 _CUT = 1e-5
-_DENSE = 1 / 64
-"""Distance of the nodes where gains differ, in standard deviations of the electrons times two."""
+STEP = moments.STEP
+"""All nodes are multiples of this, in twice the standard deviation of the electrons."""
+
+
+class Table(NamedTuple):
+    """Cubics over twice the standard deviation of the electrons: the root of their number, or with PRNU the inverse
+    hyperbolic sine of PRNU times that root, over PRNU.
+
+    `nodes`: ndarray[n + 1]; `coefficients`: ndarray[3, 4, n], for each of `moments.moments`; `piece`: which of them
+    each step from 0 up is in.
+    """
+
+    nodes: FloatArray
+    coefficients: FloatArray
+    piece: IndexArray
 
 
 def mean_unrounded(electrons: FloatArray, pixel: Pixel) -> FloatArray:
@@ -37,33 +48,35 @@ def variance(electrons: FloatArray, pixel: Pixel) -> FloatArray:
 @lru_cache(maxsize=64)
 def unclipped_e(pixel: Pixel) -> tuple[float, float]:
     """From and up to how many electrons neither end takes more from the mean than 1e-5 of the noise."""
-    table = tables(pixel)[moments.UNROUNDED]
-    electrons = (np.sinh(pixel.prnu * table.x) / pixel.prnu if pixel.prnu else table.x) ** 2
+    nodes = tables(pixel).nodes
+    electrons = (np.sinh(pixel.prnu * nodes) / pixel.prnu if pixel.prnu else nodes) ** 2
     sigma = pixel.dn_per_e * np.sqrt(electrons + (pixel.prnu * electrons) ** 2 + pixel.read_noise_e**2)
-    inside = np.abs(table(table.x) - pixel.dn_per_e * electrons - pixel.offset_dn) <= _CUT * sigma + 1e-9
-    kept = electrons[inside]
+    off = mean_unrounded(electrons, pixel) - pixel.dn_per_e * electrons - pixel.offset_dn
+    kept = electrons[np.abs(off) <= _CUT * sigma + 1e-9]
     return (float(kept[0]), float(kept[-1])) if kept.size else (1.0, 0.0)
 
 
 def _looked_up(electrons: FloatArray, pixel: Pixel, row: int) -> FloatArray:
-    table = tables(pixel)[row]
-    root = np.sqrt(np.minimum(electrons, moments.Ends.of(pixel).last_e))
-    at = np.arcsinh(pixel.prnu * root) / pixel.prnu if pixel.prnu else root
-    return np.asarray(table(at), dtype=float)
+    table, found = tables(pixel), np.empty(electrons.shape)
+    of = table.nodes, table.coefficients[row], table.piece
+    last_e = moments.Ends.of(pixel).last_e
+    cubic_of_electrons(
+        np.ascontiguousarray(electrons, dtype=float).ravel(), pixel.prnu, last_e, *of, STEP, found.ravel()
+    )
+    return found
 
 
 @lru_cache(maxsize=8)
-def tables(pixel: Pixel) -> tuple[PPoly, ...]:
-    """A cubic for each of `moments.moments` over twice the standard deviations of the electrons from 0 up.
-
-    That is the root of the electrons, or with PRNU the inverse hyperbolic sine of PRNU times the root, over PRNU.
-    """
-    from scipy.interpolate import CubicSpline, PPoly  # noqa: PLC0415  (slow to import: kept off the start-up path)
+def tables(pixel: Pixel) -> Table:
+    """That of a pixel."""
+    from scipy.interpolate import CubicSpline  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
     if pixel.prnu:
         last = np.arcsinh(pixel.prnu * np.sqrt(moments.Ends.of(pixel).last_e)) / pixel.prnu
-        nodes = np.arange(0, last + 2 * _DENSE, _DENSE)
+        nodes = np.arange(0, last + 2 * STEP, STEP)
         whole = CubicSpline(nodes, moments.moments((np.sinh(pixel.prnu * nodes) / pixel.prnu) ** 2, pixel), axis=1)
     else:
         whole = moments.table_without_prnu(pixel)
-    return tuple(PPoly(np.ascontiguousarray(whole.c[..., row]), whole.x) for row in range(3))
+    steps = np.rint(np.diff(whole.x) / STEP).astype(int)
+    piece = np.repeat(np.arange(steps.size), steps)
+    return Table(whole.x, np.ascontiguousarray(np.moveaxis(whole.c, 2, 0)), piece)

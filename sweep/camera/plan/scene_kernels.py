@@ -73,7 +73,7 @@ class SceneKernels:
             if phase.one_is_enough(self._view) is None and wanted.sampling != "skip":
                 cases = self.corners[0] if self.anywhere(wanted) else phase.cases(self._view, wanted.phase)
                 made = PlaceKernels(self._view, wanted, nodes)
-                light = made.at(cases, Counter()) @ made.shares
+                light = made.at(cases, Counter())[0] @ made.shares
             else:
                 light = make_kernel(self._view, wanted, nodes, by_pixel=False, work=Counter()).light
             self._kernels[wanted] = np.ascontiguousarray(np.broadcast_to(light, (*light.shape[:3], nodes.size)))

@@ -1,0 +1,129 @@
+"""Compiled inner loops that put classes of pixels together to the channels of a CFA. They release the GIL."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from ..base.types import FloatArray, IndexArray
+
+
+class CellBounds(NamedTuple):
+    """What is known of classes of pixels in cells of places.
+
+    `sizes`: how far the weighted light of each class through each class's filter, less the same share of the weights as
+    at the corners, may be from its bilinear interpolation, ndarray[n_cells, n, n, n_parts]. `corners`: sums of the
+    weights at the corners, ndarray[n_cells, 4, n]. `jumps`: how far these may be from their interpolation,
+    ndarray[n_cells, n]. `low`, `high`: range of the kernel over the corners, ndarray[n_cells, n, n, n_parts].
+    """
+
+    sizes: FloatArray
+    corners: FloatArray
+    jumps: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+
+@njit(cache=True, nogil=True)
+def kernels_of_channels(
+    kernels: FloatArray, sums: FloatArray, rows: IndexArray, which: IndexArray, channel: IndexArray, out: FloatArray
+) -> None:
+    """Kernels of channels, ndarray[n_places, n_channels, n_channels, n_functions], from those of classes of pixels.
+
+    `kernels`: ndarray[n, n_classes, n_classes, n_functions], `sums`: of the weights, ndarray[n, n_classes]; `rows`: the
+    one of each place, ndarray[n_places]; `which`: the class there that stands for each class, ndarray[n_places,
+    n_classes]; `channel`: of each class.
+    """
+    n_classes = channel.size
+    out[:] = 0.0
+    for place in range(rows.size):
+        row, total = rows[place], np.zeros(out.shape[1])
+        for own in range(n_classes):
+            to = which[place, own]
+            weight = sums[row, to]
+            total[channel[own]] += weight
+            for other in range(n_classes):
+                through = which[place, other]
+                for k in range(out.shape[3]):
+                    out[place, channel[own], channel[other], k] += weight * kernels[row, to, through, k]
+        for u in range(out.shape[1]):
+            for c in range(out.shape[2]):
+                for k in range(out.shape[3]):
+                    out[place, u, c, k] /= total[u]
+
+
+@njit(cache=True, nogil=True)
+def _weights_of_channels(
+    bounds: CellBounds, row: int, which: IndexArray, channel: IndexArray, least: FloatArray, tilt: FloatArray
+) -> None:
+    """Put the smallest sum of weights of each channel in a cell into `least`, and how much it differs between the
+    cell's corners, relative to the smallest of them, into `tilt`.
+    """
+    n_corners = bounds.corners.shape[1]
+    for u in range(least.size):
+        lowest, highest, jump = np.inf, 0.0, 0.0
+        for own in range(channel.size):
+            if channel[own] == u:
+                jump += bounds.jumps[row, which[own]]
+        for corner in range(n_corners):
+            total = 0.0
+            for own in range(channel.size):
+                if channel[own] == u:
+                    total += bounds.corners[row, corner, which[own]]
+            lowest, highest = min(lowest, total), max(highest, total)
+        least[u] = max(lowest - jump, 1e-300)
+        tilt[u] = (highest - lowest) / max(lowest, 1e-300)
+
+
+@njit(cache=True, nogil=True)
+def deviations_of_channels(
+    bounds: CellBounds,
+    uneven: FloatArray,
+    rows: IndexArray,
+    which: IndexArray,
+    channel: IndexArray,
+    found: FloatArray,
+    tilt: FloatArray,
+) -> None:
+    """How far kernels of channels in cells may be from a mean of those at their corners: see `between.Deviation`.
+
+    A channel's kernel k is the ratio of sums over its classes, sum M / sum D. With the interpolations' ratios r of the
+    channel and r_p of a class, k - r is the sum over classes of dev(M - r_p D) + (r_p - r) dev(D), over sum D. Both
+    ratios are means of values of classes at corners. `uneven`: what pixels of a class differ in, relative to it, in
+    how much they take of the light through each class's filter, ndarray[n_classes, n_classes]; the rest as for
+    `kernels_of_channels`. `found`: ndarray[n_cells, n_channels, n_channels, n_parts], `tilt`: ndarray[n_cells,
+    n_channels].
+    """
+    n_classes, n_channels, n_parts = channel.size, found.shape[1], found.shape[3]
+    least = np.empty(n_channels)
+    low, high = np.empty((n_classes, n_channels)), np.empty((n_classes, n_channels))
+    found[:] = 0.0
+    for cell in range(rows.size):
+        row, here = rows[cell], which[cell]
+        _weights_of_channels(bounds, row, here, channel, least, tilt[cell])
+        for part in range(n_parts):
+            low[:], high[:] = 0.0, 0.0
+            for own in range(n_classes):
+                for other in range(n_classes):
+                    p, q = here[own], here[other]
+                    below, above = bounds.low[row, p, q, part], bounds.high[row, p, q, part]
+                    low[own, channel[other]] += below
+                    high[own, channel[other]] += above
+                    missed = uneven[p, q] * max(abs(below), abs(above)) * bounds.jumps[row, p]
+                    found[cell, channel[own], channel[other], part] += bounds.sizes[row, p, q, part] + missed
+            for own in range(n_classes):
+                u = channel[own]
+                for c in range(n_channels):
+                    apart = 0.0
+                    for other in range(n_classes):
+                        if other != own and channel[other] == u:
+                            apart = max(apart, high[other, c] - low[own, c], high[own, c] - low[other, c])
+                    if apart > 0:
+                        apart = max(apart, high[own, c] - low[own, c])
+                        found[cell, u, c, part] += apart * bounds.jumps[row, here[own]]
+        for u in range(n_channels):
+            for c in range(n_channels):
+                for part in range(n_parts):
+                    found[cell, u, c, part] /= least[u]
