@@ -77,11 +77,12 @@ class LoadedStudy:
     @property
     def lights(self) -> pd.DataFrame:
         """Photons per nm of every signal, each of one photon in all; columns are (signal type, name), the index nm."""
+        from pandas import MultiIndex
+
         lights = self.study.lights
-        keys = zip(lights.types, lights.names, strict=True)
-        table = over_nm(self.wavelength_nm, dict(zip(keys, lights.photons, strict=True)))
-        table.columns.names = ["type", "signal"]
-        return table
+        table = over_nm(self.wavelength_nm, dict(enumerate(lights.photons)))
+        keys = zip(lights.types, lights.names, strict=True)  # two files may have a column of one name
+        return table.set_axis(MultiIndex.from_tuples(keys, names=["type", "signal"]), axis=1)
 
     def evaluate(
         self,
