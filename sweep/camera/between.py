@@ -145,7 +145,7 @@ class Between:
         bounds = self.bounds(centers, h, homes, corners[0].min(axis=1), corners[1].max(axis=1))
         every = np.arange(bounds.jumps.shape[1])
         which = np.tile(every, (len(centers), 1))
-        return deviation(bounds, self.uneven, np.arange(len(centers)), which, every)
+        return of_channels(bounds, self.uneven, np.arange(len(centers)), which, every)
 
     def bounds(self, centers: FloatArray, h: float, homes: FloatArray, low: FloatArray, high: FloatArray) -> CellBounds:
         """What channels have in cells, before it is related to the sums of their weights.
@@ -182,7 +182,7 @@ class Between:
         return CellBounds(found, sums, jumps, low, high)
 
 
-def deviation(
+def of_channels(
     bounds: CellBounds, uneven: FloatArray, rows: IndexArray, which: IndexArray, channel: IndexArray
 ) -> Deviation:
     """Of the channels that classes of pixels are in: see `compiled_classes.deviations_of_channels`."""

@@ -165,7 +165,7 @@ def cubic_of_electrons(
     step: float,
     out: FloatArray,
 ) -> None:
-    """Values of a table at expected electrons, ndarray[n]: see `noisy.table.Table`. Beyond `last_e` they stay."""
+    """Values of a table at expected electrons, ndarray[n]: see `noisy.table.MomentTable`. Beyond `last_e` they stay."""
     for i in range(electrons.size):
         held = electrons[i]
         held = last_e if held > last_e else held

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..base.cache import Cache
 from ..base.types import FloatArray, IndexArray
 from ..curves.hats import hats
-from .between import Between, Deviation, deviation
+from .between import Between, Deviation, of_channels
 from .compiled_classes import CellBounds, kernels_of_channels
 from .effects import blur, phase
 from .effects.base import KernelEffect
@@ -115,7 +115,7 @@ class ClassCells:
         with self._one_at_a_time:
             self._forget_many()
             rows = self._cells.which(names_of(self._view, images, cells.homes), made)
-            return deviation(CellBounds(*self._cells.rows), self.between.uneven, rows, which, classes.channel)
+            return of_channels(CellBounds(*self._cells.rows), self.between.uneven, rows, which, classes.channel)
 
     def _forget_many(self) -> None:
         if self._places.nbytes + self._cells.nbytes > _KEPT_BYTES:

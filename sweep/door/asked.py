@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from ..base.disk import is_file, is_folder
 from ..base.errors import DataError, Fault, nearest
 from ..base.types import FloatArray
@@ -125,8 +123,8 @@ def filter_of_run(folder: Path, design: str | None, wishes: AskedFor) -> Judged:
         raise DataError(Fault("a plain CFA has no filter to judge", str(folder), None, "--design", design))
     nodes_nm = study.grid.nodes_nm
     own = {OWN + channel: curve for channel, curve in zip(space.filter.channels, curves[0], strict=True)}
-    series = {name: pd.Series(curve, index=nodes_nm) for name, curve in {**study.sensor.qe, **own}.items()}
-    given = sensor_given(None, series, name=study.sensor.name, clear=study.sensor.clear)
+    curves_nm = {name: (nodes_nm, curve) for name, curve in {**study.sensor.qe, **own}.items()}
+    given = sensor_given(None, curves_nm, name=study.sensor.name, clear=study.sensor.clear)
     sensor = Given({**given.keys, "technology": study.sensor.technologies}, given.curves)
     mosaic = study.mosaics[space.cfa]
     named = _other_names(study.sensor, space.cfa, mosaic) | dict(study.section.cfas[space.cfa].curves)
@@ -159,6 +157,8 @@ def _lights(source: str, quantity: LightUnit) -> tuple[Given, tuple[str, ...]]:
 
 def _kept_lights(lights: Lights, nodes_nm: FloatArray) -> Given:
     """The lights of a run, as bright as they are in it."""
+    import pandas as pd
+
     labels = [f"{kind} {name}" for kind, name in zip(lights.types, lights.names, strict=True)]
     table = pd.DataFrame(lights.photons.T, columns=labels, index=nodes_nm)
     types = {kind: [labels[at] for at in own] for kind, own in lights.members.items()}

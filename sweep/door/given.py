@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-import pandas as pd
 
 from ..base.errors import DataError, Fault
 from ..base.types import FloatArray
 from ..curves.files import read_curves
 from ..curves.spectrum import Curves, WavelengthGrid, check_samples, resample
 
-CurveLike = pd.Series | FloatArray | tuple[Any, Any] | Path | str
+if TYPE_CHECKING:
+    import pandas as pd
+
+CurveLike: TypeAlias = "pd.Series | FloatArray | tuple[Any, Any] | Path | str"
 """A series whose index is nm, values on a study's grid, (nm, values), or a file with one curve."""
 _FORMS = "a series whose index is nm, (nm, values), or a file with one curve"
 
@@ -30,19 +32,28 @@ def curves_table(file: Path | str) -> pd.DataFrame:
     The values are the file's own: nothing is scaled. Raises SweepError with file and line for what is not clean.
     """
     read = read_curves(Path(file))
-    return pd.DataFrame(dict(read.values), index=pd.Index(read.wavelength_nm, name="wavelength_nm"))
+    return over_nm(read.wavelength_nm, read.values)
+
+
+def over_nm(wavelength_nm: FloatArray, columns: Mapping[Any, FloatArray]) -> pd.DataFrame:
+    """A table with a column per curve; the index is nm."""
+    import pandas as pd  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
+    return pd.DataFrame(dict(columns), index=pd.Index(wavelength_nm, name="wavelength_nm"))
 
 
 def as_curves(name: str, curve: CurveLike) -> Curves:
     """One curve with its samples, under a name of its own; raises DataError for what is none."""
     if isinstance(curve, Path | str):
         return _of_file(name, Path(curve))
-    if isinstance(curve, pd.Series):
-        wave, values = curve.index.to_numpy(), curve.to_numpy()
-    elif isinstance(curve, tuple) and len(curve) == 2:
+    if isinstance(curve, tuple) and len(curve) == 2:
         wave, values = np.asarray(curve[0]), np.asarray(curve[1])
     else:
-        raise DataError(Fault("no curve over wavelength", key=name, value=type(curve).__name__, allowed=_FORMS))
+        import pandas as pd  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
+        if not isinstance(curve, pd.Series):
+            raise DataError(Fault("no curve over wavelength", key=name, value=type(curve).__name__, allowed=_FORMS))
+        wave, values = curve.index.to_numpy(), curve.to_numpy()
     try:
         return Curves(*_checked(name, wave, values), source=name)
     except (TypeError, ValueError):

@@ -9,8 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
-from pandas.arrays import BooleanArray
 
 from ..base.errors import Fault, OutputError, SweepError, nearest
 from ..designs.space import Space
@@ -18,16 +16,15 @@ from ..metrics.bound import FEASIBLE, total_violation
 from ..metrics.quantity import Column, Quantity
 from ..search.limit import Limit
 from ..study import Study, folder_name
-from .given import CurveLike, on_grid
+from .given import CurveLike, on_grid, over_nm
 from .limits import any_filter, at_least, limit_or_reason
 from .own_filters import bases_of, cfa_with, judged, table_of, verdict, view_with, with_units
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
     from ..report import Output
-
-_INDEX = "wavelength_nm"
 
 
 class LoadedStudy:
@@ -71,19 +68,21 @@ class LoadedStudy:
     @property
     def curves(self) -> pd.DataFrame:
         """QE of the sensor, a column per curve; the index is nm."""
-        return pd.DataFrame(dict(self.study.sensor.qe), index=pd.Index(self.wavelength_nm, name=_INDEX))
+        return over_nm(self.wavelength_nm, self.study.sensor.qe)
 
     def curve(self, name: str) -> pd.Series:
         """A QE curve of the sensor; the index is nm. Raises SweepError, with the nearest name, where there is none."""
-        values = self.study.sensor.curve(name)
-        return pd.Series(values, index=pd.Index(self.wavelength_nm, name=_INDEX), name=name)
+        return over_nm(self.wavelength_nm, {name: self.study.sensor.curve(name)})[name]
 
     @property
     def lights(self) -> pd.DataFrame:
         """Photons per nm of every signal, each of one photon in all; columns are (signal type, name), the index nm."""
+        from pandas import MultiIndex
+
         lights = self.study.lights
-        columns = pd.MultiIndex.from_tuples(zip(lights.types, lights.names, strict=True), names=["type", "signal"])
-        return pd.DataFrame(lights.photons.T, index=pd.Index(self.wavelength_nm, name=_INDEX), columns=columns)
+        table = over_nm(self.wavelength_nm, dict(enumerate(lights.photons)))
+        keys = zip(lights.types, lights.names, strict=True)  # two files may have a column of one name
+        return table.set_axis(MultiIndex.from_tuples(keys, names=["type", "signal"]), axis=1)
 
     def evaluate(
         self,
@@ -119,6 +118,8 @@ class LoadedStudy:
 
     def _own(self, cfa: str | None, scenarios: list[str]) -> pd.DataFrame:
         """The study's plain CFAs and named designs."""
+        from pandas.arrays import BooleanArray
+
         from ..results.tables import NAMED, PLAIN
         from ..run.routes import block_of
         from ..run.rows import rules_of
@@ -269,7 +270,7 @@ class FinishedRun:
         kept = self.output.curves
         columns: dict[tuple[Any, str], np.ndarray] = {("sensor", name): curve for name, curve in kept.sensor.items()}
         columns |= {(i, channel): curve for i, own in kept.designs.items() for channel, curve in own.items()}
-        table = pd.DataFrame(columns, index=pd.Index(kept.wavelength_nm, name=_INDEX))
+        table = over_nm(kept.wavelength_nm, columns)
         table.columns.names = ["design", "curve"]
         return table
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
-import pandas as pd
 from pydantic import BaseModel
 
 from ..base.disk import is_file
@@ -21,6 +20,9 @@ from ..study.shipped import shipped_names, study_path
 from .files import sensor_file
 from .given import CurveLike, as_curves, curves_of_table
 from .objects import FinishedRun, LoadedStudy
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -112,10 +114,13 @@ def own_sensor(
     channels by their names, or by their shapes; a table has a column per curve and nm as its index. Raises SweepError
     for curves that cannot be used.
     """
-    if isinstance(source, pd.DataFrame):
-        columns = {str(channel): column for channel, column in source.items()}
-        return sensor_given(None, columns | channels, relative_to=relative_to, name=name, clear=clear)
-    return sensor_given(source, channels, relative_to=relative_to, name=name, clear=clear)
+    if source is None or isinstance(source, Path | str):
+        return sensor_given(source, channels, relative_to=relative_to, name=name, clear=clear)
+    if not _is_table(source):
+        allowed = "a built-in sensor, a file, or a table with nm as its index"
+        raise DataError(Fault("no sensor", value=type(source).__name__, allowed=allowed))
+    columns = {str(channel): column for channel, column in source.items()}
+    return sensor_given(None, columns | channels, relative_to=relative_to, name=name, clear=clear)
 
 
 def sensor_given(
@@ -128,9 +133,6 @@ def sensor_given(
 ) -> Given:
     """The same, with the channels as a mapping."""
     keys: dict[str, Any] = {"files": []}
-    if source is not None and not isinstance(source, Path | str):
-        allowed = "a built-in sensor, a file, or a table with nm as its index"
-        raise DataError(Fault("no sensor", value=type(source).__name__, allowed=allowed))
     if source is not None and is_file(Path(source)):
         keys = sensor_file(Path(source)).keys(str(Path(source).absolute()))
     elif source is not None:
@@ -160,7 +162,7 @@ def own_lights(
     `quantity`: what the numbers are, energy or photons per nm. `types`: signal type -> columns; of a file they go by
     chromaticity where it is left out. Raises SweepError for lights that cannot be used.
     """
-    if isinstance(source, pd.DataFrame):
+    if _is_table(source):
         if types is None:
             raise DataError(Fault("signal types of a table must be said", key="types", allowed="{type: [column, ...]}"))
         signals = {kind: list(columns) for kind, columns in types.items()}
@@ -176,6 +178,14 @@ def own_lights(
         return Given(lights_file(path, quantity).keys(str(path.absolute())))
     signals = {kind: list(columns) for kind, columns in types.items()}
     return Given({"files": [{"file": str(path.absolute()), "quantity": quantity, "signals": signals}]})
+
+
+def _is_table(source: object) -> TypeGuard[pd.DataFrame]:
+    if source is None or isinstance(source, Path | str):
+        return False
+    import pandas as pd  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
+    return isinstance(source, pd.DataFrame)
 
 
 def _plain(value: Any) -> Any:

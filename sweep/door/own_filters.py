@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
-from pandas.arrays import BooleanArray
 
 from ..base.errors import DataError, Fault, nearest
 from ..base.types import FloatArray
@@ -19,6 +17,10 @@ from ..metrics.evaluate import evaluate, family_quantities, image_quantities
 from ..metrics.objective import COMBINED
 from ..metrics.quantity import WORST, YIELD, Column, Columns
 from ..study import Study
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from pandas.arrays import BooleanArray
 
 _MOST_QE = 1 + 1e-9
 
@@ -121,6 +123,8 @@ def judged(study: Study, view: View, curves: FloatArray) -> Columns:
 
 def verdict(study: Study, columns: Columns) -> BooleanArray:
     """Whether filters of one's own are feasible: unknown where a constraint is on what only a family's have."""
+    from pandas.arrays import BooleanArray  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
     met = columns["violation"] <= FEASIBLE
     unknown = np.zeros_like(met)
     for name in study.constraints:
@@ -130,6 +134,8 @@ def verdict(study: Study, columns: Columns) -> BooleanArray:
 
 def table_of(study: Study, rows: Sequence[tuple[str, str, str, Columns, BooleanArray]]) -> pd.DataFrame:
     """A table with a row per design: (name, CFA, scenario, columns, feasible) of each block of designs."""
+    import pandas as pd  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
     parts = []
     for name, cfa, scenario, columns, feasible in rows:
         labels: dict[str, Any] = {"name": name, "cfa": cfa, "scenario": scenario}

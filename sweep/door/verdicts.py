@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from ..base.errors import DataError, Fault
 from ..base.types import FloatArray
@@ -15,13 +15,16 @@ from ..camera.mosaic import Mosaic
 from ..curves.lights import Pair, class_pairs
 from ..designs.technology import Technology
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
-from ..metrics.quantity import Column
+from ..metrics.quantity import Column, Columns
 from ..metrics.separation import csd_name
 from ..metrics.smooth import smooth_csd
 from ..study import Study
 from .limits import any_filter, at_least, limit_or_reason
 from .opening import Given, made_study
 from .own_filters import judged, table_of, verdict
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 OWN = "own "
 """How the names of the curves that are judged begin."""
@@ -58,14 +61,16 @@ class Judged:
 
 @dataclass(frozen=True)
 class Verdict:
-    """`table`: a row per scene and CFA, the filter's own last; `goal`: the separation that the limit is of.
+    """`study`: what judged; `rows`: scene, CFA and quantities of each, the filter's own last in each scene; `goal`: the
+    separation that the limit is of.
 
     `limit`: what no filter in its place with as much light exceeds in the first scene, before quantization, between 0
     and the curve `below`; None where `no_limit` says why. `smooth`: what the filter has before quantization. The limit
     is of filters of the same `technology`, where that is stated.
     """
 
-    table: pd.DataFrame
+    study: Study = field(repr=False)
+    rows: tuple[tuple[str, str, Columns], ...] = field(repr=False)
     goal: Column
     own: str
     smooth: float | None
@@ -75,6 +80,12 @@ class Verdict:
     notes: tuple[str, ...]
     others: tuple[Column, ...] = ()
     technology: Technology | None = None
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """A row per scene and CFA, the filter's own last; units and meanings of its quantities are in `attrs`."""
+        study = self.study
+        return table_of(study, [(cfa, cfa, scene, c, verdict(study, c)) for scene, cfa, c in self.rows])
 
     @property
     def gap(self) -> float | None:
@@ -88,9 +99,9 @@ class Verdict:
         return "\n".join([*(f"{note}." for note in self.notes), *self._lines()])
 
     def _lines(self) -> Iterator[str]:
-        scenes = list(dict.fromkeys(self.table["scenario"]))
+        scenes = list(dict.fromkeys(scene for scene, *_ in self.rows))
         for scene in scenes:
-            rows = self.table[self.table["scenario"] == scene]
+            rows = {cfa: columns for own, cfa, columns in self.rows if own == scene}
             yield from _aligned(rows, (self.goal, *self.others), scene if len(scenes) > 1 else "CFA")
         if self.limit is None or self.smooth is None:
             yield f"No limit is computed: {self.no_limit}."
@@ -104,12 +115,12 @@ class Verdict:
         )
 
 
-def _aligned(rows: pd.DataFrame, columns: Sequence[Column], corner: str) -> Iterator[str]:
-    """A line per CFA: its separations, and the light of the whole tile (1: a sensor without filters)."""
+def _aligned(rows: Mapping[str, Columns], columns: Sequence[Column], corner: str) -> Iterator[str]:
+    """A line per CFA of one scene: its separations, and the light of the whole tile (1: a sensor without filters)."""
     head = [corner, *("/".join(column.pair or ()) for column in columns), "light"]
     cells = [
-        [row["cfa"], *(column.amount(row[column.name], 1) for column in columns), f"{row[CFA_SENSITIVITY]:.3f}"]
-        for row in rows.to_dict("records")
+        [cfa, *(column.amount(float(own[column.name][0]), 1) for column in columns), f"{own[CFA_SENSITIVITY][0]:.3f}"]
+        for cfa, own in rows.items()
     ]
     wide = [max(map(len, column)) for column in zip(head, *cells, strict=True)]
     for line in (head, *cells):
@@ -143,20 +154,18 @@ def judge(asked: Judged) -> Verdict:
     curves = np.stack([study.sensor.curve(OWN + channel) for channel in asked.bases])[None]
     nothing = np.empty((1, 0, study.grid.size))
     rows = []
-    found = {}
     for scene in study.scenarios:
         for cfa in study.mosaics:
             bases, made = (asked.bases, curves) if cfa == own else ({}, nothing)
-            columns = found[scene] = judged(study, study.view_of(cfa, scene, bases, asked.technology), made)
-            rows.append((cfa, cfa, scene, columns, verdict(study, columns)))
-    table = table_of(study, rows)
-    light = float(next(iter(found.values()))[CFA_SENSITIVITY][0])
+            rows.append((scene, cfa, judged(study, study.view_of(cfa, scene, bases, asked.technology), made)))
+    first = next(columns for _, cfa, columns in rows if cfa == own)
+    light = float(first[CFA_SENSITIVITY][0])
     smooth, limit, below, reason = _limit(study, own, asked, curves, light)
     every = [study.quantities[csd_name(pair)].column for pair in study.pairs]
     goal = next(column for column in every if column.pair == asked.pair)
     further = tuple(column for column in every if column is not goal)
     notes = (*asked.notes, *study.warnings)
-    return Verdict(table, goal, own, smooth, limit, below, reason, notes, further, asked.technology)
+    return Verdict(study, tuple(rows), goal, own, smooth, limit, below, reason, notes, further, asked.technology)
 
 
 def _rows(mosaic: Mosaic) -> list[list[str]]:

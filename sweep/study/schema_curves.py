@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
+import textwrap
 from collections.abc import Iterable
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, model_validator
+from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, WithJsonSchema, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from ..base.types import Ratio, Section
 from ..curves.builtin.registry import BUILT_IN_LIGHTS
@@ -19,9 +25,31 @@ FilePath = Annotated[str, Field(min_length=1, max_length=4096)]
 
 
 class Documented(Section):
-    """A section whose keys are described by the text below them, for editors."""
+    """A section whose keys are described by the text below them, for editors; the texts are read when these ask."""
 
-    model_config = ConfigDict(use_attribute_docstrings=True)
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler, /) -> JsonSchemaValue:
+        made = handler(core_schema)
+        keys = handler.resolve_ref_schema(made)["properties"]
+        for part in cls.__mro__[: cls.__mro__.index(Documented)]:
+            for name, text in _texts_below(part).items():
+                keys[cls.model_fields[name].alias or name].setdefault("description", text)
+        return made
+
+
+def _texts_below(section: type) -> dict[str, str]:
+    """Key of a section -> the text below it in the source."""
+    (made,) = ast.parse(textwrap.dedent(inspect.getsource(section))).body
+    assert isinstance(made, ast.ClassDef)
+    return {
+        key.target.id: inspect.cleandoc(text.value.value)
+        for key, text in pairwise(made.body)
+        if isinstance(key, ast.AnnAssign)
+        and isinstance(key.target, ast.Name)
+        and isinstance(text, ast.Expr)
+        and isinstance(text.value, ast.Constant)
+        and isinstance(text.value.value, str)
+    }
 
 
 class CurveFile(Documented):

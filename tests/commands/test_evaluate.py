@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -147,3 +149,26 @@ def test_a_design_of_a_run_moves_as_it_did_there(finished: Finished) -> None:
     found = sweep.evaluate(folder)
     assert found.table["csd_yellow_red"].iloc[-1] == pytest.approx(best["csd_yellow_red"], abs=1e-9)
     assert "that works by interference (effective index 1.8)" in str(found)
+
+
+def test_what_an_answer_does_not_need_is_not_loaded(own: Path) -> None:
+    """Half of the time that the command has is that of loading; tables, figures and workers are not for it."""
+    code = (
+        f"import sys; from sweep.commands.app import app\ntry: app(['evaluate', {str(own)!r}, '--relative-to', 'Y'])\n"
+    )
+    code += "except SystemExit: pass\nprint(*{name.partition('.')[0] for name in sys.modules}, file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(done.stderr.split())
+    assert "below" in done.stdout  # the gap to the limit: everything was computed
+    assert {"numpy", "scipy", "numba"} <= loaded
+    assert not loaded & {
+        "pandas",
+        "pyarrow",
+        "matplotlib",
+        "colour",
+        "sklearn",
+        "joblib",
+        "jinja2",
+        "plotly",
+        "moocore",
+    }

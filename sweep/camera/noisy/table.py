@@ -13,16 +13,14 @@ from ..pixel import Pixel
 from . import moments
 
 _CUT = 1e-5
-STEP = moments.STEP
-"""All nodes are multiples of this, in twice the standard deviation of the electrons."""
 
 
-class Table(NamedTuple):
+class MomentTable(NamedTuple):
     """Cubics over twice the standard deviation of the electrons: the root of their number, or with PRNU the inverse
     hyperbolic sine of PRNU times that root, over PRNU.
 
-    `nodes`: ndarray[n + 1]; `coefficients`: ndarray[3, 4, n], for each of `moments.moments`; `piece`: which of them
-    each step from 0 up is in.
+    `nodes`: ndarray[n + 1], multiples of `moments.STEP`; `coefficients`: ndarray[3, 4, n], for each of
+    `moments.moments`; `piece`: which of them each step from 0 up is in.
     """
 
     nodes: FloatArray
@@ -61,22 +59,22 @@ def _looked_up(electrons: FloatArray, pixel: Pixel, row: int) -> FloatArray:
     of = table.nodes, table.coefficients[row], table.piece
     last_e = moments.Ends.of(pixel).last_e
     cubic_of_electrons(
-        np.ascontiguousarray(electrons, dtype=float).ravel(), pixel.prnu, last_e, *of, STEP, found.ravel()
+        np.ascontiguousarray(electrons, dtype=float).ravel(), pixel.prnu, last_e, *of, moments.STEP, found.ravel()
     )
     return found
 
 
 @lru_cache(maxsize=8)
-def tables(pixel: Pixel) -> Table:
+def tables(pixel: Pixel) -> MomentTable:
     """That of a pixel."""
     from scipy.interpolate import CubicSpline  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
     if pixel.prnu:
         last = np.arcsinh(pixel.prnu * np.sqrt(moments.Ends.of(pixel).last_e)) / pixel.prnu
-        nodes = np.arange(0, last + 2 * STEP, STEP)
+        nodes = np.arange(0, last + 2 * moments.STEP, moments.STEP)
         whole = CubicSpline(nodes, moments.moments((np.sinh(pixel.prnu * nodes) / pixel.prnu) ** 2, pixel), axis=1)
     else:
         whole = moments.table_without_prnu(pixel)
-    steps = np.rint(np.diff(whole.x) / STEP).astype(int)
+    steps = np.rint(np.diff(whole.x) / moments.STEP).astype(int)
     piece = np.repeat(np.arange(steps.size), steps)
-    return Table(whole.x, np.ascontiguousarray(np.moveaxis(whole.c, 2, 0)), piece)
+    return MomentTable(whole.x, np.ascontiguousarray(np.moveaxis(whole.c, 2, 0)), piece)
