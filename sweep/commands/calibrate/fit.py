@@ -28,7 +28,7 @@ _EDGE_MARGIN_NM, _EDGE_SIGMA_NM = 0.5, 0.1
 _START_SPREAD = 0.7
 _DECIMALS = 4
 MOST_EVALUATIONS = 120
-"""Of a fit, each with those of its derivatives; a fourth of them is enough where the truth can be met."""
+"""Of a fit, each with those of its derivatives."""
 
 
 @dataclass(frozen=True)
