@@ -136,8 +136,9 @@ def test_lights_without_a_distance_limit_nothing() -> None:
     space = next(space for space in study.spaces if space.filter is not None)
     view = study.view(space, "chart")
     nothing = np.zeros((1, 1, study.grid.size))
-    assert set(limiting_lights(imager_of(view), nothing)) == set(study.pairs)
-    assert limiting_lights(imager_of(view), nothing * np.nan) == {}
+    cases = imager_of(view).read(nothing)[0][0]
+    assert set(limiting_lights(view, cases)) == set(study.pairs)
+    assert limiting_lights(view, cases * np.nan) == {}
 
 
 def series(**lines: list[float]) -> SeriesFigure:

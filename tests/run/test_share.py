@@ -12,10 +12,11 @@ import pyarrow.parquet as pq
 import pytest
 
 from sweep.metrics.objective import Objective
+from sweep.metrics.share import share_interval
 from sweep.report.summary import summary_lines
 from sweep.results.output import read_output
 from sweep.results.tables import RESULTS
-from sweep.run.robustness import Candidate, drawn_dn, yield_interval
+from sweep.run.robustness import Candidate, drawn_dn
 from sweep.search.gradients import Model
 from sweep.search.limit import why_not
 from sweep.search.problem import Problem, SearchRun, best_feasible, starting_points
@@ -85,7 +86,7 @@ def share_with(x: np.ndarray, wanted_dn: float, draws: int = 200_000) -> tuple[f
     assert view.lights.population is not None
     many = replace(view.lights, population=view.lights.population.model_copy(update={"draws": draws}))
     design = Candidate(replace(view, lights=many), search.space, x[None], study.tolerance)
-    return yield_interval(int((drawn_dn(design, YELLOW_RED, 77) >= wanted_dn).sum()), draws)
+    return share_interval(int((drawn_dn(design, YELLOW_RED, 77) >= wanted_dn).sum()), draws)
 
 
 @pytest.mark.slow
