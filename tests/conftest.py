@@ -101,7 +101,8 @@ def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Finish
                     text = text.replace(every, fewer)
                 study = outputs / f"{name}.yaml"
                 study.write_text(text)
-                done = sweep("run", str(study), "--output", str(outputs), "--jobs", "1")
+                data = ["--data", str(SHARED / "data")] if name == "measured" else []
+                done = sweep("run", str(study), "--output", str(outputs), "--jobs", "1", *data)
                 assert done.returncode == 0, done.stderr
                 said.write_text(done.stdout)
         return outputs / name
