@@ -44,8 +44,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-_FIRST_LINES, _FIRST_SERIES = 1, 2
-"""Of the answer, above the first plot, also where that is over scenarios; the others stand below it."""
+_FIRST_LINES, _FIRST_LEADS = 1, 2
+"""Of the answer, above the first plot, also where that says who leads where; the others stand below it."""
 _PICTURES = ("tiles", "sensor", "signals", "chart")
 """Figures that the page shows as pictures; it draws all others itself, but for those of tasks."""
 _MAPS = "places-"
@@ -105,7 +105,7 @@ def _html(output: Output, images: Sequence[tuple[str, str, str]], published: pd.
         series_first=series_first,
         objective_words=output.goal.words,
         answer=answer_sentences(output),
-        first_lines=_FIRST_SERIES if series_first else _FIRST_LINES,
+        first_lines=_FIRST_LEADS if series_first and output.study.recognition is None else _FIRST_LINES,
         numbers=large_numbers(output),
         counts=counts_line(output),
         interactive=drawn,
