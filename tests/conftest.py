@@ -101,7 +101,8 @@ def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Finish
                     text = text.replace(every, fewer)
                 study = outputs / f"{name}.yaml"
                 study.write_text(text)
-                code, out, err = commanded("run", study, "--output", outputs, "--jobs", 1)
+                data = ["--data", SHARED / "data"] if name == "measured" else []
+                code, out, err = commanded("run", study, "--output", outputs, "--jobs", 1, *data)
                 assert code == 0, err
                 said.write_text(out)
         return outputs / name

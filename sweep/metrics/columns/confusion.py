@@ -32,7 +32,7 @@ _MEANINGS = {
     ERROR: "largest probability that noise turns a signal of one of two types into one of the other, pair by pair",
     ERROR_BOUND: "bound on how often the best rule takes a signal of one of two types for the other, for the worst "
     "signal",
-    STATE_ERROR: "largest pairwise error over all pairs of states",
+    STATE_ERROR: "error of the worst pair of states: how often noise makes one of two look like the other",
     STATE_ERROR_BOUND: "bound on how often the best rule tells the wrong state, for the worst signal",
 }
 _TOLD = {CNR: "contrast to noise", D_PRIME: "d'"}
