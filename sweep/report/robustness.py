@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..metrics.quantity import WORST, WORST_CASE
+from ..metrics.shares import told_share
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN
 from .leaders import Row
@@ -100,4 +101,5 @@ def _named(row: Row) -> str:
 
 def _share(row: Row) -> str:
     """A share with its interval, percent."""
-    return f"{row['yield']:.2%} ({row['yield_low']:.2%} to {row['yield_high']:.2%})"
+    low, high = (told_share(row[end], 2) for end in ("yield_low", "yield_high"))
+    return f"{told_share(row['yield'], 2)} ({low} to {high})"
