@@ -62,7 +62,7 @@ def _price(output: Output, best: Row, named: list[Row]) -> Iterator[str]:
     rival = max(rivals, key=lambda row: float(row[nominal.name]))
     lost, gained = 1 - best[nominal.name] / rival[nominal.name], best[worst.name] / rival[worst.name]
     yield (
-        f"That costs {lost:.1%} of the nominal separation: {nominal.told(best[nominal.name])} against "
+        f"Its worst case costs {lost:.1%} of the nominal separation: {nominal.told(best[nominal.name])} against "
         f"{nominal.told(rival[nominal.name])} of {rival['name']}, which has {worst.told(rival[worst.name])} in the "
         f"worst case; {worst.told(best[worst.name])} are {gained:.2f} times that."
     )

@@ -27,7 +27,7 @@ from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
 from ..metrics.evaluate import designed_quantities
 from ..metrics.objective import Objective
-from ..metrics.quantity import DN
+from ..metrics.quantity import DN, WORST_CASE
 from ..metrics.smooth import smooth_csd, smooth_response
 from ..metrics.smooth_noise import smooth_detectability
 from ..types import FloatArray
@@ -169,13 +169,15 @@ def _most_sensitive(problem: Problem) -> float:
 def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
     """The problem without what only families of edges have, and what was left out.
 
-    Worst cases of CSDs over a population or production stay; others become nominal ones.
+    Worst cases of CSDs over a population or production stay; others become nominal ones. What a share of lamps has
+    says nothing of the nominal one, which may be smaller: it is left out.
     """
     quantities = problem.quantities
     asked = (*problem.constraints, *problem.objective.weights)
     moves = len(ways_of(problem)) > 1
     stay = {name for name in asked if problem.worst_distance(name) and (problem.population or moves)}
-    plains = {name: name if name in stay else quantities[name].of or name for name in asked}
+    worst = {name for name in asked if quantities[name].extreme == WORST_CASE}
+    plains = {name: quantities[name].of if name in worst - stay else name for name in asked}
     known = {name for name, plain in plains.items() if quantities[plain].has_limit}
     left_out = [name for name in problem.constraints if name not in known]
     kept: dict[str, Bound] = {}
@@ -189,7 +191,7 @@ def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
     for name, weight in problem.objective.weights.items():
         plain = plains[name]
         weights[plain] = min(weight, weights.get(plain, weight))
-    if any(quantities[name].extreme for name in asked) and problem.tolerance:
+    if worst and problem.tolerance:
         left_out += _shifts_left_out([plains[name] for name in asked if plains[name] != name], problem)
     return replace(problem, objective=Objective(minimum=weights), constraints=kept), tuple(left_out)
 
