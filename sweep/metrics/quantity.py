@@ -157,7 +157,8 @@ class Quantity(Column):
         told = f"{100 * share:.10g} %"
         meaning = (
             f"at least {told} of random lamps and cameras (`population`, `production`) have this `{self.name}`: the "
-            "mean of those draws that rank right below, before clipping and rounding, with everything on"
+            "mean of those draws that rank right below, before clipping and rounding, with everything on; no limit is "
+            "computed of it"
         )
         label = f"{self.words} of {told} of lamps and cameras"
         named = replace(self, name=YIELD + self.name, meaning=meaning, label=label, extreme=OF_A_SHARE, of=self.name)

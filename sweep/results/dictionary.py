@@ -73,7 +73,7 @@ _WORST = (
 _OF_A_SHARE = (
     "the CSD that at least the share `population.wanted_yield` of random lamps and cameras has: the mean of those "
     "draws that rank right below it, a tenth of all that may have less, before clipping and rounding, with everything "
-    "on"
+    "on; no limit is computed of it, and a limit of others leaves a constraint on it out"
 )
 _OWN = (
     "a metric of the study's `metrics`, the worst over moments and places of the lattice; nothing is promised of it: "

@@ -28,7 +28,7 @@ from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
 from ..metrics.evaluate import designed_quantities
 from ..metrics.objective import Objective
-from ..metrics.quantity import DN
+from ..metrics.quantity import DN, WORST_CASE
 from ..metrics.smooth import smooth_csd, smooth_response
 from ..metrics.smooth_noise import smooth_detectability
 from .filter_program import ROUNDING, FilterProgram
@@ -152,21 +152,32 @@ def why_not(problem: Problem) -> str | None:
             "filters of the box may be below 0",
         ),
         (lambda: _clips(problem), "signals exceed the full well or the range of the ADC"),
-        (lambda: may_set_exposure(problem.view), "the modified channel could set the exposure"),
+        (
+            lambda: may_set_exposure(problem.view, _most_sensitive(problem)),
+            "the modified channel could set the exposure",
+        ),
     )
     return next((reason for refused, reason in reasons if refused()), None)
+
+
+def _most_sensitive(problem: Problem) -> float:
+    """The largest sensitivity that the study lets a filter have, 1 where it says none."""
+    bound = problem.constraints.get(SENSITIVITY)
+    return 1.0 if bound is None or bound.max is None else min(1.0, bound.max)
 
 
 def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
     """The problem without what only families of edges have, and what was left out.
 
-    Worst cases of CSDs over a population or production stay; others become nominal ones.
+    Worst cases of CSDs over a population or production stay; others become nominal ones. What a share of lamps has
+    says nothing of the nominal one, which may be smaller: it is left out.
     """
     quantities = problem.quantities
     asked = (*problem.constraints, *problem.objective.weights)
     moves = len(ways_of(problem)) > 1
     stay = {name for name in asked if problem.worst_distance(name) and (problem.population or moves)}
-    plains = {name: name if name in stay else quantities[name].of or name for name in asked}
+    worst = {name for name in asked if quantities[name].extreme == WORST_CASE}
+    plains = {name: quantities[name].of if name in worst - stay else name for name in asked}
     known = {name for name, plain in plains.items() if quantities[plain].has_limit}
     left_out = [name for name in problem.constraints if name not in known]
     kept: dict[str, Bound] = {}
@@ -180,7 +191,7 @@ def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
     for name, weight in problem.objective.weights.items():
         plain = plains[name]
         weights[plain] = min(weight, weights.get(plain, weight))
-    if any(quantities[name].extreme for name in asked) and problem.tolerance:
+    if worst and problem.tolerance:
         left_out += _shifts_left_out([plains[name] for name in asked if plains[name] != name], problem)
     return replace(problem, objective=Objective(minimum=weights), constraints=kept), tuple(left_out)
 

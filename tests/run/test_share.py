@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from sweep.metrics.bound import Bound
 from sweep.metrics.objective import Objective
 from sweep.metrics.share import share_interval
 from sweep.report.summary import summary_lines
@@ -18,7 +19,7 @@ from sweep.results.output import read_output
 from sweep.results.tables import RESULTS
 from sweep.run.robustness import Candidate, drawn_dn
 from sweep.search.gradients import Model
-from sweep.search.limit import why_not
+from sweep.search.limit import limit_of, why_not
 from sweep.search.problem import Problem, SearchRun, best_feasible, starting_points
 from sweep.search.solver import search_from
 from sweep.study import Search, Study, load_study
@@ -145,3 +146,12 @@ def test_what_does_not_fit_is_told(tmp_path: Path, old: str, new: str, told: str
     path.write_text(TEXT.replace(old, new))
     with one_line(told):
         load_study(path)
+
+
+def test_the_limit_leaves_a_constraint_on_it_out_and_says_so() -> None:
+    """Few lamps are the nearest: what 99 % have says nothing of the smallest CSD, by which filters must not be bound."""
+    plain = replace(problem("csd_yellow_red"), constraints={"sensitivity": Bound(min=0.9)})
+    asked = replace(plain, constraints=plain.constraints | {"yield_csd_yellow_red": Bound(min=400)})
+    without, found = limit_of(plain), limit_of(asked)
+    assert found.left_out == ("yield_csd_yellow_red",)
+    assert found.proven == without.proven > 0
