@@ -16,7 +16,7 @@ from ..base.types import Progress
 from ..results.folder import held_by
 from ..results.inventory import Inventory
 from ..results.journal import Journal
-from ..results.tables import RESULTS, encoded
+from ..results.tables import FEW, RESULTS, encoded
 from ..study import Study
 from .of_rows import ROW_TABLES
 from .plans import with_plans
@@ -28,7 +28,6 @@ from .workers import Workers, one_thread
 
 _SAMPLE = 256
 _BUDGET_S = 10.0
-_TIMES_MADE = 2
 _Kind = tuple[str, str, str]
 
 
@@ -105,8 +104,9 @@ def _sampled(sweep: Sweep, todo: list[Job]) -> tuple[float, float]:
             total += per_row * rows[kind]
             measured += rows[kind]
             tables.append(table)
-    # A scene's kernel is made for its rows, and again for what is drawn of them; the first one is made already.
-    kernels_s = _TIMES_MADE * median(first_s[1:] or first_s) * len(ordered)
+    # A scene's kernel is made for its rows, and again for what is drawn of a sweep's; the first one is made already.
+    made = sum(1 if kind in FEW else 2 for kind, *_ in ordered)
+    kernels_s = made * median(first_s[1:] or first_s)
     sample = pa.concat_tables(tables).unify_dictionaries()
     bytes_per_row = (len(encoded(sample)) - len(encoded(sample.slice(0, 1)))) / max(1, sample.num_rows - 1)
     return total * sum(rows.values()) / measured + kernels_s, bytes_per_row
