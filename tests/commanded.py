@@ -11,10 +11,12 @@ from unittest import mock
 from sweep.commands.app import main
 
 UNDRAWN = """\
-import sys
+import signal
+signal.signal(signal.SIGINT, signal.SIG_DFL)  # while it is loaded, a stop ends it without a word, as `start` has it
 import sweep.report.page
 from sweep.commands.app import main
 sweep.report.page._drawings = lambda _: ()
+signal.signal(signal.SIGINT, signal.default_int_handler)
 main()
 """
 """The command, whose reports have no pictures: for tests of processes, in which pictures would take half of the time."""
