@@ -28,7 +28,7 @@ from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
 from ..metrics.evaluate import designed_quantities
 from ..metrics.objective import Objective
-from ..metrics.quantity import DN
+from ..metrics.quantity import DN, WORST_CASE
 from ..metrics.smooth import smooth_csd, smooth_response
 from ..metrics.smooth_noise import smooth_detectability
 from .filter_program import ROUNDING, FilterProgram
@@ -160,28 +160,35 @@ def why_not(problem: Problem) -> str | None:
 def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
     """The problem without what only families of edges have, and what was left out.
 
-    Worst cases of CSDs over a population or production stay; others become nominal ones.
+    Worst cases of CSDs over a population or production stay; others become nominal ones, which are no worse: a bound on
+    the better end of a worst case says nothing of these. What a share of lamps has says nothing of the nominal lights.
     """
     quantities = problem.quantities
     asked = (*problem.constraints, *problem.objective.weights)
     moves = len(ways_of(problem)) > 1
     stay = {name for name in asked if problem.worst_distance(name) and (problem.population or moves)}
-    plains = {name: name if name in stay else quantities[name].of or name for name in asked}
-    known = {name for name, plain in plains.items() if quantities[plain].has_limit}
-    left_out = [name for name in problem.constraints if name not in known]
+    nominal = {name for name in asked if quantities[name].extreme == WORST_CASE} - stay
+    plains = {name: quantities[name].of if name in nominal else name for name in asked}
+    left_out: list[str] = []
     kept: dict[str, Bound] = {}
     for name, bound in problem.constraints.items():
         plain = plains[name]
-        if name in known:
-            ends = [b for b in (bound, kept.get(plain)) if b is not None]
-            least, most = [b.min for b in ends if b.min is not None], [b.max for b in ends if b.max is not None]
-            kept[plain] = Bound.model_construct(min=max(least, default=None), max=min(most, default=None))
+        better = "min" if quantities[name].wanted == "less" else "max"
+        own = bound.model_copy(update={better: None}) if name in nominal else bound
+        if not quantities[plain].has_limit or own.min is own.max is None:
+            left_out.append(name)
+            nominal -= {name} - problem.objective.weights.keys()
+            continue
+        left_out += [] if own == bound else [f"the {better} of {name}"]
+        ends = [b for b in (own, kept.get(plain)) if b is not None]
+        least, most = [b.min for b in ends if b.min is not None], [b.max for b in ends if b.max is not None]
+        kept[plain] = Bound.model_construct(min=max(least, default=None), max=min(most, default=None))
     weights: dict[str, float] = {}
     for name, weight in problem.objective.weights.items():
         plain = plains[name]
         weights[plain] = min(weight, weights.get(plain, weight))
-    if any(quantities[name].extreme for name in asked) and problem.tolerance:
-        left_out += _shifts_left_out([plains[name] for name in asked if plains[name] != name], problem)
+    if (stay or nominal) and problem.tolerance:
+        left_out += _shifts_left_out([plains[name] for name in asked if name in nominal], problem)
     return replace(problem, objective=Objective(minimum=weights), constraints=kept), tuple(left_out)
 
 
