@@ -42,6 +42,8 @@ if TYPE_CHECKING:
 
 _SENSITIVITY_TOLERANCE = 1e-6
 _MOST_PROGRAMS = 5000
+_ATTEMPTS, _ATTEMPT_PROGRAMS = 5, 100
+"""How often bounds on worst cases are raised until a filter keeps them, with so many linear programs each."""
 _NOT_LINEAR = "is not linear in the filter"
 _SHARES = (0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 """How far a solver's filter is moved toward one that is inside, to make up for the solver's tolerance."""
@@ -52,7 +54,8 @@ class Limit:
     """The bracket of the limit, in the objective's unit, and the filter that attains its lower end, QE.
 
     `attained`: the objective for `curve` (ndarray[n_wavelengths]), evaluated like any design; no filter at all reaches
-    more than `proven`. Both are -inf, and `curve` is None, when no filter meets the constraints. `left_out`: what the
+    more than `proven`. Both are -inf when no filter meets the constraints; where none is known that does, `attained` is
+    -inf and `curve` is None. `left_out`: what the
     study asks for beyond the limit's own constraints. `programs`: number of linear programs solved for it;
     `open_parts`: parts of the proof that were left open, so that the bracket is wider than it was to be; 0: none.
     `elsewhere`: what the same proof says of filters with other sensitivities at least.
@@ -96,15 +99,14 @@ def limit_of(
         known = members if heights is None else heights
         if known is None or proof.curve is None or solved >= most_programs or not known.more(proof.curve):
             break
-    attained = proof.attained
-    if proof.curve is not None and (known is not None or program.noisy):
-        worst = {} if members is None else {name: members.least(name, proof.curve) for name in over}
-        worst |= {} if heights is None else heights.least(proof.curve)
-        attained = _attained(relaxed, proof.curve, worst)
+    attained, curve = proof.attained, proof.curve
+    if curve is not None and (known is not None or program.noisy):
+        attained, curve, more = _attaining(relaxed, curve, members, heights, tolerance)
+        solved += more
     least = relaxed.constraints.get(SENSITIVITY)
     from_here = -np.inf if not program.noisy or least is None or least.min is None else least.min
     elsewhere = tuple(proof.proven_at(program, s) if s >= from_here else np.inf for s in sensitivities)
-    return Limit(attained, proof.proven, proof.curve, left_out, solved, proof.open_parts, elsewhere)
+    return Limit(attained, proof.proven, curve, left_out, solved, proof.open_parts, elsewhere)
 
 
 def _members_of(problem: Problem, over: Sequence[str]) -> MemberPairs:
@@ -127,6 +129,37 @@ def _proof(program: FilterProgram, members: MemberPairs | None, tolerance: float
         return (program.reaches(moved) if program.noisy and attained > -np.inf else attained), moved
 
     return SideSearch(program, value, tolerance, most_programs).run()
+
+
+def _attaining(
+    problem: Problem, curve: FloatArray, members: MemberPairs | None, heights: AnyHeight | None, tolerance: float
+) -> tuple[float, FloatArray | None, int]:
+    """What a program's filter attains in all worst cases, the filter, and the number of programs solved for it.
+
+    A program knows some members and places, so its filter may lack a little of a worst case that is bounded. Then the
+    bounds are raised by twice what is lacking, until a filter keeps those of the problem; None where none does.
+    """
+    asked, solved = problem, 0
+    for _ in range(_ATTEMPTS):
+        worst = {} if members is None else {name: members.least(name, curve) for name in members.names}
+        worst |= {} if heights is None else heights.least(curve)
+        attained = _attained(problem, curve, worst)
+        if attained > -np.inf:
+            return attained, curve, solved
+        lacking = {n: b.min - worst[n] for n, b in problem.constraints.items() if n in worst and b.min is not None}
+        lacking = {name: lack for name, lack in lacking.items() if lack > 0}
+        if not lacking:
+            break
+        bounds = asked.constraints
+        raised = {n: Bound.model_construct(min=(bounds[n].min or 0.0) + 2 * lack) for n, lack in lacking.items()}
+        asked = replace(asked, constraints={**bounds, **raised})
+        program = FilterProgram(asked, members)
+        found = _proof(program, members, tolerance, _ATTEMPT_PROGRAMS)
+        solved += program.solved
+        if found.curve is None:
+            break
+        curve = found.curve
+    return -np.inf, None, solved
 
 
 def why_not(problem: Problem) -> str | None:
