@@ -3,15 +3,18 @@
 The distance that the wanted share of them has is an order statistic, whose derivative is that of a single draw. What is
 told and searched is the mean of the draws that rank right below it instead, a tenth of those that may have less: its
 derivative is the mean of theirs, which changes little as draws pass one another, and it is never above the order
-statistic.
+statistic. That one's rank is so low that with 95 % confidence the share of all lamps and cameras has no less, not of
+the draws alone; but of a design that a search has chosen by these very draws, nothing is said of others.
 """
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import bdtr
 
 from ..base.types import FloatArray, IndexArray
 from ..curves.lights import Pair
@@ -24,6 +27,8 @@ _PARTS, _PARTS_OF_BOTH = 101, 25
 """Equal parts of the range of a tolerance, and of each where there are two; what is drawn is the middle of one."""
 _NEAR = 0.1
 """Of the draws that may have less: the share of them whose mean is taken."""
+_MISTAKEN = 0.05
+"""The chance that fewer than the wanted share of all lamps and cameras have what is told of a design."""
 _HELD = 4_000_000
 """Values of responses that are held at once."""
 
@@ -113,6 +118,15 @@ def _offs(tolerance: Tolerance, edge: FloatArray, film: FloatArray) -> tuple[tup
     return offs, places[0] * films + places[1]
 
 
+def rank_below(draws: int, share: float) -> int:
+    """The highest rank, from below and from 1, of a draw with no more than a share of all has, but for `_MISTAKEN`.
+
+    So many draws or more lie in the rest of all, whose number is binomial (Clopper and Pearson, Biometrika 26, 404,
+    1934, one-sided).
+    """
+    return bisect_right(range(draws), _MISTAKEN, key=lambda fewer: bdtr(fewer, draws, 1 - share))
+
+
 class LampsAndCameras:
     """The draws of a scene, made once for each two types; others than those by which a yield is counted in the end."""
 
@@ -161,5 +175,5 @@ class LampsAndCameras:
         """How many draws may have less than what the wanted share has, and of how many of these the mean is taken."""
         population = self.seen.members.population
         assert population.wanted_yield is not None
-        below = population.draws_below(population.wanted_yield)
+        below = rank_below(population.draws, population.wanted_yield)
         return below, max(1, round(_NEAR * below))

@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from scipy.stats import binom
 
 from sweep.base.errors import StudyError
+from sweep.metrics.drawn import rank_below
 from sweep.metrics.objective import Objective
 from sweep.report.summary import summary_lines
 from sweep.results.output import read_output
@@ -65,6 +67,17 @@ def lamps() -> tuple[Study, Search]:
 def problem(objective: str = "yield_csd_yellow_red") -> Problem:
     loaded, search = lamps()
     return replace(loaded.problem(search), objective=Objective(minimum={objective: 1.0}))
+
+
+@pytest.mark.parametrize(
+    ("draws", "share"), [(1000, 0.99), (4000, 0.99), (20, 0.5), (100_000, 0.99), (10_000_000, 0.5)]
+)
+def test_what_is_told_of_a_share_is_more_than_it_has_in_a_twentieth_of_all_cases(draws: int, share: float) -> None:
+    """The draw of that rank is above what the share has where fewer draws than its rank are below that."""
+    rank = rank_below(draws, share)
+    assert rank >= 5
+    chances = [float(binom.cdf(below - 1, draws, 1 - share)) for below in (rank, rank + 1)]
+    assert chances[0] <= 0.05 < chances[1]
 
 
 @pytest.mark.parametrize("thickness", [0.0, 0.004])
@@ -124,7 +137,9 @@ def test_as_column_and_constraint_any_number_of_workers_gives_the_same(tmp_path:
     assert answer["feasible"]
     assert answer["yield_csd_yellow_red"] == pytest.approx(190.0, rel=1e-4)  # it binds: more light costs yield
     said = "\n".join(summary_lines(read_output(tmp_path / "out1")))
-    assert re.search(r"separates yellow from red by 190 DN for 99 % of lamps and cameras at 0\.\d+ of a clear", said)
+    assert re.search(
+        r"separates yellow from red by 190 DN for 99 % of drawn lamps and cameras at 0\.\d+ of a clear", said
+    )
     assert why_not(problem()) == "yield_csd_yellow_red is not linear in the filter"
 
 
