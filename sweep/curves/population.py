@@ -21,6 +21,8 @@ _Off = Annotated[float, Field(ge=0, le=30)]
 _Aged = Annotated[float, Field(ge=-30, le=30)]
 _LEAST_BELOW, _ROUNDING = 10, 1e-6
 """Draws that have less than the wanted share has, at least, on average; numbers of draws are known to this."""
+_MOST_HELD = 1_000_000
+"""Draws of two types that every worker of a search holds: of so many 40 MB, for each two types."""
 _ALL = ""
 """Key of what holds for every signal."""
 
@@ -56,7 +58,7 @@ class Population(Section):
     about its middle by each of these factors. Where values differ, keys are signal types or names of signals; a value
     alone holds for all. `wanted_dn`: what share of lamps and cameras has at least this CSD is told, from `draws` of two
     lights, their temperatures, bins, ages and widths, a place of the field, and how its filter came out, each evenly.
-    `wanted_yield`: a share of these draws, others than those that are counted; `yield_csd_...` is a distance that it
+    `wanted_yield`: a share of such draws, at most 1,000,000 others; `yield_csd_...` is a distance that it
     has at least, which a search may maximize or keep above a bound.
     """
 
@@ -93,6 +95,8 @@ class Population(Section):
         if self.wanted_yield is not None and self.draws * (1 - self.wanted_yield) + _ROUNDING < _LEAST_BELOW:
             least = math.ceil(_LEAST_BELOW / (1 - self.wanted_yield) - _ROUNDING)
             raise ValueError(f"wanted_yield {self.wanted_yield:g} needs at least {least:,} `draws`, not {self.draws:,}")
+        if self.wanted_yield is not None and self.draws > _MOST_HELD:
+            raise ValueError(f"wanted_yield takes at most {_MOST_HELD:,} `draws`, not {self.draws:,}")
         return self
 
     @property

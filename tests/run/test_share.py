@@ -13,12 +13,17 @@ import pytest
 from scipy.stats import binom
 
 from sweep.base.errors import StudyError
-from sweep.metrics.drawn import rank_below
+from sweep.camera.linear import LinearImager
+from sweep.designs.tolerance import Off
+from sweep.metrics import drawn as drawn_module
+from sweep.metrics.drawn import LampsAndCameras, rank_below
+from sweep.metrics.members import population_imager
 from sweep.metrics.objective import Objective
 from sweep.report.summary import summary_lines
 from sweep.results.output import read_output
 from sweep.results.tables import RESULTS
 from sweep.run.robustness import Candidate, drawn_dn, yield_interval
+from sweep.run.rows import jobs_of
 from sweep.search.gradients import Model
 from sweep.search.limit import why_not
 from sweep.search.problem import Problem, SearchRun, best_feasible, starting_points
@@ -92,6 +97,36 @@ def test_its_derivative_is_exact(thickness: float) -> None:
             assert (above - below) / 2e-6 == pytest.approx(slope, rel=1e-6, abs=1e-6 * np.abs(slopes).max())
 
 
+def test_many_designs_are_made_in_blocks_and_read_out_once_for_all_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
+    loaded, search = lamps()
+    points = search.space.points(0, 7)
+    drawn = LampsAndCameras(population_imager(problem().view), loaded.tolerance, 1)
+    pairs = [("green", "yellow"), YELLOW_RED]
+    size, read, made = loaded.grid.size, list[int](), list[int]()
+    monkeypatch.setattr(drawn_module, "_HELD", 3 * 101 * size)
+    smooth = LinearImager.smooth
+    monkeypatch.setattr(LinearImager, "smooth", lambda self, curves: read.append(len(curves)) or smooth(self, curves))
+
+    def come_out(off: Off, some: slice) -> np.ndarray:
+        made.append(len(points[some]))
+        return search.space.curves(points[some], size, off)
+
+    found = drawn.columns(come_out, len(points), pairs)
+    assert max(made) == 3
+    assert sum(read) == 7 * 101
+    for at in range(7):
+        alone = np.concatenate(
+            [search.space.curves(points[at : at + 1], size, off) for off in drawn.draws(pairs[0]).offs]
+        )
+        for pair in pairs:
+            assert found[f"csd_{pair[0]}_{pair[1]}"][at] == drawn.kept(alone, [pair])[pair][0]
+
+
+def test_jobs_are_small_where_each_design_sees_many_draws(tmp_path: Path) -> None:
+    given = study(tmp_path)
+    assert max(job.stop - job.start for job in jobs_of(given)) <= 32
+
+
 def share_with(x: np.ndarray, wanted_dn: float, draws: int = 200_000) -> tuple[float, float]:
     """The 95 % interval of the share of other draws that has a distance."""
     study, search = lamps()
@@ -152,6 +187,7 @@ def test_as_column_and_constraint_any_number_of_workers_gives_the_same(tmp_path:
             "yield_csd_yellow_red needs `population.wanted_yield`; allowed: a share, such as 0.99",
         ),
         ("draws: 4000", "draws: 500", "wanted_yield 0.99 needs at least 1,000 `draws`, not 500"),
+        ("draws: 4000", "draws: 1000001", "wanted_yield takes at most 1,000,000 `draws`, not 1,000,001"),
         ("wanted_yield: 0.99", "wanted_yield: 99", "population.wanted_yield"),
     ],
 )
