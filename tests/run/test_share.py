@@ -45,7 +45,7 @@ sweeps:
     {cfa: RYNCy, channel: N, base: Y, to: G, grid: {left_nm: [612, 620], left_width_nm: 6, right_nm: [650, 658], right_width_nm: 6}}
 objective: sensitivity
 constraints: {yield_csd_yellow_red: {min: 190}}
-search: {starts: 2, max_evaluations: 60}
+search: {starts: 2, max_evaluations: 120}
 """
 YELLOW_RED = ("yellow", "red")
 
