@@ -234,8 +234,11 @@ def _shifts_left_out(nominal: Sequence[str], problem: Problem) -> list[str]:
 
 
 def _top(problem: Problem) -> FloatArray:
-    """No filter of the box exceeds this curve, ndarray[n_wavelengths]."""
-    return np.asarray(problem.family.upper(problem.low, problem.high)[0], dtype=float)
+    """No filter of the box exceeds this curve, however it comes out in a worst case, ndarray[n_wavelengths]."""
+    asked = (*problem.constraints, *problem.objective.weights)
+    moved = ways_of(problem)[1:] if any(problem.worst_distance(name) for name in asked) else ()
+    tops = [problem.family.upper(problem.low, problem.high)[0], *(way.high for way in moved)]
+    return np.asarray(np.max(tops, axis=0), dtype=float)
 
 
 def _clips(problem: Problem) -> bool:

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from sweep.curves.population import Population
+from sweep.designs.families.stopband import Stopband
 from sweep.metrics.bound import FEASIBLE, Bound
 from sweep.metrics.objective import Objective
 from sweep.search.gradients import Model
-from sweep.search.limit import _relaxed, limit_of
+from sweep.search.limit import _relaxed, limit_of, why_not
 from sweep.search.problem import Problem, SearchRun, best_feasible, starting_points
 from sweep.search.solver import search_from
 from sweep.search.trade_off import check_proof
@@ -75,3 +76,15 @@ def test_a_bound_on_what_a_share_has_is_left_out_of_the_limit() -> None:
     limit = limit_of(problem)
     check_proof(found, limit)
     assert limit.left_out == ("yield_csd_yellow_red",)
+
+
+def test_no_limit_is_claimed_where_a_filter_comes_out_above_the_curve_that_it_replaces() -> None:
+    """Its edges keep it from where its other curve is above that, but not when they come out elsewhere."""
+    wave, base, green = STUDY.grid.nodes_nm, share().view.base_qe[0], STUDY.sensor.qe["G"]
+    target = np.where((wave >= 656) & (wave <= 658), 1.1 * base, np.minimum(green, base))
+    low, high = np.array([600.0, 6, 640, 6, 1]), np.array([610.0, 6, 650, 6, 1])
+    objective = Objective(minimum={"worst_csd_yellow_red": 1.0})
+    problem = replace(share(), family=Stopband(wave, base, target), low=low, high=high, objective=objective)
+    assert why_not(problem) == "filters of the box may exceed the curve that they replace"
+    assert why_not(replace(problem, edge_shift_nm=0.0)) is None
+    assert why_not(replace(problem, objective=Objective(minimum={"csd_yellow_red": 1.0}))) is None
