@@ -106,7 +106,7 @@ def _of_file(name: str, source: str) -> Any:
     try:
         exec(compile(source, file, "exec", dont_inherit=True), module.__dict__)  # what `--allow-code` allows
     except (Exception, SystemExit) as error:
-        del sys.modules[module.__name__]
+        sys.modules.pop(module.__name__, None)  # the code may have taken it away
         raise SweepError(Fault(f"the code cannot be run: {_told(error)}", file)) from None
     found = getattr(module, own, None)
     if not callable(found):

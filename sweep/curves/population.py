@@ -20,7 +20,9 @@ _Drift = Annotated[float, Field(ge=-2, le=2)]
 _Off = Annotated[float, Field(ge=0, le=30)]
 _Aged = Annotated[float, Field(ge=-30, le=30)]
 _LEAST_BELOW, _ROUNDING = 10, 1e-6
-"""Draws that may have less than what the wanted share has, at least; numbers of draws are known to this."""
+"""Draws that have less than the wanted share has, at least, on average; numbers of draws are known to this."""
+_MOST_HELD = 1_000_000
+"""Draws of two types that every worker of a search holds: of so many 40 MB, for each two types."""
 _ALL = ""
 """Key of what holds for every signal."""
 
@@ -58,8 +60,8 @@ class Population(Section):
     about its middle by each of these factors. Where values differ, keys are signal types or names of signals; a value
     alone holds for all. `wanted_dn`: what share of lamps and cameras has at least this CSD is told, from `draws` of two
     lights, their temperatures, bins, ages and widths, a place of the field, and how its filter came out, each evenly.
-    `wanted_yield`: a share of lamps and cameras; `yield_csd_...` is the distance that it has, which a search may
-    maximize or keep above a bound.
+    `wanted_yield`: a share of such draws, at most 1,000,000 others; `yield_csd_...` is a distance that it
+    has at least, which a search may maximize or keep above a bound.
     """
 
     temperature_c: Annotated[
@@ -92,14 +94,12 @@ class Population(Section):
             if not low <= 0 <= high:
                 told = name or "a lamp"
                 raise ValueError(f"ageing_nm: {told} begins as new, so from 0 or less to 0 or more")
-        if self.wanted_yield is not None and self.draws_below(self.wanted_yield) < _LEAST_BELOW:
+        if self.wanted_yield is not None and self.draws * (1 - self.wanted_yield) + _ROUNDING < _LEAST_BELOW:
             least = math.ceil(_LEAST_BELOW / (1 - self.wanted_yield) - _ROUNDING)
             raise ValueError(f"wanted_yield {self.wanted_yield:g} needs at least {least:,} `draws`, not {self.draws:,}")
+        if self.wanted_yield is not None and self.draws > _MOST_HELD:
+            raise ValueError(f"wanted_yield takes at most {_MOST_HELD:,} `draws`, not {self.draws:,}")
         return self
-
-    def draws_below(self, share: float) -> int:
-        """How many of the draws may have less than what a share of them has."""
-        return math.floor(self.draws * (1 - share) + _ROUNDING)
 
     @property
     def names(self) -> dict[str, set[str]]:

@@ -109,7 +109,7 @@ def judged(study: Study, view: View, curves: FloatArray) -> Columns:
             from ..metrics.drawn import LampsAndCameras  # noqa: PLC0415
 
             drawn = LampsAndCameras(population_imager(view), study.tolerance, study.section.seed)
-            kept = drawn.columns(lambda _: curves, class_pairs(view.lights.classes))
+            kept = drawn.columns(lambda _, some: curves[some], len(curves), class_pairs(view.lights.classes))
             found |= {YIELD + name: values for name, values in kept.items()}
     found |= family_quantities(None, np.empty((len(curves), 0)))
     found |= image_quantities(view, curves, study.section.vision, study.section.seed)

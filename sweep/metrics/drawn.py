@@ -3,15 +3,18 @@
 The distance that the wanted share of them has is an order statistic, whose derivative is that of a single draw. What is
 told and searched is the mean of the draws that rank right below it instead, a tenth of those that may have less: its
 derivative is the mean of theirs, which changes little as draws pass one another, and it is never above the order
-statistic.
+statistic. That one's rank is so low that with 95 % confidence the share of all lamps and cameras has no less, not of
+the draws alone; but of a design that a search has chosen by these very draws, nothing is said of others.
 """
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import bdtr
 
 from ..base.types import FloatArray, IndexArray
 from ..curves.lights import Pair
@@ -24,6 +27,8 @@ _PARTS, _PARTS_OF_BOTH = 101, 25
 """Equal parts of the range of a tolerance, and of each where there are two; what is drawn is the middle of one."""
 _NEAR = 0.1
 """Of the draws that may have less: the share of them whose mean is taken."""
+_MISTAKEN = 0.05
+"""The chance that fewer than the wanted share of all lamps and cameras have what is told of a design."""
 _HELD = 4_000_000
 """Values of responses that are held at once."""
 
@@ -113,6 +118,15 @@ def _offs(tolerance: Tolerance, edge: FloatArray, film: FloatArray) -> tuple[tup
     return offs, places[0] * films + places[1]
 
 
+def rank_below(draws: int, share: float) -> int:
+    """The highest rank, from below and from 1, of a draw with no more than a share of all has, but for `_MISTAKEN`.
+
+    So many draws or more lie in the rest of all, whose number is binomial (Clopper and Pearson, Biometrika 26, 404,
+    1934, one-sided).
+    """
+    return bisect_right(range(draws), _MISTAKEN, key=lambda fewer: bdtr(fewer, draws, 1 - share))
+
+
 class LampsAndCameras:
     """The draws of a scene, made once for each two types; others than those by which a yield is counted in the end."""
 
@@ -127,39 +141,50 @@ class LampsAndCameras:
             self._draws[pair] = draws_of(self.seen.members, pair, self._tolerance, (self._seed, 2))
         return self._draws[pair]
 
-    def kept(self, curves: FloatArray, pair: Pair) -> tuple[float, IndexArray]:
+    def kept(self, curves: FloatArray, pairs: Sequence[Pair]) -> dict[Pair, tuple[float, IndexArray]]:
         """What the wanted share of lamps and cameras has of a design, DN, and the draws of which that is the mean.
 
-        `curves`: how it comes out, in the order of the draws' `offs`, ndarray[n_offs, n_modified, n_wavelengths]. NaN
-        where a response is no number.
+        For each pair. `curves`: how it comes out, in the order of the draws' `offs`, ndarray[n_offs, n_modified,
+        n_wavelengths]. NaN where a response is no number.
         """
-        draws, imager = self.draws(pair), self.seen.imager
-        found = np.empty(draws.size)
+        imager = self.seen.imager
+        found = {pair: np.empty(self.draws(pair).size) for pair in pairs}
         step = max(1, _HELD // (imager.n_cases * self.seen.view.lights.photons.shape[0] * len(self.seen.view.qe)))
         for start in range(0, len(curves), step):
             for off, response in enumerate(imager.smooth(curves[start : start + step]), start):
-                draws.distances(off, response, found)
-        below, count = self._ranks
-        chosen = np.argsort(found, kind="stable")[below - count : below]
-        return (float(found[chosen].mean()) if np.isfinite(found).all() else np.nan), chosen
+                for pair, distances in found.items():
+                    self.draws(pair).distances(off, response, distances)
+        return {pair: self._of_share(distances) for pair, distances in found.items()}
 
-    def columns(self, made: Callable[[Off], FloatArray], pairs: Sequence[Pair]) -> dict[str, FloatArray]:
+    def _of_share(self, distances: FloatArray) -> tuple[float, IndexArray]:
+        """What the wanted share has of all distances, ndarray[n_draws], and the draws of which that is the mean."""
+        below, count = self._ranks
+        lowest = np.argpartition(distances, below - 1)[:below]
+        chosen = lowest[np.argsort(distances[lowest], kind="stable")[below - count :]]
+        return (float(distances[chosen].mean()) if np.isfinite(distances).all() else np.nan), chosen
+
+    def columns(
+        self, made: Callable[[Off, slice], FloatArray], n_designs: int, pairs: Sequence[Pair]
+    ) -> dict[str, FloatArray]:
         """The same of several designs for each pair, by the name of its CSD, ndarray[n_designs].
 
-        `made`: how designs come out, ndarray[n_designs, n_modified, n_wavelengths].
+        `made`: how some of them come out, ndarray[n_some, n_modified, n_wavelengths]; so many are made at once that no
+        more than `_HELD` values are held.
         """
-        curves = [made(off) for off in self.draws(pairs[0]).offs]
-        return {
-            csd_name(pair): np.array(
-                [self.kept(np.stack([each[at] for each in curves]), pair)[0] for at in range(len(curves[0]))]
-            )
-            for pair in pairs
-        }
+        offs, view = self.draws(pairs[0]).offs, self.seen.view
+        step = max(1, _HELD // (len(offs) * max(1, len(view.modified)) * view.grid.size))
+        found: dict[str, list[float]] = {csd_name(pair): [] for pair in pairs}
+        for start in range(0, n_designs, step):
+            some = slice(start, min(start + step, n_designs))
+            for curves in np.stack([made(off, some) for off in offs], axis=1):
+                for pair, (value, _) in self.kept(curves, pairs).items():
+                    found[csd_name(pair)].append(value)
+        return {name: np.array(values) for name, values in found.items()}
 
     @property
     def _ranks(self) -> tuple[int, int]:
         """How many draws may have less than what the wanted share has, and of how many of these the mean is taken."""
         population = self.seen.members.population
         assert population.wanted_yield is not None
-        below = population.draws_below(population.wanted_yield)
+        below = rank_below(population.draws, population.wanted_yield)
         return below, max(1, round(_NEAR * below))

@@ -28,7 +28,7 @@ WORST = "worst_"
 the lights."""
 WORST_CASE: Literal["worst case"] = "worst case"
 YIELD = "yield_"
-"""How the name of what the wanted share of random lamps and cameras has begins."""
+"""How the name of what the wanted share of drawn lamps and cameras has begins."""
 OF_A_SHARE: Literal["yield"] = "yield"
 BEST_PLACE = "best_place_"
 """How the name of a CSD's largest value over the places where the light may fall on the mosaic begins, each at its
@@ -153,14 +153,14 @@ class Quantity(Column):
         )
 
     def of_share(self, share: float) -> Quantity:
-        """What a share of random lamps and cameras has of it: no linear program knows that."""
+        """What a share of the drawn lamps and cameras has of it: no linear program knows that."""
         told = f"{100 * share:.10g} %"
         meaning = (
-            f"at least {told} of random lamps and cameras (`population`, `production`) have this `{self.name}`: the "
-            "mean of those draws that rank right below, before clipping and rounding, with everything on; no limit is "
-            "computed of it"
+            f"at least {told} of the drawn lamps and cameras (`population`, `production`) have this `{self.name}`, and "
+            f"with 95 % confidence {told} of all, where the design was not chosen by the same draws: the mean of draws "
+            "of a rank so low, before clipping and rounding, with everything on; no limit is computed of it"
         )
-        label = f"{self.words} of {told} of lamps and cameras"
+        label = f"{self.words} of {told} of drawn lamps and cameras"
         named = replace(self, name=YIELD + self.name, meaning=meaning, label=label, extreme=OF_A_SHARE, of=self.name)
         unknown = replace(named, apart="", linear=None, promised=False, smooth_members=None)
         return replace(unknown, rows="values", smooth=self.smooth_drawn, smooth_drawn=None)

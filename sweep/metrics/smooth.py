@@ -168,7 +168,7 @@ class SmoothDesign:
         draws, imager = self._drawn.draws(pair), self._drawn.seen.imager
         made = [self.family.produced(off) if any(off) else self.family for off in draws.offs]
         curves = np.stack([family.curves(self.x[None])[0] for family in made])
-        value, chosen = self._drawn.kept(curves, pair)
+        value, chosen = self._drawn.kept(curves, [pair])[pair]
         slope = np.zeros(self._free.size)
         if np.isfinite(value):
             which = np.searchsorted(draws.starts, chosen, side="right") - 1

@@ -157,11 +157,15 @@ class UsableEnds:
 
 
 def usable_ends(output: Output) -> Iterator[UsableEnds]:
-    """For each series of scenarios where designs stop being usable; none where one is usable everywhere."""
+    """For each series of scenarios where designs stop being usable.
+
+    None where one is usable everywhere, or somewhere with an end that is not known: it may be the best one.
+    """
     allowed = _allowed(output)
     for series in noise_figures(output):
-        ends = {name: line.passes[0] for name, line in series.lines.items() if line.passes is not None}
-        if allowed is None or not ends or any((line.y <= allowed).all() for line in series.lines.values()):
+        usable = {} if allowed is None else {n: line for n, line in series.lines.items() if (line.y <= allowed).any()}
+        ends = {name: line.passes[0] for name, line in usable.items() if line.passes is not None}
+        if allowed is None or not ends or len(ends) < len(usable):
             continue
         sides = {bool(series.lines[name].y[0] <= allowed) for name in ends}
         if len(sides) == 1:

@@ -137,7 +137,7 @@ def of_a_share(space: Space, view: View, points: FloatArray, request: Request) -
     tolerance = request.tolerance if space.filter is not None else Tolerance()
     drawn = LampsAndCameras(population_imager(view), tolerance, request.seed)
     pairs = [q.pair for q in request.quantities.values() if q.extreme == OF_A_SHARE and q.pair is not None]
-    found = drawn.columns(lambda off: space.curves(points, view.grid.size, off), pairs)
+    found = drawn.columns(lambda off, some: space.curves(points[some], view.grid.size, off), len(points), pairs)
     return {YIELD + name: values for name, values in found.items()}
 
 

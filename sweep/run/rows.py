@@ -26,6 +26,8 @@ from .routes import Detours, Found, Request, block_of
 
 _WORDS = pa.dictionary(pa.int32(), pa.string())
 _MOST_CHUNKS, _LEAST_JOBS = 16, 64
+_DRAWN_DESIGNS = 32
+"""Of a job where each design is seen by many random lamps and cameras."""
 _DETOURS = b"cfa_sweep_detours"
 
 
@@ -75,6 +77,8 @@ def _job_size(study: Study, space: Space) -> int:
 
     It does not depend on the workers, and so neither do the rows.
     """
+    if study.asked.wanted_yield:
+        return _DRAWN_DESIGNS
     if study.states or not by_edges(space):
         return CHUNK
     return CHUNK * min(max(1, space.size // (CHUNK * _LEAST_JOBS)), _MOST_CHUNKS)

@@ -35,8 +35,9 @@ BACK_OFF = 1e-8
 _ON_BOUND = -0.5 * FEASIBLE
 """The same where nothing lies inside, such as a slope of 0: half of what still counts as feasible."""
 _SETTLED, _SETTLED_EVALUATIONS = 1e-6, 16
-"""A search whose latest evaluations all lie within this share of the box has arrived: what it still does is to look for
-less than rounding leaves. SLSQP's line searches take ten steps, so it has begun anew without coming away from there.
+"""A search whose latest evaluations all lie within this share of the box, with objectives within this share of their
+size and violations as near, has arrived: what it still does is to look for less than rounding leaves. SLSQP's line
+searches take ten steps, so it has begun anew without coming away from there.
 """
 _CONDITION_NM = 100.0
 """Scale of the families' own conditions, so that they weigh like the others."""
@@ -100,6 +101,7 @@ class Model:
         self._run = run
         self._budget = budget
         self.stop: Callable[[], object] | None = None
+        self.spent = False
         self._latest: deque[FloatArray] = deque(maxlen=_SETTLED_EVALUATIONS)
         self._span = (problem.high - problem.low)[problem.free]
         self._free = problem.free
@@ -123,6 +125,7 @@ class Model:
         key = u.tobytes()
         if key not in self._seen and len(self._run.log) >= self._budget and self.stop is not None:
             self.stop()
+            self.spent = True
             return next(iter(self._seen.values()))
         if key not in self._seen:
             # Only the newest is asked for again: the constraints follow the objective at the same point.
@@ -135,11 +138,15 @@ class Model:
 
     @property
     def settled(self) -> bool:
-        """Whether the latest evaluations all lie in one place."""
+        """Whether the latest evaluations all lie in one place, and are worth the same."""
         latest = self._latest
         if len(latest) < _SETTLED_EVALUATIONS or (np.abs(latest[-1] - latest[0]) > _SETTLED).any():
             return False
-        return bool((np.ptp(np.stack(self._latest), axis=0) <= _SETTLED).all())
+        log = self._run.log[-_SETTLED_EVALUATIONS:]
+        worth, violations = [e.objective for e in log], [e.violation for e in log]
+        near = max(worth) - min(worth) <= _SETTLED * max(map(abs, worth))
+        near = near and max(violations) - min(violations) <= _SETTLED
+        return near and bool((np.ptp(np.stack(latest), axis=0) <= _SETTLED).all())
 
     def _simulate(self, u: FloatArray) -> Point:
         problem, free = self._problem, self._free

@@ -42,6 +42,8 @@ if TYPE_CHECKING:
 
 _SENSITIVITY_TOLERANCE = 1e-6
 _MOST_PROGRAMS = 5000
+_ATTEMPTS, _ATTEMPT_PROGRAMS = 5, 100
+"""How often bounds on worst cases are raised until a filter keeps them, with so many linear programs each."""
 _NOT_LINEAR = "is not linear in the filter"
 _SHARES = (0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 """How far a solver's filter is moved toward one that is inside, to make up for the solver's tolerance."""
@@ -52,7 +54,8 @@ class Limit:
     """The bracket of the limit, in the objective's unit, and the filter that attains its lower end, QE.
 
     `attained`: the objective for `curve` (ndarray[n_wavelengths]), evaluated like any design; no filter at all reaches
-    more than `proven`. Both are -inf, and `curve` is None, when no filter meets the constraints. `left_out`: what the
+    more than `proven`. Both are -inf when no filter meets the constraints; where none is known that does, `attained` is
+    -inf and `curve` is None. `left_out`: what the
     study asks for beyond the limit's own constraints. `programs`: number of linear programs solved for it;
     `open_parts`: parts of the proof that were left open, so that the bracket is wider than it was to be; 0: none.
     `elsewhere`: what the same proof says of filters with other sensitivities at least.
@@ -96,15 +99,14 @@ def limit_of(
         known = members if heights is None else heights
         if known is None or proof.curve is None or solved >= most_programs or not known.more(proof.curve):
             break
-    attained = proof.attained
-    if proof.curve is not None and (known is not None or program.noisy):
-        worst = {} if members is None else {name: members.least(name, proof.curve) for name in over}
-        worst |= {} if heights is None else heights.least(proof.curve)
-        attained = _attained(relaxed, proof.curve, worst)
+    attained, curve = proof.attained, proof.curve
+    if curve is not None and (known is not None or program.noisy):
+        attained, curve, more = _attaining(relaxed, curve, members, heights, tolerance)
+        solved += more
     least = relaxed.constraints.get(SENSITIVITY)
     from_here = -np.inf if not program.noisy or least is None or least.min is None else least.min
     elsewhere = tuple(proof.proven_at(program, s) if s >= from_here else np.inf for s in sensitivities)
-    return Limit(attained, proof.proven, proof.curve, left_out, solved, proof.open_parts, elsewhere)
+    return Limit(attained, proof.proven, curve, left_out, solved, proof.open_parts, elsewhere)
 
 
 def _members_of(problem: Problem, over: Sequence[str]) -> MemberPairs:
@@ -127,6 +129,37 @@ def _proof(program: FilterProgram, members: MemberPairs | None, tolerance: float
         return (program.reaches(moved) if program.noisy and attained > -np.inf else attained), moved
 
     return SideSearch(program, value, tolerance, most_programs).run()
+
+
+def _attaining(
+    problem: Problem, curve: FloatArray, members: MemberPairs | None, heights: AnyHeight | None, tolerance: float
+) -> tuple[float, FloatArray | None, int]:
+    """What a program's filter attains in all worst cases, the filter, and the number of programs solved for it.
+
+    A program knows some members and places, so its filter may lack a little of a worst case that is bounded. Then the
+    bounds are raised by twice what is lacking, until a filter keeps those of the problem; None where none does.
+    """
+    asked, solved = problem, 0
+    for _ in range(_ATTEMPTS):
+        worst = {} if members is None else {name: members.least(name, curve) for name in members.names}
+        worst |= {} if heights is None else heights.least(curve)
+        attained = _attained(problem, curve, worst)
+        if attained > -np.inf:
+            return attained, curve, solved
+        lacking = {n: b.min - worst[n] for n, b in problem.constraints.items() if n in worst and b.min is not None}
+        lacking = {name: lack for name, lack in lacking.items() if lack > 0}
+        if not lacking:
+            break
+        bounds = asked.constraints
+        raised = {n: Bound.model_construct(min=(bounds[n].min or 0.0) + 2 * lack) for n, lack in lacking.items()}
+        asked = replace(asked, constraints={**bounds, **raised})
+        program = FilterProgram(asked, members)
+        found = _proof(program, members, tolerance, _ATTEMPT_PROGRAMS)
+        solved += program.solved
+        if found.curve is None:
+            break
+        curve = found.curve
+    return -np.inf, None, solved
 
 
 def why_not(problem: Problem) -> str | None:
@@ -169,30 +202,35 @@ def _most_sensitive(problem: Problem) -> float:
 def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
     """The problem without what only families of edges have, and what was left out.
 
-    Worst cases of CSDs over a population or production stay; others become nominal ones. What a share of lamps has
-    says nothing of the nominal one, which may be smaller: it is left out.
+    Worst cases of CSDs over a population or production stay; others become nominal ones, which are no worse: a bound on
+    the better end of a worst case says nothing of these. What a share of lamps has says nothing of the nominal lights.
     """
     quantities = problem.quantities
     asked = (*problem.constraints, *problem.objective.weights)
     moves = len(ways_of(problem)) > 1
     stay = {name for name in asked if problem.worst_distance(name) and (problem.population or moves)}
-    worst = {name for name in asked if quantities[name].extreme == WORST_CASE}
-    plains = {name: quantities[name].of if name in worst - stay else name for name in asked}
-    known = {name for name, plain in plains.items() if quantities[plain].has_limit}
-    left_out = [name for name in problem.constraints if name not in known]
+    nominal = {name for name in asked if quantities[name].extreme == WORST_CASE} - stay
+    plains = {name: quantities[name].of if name in nominal else name for name in asked}
+    left_out: list[str] = []
     kept: dict[str, Bound] = {}
     for name, bound in problem.constraints.items():
         plain = plains[name]
-        if name in known:
-            ends = [b for b in (bound, kept.get(plain)) if b is not None]
-            least, most = [b.min for b in ends if b.min is not None], [b.max for b in ends if b.max is not None]
-            kept[plain] = Bound.model_construct(min=max(least, default=None), max=min(most, default=None))
+        better = "min" if quantities[name].wanted == "less" else "max"
+        own = bound.model_copy(update={better: None}) if name in nominal else bound
+        if not quantities[plain].has_limit or own.min is own.max is None:
+            left_out.append(name)
+            nominal -= {name} - problem.objective.weights.keys()
+            continue
+        left_out += [] if own == bound else [f"the {better} of {name}"]
+        ends = [b for b in (own, kept.get(plain)) if b is not None]
+        least, most = [b.min for b in ends if b.min is not None], [b.max for b in ends if b.max is not None]
+        kept[plain] = Bound.model_construct(min=max(least, default=None), max=min(most, default=None))
     weights: dict[str, float] = {}
     for name, weight in problem.objective.weights.items():
         plain = plains[name]
         weights[plain] = min(weight, weights.get(plain, weight))
-    if worst and problem.tolerance:
-        left_out += _shifts_left_out([plains[name] for name in asked if plains[name] != name], problem)
+    if (stay or nominal) and problem.tolerance:
+        left_out += _shifts_left_out([plains[name] for name in asked if name in nominal], problem)
     return replace(problem, objective=Objective(minimum=weights), constraints=kept), tuple(left_out)
 
 
@@ -205,8 +243,11 @@ def _shifts_left_out(nominal: Sequence[str], problem: Problem) -> list[str]:
 
 
 def _top(problem: Problem) -> FloatArray:
-    """No filter of the box exceeds this curve, ndarray[n_wavelengths]."""
-    return np.asarray(problem.family.upper(problem.low, problem.high)[0], dtype=float)
+    """No filter of the box exceeds this curve, however it comes out in a worst case, ndarray[n_wavelengths]."""
+    asked = (*problem.constraints, *problem.objective.weights)
+    moved = ways_of(problem)[1:] if any(problem.worst_distance(name) for name in asked) else ()
+    tops = [problem.family.upper(problem.low, problem.high)[0], *(way.high for way in moved)]
+    return np.asarray(np.max(tops, axis=0), dtype=float)
 
 
 def _clips(problem: Problem) -> bool:

@@ -73,7 +73,7 @@ def search_from(
     except nlopt.RoundoffLimited:
         run.status = "roundoff_limited"
     except nlopt.ForcedStop:
-        run.status = "settled" if model.settled else "maxeval_reached"
+        run.status = "maxeval_reached" if model.spent else "settled"
     except (RuntimeError, nlopt.runtime_error):  # its own class; what it carries cannot leave this process
         run.status = "failed"
     return run

@@ -16,6 +16,8 @@ from ..vision.section import FEWEST_LAMPS, MOST_BITS, MOST_READ_NOISE_DN, MOST_W
 from .schema import StudySection
 from .sources import Sources
 
+_HELD_TIMES = 3
+"""Times that a network's training images are held in double precision: as they are, and while they are scaled."""
 _LEAST_LUMINANCE = 1e-20
 """cd/m^2 for each photon/s/sr/m^2 of a lamp that the eye sees; at 555 nm it is 2.4e-16."""
 
@@ -75,7 +77,7 @@ def _check_pixel(section: StudySection, sources: Sources) -> None:
 
 
 def _check_memory(vision: Vision, lights: Lights, mosaics: Mapping[str, Mosaic], sources: Sources) -> None:
-    """Lamps at all places, and all cases of the observer at one distance and level, fit into memory."""
+    """Lamps at all places, all cases of the observer at one distance and level, and training images fit into memory."""
     pixels = vision.crop_px**2
     n_lenses = len(vision.lenses)
     test_lamps = sum(max(1, len(lights.members.get(lens, ())) // 4) for lens in vision.lenses)
@@ -87,4 +89,10 @@ def _check_memory(vision: Vision, lights: Lights, mosaics: Mapping[str, Mosaic],
             problem = f"{places} places of the head take too much memory (CFA {name})"
             allowed = f"at most {MOST_KERNEL_BYTES / 2**30:g} GiB: smaller images, fewer places, lamps or distances"
             sources.add(("vision",), problem, f"{every / 2**30:.1f} GiB", allowed)
+            return
+        planes = len(mosaic.channels) if vision.input == "demosaicked" else 1
+        trained = 8 * _HELD_TIMES * planes * pixels * max(vision.train_images, vision.check_images, vision.test_images)
+        if vision.network and trained > MOST_KERNEL_BYTES:
+            allowed = f"at most {MOST_KERNEL_BYTES / 2**30:g} GiB: smaller images, or fewer of them"
+            sources.add(("vision",), f"images take too much memory (CFA {name})", f"{trained / 2**30:.1f} GiB", allowed)
             return

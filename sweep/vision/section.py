@@ -44,7 +44,8 @@ class Vision(Section):
     `test_images`: of each seed, order of lenses and CFA. `epochs`: passes over the training images at most.
     `unknown_cost`: of the answer "unknown", where a wrong one costs 1. `network`: false leaves the network out.
     `input`: what the network sees, the `raw` pixels, a plane for each of the tile, or every channel at every pixel,
-    `demosaicked` by a tent as wide as the tile. The observer reads raw pixels: no reader of either errs less.
+    `demosaicked` by a tent as wide as the tile. The observer reads raw pixels: on average over heads as they are drawn
+    here, no reader of either errs less.
     """
 
     lenses: Annotated[list[_Text], Field(min_length=2, max_length=4)] = ["red", "yellow", "green"]

@@ -12,6 +12,7 @@ import pytest
 
 from sweep.base.errors import SweepError
 from sweep.curves.files import read_curves, scan_curves
+from sweep.curves.instrument_files import read_xml
 from sweep.study import load_study
 
 from ..build import one_line
@@ -168,6 +169,16 @@ def test_what_two_readers_could_read_in_two_ways_is_refused(tmp_path: Path, file
     path.write_text(content)
     with one_line(said):
         read_curves(path)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_xml_with_entities_is_refused_in_every_encoding(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "a.xml"
+    path.write_text(f"<?xml version='1.0' encoding='{encoding}'?><!DOCTYPE x [<!ENTITY a 'b'>]><x>&a;</x>", encoding)
+    with one_line("without entities"):
+        read_xml(path, "a spectrum")
+    path.write_text(f"<?xml version='1.0' encoding='{encoding}'?><x>ä</x>", encoding)
+    assert read_xml(path, "a spectrum").text == "ä"
 
 
 def mutated(rng: np.random.Generator) -> str:

@@ -96,6 +96,7 @@ def test_code_runs_only_when_it_is_allowed(tmp_path: Path) -> None:
         ("class Band", "class Bend", "no such class or function in the file (got 'Band'); allowed: Bend"),
         ("import numpy as np\n", "import nump as np\n", "the code cannot be run: ModuleNotFoundError"),
         ("class Band:", "class Band", "the code cannot be run: SyntaxError"),
+        ("import numpy as np\n", "import sys\ndel sys.modules[__name__]\nimport nump\n", "run: ModuleNotFoundError"),
         ('("left_nm", 400, 700)', '("left_nm", 700, 400)', "no usable `parameters`"),
         ("self.wave, self.base", "self.wave, self.bases", "AttributeError: 'Band' object has no attribute 'base'"),
         ("return self.base + ", "return 2 + ", "a curve is out of its bounds"),

@@ -10,14 +10,21 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from scipy.stats import binom
 
+from sweep.camera.linear import LinearImager
+from sweep.designs.tolerance import Off
+from sweep.metrics import drawn as drawn_module
 from sweep.metrics.bound import Bound
+from sweep.metrics.drawn import LampsAndCameras, rank_below
+from sweep.metrics.members import population_imager
 from sweep.metrics.objective import Objective
 from sweep.metrics.share import share_interval
 from sweep.report.summary import summary_lines
 from sweep.results.output import read_output
 from sweep.results.tables import RESULTS
 from sweep.run.robustness import Candidate, drawn_dn
+from sweep.run.rows import jobs_of
 from sweep.search.gradients import Model
 from sweep.search.limit import limit_of, why_not
 from sweep.search.problem import Problem, SearchRun, best_feasible, starting_points
@@ -39,7 +46,7 @@ sweeps:
     {cfa: RYNCy, channel: N, base: Y, to: G, grid: {left_nm: [612, 620], left_width_nm: 6, right_nm: [650, 658], right_width_nm: 6}}
 objective: sensitivity
 constraints: {yield_csd_yellow_red: {min: 190}}
-search: {starts: 2, max_evaluations: 60}
+search: {starts: 2, max_evaluations: 120}
 """
 YELLOW_RED = ("yellow", "red")
 
@@ -68,6 +75,17 @@ def problem(objective: str = "yield_csd_yellow_red") -> Problem:
     return replace(loaded.problem(search), objective=Objective(minimum={objective: 1.0}))
 
 
+@pytest.mark.parametrize(
+    ("draws", "share"), [(1000, 0.99), (4000, 0.99), (20, 0.5), (100_000, 0.99), (10_000_000, 0.5)]
+)
+def test_what_is_told_of_a_share_is_more_than_it_has_in_a_twentieth_of_all_cases(draws: int, share: float) -> None:
+    """The draw of that rank is above what the share has where fewer draws than its rank are below that."""
+    rank = rank_below(draws, share)
+    assert rank >= 5
+    chances = [float(binom.cdf(below - 1, draws, 1 - share)) for below in (rank, rank + 1)]
+    assert chances[0] <= 0.05 < chances[1]
+
+
 @pytest.mark.parametrize("thickness", [0.0, 0.004])
 def test_its_derivative_is_exact(thickness: float) -> None:
     model = Model(replace(problem(), thickness=thickness), SearchRun(0), 1000)
@@ -78,6 +96,36 @@ def test_its_derivative_is_exact(thickness: float) -> None:
             step[free] = 1e-6
             above, below = (model.at(u + sign * step).evaluation.objective for sign in (1, -1))
             assert (above - below) / 2e-6 == pytest.approx(slope, rel=1e-6, abs=1e-6 * np.abs(slopes).max())
+
+
+def test_many_designs_are_made_in_blocks_and_read_out_once_for_all_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
+    loaded, search = lamps()
+    points = search.space.points(0, 7)
+    drawn = LampsAndCameras(population_imager(problem().view), loaded.tolerance, 1)
+    pairs = [("green", "yellow"), YELLOW_RED]
+    size, read, made = loaded.grid.size, list[int](), list[int]()
+    monkeypatch.setattr(drawn_module, "_HELD", 3 * 101 * size)
+    smooth = LinearImager.smooth
+    monkeypatch.setattr(LinearImager, "smooth", lambda self, curves: read.append(len(curves)) or smooth(self, curves))
+
+    def come_out(off: Off, some: slice) -> np.ndarray:
+        made.append(len(points[some]))
+        return search.space.curves(points[some], size, off)
+
+    found = drawn.columns(come_out, len(points), pairs)
+    assert max(made) == 3
+    assert sum(read) == 7 * 101
+    for at in range(7):
+        alone = np.concatenate(
+            [search.space.curves(points[at : at + 1], size, off) for off in drawn.draws(pairs[0]).offs]
+        )
+        for pair in pairs:
+            assert found[f"csd_{pair[0]}_{pair[1]}"][at] == drawn.kept(alone, [pair])[pair][0]
+
+
+def test_jobs_are_small_where_each_design_sees_many_draws(tmp_path: Path) -> None:
+    given = study(tmp_path)
+    assert max(job.stop - job.start for job in jobs_of(given)) <= 32
 
 
 def share_with(x: np.ndarray, wanted_dn: float, draws: int = 200_000) -> tuple[float, float]:
@@ -125,7 +173,9 @@ def test_as_column_and_constraint_any_number_of_workers_gives_the_same(tmp_path:
     assert answer["feasible"]
     assert answer["yield_csd_yellow_red"] == pytest.approx(190.0, rel=1e-4)  # it binds: more light costs yield
     said = "\n".join(summary_lines(read_output(tmp_path / "out1")))
-    assert re.search(r"separates yellow from red by 190 DN for 99 % of lamps and cameras at 0\.\d+ of a clear", said)
+    assert re.search(
+        r"separates yellow from red by 190 DN for 99 % of drawn lamps and cameras at 0\.\d+ of a clear", said
+    )
     assert why_not(problem()) == "yield_csd_yellow_red is not linear in the filter"
 
 
@@ -138,6 +188,7 @@ def test_as_column_and_constraint_any_number_of_workers_gives_the_same(tmp_path:
             "yield_csd_yellow_red needs `population.wanted_yield`; allowed: a share, such as 0.99",
         ),
         ("draws: 4000", "draws: 500", "wanted_yield 0.99 needs at least 1,000 `draws`, not 500"),
+        ("draws: 4000", "draws: 1000001", "wanted_yield takes at most 1,000,000 `draws`, not 1,000,001"),
         ("wanted_yield: 0.99", "wanted_yield: 99", "population.wanted_yield"),
     ],
 )

@@ -10,8 +10,10 @@ import pytest
 from scipy.optimize import linprog
 
 from sweep.designs.tolerance import Off
+from sweep.metrics.bound import Bound
 from sweep.metrics.members import population_imager
 from sweep.metrics.objective import Objective
+from sweep.metrics.smooth import smooth_csd
 from sweep.search.limit import Limit, limit_of
 from sweep.search.problem import Problem, best_feasible, starting_points
 from sweep.search.produced import all_ways, ways_of
@@ -99,6 +101,19 @@ def test_its_filter_has_it_however_it_comes_out() -> None:
     assert 0 <= found.proven - found.attained <= 0.02
     least = min(np.sqrt(apart(moved(found.curve, shift)) ** 2 + others()).min() for shift in SHIFTS)
     assert least == pytest.approx(found.attained, abs=0.01)
+
+
+def test_its_filter_keeps_the_bounds_of_the_study_on_worst_cases() -> None:
+    """A program that knows some members of a worst case has filters that lack a little of it."""
+    bounds = {**problem().constraints, "worst_csd_yellow_red": Bound(min=256)}
+    asked = replace(problem(), constraints=bounds, objective=Objective(minimum={"csd_yellow_red": 1.0}))
+    found = limit_of(asked)
+    assert found.curve is not None
+    came_out = np.stack([way.curve(found.curve) for way in ways_of(asked)])[:, None]
+    each = smooth_csd(asked.view, came_out, ("yellow", "red"))
+    assert each.min() >= 256 * (1 - 1e-9)
+    assert each[0] == pytest.approx(found.attained, rel=1e-12)
+    assert 0 <= found.proven - found.attained <= 0.02
 
 
 def margin(t: float, sign: float) -> float:

@@ -17,6 +17,7 @@ from sweep.metrics.separation import separation
 from sweep.metrics.smooth import smooth_response
 from sweep.run import search as searching
 from sweep.search import trade_off
+from sweep.search.gradients import Model
 from sweep.search.limit import Limit, limit_of
 from sweep.search.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
 from sweep.search.solver import search_from
@@ -120,6 +121,32 @@ def test_settled_search_misses_nothing(study: Study, monkeypatch: pytest.MonkeyP
         assert best is not None
         assert more is not None
         assert more.objective <= best.objective * (1 + 1e-9)
+
+
+def test_a_search_whose_budget_is_spent_says_so(study: Study) -> None:
+    """Where it lies in one place just then, too; algorithms without gradients never end for that."""
+    assert study.search is not None
+    problem = study.problem(study.search)
+    run = search_from(problem, 0, starting_points(problem, 1, 1)[0], "COBYLA", 420)
+    assert len(run.log) == 420
+    assert run.status == "maxeval_reached"
+
+
+def test_a_search_has_not_settled_while_its_objective_moves(study: Study) -> None:
+    """Of a box a million times as wide as what matters in it."""
+    assert study.search is not None
+    plain = study.problem(study.search)
+    wide = replace(plain, high=plain.high + np.array([0, 0, 0, 1e7, 0]))
+    model = Model(wide, SearchRun(0), 1000)
+    x = plain.from_unit(np.full(plain.free.size, 0.4))
+    for width in np.linspace(5, 9, 16):
+        x[3] = width
+        model.at(wide.to_unit(x))
+    assert not model.settled
+    for step in range(16):
+        x[3] = 9 + 1e-6 * step
+        model.at(wide.to_unit(x))
+    assert model.settled
 
 
 def test_same_seed_same_log(study: Study) -> None:

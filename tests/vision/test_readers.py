@@ -22,7 +22,7 @@ from sweep.vision.readers import planes_of, read_images
 from sweep.vision.scenes import FIXED, ORDERS, SHUFFLED, draw_scenes
 from sweep.vision.scores import confusion_matrix, costs, macro_f1, mean_of, nested_weights
 
-from ..build import BASE, faults
+from ..build import BASE, faults, load
 from .heads import NO_FILTERS, head_view, vision
 
 THREE = ["red", "yellow", "green"]
@@ -190,6 +190,12 @@ def test_what_a_study_of_vision_cannot_be(tmp_path: Path) -> None:
     (found,) = faults(tmp_path, f"{BASE}pixel: {{bits: 14}}\n{asked.replace('yelow', 'yellow')}}}\n")
     assert "pixel.bits" in found
     assert "at most 12" in found
+    many = f"{asked.replace('yelow', 'yellow')}, crop_px: 48, places_per_pixel: 1, train_images: 30000"
+    (found,) = faults(tmp_path, f"{BASE}{many}, input: demosaicked}}\n")
+    assert "images take too much memory (CFA RGGB)" in found
+    assert "4.6 GiB" in found  # 30,000 images of 48 x 48 pixels, 3 channels of 8 bytes, held three times
+    load(tmp_path, f"{BASE}{many}}}\n")
+    load(tmp_path, f"{BASE}{many}, input: demosaicked, network: false}}\n")
 
 
 @pytest.mark.slow
