@@ -18,6 +18,7 @@ ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 # Tests start hundreds of processes, which would each compile the package's source anew.
 unexport PYTHONDONTWRITEBYTECODE
 TESTS := $(ONE_THREAD) $(BIN)/python -m pytest -n logical --dist
+KERNELS := $(shell grep -rl --include=*.py "from numba" sweep)
 
 .PHONY: study report test slow accuracy check documents bench clean
 .DELETE_ON_ERROR:
@@ -28,10 +29,10 @@ study: $(VENV)/.ready$(EXTRA)
 report: $(VENV)/.ready
 	$(BIN)/sweep report outputs/$(NAME)
 
-test: $(VENV)/.ready-dev
+test: $(VENV)/.compiled
 	$(TESTS) loadfile $(ARGS)
 
-slow: $(VENV)/.ready-dev
+slow: $(VENV)/.compiled
 	$(TESTS) worksteal -m slow $(ARGS)
 
 accuracy: $(VENV)/.ready-dev
@@ -74,6 +75,11 @@ $(VENV)/.ready-dev: pyproject.toml | $(VENV)/bin/python
 	$(INSTALLING)
 	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
 	@touch $@ $(VENV)/.ready $(VENV)/.ready-vision
+
+$(VENV)/.compiled: $(VENV)/.ready-dev tests/compile.py $(KERNELS)
+	@echo "Compiling what the tests share: once, which takes half a minute."
+	@$(ONE_THREAD) $(BIN)/python -m tests.compile
+	@touch $@
 
 $(VENV)/.ready-bench: pyproject.toml | $(VENV)/bin/python
 	$(INSTALLING)

@@ -21,7 +21,7 @@ from sweep.study import load_study
 
 from .conftest import STUDIES
 
-USUAL = ("stopband", "fog", "distance", "dual", "angle")
+USUAL = ("stopband", "fog", "distance", "dual", "angle", "robust")
 
 
 def said(name: str) -> tuple[float, float]:

@@ -23,7 +23,7 @@ from sweep.base.errors import StudyError
 from sweep.base.types import FloatArray
 from sweep.camera.effects import base, blur, noise, phase, quantization, sampling, saturation
 from sweep.camera.forget import forget_scenes
-from sweep.camera.kernel import pixels_per_place
+from sweep.camera.kernel_size import pixels_per_place
 from sweep.camera.methods import REFERENCE
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.noisy import table

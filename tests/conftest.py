@@ -13,7 +13,7 @@ import pytest
 
 from sweep.study import Study
 
-from .commanded import sweep
+from .commanded import commanded
 from .hard.registry import write_table
 
 ROOT = Path(__file__).parent.parent
@@ -101,9 +101,10 @@ def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Finish
                     text = text.replace(every, fewer)
                 study = outputs / f"{name}.yaml"
                 study.write_text(text)
-                done = sweep("run", str(study), "--output", str(outputs), "--jobs", "1")
-                assert done.returncode == 0, done.stderr
-                said.write_text(done.stdout)
+                data = ["--data", SHARED / "data"] if name == "measured" else []
+                code, out, err = commanded("run", study, "--output", outputs, "--jobs", 1, *data)
+                assert code == 0, err
+                said.write_text(out)
         return outputs / name
 
     return folder_of

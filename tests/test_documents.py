@@ -9,6 +9,7 @@ from collections.abc import Callable
 import pandas as pd
 import pytest
 
+from sweep.metrics.share import told_share
 from sweep.study import load_study
 
 from .conftest import ROOT, STUDIES, Finished
@@ -130,7 +131,7 @@ def test_the_table_of_the_readme_is_that_of_its_command(finished: Finished) -> N
     lines = [line for line in README.splitlines() if line.endswith(" % |")]
     assert len(lines) == len(names)
     cells = pd.read_parquet(folder / "regions.parquet").groupby(["norm", "design_id"])[["separated", "pairs"]].sum()
-    told_apart = 100 * cells["separated"] / cells["pairs"]
+    told_apart = cells["separated"] / cells["pairs"]
     at_angles = pd.read_parquet(finished("angle") / "results.parquet")
     over_places = at_angles[at_angles["scenario"] == "field"].set_index("name")
     others = {"nominal": "best at f/2", "best stopband": "best for all lamps"}
@@ -140,12 +141,12 @@ def test_the_table_of_the_readme_is_that_of_its_command(finished: Finished) -> N
     for line, name in zip(lines, names, strict=True):
         row = rows.loc[name]
         shares = [told_apart[norm, row["design_id"]] for norm in ("en_12368", "ite")]
-        cells_of_norms = [f"{s:.{0 if s == 100 else 3 if s > 99.95 else 1}f} % |" for s in shares]
-        assert line.endswith(f"| {' '.join(cells_of_norms)}"), name
+        *of_norms, kept = (told_share(share).replace("%", " %") for share in (*shares, row["yield"]))
+        assert line.endswith(f"| {' | '.join(of_norms)} |"), name
         values = (
             row["csd_yellow_red"],
             row["worst_csd_yellow_red"],
             over_places.loc[others.get(name, name)]["csd_yellow_red"],
         )
-        own = f"{' | '.join(f'{value:.0f} DN' for value in values)} | {100 * row['yield']:.1f} %"
+        own = f"{' | '.join(f'{value:.0f} DN' for value in values)} | {kept} |"
         assert own in line, name

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import re
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -51,6 +53,26 @@ ONLY_USER = {
 """Who alone may import a library: files, or all of a folder."""
 
 
+@cache
+def parsed(text: str) -> ast.Module:
+    """The tree of a file's text, made once for all that look at it."""
+    return ast.parse(text)
+
+
+@cache
+def nodes(text: str) -> list[ast.AST]:
+    """All nodes of a file's tree that the tests ask for: imports and functions."""
+    return [n for n in ast.walk(parsed(text)) if isinstance(n, ast.Import | ast.ImportFrom | ast.FunctionDef)]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def forgotten() -> Iterator[None]:
+    """Half a million nodes are of no use to other tests."""
+    yield
+    parsed.cache_clear()
+    nodes.cache_clear()
+
+
 def level(unit: str) -> int | None:
     return LEVELS.index(unit) if unit in LEVELS else None
 
@@ -66,7 +88,7 @@ def imported(path: Path, root: Path) -> list[tuple[int, str, tuple[str, ...]]]:
     """
     package = path.relative_to(root).parts[:-1]
     found: list[tuple[int, str, tuple[str, ...]]] = []
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in nodes(path.read_text()):
         if isinstance(node, ast.Import):
             found += [(node.lineno, alias.name.split(".")[0], ()) for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.level == 0:
@@ -141,7 +163,7 @@ def test_no_test_module_imports_another() -> None:
     """What several of them need has a module of its own."""
     root, found = Path(__file__).parent, []
     for path in root.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in nodes(path.read_text(encoding="utf-8")):
             if isinstance(node, ast.ImportFrom):
                 names = [*(node.module or "").split("."), *(alias.name for alias in node.names)]
                 if any(name.startswith("test_") for name in names):
@@ -222,7 +244,7 @@ def public_names(root: Path) -> dict[str, set[str]]:
     """What the files of a package define for others, with the files."""
     found: dict[str, set[str]] = {}
     for path in root.rglob("*.py"):
-        for node in ast.parse(path.read_text()).body:
+        for node in parsed(path.read_text()).body:
             names = [node.name] if isinstance(node, ast.FunctionDef | ast.ClassDef) else []
             if isinstance(node, ast.Assign):
                 names = [target.id for target in node.targets if isinstance(target, ast.Name)]
@@ -240,7 +262,7 @@ def too_long(root: Path) -> list[str]:
         text = path.read_text()
         if len(text.splitlines()) > MOST_LINES:
             found.append(f"{path.relative_to(root)} has {len(text.splitlines())} lines")
-        for node in ast.walk(ast.parse(text)):
+        for node in nodes(text):
             if (
                 isinstance(node, ast.FunctionDef)
                 and node.end_lineno

@@ -22,6 +22,7 @@ from .compiled_areas import CellWeights, areas
 from .compiled_cells import SEGMENTS, SHARP, Envelopes, Light, deviations, ranges
 from .compiled_classes import CellBounds, deviations_of_channels
 from .effects import blur, crosstalk, demosaic, sampling
+from .kernel_size import pixels_per_place
 from .methods import Methods
 from .view import View
 
@@ -152,7 +153,7 @@ class Between:
 
         `low`, `high`: range of the kernel over the corners, ndarray[n, n_channels, n_channels, n_parts].
         """
-        step = max(1, _AT_ONCE // (kernel.pixels_per_place(self._view) * self.n_parts))
+        step = max(1, _AT_ONCE // (pixels_per_place(self._view) * self.n_parts))
         parts = []
         for at in range(0, len(centers), step):
             some = slice(at, at + step)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import DTypeLike
 
-from ..base.types import BoolArray, FloatArray
+from ..base.types import BoolArray, FloatArray, IndexArray
 from ..designs.block import Block
 from ..designs.products import row_products
 from .effects import flicker, quadrature
@@ -22,6 +22,7 @@ from .field import over_field
 from .kernel import Kernel
 from .registry import factor_of_light
 from .seen import SeenFilters
+from .split_light import SplitLight
 from .view import View, background_irradiance, per_photon, signal_irradiance
 
 KEPT = 15_000_000
@@ -84,19 +85,26 @@ class Electrons:
         fixed, modified = list(view.fixed), list(view.modified)
         places = over_field(view)
         self.seen = [SeenFilters(place, view.methods.angle) for place in places]
-        self.place = np.repeat(np.arange(len(places)), len(kernel.light) // len(places))
+        self.place = np.repeat(np.arange(len(places)), kernel.shape[0] // len(places))
+        self._split = kernel.source if isinstance(kernel.source, SplitLight) and len(places) == 1 else None
         background = [_background(place) for place in places]
         each = [np.repeat(light[None], len(modified), axis=0) for light in background]
         self.background = np.stack([seen.light(light, modified) for seen, light in zip(self.seen, each, strict=True)])
-        self.fixed = self._products(kernel.light[:, :, fixed], view.qe[None, fixed], fixed)[0]
+        if self._split is None:
+            self.fixed = self._products(kernel.light[:, :, fixed], view.qe[None, fixed], fixed)[0]
+        else:
+            self.fixed = self._of_pixels(self._split, view.qe[None, fixed], fixed)[0]
         rates = [s.curves(view.qe[fixed], fixed) @ light for s, light in zip(self.seen, background, strict=True)]
         self._fixed_uniform = np.einsum("xuc,xc->xu", kernel.uniform[:, :, fixed], np.stack(rates)[self.place])
         self._modified_uniform = kernel.uniform[:, :, modified]
         # Units that look through a filter that changes; electrons/s per QE of it, kept where the table is small.
-        self._touched = np.flatnonzero((kernel.light[:, :, modified] != 0).any(axis=(0, 2, 3)))
-        self._modified = kernel.light[:, self._touched][:, :, modified]
-        size = self._modified[..., 0].size * len(self.signals) * self._nodes.size
-        self._kept = self._table().astype(dtype, copy=False) if 0 < size <= KEPT and not once else None
+        if self._split is None:
+            self._touched = np.flatnonzero((kernel.light[:, :, modified] != 0).any(axis=(0, 2, 3)))
+            self._modified = kernel.light[:, self._touched][:, :, modified]
+            size = self._modified[..., 0].size * len(self.signals) * self._nodes.size
+            self._kept = self._table().astype(dtype, copy=False) if 0 < size <= KEPT and not once else None
+        else:
+            self._touched, self._kept = self._split.touched(modified), None
 
     def _looked_at(self, qe: FloatArray, channels: Sequence[int], place: int = 0) -> FloatArray:
         """QE of some channels as the quadrature sees it (itself, or linear between its nodes), and then the rays."""
@@ -114,6 +122,14 @@ class Electrons:
         """
         parts = [self._products_at(at, light[self.place == at], qe, of) for at in range(len(self.seen))]
         return np.concatenate(parts, axis=1)
+
+    def _of_pixels(
+        self, split: SplitLight, qe: FloatArray, of: Sequence[int], units: IndexArray | None = None
+    ) -> FloatArray:
+        """`_products` of a light in factors."""
+        spectra = self._looked_at(qe, of)[:, :, None] * self.signals
+        self._work["response"] += len(qe) * split.work(len(of), len(self.signals))
+        return split.sums(spectra, of, units)
 
     def _products_at(self, place: int, light: FloatArray, qe: FloatArray, of: Sequence[int]) -> FloatArray:
         """Of the cases of one place of the field."""
@@ -149,7 +165,9 @@ class Electrons:
         found = np.repeat(self.fixed[None], len(curves), axis=0)
         if not self._touched.size:
             return found
-        if self._kept is None:
+        if self._split is not None:
+            part = self._of_pixels(self._split, curves, self.view.modified, self._touched)
+        elif self._kept is None:
             part = self._products(self._modified, curves, self.view.modified)
         else:
             qe = curves[:, :, self._nodes].reshape(len(curves), -1).astype(self._kept.dtype)

@@ -41,15 +41,22 @@ def exposure_times(view: View, modified_white: FloatArray, fixed: float | None =
     return np.asarray(np.divide(full_e, brightest, out=found, where=brightest > 0), dtype=float)
 
 
-def may_set_exposure(view: View) -> bool:
+def may_set_exposure(view: View, most: float = 1.0) -> bool:
     """Whether a modified channel up to its base curve may be the one that is exposed for: the brightest on white.
+
+    `most`: the largest sensitivity that it has, its sum over that of its base curve.
+    """
+    return isinstance(view.scenario.exposure, WhitePatchExposure) and not leaves_exposure(view) >= most
+
+
+def leaves_exposure(view: View) -> float:
+    """The largest sensitivity with which no modified channel is the brightest on white; infinite for dark bases.
 
     The white patch is flat in photons, so sums of the curves say it, the same for equal curves.
     """
     rates = view.qe.sum(axis=1)
-    kept, modified = rates[list(view.fixed)], rates[list(view.modified)]
-    of_white = isinstance(view.scenario.exposure, WhitePatchExposure)
-    return of_white and not (kept.size and kept.max() >= modified.max(initial=0.0))
+    kept, modified = rates[list(view.fixed)].max(initial=0.0), rates[list(view.modified)].max(initial=0.0)
+    return float(kept / modified) if modified > 0 else np.inf
 
 
 def relative_slope(view: View, white: FloatArray, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:

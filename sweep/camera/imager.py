@@ -23,7 +23,8 @@ from ..designs.block import Block
 from .effects import phase
 from .electrons import Changing, Electrons
 from .field import over_field
-from .kernel import blocks, kept_kernel, make_kernel
+from .kernel import kept_kernel, make_kernel
+from .kernel_size import blocks
 from .noisy_readout import NoisyReadout
 from .places import AnyPlace
 from .readout import Readout
@@ -63,7 +64,7 @@ class Imager:
             kernel = kept_kernel(view, by_pixel=by_pixel, work=self.work)
         else:
             kernel = make_kernel(view, methods, grid.nodes_nm, by_pixel=by_pixel, work=self.work, cases=cases)
-        self.n_cases, self.n_units = kernel.light.shape[:2]
+        self.n_cases, self.n_units = kernel.shape
         each = len(over_field(view))
         self.n_places = self.n_cases + each * sum(len(block.places_px) for block in self._others)
         self.electrons = Electrons(view, kernel, self.work, dtype, once=once)

@@ -10,7 +10,7 @@ import hashlib
 import pickle
 from collections import Counter
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -19,37 +19,46 @@ from ..base.types import FloatArray
 from ..curves.hats import hats
 from .effects import blur, crosstalk, demosaic, phase, sampling
 from .field import over_field
-from .methods import REFERENCE, Methods
+from .kernel_size import pixels_per_place
+from .methods import Methods
 from .mosaic import Mosaic
 from .registry import factor_of_light
+from .split_light import SplitLight
 from .view import View
 
 _HELD = 8_000_000
 """Values of pixels that are held at once."""
-MOST_KERNEL_BYTES = 2 * 2**30
-"""What the images of a scene may take of a worker's memory."""
 _KEPT_BYTES = 16 * 2**20
 """Kernels that take more are not kept."""
-_COPIES = 4
-"""So many arrays of the size of a kernel are held while it is made."""
 
 
 @dataclass(frozen=True)
 class Kernel:
     """Weights of a scene.
 
-    `light`: ndarray[n_cases, n_units, n_channels, n_wavelengths], what a unit gets of a signal's light through each
-    channel's filter, relative to a uniform field on axis in clear air. `uniform`: ndarray[n_cases, n_units,
+    `source`: `light` as an array, or, of the pixels of a target, in factors. `uniform`: ndarray[n_cases, n_units,
     n_channels], the same of a uniform background, which nothing has dimmed yet. `readout`: ndarray[n_cases, n_units,
     n_channels], weight of each unit in the value of each channel, `spread`: of its variance in that of the channel. A
     case is a place of the light on the mosaic. `by_channel`: whether each unit is a channel; else it is a pixel.
     """
 
-    light: FloatArray
+    source: FloatArray | SplitLight
     uniform: FloatArray
     readout: FloatArray
     spread: FloatArray
     by_channel: bool
+
+    @cached_property
+    def light(self) -> FloatArray:
+        """What a unit gets of a signal's light through each channel's filter, relative to a uniform field on axis in
+        clear air, ndarray[n_cases, n_units, n_channels, n_wavelengths].
+        """
+        return self.source.whole() if isinstance(self.source, SplitLight) else self.source
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Cases and units."""
+        return self.source.shape[0], self.source.shape[1]
 
 
 def colorless(view: View) -> View:
@@ -92,8 +101,18 @@ def make_kernel(
             step = max(1, _HELD // (pixels_per_place(view) * max(len(view.mosaic.channels) ** 2, knots.size)))
             blocks = [cases.some(slice(at, at + step)) for at in range(0, len(cases.places_px), step)]
             made = _joined([_pixels(view, methods, knots, block, by_pixel=False, work=work) for block in blocks])
-        light = made.light if knots is wavelength_nm else _interpolated(made.light, knots, wavelength_nm)
-    return replace(made, light=light * factor_of_light(view, methods, wavelength_nm))
+        same = knots is wavelength_nm or _one_light(made.source)
+        between = None if same else hats(wavelength_nm, knots)
+        if isinstance(made.source, SplitLight):
+            factor = np.broadcast_to(factor_of_light(view, methods, wavelength_nm), wavelength_nm.shape)
+            return replace(made, source=replace(made.source, hats=between, factor=factor))
+        light = made.light if between is None else made.light @ between
+    return replace(made, source=light * factor_of_light(view, methods, wavelength_nm))
+
+
+def _one_light(source: FloatArray | SplitLight) -> bool:
+    """Whether every wavelength sees the same."""
+    return bool((source.values if isinstance(source, SplitLight) else source).shape[-1] == 1)
 
 
 KERNELS: Cache[bytes, tuple[Kernel, Counter[str]]] = Cache(8)
@@ -118,13 +137,6 @@ def kept_kernel(view: View, *, by_pixel: bool, work: Counter[str]) -> Kernel:
     kernel, own = KERNELS.get(hashlib.sha256(pickle.dumps((over, colorless(view)))).digest(), made)
     work.update(own)
     return kernel
-
-
-def _interpolated(light: FloatArray, knots: FloatArray, wavelength_nm: FloatArray) -> FloatArray:
-    """Linear between the knots along the last axis."""
-    if light.shape[-1] == 1:
-        return light
-    return np.asarray(light @ hats(wavelength_nm, knots), dtype=float)
 
 
 def _uniform(view: View, methods: Methods, *, by_pixel: bool) -> Kernel:
@@ -156,46 +168,6 @@ def _ideal(view: View, methods: Methods, wavelength_nm: FloatArray) -> Kernel:
         lost = np.interp(wavelength_nm, knots, kept)
     own = np.eye(uniform.shape[-1])[None]
     return Kernel(uniform[..., None] * lost, uniform, own, own, by_channel=True)
-
-
-def pixels_per_place(view: View) -> int:
-    """About how many pixels are looked at around each place of a light."""
-    target, rows_columns = view.scenario.target, view.mosaic.indices.shape
-    if target is None:
-        return int(np.prod(rows_columns))
-    reach = sampling.reach_px(view, target)
-    return int(np.prod([2 * reach + n + 3 for n in rows_columns]))
-
-
-def bytes_per_place(view: View, *, by_pixel: bool) -> int:
-    """About how much memory the kernel of one place of a light takes while it is made."""
-    n = len(view.mosaic.channels)
-    units = pixels_per_place(view) if by_pixel else n
-    return 8 * _COPIES * units * n * view.grid.size * len(over_field(view))
-
-
-def blocks(view: View, cases: phase.Cases) -> list[phase.Cases]:
-    """Places whose kernels, pixel by pixel, fit into half of `MOST_KERNEL_BYTES` together."""
-    step = max(1, MOST_KERNEL_BYTES // 2 // bytes_per_place(view, by_pixel=True))
-    return [cases.some(slice(at, at + step)) for at in range(0, len(cases.places_px), step)]
-
-
-def too_large(view: View) -> tuple[str, str, str] | None:
-    """Why a target's kernel is not computed: problem, value, what is allowed; None when it is."""
-    if view.scenario.target is None:
-        return None
-    channels = f"{len(view.mosaic.channels)} channels and {view.grid.size} wavelengths"
-    if (one := bytes_per_place(view, by_pixel=True)) > MOST_KERNEL_BYTES:
-        problem = f"{pixels_per_place(view):,} pixels around the light, of {channels}, take too much memory"
-        return problem, f"{one / 2**30:.1f} GiB", f"at most {MOST_KERNEL_BYTES / 2**30:g} GiB"
-    places = len(phase.places_px(view, REFERENCE.phase))
-    if places > phase.MOST:
-        problem = f"a light at any place of a tile of {view.mosaic.indices.size:,} pixels has too many places"
-        return problem, f"{places:,}", f"at most {phase.MOST:,} (a tile of {phase.MOST // 16} pixels), or a named place"
-    if (every := places * bytes_per_place(view, by_pixel=False)) > MOST_KERNEL_BYTES:
-        problem = f"{places:,} places of the light, of {channels}, take too much memory"
-        return problem, f"{every / 2**30:.1f} GiB", f"at most {MOST_KERNEL_BYTES / 2**30:g} GiB"
-    return None
 
 
 def _joined(parts: list[Kernel]) -> Kernel:
@@ -288,11 +260,13 @@ def _apart(light: sampling.PixelLight, own: FloatArray, apart: FloatArray, share
         steps = ((-1, 0), (1, 0), (0, -1), (0, 1))
         taken += [(share / 4, rows + down, columns + right) for down, right in steps]
     n = own.shape[2]
-    split = np.zeros((len(apart), rows.size, n, light.values.shape[1]))
     uniform = np.zeros((len(apart), rows.size, n))
-    pixels, through = np.arange(rows.size), own.argmax(axis=2)
+    pixels, channel = np.arange(rows.size), own.argmax(axis=2)
     for part, row, column in taken:
-        split[:, pixels, through[row, column]] += part * light.values[light.place[:, row, column]]
-        uniform[:, pixels, through[row, column]] += part
+        uniform[:, pixels, channel[row, column]] += part
+    shares = np.array([part for part, _, _ in taken])
+    place = np.stack([light.place[:, row, column] for _, row, column in taken])
+    through = np.stack([channel[row, column] for _, row, column in taken])
+    split = SplitLight(light.values, None, np.ones(light.values.shape[1]), shares, place, through, n)
     readout = apart[:, used]
     return Kernel(split, uniform, readout, readout**2, by_channel=False)

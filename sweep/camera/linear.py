@@ -20,6 +20,7 @@ from .exposure import relative_slope
 from .imager import Imager
 from .methods import REFERENCE
 from .pixel import unquantized
+from .split_light import SplitLight
 from .view import View
 
 _STEPS_DN2 = 1 / 12
@@ -125,7 +126,11 @@ class LinearImager(Imager):
         own, channel = self.by_pixel, self.view.modified[modified]
         kernel = own.electrons.kernel
         share = kernel.spread[:, :, channel]
-        light = np.einsum("xu,xuw->xw", share, kernel.light[:, :, channel])
+        split = kernel.source
+        if isinstance(split, SplitLight):
+            light = split.folded(share, channel)
+        else:
+            light = np.einsum("xu,xuw->xw", share, split[:, :, channel])
         uniform = (share * kernel.uniform[:, :, channel]).sum(axis=1)
         return own._per_qe(modified, curves, light[:, None], uniform[:, None])[:, :, 0]
 

@@ -14,7 +14,8 @@ from ..base.types import FloatArray
 from . import compiled_light, legendre
 from .effects import crosstalk, demosaic, phase, sampling
 from .encircled import encircled
-from .kernel import pixels_per_place, profile_of
+from .kernel import profile_of
+from .kernel_size import pixels_per_place
 from .methods import Methods
 from .view import View
 

@@ -32,7 +32,7 @@ class Readout:
 
     def __init__(self, view: View, kernel: Kernel, work: Counter[str]) -> None:
         self.view = view
-        self.n_cases = len(kernel.light)
+        self.n_cases = kernel.shape[0]
         self._weights, self._spread = kernel.readout, kernel.spread
         self._work = work
         pixel = view.pixel

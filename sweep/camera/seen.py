@@ -58,9 +58,11 @@ class SeenFilters:
 
     def matrix(self, channel: int) -> csr_matrix:
         """That of a channel, whether it moves or not."""
+        if channel in self.matrices:
+            return self.matrices[channel]
         from scipy.sparse import csr_matrix, eye_array  # noqa: PLC0415  (slow to import: only where filters move)
 
-        return self.matrices.get(channel, csr_matrix(eye_array(self._size)))
+        return csr_matrix(eye_array(self._size))
 
     def curves(self, qe: FloatArray, channels: Sequence[int]) -> FloatArray:
         """Curves of some channels, ndarray[..., n, n_wavelengths], as the rays see them."""

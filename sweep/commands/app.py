@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
-from typing import Annotated
+from collections.abc import Callable
+from functools import cache
+from typing import Annotated, Any
 
 import typer
 
@@ -47,6 +49,12 @@ def _add_verbs() -> None:
 _add_verbs()
 
 
+@cache
+def _parser() -> Callable[..., Any]:
+    """What reads the arguments, made once in a process that gives several commands."""
+    return typer.main.get_command(app)
+
+
 def main() -> None:
     """Run the command; what goes wrong is one line each on stderr and an exit code, 2 for a fault of the input."""
-    ends_in_lines(lambda: app(prog_name="sweep", standalone_mode=False))
+    ends_in_lines(lambda: _parser()(prog_name="sweep", standalone_mode=False))

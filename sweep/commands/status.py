@@ -9,6 +9,7 @@ from typing import Any
 
 from ..base.disk import read_facts
 from ..base.errors import OutputError
+from ..metrics.share import told_share
 from ..results.folder import held_by
 from ..results.inventory import Inventory, faults_of, no_run
 from ..results.journal import SHARDS, Entry, Journal
@@ -42,7 +43,7 @@ def status_lines(folder: Path, *, verify: bool = False) -> list[str]:
     done, total = sum(entry.rows for entry in rows), _number(inventory.facts, "designs")
     faults = sum(entry.failed for entry in rows)
     state = f"running ({running})" if running else "interrupted; the same command continues"
-    share = f" ({done / total:.1%})" if total else ""
+    share = f" ({told_share(done / total)})" if total else ""
     lines = [f"{state}: {done:,} of {total:,} designs{share}, {faults:,} failed, {len(rows):,} chunks finished."]
     answers = len(entries) - len(rows)
     if answers:

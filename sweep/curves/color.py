@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from importlib import resources
 
 import numpy as np
 
@@ -25,6 +26,7 @@ class ColorRegion:
 
 
 _GRAY = 0.5
+_OBSERVER = "cie_1931.csv"
 _EN_12368 = "EN 12368 (traffic control equipment, signal heads), color regions of signal lights"
 REGIONS = {
     "red": ColorRegion(((0, -1, -0.290), (-1, -1, -0.980), (0, 1, 0.320)), _EN_12368),
@@ -39,16 +41,20 @@ green: y <= 0.726 - 0.726 x, x <= 0.625 y - 0.041, y >= 0.400."""
 
 
 @cache
-def color_matching(grid: WavelengthGrid) -> FloatArray:
-    """CIE 1931 2 degree color-matching functions on the grid, ndarray[3, n_wavelengths] (colour-science).
+def _observer(grid: WavelengthGrid) -> FloatArray:
+    """The CIE 1931 2 degree observer's x, y and z, and V(lambda) of 1924, on the grid, ndarray[4, n_wavelengths].
 
-    0 outside 360 to 830 nm, where they are not defined: the eye sees next to nothing there.
+    The tables of colour-science, which takes a second to import. 0 outside 360 to 830 nm, where they are not defined:
+    the eye sees next to nothing there.
     """
-    from colour import MSDS_CMFS  # noqa: PLC0415  (more than a second to import)
+    with resources.files("sweep.curves.builtin").joinpath(_OBSERVER).open(encoding="utf-8") as file:
+        wave, *columns = np.loadtxt(file, delimiter=",", skiprows=1).T
+    return np.stack([np.interp(grid.nodes_nm, wave, column, left=0, right=0) for column in columns])
 
-    functions = MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
-    wave = functions.wavelengths
-    return np.stack([np.interp(grid.nodes_nm, wave, column, left=0, right=0) for column in functions.values.T])
+
+def color_matching(grid: WavelengthGrid) -> FloatArray:
+    """CIE 1931 2 degree color-matching functions on the grid, ndarray[3, n_wavelengths]; 0 outside 360 to 830 nm."""
+    return _observer(grid)[:3]
 
 
 VISIBLE_NM = (360.0, 830.0)
@@ -57,15 +63,8 @@ LUMINOUS_EFFICACY_LM_W = 683.002
 """Of monochromatic light at 540 THz, which defines the candela."""
 
 
-@cache
-def _photopic(grid: WavelengthGrid) -> FloatArray:
-    """V(lambda), CIE 1924, on the grid, ndarray[n_wavelengths] (colour-science)."""
-    from colour import SDS_LEFS  # noqa: PLC0415  (more than a second to import)
-
-    efficiency = SDS_LEFS["CIE 1924 Photopic Standard Observer"]
-    return np.asarray(
-        np.interp(grid.nodes_nm, efficiency.wavelengths, efficiency.values, left=0.0, right=0.0), dtype=float
-    )
+_XYZ_TO_RGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.204, 1.057]])
+"""Of sRGB (IEC 61966-2-1)."""
 
 
 def luminance_per_photon_radiance(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
@@ -74,7 +73,7 @@ def luminance_per_photon_radiance(grid: WavelengthGrid, photons: FloatArray) -> 
     L = 683 integral(V h c / lambda S) d lambda, S in photons per nm; 0 for spectra outside VISIBLE_NM.
     """
     power = energy_from_photons(grid.nodes_nm, photons)
-    return np.asarray(LUMINOUS_EFFICACY_LM_W * grid.integrate(power * _photopic(grid)), dtype=float)
+    return np.asarray(LUMINOUS_EFFICACY_LM_W * grid.integrate(power * _observer(grid)[3]), dtype=float)
 
 
 def chromaticity(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
@@ -89,11 +88,10 @@ def display_colors(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
     Saturated lights lie outside sRGB; negative primaries are cut off (the color shown is the nearest in hue, not the
     light's own). What nobody sees is gray.
     """
-    from colour.models import XYZ_to_sRGB, eotf_inverse_sRGB  # noqa: PLC0415  (more than a second to import)
-
     xyz = energy_from_photons(grid.nodes_nm, photons) @ color_matching(grid).T
     seen = xyz.max(axis=1) > 0
     colors = np.full((len(xyz), 3), _GRAY)
-    linear = np.clip(XYZ_to_sRGB(xyz[seen] / xyz[seen].max(axis=1, keepdims=True), apply_cctf_encoding=False), 0, None)
-    colors[seen] = eotf_inverse_sRGB(linear / linear.max(axis=1, keepdims=True))
+    linear = np.clip(xyz[seen] / xyz[seen].max(axis=1, keepdims=True) @ _XYZ_TO_RGB.T, 0, None)
+    linear = linear / linear.max(axis=1, keepdims=True)
+    colors[seen] = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     return colors

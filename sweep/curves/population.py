@@ -33,7 +33,9 @@ Yellow, orange and red LEDs are of AlGaInP: the peak follows the band gap E, d l
 Varshni's -d E / d T = a T (T + 2 b) / (T + b)^2. InP's a = 0.363 meV/K and b = 162 K (Vurgaftman, Meyer, Ram-Mohan,
 "Band parameters for III-V compound semiconductors", J. Appl. Phys. 89, 5815, 2001) give 0.32 meV/K at 300 K: 0.09 nm/K
 at 592 nm, 0.105 nm/K at 640 nm. Green is of InGaN, whose peak follows the gap less: 0.02 to 0.04 nm/K, the middle of it
-here. A study of certain LEDs should state what their data sheets say.
+here, a usual figure without a source. None of these was compared with the text of a maker's data sheet: a study of
+certain LEDs should state what theirs say. (Data sheets often give the drift of the dominant wavelength, which of red
+LEDs is less than that of the peak, because the eye's sensitivity falls there.)
 """
 
 

@@ -33,11 +33,12 @@ SIGNAL_REGIONS: Mapping[str, Mapping[str, ColorRegion]] = {
 """What yellow and red lights a norm allows, between these bounds and the spectral locus, with corners (x, y).
 
 EN 12368: yellow (0.593, 0.387), (0.536, 0.444), red (0.660, 0.320), (0.690, 0.290). ITE: yellow 0.411 <= y <= 0.452,
-y >= 0.995 - x: (0.584, 0.411), (0.543, 0.452), red y <= 0.308, y >= 0.998 - x: (0.690, 0.308). Bounds of both as
+y >= 0.995 - x: (0.584, 0.411), (0.543, 0.452), red y <= 0.308, y >= 0.998 - x: (0.690, 0.308). ITE's supplement for
+LED circular signals of 2005, which replaced part 2, is not in it: its bounds could not be read. Bounds of both as
 compared by the Lighting Research Center, Rensselaer, "LED Traffic Signal Comparison". UN R48, which SAE J578 shares:
 yellow (0.545, 0.425), (0.597, 0.390), red (0.645, 0.335), (0.721, 0.259), of vehicles' lamps.
 """
-NORM_NAMES: Mapping[str, str] = {"en_12368": "EN 12368", "ite": "ITE", "un_r48": "UN R48 and SAE J578"}
+NORM_NAMES: Mapping[str, str] = {"en_12368": "EN 12368", "ite": "ITE (1985, 1998)", "un_r48": "UN R48 and SAE J578"}
 
 
 def corners(*points: tuple[float, float], source: str) -> ColorRegion:

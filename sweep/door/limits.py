@@ -7,10 +7,12 @@ from typing import cast
 
 import numpy as np
 
+from ..camera.exposure import leaves_exposure
 from ..camera.view import View
 from ..designs.families.stopband import Stopband
 from ..designs.family import Family
 from ..metrics.bound import Bound
+from ..metrics.columns.sensitivity import SENSITIVITY
 from ..search.limit import Limit, limit_of, why_not
 from ..search.problem import Problem
 from ..study import Study
@@ -43,6 +45,16 @@ def at_least(problem: Problem, quantity: str, value: float) -> Problem:
     lower = value if old is None or old.min is None else max(value, old.min)
     bound = Bound(min=lower, max=None if old is None else old.max)
     return replace(problem, constraints={**problem.constraints, quantity: bound})
+
+
+def as_exposed(problem: Problem) -> Problem:
+    """The problem of filters that are not the brightest on white, and so leave the exposure to other pixels."""
+    most = min(1.0, leaves_exposure(problem.view))
+    old = problem.constraints.get(SENSITIVITY)
+    bound = Bound(
+        min=None if old is None else old.min, max=most if old is None or old.max is None else min(most, old.max)
+    )
+    return replace(problem, constraints={**problem.constraints, SENSITIVITY: bound})
 
 
 def limit_or_reason(problem: Problem) -> tuple[Limit | None, str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from ..base.errors import DataError, Fault
 from ..base.types import FloatArray
+from ..camera.exposure import may_set_exposure
 from ..camera.mosaic import Mosaic
 from ..curves.lights import Pair, class_pairs
 from ..designs.technology import Technology
@@ -19,7 +20,7 @@ from ..metrics.quantity import Column, Columns
 from ..metrics.separation import csd_name
 from ..metrics.smooth import smooth_csd
 from ..study import Study
-from .limits import any_filter, at_least, limit_or_reason
+from .limits import any_filter, as_exposed, at_least, limit_or_reason
 from .opening import Given, made_study
 from .own_filters import judged, table_of, verdict
 
@@ -177,23 +178,38 @@ def _limit(
 ) -> tuple[float | None, float | None, str, str]:
     """The filter before quantization, the limit, the curve below which it holds, and why there is none.
 
-    Of filters below the curve that this one replaces; where this one is not, of those below the clear pixel.
+    Of filters below the curve that this one replaces, or else the clear pixel; or else below that curve and this one,
+    whichever is larger, that are not the brightest on white, where this one is not.
     """
     scenario, bases = next(iter(study.scenarios)), asked.bases
     if len(bases) > 1:
         return None, None, "", "more than one modified channel"
     ((channel, base),) = bases.items()
-    for below in dict.fromkeys((base, study.sensor.clear)):
-        ceiling = study.sensor.curve(below)
-        if (curves[0, 0] <= ceiling * (1 + _SAME)).all():
-            view = study.view_of(own, scenario, {channel: below}, asked.technology)
-            problem = at_least(any_filter(study, view), CFA_SENSITIVITY, light)
-            found, reason = limit_or_reason(problem)
-            if found is None:
-                return None, None, below, reason
-            return float(smooth_csd(problem.view, curves, asked.pair)[0]), found.proven, below, ""
-    over = study.grid.nodes_nm[np.argmax(curves[0, 0] - study.sensor.curve(study.sensor.clear))]
-    return None, None, "", f"at {over:g} nm the filter lets more through than {base} and {study.sensor.clear}"
+    clear_name = study.sensor.clear
+    curve, replaced, clear = curves[0, 0], study.sensor.curve(base), study.sensor.curve(clear_name)
+    view = study.view_of(own, scenario, {channel: base}, asked.technology)
+    smooth = float(smooth_csd(view, curves, asked.pair)[0])
+    larger = base if _below(curve, replaced) else f"the larger of {base} and itself"
+    for below, ceiling, exposed in (
+        (base, replaced, False),
+        (clear_name, clear, False),
+        (f"{larger}, which leaves the exposure to other pixels,", np.maximum(replaced, curve), True),
+    ):
+        if _below(curve, ceiling):
+            qe = view.qe.copy()
+            qe[view.modified[0]] = ceiling
+            problem = at_least(any_filter(study, replace(view, qe=qe)), CFA_SENSITIVITY, light)
+            if exposed and may_set_exposure(problem.view, float(curve.sum() / ceiling.sum())):
+                return None, None, "", "the filter is the brightest on white, and sets the exposure"
+            found, reason = limit_or_reason(as_exposed(problem) if exposed else problem)
+            if found is not None:
+                return smooth, found.proven, below, ""
+    return None, None, "", reason
+
+
+def _below(curve: FloatArray, ceiling: FloatArray) -> bool:
+    """Whether a curve is nowhere above another one, but for rounding."""
+    return bool((curve <= ceiling * (1 + _SAME)).all())
 
 
 def opposite(mosaic: Mosaic, channel: str, known: Mapping[str, FloatArray]) -> str:

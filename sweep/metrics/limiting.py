@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.types import FloatArray
-from ..camera.imager import Imager
+from ..camera.view import View
 from ..curves.lights import Pair, class_pairs, pair_name
 
 BETWEEN = " / "
@@ -16,14 +16,12 @@ def limited_by_name(pair: Pair) -> str:
     return pair_name("limited_by", pair)
 
 
-def limiting_lights(imager: Imager, curves: FloatArray) -> dict[Pair, tuple[str, str]]:
+def limiting_lights(view: View, cases: FloatArray) -> dict[Pair, tuple[str, str]]:
     """The two lights that limit each CSD of one design, the first of the first type of a pair.
 
-    `curves`: ndarray[1, n_modified, n_wavelengths]. Of a light that may fall anywhere, the places are those of the
-    method's lattice. A pair without a distance is left out.
+    `cases`: its readout, DN, ndarray[n_cases, n_signals, n_channels]. Of a light that may fall anywhere, the places are
+    those of the method's lattice. A pair without a distance is left out.
     """
-    view = imager.view
-    cases = imager.read(curves)[0][0]
     limiting: dict[Pair, tuple[str, str]] = {}
     for pair in class_pairs(view.lights.classes):
         first, second = (view.members[name] for name in pair)

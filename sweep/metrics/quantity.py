@@ -158,7 +158,7 @@ class Quantity(Column):
         meaning = (
             f"at least {told} of the drawn lamps and cameras (`population`, `production`) have this `{self.name}`, and "
             f"with 95 % confidence {told} of all, where the design was not chosen by the same draws: the mean of draws "
-            "of a rank so low, before clipping and rounding, with everything on"
+            "of a rank so low, before clipping and rounding, with everything on; no limit is computed of it"
         )
         label = f"{self.words} of {told} of drawn lamps and cameras"
         named = replace(self, name=YIELD + self.name, meaning=meaning, label=label, extreme=OF_A_SHARE, of=self.name)

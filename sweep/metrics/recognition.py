@@ -11,10 +11,10 @@ import numpy as np
 from ..base.types import FloatArray, IndexArray
 from ..camera.effects import noise
 from ..camera.imager import Imager
+from .share import share_interval
 
 MOST_LIKELY = "most_likely"
 """Name of the rule that knows mean and variance of every signal's channels."""
-_CONFIDENCE = 0.95
 _LEAST_VARIANCE = 1e-6
 _MOST_PIXELS = 1024
 _AT_ONCE = 4_000_000
@@ -57,7 +57,7 @@ def recognize(
     scene's places with its own Poisson electrons and gain errors. The classifiers see raw digital numbers (of a patch
     with more than 1,024 pixels a random choice of so many, the same for all), train on one half and are tested on the
     other. The most likely rule takes the channels' readout and the signal with the largest Gaussian likelihood at the
-    patch's place, and says its state. Intervals are Wilson's.
+    patch's place, and says its state. Intervals: see `share_interval`.
     """
     members = {name: imager.view.members[name] for name in states}
     signals = np.concatenate(list(members.values()))
@@ -112,10 +112,7 @@ class _MostLikely:
 
 
 def _accuracy(rule: str, truth: Any, said: Any) -> Iterator[tuple[str, float]]:
-    from scipy.stats import binomtest
-
     right = np.asarray(truth == said)
-    interval = binomtest(int(right.sum()), right.size).proportion_ci(_CONFIDENCE, method="wilson")
     worst = min(float(right[truth == state].mean()) for state in np.unique(truth))
-    values = (float(right.mean()), float(interval.low), float(interval.high), worst)
+    values = (float(right.mean()), *share_interval(int(right.sum()), right.size), worst)
     yield from zip(_columns_of(rule), values, strict=True)

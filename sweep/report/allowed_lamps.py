@@ -13,6 +13,7 @@ from ..base.types import FloatArray
 from ..curves.regulations import NORM_NAMES
 from ..curves.single_leds import RegionMap
 from ..metrics.quantity import DN
+from ..metrics.share import told_share
 from ..results.output import Output
 from ..results.tables import PLAIN
 from .figures import empty_figure
@@ -88,23 +89,15 @@ def lamp_lines(output: Output) -> Iterator[str]:
         shown = chosen[0] if chosen else max(own, key=lambda each: each.share)
         plain = [each for each in own if each.row["kind"] == PLAIN and each is not shown]
         beside = max(plain, key=lambda each: each.share, default=None)
-        rival = "" if beside is None else f", {full_name(beside.row)} {_share(beside.share)}"
+        rival = "" if beside is None else f", {full_name(beside.row)} {told_share(beside.share)}"
         asked, near = _asked(output), shown.nearest
         yield (
             f"Of all {shown.pairs:,} pairs of a yellow and a red LED that {NORM_NAMES[norm]} allows, "
-            f"{full_name(shown.row)} keeps {_share(shown.share)} at least {asked.wanted_dn:g} {DN} "
+            f"{full_name(shown.row)} keeps {told_share(shown.share)} at least {asked.wanted_dn:g} {DN} "
             f"apart{rival}; its nearest are {_led(near, 'yellow')} and {_led(near, 'red')}, {_dn(near['least_dn'])}."
         )
     if maps:
         yield f"{capital(_grid(_asked(output)))}."
-
-
-def _share(share: float) -> str:
-    """Percent; not rounded to none or to all."""
-    if share in (0, 1):
-        return f"{share:.0%}"
-    digits = next((few for few in (1, 3, 6) if 0 < round(share, few + 2) < 1), 9)
-    return f"{share:.{digits}%}"
 
 
 def _dn(value: float) -> str:
@@ -138,7 +131,7 @@ def lamp_table(output: Output) -> pd.DataFrame:
                 "norm": NORM_NAMES[each.norm],
                 "design": label(each.row),
                 "pairs": f"{each.pairs:,}",
-                "told apart": _share(each.share),
+                "told apart": told_share(each.share),
                 "nearest yellow": _led(each.nearest, "yellow"),
                 "nearest red": _led(each.nearest, "red"),
                 "their distance": _dn(each.nearest["least_dn"]),
@@ -175,7 +168,9 @@ def _draw(maps: list[LampMap], title: str, wanted_dn: float) -> Figure:
         if min(each.least_dn.shape) > 1 and np.nanmin(each.least_dn) < wanted_dn <= np.nanmax(each.least_dn):
             axes.contour(each.red_nm, each.yellow_nm, each.least_dn, levels=[wanted_dn], colors="white", linewidths=1.4)
         axes.plot(each.nearest["red_nm"], each.nearest["yellow_nm"], "x", color="#d55e00", markersize=8, clip_on=False)
-        axes.set_title(f"{label(each.row)}: {_share(each.share)}, nearest {_dn(each.nearest['least_dn'])}", fontsize=9)
+        axes.set_title(
+            f"{label(each.row)}: {told_share(each.share)}, nearest {_dn(each.nearest['least_dn'])}", fontsize=9
+        )
         panels.append(axes)
     figure.supxlabel("peak of the red LED / nm", fontsize=9)
     figure.supylabel("peak of the yellow LED / nm", fontsize=9)

@@ -96,7 +96,6 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     yield from _of_least(output, best, plain)
     if filter_told := assumed(output, best):
         yield filter_told
-    lights = best.get(limited_by_name(separation.pair)) if separation.pair else None
     search = output.provenance.search
     proven = None if search is None or best["kind"] not in (SWEPT, FOUND) else search.limit_proven
     parts = _band(best)
@@ -104,12 +103,26 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
         most = separation.told_bound(proven)
         alike = " and moves like it" if moves_with_light(output, best) else ""
         parts.append(f"No filter in its place that meets the same{alike} exceeds {most} (proven, before quantization).")
-    if isinstance(lights, str) and separation.extreme != OF_A_SHARE and not over_population(output):
+    if lights := _limited(output, best):
         parts.append(f"The two lights that limit it are {lights}.")
     if parts:
         yield " ".join(parts)
     yield from unseen_lines(output)
     yield from (_best_of_other(output, row) for row in leaders.others)
+
+
+def _limited(output: Output, row: Row) -> str:
+    """The two lights that limit the separation of a row, where it is that of two lights of the study."""
+    separation = output.trade_off[0]
+    lights = row.get(limited_by_name(separation.pair)) if separation.pair else None
+    of_two = separation.extreme != OF_A_SHARE and not over_population(output)
+    return lights if isinstance(lights, str) and of_two else ""
+
+
+def _limited_told(output: Output, row: Row) -> str:
+    """The same behind a figure."""
+    lights = _limited(output, row)
+    return f" (limited by {lights})" if lights else ""
 
 
 def _of_least(output: Output, best: Row, plain: Row | None) -> Iterator[str]:
@@ -129,7 +142,7 @@ def _best_of_other(output: Output, row: Row) -> str:
     same = " that meets the same" if output.constraints else ""
     name = label(row) if row["kind"] == FOUND else f"{label(row)},"
     who = f"the {name} of {row['cfa']}" if row["kind"] == FOUND else f"the best of {row['cfa']}{same}, {name}"
-    return f"{capital(who)} {said_separation(output, row)}."
+    return f"{capital(who)} {said_separation(output, row)}{_limited_told(output, row)}."
 
 
 def _band(row: Row) -> list[str]:
@@ -187,7 +200,8 @@ def _others(output: Output, leaders: Leaders) -> Iterator[str]:
 
 def _figures(output: Output, row: Row) -> str:
     separation = output.trade_off[0]
-    return f"{separation.told(row[separation.name])} at {row[CFA_SENSITIVITY]:.3f} {OF_CLEAR}"
+    light = f"{row[CFA_SENSITIVITY]:.3f} {OF_CLEAR}"
+    return f"{separation.told(row[separation.name])} at {light}{_limited_told(output, row)}"
 
 
 def _missed(output: Output, row: Row) -> str:

@@ -77,9 +77,11 @@ def _numbers_under_noise(output: Output, ends: Sequence[UsableEnds]) -> Iterator
     numbers = [
         LargeNumber(
             f"{end.told(name)}{'' if ' ' in end.unit else f' {end.unit}'}".rstrip(),
-            f"{f'{end.unit}: ' if ' ' in end.unit else ''}{'most' if end.more else 'least'} {end.name} "
+            f"{f'of {end.unit}: ' if ' ' in end.unit else ''}{'most' if end.more else 'least'} {end.name} "
             f"for an error of {end.error_max:g}, {name}",
-            f"{plain} {end.told(plain)} {end.unit}".rstrip() if plain is not None and plain in end.at else "",
+            f"{plain} {end.told(plain)}{'' if ' ' in end.unit else f' {end.unit}'}".rstrip()
+            if plain is not None and plain in end.at
+            else "",
         )
         for end in ends
         if name in end.at

@@ -18,6 +18,7 @@ from .series import Line, SeriesFigure, quantity_of
 from .values import over_series, series_figures
 
 _LEAST = 1e-12
+_ERROR = "error of the worst pair of states"
 _COMPUTED = (
     "Computed, not drawn: how often noise makes one of two signals of different states look like the other, for the "
     "two that are confused most. The dashed line is the error that the study allows; a ring marks where a design "
@@ -43,7 +44,7 @@ def all_series(output: Output) -> list[SeriesFigure]:
 
 
 def noise_figures(output: Output) -> Iterator[SeriesFigure]:
-    """For each series of scenarios the pairwise error, and the accuracy of each classifier on raw patches."""
+    """For each series of scenarios the error of the worst pair of states, and accuracies of classifiers on patches."""
     allowed = _allowed(output)
     if allowed is None:
         return
@@ -55,7 +56,7 @@ def noise_figures(output: Output) -> Iterator[SeriesFigure]:
             n: Line(np.maximum(y, _LEAST), None, _crossing(output, base, key, n))
             for n, y in over_series(rows, scenarios, STATE_ERROR).items()
         }
-        label = f"error of the worst pair of states ({_LEAST:g}: or less)"
+        label = f"{_ERROR} ({_LEAST:g}: or less)"
         yield SeriesFigure(title, key, label, x, errors, "", log_y=True, level=allowed, note=_COMPUTED)
         for rule in CLASSIFIERS if output.recognition is not None else ():
             lines = {n: Line(y, None) for n, y in _accuracies(output, scenarios, rule).items()}
@@ -181,7 +182,7 @@ def told_apart_table(output: Output) -> pd.DataFrame:
     dprime = [name for name, column in output.columns.items() if column.metric == D_PRIME]
     shown = pd.DataFrame({"name": rows["name"].astype(str), "scenario": rows["scenario"].astype(str)})
     shown["smallest d'"] = rows[dprime].min(axis=1).map("{:.2f}".format)
-    for column, label in ((STATE_ERROR, "pairwise error"), (STATE_ERROR_BOUND, "bound of the error")):
+    for column, label in ((STATE_ERROR, _ERROR), (STATE_ERROR_BOUND, "bound of the error")):
         shown[label] = rows[column].map("{:.2g}".format)
     drawn = output.recognition
     if drawn is not None:

@@ -44,8 +44,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-_FIRST_LINES = 1
-"""Of the answer, above the first plot; the others stand below it."""
+_FIRST_LINES, _FIRST_LEADS = 1, 2
+"""Of the answer, above the first plot, also where that says who leads where; the others stand below it."""
 _PICTURES = ("tiles", "sensor", "signals", "chart")
 """Figures that the page shows as pictures; it draws all others itself, but for those of tasks."""
 _MAPS = "places-"
@@ -94,7 +94,7 @@ def _contents(output: Output, some: Iterable[str] | None, parallel: Parallel) ->
 
 def _html(output: Output, images: Sequence[tuple[str, str, str]], published: pd.DataFrame) -> str:
     drawn, card = payload(output), scorecard(output)
-    groups = scene_groups(output)
+    groups, series_first = scene_groups(output), bool(drawn["series"]) and output.best.empty
     return page(
         "report.html.j2",
         study=output.study,
@@ -102,10 +102,10 @@ def _html(output: Output, images: Sequence[tuple[str, str, str]], published: pd.
         quoted=shlex.quote(output.folder.as_posix()),
         objective=_objective(output),
         numbers_in="" if len(output.scenarios) == 1 or output.best.empty else f"in {leaders_of(output).scenario}",
-        series_first=bool(drawn["series"]) and output.best.empty,
+        series_first=series_first,
         objective_words=output.goal.words,
         answer=answer_sentences(output),
-        first_lines=_FIRST_LINES,
+        first_lines=_FIRST_LEADS if series_first and output.study.recognition is None else _FIRST_LINES,
         numbers=large_numbers(output),
         counts=counts_line(output),
         interactive=drawn,

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..metrics.quantity import WORST, WORST_CASE
+from ..metrics.share import told_share
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN
 from .leaders import Row
@@ -61,7 +62,7 @@ def _price(output: Output, best: Row, named: list[Row]) -> Iterator[str]:
     rival = max(rivals, key=lambda row: float(row[nominal.name]))
     lost, gained = 1 - best[nominal.name] / rival[nominal.name], best[worst.name] / rival[worst.name]
     yield (
-        f"That costs {lost:.1%} of the nominal separation: {nominal.told(best[nominal.name])} against "
+        f"Its worst case costs {lost:.1%} of the nominal separation: {nominal.told(best[nominal.name])} against "
         f"{nominal.told(rival[nominal.name])} of {rival['name']}, which has {worst.told(rival[worst.name])} in the "
         f"worst case; {worst.told(best[worst.name])} are {gained:.2f} times that."
     )
@@ -100,4 +101,5 @@ def _named(row: Row) -> str:
 
 def _share(row: Row) -> str:
     """A share with its interval, percent."""
-    return f"{row['yield']:.2%} ({row['yield_low']:.2%} to {row['yield_high']:.2%})"
+    low, high = (told_share(row[end], 2) for end in ("yield_low", "yield_high"))
+    return f"{told_share(row['yield'], 2)} ({low} to {high})"

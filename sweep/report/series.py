@@ -109,12 +109,12 @@ def lead_sentence(series: SeriesFigure) -> str:
         span = f"at {at(start)}" if start == stop else f"from {at(start)}{' on' if last else f' to {at(stop)}'}"
         span = ("everywhere" if last else f"up to {at(stop)}") if first and start != stop else span
         if leader is None:
-            parts.append(f"{span} nobody has {_LEAST_LEAD:g} {dn}")
+            parts.append(f"nobody has {_LEAST_LEAD:g} {dn} {span}")
             continue
         following = None if last else leads[number + 1][0]
         rival = following or _second(values, leader, stop)
         parts.append(
-            f"{span} {leader} leads ({_told(values[leader][stop], dn)}{'' if start == stop else f' at {at(stop)}'}"
+            f"{leader} leads {span} ({_told(values[leader][stop], dn)}{'' if start == stop else f' at {at(stop)}'}"
         )
         parts[-1] += f", {rival} {_told(values[rival][stop], dn)})" if rival else ")"
     return f"{what[:1].upper()}{what[1:]} over {name}{f', {series.among}' if series.among else ''}: {'; '.join(parts)}."

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..results.facts import SearchFacts
 from ..results.output import Output
+from ..study.axes import series_of
 from .answer import answer_sentences
 from .assumed import assumed_line
 from .names import OF_CLEAR
@@ -17,16 +18,17 @@ _MOST_SCENARIOS = 8
 
 
 def _scene_lines(output: Output) -> list[str]:
-    """CFAs and named designs in each scenario; of many scenarios the first and the last ones."""
+    """CFAs and named designs in each scenario; of those that differ in one number the two ends, of many others few."""
     shown = output.trade_off[0]
     title = f"{shown.words[:1].upper()}{shown.words[1:]} of the named CFAs and designs"
     title += f", and their share {OF_CLEAR}:" if len(output.scenarios) == 1 else ":"
     rows, scenarios = output.named, output.scenarios
+    inner = {name for own in series_of(scenarios).values() for name in list(own)[1:-1]}
+    shown_ones = [name for name in scenarios if name not in inner]
+    if len(shown_ones) > _MOST_SCENARIOS:
+        shown_ones = [*shown_ones[:4], *shown_ones[-2:]]
     lines = []
-    for name in scenarios if len(scenarios) <= _MOST_SCENARIOS else [*scenarios[:4], "", *scenarios[-2:]]:
-        if not name:
-            lines.append(f"({len(scenarios) - 6} more scenarios in the report.)")
-            continue
+    for name in shown_ones:
         each = ", ".join(
             f"{row['name']} {shown.told(row[shown.name])}"
             + (f" at {row[CFA_SENSITIVITY]:.3f}" if len(scenarios) == 1 else "")
@@ -34,6 +36,8 @@ def _scene_lines(output: Output) -> list[str]:
         )
         if each:
             lines.append(f"{title} {each}." if len(scenarios) == 1 else f"{name}: {each}.")
+    if left := len(scenarios) - len(shown_ones):
+        lines.append(f"({left} more scenario{'s' if left > 1 else ''} in the report.)")
     return lines if len(scenarios) == 1 else [title, *lines]
 
 
@@ -83,14 +87,24 @@ def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
 
 
 def _plan_line(output: Output) -> str:
-    """What was simulated, over all scenarios."""
+    """What was simulated, over all scenarios, and what the rest changes; where that cannot be promised, for what."""
     plans = output.provenance.plans
     computed = dict.fromkeys(effect for plan in plans.values() for effect in plan.computed)
-    promised = max(plan.promised_dn for plan in plans.values())
+    kept = [plan.promised_dn for plan in plans.values() if plan.promised_dn <= plan.tolerance_dn]
+    short = {name: plan for name, plan in plans.items() if plan.promised_dn > plan.tolerance_dn}
     tolerance = max(plan.tolerance_dn for plan in plans.values())
-    line = f"Simulated: {', '.join(computed)}; all else changes a CSD by at most {promised:.2g} of {tolerance:g} DN."
-    short = [name for name, plan in plans.items() if plan.promised_dn > plan.tolerance_dn]
-    return f"{line} The tolerance cannot be promised in {', '.join(short)}." if short else line
+    line = f"Simulated: {', '.join(computed)}"
+    if kept:
+        line += f"; all else changes a CSD by at most {max(kept):.2g} of {tolerance:g} DN"
+        line += f" in {len(kept)} of {len(plans)} scenarios" if short else ""
+    if not short:
+        return f"{line}."
+    where = f" in the other {len(short)}" if kept else f" in any of {len(plans)} scenarios" if len(plans) > 1 else ""
+    causes = dict.fromkeys(max(p.effects, key=lambda effect: effect.promised_dn).effect for p in short.values())
+    worst = max(short, key=lambda name: short[name].promised_dn)
+    proven = f"no more than {short[worst].promised_dn:,.0f} DN is proven{f' in {worst}' if len(plans) > 1 else ''}"
+    line += f". The tolerance of {tolerance:g} DN cannot be promised{where} ({', '.join(causes)}: {proven})"
+    return f"{line}; `sweep audit` measures what is really changed."
 
 
 def counts_line(output: Output) -> str:

@@ -11,6 +11,7 @@ import pandas as pd
 
 from ..base.cache import Cache
 from ..base.types import FloatArray
+from ..metrics.share import told_share
 from ..results.output import Output
 from ..results.tables import VISION, VISION_CONDITIONS
 from ..vision.scenes import UNSEEN, states_of
@@ -113,4 +114,5 @@ def said_interval(found: Interval, digits: int = 2) -> str:
 
 def said_percent(found: Interval) -> str:
     """A share with its interval, in percent, without the sign."""
-    return f"{100 * found.value:.1f} ({100 * found.low:.1f} to {100 * found.high:.1f})"
+    value, low, high = (told_share(share).removesuffix("%") for share in (found.value, found.low, found.high))
+    return f"{value} ({low} to {high})"

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import pandas as pd
 
+from ..metrics.share import told_share
 from ..results.output import Output
 from ..vision.scenes import FIXED, SEEN, SHUFFLED
 from ..vision.scores import costs, macro_f1
@@ -88,7 +89,7 @@ def _unknown(benchmark: Benchmark, design: str, reader: str) -> str:
     rows, cost = benchmark.said(design, reader, SHUFFLED), benchmark.vision.unknown_cost
     wrong = (rows["said"] != rows["state"]).to_numpy(dtype=bool)
     each, unknown = costs(wrong, rows["p"].to_numpy(dtype=float), cost)
-    return f"{each.mean():.3f} ({100 * unknown.mean():.0f} %)"
+    return f"{each.mean():.3f} ({told_share(float(unknown.mean()), 0)})"
 
 
 def vision_conditions_table(benchmark: Benchmark, ranks: Ranks) -> pd.DataFrame:

@@ -74,7 +74,7 @@ _OF_A_SHARE = (
     "the CSD that at least the share `population.wanted_yield` of the drawn lamps and cameras has, and with 95 % "
     "confidence (one-sided, binomial) that share of all, where the design was not chosen by the same draws, as a "
     "search's is: the mean of the draws that rank right below, a tenth of all that may have less, before clipping and "
-    "rounding, with everything on"
+    "rounding, with everything on; no limit is computed of it, and a limit of others leaves a constraint on it out"
 )
 _OWN = (
     "a metric of the study's `metrics`, the worst over moments and places of the lattice; nothing is promised of it: "

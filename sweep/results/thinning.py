@@ -67,7 +67,7 @@ def thinned(
         if every > 1:
             few = table.filter(pa.array(ok & ~always))
             best = best_rows(few if best is None else pa.concat_tables([best, few]), order, _BEST)
-            kept += [_leading(table, separation), _best_of_each(few, order)]
+            kept += [leading(table, separation), _best_of_each(few, order)]
         release_memory()
     if best is not None:
         kept.append(best)
@@ -77,11 +77,11 @@ def thinned(
     return frame, Counts(total, feasible, front, failed, total - len(frame))
 
 
-def _leading(table: pa.Table, separation: str) -> pa.Table:
+def leading(table: pa.Table, separation: str) -> pa.Table:
     """In each scenario the design that separates most, and the one that separates most for its exposure."""
     rate = pc.divide(table[separation], table[EXPOSURE])
     rated = table.append_column(_RATE, rate)
-    found = []
+    found = [rated.schema.empty_table()]
     for scenario in table["scenario"].unique().to_pylist():
         own = rated.filter(pa.array(holds(rated, "scenario", scenario)))
         found += [best_rows(own, [measure], 1) for measure in (separation, _RATE)]

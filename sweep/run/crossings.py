@@ -18,8 +18,7 @@ from ..camera.imager import Imager
 from ..camera.methods import REFERENCE
 from ..camera.scenario import Scenario
 from ..camera.view import View
-from ..metrics.columns.confusion import STATE_ERROR
-from ..metrics.evaluate import evaluate
+from ..metrics.columns.confusion import STATE_ERROR, state_errors
 from ..results.designs import row_curves
 from ..results.tables import FEW
 from ..study import Study
@@ -129,7 +128,7 @@ def _with(said: Mapping[str, Any], path: tuple[str, ...], number: float) -> dict
 
 def state_error_of(view: View, curves: FloatArray, states: tuple[str, ...]) -> float:
     """How often noise confuses the worst two states of a filter; `curves`: ndarray[1, n_modified, n_wavelengths]."""
-    return float(evaluate(Imager(view, once=True), curves, states)[STATE_ERROR][0])
+    return float(state_errors(Imager(view, once=True), curves, states)[0])
 
 
 def _crossing(

@@ -85,9 +85,7 @@ def estimate(study: Study, output: Path, n_jobs: int, progress: Progress) -> Est
 def _on_top(study: Study) -> tuple[str, ...]:
     """What is not timed."""
     tables = [table.long for table in ROW_TABLES.values() if table.long and table.asked(study)]
-    levels = study.search is not None and study.search.nominal_levels
-    others = {"images of signal heads": study.section.vision, "searches at nominal levels": levels}
-    return (*tables, *(what for what, given in others.items() if given))
+    return (*tables, *(["images of signal heads"] if study.section.vision else []))
 
 
 def _sampled(sweep: Sweep, todo: list[Job]) -> tuple[float, float]:

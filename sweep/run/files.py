@@ -39,6 +39,7 @@ from ..study import Study
 from .answers import Kept
 from .front import Front, Gathered, few_of
 from .held_out import left_out_table
+from .looks import Looking, looks_of
 from .of_rows import ROW_TABLES, Shown
 from .provenance import plan_facts, provenance, resolved_yaml
 from .routes import Detours, detours_in_words
@@ -123,7 +124,7 @@ class Making:
     @cached_property
     def sweep(self) -> Sweep:
         """The chunks of the study."""
-        return Sweep(self.study, self.rules, self.journal, self.crew)
+        return Sweep(self.study, self.rules, self.journal, self.crew, Looking.of(self.study, files_of(self.study)))
 
     @cached_property
     def answer(self) -> SearchAnswer | None:
@@ -184,7 +185,9 @@ class Making:
 
     def _write_of_rows(self, names: set[str]) -> None:
         rows, on_front = self.gathered.frame(), self.gathered.front_frame()
-        shown = Shown(self.study, rows, on_front, self._limit, self.crew, self._kept, self.progress)
+        looking, known = Looking.of(self.study, names), self.sweep.looks
+        looks = looks_of(self.study, looking, rows, on_front, known, self.crew, self.progress)
+        shown = Shown(self.study, rows, on_front, looks, self._limit, self.crew, self._kept, self.progress)
         for name, table in ROW_TABLES.items():
             if name in names:
                 self.inventory.write_table(name, table.made(shown))

@@ -8,7 +8,8 @@ import pyarrow as pa
 
 from ..base.types import BoolArray, FloatArray, IndexArray
 from ..metrics.pareto import non_dominated
-from ..results.tables import FEW, best_rows, holds
+from ..results.tables import FEW, SWEPT, best_rows, holds
+from ..results.thinning import leading
 from .rows import Rules
 
 BEST_PER_CFA = 12
@@ -78,8 +79,8 @@ def _thinned(values: FloatArray) -> FloatArray:
 class Gathered:
     """What a run keeps of its rows: the front of all of them, that of the swept ones, and those that reports draw.
 
-    Those are every plain CFA, named design and answer, and in the first scenario the best swept designs of each CFA and
-    some of its front.
+    Those are every plain CFA, named design and answer, in the first scenario the best swept designs of each CFA and
+    some of its front, and in each scenario who separates most, and most for its exposure, whatever the constraints.
     """
 
     def __init__(self, rules: Rules, scenario: str) -> None:
@@ -89,6 +90,7 @@ class Gathered:
         self._always: list[pa.Table] = [self.rules.schema.empty_table()]
         self._best: dict[str, pa.Table] = {}
         self._feasible: dict[str, pa.Table] = {}
+        self._leading = self.rules.schema.empty_table()
 
     def add(self, few: pa.Table) -> None:
         """Take in what `few_of` a table gives."""
@@ -97,6 +99,7 @@ class Gathered:
         always = holds(few, "kind", *FEW)
         if always.any():
             self._always.append(few.filter(pa.array(always)))
+        self._leading = leading(pa.concat_tables([self._leading, few]).unify_dictionaries(), self.rules.front[0])
         candidates = holds(few, "kind", "sweep") & holds(few, "scenario", self.scenario)
         swept = few.filter(pa.array(candidates & few["feasible"].to_numpy()))
         for cfa in swept["cfa"].unique().to_pylist():
@@ -121,8 +124,8 @@ class Gathered:
         return self._frame([*self._always, *self._best.values()])
 
     def front_frame(self) -> pd.DataFrame:
-        """Feasible swept rows of the whole front in the first scenario, of each CFA evenly up to FRONT_ROWS."""
-        tables = [self.rules.schema.empty_table()]
+        """Swept rows: feasible ones of the whole front in the first scenario, evenly up to FRONT_ROWS; who leads."""
+        tables = [self._leading.filter(pa.array(holds(self._leading, "kind", SWEPT)))]
         for table in self._feasible.values():
             found = self.front.marked(table)
             found = found.filter(found["pareto"]).sort_by([(self.rules.front[1], "ascending")])
@@ -132,12 +135,15 @@ class Gathered:
 
     def _frame(self, tables: list[pa.Table]) -> pd.DataFrame:
         frame: pd.DataFrame = self.front.marked(pa.concat_tables(tables).unify_dictionaries()).to_pandas()
-        return frame.sort_values("design_id", ignore_index=True)
+        return frame.drop_duplicates("design_id").sort_values("design_id", ignore_index=True)
 
 
 def few_of(table: pa.Table, rules: Rules) -> pa.Table:
-    """The rows of a chunk that `Gathered` may keep: those on its front, those that are no sweep, its best designs."""
+    """The rows of a chunk that `Gathered` may keep: its front, those that are no sweep, its best designs, who leads."""
     wanted = table["pareto"].to_numpy() | holds(table, "kind", *FEW)
     rest = table.filter(pa.array(table["feasible"].to_numpy() & ~wanted))
-    few = pa.concat_tables([table.filter(pa.array(wanted)), best_rows(rest, rules.order, BEST_PER_CFA)])
+    best = best_rows(rest, rules.order, BEST_PER_CFA)
+    leaders = leading(table.filter(pa.array(~wanted)), rules.front[0])
+    others = pa.concat_tables([best, leaders.filter(pa.array(~np.isin(leaders["design_id"], best["design_id"])))])
+    few = pa.concat_tables([table.filter(pa.array(wanted)), others])
     return few.combine_chunks()

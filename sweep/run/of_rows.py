@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import pandas as pd
@@ -30,6 +30,7 @@ from .crossings import crossings_table
 from .curves import kept_curves, points_table
 from .held_out import held_out_table
 from .limiting import limited_by_table
+from .looks import Look
 from .recognition import recognition_table
 
 
@@ -37,12 +38,13 @@ from .recognition import recognition_table
 class Shown:
     """Rows that a report can show, and those `on_front` of them; `limit`: of a search.
 
-    `kept`: calls whose results a journal keeps under a name.
+    `looks`: at them, by their ids; `kept`: calls whose results a journal keeps under a name.
     """
 
     study: Study
     rows: pd.DataFrame
     on_front: pd.DataFrame
+    looks: Mapping[int, Look]
     limit: Callable[[], Limit | None]
     parallel: Parallel
     kept: Callable[[str], Parallel]
@@ -98,8 +100,8 @@ def _has_colors(study: Study) -> bool:
 
 ROW_TABLES = {
     CURVES: RowTable(_always, _curves),
-    POINTS: RowTable(_always, lambda s: points_table(s.study, s.rows, s.on_front)),
-    LIMITED_BY: RowTable(_always, lambda s: limited_by_table(s.study, s.rows, s.on_front, s.parallel, s.progress)),
+    POINTS: RowTable(_always, lambda s: points_table(s.study, s.rows, s.on_front, s.looks)),
+    LIMITED_BY: RowTable(_always, lambda s: limited_by_table(s.study, s.looks)),
     VALIDATED: RowTable(
         lambda study: study.held_out is not None,
         lambda s: held_out_table(s.study, s.rows, s.on_front, s.parallel, s.progress),
@@ -114,9 +116,7 @@ ROW_TABLES = {
         lambda s: crossings_table(s.study, s.rows, s.parallel, s.progress),
         "where an allowed error ends",
     ),
-    RECOGNITION: RowTable(
-        _has_patches, lambda s: recognition_table(s.study, s.rows, s.parallel, s.progress), "raw patches"
-    ),
+    RECOGNITION: RowTable(_has_patches, lambda s: recognition_table(s.study, s.rows, s.looks), "raw patches"),
     TRADED: RowTable(_has_colors, lambda s: traded_table(s.study, s.rows)),
     RENDERED: RowTable(_has_colors, lambda s: rendered_table(s.study, s.rows)),
 }

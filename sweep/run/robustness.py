@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -19,14 +18,13 @@ from ..designs.tolerance import AS_DESIGNED, Off, Tolerance
 from ..metrics.drawn import draws_of
 from ..metrics.members import PopulationImager, population_imager
 from ..metrics.separation import csd_name
+from ..metrics.share import share_interval
 from ..results.designs import row_space
 from ..results.tables import FEW, PLAIN
 from ..study import Study
 
 _LARGEST, _STEP, _HALVINGS = 3.0, 0.25, 6
 """Times the population that are looked at, the steps in which, and how often the last of these is halved."""
-_Z = 1.959963984540054
-"""Of a two-sided 95 % interval of a normal distribution."""
 _FIELDS = [
     ("design_id", pa.int64()),
     *((name, pa.float64()) for name in ("breaks_at", "breaks_dn", "breaks_edge_nm", "breaks_thickness")),
@@ -106,7 +104,7 @@ def _robustness(
     assert population is not None
     if population.wanted_dn is not None:
         kept = int((drawn_dn(design, pair, seed) >= population.wanted_dn).sum())
-        low, high = yield_interval(kept, population.draws)
+        low, high = share_interval(kept, population.draws)
         numbers |= {"yield": kept / population.draws, "yield_low": low, "yield_high": high}
     return numbers, lights
 
@@ -168,10 +166,3 @@ def drawn_dn(design: Candidate, pair: Pair, seed: int) -> FloatArray:
     for number, off in enumerate(draws.offs):
         draws.distances(number, imager.imager.smooth(design.curves(off))[0], found)
     return found
-
-
-def yield_interval(kept: int, n: int) -> tuple[float, float]:
-    """The 95 % interval of a share, of which `kept` of `n` were counted (Wilson, J. Am. Stat. Assoc. 22, 209, 1927)."""
-    share, z = kept / n, _Z**2 / n
-    middle, half = share + z / 2, _Z * math.sqrt(share * (1 - share) / n + z / (4 * n))
-    return max(0.0, (middle - half) / (1 + z)), min(1.0, (middle + half) / (1 + z))

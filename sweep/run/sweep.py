@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import groupby
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from ..results.journal import Journal, Shard
 from ..results.tables import sliced
 from ..study import Study
 from .front import Gathered, few_of
+from .looks import Look, Looking
 from .routes import Detours
 from .rows import Job, Rules, detours_of, failed_rows, job_key, jobs_of, joined, run_job, with_local_front
 from .workers import WorkerKilledError, Workers, alone
@@ -27,19 +28,26 @@ from .workers import WorkerKilledError, Workers, alone
 _SCENES_PER_WORKER, _FEW = 2, 64
 """From how many scenes for each worker on, and up to how many designs, one worker computes all jobs of a scene."""
 KILLED = "error: its worker died twice"
+_Finished = tuple[Shard, pa.Table, dict[int, Look]]
+"""A job's rows as a file's content, the few that `Gathered` takes in, and looks at its designs by their ids."""
 
 
 @dataclass
 class Sweep:
-    """All chunks of a study, those that the journal holds and those that are still to compute."""
+    """All chunks of a study, those that the journal holds and those that are still to compute.
+
+    `looking`: how plain CFAs and named designs are looked at while they are computed; `looks`: what was seen.
+    """
 
     study: Study
     rules: Rules
     journal: Journal
     crew: Workers
+    looking: Looking | None = None
     warnings: list[str] = field(default_factory=list)
     failed: int = 0
     detours: Detours = field(default_factory=Counter)
+    looks: dict[int, Look] = field(default_factory=dict)
 
     @cached_property
     def fingerprint(self) -> str:
@@ -110,16 +118,18 @@ class Sweep:
         progress("designs", done, self.study.n_designs)
         batches = self._batches(todo)
         calls = (
-            delayed(_shards, [(self.jobs[i], self._view(self.jobs[i])) for i in batch], self.rules) for batch in batches
+            delayed(_shards, [(self.jobs[i], self._view(self.jobs[i])) for i in batch], self.rules, self.looking)
+            for batch in batches
         )
 
-        def keep(at: int, found: list[tuple[Shard, pa.Table]]) -> None:
-            for index, (shard, _) in zip(batches[at], found, strict=True):
+        def keep(at: int, found: list[_Finished]) -> None:
+            for index, (shard, *_) in zip(batches[at], found, strict=True):
                 self.journal.save(self.keys[index], index, shard)
 
         for found in self.crew(calls, _quarantined, keep):
-            for shard, few in found:
+            for shard, few, looks in found:
                 gathered.add(few)
+                self.looks |= looks
                 done += shard.rows
                 if shard.failed and fail_fast:
                     raise _first_failure(shard.table())
@@ -146,7 +156,7 @@ class Sweep:
         for index, (job, key) in enumerate(zip(self.jobs, self.keys, strict=True)):
             table = self._kept(index)
             if table is None:
-                ((shard, _),) = _shards([(job, self._view(job))], self.rules)
+                ((shard, *_),) = _shards([(job, self._view(job))], self.rules)
                 self.journal.save(key, index, shard)
                 table = shard.table()
             self.failed += self.journal.entries[key].failed
@@ -162,27 +172,28 @@ class Sweep:
         return table
 
 
-def _shards(batch: Sequence[tuple[Job, View]], rules: Rules) -> list[tuple[Shard, pa.Table]]:
-    """Each job's rows as a file's content, and the few that `Gathered` takes in."""
-    found = []
-    for job, view in batch:
-        started = time.monotonic()
-        table = run_job(job, view, rules)
-        found.append((Shard.of(table, time.monotonic() - started), few_of(table, rules)))
-    return found
+def _shards(batch: Sequence[tuple[Job, View]], rules: Rules, looking: Looking | None = None) -> list[_Finished]:
+    """What is found of each job."""
+    return [_finished(job, view, rules, partial(run_job, job, view, rules), looking) for job, view in batch]
 
 
-def _quarantined(call: Call) -> list[tuple[Shard, pa.Table]]:
+def _finished(
+    job: Job, view: View, rules: Rules, computed: Callable[[], pa.Table], looking: Looking | None = None
+) -> _Finished:
+    """A job's rows, once they are computed."""
+    started = time.monotonic()
+    table = computed()
+    shard = Shard.of(table, time.monotonic() - started)
+    return shard, few_of(table, rules), {} if looking is None else looking.beside_rows(job, view, table)
+
+
+def _quarantined(call: Call) -> list[_Finished]:
     """Jobs whose worker died twice: one by one, and of those that kill again by halves, down to the design that does,
-    which becomes a row with its status.
+    which becomes a row with its status. None of them is looked at.
     """
-    batch, rules = call[1]
-    found = []
-    for job, view in batch:
-        started = time.monotonic()
-        table = _halved(job, view, rules) if len(batch) == 1 else _table_alone(job, view, rules)
-        found.append((Shard.of(table, time.monotonic() - started), few_of(table, rules)))
-    return found
+    batch, rules, _ = call[1]
+    again = _halved if len(batch) == 1 else _table_alone
+    return [_finished(job, view, rules, partial(again, job, view, rules)) for job, view in batch]
 
 
 def _table_alone(job: Job, view: View, rules: Rules) -> pa.Table:

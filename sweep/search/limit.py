@@ -185,9 +185,18 @@ def why_not(problem: Problem) -> str | None:
             "filters of the box may be below 0",
         ),
         (lambda: _clips(problem), "signals exceed the full well or the range of the ADC"),
-        (lambda: may_set_exposure(problem.view), "the modified channel could set the exposure"),
+        (
+            lambda: may_set_exposure(problem.view, _most_sensitive(problem)),
+            "the modified channel could set the exposure",
+        ),
     )
     return next((reason for refused, reason in reasons if refused()), None)
+
+
+def _most_sensitive(problem: Problem) -> float:
+    """The largest sensitivity that the study lets a filter have, 1 where it says none."""
+    bound = problem.constraints.get(SENSITIVITY)
+    return 1.0 if bound is None or bound.max is None else min(1.0, bound.max)
 
 
 def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:

@@ -52,6 +52,15 @@ def best_nominal(problem: Problem, answer: Evaluation, effort: Effort, parallel:
     return _best(nominal_problem(problem), starts, effort, parallel)
 
 
+def searches_of_price(count: int, front: int, starts: int) -> tuple[int, int]:
+    """Searches for a worst case and for a nominal quantity that a price takes, at `count` levels and `front` of light.
+
+    Both ends are starts at each level, and what was found at the one above; the first has none above it. `starts`: of
+    the search for the answer.
+    """
+    return max(0, 3 * count - 1), min(_STARTS, 1 + starts) * (1 + front) if count else 0
+
+
 def worst_case_price(
     problem: Problem,
     answer: Evaluation,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from ..camera.effects import blur
-from ..camera.kernel import MOST_KERNEL_BYTES
+from ..camera.kernel_size import MOST_KERNEL_BYTES
 from ..camera.mosaic import Mosaic
 from ..camera.scenario import Scenario
 from ..camera.scene import FixedExposure

@@ -18,9 +18,12 @@ from scipy.optimize import minimize
 from sweep.camera import places
 from sweep.camera.between import Between
 from sweep.camera.effects import phase
+from sweep.camera.forget import forget_scenes
 from sweep.camera.imager import Imager
 from sweep.camera.kernel import kept_kernel, make_kernel
 from sweep.camera.methods import REFERENCE, Methods
+from sweep.camera.mosaic import Mosaic
+from sweep.camera.place_cells import kept_cells
 from sweep.camera.place_kernels import PlaceKernels
 from sweep.camera.plan.plan import Plan
 from sweep.camera.plan.planner import Planner
@@ -202,6 +205,43 @@ def test_kernels_by_the_edges_of_pixels_are_those_by_their_areas(blurred: str) -
         size = np.array(made.view.mosaic.indices.shape[::-1])
         moved = phase.Cases(cases.places_px + 3 * size, cases.home_px + 3 * size)
         np.testing.assert_allclose(quick.at(moved, Counter())[0] @ quick.shares, found, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("name", ["RGGB", "RCCC", "RYNCy", "1x3", "3x3"])
+def test_what_cfas_share_gives_the_kernels_of_each(name: str) -> None:
+    """Kernels of mirrored, moved and turned places, put together from classes of pixels, and their bounds, against
+    those that are made for the CFA at the place itself.
+    """
+    made = scene(name, name, SMALL | {"optics": F2}, DARK | {"crosstalk": 0.05})
+    view = replace(made.view, methods=REFERENCE)
+    kept, nodes = kept_cells(view), view.grid.nodes_nm
+    direct, between = PlaceKernels(view, REFERENCE, nodes), Between(view, REFERENCE, nodes)
+    rows, columns = view.mosaic.indices.shape
+    centers = np.random.default_rng(2).integers(0, 32, (40, 2)) / 32 * [columns, rows] + 1 / 64
+    cells = phase.Cells(centers, np.floor(centers + 0.5), 1 / 64)
+    found = kept.of_cells(cells, Counter())
+    own = direct.at(cells.corners, Counter())[0] @ direct.shares
+    at_corners = (found.kernels @ kept.functions)[found.corners].reshape(own.shape)
+    np.testing.assert_allclose(at_corners, own, rtol=0, atol=1e-9)
+    ranges = between.ranges(own)
+    bound = between.of_cells(cells.centers, cells.half, cells.homes, ranges.reshape(2, 40, 4, *ranges.shape[2:]))
+    np.testing.assert_allclose(found.deviation.tilt, bound.tilt, rtol=1e-9)
+    some = bound.kernel > 0
+    assert (found.deviation.kernel[~some] == 0).all()
+    assert np.median(found.deviation.kernel[some] / bound.kernel[some]) < 1.5
+
+
+def test_the_cfas_and_exposures_of_a_scene_share_places() -> None:
+    """Kernels at places are made once for all CFAs of 2 x 2 pixels, and whatever the exposure and the noise."""
+    forget_scenes()
+    counts = []
+    for name, level in (("RGGB", 0.9), ("RCCC", 0.9), ("RGGB", 0.5)):
+        given = SMALL | {"optics": F2, "exposure": {"kind": "white_patch", "level": level}}
+        work: Counter[str] = Counter()
+        cells = kept_cells(scene(name, name, given, DARK).view)
+        cells.of_cells(phase.whole(Mosaic.from_name("RYNCy")), work)
+        counts.append(work["places"])
+    assert counts == [6, 0, 0]  # of the 25 corners of 16 cells of a pixel, those in an eighth of it
 
 
 def test_a_straight_extreme_is_that_of_a_light_at_its_place() -> None:

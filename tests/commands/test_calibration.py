@@ -121,7 +121,7 @@ def test_a_fit_recovers_parameters_that_it_was_given(photon_ratio: float | None,
     for name, center_nm in centers_nm.items():
         truth["filters"][name]["edges"][0]["center_nm"] = center_nm
     targets = figures(checked(truth), ["RGGB", "RCCC", "RYYCy"])
-    fit = fit_from(Task(prior, targets, ()), seed=1, start=0)
+    fit = fit_from(Task(prior, targets, ()), seed=1, start=0, most_evaluations=25)
     found = figures(fit.parameters, list(targets))
     for row, values in targets.items():
         for quantity, value in values.items():

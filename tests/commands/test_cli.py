@@ -102,9 +102,9 @@ def test_wrong_input_is_one_line_and_exit_2(tmp_path: Path) -> None:
 
 
 def test_check_counts_designs() -> None:
-    done = sweep("check", str(STUDIES / "stopband.yaml"))
-    assert done.returncode == 0
-    assert "116,286 designs" in done.stdout
+    code, out, _ = commanded("check", STUDIES / "stopband.yaml")
+    assert code == 0
+    assert "116,286 designs" in out
 
 
 def test_plan_says_what_a_scene_calls_for(tmp_path: Path) -> None:

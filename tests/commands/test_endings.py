@@ -8,7 +8,9 @@ import shlex
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -61,6 +63,34 @@ start()
 def test_a_stop_while_the_command_is_loaded_ends_it_without_a_word() -> None:
     done = subprocess.run([sys.executable, "-c", EARLY], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
+
+
+def test_a_command_that_is_done_leaves_no_worker_behind(tmp_path: Path) -> None:
+    study = tmp_path / "tiny.yaml"
+    study.write_text(SWEPT)
+    # As UNDRAWN, but by the door that users take.
+    program = UNDRAWN.replace("commands.app import main", "commands.start import start as main")
+    arguments = ["run", str(study), "--output", str(tmp_path), "--jobs", "2"]
+    command = [sys.executable, "-c", program, *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True) as run:
+        said, _ = run.communicate()
+    assert run.returncode == 0
+    assert "report.html" in said.splitlines()[-1]
+    until = time.monotonic() + 10
+    while (left := _of_session(run.pid)) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert left == []
+
+
+def _of_session(session: int) -> list[int]:
+    """Processes of a session that are still there, but for those that nobody has waited for."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            state, _, _, own = stat.read_text().rpartition(")")[2].split()[:4]
+            if int(own) == session and state != "Z":
+                found.append(int(stat.parent.name))
+    return found
 
 
 @pytest.mark.parametrize(

@@ -83,13 +83,36 @@ def test_own_sensor_and_lights(tmp_path: Path, own: Path) -> None:
     assert (code, err) == (0, "")
     assert "times W; values in percent; it is N of RGBN, in place of W" in said
     assert list(rows(said)) == ["RGGB", "RGBW", "RGBN"]
-    assert "No limit is computed: the modified channel could set the exposure" in said
+    assert "No limit is computed: the filter is the brightest on white, and sets the exposure" in said
 
 
-def test_what_exceeds_the_curve_is_measured_against_the_clear_pixel_or_has_no_limit(own: Path) -> None:
-    said = commanded("evaluate", own)[1]
-    assert "No limit is computed: at" in said
-    assert "lets more through than Y and C" in said
+def test_a_filter_that_sets_the_exposure_has_no_limit(own: Path) -> None:
+    """95 % at most wavelengths."""
+    assert "No limit is computed: the filter is the brightest on white, and sets the" in commanded("evaluate", own)[1]
+
+
+def test_a_filter_a_little_above_the_curve_it_replaces_has_a_limit_too(tmp_path: Path) -> None:
+    """As one of few samples is: every 10 nm of Y lies above Y in places. No filter that leaves the exposure exceeds it."""
+    any_filter = {"cfa": "RYNCy", "channel": "N", "base": "Y", "to": 0.0}
+    study = sweep.make_study(cfas=["RYYCy", "RYNCy"], boxes={"any": any_filter})
+    y, nm = study.curve("Y").to_numpy(), study.wavelength_nm
+    few = nm[::10]
+    sampled = np.interp(nm, few, y[::10] * np.where(abs(few - 640) < 15, 0.4, 1.0))
+    found = sweep.evaluate(csv(tmp_path, "wavelength_nm,N", nm, sampled, name="few.csv"))
+    assert (sampled > y).any()
+    assert "no filter between 0 and the larger of Y and itself, which leaves the exposure to other pixels," in str(
+        found
+    )
+    assert found.limit is not None
+    assert found.smooth is not None
+    ceiling, rng = np.maximum(y, sampled), np.random.default_rng(1)
+    stops = [np.where((nm > a) & (nm < a + w), rng.uniform(), 1.0) for a in range(560, 680, 10) for w in (10, 30, 50)]
+    rivals = np.array([ceiling * stop for stop in stops])
+    rivals = rivals[(rivals.sum(axis=1) <= y.sum()) & (rivals.sum(axis=1) >= sampled.sum())]
+    assert len(rivals) > 5
+    table = study.evaluate(N=np.concatenate([rivals, sampled[None]]))
+    assert table["csd_yellow_red"].max() <= found.limit + 2  # the table's are rounded: two of four steps
+    assert found.smooth <= found.limit
 
 
 @pytest.mark.usefixtures("plain_pictures")

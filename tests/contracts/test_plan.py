@@ -68,6 +68,7 @@ SEEN_FROM = NOT_ALONE | {"phase": STRAIGHT}
 def contract(made: Scene) -> list[Row]:
     """Every method of every effect, switched alone from every base from which a plan may switch it."""
     planner, noisy = Planner([made.box]), made.view.scenario.noise is not None
+    columns_by = cache(lambda methods: columns(made, methods))  # from several bases the same methods are reached
     found = []
     bases = BASES
     if asks_for_any_place(made):
@@ -75,7 +76,7 @@ def contract(made: Scene) -> list[Row]:
     for name, before in bases.items():
         if (name == "unrounded" and noisy) or (name == "no noise" and not noisy):
             continue
-        reference = columns(made, before)
+        reference = columns_by(before)
         for effect, own in EFFECTS.items():
             exact = planner._exact[effect] is not None
             for method in own.methods[:1] if exact else own.methods[:-1]:
@@ -91,7 +92,7 @@ def contract(made: Scene) -> list[Row]:
                 if not exact and effect not in (*READOUT, "phase") and before.saturation == "clip":
                     # Over all places, what a readout that is not straight adds is part of the promise of `phase`.
                     promised += planner._left_over(after) if planner.promise("phase", after, after) else 0.0
-                realized = float(np.abs(columns(made, after) - reference).max())
+                realized = float(np.abs(columns_by(after) - reference).max())
                 found.append(Row(made.name, name, effect, method, promised, realized))
     return found
 

@@ -8,7 +8,7 @@ import pytest
 
 from sweep.curves.builtin.led import led_photons
 from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
-from sweep.curves.color import REGIONS, chromaticity, display_colors
+from sweep.curves.color import REGIONS, chromaticity, color_matching, display_colors, luminance_per_photon_radiance
 from sweep.curves.spectrum import WavelengthGrid
 
 GRID = WavelengthGrid()
@@ -26,6 +26,27 @@ def by_colour_science(photons: np.ndarray) -> np.ndarray:
 def test_chromaticity_agrees_with_colour_science(peak_nm: float) -> None:
     photons = led_photons(GRID.nodes_nm, peak_nm, 8.0, 7.0)
     np.testing.assert_allclose(chromaticity(GRID, photons[None])[0], by_colour_science(photons), atol=1e-6)
+
+
+def test_the_observer_is_that_of_colour_science_at_every_wavelength() -> None:
+    grid = WavelengthGrid(start_nm=350, stop_nm=840)
+    functions = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
+    np.testing.assert_array_equal(color_matching(grid)[:, 10:-10], functions.values.T)
+    assert not color_matching(grid)[:, [*range(10), *range(-10, 0)]].any()
+    efficiency = colour.SDS_LEFS["CIE 1924 Photopic Standard Observer"]
+    seen = luminance_per_photon_radiance(grid, np.eye(grid.size))[10:-10]
+    power_j = 6.62607015e-34 * 299792458 / (efficiency.wavelengths * 1e-9)
+    np.testing.assert_allclose(seen, 683.002 * power_j * efficiency.values, rtol=1e-12)
+
+
+def test_display_colors_are_those_of_colour_science() -> None:
+    wave = np.arange(400.0, 701.0)
+    energy = LIGHTS.photons / GRID.nodes_nm
+    assert np.array_equal(GRID.nodes_nm, wave)
+    xyz = energy @ color_matching(GRID).T
+    linear = np.clip(colour.XYZ_to_sRGB(xyz / xyz.max(axis=1, keepdims=True), apply_cctf_encoding=False), 0, None)
+    wanted = colour.models.eotf_inverse_sRGB(linear / linear.max(axis=1, keepdims=True))
+    np.testing.assert_allclose(display_colors(GRID, LIGHTS.photons), wanted, atol=1e-12)
 
 
 def test_every_signal_lies_inside_its_color_region() -> None:

@@ -90,7 +90,7 @@ def test_two_runs_say_who_is_best_and_by_how_much(runs: dict[str, Path], tmp_pat
     less = best["chart"] - best["brighter"]
     assert less > 0
     assert (
-        f"Best yellow/red CSD: A chart with {best['chart']:.1f} DN; B brighter has {best['brighter']:.1f} DN, "
+        f"Best yellow/red CSD under the constraints: A chart with {best['chart']:.1f} DN; B brighter has {best['brighter']:.1f} DN, "
         f"{less:.1f} DN ({less / best['chart']:.1%}) less." in said
     )
     assert "scenarios.chart.exposure.level  0.95     0.8" in said
@@ -109,7 +109,7 @@ def test_two_runs_say_who_is_best_and_by_how_much(runs: dict[str, Path], tmp_pat
     assert page.count("data:image/png;base64,") == 1
     assert "http://" not in page
     assert "https://" not in page
-    assert "Best yellow/red CSD: A chart" in page
+    assert "Best yellow/red CSD under the constraints: A chart" in page
 
 
 def test_the_same_folder_twice_is_equal(runs: dict[str, Path], tmp_path: Path) -> None:
@@ -141,21 +141,21 @@ def test_plain_cfas_alone_are_compared(runs: dict[str, Path], tmp_path: Path) ->
     assert not (tmp_path / "fronts.png").exists()
     assert "fronts.png" not in said
     said, _ = compared([runs["plain"], runs["chart"]], tmp_path)
-    assert "Best yellow/red CSD: B chart with" in said
+    assert "Best yellow/red CSD under the constraints: B chart with" in said
 
 
 def test_other_objectives_and_axes_are_not_mixed(runs: dict[str, Path], tmp_path: Path) -> None:
     said, _ = compared([runs["chart"], runs["orange"]], tmp_path)
     assert "different objectives" in said
     assert "so none are compared" in said
-    assert "Best orange/red CSD: B orange with" in said
+    assert "Best orange/red CSD under the constraints: B orange with" in said
     said, _ = compared([runs["orange"], runs["chart"], runs["brighter"]], tmp_path)
     assert "compared are those of B chart and C brighter." in said
 
 
 def test_a_combined_objective_has_its_own_words(runs: dict[str, Path], tmp_path: Path) -> None:
     said, _ = compared([runs["combined"], runs["combined"]], tmp_path)
-    assert "Best csd_yellow_red + 2 csd_orange_red: A combined with" in said
+    assert "Best csd_yellow_red + 2 csd_orange_red under the constraints: A combined with" in said
 
 
 def test_best_designs_of_different_scenarios_name_them(runs: dict[str, Path], tmp_path: Path) -> None:
@@ -174,7 +174,7 @@ def test_best_designs_of_different_scenarios_name_them(runs: dict[str, Path], tm
 
 def test_dn_of_other_meaning_are_not_ranked(runs: dict[str, Path], tmp_path: Path) -> None:
     said, _ = compared([runs["chart"], runs["deep"]], tmp_path)
-    assert "Best yellow/red CSD in DN of 20 bits: B deep with" in said
+    assert "Best yellow/red CSD in DN of 20 bits under the constraints: B deep with" in said
     assert "These are DN of different meaning, which are not ranked" in said
     assert "so none are compared" in said
     assert "Note: pixel differs: bits 12 / 20 (A chart, B deep)." in said

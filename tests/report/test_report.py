@@ -15,10 +15,11 @@ import pytest
 
 from sweep.base.errors import OutputError
 from sweep.metrics.pareto import knee
-from sweep.report import read_output
+from sweep.report import read_output, summary_lines
 from sweep.report.history import history_of
 from sweep.report.page_data import payload
 from sweep.report.scenes import scene_groups
+from sweep.results.facts import EffectFacts
 from sweep.results.identity import CHUNK
 from sweep.results.profiles import ParameterProfile, Profiles
 from sweep.run.rows import Job, jobs_of, rules_of, run_job
@@ -95,10 +96,32 @@ def test_what_keeps_the_objective_is_around_the_best_value() -> None:
 
 
 def test_what_is_off_is_not_told_as_simulated(finished: Finished) -> None:
-    from sweep.report import summary_lines
-
     line = next(line for line in summary_lines(read_output(finished("stopband"))) if line.startswith("Simulated: "))
     assert line.startswith("Simulated: quantization, quadrature; all else changes a CSD by at most 0 of 0.1 DN")
+
+
+@pytest.mark.parametrize("short", [("far", "near"), ("near",)])
+def test_what_cannot_be_promised_is_said_short_with_its_cause(finished: Finished, short: tuple[str, ...]) -> None:
+    output = read_output(finished("stopband"))
+    kept = output.provenance.plans["chart"]
+    blur = EffectFacts(effect="blur", method="every wavelength", promised_dn=8190.0, reason="of a test")
+    wide = kept.model_copy(update={"promised_dn": 8190.5, "effects": (*kept.effects, blur)})
+    plans = {name: wide if name in short else kept for name in ("near", "far")}
+    facts = output.provenance.model_copy(update={"plans": plans})
+    line = next(line for line in summary_lines(replace(output, provenance=facts)) if line.startswith("Simulated"))
+    where = f" in {'any of 2 scenarios' if len(short) > 1 else 'the other 1'}"
+    assert f"The tolerance of 0.1 DN cannot be promised{where} (blur: no more than 8,190 DN is proven in near);" in line
+    assert ("all else changes a CSD by at most 0 of 0.1 DN in 1 of 2 scenarios." in line) == (len(short) == 1)
+
+
+@pytest.mark.slow
+def test_of_a_series_the_terminal_lists_the_two_ends(finished: Finished) -> None:
+    lines = summary_lines(read_output(finished("fog")))
+    assert [line.split(":")[0] for line in lines if line.startswith("day ")] == [
+        "day visibility_m=50",
+        "day visibility_m=10000",
+    ]
+    assert "(1 more scenario in the report.)" in lines
 
 
 def test_the_history_ends_at_the_answer(finished: Finished) -> None:

@@ -21,7 +21,7 @@ from sweep.results.names import REPORT
 from sweep.study import load_study
 
 from ..build import ran
-from ..conftest import STUDIES, Finished
+from ..conftest import STUDIES, Finished, needs_measured
 
 FAST = ("stopband",)
 SLOW = (
@@ -42,7 +42,11 @@ SLOW = (
     "scorecard",
     "balanced",
 )
-EVERY = [*FAST, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)]
+EVERY = [
+    *FAST,
+    *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW),
+    pytest.param("measured", marks=[pytest.mark.slow, needs_measured]),
+]
 
 
 def whole(folder: Path) -> pd.DataFrame:
@@ -131,13 +135,27 @@ def test_the_limiting_lights_are_as_far_apart_as_the_csd(finished: Finished) -> 
             assert apart == pytest.approx(table.loc[design, f"csd_{pair}"], rel=1e-12)
 
 
+def test_who_separates_most_names_its_lights_whatever_the_constraints(finished: Finished) -> None:
+    folder = finished("stopband")
+    limited, table = pd.read_parquet(folder / "limited_by.parquet").set_index("design_id"), whole(folder)
+    most = table.loc[table["csd_yellow_red"].idxmax()]
+    assert not most["feasible"]
+    said = " ".join(answer_sentences(read_output(folder)))
+    lights = limited.loc[most["design_id"], "limited_by_yellow_red"]
+    assert f"Design {most['design_id']} of RYNCy separates most of all: {most['csd_yellow_red']:.0f} DN" in said
+    assert f"(limited by {lights}), but it does not meet" in said
+    rate = table.loc[(table["csd_yellow_red"] / table["exposure_s"]).idxmax()]
+    assert rate["design_id"] in limited.index
+
+
 def test_lights_without_a_distance_limit_nothing() -> None:
     study = load_study(STUDIES / "stopband.yaml")
     space = next(space for space in study.spaces if space.filter is not None)
     view = study.view(space, "chart")
     nothing = np.zeros((1, 1, study.grid.size))
-    assert set(limiting_lights(imager_of(view), nothing)) == set(study.pairs)
-    assert limiting_lights(imager_of(view), nothing * np.nan) == {}
+    cases = imager_of(view).read(nothing)[0][0]
+    assert set(limiting_lights(view, cases)) == set(study.pairs)
+    assert limiting_lights(view, cases * np.nan) == {}
 
 
 def series(**lines: list[float]) -> SeriesFigure:
@@ -151,18 +169,18 @@ def series(**lines: list[float]) -> SeriesFigure:
     [
         (
             series(A=[90, 81, 61], B=[80, 77, 68]),
-            "Yellow/red CSD over distance: up to 200 m A leads (81 DN at 200 m, B 77 DN); "
-            "at 300 m B leads (68 DN, A 61 DN).",
+            "Yellow/red CSD over distance: A leads up to 200 m (81 DN at 200 m, B 77 DN); "
+            "B leads at 300 m (68 DN, A 61 DN).",
         ),
         (
             series(A=[90, 81, 70], B=[80, 77, 68]),
-            "Yellow/red CSD over distance: everywhere A leads (70 DN at 300 m, B 68 DN).",
+            "Yellow/red CSD over distance: A leads everywhere (70 DN at 300 m, B 68 DN).",
         ),
         (
             series(A=[0.2, 9, 8], B=[0.1, 2, 8]),
-            "Yellow/red CSD over distance: at 100 m nobody has 1 DN; from 200 m on A leads (8.0 DN at 300 m, B 8.0 DN).",
+            "Yellow/red CSD over distance: nobody has 1 DN at 100 m; A leads from 200 m on (8.0 DN at 300 m, B 8.0 DN).",
         ),
-        (series(A=[5, 5, 5]), "Yellow/red CSD over distance: everywhere A leads (5.0 DN at 300 m)."),
+        (series(A=[5, 5, 5]), "Yellow/red CSD over distance: A leads everywhere (5.0 DN at 300 m)."),
     ],
 )
 def test_a_series_says_who_leads_from_where_to_where(figure: SeriesFigure, said: str) -> None:

@@ -9,6 +9,7 @@ import pickle
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +46,10 @@ def watch(event: str, details: tuple[Any, ...]) -> None:
     seen.append((event, details))
 
 
-sys.addaudithook(watch)
+@cache
+def watch_from_now_on() -> None:
+    """Not before: a hook cannot be taken back, and each event of every later test would go through it."""
+    sys.addaudithook(watch)
 
 
 @pytest.fixture(scope="module")
@@ -343,6 +347,7 @@ def attacked(interrupted: Path, tmp_path: Path, *attacks: Attack) -> tuple[Path,
 
 def watched(run: Callable[[], object]) -> list[tuple[str, tuple[Any, ...]]]:
     global seen  # noqa: PLW0603  (an audit hook cannot be taken back)
+    watch_from_now_on()
     seen = []
     try:
         run()

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from sweep.base.types import in_turn
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.members import population_imager
 from sweep.metrics.smooth import smooth_csd
 from sweep.report import make_report, read_output, summary_lines
+from sweep.run.search import run_search
+from sweep.search import price
+from sweep.search.problem import Problem, SearchRun
+from sweep.search.solver import search_from
 from sweep.study import Study, load_study
 
 from ..build import faults, ran
@@ -44,6 +50,25 @@ def both(study: Study, found: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.
     view = study.view(space, "chart")
     worst = population_imager(view).worst(curves)["csd_yellow_red"]
     return smooth_csd(view, curves, pair), worst, designed_quantities(view, curves)["sensitivity"]
+
+
+def test_a_dry_run_knows_the_searches_of_a_price(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    lights(tmp_path, "own", 592, 632)
+    (tmp_path / "price.yaml").write_text(TEXT.replace("max_evaluations: 120", "max_evaluations: 24"))
+    study = load_study(tmp_path / "price.yaml")
+    assert study.search is not None
+    asked: list[str] = []
+
+    def counted(problem: Problem, *how: Any) -> SearchRun:
+        asked.append(problem.objective.column)
+        return search_from(problem, *how)
+
+    monkeypatch.setattr(price, "search_from", counted)
+    answer = run_search(study, study.search, in_turn, lambda *_: None)
+    n_front = sum(point.best is not None for point in answer.front)
+    counts = asked.count("worst_csd_yellow_red"), asked.count("csd_yellow_red")
+    assert counts == price.searches_of_price(2, n_front, 2)
+    assert min(counts) > 0
 
 
 @pytest.mark.slow

@@ -14,11 +14,12 @@ from scipy.optimize import brentq
 
 from sweep.designs.tolerance import Tolerance
 from sweep.metrics.members import population_imager
+from sweep.metrics.share import share_interval
 from sweep.report.summary import summary_lines
 from sweep.results.output import read_output
 from sweep.results.tables import ROBUSTNESS
 from sweep.run import robustness, run_study
-from sweep.run.robustness import Candidate, drawn_dn, yield_interval
+from sweep.run.robustness import Candidate, drawn_dn
 from sweep.study import Study, load_study
 
 from ..build import ran
@@ -90,7 +91,7 @@ def agree(study: Study, n: int, thickness: float = 0.0) -> None:
     drawn = drawn_dn(candidate(study), ("yellow", "red"), study.section.seed)
     own = brute_force(study, n, 9, thickness)
     for wanted in (WANTED, 230.0):
-        ends = [yield_interval(int((values >= wanted).sum()), values.size) for values in (drawn, own)]
+        ends = [share_interval(int((values >= wanted).sum()), values.size) for values in (drawn, own)]
         assert 0.01 < (own >= wanted).mean() < 0.99
         assert max(low for low, _ in ends) <= min(high for _, high in ends), ends
 
@@ -141,7 +142,7 @@ def test_yields_agree_with_a_million_draws(tmp_path: Path) -> None:
 def test_the_interval_of_a_share() -> None:
     """Wilson's: the shares p with |k/n - p| <= 1.96 sqrt(p (1 - p) / n)."""
     for kept, n in ((0, 50), (3, 20), (500, 1000), (20, 20)):
-        for end in yield_interval(kept, n):
+        for end in share_interval(kept, n):
             if 1e-9 < end < 1 - 1e-9:
                 assert abs(kept / n - end) == pytest.approx(1.959964 * np.sqrt(end * (1 - end) / n), rel=1e-6)
 

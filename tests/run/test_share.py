@@ -12,25 +12,26 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.stats import binom
 
-from sweep.base.errors import StudyError
 from sweep.camera.linear import LinearImager
 from sweep.designs.tolerance import Off
 from sweep.metrics import drawn as drawn_module
+from sweep.metrics.bound import Bound
 from sweep.metrics.drawn import LampsAndCameras, rank_below
 from sweep.metrics.members import population_imager
 from sweep.metrics.objective import Objective
+from sweep.metrics.share import share_interval
 from sweep.report.summary import summary_lines
 from sweep.results.output import read_output
 from sweep.results.tables import RESULTS
-from sweep.run.robustness import Candidate, drawn_dn, yield_interval
+from sweep.run.robustness import Candidate, drawn_dn
 from sweep.run.rows import jobs_of
 from sweep.search.gradients import Model
-from sweep.search.limit import why_not
+from sweep.search.limit import limit_of, why_not
 from sweep.search.problem import Problem, SearchRun, best_feasible, starting_points
 from sweep.search.solver import search_from
 from sweep.study import Search, Study, load_study
 
-from ..build import ran
+from ..build import one_line, ran
 from ..conftest import STUDIES
 
 TEXT = """\
@@ -134,7 +135,7 @@ def share_with(x: np.ndarray, wanted_dn: float, draws: int = 200_000) -> tuple[f
     assert view.lights.population is not None
     many = replace(view.lights, population=view.lights.population.model_copy(update={"draws": draws}))
     design = Candidate(replace(view, lights=many), search.space, x[None], study.tolerance)
-    return yield_interval(int((drawn_dn(design, YELLOW_RED, 77) >= wanted_dn).sum()), draws)
+    return share_interval(int((drawn_dn(design, YELLOW_RED, 77) >= wanted_dn).sum()), draws)
 
 
 @pytest.mark.slow
@@ -194,5 +195,14 @@ def test_as_column_and_constraint_any_number_of_workers_gives_the_same(tmp_path:
 def test_what_does_not_fit_is_told(tmp_path: Path, old: str, new: str, told: str) -> None:
     path = tmp_path / "share.yaml"
     path.write_text(TEXT.replace(old, new))
-    with pytest.raises(StudyError, match=re.escape(told)):
+    with one_line(told):
         load_study(path)
+
+
+def test_the_limit_leaves_a_constraint_on_it_out_and_says_so() -> None:
+    """Few lamps are the nearest: what 99 % have says nothing of the smallest CSD, by which filters must not be bound."""
+    plain = replace(problem("csd_yellow_red"), constraints={"sensitivity": Bound(min=0.9)})
+    asked = replace(plain, constraints=plain.constraints | {"yield_csd_yellow_red": Bound(min=400)})
+    without, found = limit_of(plain), limit_of(asked)
+    assert found.left_out == ("yield_csd_yellow_red",)
+    assert found.proven == without.proven > 0

@@ -25,7 +25,7 @@ from sweep.run.workers import Workers, workers
 from sweep.study import load_study
 
 from ..build import STUDY, ran
-from ..commanded import commanded
+from ..commanded import UNDRAWN, commanded
 
 SLOWED = Path(__file__).parent.parent / "slowed"
 SAID = "sweep: interrupted; finished chunks are kept, the same command continues\n"
@@ -236,30 +236,51 @@ def workers_of(mark: str) -> list[psutil.Process]:
     return found
 
 
+def begun(folder: Path, jobs: int) -> subprocess.Popen[bytes]:
+    """A run without pictures, which has said that it began; its processes bear the folder as a mark."""
+    arguments = command(folder, "--jobs", str(jobs))[3:]
+    with (folder / "said").open("w") as said:
+        run = subprocess.Popen(
+            [sys.executable, "-c", UNDRAWN, *arguments],
+            stdout=subprocess.DEVNULL,
+            stderr=said,
+            start_new_session=True,
+            env=os.environ | {"SWEEP_MARK": str(folder)},
+        )
+    wait_for(folder / "out" / "tiny" / "run.json", run, folder)
+    return run
+
+
+def emptied(folder: Path) -> None:
+    for made in sorted(folder.rglob("*"), reverse=True):
+        made.rmdir() if made.is_dir() else made.unlink()
+    folder.rmdir()
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("plain_pictures")
-def test_forty_kills_in_every_phase(tmp_path: Path, undisturbed: Path) -> None:
-    """Parents and workers, by three signals, at random moments; the rows are those of an undisturbed run each time."""
-    rng = np.random.default_rng(17)
-    kills, whole, out = {"run": 0, "worker": 0}, 0, tmp_path / "out" / "tiny"
+@pytest.mark.parametrize("seed", range(4))
+def test_forty_kills_in_every_phase(tmp_path: Path, undisturbed: Path, seed: int) -> None:
+    """Parents and workers, by three signals, at random moments; the rows are those of an undisturbed run each time.
+
+    Ten kills of each seed; a run that goes on may have another number of workers than the one that was killed.
+    """
+    rng = np.random.default_rng([17, seed])
+    kills, out = {"run": 0, "worker": 0}, tmp_path / "out" / "tiny"
     noisy_study(tmp_path)
-    while sum(kills.values()) < 40:
-        with (tmp_path / "said").open("w") as said:
-            run = subprocess.Popen(
-                command(tmp_path, "--jobs", "2"),
-                stdout=subprocess.DEVNULL,
-                stderr=said,
-                start_new_session=True,
-                env=os.environ | {"SWEEP_MARK": str(tmp_path)},
-            )
-        wait_for(tmp_path / "out" / "tiny" / "run.json", run, tmp_path)
-        time.sleep(float(rng.uniform(0, 8)))
+    started_s = time.monotonic()
+    assert begun(tmp_path, 2).wait(timeout=120) == 0
+    whole_s = time.monotonic() - started_s
+    emptied(out)
+    while sum(kills.values()) < 10:
+        run = begun(tmp_path, 1 + int(rng.integers(2)))
+        time.sleep(float(rng.uniform(0, whole_s)))
         number = [signal.SIGKILL, signal.SIGTERM, signal.SIGINT][int(rng.integers(3))]
-        if rng.random() < 0.3 and run.poll() is None:
+        if rng.random() < 0.4 and run.poll() is None:
             for process in psutil.Process(run.pid).children(recursive=True)[-1:]:
                 process.kill()
                 kills["worker"] += 1
-            time.sleep(float(rng.uniform(0, 4)))
+            time.sleep(float(rng.uniform(0, whole_s / 2)))
         if run.poll() is None:
             os.kill(run.pid, number)
             kills["run"] += 1
@@ -269,11 +290,8 @@ def test_forty_kills_in_every_phase(tmp_path: Path, undisturbed: Path) -> None:
         said_text = (tmp_path / "said").read_text()
         assert "Traceback" not in said_text, said_text
         if (out / "report.html").exists():
-            whole += 1
             assert pq.read_table(out / "results.parquet").equals(pq.read_table(undisturbed / "results.parquet"))
-            for made in sorted(out.rglob("*"), reverse=True):
-                made.rmdir() if made.is_dir() else made.unlink()
-            out.rmdir()
+            emptied(out)
     assert_continues(tmp_path, undisturbed, 2)
 
 

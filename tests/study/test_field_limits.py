@@ -223,12 +223,9 @@ def beyond_hardware(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def test_each_limit_is_where_the_schema_has_it() -> None:
+    schema = study_schema()
     for key, ends in LIMITS.items():
-        sections = [
-            s["properties"][key]
-            for s in [study_schema(), *study_schema()["$defs"].values()]
-            if key in s.get("properties", {})
-        ]
+        sections = [s["properties"][key] for s in [schema, *schema["$defs"].values()] if key in s.get("properties", {})]
         parts = [
             part
             for prop in sections

@@ -127,14 +127,15 @@ def test_changed_studies(studies: list[dict[str, Any]], tmp_path: Path, seed: in
 
 
 @pytest.mark.slow
-def test_five_hundred_changed_studies(studies: list[dict[str, Any]], tmp_path: Path) -> None:
-    rng, path, found = np.random.default_rng(2), tmp_path / "changed.yaml", Counter()
-    for index in range(500):
+@pytest.mark.parametrize("seed", range(5))
+def test_five_hundred_changed_studies(studies: list[dict[str, Any]], tmp_path: Path, seed: int) -> None:
+    rng, path, found = np.random.default_rng([2, seed]), tmp_path / "changed.yaml", Counter()
+    for index in range(100):
         tree = one_of(rng, studies)
         path.write_bytes(written(changed(rng, tree)) if index % 3 else torn(rng, written(tree), 2))
         found[tried(path, compute=True)] += 1
-    assert found["refused"] > 150, found
-    assert found["computed"] > 25, found
+    assert found["refused"] > 30, found
+    assert found["computed"] > 5, found
 
 
 @pytest.mark.slow
@@ -261,10 +262,11 @@ def test_changed_tables(tmp_path: Path, seed: int) -> None:
 
 
 @pytest.mark.slow
-def test_three_hundred_changed_tables_are_described_and_read(tmp_path: Path) -> None:
-    rng, found = np.random.default_rng(5), Counter()
-    for index in range(300):
+@pytest.mark.parametrize("seed", range(3))
+def test_three_hundred_changed_tables_are_described_and_read(tmp_path: Path, seed: int) -> None:
+    rng, found = np.random.default_rng([5, seed]), Counter()
+    for index in range(100):
         name, content = changed_table(rng, index)
         described = tmp_path / f"pictures-{index}" if index % 3 == 0 else None
         found[curves_tried(tmp_path / name, content, described)] += 1
-    assert min(found[True], found[False]) > 30, found
+    assert min(found[True], found[False]) > 10, found

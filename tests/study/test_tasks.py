@@ -186,6 +186,7 @@ def test_spectra_of_a_file_are_judged_as_those_of_a_group(tmp_path: Path) -> Non
         assert made.digests.keys() == {"road.csv", "lamps.csv"}
 
 
+@pytest.mark.usefixtures("plain_pictures")
 def test_a_run_keeps_the_spectra_of_its_own_tasks(tmp_path: Path) -> None:
     """It is made again without the file; with another file of that name it is refused."""
     study = {

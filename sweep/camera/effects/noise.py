@@ -17,7 +17,7 @@ from ..shot import Shot
 from .base import Chosen, Load, ReadoutEffect
 from .saturation import top_e
 
-LOOKED_UP_S, TABLE_S = 5e-8, 0.04
+LOOKED_UP_S, TABLE_S = 1.2e-8, 0.04
 """Seconds of looking a value up in the table of noise, and of making the table; `tests/bench_work.py` measures them."""
 _MOST_POISSON_E = 1e18
 """NumPy's Poisson generator takes no larger mean."""

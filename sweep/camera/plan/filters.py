@@ -31,8 +31,9 @@ def amounts_of_filters(reach: Reach, factor: FloatArray, change: FilterChange) -
     halves, most = np.zeros((len(first), *shape)), np.zeros(middle.shape)
     for channel, matrix in change.matrices.items():
         most[channel] = np.abs(matrix @ middle[channel]) + abs(matrix) @ half[channel]
+        of_light = matrix.T
         for knot, hat in enumerate(reach.hats):
-            moved = (matrix.T @ (light * hat).T).T
+            moved = (of_light @ (light * hat).T).T
             centers[:, channel, knot] = moved @ middle[channel]
             each[:, channel, knot] = np.abs(moved) @ half[channel]
             halves[:, channel, knot] = np.abs(moved[first] - moved[second]) @ half[channel]

@@ -25,7 +25,8 @@ import numpy as np
 from ...base.types import FloatArray
 from ..effects import phase, quantization
 from ..effects.base import Change, FilterChange, KernelChange, LightChange, Part, ShareChange
-from ..kernel import Kernel, make_kernel, pixels_of_tile, pixels_per_place, readout_of
+from ..kernel import Kernel, make_kernel, pixels_of_tile, readout_of
+from ..kernel_size import pixels_per_place
 from ..methods import Methods
 from ..view import View
 from .bounds import Amounts, Reach
@@ -82,7 +83,7 @@ class Moves:
         made = make_kernel(self._view, methods, nodes, by_pixel=True, work=Counter(), cases=cases)
         if made.by_channel:  # without crosstalk one pixel of a channel stands for all
             made = pixels_of_tile(made, self._view.mosaic)
-        return replace(made, light=np.broadcast_to(made.light, (*made.light.shape[:3], nodes.size)))
+        return replace(made, source=np.broadcast_to(made.light, (*made.light.shape[:3], nodes.size)))
 
     def _of_block(
         self,

@@ -12,7 +12,8 @@ from ...base.types import FloatArray, IndexArray
 from ..between import Between, Deviation
 from ..effects import blur, phase, sampling
 from ..effects.base import Change, KernelChange, KernelEffect, Part
-from ..kernel import make_kernel, pixels_per_place
+from ..kernel import make_kernel
+from ..kernel_size import pixels_per_place
 from ..methods import REFERENCE, Methods
 from ..place_kernels import PlaceKernels
 from ..registry import EFFECTS, WHOLE_LIGHT

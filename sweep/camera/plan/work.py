@@ -20,7 +20,7 @@ BOX_S, TABLED_S, FOLDED_S = 2.5e-3, 3e-9, 1.4e-8
 REACH_S, READOUT_S, LINEAR_S, COMPARED_S, KERNEL_S = 1e-3, 2.5e-3, 1.5e-3, 5e-9, 0.01
 """Seconds of a planner: for the reach of a box, a bound of the readout, one of the optics and each value that it
 compares, and a kernel of a light at a distance; `tests/bench_work.py` measures what they come to."""
-NOISE_S, UNEVEN_NOISE_S = 4e-3, 0.08
+NOISE_S, UNEVEN_NOISE_S = 0.008, 0.06
 """Seconds of the first bounds of a noisy readout, without PRNU and with it; `tests/bench_work.py` measures them."""
 LEAST_LOOK_S = 2 * REACH_S
 """Seconds for each CFA, with which hardly anything can be found."""

@@ -27,6 +27,8 @@ _ORDER_SIGMA_DN = 0.3
 _EDGE_MARGIN_NM, _EDGE_SIGMA_NM = 0.5, 0.1
 _START_SPREAD = 0.7
 _DECIMALS = 4
+MOST_EVALUATIONS = 120
+"""Of a fit, each with those of its derivatives."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,7 @@ def printed_order(values: Mapping[str, float]) -> list[tuple[str, str]]:
     return [(a, b) for a, b in itertools.pairwise(names) if values[a] < values[b]]
 
 
-def fit_from(task: Task, seed: int, start: int) -> Fit:
+def fit_from(task: Task, seed: int, start: int, most_evaluations: int = MOST_EVALUATIONS) -> Fit:
     """Fit from the prior's mean (start 0) or from a draw of the prior; the same for the same seed and start."""
     residuals = _Residuals(task)
     low, high = (np.array([getattr(f, end) for f in residuals.free]) for end in ("low", "high"))
@@ -110,7 +112,7 @@ def fit_from(task: Task, seed: int, start: int) -> Fit:
     inside = 1e-6 * residuals.sigma
     x0 = np.clip(residuals.mean + draw * residuals.sigma, low + inside, high - inside)
     found = least_squares(
-        residuals, x0, bounds=(low, high), x_scale=residuals.sigma, max_nfev=120, xtol=1e-7, ftol=1e-7
+        residuals, x0, bounds=(low, high), x_scale=residuals.sigma, max_nfev=most_evaluations, xtol=1e-7, ftol=1e-7
     )
     x = np.clip(np.round(found.x, _DECIMALS), low, high)
     names = [f.name for f in residuals.free]

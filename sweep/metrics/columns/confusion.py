@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -32,7 +32,7 @@ _MEANINGS = {
     ERROR: "largest probability that noise turns a signal of one of two types into one of the other, pair by pair",
     ERROR_BOUND: "bound on how often the best rule takes a signal of one of two types for the other, for the worst "
     "signal",
-    STATE_ERROR: "largest pairwise error over all pairs of states",
+    STATE_ERROR: "error of the worst pair of states: how often noise makes one of two look like the other",
     STATE_ERROR_BOUND: "bound on how often the best rule tells the wrong state, for the worst signal",
 }
 _TOLD = {CNR: "contrast to noise", D_PRIME: "d'"}
@@ -61,7 +61,7 @@ class Confusion(NoiseMetric):
     ) -> Columns:
         """Exact sums over the digital numbers of a few pixels; where these are too many, Gaussian errors or bounds."""
         cases = [(read.mean[:, case], read.variance[:, case]) for case in range(read.mean.shape[1])]
-        error, bound, state_bound = _errors(imager, curves, read, cases, members)
+        error, bound, state_bound = _errors(imager, curves, read, members)
         found: Columns = {}
         for pair in class_pairs(list(members)):
             both = members[pair[0]], members[pair[1]]
@@ -99,29 +99,54 @@ def _quantity(metric: str, name: str, types: tuple[str, ...]) -> Quantity:
     )
 
 
+def state_errors(imager: Imager, curves: FloatArray, states: Sequence[str]) -> FloatArray:
+    """`STATE_ERROR` of designs, ndarray[n_designs], and nothing else; `curves`: see `designed_quantities`."""
+    members = {name: imager.view.members[name] for name in states}
+    exact = _exact(imager, curves, members)
+    if exact is not None:
+        return np.asarray(np.max([error for case in exact for error in case.error.values()], axis=0), dtype=float)
+    error = _gaussian(imager.read_with_noise(curves), members)
+    return np.asarray(np.max(list(error.values()), axis=0), dtype=float)
+
+
+def _exact(imager: Imager, curves: FloatArray, members: Mapping[str, IndexArray]) -> list[confusion.Errors] | None:
+    """Errors and bounds in each case by sums over the digital numbers; None where these are too many."""
+    few = imager.readout.few_pixels
+    if few is None or not confusion.affordable(imager.readout.pixel, few):
+        return None
+    electrons = imager.pixel_electrons(curves)
+    return [confusion.errors(case, few, imager.readout.pixel, members) for case in np.moveaxis(electrons, 1, 0)]
+
+
+def _largest(quantity: Callable[..., FloatArray], read: NoisyReadout, *of: Any) -> FloatArray:
+    """The largest over the cases of a quantity of the readout, ndarray[n_designs]."""
+    found = [
+        quantity(
+            read.mean[:, case],
+            read.variance[:, case],
+            *of,
+            NoiseShape(read.gaussian[:, case], read.reach_dn[:, case]),
+        )
+        for case in range(read.mean.shape[1])
+    ]
+    return np.asarray(np.max(found, axis=0), dtype=float)
+
+
+def _gaussian(read: NoisyReadout, members: Mapping[str, IndexArray]) -> _ByPair:
+    """The error of each pair, Gaussian or a bound."""
+    return {(a, b): _largest(pairwise_error, read, members[a], members[b]) for a, b in class_pairs(list(members))}
+
+
 def _errors(
-    imager: Imager,
-    curves: FloatArray,
-    read: NoisyReadout,
-    cases: list[tuple[FloatArray, FloatArray]],
-    members: Mapping[str, IndexArray],
+    imager: Imager, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
 ) -> tuple[_ByPair, _ByPair, FloatArray]:
     """Error and bound of each pair, and the bound of all states, the largest over the cases."""
-    few, pairs = imager.readout.few_pixels, class_pairs(list(members))
-    if few is not None and confusion.affordable(imager.readout.pixel, few):
-        electrons = imager.pixel_electrons(curves)
-        exact = [confusion.errors(electrons[:, case], few, imager.readout.pixel, members) for case in range(len(cases))]
+    exact, pairs = _exact(imager, curves, members), class_pairs(list(members))
+    if exact is not None:
         return (
             {pair: np.max([each.error[pair] for each in exact], axis=0) for pair in pairs},
             {pair: np.max([each.bound[pair] for each in exact], axis=0) for pair in pairs},
             np.max([each.state_bound for each in exact], axis=0),
         )
-    shapes = [NoiseShape(read.gaussian[:, case], read.reach_dn[:, case]) for case in range(len(cases))]
-
-    def largest(quantity: Callable[..., FloatArray], *of: Any) -> FloatArray:
-        found = [quantity(*case, *of, shape) for case, shape in zip(cases, shapes, strict=True)]
-        return np.asarray(np.max(found, axis=0), dtype=float)
-
-    error = {(a, b): largest(pairwise_error, members[a], members[b]) for a, b in pairs}
-    bound = {(a, b): largest(error_bound, members[a], members[b]) for a, b in pairs}
-    return error, bound, largest(state_error_bound, members)
+    bound = {(a, b): _largest(error_bound, read, members[a], members[b]) for a, b in pairs}
+    return _gaussian(read, members), bound, _largest(state_error_bound, read, members)

@@ -27,7 +27,7 @@ def best_of_runs(runs: Mapping[str, Output]) -> pd.DataFrame:
             "run": name,
             "study": output.study.study,
             "folder": str(output.folder),
-            "maximizes": str(output.objective),
+            "maximizes": _maximized(output)[0],
         }
         if not output.best.empty:
             best = output.best.iloc[0].to_dict()
@@ -118,7 +118,8 @@ def ranking(runs: Mapping[str, Output]) -> list[str]:
         (first, most), *others = ordered
         scenes = {run: " ".join(str(runs[run].best.iloc[0]["scenario"]).split()) for run in values}
         place = {run: f" in {scene}" if len(set(scenes.values())) > 1 else "" for run, scene in scenes.items()}
-        text = f"Best {objective}{f' in {dn}' if several and dn else ''}: {first}"
+        under = " under the constraints" if any(runs[run].constraints for run in values) else ""
+        text = f"Best {objective}{f' in {dn}' if several and dn else ''}{under}: {first}"
         text += f" with {column.amount(most)}{place[first]}"
         for run, value in others:
             if most - value <= _SAME * abs(most):

@@ -13,6 +13,7 @@ from ...base.types import FloatArray
 from ...metrics.objective import COMBINED
 from ...metrics.pareto import hypervolume
 from ...metrics.quantity import DN, WORST_CASE
+from ...metrics.share import told_share
 from ...results.tables import FOUND
 from .. import Output
 
@@ -143,7 +144,7 @@ def hypervolumes(found: list[ComparedFront], box: Region) -> pd.DataFrame:
                 "separation / DN": f"{low[0]:.1f} to {high[0]:.1f}",
                 "sensitivity": f"{low[1]:.4f} to {high[1]:.4f}",
                 "hypervolume": area,
-                "of the box": f"{area / box.area:.1%}" if box.area > 0 else "-",
+                "of the box": told_share(area / box.area) if box.area > 0 else "-",
             }
         )
     return pd.DataFrame(rows)

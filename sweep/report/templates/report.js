@@ -124,7 +124,7 @@ function drawOverview() {
     placed.push(row);
     const name = data.names[row] ? data.names[row].short : cfaOf(row);
     return {x: light[row], y: y[row], text: `${plain(name)} ${y[row] < 10 ? y[row].toFixed(1) : y[row].toFixed(0)}`, showarrow: false,
-      xanchor: light[row] > 0.85 * right ? "right" : "left", xshift: light[row] > 0.85 * right ? -8 : 8, yshift: 9 + 13 * near, font: {size: 12}};
+      xanchor: light[row] > 0.85 * right ? "right" : "left", xshift: light[row] > 0.85 * right ? -8 : 8, yshift: 9 + 13 * near, font: {size: 12}, bgcolor: "rgba(255,255,255,0.75)", borderpad: 0};
   });
   Plotly.react("cfas", found, {
     xaxis: Object.assign({title: {text: plain(overview.x_label).replace(": ", narrow() ? ":<br>" : ": ")}, range: [0, 1.03 * right]}, grid),
@@ -271,7 +271,7 @@ function choose(row) {
   const box = byId("details"), list = document.createElement("dl");
   for (const name of Object.keys(data.columns)) {
     const value = columns[name][row];
-    if (!Number.isFinite(value)) continue;
+    if (!Number.isFinite(value) || (name === "violation" && value <= 0)) continue;
     const pair = document.createElement("div"), term = document.createElement("dt"), text = document.createElement("dd");
     term.textContent = data.columns[name].label;
     text.textContent = shown(name, value);

@@ -1,0 +1,96 @@
+"""The light of single pixels in factors: what falls on each different place of a pixel, and which pixels are there.
+
+A pixel takes its own light, and with crosstalk some of its neighbors', each through the filter there. The image is
+round, so that many pixels of many places of the light see the same. Electrons are summed over the wavelengths once for
+each of these places and each filter, and then gathered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.types import FloatArray, IndexArray
+from .compiled_split import gather
+
+
+@dataclass(frozen=True)
+class SplitLight:
+    """`Kernel.light` of pixels, ndarray[n_cases, n_units, n_channels, n_wavelengths], in factors.
+
+    `values`: light at each different place, ndarray[n_places, n_knots or 1]; `hats`: from these knots to all
+    wavelengths, ndarray[n_knots, n_wavelengths], None where they are the same or see the same; `factor`: of the light's
+    way, ndarray[n_wavelengths]. A pixel is a sum of parts: `shares`: how much of each, ndarray[n_parts]; `place`: where
+    it is, ndarray[n_parts, n_cases, n_units]; `through`: whose filter it has, ndarray[n_parts, n_units].
+    """
+
+    values: FloatArray
+    hats: FloatArray | None
+    factor: FloatArray
+    shares: FloatArray
+    place: IndexArray
+    through: IndexArray
+    n_channels: int
+
+    @property
+    def shape(self) -> tuple[int, int, int, int]:
+        """That of the array."""
+        return (*self.place.shape[1:], self.n_channels, self.factor.size)
+
+    def whole(self) -> FloatArray:
+        """The array itself."""
+        by_place = (self.values if self.hats is None else self.values @ self.hats) * self.factor
+        found = np.zeros(self.shape)
+        pixels = np.arange(self.place.shape[2])
+        for share, place, through in zip(self.shares, self.place, self.through, strict=True):
+            found[:, pixels, through] += share * by_place[place]
+        return found
+
+    def _seen(self, spectra: FloatArray) -> FloatArray:
+        """Sums over the wavelengths at each place: ndarray[..., n, n_wavelengths] -> ndarray[..., n_places, n]."""
+        on_knots = spectra * self.factor
+        if self.values.shape[1] == 1:
+            on_knots = on_knots.sum(axis=-1, keepdims=True)
+        elif self.hats is not None:
+            on_knots = on_knots @ self.hats.T
+        return np.asarray(self.values @ np.swapaxes(on_knots, -1, -2), dtype=float)
+
+    def touched(self, channels: Sequence[int]) -> IndexArray:
+        """The units that look through the filter of any of these channels."""
+        lit = (self.values != 0).any(axis=1)[self.place].any(axis=1)
+        return np.flatnonzero((np.isin(self.through, list(channels)) & (self.shares[:, None] != 0) & lit).any(axis=0))
+
+    def sums(self, spectra: FloatArray, channels: Sequence[int], units: IndexArray | None = None) -> FloatArray:
+        """Sums over channels and wavelengths, ndarray[n_designs, n_cases, n_signals, n_units] (those of `units`).
+
+        `spectra`: QE times signals, ndarray[n_designs, n_channels, n_signals, n_wavelengths], of the `channels`. One
+        design is computed as if there was no other.
+        """
+        seen = np.ascontiguousarray(self._seen(spectra))
+        row = np.full(self.n_channels, -1)
+        row[list(channels)] = np.arange(len(channels))
+        place, through = self.place, row[self.through]
+        if units is not None:
+            place, through = np.ascontiguousarray(place[..., units]), np.ascontiguousarray(through[:, units])
+        found = np.zeros((len(spectra), place.shape[1], spectra.shape[2], place.shape[2]))
+        gather(seen, self.shares, place, through, found)
+        return found
+
+    def folded(self, weights: FloatArray, channel: int) -> FloatArray:
+        """Weighted sums over the units of what they get through one channel's filter, ndarray[n_cases, n_wavelengths].
+
+        `weights`: ndarray[n_cases, n_units].
+        """
+        by_place = np.zeros((len(weights), len(self.values)))
+        for share, place, through in zip(self.shares, self.place, self.through, strict=True):
+            own = np.flatnonzero(through == channel)
+            for case in range(len(weights)):
+                np.add.at(by_place[case], place[case, own], share * weights[case, own])
+        seen = by_place @ self.values
+        return np.asarray((seen if self.hats is None else seen @ self.hats) * self.factor, dtype=float)
+
+    def work(self, n_channels: int, n_signals: int) -> int:
+        """Multiplications of `sums` for one design."""
+        return int(n_channels * n_signals * self.values.size + n_signals * self.place.size)

@@ -1,0 +1,154 @@
+"""What tables show of a design besides its row, all of it read from one image chain of its scene.
+
+The worker that computes the rows of a plain CFA or named design looks at it, too: it has the scene's kernels at hand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+
+from ..base.types import FloatArray, Parallel, Progress, delayed
+from ..camera.imager import imager_of
+from ..camera.view import View
+from ..curves.lights import Pair
+from ..metrics.limiting import limiting_lights
+from ..metrics.recognition import recognize
+from ..results.designs import row_curves
+from ..results.tables import FEW, FOUND, LIMITED_BY, POINTS, RECOGNITION, holds
+from ..study import Study
+from .rows import Job
+
+_AT_ONCE = 64
+_Row = Mapping[Hashable, Any]
+_Seen = tuple[int, FloatArray, frozenset[str]]
+"""A design's id, its curves, ndarray[1, n_modified, n_wavelengths], and for which tables it is looked at."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What is seen of a design, as far as it was looked for.
+
+    `limited_by`: of each pair of types the two lights that limit its separation; `dn`: digital numbers at the first
+    place, ndarray[n_signals, n_channels]; `recognized`: see `recognize`.
+    """
+
+    limited_by: Mapping[Pair, tuple[str, str]] | None = None
+    dn: FloatArray | None = None
+    recognized: Mapping[str, float] | None = None
+
+
+@dataclass(frozen=True)
+class Looking:
+    """How a study looks at designs. `tables`: those that are to be made; `drawn`: the scenario of which signals are
+    drawn; `states`, `patches`, `seed`: of raw patches.
+    """
+
+    tables: frozenset[str]
+    drawn: str
+    states: tuple[str, ...]
+    patches: int
+    seed: int
+
+    @classmethod
+    def of(cls, study: Study, tables: Collection[str]) -> Looking:
+        """For some of a study's tables."""
+        asked = study.section.recognition
+        patches = 0 if asked is None else asked.patches or 0
+        first = next(iter(study.scenarios))
+        return cls(
+            frozenset({LIMITED_BY, POINTS, RECOGNITION} & {*tables}), first, study.states, patches, study.section.seed
+        )
+
+    def wanted(self, kind: str, scenario: str, *, on_front: bool = False) -> frozenset[str]:
+        """For which tables a row is looked at."""
+        found = {LIMITED_BY}
+        if on_front or scenario == self.drawn or kind == FOUND:
+            found.add(POINTS)
+        if self.patches and kind in FEW:
+            found.add(RECOGNITION)
+        return self.tables & found
+
+    def at(self, view: View, seen: _Seen) -> Look:
+        """Look at a design. The random numbers of its patches follow from the study's seed and its id."""
+        design_id, curves, wanted = seen
+        imager = imager_of(view)
+        limited_by = dn = recognized = None
+        if wanted & {LIMITED_BY, POINTS}:
+            cases = imager.read(curves)[0][0]
+            limited_by, dn = limiting_lights(view, cases), cases[0].copy()
+        if RECOGNITION in wanted:
+            rng = np.random.default_rng((self.seed, design_id))
+            recognized = recognize(imager, curves, self.states, self.patches, rng)
+        return Look(limited_by, dn, recognized)
+
+    def beside_rows(self, job: Job, view: View, table: pa.Table) -> dict[int, Look]:
+        """Looks at the designs of a job, where all are shown, by their ids.
+
+        One that cannot be looked at is left out: `looks_of` looks again, once all rows are kept, and tells why not.
+        """
+        found: dict[int, Look] = {}
+        wanted = self.wanted(job.space.kind, job.scenario)
+        if not wanted or job.space.kind not in FEW:
+            return found
+        for index in np.flatnonzero(holds(table, "status", "ok")):
+            curves = job.space.curves(job.space.points(job.start, job.stop)[index : index + 1], view.grid.size)
+            with suppress(Exception):
+                design_id = job.first_id + int(index)
+                found[design_id] = self.at(view, (design_id, curves, wanted))
+        return found
+
+
+def looks_of(
+    study: Study,
+    looking: Looking,
+    rows: pd.DataFrame,
+    on_front: pd.DataFrame,
+    known: Mapping[int, Look],
+    parallel: Parallel,
+    progress: Progress,
+) -> dict[int, Look]:
+    """Looks at the designs to draw and those on the front by their ids; `known`: those that are there already."""
+    found = dict(known)
+    groups: dict[tuple[str, ...], list[_Seen]] = {}
+    views: dict[tuple[str, ...], View] = {}
+    for row, wanted in _shown(looking, rows, on_front):
+        if wanted and int(row["design_id"]) not in found:
+            space, curves = row_curves(study, row)
+            key = (str(row["scenario"]), space.cfa, *(() if space.filter is None else space.filter.channels))
+            views.setdefault(key, study.view(space, key[0]))
+            groups.setdefault(key, []).append((int(row["design_id"]), curves, wanted))
+    parts = [
+        (views[key], own[start : start + _AT_ONCE])
+        for key, own in groups.items()
+        for start in range(0, len(own), _AT_ONCE)
+    ]
+    # The CFAs of a scene share its kernels: in one call, where few designs of each are looked at.
+    calls: list[list[tuple[View, list[_Seen]]]] = []
+    for _, own_parts in groupby(parts, lambda part: part[0].scenario):
+        scene = list(own_parts)
+        calls += [scene] if sum(len(designs) for _, designs in scene) <= _AT_ONCE else [[part] for part in scene]
+    for looks in parallel(delayed(_looked, looking, call) for call in calls):
+        found |= looks
+        progress("lights and patches", len(found), len(known) + sum(len(own) for own in groups.values()))
+    return found
+
+
+def _shown(looking: Looking, rows: pd.DataFrame, on_front: pd.DataFrame) -> Iterator[tuple[_Row, frozenset[str]]]:
+    """Rows that are shown, each once, and for which tables they are looked at; not those that failed."""
+    front = {*on_front["design_id"]}
+    every = pd.concat([rows, on_front]).drop_duplicates("design_id")
+    for row in every[every["status"] == "ok"].to_dict("records"):
+        kind, scenario = str(row["kind"]), str(row["scenario"])
+        yield row, looking.wanted(kind, scenario, on_front=row["design_id"] in front)
+
+
+def _looked(looking: Looking, parts: Sequence[tuple[View, Sequence[_Seen]]]) -> dict[int, Look]:
+    return {seen[0]: looking.at(view, seen) for view, designs in parts for seen in designs}

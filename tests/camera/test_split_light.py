@@ -1,0 +1,61 @@
+"""The light of single pixels in factors, against a loop over pixels, wavelengths and filters."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sweep.camera.effects import phase
+from sweep.camera.kernel import Kernel, make_kernel
+from sweep.camera.methods import REFERENCE
+from sweep.camera.split_light import SplitLight
+
+from ..hard.scenes import DARK, F2, FAR, Scene, scene
+
+
+def pixels(made: Scene, blurred: str) -> Kernel:
+    """Kernel of pixels at three places."""
+    places = np.array([[0.0, 0.0], [0.3, 0.9], [1.6, -0.2]])
+    cases = phase.Cases(places, np.floor(places + 0.5))
+    methods, nodes = replace(REFERENCE, blur=blurred), made.view.grid.nodes_nm
+    return make_kernel(made.view, methods, nodes, by_pixel=True, work=Counter(), cases=cases)
+
+
+@pytest.mark.parametrize("blurred", ["every wavelength", "every 10 nm", "skip"])
+@pytest.mark.parametrize("crosstalk", [0.0, 0.1])
+def test_sums_are_those_of_the_array(blurred: str, crosstalk: float) -> None:
+    given = {"target": FAR, "optics": F2, "visibility_m": 500, "noise": True}
+    made = scene("split", "RYNCy", given, DARK | {"crosstalk": crosstalk})
+    kernel = pixels(made, blurred)
+    split = kernel.source
+    assert isinstance(split, SplitLight)
+    assert split.shape == kernel.light.shape
+    rng = np.random.default_rng(1)
+    channels = [0, 2, 3]
+    spectra = rng.uniform(size=(2, 3, 5, kernel.light.shape[3]))
+    expected = np.einsum("xucw,ncsw->nxsu", kernel.light[:, :, channels], spectra)
+    np.testing.assert_allclose(split.sums(spectra, channels), expected, rtol=1e-12)
+    # A design is not changed by those beside it, and the pixels of some channels can be asked for alone.
+    np.testing.assert_array_equal(split.sums(spectra[1:], channels)[0], split.sums(spectra, channels)[1])
+    touched = split.touched([2])
+    lit = (kernel.light[:, :, 2] != 0).any(axis=(0, 2))
+    np.testing.assert_array_equal(touched, np.flatnonzero(lit))
+    one = split.sums(spectra[:, 1:2], [2], touched)
+    np.testing.assert_allclose(one, np.einsum("xuw,nsw->nxsu", kernel.light[:, touched, 2], spectra[:, 1]), rtol=1e-12)
+    weights = rng.uniform(size=kernel.shape)
+    folded = np.einsum("xu,xuw->xw", weights, kernel.light[:, :, 3])
+    np.testing.assert_allclose(split.folded(weights, 3), folded, rtol=1e-12)
+
+
+def test_a_channel_is_the_mean_of_its_pixels() -> None:
+    """The kernel of channels, made on another way, is that of the pixels, weighed as they are read out."""
+    made = scene("mean", "RGGB", {"target": FAR, "optics": F2}, DARK | {"crosstalk": 0.1})
+    apart = pixels(made, "every wavelength")
+    places = np.array([[0.0, 0.0], [0.3, 0.9], [1.6, -0.2]])
+    cases = phase.Cases(places, np.floor(places + 0.5))
+    nodes = made.view.grid.nodes_nm
+    whole = make_kernel(made.view, REFERENCE, nodes, by_pixel=False, work=Counter(), cases=cases)
+    np.testing.assert_allclose(np.einsum("xuv,xucw->xvcw", apart.readout, apart.light), whole.light, rtol=1e-11)

@@ -1,0 +1,77 @@
+"""Compiles what tests share, before they begin: Numba keeps it on the disk, where every process finds it.
+
+Two processes work side by side, each on kernels of its own; a kernel that is missed here is compiled in the first test
+that calls it.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+
+def places_of_lights() -> None:
+    """Images of a small light at any place, promises, plans."""
+    from sweep.camera.methods import REFERENCE
+    from sweep.camera.plan.planner import Planner
+
+    from .hard.scenes import F2, TINY, columns, scene
+
+    for cfa, wide, target in (("RYNCy", False, TINY), ("RGGB", True, TINY | {"phase_px": [0.3, 1.2]})):
+        made = scene("small", cfa, {"target": target, "optics": F2}, wide=wide)
+        columns(made, Planner([made.box]).plan("small", 1.0).methods)
+        columns(made, REFERENCE)
+
+
+def designs_and_metrics() -> None:
+    """Blocks of filters, distances, errors under noise, worst cases over lamps, drawn images."""
+    import numpy as np
+
+    from sweep.camera.pixel import Pixel
+    from sweep.metrics import confusion
+    from sweep.run import run_study
+    from sweep.study import load_study
+    from sweep.vision.images import HeadCamera
+    from sweep.vision.lamps import TEST, split_lamps
+    from sweep.vision.scenes import SHUFFLED, draw_scenes
+
+    from .build import STUDY
+    from .vision.heads import NO_FILTERS, head_view, vision
+
+    dim, budget = "exposure: {kind: fixed, exposure_s: 0.002}", "starts: 4, max_evaluations: 200"
+    assert dim in STUDY
+    assert budget in STUDY
+    text = (
+        STUDY.replace("COUNT", "2").replace("count: 51", "count: 3").replace(budget, "starts: 1, max_evaluations: 10")
+    )
+    noisy = text.replace(dim, f"{dim}, noise: true") + "pixel: {read_noise_e: 2, prnu: 0.01, offset_dn: 64}\n"
+    with TemporaryDirectory() as folder:
+        os.environ["SWEEP_CACHE"] = folder  # plans are kept there, not in the user's
+        for name, made in (("noisy", noisy), ("population", text + "population: {temperature_c: [-40, 85]}\n")):
+            path = Path(folder) / f"{name}.yaml"
+            path.write_text(made)
+            run_study(load_study(path), Path(folder) / name, 1, lambda *_: None)
+    channels, types = [np.arange(2), np.arange(2, 3)], {"a": np.array([0]), "b": np.array([1])}
+    for well_e, bits in ((100.0, 8), (1e5, 16)):
+        pixel = Pixel(well_e=well_e, bits=bits, read_noise_e=1.0)
+        confusion.errors(np.array([[[9.0, 9, 9], [12.0, 12, 20]]]), channels, pixel, types)
+    asked, view = vision(), head_view()
+    scenes = draw_scenes(asked, split_lamps(view.lights, asked, (1, 0))[TEST], SHUFFLED, 1, (5,))
+    HeadCamera(view, NO_FILTERS, asked).images(scenes)
+
+
+WORKS: tuple[Callable[[], None], ...] = (places_of_lights, designs_and_metrics)
+
+
+def compile_kernels() -> None:
+    with ProcessPoolExecutor(len(WORKS), mp_context=get_context("spawn")) as pool:
+        for done in [pool.submit(work) for work in WORKS]:
+            done.result()
+
+
+if __name__ == "__main__":
+    compile_kernels()
