@@ -90,7 +90,7 @@ class Gathered:
         self._always: list[pa.Table] = [self.rules.schema.empty_table()]
         self._best: dict[str, pa.Table] = {}
         self._feasible: dict[str, pa.Table] = {}
-        self._leading = self.rules.schema.empty_table()
+        self._leading: dict[str, pa.Table] = {}
 
     def add(self, few: pa.Table) -> None:
         """Take in what `few_of` a table gives."""
@@ -99,9 +99,12 @@ class Gathered:
         always = holds(few, "kind", *FEW)
         if always.any():
             self._always.append(few.filter(pa.array(always)))
-        self._leading = leading(pa.concat_tables([self._leading, few]).unify_dictionaries(), self.rules.front[0])
-        candidates = holds(few, "kind", "sweep") & holds(few, "scenario", self.scenario)
-        swept = few.filter(pa.array(candidates & few["feasible"].to_numpy()))
+        every = few.filter(pa.array(holds(few, "kind", SWEPT)))
+        for scenario in every["scenario"].unique().to_pylist():
+            own = every.filter(pa.array(holds(every, "scenario", scenario)))
+            both = pa.concat_tables([self._leading[scenario], own]) if scenario in self._leading else own
+            self._leading[scenario] = leading(both.unify_dictionaries(), self.rules.front[0])
+        swept = every.filter(pa.array(holds(every, "scenario", self.scenario) & every["feasible"].to_numpy()))
         for cfa in swept["cfa"].unique().to_pylist():
             own = swept.filter(pa.array(holds(swept, "cfa", cfa)))
             both = pa.concat_tables([self._best[cfa], own]) if cfa in self._best else own
@@ -125,7 +128,10 @@ class Gathered:
 
     def front_frame(self) -> pd.DataFrame:
         """Swept rows: feasible ones of the whole front in the first scenario, evenly up to FRONT_ROWS; who leads."""
-        tables = [self._leading.filter(pa.array(holds(self._leading, "kind", SWEPT)))]
+        every = leading(
+            pa.concat_tables([*self._always, *self._leading.values()]).unify_dictionaries(), self.rules.front[0]
+        )
+        tables = [every.filter(pa.array(holds(every, "kind", SWEPT)))]
         for table in self._feasible.values():
             found = self.front.marked(table)
             found = found.filter(found["pareto"]).sort_by([(self.rules.front[1], "ascending")])
