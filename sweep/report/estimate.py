@@ -7,7 +7,7 @@ import time
 from ..study import Study
 from .figures import CurvesFigure, draw_curves, rendered
 
-_PICTURES, _PER_SCENARIO, _OF_GRIDS = 13.0, 0.5, 12.0
+_PICTURES, _PER_SCENARIO, _OF_GRIDS = 17.0, 0.5, 12.0
 """Of a report, for each scenario of its study, and for sweeps of many designs; `python -m tests.bench_estimate`."""
 _MANY = 1000
 

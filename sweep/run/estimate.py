@@ -28,6 +28,8 @@ from .workers import Workers, one_thread
 
 _SAMPLE = 256
 _BUDGET_S = 10.0
+_STARTED_S = 0.7
+"""What libraries and compiled code take to load; `python -m tests.bench_estimate`."""
 _Kind = tuple[str, str, str]
 
 
@@ -63,6 +65,7 @@ def estimate(study: Study, output: Path, n_jobs: int, progress: Progress) -> Est
     seconds, bytes_per_row = 0.0, 0.0
     if todo:
         seconds, bytes_per_row = _sampled(sweep, todo)
+        seconds += _STARTED_S * crew.count  # each worker loads them
     own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
     evaluations = 0
     if study.search is not None and not whole:
