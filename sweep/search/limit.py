@@ -194,9 +194,15 @@ def why_not(problem: Problem) -> str | None:
 
 
 def _most_sensitive(problem: Problem) -> float:
-    """The largest sensitivity that the study lets a filter have, 1 where it says none."""
+    """The largest sensitivity that the study lets a filter have, 1 where it says none, or none as it comes out."""
     bound = problem.constraints.get(SENSITIVITY)
-    return 1.0 if bound is None or bound.max is None else min(1.0, bound.max)
+    return 1.0 if bound is None or bound.max is None or _moves(problem) else min(1.0, bound.max)
+
+
+def _moves(problem: Problem) -> bool:
+    """Whether filters count as they come out of production, too."""
+    asked = (*problem.constraints, *problem.objective.weights)
+    return len(ways_of(problem)) > 1 and any(problem.worst_distance(name) for name in asked)
 
 
 def _relaxed(problem: Problem) -> tuple[Problem, tuple[str, ...]]:
@@ -244,8 +250,7 @@ def _shifts_left_out(nominal: Sequence[str], problem: Problem) -> list[str]:
 
 def _top(problem: Problem) -> FloatArray:
     """No filter of the box exceeds this curve, however it comes out in a worst case, ndarray[n_wavelengths]."""
-    asked = (*problem.constraints, *problem.objective.weights)
-    moved = ways_of(problem)[1:] if any(problem.worst_distance(name) for name in asked) else ()
+    moved = ways_of(problem)[1:] if _moves(problem) else ()
     tops = [problem.family.upper(problem.low, problem.high)[0], *(way.high for way in moved)]
     return np.asarray(np.max(tops, axis=0), dtype=float)
 

@@ -14,7 +14,7 @@ from sweep.metrics.bound import Bound
 from sweep.metrics.members import population_imager
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth import smooth_csd
-from sweep.search.limit import Limit, limit_of
+from sweep.search.limit import Limit, limit_of, why_not
 from sweep.search.problem import Problem, best_feasible, starting_points
 from sweep.search.produced import all_ways, ways_of
 from sweep.search.solver import search_from
@@ -40,6 +40,16 @@ def problem() -> Problem:
 @cache
 def limit() -> Limit:
     return limit_of(problem())
+
+
+def test_a_bound_on_sensitivity_is_none_of_what_comes_out() -> None:
+    """Beside a darker Y a filter of at most 0.9 leaves the exposure to others; one that production moves may not."""
+    qe = problem().view.qe.copy()
+    qe[problem().view.mosaic.channels.index("Y")] *= 0.95
+    view = replace(problem().view, qe=qe)
+    moved = replace(problem(), view=view, constraints={"sensitivity": Bound(max=0.9)})
+    assert why_not(moved) == "the modified channel could set the exposure"
+    assert why_not(replace(moved, objective=Objective(minimum={"csd_yellow_red": 1.0}))) is None
 
 
 def test_a_way_is_the_family_as_production_has_it() -> None:
