@@ -17,7 +17,10 @@ import sweep.report.page
 from sweep.commands.app import main
 sweep.report.page._drawings = lambda _: ()
 signal.signal(signal.SIGINT, signal.default_int_handler)
-main()
+try:
+    main()
+finally:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 """
 """The command, whose reports have no pictures: for tests of processes, in which pictures would take half of the time."""
 

@@ -44,6 +44,7 @@ def ends_in_lines(command: Callable[[], object]) -> NoReturn:
         code = _INTERRUPTED
     if code == _BROKEN_PIPE or not _flushed():
         _drop_output()
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # all is said: what stops it now, stops it without a word
     sys.exit(code)
 
 

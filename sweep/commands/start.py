@@ -31,4 +31,6 @@ def start() -> None:
     except SystemExit as end:
         if end.code == 0 and sys.platform == "linux":
             os._exit(0)
+        if usual:
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
         raise
