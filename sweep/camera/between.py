@@ -1,11 +1,9 @@
 """What may lie between the places that are looked at: bounds for cells of places.
 
-Over a cell of half width h, a function whose slope along one axis changes by at most omega + L |x - x'| differs from
-the line between its two ends by at most omega h / 2 + L h^2 / 2. So the kernel differs from the bilinear interpolation
-of its values at a cell's four corners by at most the sum of that over both axes. The kernel is a ratio, of the light
-weighed by how much of each pixel the readout covers to the sum of these weights. The slope of a covered area is a
-difference of two chords (known up to an interval in every cell), that of a pixel's light a difference of two line
-means of the image.
+In a cell of half width h the kernel is taken as the biquadratic function through its values at nine nodes: what it may
+be off is of the third order of h (`compiled_areas`). The kernel is a ratio, of the light weighed by how much of each
+pixel the readout covers to the sum of these weights. The slope of a covered area is a difference of two chords (known
+up to an interval in every cell), that of a pixel's light a difference of two line means of the image.
 """
 
 from __future__ import annotations
@@ -19,8 +17,9 @@ import numpy as np
 from ..base.types import FloatArray, IndexArray
 from . import kernel
 from .compiled_areas import CellWeights, areas
-from .compiled_cells import SEGMENTS, SHARP, Envelopes, Light, deviations, ranges
+from .compiled_cells import deviations, ranges
 from .compiled_classes import CellBounds, deviations_of_channels
+from .compiled_slopes import SEGMENTS, SHARP, Envelopes, Light
 from .effects import blur, crosstalk, demosaic, sampling
 from .kernel_size import pixels_per_place
 from .methods import Methods
@@ -35,30 +34,56 @@ _AT_ONCE = 4_000_000
 """Values of pixels that are held at once."""
 
 
+def _exceeded(values: FloatArray) -> FloatArray:
+    """Sizes at the nodes of the profile, ndarray[n_radii, n_parts], and by how much they are exceeded between them."""
+    return np.asarray(values + _BETWEEN_NODES * values.max(axis=0))
+
+
+def _bent(slopes: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
+    """The size of the second derivative of a round image along its radii, and across them, of the largest of several
+    wavelengths, ndarray[n_radii]; `slopes`: at the radii, ndarray[n_radii, n_wavelengths].
+
+    Central differences of slopes are off by at most step^2 / 6 times the fourth derivative of the image, and that is at
+    most the square of its highest frequency times its second (Bernstein). Across a radius it is slope / radius.
+    """
+    along = np.empty_like(slopes)
+    along[1:-1] = (slopes[2:] - slopes[:-2]) / (2 * step)
+    along[0], along[-1] = slopes[1] / step, along[-2]  # slopes are odd
+    sizes = np.abs(along).max(axis=1)
+    sizes += (8 * _BETWEEN_NODES / 6 + _BETWEEN_NODES) * sizes.max()
+    steep = np.abs(slopes).max(axis=1)
+    across = np.empty_like(sizes)
+    across[1:] = (steep + _BETWEEN_NODES * steep.max())[1:] / (step * (np.arange(1, len(steep)) - 0.5))
+    across[0] = sizes[:2].max()
+    return sizes, np.minimum(across, np.maximum.accumulate(sizes))
+
+
 def _envelopes(profile: blur.Profile, pitch_um: float, parts: list[tuple[FloatArray, FloatArray]]) -> Envelopes:
     """Of parts of a blurred image; a part is one wavelength or several.
 
     `parts`: values and slopes at the profile's radii, ndarray[n_radii, n_wavelengths] each.
     """
     step = float(profile.r_um[1]) / pitch_um
-    steep = np.stack([np.abs(slopes).max(axis=1) for _, slopes in parts], axis=1)
-    steep = (steep + _BETWEEN_NODES * steep.max(axis=0)) * pitch_um
+    steep = np.stack([np.abs(slopes).max(axis=1) for _, slopes in parts], axis=1) * pitch_um
+    steep = _exceeded(steep)
+    bent = np.array([_bent(slopes * pitch_um, step) for _, slopes in parts])  # [n_parts, 2, n_radii]
     margin = step * steep.max(axis=0)  # what a part changes between two nodes
     above, below = (np.stack([f(values, axis=1) for values, _ in parts], axis=1) for f in (np.max, np.min))
     above = np.maximum.accumulate(above[::-1], axis=0)[::-1] + margin
-    return Envelopes(above, np.minimum.accumulate(below, axis=0) - margin, steep, 1 / step)
+    below = np.minimum.accumulate(below, axis=0) - margin
+    return Envelopes(above, below, steep, bent.max(axis=1).T, bent.sum(axis=1).T, 1 / step)
 
 
 class Deviation(NamedTuple):
-    """How far the kernel in cells of places may be from what it is at their corners.
+    """How far the kernel in cells of places may be from its interpolation through their nodes.
 
-    `kernel`: ndarray[n_cells, n_channels, n_channels, n_bands], from a mean of its values at the corners, of which each
-    channel has one. `tilt`: ndarray[n_cells, n_channels], how much the weights of that mean may differ, relative to
-    them, from those of the bilinear interpolation, which are the same for all channels.
+    `kernel`: ndarray[n_cells, n_channels, n_channels, n_bands], and `moves`, ndarray[n_cells, n_channels, 3], for a
+    light whose interpolation differs by up to 1 from its mean at the nodes, has a slope of up to 1 per pixel, or a
+    second derivative of up to 1.
     """
 
     kernel: FloatArray
-    tilt: FloatArray
+    moves: FloatArray
 
 
 class Between:
@@ -108,10 +133,14 @@ class Between:
         if h not in self._nearby:
             from scipy.ndimage import maximum_filter1d  # noqa: PLC0415  (slow to import)
 
-            piece = 2 * self._half / SEGMENTS
-            width = 3 + 2 * math.ceil(math.hypot(h, h + piece / 2) * self._images.per_px)
-            steep = maximum_filter1d(self._images.steep, width, axis=0, mode="nearest")
-            self._nearby[h] = self._images._replace(steep=np.ascontiguousarray(steep))
+            def around(values: FloatArray, reach_px: float) -> FloatArray:
+                width = 3 + 2 * math.ceil(reach_px * self._images.per_px)
+                return np.ascontiguousarray(maximum_filter1d(values, width, axis=0, mode="nearest"))
+
+            images = self._images
+            piece, pixel = math.hypot(h, h + self._half / SEGMENTS), math.sqrt(2) * (h + self._half)
+            steep, bent = around(images.steep, piece), around(images.bent, piece)
+            self._nearby[h] = images._replace(steep=steep, bent=bent, inner=around(images.inner, pixel))
         return self._nearby[h]
 
     @property
@@ -138,20 +167,10 @@ class Between:
         middle = min(self._middle, flat.shape[1] - 1)
         return ranges(flat, middle, self._ends).reshape(2, *kernels.shape[:-1], self.n_parts)
 
-    def of_cells(self, centers: FloatArray, h: float, homes: FloatArray, corners: FloatArray) -> Deviation:
-        """Of cells of half width `h` around `centers` (ndarray[n, 2]), read out at `homes` (ndarray[n, 2]).
-
-        `corners`: `ranges` of the kernel at their corners, ndarray[2, n, 4, n_channels, n_channels, n_parts].
-        """
-        bounds = self.bounds(centers, h, homes, corners[0].min(axis=1), corners[1].max(axis=1))
-        every = np.arange(bounds.jumps.shape[1])
-        which = np.tile(every, (len(centers), 1))
-        return of_channels(bounds, self.uneven, np.arange(len(centers)), which, every)
-
     def bounds(self, centers: FloatArray, h: float, homes: FloatArray, low: FloatArray, high: FloatArray) -> CellBounds:
         """What channels have in cells, before it is related to the sums of their weights.
 
-        `low`, `high`: range of the kernel over the corners, ndarray[n, n_channels, n_channels, n_parts].
+        `low`, `high`: range of the kernel over the nodes, ndarray[n, n_channels, n_channels, n_parts].
         """
         step = max(1, _AT_ONCE // (pixels_per_place(self._view) * self.n_parts))
         parts = []
@@ -163,24 +182,27 @@ class Between:
     def _of_block(
         self, centers: FloatArray, h: float, homes: FloatArray, low: FloatArray, high: FloatArray
     ) -> CellBounds:
-        """See the head of this file. A ratio k = M / D is that of the interpolations, r, but for dev(M - r D) / D; r is
-        a mean of the corners' values, and dev(M - r D) is the sum of dev(weight x (light - r)) over the pixels.
+        """See the head of this file. Of a ratio k = M / D with the interpolation i, k - i is dev(M - i D) / D, and
+        dev(M - r D), with the mean r of i, the sum of dev(weight x (light - r)) over the pixels.
         """
         mosaic = self._view.mosaic
         n = len(mosaic.channels)
         seen = sampling.window(mosaic, centers, self._reach)
         x, y = seen.columns, seen.rows
+        sums, moves = np.zeros((len(x), 9, n)), np.zeros((len(x), n, 3))
         if self._target.readout == "center":  # the weights of a demosaicked pixel are the same in the whole cell
-            weighed = demosaic.center_weights(seen, homes - centers, self._methods.demosaic, mosaic)
-            nothing = np.zeros_like(weighed)
-            weights = CellWeights(weighed, nothing, nothing, nothing)
-            sums, jumps = np.ones((len(x), 4, n)), np.zeros((len(x), n))
+            weights = CellWeights.constant(
+                demosaic.center_weights(seen, homes - centers, self._methods.demosaic, mosaic)
+            )
+            sums[:] = 1.0
         else:
-            weights, sums, jumps = areas(x, y, seen.channel, n, self._half, self._radii[1], h)
+            shape = (len(x), *seen.channel.shape)
+            weights = CellWeights(np.zeros(shape), *np.zeros((5, *shape, 2)))
+            areas(x, y, seen.channel, self._half, self._radii[1], h, weights, sums, moves)
         found = np.empty((len(x), n, n, self.n_parts))
         light = Light(self._near(h), self._half, self._radii[0], self._share, self._taken)
         deviations(x, y, seen.channel, weights, light, h, np.stack([low, high], axis=1), found)
-        return CellBounds(found, sums, jumps, low, high)
+        return CellBounds(found, sums, moves, low, high)
 
 
 def of_channels(
@@ -189,6 +211,6 @@ def of_channels(
     """Of the channels that classes of pixels are in: see `compiled_classes.deviations_of_channels`."""
     n = int(channel.max()) + 1
     kernels = np.empty((len(rows), n, n, bounds.sizes.shape[3]))
-    tilt = np.empty((len(rows), n))
-    deviations_of_channels(bounds, uneven, rows, which, channel, kernels, tilt)
-    return Deviation(kernels, tilt)
+    moves = np.empty((len(rows), n, 3))
+    deviations_of_channels(bounds, uneven, rows, which, channel, kernels, moves)
+    return Deviation(kernels, moves)

@@ -8,20 +8,23 @@ import numpy as np
 from numba import njit
 
 from ..base.types import FloatArray, IndexArray
+from .compiled_light import add
+from .compiled_patches import to_control
 
 
 class CellBounds(NamedTuple):
     """What is known of classes of pixels in cells of places.
 
     `sizes`: how far the weighted light of each class through each class's filter, less the same share of the weights as
-    at the corners, may be from its bilinear interpolation, ndarray[n_cells, n, n, n_parts]. `corners`: sums of the
-    weights at the corners, ndarray[n_cells, 4, n]. `jumps`: how far these may be from their interpolation,
-    ndarray[n_cells, n]. `low`, `high`: range of the kernel over the corners, ndarray[n_cells, n, n, n_parts].
+    at the nodes, may be from its interpolation, ndarray[n_cells, n, n, n_parts]. `nodes`: sums of the weights at the
+    nodes, ndarray[n_cells, 9, n]. `moves`: how far these, times a parabola, may be from their interpolation, for the
+    size of the parabola, its slope and its second derivative, ndarray[n_cells, n, 3]. `low`, `high`: range of the
+    kernel over the nodes, ndarray[n_cells, n, n, n_parts].
     """
 
     sizes: FloatArray
-    corners: FloatArray
-    jumps: FloatArray
+    nodes: FloatArray
+    moves: FloatArray
     low: FloatArray
     high: FloatArray
 
@@ -56,25 +59,24 @@ def kernels_of_channels(
 
 @njit(cache=True, nogil=True)
 def _weights_of_channels(
-    bounds: CellBounds, row: int, which: IndexArray, channel: IndexArray, least: FloatArray, tilt: FloatArray
+    bounds: CellBounds, row: int, which: IndexArray, channel: IndexArray, least: FloatArray, moves: FloatArray
 ) -> None:
-    """Put the smallest sum of weights of each channel in a cell into `least`, and how much it differs between the
-    cell's corners, relative to the smallest of them, into `tilt`.
+    """Put the smallest sum of weights of each channel in a cell into `least`, and how far that sum times a parabola may
+    be from its interpolation, relative to it, into `moves`, ndarray[n_channels, 3].
     """
-    n_corners = bounds.corners.shape[1]
+    values, control = np.empty(9), np.empty(9)
+    moves[:] = 0.0
+    for own in range(channel.size):
+        add(moves[channel[own]], 1.0, bounds.moves[row, which[own]])
     for u in range(least.size):
-        lowest, highest, jump = np.inf, 0.0, 0.0
+        values[:] = 0.0
         for own in range(channel.size):
             if channel[own] == u:
-                jump += bounds.jumps[row, which[own]]
-        for corner in range(n_corners):
-            total = 0.0
-            for own in range(channel.size):
-                if channel[own] == u:
-                    total += bounds.corners[row, corner, which[own]]
-            lowest, highest = min(lowest, total), max(highest, total)
-        least[u] = max(lowest - jump, 1e-300)
-        tilt[u] = (highest - lowest) / max(lowest, 1e-300)
+                add(values, 1.0, bounds.nodes[row, :, which[own]])
+        to_control(values, control)
+        least[u] = max(control.min() - moves[u, 0], 1e-300)
+        for size in range(3):
+            moves[u, size] /= least[u]
 
 
 @njit(cache=True, nogil=True)
@@ -85,16 +87,16 @@ def deviations_of_channels(
     which: IndexArray,
     channel: IndexArray,
     found: FloatArray,
-    tilt: FloatArray,
+    moves: FloatArray,
 ) -> None:
-    """How far kernels of channels in cells may be from a mean of those at their corners: see `between.Deviation`.
+    """How far kernels of channels in cells may be from their interpolation: see `between.Deviation`.
 
-    A channel's kernel k is the ratio of sums over its classes, sum M / sum D. With the interpolations' ratios r of the
-    channel and r_p of a class, k - r is the sum over classes of dev(M - r_p D) + (r_p - r) dev(D), over sum D. Both
-    ratios are means of values of classes at corners. `uneven`: what pixels of a class differ in, relative to it, in
-    how much they take of the light through each class's filter, ndarray[n_classes, n_classes]; the rest as for
-    `kernels_of_channels`. `found`: ndarray[n_cells, n_channels, n_channels, n_parts], `tilt`: ndarray[n_cells,
-    n_channels].
+    A channel's kernel k is the ratio of sums over its classes, sum M / sum D. With its interpolation i, and the mean
+    over the nodes of its own ratio, r, and of that of a class, r_p, (k - i) sum D is nothing at the nodes, so that it
+    is the sum over classes of dev(M - r_p D) + (r_p - r) dev(D), and dev((r - i) sum D), which `moves` is for.
+    `uneven`: what pixels of a class differ in, relative to it, in how much they take of the light through each class's
+    filter, ndarray[n_classes, n_classes]; the rest as for `kernels_of_channels`. `found`: ndarray[n_cells, n_channels,
+    n_channels, n_parts], `moves`: ndarray[n_cells, n_channels, 3].
     """
     n_classes, n_channels, n_parts = channel.size, found.shape[1], found.shape[3]
     least = np.empty(n_channels)
@@ -102,7 +104,7 @@ def deviations_of_channels(
     found[:] = 0.0
     for cell in range(rows.size):
         row, here = rows[cell], which[cell]
-        _weights_of_channels(bounds, row, here, channel, least, tilt[cell])
+        _weights_of_channels(bounds, row, here, channel, least, moves[cell])
         for part in range(n_parts):
             low[:], high[:] = 0.0, 0.0
             for own in range(n_classes):
@@ -111,7 +113,7 @@ def deviations_of_channels(
                     below, above = bounds.low[row, p, q, part], bounds.high[row, p, q, part]
                     low[own, channel[other]] += below
                     high[own, channel[other]] += above
-                    missed = uneven[p, q] * max(abs(below), abs(above)) * bounds.jumps[row, p]
+                    missed = uneven[p, q] * max(abs(below), abs(above)) * bounds.moves[row, p, 0]
                     found[cell, channel[own], channel[other], part] += bounds.sizes[row, p, q, part] + missed
             for own in range(n_classes):
                 u = channel[own]
@@ -122,7 +124,7 @@ def deviations_of_channels(
                             apart = max(apart, high[other, c] - low[own, c], high[own, c] - low[other, c])
                     if apart > 0:
                         apart = max(apart, high[own, c] - low[own, c])
-                        found[cell, u, c, part] += apart * bounds.jumps[row, here[own]]
+                        found[cell, u, c, part] += apart * bounds.moves[row, here[own], 0]
         for u in range(n_channels):
             for c in range(n_channels):
                 for part in range(n_parts):

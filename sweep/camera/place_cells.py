@@ -1,4 +1,4 @@
-"""Kernels at the corners of cells of places, and how far they may be from that in them: kept, each made once."""
+"""Kernels at the nodes of cells of places, and how far they may be from that in them: kept, each made once."""
 
 from __future__ import annotations
 
@@ -69,27 +69,30 @@ def _filled(larger: NDArray[Any], rows: NDArray[Any]) -> NDArray[Any]:
 class CellKernels(NamedTuple):
     """What is known of cells.
 
-    `kernels`: at their corners, each place once, ndarray[n_places, n_channels, n_channels, n_functions]; `corners`:
-    those of each cell, ndarray[n_cells, 4]; `deviation`: how far the kernel in them may be from that.
+    `kernels`: at their nodes, each place once, ndarray[n_places, n_channels, n_channels, n_functions]; `nodes`: those
+    of each cell, ndarray[n_cells, 9]; `deviation`: how far the kernel in them may be from its interpolation.
     """
 
     kernels: FloatArray
-    corners: IndexArray
+    nodes: IndexArray
     deviation: Deviation
 
 
 class ClassCells:
     """Kernels of classes of pixels, at places and in cells of places: what the CFAs of a scene share."""
 
-    def __init__(self, view: View) -> None:
-        """`view`: of a mosaic whose channels are the classes."""
-        self._view, wave = view, view.grid.nodes_nm
-        knots_nm = wave if view.methods.blur == "skip" else blur.knots(wave, view.methods.blur)
+    def __init__(self, view: View, knots_nm: FloatArray) -> None:
+        """`view`: of a mosaic whose channels are the classes; `knots_nm`: wavelengths at which the light is made."""
+        self._view = view
         self.between = Between(view, view.methods, knots_nm)
         self._light = PlaceKernels(view, view.methods, knots_nm)
-        self.functions = self._light.shares @ hats(wave, knots_nm)
         self._places, self._cells = _Kept(), _Kept()
         self._one_at_a_time = threading.RLock()
+
+    @property
+    def shares(self) -> FloatArray:
+        """How much of each function of the light is at each wavelength, ndarray[n_functions, n_knots]."""
+        return self._light.shares
 
     def at_places(self, cases: phase.Cases, classes: Classes, work: Counter[str]) -> FloatArray:
         """Kernels of channels at places, ndarray[n, n_channels, n_channels, n_functions]."""
@@ -97,13 +100,13 @@ class ClassCells:
             self._forget_many()
             rows, which = self._rows(cases, classes, work)
             n = int(classes.channel.max()) + 1
-            found = np.empty((len(rows), n, n, len(self.functions)))
+            found = np.empty((len(rows), n, n, len(self.shares)))
             kernels, sums = self._places.rows[:2]
             kernels_of_channels(kernels, sums, rows, which, classes.channel, found)
         return found
 
     def in_cells(self, cells: phase.Cells, classes: Classes, work: Counter[str]) -> Deviation:
-        """How far kernels of channels in cells may be from a mean of those at their corners."""
+        """How far kernels of channels in cells may be from their interpolation through the nodes."""
         images, which = classes.images(cells.centers)
 
         def made(new: IndexArray) -> _Rows:
@@ -128,16 +131,16 @@ class ClassCells:
         def made(new: IndexArray) -> _Rows:
             work["places"] += len(new)
             kernels, sums = self._light.at(phase.Cases(images[new], cases.home_px[new]), work)
-            low, high = self.between.ranges(kernels @ self._light.shares)
+            low, high = self.between.ranges(kernels @ self.shares)
             return kernels, sums, low, high
 
         return self._places.which(names_of(self._view, images, cases.home_px), made), which
 
     def _ranges(self, cells: phase.Cells, classes: Classes, work: Counter[str]) -> tuple[FloatArray, FloatArray]:
-        """Range of each part of the kernel over the corners of cells, ndarray[n_cells, n_classes, n_classes, n_parts]
+        """Range of each part of the kernel over the nodes of cells, ndarray[n_cells, n_classes, n_classes, n_parts]
         both.
         """
-        rows, which = self._rows(cells.corners, classes, work)
+        rows, which = self._rows(cells.nodes, classes, work)
         to, through = which[:, :, None], which[:, None, :]
         ends = []
         for values, end in zip(self._places.rows[2:], (np.min, np.max), strict=True):
@@ -151,7 +154,8 @@ class KeptCells:
 
     def __init__(self, shared: ClassCells, view: View, classes: Classes) -> None:
         self._shared, self._view, self._classes = shared, view, classes
-        self.between, self.functions = shared.between, shared.functions
+        wave = view.grid.nodes_nm
+        self.between, self.functions = shared.between, shared.shares @ hats(wave, _knots_nm(view))
         self._places, self._cells = _Kept(), _Kept()
         self._one_at_a_time = threading.Lock()
 
@@ -160,27 +164,27 @@ class KeptCells:
 
         def in_cells(new: IndexArray) -> _Rows:
             some = phase.Cells(cells.centers[new], cells.homes[new], cells.half)
-            corners = self._corners(some, work)
+            nodes = self._nodes(some, work)
             found = self._shared.in_cells(some, self._classes, work)
-            return found.kernel, found.tilt, corners.reshape(len(new), len(phase.CORNERS))
+            return found.kernel, found.moves, nodes.reshape(len(new), len(phase.NODES))
 
         with self._one_at_a_time:
             if self._places.nbytes + self._cells.nbytes > _KEPT_BYTES:
                 self._places, self._cells = _Kept(), _Kept()
             which = self._cells.which(names_of(self._view, cells.centers, cells.homes), in_cells)
-            sizes, tilt, corners = (rows[which] for rows in self._cells.rows)
-            places, numbered = np.unique(corners, return_inverse=True)
+            sizes, moves, nodes = (rows[which] for rows in self._cells.rows)
+            places, numbered = np.unique(nodes, return_inverse=True)
             kernels = self._places.rows[0][places]
-        return CellKernels(kernels, numbered.reshape(corners.shape), Deviation(sizes, tilt))
+        return CellKernels(kernels, numbered.reshape(nodes.shape), Deviation(sizes, moves))
 
-    def _corners(self, cells: phase.Cells, work: Counter[str]) -> IndexArray:
-        """The rows of the corners of cells, those of a cell one after the other."""
-        corners = cells.corners
+    def _nodes(self, cells: phase.Cells, work: Counter[str]) -> IndexArray:
+        """The rows of the nodes of cells, those of a cell one after the other."""
+        nodes = cells.nodes
 
         def at_places(new: IndexArray) -> _Rows:
-            return (self._shared.at_places(corners.some(new), self._classes, work),)
+            return (self._shared.at_places(nodes.some(new), self._classes, work),)
 
-        return self._places.which(names_of(self._view, corners.places_px, corners.home_px), at_places)
+        return self._places.which(names_of(self._view, nodes.places_px, nodes.home_px), at_places)
 
 
 def names_of(view: View, places: FloatArray, homes: FloatArray) -> list[Hashable]:
@@ -217,6 +221,12 @@ def _bare(view: View) -> View:
     return replace(colorless(view), methods=methods, scenario=scenario, pixel=sizes, tasks=None)
 
 
+def _knots_nm(view: View) -> FloatArray:
+    """Wavelengths at which a view's method makes the light."""
+    wave = view.grid.nodes_nm
+    return wave if view.methods.blur == "skip" else blur.knots(wave, view.methods.blur)
+
+
 def kept_cells(view: View) -> KeptCells:
     """Those of a scene."""
 
@@ -227,6 +237,6 @@ def kept_cells(view: View) -> KeptCells:
 
     def made() -> KeptCells:
         apart, classes = classes_of(bare)
-        return KeptCells(_SHARED.get(named(apart), lambda: ClassCells(apart)), bare, classes)
+        return KeptCells(_SHARED.get(named(apart), lambda: ClassCells(apart, _knots_nm(apart))), bare, classes)
 
     return _SCENES.get(named(bare), made)

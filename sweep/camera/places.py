@@ -1,6 +1,6 @@
 """The smallest and the largest color separation distance over all real places of a light on the mosaic.
 
-The tile is divided into cells. In each, all distances are bounded from the responses at its four corners and from what
+The tile is divided into cells. In each, all distances are bounded from the responses at its nine nodes and from what
 may lie between them (`between`); cells that may hold a smaller or a larger distance than those found, by more
 than the method of `phase` leaves open, are divided. The readout is taken as straight.
 """
@@ -15,7 +15,7 @@ import numpy as np
 
 from ..base.types import FloatArray, IndexArray
 from ..curves.lights import Pair, class_pairs
-from .compiled_distances import distances
+from .compiled_distances import Distances, distances
 from .effects import phase
 from .place_cells import CellKernels, kept_cells
 from .registry import factor_of_light
@@ -84,7 +84,7 @@ class AnyPlace:
         `light`: by the functions of the kernels, DN, ndarray[n_signals, n_channels x n_functions].
         """
         union, cells = _together([search.cells for search in searches])
-        each = 4 * light.shape[1] * len(self._mosaic.channels)
+        each = len(phase.NODES) * light.shape[1] * len(self._mosaic.channels)
         step = max(1, _AT_ONCE // max(each, *(16 * search.pairs.size for search in searches)))
         for at in range(0, len(union.centers), step):
             known = self._cells.of_cells(union.some(slice(at, at + step)), self._work)
@@ -130,40 +130,42 @@ class _Search:
     def _begin(self, cells: phase.Cells, pairs: IndexArray) -> None:
         """Look at some cells and pairs next."""
         self.cells, self.pairs = cells, pairs
-        self._low = np.empty((len(cells.centers), pairs.size))
-        self._nearest = np.empty(len(cells.centers))
-        self._corners = np.empty((len(cells.centers), len(phase.CORNERS)))
+        n = len(cells.centers)
+        self._known = Distances(np.empty((n, pairs.size)), np.empty(n), np.empty((n, len(phase.NODES))))
 
     def take(self, some: IndexArray, which: IndexArray, seen: FloatArray, known: CellKernels) -> None:
         """Bound the distances in some of the cells, which are those of `known`.
 
         `seen`: what the channels see of each signal at its places, DN, ndarray[n_places, n_channels, n_signals]. The
-        difference of two signals' responses is within `rest` of a mean of those at the corners, in each channel. So the
-        distance is at most the largest at a corner and what is left, and at least how far all corners lie to one side
-        of a plane, less what is left.
+        difference of two signals' responses is within `rest`, and what its own slopes add, of the biquadratic function
+        through those at the nodes, in each channel.
         """
-        tilt = known.deviation.tilt[which]
-        rest = known.deviation.kernel[which].reshape(*tilt.shape, -1) @ self._amounts[self.pairs].T
+        rest = known.deviation.kernel[which]
+        rest = rest.reshape(*rest.shape[:2], -1) @ self._amounts[self.pairs].T
         pairs = self._one[self.pairs], self._other[self.pairs]
-        low, nearest, corners = distances(seen, known.corners[which], pairs, rest, tilt)
-        self._low[some], self._nearest[some], self._corners[some] = low, nearest, corners
+        found = Distances(*(np.empty((len(some), *values.shape[1:])) for values in self._known))
+        ends = self._least[0] - self._within_dn, self._most[0] + self._within_dn
+        moves, half = known.deviation.moves[which], self.cells.half
+        distances(seen, known.nodes[which], pairs, rest, moves, half, ends, found)
+        for every, own in zip(self._known, found, strict=True):
+            every[some] = own
 
     def goes_on(self) -> bool:
         """Whether cells are left to look at, once those before are bounded: not when all is found, or too much."""
-        cells, values = self.cells, self._corners
+        cells, (low, nearest, values) = self.cells, self._known
         self._counted += len(cells.centers)
         for at, (found, sign) in enumerate(((self._least, 1.0), (self._most, -1.0))):
-            cell, corner = np.unravel_index((sign * values).argmin(), values.shape)
-            if sign * values[cell, corner] < sign * found[0]:
-                place = cells.centers[cell] + cells.half * phase.CORNERS[corner]
-                better = (float(values[cell, corner]), np.stack([place, cells.homes[cell]]))
+            cell, node = np.unravel_index((sign * values).argmin(), values.shape)
+            if sign * values[cell, node] < sign * found[0]:
+                place = cells.centers[cell] + cells.half * phase.NODES[node]
+                better = (float(values[cell, node]), np.stack([place, cells.homes[cell]]))
                 self._least, self._most = (better, self._most) if at == 0 else (self._least, better)
         least, most = self._least, self._most
-        undecided = self._low.min(axis=1) < least[0] - self._within_dn
-        undecided |= self._nearest > most[0] + self._within_dn
+        undecided = low.min(axis=1) < least[0] - self._within_dn
+        undecided |= nearest > most[0] + self._within_dn
         if not undecided.any():
             self.found = Extremes(least[0], most[0], least[1], most[1])
             return False
-        pairs = self.pairs[(self._low[undecided] <= self._nearest[undecided, None]).any(axis=0)]
+        pairs = self.pairs[(low[undecided] <= nearest[undecided, None]).any(axis=0)]
         self._begin(cells.divided(undecided), pairs)
         return self._counted < _MOST_CELLS

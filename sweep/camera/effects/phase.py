@@ -28,7 +28,8 @@ _WITHIN_DN = {
 MOST = 1024
 """Places of a lattice on a tile, at most."""
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
-"""A cell's corners from its center (column, row), in units of its half width."""
+NODES = np.array([[x, y] for y in (-1.0, 0.0, 1.0) for x in (-1.0, 0.0, 1.0)])
+"""A cell's corners and its nodes from its center (column, row), in units of its half width."""
 PER_DECADE = 0.7
 """Places of a search, in those of the lattice, for the square of its limit's decades below 100 DN, about."""
 SEARCH_S, SEARCH_DECADE_S = 0.01, 0.009
@@ -116,27 +117,27 @@ class Cells:
         return Cells(self.centers[which], self.homes[which], self.half)
 
     @property
-    def corners(self) -> Cases:
-        """All corners, those of a cell one after the other."""
-        places = (self.centers[:, None] + self.half * CORNERS).reshape(-1, 2)
-        return Cases(places, np.repeat(self.homes, len(CORNERS), axis=0))
+    def nodes(self) -> Cases:
+        """All nodes, those of a cell one after the other."""
+        places = (self.centers[:, None] + self.half * NODES).reshape(-1, 2)
+        return Cases(places, np.repeat(self.homes, len(NODES), axis=0))
 
-    def shared_corners(self, shot: Shot) -> tuple[Cases, IndexArray]:
-        """The corners, each once, and those of each cell, ndarray[n_cells, n_corners].
+    def shared_nodes(self, shot: Shot) -> tuple[Cases, IndexArray]:
+        """The nodes, each once, and those of each cell, ndarray[n_cells, n_nodes].
 
         Of a mean over the disc it does not matter which pixel is the nearest.
         """
-        target, every = shot.scenario.target, self.corners
+        target, every = shot.scenario.target, self.nodes
         keys = every.places_px
         if target is not None and target.readout == "center":
             keys = np.concatenate([every.places_px, every.home_px], axis=1)
         _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-        return every.some(first), which.reshape(-1, len(CORNERS))
+        return every.some(first), which.reshape(-1, len(NODES))
 
 
 def whole(mosaic: Mosaic) -> Cells:
-    """Cells between the places of the finest lattice, over a part of the tile that stands for all of it."""
-    half = 0.5 / PER_PIXEL
+    """Cells whose nodes are places of the finest lattice, over a part of the tile that stands for all of it."""
+    half = 1 / PER_PIXEL
     x, y = (np.arange(a + half, b, 2 * half) for a, b in domain_px(mosaic).T)
     centers = np.stack([v.ravel() for v in np.meshgrid(x, y)], axis=1)
     if np.array_equal(mosaic.indices, mosaic.indices.T):  # places on both sides of the diagonal see the same

@@ -189,5 +189,5 @@ class Promises:
     @cached_property
     def linear_s(self) -> float:
         """Seconds of a bound of the optics, counted."""
-        corners = 1 if not self._kernels.anywhere(REFERENCE) else self._kernels.corners[1].size
+        corners = 1 if not self._kernels.anywhere(REFERENCE) else self._kernels.corners.size
         return LINEAR_S + COMPARED_S * corners * len(self.view.mosaic.channels) * len(self.reach.first)

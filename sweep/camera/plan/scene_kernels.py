@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 
 from ...base.types import FloatArray, IndexArray
-from ..between import Between, Deviation
 from ..effects import blur, phase, sampling
 from ..effects.base import Change, KernelChange, KernelEffect, Part
 from ..kernel import make_kernel
@@ -19,6 +17,7 @@ from ..place_kernels import PlaceKernels
 from ..registry import EFFECTS, WHOLE_LIGHT
 from ..view import View
 from .bounds import Spread
+from .places_between import PlacesBetween, beside_corners
 from .work import KERNEL_S, Work
 
 
@@ -30,7 +29,7 @@ class SceneKernels:
         self._view, self._knots_nm = view, blur.knots(view.grid.nodes_nm, blur.COARSE)
         self._wanted: dict[Methods, Methods] = {}
         self._kernels: dict[Methods, FloatArray] = {}
-        self._deviations: dict[Methods, Deviation] = {}
+        self._places = PlacesBetween(view, self._knots_nm)
         self._gaps: dict[tuple[str, float], float] = {}
         self._works: dict[tuple[object, ...], dict[Methods, Work]] = {}
         self.spent_s = 0.0
@@ -44,15 +43,10 @@ class SceneKernels:
         """Whether the light may fall anywhere, and more than a lattice of places is looked at."""
         return phase.all_count(self._view, methods)
 
-    @cached_property
-    def _cells(self) -> phase.Cells:
-        """Cells of places; their corners stand for all places, with what may lie between them."""
-        return phase.whole(self._view.mosaic)
-
-    @cached_property
-    def corners(self) -> tuple[phase.Cases, IndexArray]:
-        """The corners of the cells, each once, and those of each cell."""
-        return self._cells.shared_corners(self._view)
+    @property
+    def corners(self) -> IndexArray:
+        """The cases at the corners of each cell of places, ndarray[n_cells, 4]."""
+        return self._places.corners
 
     def wanted(self, methods: Methods) -> Methods:
         """What the kernel depends on, all light being left."""
@@ -71,39 +65,37 @@ class SceneKernels:
         wanted, nodes = self.wanted(methods), self._knots_nm
         if wanted not in self._kernels:
             self.spent_s += self._seconds(wanted)
-            if phase.one_is_enough(self._view) is None and wanted.sampling != "skip":
-                cases = self.corners[0] if self.anywhere(wanted) else phase.cases(self._view, wanted.phase)
+            if self.anywhere(wanted):
+                light = self._places.at_corners(wanted)
+            elif phase.one_is_enough(self._view) is None and wanted.sampling != "skip":
                 made = PlaceKernels(self._view, wanted, nodes)
-                light = made.at(cases, Counter())[0] @ made.shares
+                light = made.at(phase.cases(self._view, wanted.phase), Counter())[0] @ made.shares
             else:
                 light = make_kernel(self._view, wanted, nodes, by_pixel=False, work=Counter()).light
             self._kernels[wanted] = np.ascontiguousarray(np.broadcast_to(light, (*light.shape[:3], nodes.size)))
         return self._kernels[wanted]
 
+    def _in_cells(self, methods: Methods) -> tuple[FloatArray, FloatArray]:
+        """The kernel at the nodes of cells, or, where it is that of a lattice, the same in all of them; how far it may
+        be from its interpolation.
+        """
+        if self.anywhere(methods):
+            return self._places.of(self.wanted(methods))
+        found = self.of(methods)
+        return found[:1, None], np.zeros(found.shape[1:3])
+
     def _seconds(self, wanted: Methods) -> float:
         """Of a kernel, counted."""
         if self._view.scenario.target is None or wanted.sampling == "skip":
             return 0.0
-        n_cases = len(self.corners[0].places_px) if self.anywhere(wanted) else phase.n_places(self._view, wanted.phase)
+        n_cases = self._places.n_nodes if self.anywhere(wanted) else phase.n_places(self._view, wanted.phase)
         functions = pixels_per_place(self._view) * self._knots_nm.size
         return KERNEL_S + n_cases * (sampling.PLACE_S + sampling.PLACE_PIXEL_S * functions)
 
     def nearest(self, methods: Methods) -> FloatArray:
         """The kernel at the place of a lattice that is nearest to the center of each cell."""
         lattice = phase.places_px(self._view, methods.phase)
-        return self.of(methods)[phase.nearest_places(self._view, self._cells.centers, lattice)]
-
-    def _deviation(self, methods: Methods) -> Deviation:
-        """How far the kernel in cells may be from a mean of that at the corners: [cells, channels, channels, 1]."""
-        wanted = self.wanted(methods)
-        if wanted not in self._deviations:
-            between, cells = Between(self._view, wanted, self._knots_nm), self._cells
-            ranges = between.ranges(self.of(wanted))[:, self.corners[1]]
-            found = between.of_cells(cells.centers, cells.half, cells.homes, ranges)
-            # At any wavelength: that of the middle one, and what differs from it.
-            largest = found.kernel[..., :1] + found.kernel[..., 1:].max(axis=3, initial=0.0, keepdims=True)
-            self._deviations[wanted] = Deviation(largest, found.tilt)
-        return self._deviations[wanted]
+        return self.of(methods)[phase.nearest_places(self._view, self._places.cells.centers, lattice)]
 
     def gap(self, methods: Methods, method: str) -> float:
         """How far a kernel may be from its interpolation between the wavelengths of a method of blur."""
@@ -121,23 +113,21 @@ class SceneKernels:
     def spread(
         self, what: Change, before: Methods, after: Methods, change: FloatArray, left: FloatArray, scale: float
     ) -> Spread | None:
-        """What lies between the corners of the cells, of a change of the kernel and what is left; None for a lattice.
+        """What lies between the corners of cells, of a change of the kernel and what is left; None for a lattice.
 
         `scale`: of a change that is this share of the kernel.
         """
         if not self.anywhere(before):
             return None
-        here = self._deviation(before)
-        nothing = Deviation(np.zeros_like(here.kernel), here.tilt)
-        there = self._deviation(after) if self.anywhere(after) else nothing
-        sizes = here.kernel * scale
         part = what.part if isinstance(what, KernelChange) else None
-        if part in (Part.WEIGHTS, Part.LIGHT):
-            sizes = (here.kernel + there.kernel) * bool(change.any())
-        corners = self.corners[1]
+        corners, (here, off) = self.corners, self._in_cells(before)
+        there, off_there = self._in_cells(after)
+        changed, off_changed = scale * here, scale * off
         if part is Part.PLACES:  # what is left is that of another place in each cell
             corners = np.arange(len(change)).reshape(corners.shape)
-        changes, lefts = change[corners], left[corners]  # [cells, corners, ...]
-        tilt, wide = here.tilt[:, :, None] / 2, np.ptp(lefts, axis=1)
-        changed = sizes[..., 0] + tilt * np.ptp(changes, axis=1).max(axis=3)
-        return Spread(corners, changed, there.kernel[..., 0] + tilt * wide.max(axis=3), wide)
+            there, off_there = np.zeros_like(here), np.zeros_like(off)
+        elif part is not None:
+            changed, off_changed = here - there, (off + off_there) * bool(change.any())
+        moved = off_changed + beside_corners(changed)
+        beside = off_there + beside_corners(np.broadcast_to(there, here.shape))
+        return Spread(corners, moved, beside, np.ptp(left[corners], axis=1))

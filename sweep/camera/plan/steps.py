@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...base.types import FloatArray
-from ..effects import blur, phase
+from ..effects import blur
 from ..effects.base import Change, CurveChange, FilterChange, KernelChange, LightChange, LinearEffect, Part, ShareChange
 from ..methods import Methods
 from ..registry import factor_of_light
@@ -90,9 +90,8 @@ class Steps:
         if what.part is not Part.PLACES:
             return now, self._kernels.of(after)
         # The places that are nearest to those in a cell are compared at all of its corners.
-        return now[self._kernels.corners[1].ravel()], np.repeat(
-            self._kernels.nearest(after), len(phase.CORNERS), axis=0
-        )
+        corners = self._kernels.corners
+        return now[corners.ravel()], np.repeat(self._kernels.nearest(after), corners.shape[1], axis=0)
 
     def _remainder(self, what: KernelChange, before: Methods, after: Methods, *, changes: bool) -> float:
         """How far the change may be from its interpolation between the knots of the comparison."""
