@@ -19,6 +19,7 @@ from . import kernel
 from .compiled_areas import CellWeights, areas
 from .compiled_cells import deviations, ranges
 from .compiled_classes import CellBounds, deviations_of_channels
+from .compiled_distances import amounts_of_pairs
 from .compiled_slopes import SEGMENTS, SHARP, Envelopes, Light
 from .effects import blur, crosstalk, demosaic, sampling
 from .kernel_size import pixels_per_place
@@ -148,15 +149,14 @@ class Between:
         """Parts of the light that are bounded apart: all of it as at the middle wavelength, and the rest by band."""
         return len(self._ends)
 
-    def amounts(self, light: FloatArray) -> FloatArray:
-        """Size of each part of a light, ndarray[..., n_wavelengths] (of the scene's grid) -> ndarray[..., n_parts]."""
-        whole = np.abs(light.sum(axis=-1, keepdims=True))
-        if self.n_parts == 1:
-            return np.asarray(whole, dtype=float)
+    def amounts(self, light: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
+        """Size of each part of the difference of two lights, ndarray[n_pairs, n_channels, n_parts].
+
+        `light`: ndarray[n, n_channels, n_wavelengths] (of the scene's grid); `first`, `second`: of each pair.
+        """
+        found = np.zeros((first.size, light.shape[1], self.n_parts))
         band = np.searchsorted(self._knots_nm[self._ends[1:-1]], self._view.grid.nodes_nm)
-        held, starts = np.unique(band, return_index=True)
-        found = np.zeros((*light.shape[:-1], self.n_parts))
-        found[..., :1], found[..., 1 + held] = whole, np.add.reduceat(np.abs(light), starts, axis=-1)
+        amounts_of_pairs(light, first, second, 1 + band, found)
         return found
 
     def ranges(self, kernels: FloatArray) -> FloatArray:

@@ -26,31 +26,55 @@ class Distances(NamedTuple):
     nodes: FloatArray
 
 
+_FINITE = {"contract", "nnan", "nsz"}
+
+
 @njit(cache=True, nogil=True)
-def _bounds(control: FloatArray, left: FloatArray) -> tuple[float, float]:
+def amounts_of_pairs(
+    light: FloatArray, first: IndexArray, second: IndexArray, band: IndexArray, found: FloatArray
+) -> None:
+    """Put the size of the difference of two lights, in all and by the band of each wavelength, into `found`,
+    ndarray[n_pairs, n_channels, n_parts], which is nothing before; all alone where there is one part.
+
+    `light`: ndarray[n, n_channels, n_wavelengths]; `band`: the part of each wavelength.
+    """
+    for pair in range(first.size):
+        for u in range(light.shape[1]):
+            one, other, own = light[first[pair], u], light[second[pair], u], found[pair, u]
+            total = 0.0
+            for at in range(band.size):
+                away = one[at] - other[at]
+                total += away
+                if own.size > 1:
+                    own[band[at]] += abs(away)
+            own[0] = abs(total)
+
+
+@njit(cache=True, nogil=True, fastmath=_FINITE)
+def _bounds(control: FloatArray, left: FloatArray, along: FloatArray, squared: FloatArray) -> tuple[float, float]:
     """Of the length of a vector that is in the hull of some points (ndarray[n_channels, n]), but for `left` in each
     channel: it is at least how far all points lie to one side of a plane, less what is left, and at most the length of
-    the longest and what is left.
+    the longest and what is left. `along`, `squared`: ndarray[n], to work in.
     """
     n_channels, n = control.shape
-    beside = length = furthest = beyond_left = 0.0
+    beside = length = beyond_left = 0.0
+    along[:], squared[:] = 0.0, 0.0
     for u in range(n_channels):
-        towards = control[u, n // 2]
+        towards, own = control[u, n // 2], control[u]
         length += towards**2
         beside += left[u] ** 2
         beyond_left += abs(towards) * left[u]
-    beyond = math.inf
-    for at in range(n):
-        along = squared = 0.0
-        for u in range(n_channels):
-            squared += control[u, at] ** 2
-            along += control[u, at] * control[u, n // 2]
-        furthest, beyond = max(furthest, squared), min(beyond, along)
+        for at in range(n):
+            along[at] += own[at] * towards
+            squared[at] += own[at] * own[at]
+    beyond, furthest = along[0], squared[0]
+    for at in range(1, n):
+        furthest, beyond = max(furthest, squared[at]), min(beyond, along[at])
     low = max((beyond - beyond_left) / math.sqrt(length), 0.0) if length > 0 else 0.0
     return low, math.sqrt(furthest) + math.sqrt(beside)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=_FINITE)
 def _left_over(
     values: FloatArray, control: FloatArray, rest: FloatArray, moves: FloatArray, h: float, left: FloatArray
 ) -> None:
@@ -59,10 +83,12 @@ def _left_over(
     `values`, `control`: ndarray[n_channels, 9]; `rest`: ndarray[n_channels], `moves`: ndarray[n_channels, 3].
     """
     for u in range(left.size):
-        mean = values[u].mean()
-        size = max(control[u].max() - mean, mean - control[u].min())
+        mean, least, most = 0.0, control[u, 0], control[u, 0]
+        for at in range(_N_NODES):
+            mean += values[u, at] / _N_NODES
+            least, most = min(least, control[u, at]), max(most, control[u, at])
         slope, bend = largest_derivatives(control[u], h)
-        left[u] = rest[u] + moves[u, 0] * size + moves[u, 1] * slope + moves[u, 2] * bend
+        left[u] = rest[u] + moves[u, 0] * max(most - mean, mean - least) + moves[u, 1] * slope + moves[u, 2] * bend
 
 
 @njit(cache=True, nogil=True)
@@ -74,7 +100,7 @@ def _divided(every: FloatArray, lefts: FloatArray, some: BoolArray, low: FloatAr
     """
     n_pairs, n_channels = lefts.shape
     half_way, control = np.empty((3, N_CONTROL)), np.empty((n_channels, N_CONTROL, N_CONTROL))
-    part = np.empty((n_channels, _N_NODES))
+    part, (along, squared) = np.empty((n_channels, _N_NODES)), np.empty((2, _N_NODES))
     above = np.full((PARTS, PARTS), np.inf)
     for pair in range(n_pairs):
         if not some[pair]:
@@ -87,10 +113,21 @@ def _divided(every: FloatArray, lefts: FloatArray, some: BoolArray, low: FloatAr
                 for u in range(n_channels):
                     for at in range(_N_NODES):
                         part[u, at] = control[u, 2 * row + at // 3, 2 * column + at % 3]
-                below, most = _bounds(part, lefts[pair])
+                below, most = _bounds(part, lefts[pair], along, squared)
                 least, above[row, column] = min(least, below), min(above[row, column], most)
         low[pair] = max(low[pair], least)
     return min(nearest, float(above.max()))
+
+
+@njit(cache=True, nogil=True, fastmath=_FINITE)
+def _differences(one: FloatArray, other: FloatArray, found: FloatArray, squared: FloatArray) -> None:
+    """Put the difference of two signals at the nodes, ndarray[n_channels, 9], and the square of its length there."""
+    squared[:] = 0.0
+    for u in range(len(one)):
+        for node in range(_N_NODES):
+            away = one[u, node] - other[u, node]
+            found[u, node] = away
+            squared[node] += away * away
 
 
 @njit(cache=True, nogil=True)
@@ -114,24 +151,25 @@ def distances(
     n_channels, n_pairs = seen.shape[1], pairs[0].size
     values = np.empty((n_pairs, n_channels, _N_NODES))
     control, lefts = np.empty((n_channels, _N_NODES)), np.empty((n_pairs, n_channels))
-    some = np.empty(n_pairs, dtype=np.bool_)
+    some, (along, squared) = np.empty(n_pairs, dtype=np.bool_), np.empty((2, _N_NODES))
+    own = np.empty((seen.shape[2], n_channels, _N_NODES))
     for cell in range(len(at)):
+        for node in range(_N_NODES):
+            for u in range(n_channels):
+                for signal in range(seen.shape[2]):
+                    own[signal, u, node] = seen[at[cell, node], u, signal]
         nearest = math.inf
-        found.nodes[cell] = math.inf
+        shortest = np.full(_N_NODES, np.inf)
         for pair in range(n_pairs):
-            one, other = pairs[0][pair], pairs[1][pair]
+            _differences(own[pairs[0][pair]], own[pairs[1][pair]], values[pair], squared)
             for node in range(_N_NODES):
-                squared, place = 0.0, at[cell, node]
-                for u in range(n_channels):
-                    away = seen[place, u, one] - seen[place, u, other]
-                    values[pair, u, node] = away
-                    squared += away**2
-                found.nodes[cell, node] = min(found.nodes[cell, node], math.sqrt(squared))
+                shortest[node] = min(shortest[node], squared[node])
             for u in range(n_channels):
                 to_control(values[pair, u], control[u])
             _left_over(values[pair], control, rest[cell, :, pair], moves[cell], h, lefts[pair])
-            found.low[cell, pair], most = _bounds(control, lefts[pair])
+            found.low[cell, pair], most = _bounds(control, lefts[pair], along, squared)
             nearest = min(nearest, most)
+        found.nodes[cell] = np.sqrt(shortest)
         if found.low[cell].min() < ends[0] or nearest > ends[1]:
             for pair in range(n_pairs):
                 some[pair] = found.low[cell, pair] <= nearest

@@ -42,7 +42,7 @@ def to_control(values: FloatArray, control: FloatArray) -> None:
         control[column + 3] = 2 * control[column + 3] - (control[column] + control[column + 6]) / 2
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath={"nnan", "nsz"})
 def largest_derivatives(control: FloatArray, h: float) -> tuple[float, float]:
     """The largest first and second derivative along either axis of a patch of half width `h`."""
     first = second = 0.0

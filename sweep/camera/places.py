@@ -74,9 +74,9 @@ class AnyPlace:
             active = [search for search in active if search.goes_on()]
         return {pair: search.found for pair, search in searches.items()}
 
-    def amounts(self, light: FloatArray) -> FloatArray:
-        """`Between.amounts` of a light."""
-        return self._cells.between.amounts(light)
+    def amounts(self, light: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
+        """`Between.amounts` of pairs of lights."""
+        return self._cells.between.amounts(light, first, second)
 
     def _look(self, searches: Sequence[_Search], light: FloatArray) -> None:
         """Bound all distances in the cells of all searches, which are of one size: each cell once.
@@ -119,8 +119,7 @@ class _Search:
         """
         one, other = (at.ravel() for at in np.meshgrid(first, second, indexing="ij"))
         self._within_dn, self._one, self._other = scene.within_dn, one, other
-        amounts = [scene.amounts(light[at] - light[second]) for at in first]
-        self._amounts = np.concatenate(amounts).reshape(one.size, -1)
+        self._amounts = scene.amounts(light, one, other).reshape(one.size, -1)
         nowhere = np.full((2, 2), np.nan)
         self._least, self._most = (np.inf, nowhere), (-np.inf, nowhere)
         self.found: Extremes | None = None
