@@ -9,24 +9,8 @@ from numba import njit
 
 from ..base.types import FloatArray, IndexArray
 from .compiled_areas import BOTH_AXES, JUMP, SLOPE, THIRD, CellWeights
-from .compiled_light import add
+from .compiled_light import add, mixed
 from .compiled_slopes import Light, Seen, light_in_cell, node
-
-
-@njit(cache=True, nogil=True)
-def _mixed(values: FloatArray, channel: IndexArray, row: int, column: int, share: float, found: FloatArray) -> bool:
-    """Put what of a pixel's light is in each channel's value into `found`, neighbors' weights, too; whether any is."""
-    found[:] = 0.0
-    found[channel[row, column]] += (1 - share) * values[row, column]
-    if share > 0:
-        rows, columns = values.shape
-        for to_row, to_column in ((row - 1, column), (row + 1, column), (row, column - 1), (row, column + 1)):
-            if 0 <= to_row < rows and 0 <= to_column < columns:
-                found[channel[to_row, to_column]] += share / 4 * values[to_row, to_column]
-    some = False
-    for value in found:
-        some = some or value > 0
-    return some
 
 
 @njit(cache=True, nogil=True)
@@ -36,13 +20,13 @@ def _at_rim(own: CellWeights, channel: IndexArray, row: int, column: int, share:
     """
     some = False
     for axis in range(2):
-        changes = _mixed(own.sudden[:, :, axis], channel, row, column, share, of_rim[1, axis])
-        slopes = _mixed(own.slope[:, :, axis], channel, row, column, share, of_rim[0, axis])
+        changes = mixed(own.sudden[:, :, axis], channel, row, column, share, of_rim[1, axis])
+        slopes = mixed(own.slope[:, :, axis], channel, row, column, share, of_rim[0, axis])
         if changes or slopes:
             some = True
-            _mixed(own.bend[:, :, axis], channel, row, column, share, of_rim[2, axis])
-            _mixed(own.jump[:, :, axis], channel, row, column, share, of_rim[3, axis])
-            _mixed(own.third[:, :, axis], channel, row, column, share, of_rim[4, axis])
+            mixed(own.bend[:, :, axis], channel, row, column, share, of_rim[2, axis])
+            mixed(own.jump[:, :, axis], channel, row, column, share, of_rim[3, axis])
+            mixed(own.third[:, :, axis], channel, row, column, share, of_rim[4, axis])
         else:
             of_rim[2:, axis] = 0.0
     return some
@@ -105,7 +89,7 @@ def _of_cell(
     found[:] = 0.0
     for row in range(y.size):
         for column in range(x.size):
-            if not _mixed(own.high, channel, row, column, light.share, weight):
+            if not mixed(own.high, channel, row, column, light.share, weight):
                 continue
             to = channel[row, column]
             # Elsewhere than at the rim of the readout the weights are the same in the whole cell.

@@ -54,7 +54,7 @@ def covered_shares(x: FloatArray, y: FloatArray, half: float, radius: float) -> 
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
-def _along_edge(away: float, middle: float, half: float, table: Table, rule: EdgeRule, found: FloatArray) -> None:
+def along_edge(away: float, middle: float, half: float, table: Table, rule: EdgeRule, found: FloatArray) -> None:
     """What flows through an edge that is `away` from the light's center and `half` to both sides of `middle` long."""
     coefficients, per_px = table
     nodes, weights = rule
@@ -120,7 +120,7 @@ def _blurred(
                     shared = touch and inside and wanted[to_row, to_column]
                     if shared and side < 0:
                         continue
-                    _along_edge(along + side * half, across, half, table, rule, flow)
+                    along_edge(along + side * half, across, half, table, rule, flow)
                     add(own, side * scale, flow)
                     if shared:
                         add(light[to_row, to_column], -scale, flow)
@@ -135,6 +135,22 @@ def covered_by_disc(x: FloatArray, y: FloatArray, half: float, radius: float) ->
             for column in range(x.shape[1]):
                 found[case, row, column] = covered_share(x[case, column], y[case, row], half, radius)
     return found
+
+
+@njit(cache=True, nogil=True)
+def mixed(values: FloatArray, channel: IndexArray, row: int, column: int, share: float, found: FloatArray) -> bool:
+    """Put what of a pixel's light is in each channel's value into `found`, neighbors' weights, too; whether any is."""
+    found[:] = 0.0
+    found[channel[row, column]] += (1 - share) * values[row, column]
+    if share > 0:
+        rows, columns = values.shape
+        for to_row, to_column in ((row - 1, column), (row + 1, column), (row, column - 1), (row, column + 1)):
+            if 0 <= to_row < rows and 0 <= to_column < columns:
+                found[channel[to_row, to_column]] += share / 4 * values[to_row, to_column]
+    some = False
+    for value in found:
+        some = some or value > 0
+    return some
 
 
 @njit(cache=True, nogil=True)

@@ -85,7 +85,7 @@ class ClassCells:
         """`view`: of a mosaic whose channels are the classes; `knots_nm`: wavelengths at which the light is made."""
         self._view = view
         self.between = Between(view, view.methods, knots_nm)
-        self._light = PlaceKernels(view, view.methods, knots_nm)
+        self._light = PlaceKernels(view, view.methods, knots_nm, many=True)
         self._places, self._cells = _Kept(), _Kept()
         self._one_at_a_time = threading.RLock()
 

@@ -12,24 +12,25 @@ import numpy as np
 
 from ..base.types import FloatArray
 from . import compiled_light, legendre
+from .compiled_pixels import kernels_by_ring
 from .effects import crosstalk, demosaic, phase, sampling
 from .encircled import encircled
 from .kernel import profile_of
 from .kernel_size import pixels_per_place
 from .methods import Methods
+from .pixel_light import edge_rule, rings
 from .view import View
 
-_AT_ONCE = 4_000_000
+_AT_ONCE = 1_000_000
 """Pixels that are held at once."""
-_EDGE_LESS = 2
-"""An integral along an edge needs so many nodes less than one over a pixel, along each axis."""
 _SHARP: compiled_light.Table = (np.empty((0, 0)), 0.0)
 
 
 class PlaceKernels:
     """Kernels at places, for one way to compute a scene's light at some wavelengths."""
 
-    def __init__(self, view: View, methods: Methods, knots_nm: FloatArray) -> None:
+    def __init__(self, view: View, methods: Methods, knots_nm: FloatArray, *, many: bool = False) -> None:
+        """`many`: so many places are asked for that a table of the light of all pixels pays (`pixel_light`)."""
         target, pixel = view.scenario.target, view.pixel
         assert target is not None
         self._view, self._methods, self._target = view, methods, target
@@ -37,14 +38,14 @@ class PlaceKernels:
         self._radii = sampling.radii_px(view, target)
         self._share = crosstalk.share(view, methods.crosstalk)
         profile = profile_of(view, methods, knots_nm)
-        self._table, self._rule = _SHARP, legendre.rule(1)
+        self._table, self._rule, self._rings = _SHARP, legendre.rule(1), None
         self.shares = np.ones((1, knots_nm.size))
         if profile is not None:
             light = encircled(profile)
             self._table = light.coefficients, pixel.pitch_um / float(profile.r_um[1])
             self.shares = light.shares
-            order = profile.order(2 * self._half * pixel.pitch_um) - _EDGE_LESS
-            self._rule = legendre.rule(order)
+            self._rule = edge_rule(profile, self._half * pixel.pitch_um)
+            self._rings = rings(profile, self._half, pixel.pitch_um) if many else None
 
     def at(self, cases: phase.Cases, work: Counter[str]) -> tuple[FloatArray, FloatArray]:
         """What each channel gets through each channel's filter of each function of the light, ndarray[n_cases,
@@ -67,7 +68,13 @@ class PlaceKernels:
             weights = demosaic.center_weights(seen, cases.home_px - cases.places_px, self._methods.demosaic, mosaic)
         n = len(mosaic.channels)
         found, sums = np.empty((len(x), n, n, len(self.shares))), np.empty((len(x), n))
-        sizes = (self._half, self._radii[0], self._share)
-        compiled_light.kernels(x, y, weights, seen.channel, *sizes, self._table, self._rule, found, sums)
+        if self._rings is None:
+            sizes = (self._half, self._radii[0], self._share)
+            compiled_light.kernels(x, y, weights, seen.channel, *sizes, self._table, self._rule, found, sums)
+        else:
+            by_ring = np.zeros((*found.shape[:3], *self._rings.shares.shape[:2]))
+            kernels_by_ring(x, y, weights, seen.channel, self._share, self._rings, by_ring, sums)
+            flat = self._rings.shares.reshape(-1, found.shape[3])
+            found = (by_ring.reshape(-1, len(flat)) @ flat).reshape(found.shape) / sums[:, :, None, None]
         work["sampling"] += weights.size * len(self.shares)
         return found, sums

@@ -95,12 +95,12 @@ def plan_key(study: Study, scenario: str, tolerance_dn: float | None) -> str:
 
 
 @cache
-def _code() -> tuple[object, ...]:
-    """The version of the package, and when its files were changed: a plan of other code is another one."""
+def _code() -> str:
+    """Of the version of the package, and when its files were changed: a plan of other code is another one."""
     root = Path(__file__).parent.parent
     files = [(path, path.stat()) for path in sorted(root.rglob("*.py"))]
     stamps = [(str(path.relative_to(root)), found.st_mtime_ns, found.st_size) for path, found in files]
-    return version("cfa-sweep"), tuple(stamps)
+    return hashlib.sha256(repr((version("cfa-sweep"), stamps)).encode()).hexdigest()
 
 
 def _digest_of(held: Mapping[str, object]) -> str:

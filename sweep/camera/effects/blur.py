@@ -111,7 +111,8 @@ def _frequencies(reach_um: float, wavelength_um: FloatArray, f_number: float) ->
 class Profile:
     """h(r) of one disc for some wavelengths, as a table to look up.
 
-    `spectrum`: frequencies, 1/um, and the factor of J0(2 pi r nu) at each, ndarray[n_frequencies, n_wavelengths].
+    `spectrum`: frequencies, 1/um, and the factor of J0(2 pi r nu) at each, ndarray[n_frequencies, n_wavelengths];
+    `highest_per_um`: the highest of them.
     """
 
     def __init__(
@@ -127,13 +128,13 @@ class Profile:
         table = j0(2 * math.pi * np.outer(r, nu)) @ self.spectrum[1]
         self._spline = make_interp_spline(r, table, k=3, axis=0)
         self.r_um, self.values = r, table
-        self._highest = float(nu[-1])
+        self.highest_per_um = float(nu[-1])
         self.n_wavelengths = wavelength_um.size
         self.work = r.size * nu.size * wavelength_um.size
 
     def order(self, width_um: float) -> int:
         """Order of a Gauss-Legendre rule that integrates h over `width_um`."""
-        return 5 + math.ceil(2.5 * self._highest * width_um)
+        return 5 + math.ceil(2.5 * self.highest_per_um * width_um)
 
     def at(self, r_um: FloatArray) -> FloatArray:
         """h, ndarray[..., n_wavelengths]."""

@@ -1,0 +1,86 @@
+"""The light of pixels of a blurred round image, wherever they are: a table for images that are asked for many places.
+
+The mean over a square pixel, as a function of where its center is, has the square's symmetry: it is a sum over k of
+a_k(r) cos(4 k angle). Its finest detail is the image's, so that of k few are needed, and within a ring of a pixel's
+width few functions of the radius tell all wavelengths apart.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from ..base.cache import Cache
+from ..base.types import FloatArray
+from . import legendre
+from .compiled_pixels import Rings, means_on_rays
+from .effects.blur import Profile
+from .encircled import encircled
+
+_RESIDUAL = 1e-10
+"""No harmonic or function of the radius that is left out is larger, relative to a uniform field."""
+_EDGE_LESS = 2
+"""An integral along an edge needs so many nodes less than one over a pixel, along each axis."""
+_LANES = 4
+"""Functions are filled up to a multiple of so many."""
+_BEYOND = 10
+"""Nodes before and behind the table's ends, where its spline is not uniform."""
+_BASIS_STEP = 4
+"""The functions of a ring are those of every such node."""
+
+
+def edge_rule(profile: Profile, half_um: float) -> tuple[FloatArray, FloatArray]:
+    """Nodes and weights of integrals along a pixel's edge."""
+    return legendre.rule(profile.order(2 * half_um) - _EDGE_LESS)
+
+
+def _rings(profile: Profile, half_px: float, pitch_um: float) -> Rings:
+    light, per_px = encircled(profile), pitch_um / float(profile.r_um[1])
+    # A pixel's corner is the furthest from the light's center of what is read.
+    radii = np.arange(profile.r_um.size - math.ceil(2**0.5 * half_px * per_px)) / per_px
+    finest = 2 * math.pi * 2**0.5 * half_px * profile.highest_per_um * pitch_um
+    most = math.ceil((finest + 4 * finest ** (1 / 3) + 16) / 4)  # J_n(x) falls fast from n = x on
+    angles = np.arange(most + 1) * (math.pi / 4 / most)
+    values = np.empty((radii.size, angles.size, light.coefficients.shape[1]))
+    table, rule = (light.coefficients, per_px), edge_rule(profile, half_px * pitch_um)
+    means_on_rays(radii, angles, half_px, table, rule, values)
+    k = np.arange(most + 1)
+    cosines = np.cos(math.pi / most * np.outer(k, k)) * (2 / most)
+    cosines[:, [0, -1]] /= 2
+    cosines[[0, -1]] /= 2
+    harmonics = np.einsum("kj,rjf->rkf", cosines, values)
+    n = 1 + int(np.flatnonzero(np.abs(harmonics).max(axis=(0, 2)) > _RESIDUAL)[-1])
+    return _compressed(harmonics[:, :n], per_px)
+
+
+def _compressed(harmonics: FloatArray, per_px: float) -> Rings:
+    """Rings of functions of the radius at its nodes, ndarray[n_radii, n_harmonics, n_functions]."""
+    n_radii, n_harmonics, n_functions = harmonics.shape
+    n_rings = max(1, int((n_radii - 1) / per_px))
+    starts = (np.arange(n_rings) * per_px).astype(int)
+    ends = np.append(starts[1:] + 2, n_radii - 6 + 2)
+    mirrored = np.concatenate([harmonics[_BEYOND:0:-1], harmonics])  # the image is round
+    spline = make_interp_spline(np.arange(-_BEYOND, n_radii), mirrored.reshape(len(mirrored), -1), k=5, axis=0)
+    every = spline.c[_BEYOND - 2 : -2].reshape(-1, n_harmonics, n_functions)
+    parts = []
+    for start, end in zip(starts, ends, strict=True):
+        own = every[start : end + 6]
+        _, sizes, basis = np.linalg.svd(own[::_BASIS_STEP].reshape(-1, n_functions), full_matrices=False)
+        basis = basis[: max(1, int((sizes > _RESIDUAL).sum()))]
+        parts.append((own @ basis.T, basis))
+    n = -(-max(len(basis) for _, basis in parts) // _LANES) * _LANES
+    coefficients = np.zeros((n_rings, max(len(own) for own, _ in parts), n_harmonics, n))
+    shares = np.zeros((n_rings, n, n_functions))
+    for at, (own, basis) in enumerate(parts):
+        coefficients[at, : len(own), :, : len(basis)], shares[at, : len(basis)] = own, basis
+    return Rings(coefficients, shares, starts, per_px)
+
+
+RINGS: Cache[tuple[Profile, float], Rings] = Cache(8)
+
+
+def rings(profile: Profile, half_px: float, pitch_um: float) -> Rings:
+    """Those of a profile for pixels of a size, kept. `half_px`: half of a pixel's light-sensitive side."""
+    return RINGS.get((profile, half_px), lambda: _rings(profile, half_px, pitch_um))
