@@ -14,22 +14,30 @@ from .compiled_slopes import Light, Seen, light_in_cell, node
 
 
 @njit(cache=True, nogil=True)
-def _at_rim(own: CellWeights, channel: IndexArray, row: int, column: int, share: float, of_rim: FloatArray) -> bool:
-    """Whether the weights of a pixel's light change in a cell; what is known of that goes to ndarray[5, 2,
-    n_channels]: slope, how much it changes, second derivative, its jumps and third derivative, along either axis.
+def _is_at_rim(own: CellWeights, row: int, column: int, share: float) -> bool:
+    """Whether the weights of a pixel's light change in a cell: its own, or those of its neighbors."""
+    if own.sudden[row, column, 0] > 0 or own.sudden[row, column, 1] > 0:
+        return True
+    if share > 0:
+        rows, columns = own.high.shape
+        for to_row, to_column in ((row - 1, column), (row + 1, column), (row, column - 1), (row, column + 1)):
+            inside = 0 <= to_row < rows and 0 <= to_column < columns
+            if inside and (own.sudden[to_row, to_column, 0] > 0 or own.sudden[to_row, to_column, 1] > 0):
+                return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def _mix_rim(own: CellWeights, channel: IndexArray, row: int, column: int, share: float, of_rim: FloatArray) -> None:
+    """Put what is known of how the weights of a pixel's light change in a cell into ndarray[5, 2, n_channels]: slope,
+    how much it changes, second derivative, its jumps and third derivative, along either axis.
     """
-    some = False
     for axis in range(2):
-        changes = mixed(own.sudden[:, :, axis], channel, row, column, share, of_rim[1, axis])
-        slopes = mixed(own.slope[:, :, axis], channel, row, column, share, of_rim[0, axis])
-        if changes or slopes:
-            some = True
-            mixed(own.bend[:, :, axis], channel, row, column, share, of_rim[2, axis])
-            mixed(own.jump[:, :, axis], channel, row, column, share, of_rim[3, axis])
-            mixed(own.third[:, :, axis], channel, row, column, share, of_rim[4, axis])
-        else:
-            of_rim[2:, axis] = 0.0
-    return some
+        mixed(own.slope[:, :, axis], channel, row, column, share, of_rim[0, axis])
+        mixed(own.sudden[:, :, axis], channel, row, column, share, of_rim[1, axis])
+        mixed(own.bend[:, :, axis], channel, row, column, share, of_rim[2, axis])
+        mixed(own.jump[:, :, axis], channel, row, column, share, of_rim[3, axis])
+        mixed(own.third[:, :, axis], channel, row, column, share, of_rim[4, axis])
 
 
 @njit(cache=True, nogil=True)
@@ -52,7 +60,7 @@ def _add_inner(weight: float, dx: float, dy: float, h: float, light: Light, seen
 def _add_rim(weight: float, of_rim: FloatArray, seen: Seen, ratio: FloatArray, h: float, found: FloatArray) -> None:
     """Add what the light of a pixel, less `ratio`, times its changing weight in a channel may be off, ndarray[n_parts].
 
-    `of_rim`: ndarray[5, 2] (`_at_rim`); `ratio`: the lowest and the highest of the channel for a weight that goes
+    `of_rim`: ndarray[5, 2] (`_mix_rim`); `ratio`: the lowest and the highest of the channel for a weight that goes
     through one filter alone, ndarray[2, n_parts]. A product's derivatives are Leibniz's sums; where a third one has no
     bound, how much its slope changes has.
     """
@@ -93,11 +101,12 @@ def _of_cell(
                 continue
             to = channel[row, column]
             # Elsewhere than at the rim of the readout the weights are the same in the whole cell.
-            if not _at_rim(own, channel, row, column, light.share, of_rim):
+            if not _is_at_rim(own, row, column, light.share):
                 for u in range(n_channels):
                     if weight[u] > 0:
                         _add_inner(weight[u], x[column], y[row], h, light, seen, found[u, to])
                 continue
+            _mix_rim(own, channel, row, column, light.share, of_rim)
             light_in_cell(x[column], y[row], h, light, seen)
             for u in range(n_channels):
                 if weight[u] <= 0:  # no part of the cell gives it one

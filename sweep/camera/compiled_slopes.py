@@ -12,9 +12,9 @@ from ..base.types import FloatArray
 from .compiled_areas import bends_of_disc, slope_of_disc
 from .compiled_light import add, covered_share
 
-SEGMENTS = 8
+SEGMENTS = 4
 """Parts of a pixel's edge over which the image's slope is bounded one by one."""
-SQUARES = 4
+SQUARES = 3
 """Parts of a pixel along either axis over which the image is bounded one by one."""
 
 
