@@ -17,6 +17,7 @@ from scipy.optimize import minimize
 
 from sweep.camera import places
 from sweep.camera.between import Between, Deviation, of_channels
+from sweep.camera.compiled_distances import Distances, distances
 from sweep.camera.effects import phase
 from sweep.camera.forget import forget_scenes
 from sweep.camera.imager import Imager
@@ -201,6 +202,10 @@ def test_kernels_by_the_edges_of_pixels_are_those_by_their_areas(blurred: str) -
         # The area's rule reads a cubic spline, which is off by 1e-7 of a uniform field.
         np.testing.assert_allclose(found, kernel_at(made.view, methods, nodes, cases), rtol=0, atol=3e-8)
         assert len(quick.shares) < nodes.size
+        # The same by a table of the light of all pixels, as for thousands of places.
+        table = PlaceKernels(made.view, methods, nodes, many=True)
+        for one, other in zip(table.at(cases, Counter()), quick.at(cases, Counter()), strict=True):
+            np.testing.assert_allclose(one, other, rtol=0, atol=2e-10)
         # A light that moves by a tile sees the same.
         size = np.array(made.view.mosaic.indices.shape[::-1])
         moved = phase.Cases(cases.places_px + 3 * size, cases.home_px + 3 * size)
@@ -324,6 +329,36 @@ def test_what_lies_between_the_nodes_is_within_its_bound() -> None:
                     if half < 1 / 4:
                         ratios += list(most[..., 0].max(axis=(1, 2)) / off.max(axis=(1, 2, 3)))
             assert np.median(ratios) < 60
+
+
+@pytest.mark.parametrize("n_pairs", [1, 3, 40])
+def test_distances_in_a_cell_are_within_their_bounds(n_pairs: int) -> None:
+    """Differences that are parabolas along either axis, and a little more, at places of a fine grid."""
+    rng = np.random.default_rng(n_pairs)
+    t = np.linspace(-1, 1, 33)
+    grid = np.stack([v.ravel() for v in np.meshgrid(t, t)], axis=1)
+    n_cells, n_channels, rest = 20, 3, 0.01
+    middle = rng.normal(size=(n_cells, 1, n_channels, 2 * n_pairs)) * 3
+    seen = middle + rng.normal(size=(n_cells, 9, n_channels, 2 * n_pairs)) * rng.choice([0.1, 1.0], (n_cells, 1, 1, 1))
+    pairs = np.arange(n_pairs), n_pairs + np.arange(n_pairs)
+    away = seen[..., pairs[0]] - seen[..., pairs[1]]
+    found = Distances(np.empty((n_cells, n_pairs)), np.empty(n_cells), np.empty((n_cells, 9)))
+    left = np.full((n_cells, n_channels, n_pairs), rest)
+    at = np.arange(n_cells * 9).reshape(n_cells, 9)
+    moves = np.zeros((n_cells, n_channels, 3))
+    distances(seen.reshape(-1, n_channels, 2 * n_pairs), at, pairs, left, moves, 0.1, (np.inf, -np.inf), found)
+    there = np.stack([interpolated(np.tile(place, (n_cells, 1)), away) for place in grid])  # [places, cells, ...]
+    # What is left of each channel may be anything up to `rest`.
+    shortest = np.sqrt((np.maximum(np.abs(there) - rest, 0) ** 2).sum(axis=2))
+    longest = np.sqrt(((np.abs(there) + rest) ** 2).sum(axis=2))
+    np.testing.assert_allclose(found.nodes, np.sqrt((away**2).sum(axis=2)).min(axis=2), rtol=1e-12)
+    low, most = shortest.min(axis=0), longest.min(axis=2).max(axis=0)
+    assert (found.low <= low + 1e-12).all()
+    assert (found.nearest >= most - 1e-12).all()
+    if n_pairs < 10:  # patches that are divided are told to a part of what varies in them
+        varies = np.ptp(longest, axis=0)
+        assert np.median((low - found.low) / varies) < 0.1
+        assert np.median((found.nearest - most) / varies.max(axis=1)) < 0.1
 
 
 @pytest.mark.parametrize("name", list(TILES))
