@@ -153,9 +153,10 @@ def test_lights_without_a_distance_limit_nothing() -> None:
     space = next(space for space in study.spaces if space.filter is not None)
     view = study.view(space, "chart")
     nothing = np.zeros((1, 1, study.grid.size))
-    cases = imager_of(view).read(nothing)[0][0]
-    assert set(limiting_lights(view, cases)) == set(study.pairs)
-    assert limiting_lights(view, cases * np.nan) == {}
+    response = imager_of(view).read(nothing)[0]
+    assert set(limiting_lights(view, response)) == set(study.pairs)
+    assert all(lights[0] is not None for lights in limiting_lights(view, response).values())
+    assert all(lights[0] is None for lights in limiting_lights(view, response * np.nan).values())
 
 
 def series(**lines: list[float]) -> SeriesFigure:

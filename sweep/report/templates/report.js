@@ -29,6 +29,8 @@ const group = unpack(data.group), ids = unpack(data.design_id);
 const scenario = unpack(data.scenario.codes), cfa = unpack(data.cfa.codes);
 const wavelength = Array.from(unpack(data.curves.wavelength_nm));
 const G = Object.fromEntries(data.groups.map((name, i) => [name, i]));
+const limited = {};
+for (const [name, lights] of Object.entries(data.limited)) limited[name] = unpack(lights.codes);
 const x = columns[data.axes.x], y = columns[data.axes.y], light = columns.cfa_sensitivity;
 let overview = data.overviews[0], view = data.views[0] || null;
 
@@ -49,16 +51,16 @@ function described(row) {
   const lines = [title(row)];
   for (const name of Object.keys(data.columns)) {
     const value = columns[name][row];
-    if (Number.isFinite(value) && !(name === "violation" && value <= 0))
-      lines.push(`${data.columns[name].label}: ${shown(name, value)}`);
+    if (!Number.isFinite(value) || (name === "violation" && value <= 0)) continue;
+    lines.push(`${data.columns[name].label}: ${shown(name, value)}`);
+    if (lightsOf(name, row)) lines.push(`${data.limited[name].label}: ${lightsOf(name, row)}`);
   }
-  return [...lines, ...limitsOf(row)].slice(0, 30);
+  return lines.slice(0, 30);
 }
 
-/* The two lights that limit each CSD of a design, where the run kept them. */
-function limitsOf(row) {
-  const own = data.limited[ids[row]];
-  return own ? Object.entries(own.texts).map(([name, lights]) => `${name} ${lights}`) : [];
+/* The two lights that limit a CSD of a design; none of another quantity. */
+function lightsOf(name, row) {
+  return name in limited ? data.limited[name].words[limited[name][row]] : "";
 }
 
 /* The design that is meant: one of the front, or with a name, within a few pixels, else the nearest. */
@@ -254,7 +256,7 @@ function drawClouds(row) {
           color: data.colors.types[type] || cycle[k % 7]},
       });
     });
-    const near = (data.limited[ids[row]] || {}).nearest;
+    const near = data.nearest[ids[row]];
     if (near) {
       const ends = near.slice(0, 2).map(([type, name]) => types.findIndex((t, i) => t === type && data.clouds.names[i] === name));
       found.push({type: "scatter", mode: "lines", name: `nearest lights, ${near[2]} apart`, showlegend: pair === 0, legendgroup: "nearest",
@@ -278,10 +280,11 @@ function choose(row) {
     pair.append(term, text);
     list.append(pair);
   }
-  for (const text of limitsOf(row)) {
+  for (const [name, {label}] of Object.entries(data.limited)) {
+    if (!lightsOf(name, row)) continue;
     const part = document.createElement("div"), term = document.createElement("dt"), lights = document.createElement("dd");
-    term.textContent = text.slice(0, text.indexOf(" limited by ") + 11);
-    lights.textContent = text.slice(text.indexOf(" limited by ") + 12);
+    term.textContent = label;
+    lights.textContent = lightsOf(name, row);
     part.className = "limits";
     part.append(term, lights);
     list.append(part);
