@@ -31,7 +31,7 @@ _PUBLISHED_LABEL = "our counterpart of the paper's N_4"
 
 def payload(output: Output) -> dict[str, Any]:
     """Everything that the page's script needs, ready for JSON; no NaN but inside packed numbers."""
-    rows = _rows(output)
+    rows = content.drawn_rows(output)
     columns = _columns(output, rows)
     return {
         "study": output.study.study,
@@ -71,13 +71,6 @@ def _words(values: pd.Series) -> dict[str, Any]:
     """A column of words: the words, and the number of each row's word."""
     codes, words = pd.factorize(values.astype(str))
     return {"words": [str(word) for word in words], "codes": _packed(codes, "u1" if len(words) <= 256 else "u2")}
-
-
-def _rows(output: Output) -> pd.DataFrame:
-    """Rows to show: all CFAs, named and found designs, and the swept ones that figures show or that were kept."""
-    table = output.table[output.table["status"] == "ok"]
-    kept = np.union1d(output.swept_points, output.points["design_id"])
-    return table[(table["kind"] != SWEPT) | table["design_id"].isin(kept)].reset_index(drop=True)
 
 
 def _groups(rows: pd.DataFrame) -> np.ndarray:

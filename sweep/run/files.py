@@ -228,7 +228,7 @@ class Making:
         if answer is not None:
             found["search"] = search_facts(study, answer)
             if study.plans[answer.search.scenario].methods.saturation == "clip":
-                warnings.append("saturation is computed; the search sees the response before it, its row after")
+                warnings.append("pixels may saturate: the search sees them before clipping, its row after")
             if answer.front:
                 found["hypervolume"] = _hypervolumes(answer, gathered.swept)
                 found["hypervolume_least_sensitivity"] = answer.search.levels[0]

@@ -105,6 +105,28 @@ function levelTraces(drawn) {
   return found;
 }
 
+/* Names of designs, each where it lies on no marker and no other name, as far as there is room; `at`: pixels. */
+function beside(labeled, others, at, width) {
+  const boxOf = (row, r) => { const [u, v] = at(row); return [u - r, v - r, u + r, v + r]; };
+  const markers = [...labeled.map((row) => boxOf(row, 8)), ...others.map((row) => boxOf(row, 3))], placed = [];
+  const meets = (a, b) => a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
+  return labeled.sort((a, b) => y[b] - y[a]).map((row) => {
+    const name = data.names[row] ? data.names[row].short : cfaOf(row), [u, v] = at(row);
+    const text = `${name} ${y[row] < 10 ? y[row].toFixed(1) : y[row].toFixed(0)}`, long = 6.6 * text.length;
+    const places = [9, -9, 22, -22, 35, 48].flatMap((up) => [["left", 10, up], ["right", -10, up], ["center", 0, 1.8 * up]]);
+    const rated = places.map(([anchor, right, up]) => {
+      const start = u + right - {left: 0, center: long / 2, right: long}[anchor];
+      const box = [start, v + up - 8, start + long, v + up + 8];
+      const over = markers.filter((marker) => meets(box, marker)).length + 20 * placed.filter((other) => meets(box, other)).length;
+      return {anchor, right, up, box, over: over + (box[0] < 0 || box[2] > width || box[1] < 0 ? 50 : 0)};
+    });
+    const best = rated.reduce((least, place) => place.over < least.over ? place : least);
+    placed.push(best.box);
+    return {x: light[row], y: y[row], text: plain(text), showarrow: false, xanchor: best.anchor, xshift: best.right, yshift: best.up,
+      font: {size: 12}, bgcolor: "rgba(255,255,255,0.75)", borderpad: 0};
+  });
+}
+
 function drawOverview() {
   const color = data.colors.groups, found = [], labeled = [];
   const add = (name, text, marker, write) => {
@@ -121,13 +143,8 @@ function drawOverview() {
   let top = 1, right = 1;
   for (const i of labeled) { top = Math.max(top, y[i]); right = Math.max(right, light[i]); }
   for (const line of [overview.traced, overview.limit]) if (line) top = Math.max(top, ...line[1]);
-  const placed = [], notes = labeled.sort((a, b) => y[a] - y[b]).map((row) => {
-    const near = placed.filter((i) => Math.abs(light[i] - light[row]) < (narrow() ? 0.3 : 0.11) && Math.abs(y[i] - y[row]) < 0.06 * top).length;
-    placed.push(row);
-    const name = data.names[row] ? data.names[row].short : cfaOf(row);
-    return {x: light[row], y: y[row], text: `${plain(name)} ${y[row] < 10 ? y[row].toFixed(1) : y[row].toFixed(0)}`, showarrow: false,
-      xanchor: light[row] > 0.85 * right ? "right" : "left", xshift: light[row] > 0.85 * right ? -8 : 8, yshift: 9 + 13 * near, font: {size: 12}, bgcolor: "rgba(255,255,255,0.75)", borderpad: 0};
-  });
+  const width = byId("cfas").clientWidth - (narrow() ? 80 : 270), height = narrow() ? 300 : 350;
+  const notes = beside(labeled, rowsOf("front", true), (row) => [light[row] / (1.03 * right) * width, y[row] / (1.1 * top) * height], width);
   Plotly.react("cfas", found, {
     xaxis: Object.assign({title: {text: plain(overview.x_label).replace(": ", narrow() ? ":<br>" : ": ")}, range: [0, 1.03 * right]}, grid),
     yaxis: Object.assign({title: {text: plain(overview.y_label)}, range: [0, 1.1 * top]}, grid),
