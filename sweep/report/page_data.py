@@ -190,7 +190,9 @@ def _curves(output: Output) -> dict[str, Any]:
         "wavelength_nm": _packed(curves.wavelength_nm, "f4"),
         "sensor": {name: _packed(qe, "f4") for name, qe in curves.sensor.items()},
         "limits": {cfa: _packed(qe, "f4") for cfa, qe in curves.limits.items()},
-        "designs": {str(at): [_packed(qe, "f4") for qe in made.values()] for at, made in curves.designs.items()},
+        "designs": {
+            str(at): {channel: _packed(qe, "f4") for channel, qe in made.items()} for at, made in curves.designs.items()
+        },
         "shades": {kind: _packed(shade, "f4") for kind, shade in content.light_shades(output).items()},
         "plain": {cfa: content.channel_curves(output, cfa) for cfa in output.study.cfas},
         "ends": {cfa: end_curves(output, cfa) for cfa in dict.fromkeys(output.table["cfa"].astype(str))},

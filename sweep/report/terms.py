@@ -47,11 +47,18 @@ def _amount(column: Column | None, value: float | None) -> str:
 
 
 def terms_of(output: Output) -> list[str]:
-    """What the separation of the first screen is, and which pixels have a filter of the study."""
-    separation = output.trade_off[0]
-    plain = output.columns[separation.of] if separation.extreme else separation
-    unit = " In digital numbers (DN)." if separation.unit == DN else ""
-    return [f"{capital(plain.words)}: {plain.meaning}.{unit}", *_changed(output)]
+    """What the separation of the first screen is and what the constraints bound, and which pixels have a filter of the
+    study.
+    """
+    asked = (output.trade_off[0].name, *output.constraints)
+    columns = [output.columns[name] for name in asked if name in output.columns]
+    plain = {each.of if each.extreme else each.name: None for each in columns}
+    return [*(_meaning(output.columns[name]) for name in plain), *_changed(output)]
+
+
+def _meaning(column: Column) -> str:
+    unit = ", in digital numbers (DN)" if column.unit == DN else ""
+    return f"{capital(column.words)}: {column.meaning}{unit}."
 
 
 def _changed(output: Output) -> Iterator[str]:

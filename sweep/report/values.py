@@ -112,8 +112,9 @@ def series_figures(output: Output) -> list[SeriesFigure]:
     figures, series = [], series_of(output.scenarios)
     for (base, key), scenarios in series.items():
         upper = over_series(rows, scenarios, best_place) if best_place in rows else {}
-        upper = {name: values for name, values in upper.items() if np.isfinite(values).all()}
-        lines = {n: Line(y, upper.get(n)) for n, y in over_series(rows, scenarios, separation.name).items()}
+        worst = over_series(rows, scenarios, separation.name)
+        upper = {n: y for n, y in upper.items() if np.isfinite(y).all() and not np.array_equal(y, worst[n])}
+        lines = {name: Line(y, upper.get(name)) for name, y in worst.items()}
         if lines:
             band = "over the places on the mosaic" if upper else ""
             title = f"{output.study.study}, {base}: {separation.words}"

@@ -29,13 +29,12 @@ _NOT_SWEPT, _INFEASIBLE, _FEASIBLE, _ON_FRONT = range(4)
 
 @dataclass(frozen=True)
 class Counts:
-    """Rows of the whole table: all, feasible, feasible and on the Pareto front, failed; and how many were left out."""
+    """Rows of the whole table: all, feasible, feasible and on the Pareto front, failed."""
 
     rows: int
     feasible: int
     front: int
     failed: int
-    left_out: int
 
 
 def per_exposure(separation: str) -> str:
@@ -110,7 +109,7 @@ def thinned(
     frame: pd.DataFrame = pa.concat_tables(kept).unify_dictionaries().to_pandas()
     frame = frame.drop_duplicates("design_id").sort_values("design_id", ignore_index=True)
     frame[per_exposure(separation)] = frame[separation] / (frame[EXPOSURE] * _MS)
-    return frame, Counts(total, feasible, front, failed, total - len(frame))
+    return frame, Counts(total, feasible, front, failed)
 
 
 def leading(table: pa.Table, separation: str) -> pa.Table:

@@ -142,7 +142,7 @@ def test_the_best_design_is_that_of_the_table(finished: Finished, standing: Any)
     for name, text in said.items():
         if name.endswith("limited by"):
             continue
-        column = {"CFA sensitivity": "cfa_sensitivity"}.get(name, name)
+        column = {"CFA sensitivity": "cfa_sensitivity", "slope": "slope_per_nm"}.get(name, name)
         if column.endswith(" CSD"):
             column = "csd_" + column.removesuffix(" CSD").replace("/", "_")
         assert agrees(text, float(best[column])), name

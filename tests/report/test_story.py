@@ -168,7 +168,7 @@ def test_who_separates_most_names_its_lights_whatever_the_constraints(finished: 
     said = " ".join(answer_sentences(read_output(folder)))
     lights = limited.loc[most["design_id"], "limited_by_yellow_red"]
     assert f"Design {most['design_id']} of RYNCy separates most of all: {most['csd_yellow_red']:.0f} DN" in said
-    assert f"(limited by {lights}), but it does not meet" in said
+    assert f"(limited by {lights}), but its sensitivity is below 0.9 and its slope above 0.06 per nm." in said
     rate = table.loc[(table["csd_yellow_red"] / table["exposure_s"]).idxmax()]
     assert rate["design_id"] in limited.index
 
@@ -220,7 +220,8 @@ def test_a_study_of_plain_cfas_has_an_answer(tmp_path: Path) -> None:
     ran(load_study(path), tmp_path / "out", 1)
     output = read_output(tmp_path / "out")
     make_report(output)
-    assert answer_sentences(output)[0].startswith("RGGB separates yellow from red by 139 DN at 0.352 of a clear sensor")
+    told = "The best CFA of this study, RGGB, separates yellow from red by 139 DN at 0.352 of a clear sensor's light: 4.48 "
+    assert answer_sentences(output)[0].startswith(told)
     assert (tmp_path / "out" / REPORT).is_file()
     assert (tmp_path / "out" / "cfas.png").is_file()
     assert not (tmp_path / "out" / "pareto.png").exists()

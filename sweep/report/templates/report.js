@@ -201,9 +201,11 @@ function levels() {
   }
   for (const row of rowsOf("named"))
     merged.push({x: x[row], y: y[row], text: plain(data.names[row].short), showarrow: false, yshift: 13, font: {size: 11}});
-  if (view.bound !== null)
+  if (view.bound !== null) {
+    merged.push({x: view.bound, yref: "paper", y: 1, yanchor: "bottom", text: plain(view.bound_text), showarrow: false, font: {size: 11, color: "#555"}});
     shapes.push({type: "line", yref: "paper", y0: 0, y1: 1, x0: view.bound, x1: view.bound,
       line: {color: "#000000", width: 1, dash: "dash"}});
+  }
   return {shapes, annotations: merged};
 }
 
@@ -216,7 +218,7 @@ function drawPareto() {
   const layout = Object.assign({
     xaxis: Object.assign({title: {text: plain(view.x_label).replace(" (", narrow() ? "<br>(" : " (")}}, grid),
     yaxis: Object.assign({title: {text: plain(view.y_label)}}, grid),
-    height: narrow() ? 520 : 560, margin: {l: 60, r: 10, t: 30, b: 60}, legend: legend(), hovermode: "closest",
+    height: narrow() ? 520 : 570, margin: {l: 60, r: 10, t: 50, b: 60}, legend: legend(), hovermode: "closest",
     plot_bgcolor: "#fff",
     title: {text: plain(view.title), font: {size: narrow() ? 12 : 15}},
   }, levels());
@@ -226,25 +228,25 @@ function drawPareto() {
 }
 
 function drawCurves(row) {
-  const own = data.curves.designs[ids[row]] || [], found = [];
+  const own = Object.entries(data.curves.designs[ids[row]] || {}), found = [];
   const line = (name, packed, color, dash, width) => found.push({
     type: "scatter", mode: "lines", name: plain(name), x: wavelength, y: Array.from(unpack(packed)),
     line: {color, dash, width},
   });
   const whole = group[row] === G.plain, names = (whole ? data.curves.plain : data.curves.ends)[cfaOf(row)] || [];
   let top = 0.1;
-  for (const packed of [...names.map((name) => data.curves.sensor[name]), ...own]) top = Math.max(top, ...unpack(packed));
+  for (const packed of [...names.map((name) => data.curves.sensor[name]), ...own.map(([, packed]) => packed)]) top = Math.max(top, ...unpack(packed));
   for (const [type, packed] of Object.entries(data.curves.shades)) found.push({
     type: "scatter", mode: "lines", name: `${plain(type)} lights`, x: wavelength, y: Array.from(unpack(packed), (v) => v * top), fill: "tozeroy",
     line: {width: 0}, fillcolor: `${data.colors.types[type] || "#777777"}22`, hoverinfo: "skip"});
   for (const name of names)
     line(name, data.curves.sensor[name], data.colors.curves[name] || "#777777", whole ? "solid" : "dot", whole ? 2.5 : 1.5);
   if (!whole && data.curves.limits[cfaOf(row)]) line("limit of any filter, unquantized", data.curves.limits[cfaOf(row)], "#000000", "dash", 1.2);
-  own.forEach((packed, i) => line(own.length > 1 ? `${title(row)}, ${"ab"[i]}` : title(row), packed, cycle[i], "solid", 2.5));
+  own.forEach(([channel, packed], i) => line(own.length > 1 ? `${title(row)}, ${channel}` : title(row), packed, cycle[i], "solid", 2.5));
   Plotly.react("curves", found, {
-    title: {text: `QE of ${plain(title(row))}`, font: {size: 14}}, height: 340, margin: {l: 50, r: 10, t: 36, b: 45},
+    title: {text: `QE of ${plain(title(row))}`, font: {size: 14}}, height: 380, margin: {l: 50, r: 10, t: 36, b: 85},
     xaxis: Object.assign({title: {text: "wavelength / nm"}}, grid),
-    yaxis: Object.assign({title: {text: "QE"}, rangemode: "tozero"}, grid), legend: {orientation: "h", y: -0.25},
+    yaxis: Object.assign({title: {text: "QE"}, rangemode: "tozero"}, grid), legend: {orientation: "h", yref: "container", y: 0, yanchor: "bottom"},
   }, config);
 }
 
@@ -399,7 +401,7 @@ function drawSeries(series, box) {
     line: {color: "#666666", width: 1, dash: "dash"}}];
   Plotly.react(box, found, {
     title: {text: plain(series.title), font: {size: 14}}, height: narrow() ? 460 : 420, shapes, hovermode: "x unified",
-    margin: {l: 60, r: 10, t: 36, b: 50}, legend: narrow() ? {orientation: "h", y: -0.25} : {},
+    margin: {l: 60, r: 10, t: 36, b: 50}, legend: narrow() ? {orientation: "h", y: -0.25} : {tracegroupgap: 2},
     xaxis: Object.assign({title: {text: plain(series.x_label)}, type: series.log_x ? "log" : "linear"}, grid),
     yaxis: Object.assign({title: {text: plain(series.y_label)}, type: series.log_y ? "log" : "linear", exponentformat: "power",
       rangemode: series.from_zero && !series.log_y ? "tozero" : "normal"}, grid),
@@ -507,16 +509,26 @@ drawAll();
 listen("cfas");
 later("history", drawHistory);
 data.series.forEach((series, i) => later(`series-${i}`, () => drawSeries(series, byId(`series-${i}`))));
-/* A page that is printed has every figure, as wide as the paper. */
+/* A page that is printed has every figure, as wide as the paper; the first one beside the answer, two series to a page. */
+const heights = new Map();
+function printed(box) {
+  const wide = {width: 960}, small = {"xaxis.title.font.size": 11, "yaxis.title.font.size": 11};
+  if (box.parentElement.classList.contains("screen")) return {...wide, ...small, height: 330};
+  if (box.id.startsWith("series-")) return {...wide, ...small, height: 270};
+  return box.id === "curves" ? {...wide, height: 340} : wide;
+}
 function print() {
   for (const [box, draw] of drawers) {
     near.unobserve(box);
     draw();
   }
-  document.querySelectorAll(".js-plotly-plot").forEach((box) => Plotly.relayout(box, {width: 960}));
+  document.querySelectorAll(".js-plotly-plot").forEach((box) => {
+    heights.set(box, box.layout.height);
+    Plotly.relayout(box, printed(box));
+  });
 }
 window.addEventListener("beforeprint", print);
 window.addEventListener("afterprint", () => document.querySelectorAll(".js-plotly-plot").forEach((box) =>
-  Plotly.relayout(box, {width: null, autosize: true})));
+  Plotly.relayout(box, {width: null, height: heights.get(box), autosize: true, "xaxis.title.font.size": null, "yaxis.title.font.size": null})));
 document.body.dataset.readyMs = Math.round(performance.now());
 })();
