@@ -73,7 +73,7 @@ def speaks_plainly(page: Any) -> None:
     compared = page.locator(".numbers > div small").all_inner_texts()
     assert len(compared) == 3
     assert all(any(letter.isdigit() for letter in text) for text in compared)
-    assert "smallest distance between a point of one" in page.inner_text(".terms")
+    assert "the distance of the two nearest lights" in page.inner_text(".terms")
 
 
 def fits(page: Any, width: int) -> None:
