@@ -118,30 +118,26 @@ class Tables:
 
 @dataclass(frozen=True)
 class EdgeBlock:
-    """Designs `start`..`stop`-1 of a grid of stopbands, or the `chosen` ones of these, by their edges' numbers."""
+    """Designs of a grid of stopbands by the numbers of their edges; `numbers`: their own in the grid."""
 
     space: Space
-    start: int
-    stop: int
+    numbers: IndexArray
     tables: Tables
     at_left: IndexArray
     at_right: IndexArray
     depth: FloatArray
-    chosen: IndexArray | None = None
 
     def __len__(self) -> int:
         return len(self.depth)
 
     def curves(self) -> FloatArray:
         """See `Block.curves`."""
-        points = self.space.points(self.start, self.stop)
-        return self.space.curves(points if self.chosen is None else points[self.chosen], self.tables.base.size)
+        return self.space.curves(self.space.points_of(self.numbers), self.tables.base.size)
 
     def some(self, which: IndexArray) -> EdgeBlock:
         """See `Block.some`."""
-        chosen = which if self.chosen is None else self.chosen[which]
         ends = (self.at_left[which], self.at_right[which], self.depth[which])
-        return EdgeBlock(self.space, self.start, self.stop, self.tables, *ends, chosen)
+        return EdgeBlock(self.space, self.numbers[which], self.tables, *ends)
 
     def product(self, weights: FloatArray, nodes: IndexArray) -> FloatArray:
         """See `Block.product`."""
@@ -186,7 +182,12 @@ def _separable(space: Space) -> tuple[SeparableFamily, FloatArray, FloatArray] |
 
 
 def edges_of(space: Space, start: int, stop: int) -> EdgeBlock | None:
-    """The designs of a grid by their edges; None where the family is not separable, or its tables were too large."""
+    """Designs `start`..`stop`-1 of a grid by their edges; see `edges_of_some`."""
+    return edges_of_some(space, np.arange(start, stop))
+
+
+def edges_of_some(space: Space, numbers: IndexArray) -> EdgeBlock | None:
+    """Designs of a grid by their edges; None where the family is not separable, or its tables were too large."""
     found = _separable(space)
     if found is None:
         return None
@@ -202,7 +203,7 @@ def edges_of(space: Space, start: int, stop: int) -> EdgeBlock | None:
         return Tables(base, change, left_edges, right_edges)
 
     tables = _tables.get(key, made)
-    left, left_width, right, right_width, depth = space.digits(start, stop)
+    left, left_width, right, right_width, depth = space.digits(numbers)
     at_left = left * len(space.axes[_LEFT_WIDTH]) + left_width
     at_right = right * len(space.axes[_RIGHT_WIDTH]) + right_width
-    return EdgeBlock(space, start, stop, tables, at_left, at_right, np.asarray(space.axes[_DEPTH], dtype=float)[depth])
+    return EdgeBlock(space, numbers, tables, at_left, at_right, np.asarray(space.axes[_DEPTH], dtype=float)[depth])

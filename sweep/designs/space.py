@@ -61,9 +61,9 @@ class Space:
         """Names of the family's parameters, with units."""
         return () if self.filter is None else tuple(p.name for p in self.filter.family.parameters)
 
-    def digits(self, start: int, stop: int) -> list[IndexArray]:
-        """For each axis of a grid the index of its value in designs start..stop-1, ndarray[stop - start]."""
-        rest = np.arange(start, stop)
+    def digits(self, numbers: IndexArray) -> list[IndexArray]:
+        """For each axis of a grid the index of its value in the designs of these numbers, ndarray[n_designs]."""
+        rest = numbers
         found = []
         for axis in reversed(self.axes):  # mixed radix: NumPy's own unravel_index stops at 64 axes
             rest, digit = np.divmod(rest, len(axis))
@@ -72,11 +72,16 @@ class Space:
 
     def points(self, start: int, stop: int) -> FloatArray:
         """Parameters of designs start..stop-1: ndarray[stop - start, n_parameters]."""
+        return self.points_of(np.arange(start, stop))
+
+    def points_of(self, numbers: IndexArray) -> FloatArray:
+        """Parameters of the designs of these numbers, one at least: ndarray[n_designs, n_parameters]."""
         if self.rows is not None:
-            return self.rows.points(self.axes, start, stop)
-        digits = zip(self.axes, self.digits(start, stop), strict=True)
+            start = int(numbers.min())
+            return self.rows.points(self.axes, start, int(numbers.max()) + 1)[numbers - start]
+        digits = zip(self.axes, self.digits(numbers), strict=True)
         columns = [np.asarray(axis, dtype=float)[digit] for axis, digit in digits]
-        return np.stack(columns, axis=1) if columns else np.empty((stop - start, 0))
+        return np.stack(columns, axis=1) if columns else np.empty((len(numbers), 0))
 
     def curves(self, points: FloatArray, n_wavelengths: int, off: Off = AS_DESIGNED) -> FloatArray:
         """QE of the modified channels: ndarray[n_designs, n_modified, n_wavelengths]; none for a plain CFA.

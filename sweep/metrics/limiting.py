@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Mapping
 
-from ..base.types import FloatArray
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.types import FloatArray, IndexArray
+from ..camera.imager import Imager
 from ..camera.view import View
 from ..curves.lights import Pair, class_pairs, pair_name
+from ..designs.block import Block
 
 BETWEEN = " / "
+LimitingLights = Mapping[Pair, NDArray[np.object_]]
+"""Of each pair of signal types the two lights that limit its CSD, `one / other`, for each design; None: no distance."""
 
 
 def limited_by_name(pair: Pair) -> str:
@@ -16,18 +23,38 @@ def limited_by_name(pair: Pair) -> str:
     return pair_name("limited_by", pair)
 
 
-def limiting_lights(view: View, cases: FloatArray) -> dict[Pair, tuple[str, str]]:
-    """The two lights that limit each CSD of one design, the first of the first type of a pair.
+def limiting_lights(view: View, response: FloatArray) -> LimitingLights:
+    """The two lights that limit each CSD of designs, the first of the first type of a pair, ndarray[n_designs] each.
 
-    `cases`: its readout, DN, ndarray[n_cases, n_signals, n_channels]. Of a light that may fall anywhere, the places are
-    those of the method's lattice. A pair without a distance is left out.
+    `response`: readouts, DN, ndarray[n_designs, n_cases, n_signals, n_channels]. Of a light that may fall anywhere, the
+    places are those of the method's lattice.
     """
-    limiting: dict[Pair, tuple[str, str]] = {}
-    for pair in class_pairs(view.lights.classes):
-        first, second = (view.members[name] for name in pair)
-        # Differences come before squares, and no square is too large: nearly equal points lose no digits.
-        apart = np.hypot.reduce(cases[:, first, None] - cases[:, None, second], axis=-1)
-        if np.isfinite(apart).all():
-            _, one, other = np.unravel_index(int(apart.argmin()), apart.shape)
-            limiting[pair] = view.lights.names[first[one]], view.lights.names[second[other]]
-    return limiting
+    from .nearest import nearest_pairs  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+    members = [view.members[name] for name in view.lights.classes]
+    bounds = np.cumsum([0, *map(len, members)])
+    pairs = class_pairs(view.lights.classes)
+    found = np.empty((len(response), len(pairs), 2), dtype=np.intp)
+    if pairs:
+        nearest_pairs(np.ascontiguousarray(response, dtype=float), np.concatenate(members), bounds, found)
+    return {pair: _named(view, found[:, at]) for at, pair in enumerate(pairs)}
+
+
+def _named(view: View, lights: IndexArray) -> NDArray[np.object_]:
+    """Names of two lights each; `lights`: ndarray[n_designs, 2], -1 where there are none."""
+    each, which = np.unique(lights, axis=0, return_inverse=True)
+    names = [None if one < 0 else BETWEEN.join((view.lights.names[one], view.lights.names[two])) for one, two in each]
+    return np.array(names, dtype=object)[which.reshape(-1)]
+
+
+def limiting_lights_of(imager: Imager, block: Block) -> LimitingLights:
+    """`limiting_lights` of a block of designs, read out by the same route as `evaluate` reads them."""
+    changing = imager.read_changing(block)
+    if changing is None:
+        return limiting_lights(imager.view, imager.read(block.curves())[0])
+    whole = changing.whole
+    response = np.empty((len(block), *whole.shape[1:]))
+    response[changing.which] = whole
+    if not changing.which.all():
+        response[~changing.which] = imager.read(block.some(np.flatnonzero(~changing.which)).curves())[0]
+    return limiting_lights(imager.view, response)

@@ -7,6 +7,8 @@ that results are those of the same sums in NumPy.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 
@@ -15,6 +17,8 @@ from ..designs.vectorized import larger, smaller
 
 _NUMBERS = {"nnan", "nsz"}
 """Lets the compiler take the smaller of several numbers at once; callers hand in no NaN."""
+_LEAST_SQUARE, _MOST_SQUARE = 1e-280, 1e280
+"""Squared distances below and above are those of differences whose squares a float does not hold well."""
 LANES = 64
 """Designs that `nearest_along_squared` takes side by side."""
 
@@ -44,6 +48,47 @@ def nearest_squared(response: FloatArray, bounds: IndexArray, out: FloatArray) -
                     best = smaller(best, nearest)
                 out[d, pair] = best
                 pair += 1
+
+
+@njit(cache=True, nogil=True)
+def nearest_pairs(response: FloatArray, order: IndexArray, bounds: IndexArray, out: IndexArray) -> None:
+    """The two nearest signals of each pair of classes, over all cases; of equally near ones the first.
+
+    `response`: C-ordered ndarray[n_designs, n_cases, n_signals, n_channels]; `order`: its signals, one class after the
+    other; `bounds`: ndarray[n_classes + 1], where each class begins in `order`. `out`: ndarray[n_designs, n_pairs, 2],
+    signals, pairs in the order of `curves.lights.class_pairs`; -1 where a distance is not finite.
+    """
+    for d in range(response.shape[0]):
+        pair = 0
+        for a in range(bounds.size - 1):
+            for b in range(a + 1, bounds.size - 1):
+                first, second = order[bounds[a] : bounds[a + 1]], order[bounds[b] : bounds[b + 1]]
+                squared = _nearest_pair(response[d], first, second, False, out[d, pair])
+                if not _LEAST_SQUARE < squared < _MOST_SQUARE:
+                    farthest = _nearest_pair(response[d], first, second, True, out[d, pair])
+                    if not farthest < np.inf:
+                        out[d, pair] = -1
+                pair += 1
+
+
+@njit(cache=True, nogil=True)
+def _nearest_pair(cases: FloatArray, first: IndexArray, second: IndexArray, legs: bool, out: IndexArray) -> float:
+    """Put the two nearest signals into `out`; returns their squared distance, NaN or infinite where one of all is.
+
+    `legs`: distances instead, without squares. `cases`: ndarray[n_cases, n_signals, n_channels].
+    """
+    best, odd = np.inf, 0.0
+    for case in range(cases.shape[0]):
+        for i in first:
+            for j in second:
+                total = 0.0
+                for c in range(cases.shape[2]):
+                    apart = cases[case, i, c] - cases[case, j, c]
+                    total = math.hypot(total, apart) if legs else total + apart * apart
+                if total < best:
+                    best, out[0], out[1] = total, i, j
+                odd += 0.0 * total
+    return best + odd
 
 
 @njit(cache=True, nogil=True)

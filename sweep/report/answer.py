@@ -6,13 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..metrics.bound import FEASIBLE
 from ..metrics.columns.confusion import CNR, D_PRIME
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.limiting import limited_by_name
 from ..metrics.quantity import DECADES, OF_A_SHARE, WORST_CASE
 from ..results.output import Output
-from ..results.tables import FOUND, PLAIN, SWEPT
+from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
 from ..results.thinning import per_exposure
 from .allowed_lamps import lamp_lines
 from .assumed import assumed, moves_with_light, technology_of
@@ -21,6 +20,7 @@ from .names import OF_CLEAR, capital, full_name, label, rate_told
 from .noise import usable_lines
 from .robustness import over_population, robustness_lines, worst_over
 from .series import lead_sentence, leads_of
+from .terms import constraints_told, missed_told
 from .unseen import unseen_lines, unseen_told
 from .values import series_figures
 
@@ -48,7 +48,8 @@ def _of_designs(output: Output) -> list[str]:
         failed = searched[searched["status"] != "ok"]
         if len(failed) == len(searched):
             return [f"Every design failed: {failed['status'].iloc[0]}."]
-        return [f"No design is feasible{_under(output)}.", *who_else(output)]
+        under = constraints_told(output)
+        return [f"No design meets every constraint{f': {under}' if under else ''}.", *who_else(output)]
     usable = list(usable_lines(output))
     # Where the question is of noise, separations matter where another CFA begins to lead.
     series = usable + [lead_sentence(s) for s in series_figures(output) if not usable or len(leads_of(s)) > 1]
@@ -57,11 +58,6 @@ def _of_designs(output: Output) -> list[str]:
     leaders = leaders_of(output)
     lamps = robustness_lines(output, leaders.chosen)
     return [*_best(output, leaders), *lamps, *lamp_lines(output), *who_else(output), *series]
-
-
-def _under(output: Output) -> str:
-    limits = " and ".join(f"{output.words(q)} {bound}" for q, bound in output.constraints.items())
-    return f" with {limits}" if limits else ""
 
 
 def said_separation(output: Output, row: Row) -> str:
@@ -82,9 +78,11 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     best, plain, separation = leaders.chosen, leaders.plain, output.trade_off[0]
     if best is None:
         return
-    under = _under(output).removeprefix(" with ")
-    text = f"Under {under}, {full_name(best)}" if under else capital(full_name(best))
-    text += technology_of(output, best)
+    under = constraints_told(output)
+    who = full_name(best) + technology_of(output, best)
+    if best["kind"] in (PLAIN, NAMED):
+        who = f"the best {'CFA' if best['kind'] == PLAIN else 'design'} of this study, {who},"
+    text = f"With {under}, {who}" if under else capital(who)
     if output.goal.name not in (separation.name, separation.of):
         text += f" has the best {output.goal.words}, {output.goal.amount(best[output.goal.name])}, and"
     text += f" {said_separation(output, best)}{unseen_told(output, best)}"
@@ -97,7 +95,7 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     if filter_told := assumed(output, best):
         yield filter_told
     search = output.provenance.search
-    proven = None if search is None or best["kind"] not in (SWEPT, FOUND) else search.limit_proven
+    proven = None if search is None or not _made(best) else search.limit_proven
     parts = _band(best)
     if proven is not None and output.goal.name == separation.name:
         most = separation.told_bound(proven)
@@ -148,8 +146,13 @@ def _best_of_other(output: Output, row: Row) -> str:
 def _band(row: Row) -> list[str]:
     """Where the band of a found filter lies, between the middles of its edges; nothing of other filters."""
     ends = [row.get(name, np.nan) for name in ("left_nm", "right_nm")]
-    found = row["kind"] in (SWEPT, FOUND) and np.isfinite(ends).all()
+    found = _made(row) and np.isfinite(ends).all()
     return [f"Its edges are at {ends[0]:.0f} and {ends[1]:.0f} nm."] if found else []
+
+
+def _made(row: Row) -> bool:
+    """Whether the study swept or searched a design."""
+    return row["kind"] in (SWEPT, FOUND)
 
 
 def _times(output: Output, best: Row, plain: Row) -> str:
@@ -177,7 +180,7 @@ def _others(output: Output, leaders: Leaders) -> Iterator[str]:
     best, most, rate = leaders.chosen, leaders.separates, leaders.per_exposure
     separation = output.trade_off[0]
     per_time = separation.unit != DECADES and separation.metric not in _BY_NOISE
-    if most is not None and best is not None and most["design_id"] == best["design_id"]:
+    if most is not None and best is not None and most["design_id"] == best["design_id"] and _made(best):
         yield f"Nothing else in this run {'separates' if per_time else 'has'} more."
     more = most is not None and (best is None or most[separation.name] > best[separation.name])
     if most is not None and more:
@@ -205,10 +208,6 @@ def _figures(output: Output, row: Row) -> str:
 
 
 def _missed(output: Output, row: Row) -> str:
-    """Constraints that a row does not meet, in words."""
-    missed = [
-        f"{output.words(name)} {bound}"
-        for name, bound in output.constraints.items()
-        if bound.violation(np.array([row[name]], dtype=float))[0] > FEASIBLE
-    ]
-    return f", but it does not meet {' and '.join(missed)}" if missed and row["kind"] != PLAIN else ""
+    """Constraints that a row does not meet, in words; of a plain CFA none are asked."""
+    missed = missed_told(output, row)
+    return f", but {missed}" if missed and row["kind"] != PLAIN else ""

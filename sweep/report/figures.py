@@ -8,9 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from ..base.types import FloatArray, IndexArray
+from ..base.types import FloatArray
+from ..results.thinning import even
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -98,14 +97,6 @@ def thin(points: Points, most: int = _DRAWN_POINTS) -> Points:
         return points
     kept = even(points.x.size, most)
     return Points(points.x[kept], points.y[kept])
-
-
-def even(size: int, most: int) -> IndexArray:
-    """At most `most` of `size` indices, in order, spread evenly and not in step with a grid."""
-    if size <= most:
-        return np.arange(size)
-    golden = (np.arange(most) * ((5**0.5 - 1) / 2)) % 1
-    return np.unique((golden * size).astype(np.intp))
 
 
 def draw_pareto(figure: ParetoFigure) -> Figure:

@@ -94,7 +94,9 @@ def _numbers_under_noise(output: Output, ends: Sequence[UsableEnds]) -> Iterator
 
 
 def _numbers_over(output: Output, series: SeriesFigure) -> Iterator[LargeNumber]:
-    """Of the first one that leads in a series: separation, light, and where its lead ends."""
+    """Of the first one that leads in a series: separation, light beside the plain CFA that separates most there, and
+    where its lead ends.
+    """
     separation, (_, unit) = output.trade_off[0], series.quantity
     leads = leads_of(series)
     name, start, stop = next((lead for lead in leads if lead[0] is not None), (None, 0, 0))
@@ -110,9 +112,13 @@ def _numbers_over(output: Output, series: SeriesFigure) -> Iterator[LargeNumber]
         return "" if not ranked else f"{ranked[0]} {separation.told(others[ranked[0]][place])}"
 
     own = series.lines[name].y
-    yield LargeNumber(separation.told(own[start]), f"{name} at {at(start)}", rival(start))
-    rows = output.few[output.few["name"] == name]
-    yield LargeNumber(f"{rows[CFA_SENSITIVITY].iloc[0]:.3f}", OF_CLEAR, name)
+    yield LargeNumber(separation.told(own[start]), f"{separation.words}, {name} at {at(start)}", rival(start))
+    rows = {str(row["name"]): row for row in output.few.to_dict("records")}
+    light = float(rows[name][CFA_SENSITIVITY])
+    plain = [other for other in others if rows[other]["kind"] == PLAIN]
+    most = max(plain, key=lambda other: np.nan_to_num(others[other][start], nan=-np.inf), default="")
+    beside = _beside(rows.get(most), CFA_SENSITIVITY, light, "{:.3f}".format)
+    yield LargeNumber(f"{light:.3f}", OF_CLEAR, beside)
     figures = ", ".join(part for part in (f"{separation.told(own[stop])}", rival(stop)) if part)
     yield LargeNumber(at(stop), f"{name} leads up to here" if leads[-1][2] != stop else "and still leads here", figures)
 

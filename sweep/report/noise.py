@@ -51,19 +51,21 @@ def noise_figures(output: Output) -> Iterator[SeriesFigure]:
     rows = output.few
     for (base, key), scenarios in series_of(output.scenarios).items():
         x = np.array(list(scenarios.values()))
-        title = f"{output.study.study}: {base}"
+        where = f"{output.study.study}, {base}"
         errors = {
             n: Line(np.maximum(y, _LEAST), None, _crossing(output, base, key, n))
             for n, y in over_series(rows, scenarios, STATE_ERROR).items()
         }
         label = f"{_ERROR} ({_LEAST:g}: or less)"
+        title = f"{where}: {_ERROR}"
         yield SeriesFigure(title, key, label, x, errors, "", log_y=True, level=allowed, note=_COMPUTED)
         for rule in CLASSIFIERS if output.recognition is not None else ():
             lines = {n: Line(y, None) for n, y in _accuracies(output, scenarios, rule).items()}
+            label = f"accuracy of {_RULE_NAMES[rule]} on raw patches"
             yield SeriesFigure(
-                title,
+                f"{where}: {label}",
                 key,
-                f"accuracy of {_RULE_NAMES[rule]} on raw patches",
+                label,
                 x,
                 lines,
                 "",
@@ -112,20 +114,22 @@ def _range(x: FloatArray, usable: BoolArray, unit: str, crossing: float | None) 
     if not usable.any():
         return "nowhere"
     ends = np.flatnonzero(np.diff(usable))
-    of = f" {unit}".rstrip()
+    of = f" of {unit}" if " " in unit else f" {unit}".rstrip()
     if len(ends) > 1:
         return f"at {' '.join(f'{v:g}' for v in x[usable])}{of}"
     low, high = x[ends[0] : ends[0] + 2]
     word = "up to" if usable[0] else "from"
     if crossing is None:
         return f"{word} a number between {low:g} and {high:g}{of}"
-    return f"{word} {_rounded(crossing, up=not usable[0]):g}{of}"
+    return f"{word} {_rounded(crossing, up=not usable[0])}{of}"
 
 
-def _rounded(value: float, *, up: bool) -> float:
-    """Three digits of a number, to one side."""
+def _rounded(value: float, *, up: bool) -> str:
+    """Three digits of a number, rounded to one side; also where the last ones are 0."""
     unit = 10.0 ** (math.floor(math.log10(abs(value))) - 2) if value else 1.0
-    return float(f"{(math.ceil if up else math.floor)(value / unit * (1 - 1e-12)) * unit:.3g}")
+    rounded = (math.ceil if up else math.floor)(value / unit * (1 - 1e-12)) * unit
+    text = f"{rounded:#.3g}".removesuffix(".")
+    return f"{float(text):g}" if "e" in text else text
 
 
 def _crossing(output: Output, series: str, key: str, design: str) -> tuple[float, float] | None:
@@ -153,7 +157,7 @@ class UsableEnds:
 
     def told(self, design: str) -> str:
         """Where a design stops being usable, rounded to the side where it is usable; without its unit."""
-        return f"{_rounded(self.at[design], up=not self.more):g}"
+        return _rounded(self.at[design], up=not self.more)
 
 
 def usable_ends(output: Output) -> Iterator[UsableEnds]:

@@ -38,6 +38,7 @@ from .sensor_map import map_drawings
 from .series import draw_series
 from .signal_figures import draw_chart, draw_clouds
 from .summary import counts_line, summary_lines
+from .terms import constraints_told, terms_of
 from .tiles import draw_tiles, tiles_figure
 
 if TYPE_CHECKING:
@@ -103,6 +104,7 @@ def _html(output: Output, images: Sequence[tuple[str, str, str]], published: pd.
         objective=_objective(output),
         numbers_in="" if len(output.scenarios) == 1 or output.best.empty else f"in {leaders_of(output).scenario}",
         series_first=series_first,
+        terms_first=series_first and drawn["series"][0]["y_label"] == output.trade_off[0].axis,
         objective_words=output.goal.words,
         answer=answer_sentences(output),
         first_lines=_FIRST_LEADS if series_first and output.study.recognition is None else _FIRST_LINES,
@@ -134,7 +136,8 @@ def _html(output: Output, images: Sequence[tuple[str, str, str]], published: pd.
         left_out=rows(tables.worst_left_out(output)),
         geometry=rows(tables.geometry_table(output)),
         published=rows(published),
-        constraints=[f"{output.words(name)} {bound}" for name, bound in output.constraints.items()],
+        constraints=constraints_told(output),
+        terms=terms_of(output),
         summary=summary_lines(output),
         provenance=output.provenance.model_dump(mode="json"),
         limited=output.provenance.search is not None and output.provenance.search.limit_proven is not None,

@@ -16,16 +16,13 @@ from ..metrics.pareto import knee
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
 from . import values as content
-from .figures import COLORS, CURVE_COLORS, TYPE_COLORS, ParetoFigure, even
+from .figures import COLORS, CURVE_COLORS, TYPE_COLORS, ParetoFigure
 from .filter_figures import end_curves
 from .history import history_of
 from .noise import all_series
 from .overview import OverviewFigure, overview_figure
 from .series import SeriesFigure
 
-_MOST_POINTS = 6_000
-"""Swept designs of each group, feasible or not, that the page holds; the front and the named designs are all there."""
-_BEST_ROWS = 9
 _OF_PARAMETERS, _OF_OTHERS = 2, 4
 GROUPS = ("infeasible", "feasible", "front", "named", "best", "plain")
 _PUBLISHED = "RYN_4Cy"
@@ -34,7 +31,7 @@ _PUBLISHED_LABEL = "our counterpart of the paper's N_4"
 
 def payload(output: Output) -> dict[str, Any]:
     """Everything that the page's script needs, ready for JSON; no NaN but inside packed numbers."""
-    rows = _rows(output)
+    rows = content.drawn_rows(output)
     columns = _columns(output, rows)
     return {
         "study": output.study.study,
@@ -54,6 +51,7 @@ def payload(output: Output) -> dict[str, Any]:
         "clouds": _clouds(output, rows),
         "cloud_scenario": output.scenarios[0],
         "limited": _limited(output, rows),
+        "nearest": _nearest(output, rows),
         "profiles": _profiles(output),
         "history": _history(output),
         "front": _front(output, rows),
@@ -72,19 +70,7 @@ def _packed(values: Any, kind: str) -> dict[str, str]:
 def _words(values: pd.Series) -> dict[str, Any]:
     """A column of words: the words, and the number of each row's word."""
     codes, words = pd.factorize(values.astype(str))
-    return {"words": [str(word) for word in words], "codes": _packed(codes, "u2")}
-
-
-def _rows(output: Output) -> pd.DataFrame:
-    """Rows to show: all CFAs, all designs on the front, named or found, and an even share of the others."""
-    table = output.table[output.table["status"] == "ok"]
-    swept = table["kind"] == SWEPT
-    always = ~swept | (table["pareto"] & table["feasible"])
-    parts = [table[always], output.best.head(_BEST_ROWS)]
-    for feasible in (False, True):
-        others = table[~always & (table["feasible"] == feasible)]
-        parts.append(others.iloc[even(len(others), _MOST_POINTS)])
-    return pd.concat(parts).drop_duplicates("design_id").sort_values("design_id", ignore_index=True)
+    return {"words": [str(word) for word in words], "codes": _packed(codes, "u1" if len(words) <= 256 else "u2")}
 
 
 def _groups(rows: pd.DataFrame) -> np.ndarray:
@@ -168,18 +154,20 @@ def _overview(output: Output, scenario: str) -> dict[str, Any]:
 
 
 def _limited(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
-    """design_id -> the two lights that limit each CSD, in words, and those of the trade-off's CSD as (type, name)."""
-    columns = {
-        limited_by_name(c.pair): f"{c.words} limited by"
-        for c in output.columns.values()
-        if c.metric == CSD and c.pair is not None
+    """Column of a CSD -> a label, and the two lights that limit it in each row; no word where it is not known."""
+    columns = [column for column in map(output.columns.get, output.distances) if column and column.metric == CSD]
+    return {
+        column.name: {"label": f"{column.words} limited by", **_words(rows[limited_by_name(column.pair)].fillna(""))}
+        for column in columns
+        if column.pair is not None and limited_by_name(column.pair) in rows
     }
-    found = {}
-    told = rows[[name for name in columns if name in rows]]
-    for _, row in _records(rows, told.map(_is_word).any(axis=1)):
-        texts = {words: row[name] for name, words in columns.items() if _is_word(row.get(name))}
-        found[str(row["design_id"])] = {"texts": texts, "nearest": content.nearest_lights(output, row)}
-    return found
+
+
+def _nearest(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
+    """design_id -> the two lights that limit the trade-off's CSD, of the designs whose signals are drawn."""
+    drawn = rows["design_id"].isin(output.points["design_id"])
+    found = {str(row["design_id"]): content.nearest_lights(output, row) for _, row in _records(rows, drawn)}
+    return {design: lights for design, lights in found.items() if lights is not None}
 
 
 def _knee(figure: ParetoFigure, output: Output, rows: pd.DataFrame) -> int | None:
@@ -202,7 +190,9 @@ def _curves(output: Output) -> dict[str, Any]:
         "wavelength_nm": _packed(curves.wavelength_nm, "f4"),
         "sensor": {name: _packed(qe, "f4") for name, qe in curves.sensor.items()},
         "limits": {cfa: _packed(qe, "f4") for cfa, qe in curves.limits.items()},
-        "designs": {str(at): [_packed(qe, "f4") for qe in made.values()] for at, made in curves.designs.items()},
+        "designs": {
+            str(at): {channel: _packed(qe, "f4") for channel, qe in made.items()} for at, made in curves.designs.items()
+        },
         "shades": {kind: _packed(shade, "f4") for kind, shade in content.light_shades(output).items()},
         "plain": {cfa: content.channel_curves(output, cfa) for cfa in output.study.cfas},
         "ends": {cfa: end_curves(output, cfa) for cfa in dict.fromkeys(output.table["cfa"].astype(str))},

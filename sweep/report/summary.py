@@ -12,6 +12,7 @@ from .names import OF_CLEAR
 from .published import comparison_lines, comparison_with_published
 from .scorecard import score_lines, scorecard
 from .tables import geometry_table
+from .values import drawn_rows
 
 _MOST_PARAMETERS = 10
 _MOST_SCENARIOS = 8
@@ -62,8 +63,9 @@ def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
     lines.append(_plan_line(output))
     search = output.provenance.search
     if search:
-        found = f"{output.goal.amount(search.best_smooth_objective, 2)} before clipping and quantization"
-        lines.append(f"Search: {search.algorithm}, {search.starts} starts, {search.evaluations} evaluations: {found}.")
+        found = f"{output.goal.amount(search.best_smooth_objective)} before clipping and quantization"
+        how = f"{search.algorithm}, {_count(search.starts, 'start')}, {_count(search.evaluations, 'evaluation')}"
+        lines.append(f"Search: {how}: {found}.")
         lines.append(_limit_line(output, search))
     areas = output.provenance.hypervolume
     if areas:
@@ -95,7 +97,8 @@ def _plan_line(output: Output) -> str:
     tolerance = max(plan.tolerance_dn for plan in plans.values())
     line = f"Simulated: {', '.join(computed)}"
     if kept:
-        line += f"; all else changes a CSD by at most {max(kept):.2g} of {tolerance:g} DN"
+        most = f"all else changes a CSD by at most {max(kept):.2g} DN" if max(kept) else "nothing else changes a CSD"
+        line += f"; {most} (tolerance {tolerance:g} DN)"
         line += f" in {len(kept)} of {len(plans)} scenarios" if short else ""
     if not short:
         return f"{line}."
@@ -110,26 +113,34 @@ def _plan_line(output: Output) -> str:
 def counts_line(output: Output) -> str:
     """How many designs there are, and what the report leaves out."""
     counts = output.counts
-    text = f"{counts.rows:,} designs, {counts.feasible:,} feasible"
+    text = f"{_count(counts.rows, 'design')}"
+    if counts.feasible < counts.rows - counts.failed:
+        text += f", {counts.feasible:,} of them feasible (every constraint is met)"
     if counts.front:
         text += f", {counts.front:,} of these on the Pareto front of separation and sensitivity"
     if counts.failed:
         text += f", {counts.failed:,} failed"
-    if counts.left_out:
-        text += f"; the report draws the front, the best and a sample, and leaves out {counts.left_out:,}"
+    drawn = len(drawn_rows(output))
+    if drawn < counts.rows - counts.failed:
+        text += f"; the report draws {drawn:,} as points: the front, the best and an even sample"
     return f"{text}."
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number:,} {what}{'' if number == 1 else 's'}"
 
 
 def _limit_line(output: Output, search: SearchFacts) -> str:
     """The bracket of the limit: what is proven, for which filters and which response."""
     if search.no_limit is not None or search.limit_proven is None:
         return f"Limit: none computed ({search.no_limit})."
-    proven = output.goal.amount(search.limit_proven, 3)
-    gap = "nothing is left to gain" if search.gap is None else f"the search's answer is {search.gap:.1%} below"
+    proven = output.goal.told_bound(search.limit_proven)
+    gap = "nothing is left to gain" if search.gap is None else f"the search's answer is {100 * search.gap:.1f} % below"
     without = f" but {', '.join(search.limit_left_out)}" if search.limit_left_out else ""
     proof = f"no filter exceeds {proven} (proven)"
     if search.limit_attained is not None:
-        proof += f" and one attains {output.goal.amount(search.limit_attained, 3)}"
+        left = f"{max(0.0, search.limit_proven - search.limit_attained):.2g} {output.goal.unit}".rstrip()
+        proof += f" and one comes within {left} of that limit"
     if search.limit_open_parts:
         programs, parts = search.limit_programs, search.limit_open_parts
         proof += f", but the limit itself is not proven: {parts} parts are open after {programs} linear programs"

@@ -55,7 +55,7 @@ def pareto_figure(output: Output, scenario: str, cfa: str) -> ParetoFigure:
         limit=limit,
         levels=dict(zip(references["cfa"], references[separation.name], strict=True)),
         bound=least,
-        bound_text="" if least is None else f"{sensitivity.words} >= {least:g}",
+        bound_text="" if least is None else f"{sensitivity.words} at least {least:g}",
     )
 
 
@@ -112,11 +112,12 @@ def series_figures(output: Output) -> list[SeriesFigure]:
     figures, series = [], series_of(output.scenarios)
     for (base, key), scenarios in series.items():
         upper = over_series(rows, scenarios, best_place) if best_place in rows else {}
-        upper = {name: values for name, values in upper.items() if np.isfinite(values).all()}
-        lines = {n: Line(y, upper.get(n)) for n, y in over_series(rows, scenarios, separation.name).items()}
+        worst = over_series(rows, scenarios, separation.name)
+        upper = {n: y for n, y in upper.items() if np.isfinite(y).all() and not np.array_equal(y, worst[n])}
+        lines = {name: Line(y, upper.get(name)) for name, y in worst.items()}
         if lines:
             band = "over the places on the mosaic" if upper else ""
-            title = f"{output.study.study}: {base}"
+            title = f"{output.study.study}, {base}: {separation.words}"
             x = np.array(list(scenarios.values()))
             among = base if [other for _, other in series].count(key) > 1 else ""
             figures.append(SeriesFigure(title, key, separation.axis, x, lines, band, among=among))
@@ -223,6 +224,15 @@ def modifications(output: Output) -> list[Modification]:
     """The study's named designs, sweeps and boxes."""
     study = output.study
     return [*study.designs.values(), *study.sweeps.values(), *study.boxes.values()]
+
+
+def drawn_rows(output: Output) -> pd.DataFrame:
+    """Rows that figures show as points: all CFAs, named and found designs, an even share of the swept ones, and those
+    whose signals were kept.
+    """
+    table = output.table[output.table["status"] == "ok"]
+    shown = np.union1d(output.swept_points, output.points["design_id"])
+    return table[(table["kind"] != SWEPT) | table["design_id"].isin(shown)].reset_index(drop=True)
 
 
 def drawn(output: Output) -> pd.DataFrame:

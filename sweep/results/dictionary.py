@@ -36,6 +36,7 @@ from .tables import (
     front_schema,
     search_schema,
 )
+from .thinning import MOST_POINTS
 
 _KEYS = {
     (
@@ -101,10 +102,10 @@ def columns_table() -> list[str]:
 
 FILES = {
     RESULTS: "a row per design and scenario; its columns are below",
-    LIMITED_BY: "the two lights that limit each CSD, of plain CFAs, named designs, answers of the search, "
-    "and of each CFA the best swept "
-    "designs and up to 200 of its front in the first scenario; not of other swept designs: `design_id`, "
-    "`limited_by_<a>_<b>` (of a light at any place, at the worst one of the lattice that was computed)",
+    LIMITED_BY: "the two lights that limit each CSD, of plain CFAs, named designs, answers of the search, and of the "
+    "swept designs that the report draws: the best of each CFA, those that lead, the feasible front, and up to "
+    f"{MOST_POINTS:,} other feasible and as many infeasible ones, evenly: `design_id`, `limited_by_<a>_<b>` (of a "
+    "light at any place, at the worst one of the lattice that was computed)",
     VALIDATED: "where a study validates on other lights: `design_id` and `held_out_csd_<a>_<b>`, their CSDs, DN",
     ROBUSTNESS: "where the lights have a population, for each plain CFA, named design and answer of the search: "
     "`design_id`; how many times as large population and production tolerances must be for the worst CSD to fall below "

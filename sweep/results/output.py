@@ -13,6 +13,7 @@ import pandas as pd
 from ruamel.yaml import YAML
 
 from ..base.errors import Fault, OutputError
+from ..base.types import IndexArray
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective
 from ..metrics.quantity import Column
@@ -53,7 +54,7 @@ from .tables import (
     front_schema,
     read_table,
 )
-from .thinning import Counts, thinned
+from .thinning import Counts, swept_points, thinned
 
 _OPTIONAL = (
     FRONT,
@@ -81,7 +82,8 @@ class Output:
     """What a run left in its folder; of a long result table, `table` holds what a report shows.
 
     `study`: the study that was run, and `resolved` its file. `profiles`: over the whole table, per CFA; none where a
-    sweep is no grid. `searched`: the search's evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per
+    sweep is no grid. `swept_points`: ids of the swept designs that figures show as points. `searched`: the search's
+    evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per
     light that was left out of a search; `price`: the largest worst case at each nominal level; `regions`: cells of the
     maps of color regions. `traded`: color error against noise, `rendered`: areas of pictures; `places`: separations
     over the sensor; `vision`: tables of the benchmark of vision by their files' names.
@@ -93,6 +95,7 @@ class Output:
     provenance: Provenance
     table: pd.DataFrame
     counts: Counts
+    swept_points: IndexArray
     curves: KeptCurves
     points: pd.DataFrame
     front: pd.DataFrame | None
@@ -224,8 +227,10 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         check_columns(folder / ROBUSTNESS, ["design_id", "breaks_at", "breaks_thickness"])
     objective = study.objective.column
     profiles = Profiles(objective, next(iter(study.scenarios)), provenance.parameters)
-    table, counts = thinned(folder / RESULTS, [objective, *provenance.trade_off], provenance.trade_off[0], profiles.add)
-    points, limited = (read_table(folder / name).to_pandas() for name in (POINTS, LIMITED_BY))
+    points = swept_points(folder / RESULTS)
+    order = [objective, *provenance.trade_off]
+    table, counts = thinned(folder / RESULTS, order, provenance.trade_off[0], points, profiles.add)
+    signals, limited = (read_table(folder / name).to_pandas() for name in (POINTS, LIMITED_BY))
     more = {name: read_table(folder / name).to_pandas() for name in optional}
     return Output(
         folder=folder,
@@ -234,8 +239,9 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         provenance=provenance,
         table=_joined(table, limited, more.get(VALIDATED), more.get(ROBUSTNESS)),
         counts=counts,
+        swept_points=points,
         curves=_kept_curves(folder / CURVES),
-        points=points,
+        points=signals,
         front=more.get(FRONT),
         recognition=more.get(RECOGNITION),
         crossings=more.get(CROSSINGS),

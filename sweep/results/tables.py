@@ -246,12 +246,12 @@ def _repeating(schema: pa.Schema) -> list[str] | bool:
     return [field.name for field in schema if pa.types.is_dictionary(field.type)] + list(json.loads(parameters))
 
 
-def batches(path: Path) -> Iterator[pa.Table]:
-    """A Parquet file in tables of a row group each; raises OutputError when it is missing or damaged."""
+def batches(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
+    """A Parquet file, or some columns, in tables of a row group each; raises OutputError if missing or damaged."""
     try:
         # Buffered ahead, a whole file would be in memory.
         file = pq.ParquetFile(path, pre_buffer=False, page_checksum_verification=True)
-        for batch in file.iter_batches(ROW_GROUP):
+        for batch in file.iter_batches(ROW_GROUP, columns=columns):
             yield pa.Table.from_batches([batch])
     except (OSError, pa.ArrowException) as error:
         raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None

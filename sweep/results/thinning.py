@@ -6,31 +6,35 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from ..base.errors import Fault, OutputError
+from ..base.types import IndexArray
 from ..metrics.columns.exposure import EXPOSURE
-from .tables import batches, best_rows, holds, release_memory
+from .tables import SWEPT, batches, best_rows, holds, release_memory
 
 MOST_ROWS = 150_000
 """A table of up to this many rows is kept whole."""
+MOST_POINTS = 6_000
+"""Swept designs off the front, of those that are feasible and of the others each, that a report draws as points."""
 _BEST = 100
 _MS = 1e3
 _RATE = "separation_over_exposure"
+_NOT_SWEPT, _INFEASIBLE, _FEASIBLE, _ON_FRONT = range(4)
 
 
 @dataclass(frozen=True)
 class Counts:
-    """Rows of the whole table: all, feasible, feasible and on the Pareto front, failed; and how many were left out."""
+    """Rows of the whole table: all, feasible, feasible and on the Pareto front, failed."""
 
     rows: int
     feasible: int
     front: int
     failed: int
-    left_out: int
 
 
 def per_exposure(separation: str) -> str:
@@ -38,15 +42,45 @@ def per_exposure(separation: str) -> str:
     return f"{separation}_per_ms"
 
 
+def even(size: int, most: int) -> IndexArray:
+    """At most `most` of `size` indices, in order, spread evenly and not in step with a grid."""
+    if size <= most:
+        return np.arange(size)
+    golden = (np.arange(most) * ((5**0.5 - 1) / 2)) % 1
+    return np.unique((golden * size).astype(np.intp))
+
+
+def swept_points(path: Path) -> IndexArray:
+    """Ids of the swept designs of a result table that a report draws as points, in order.
+
+    They are the feasible front of each CFA and scenario, and an even share of the others, feasible or not. A design's
+    id is the number of its row, so that a byte for each row is all that is held of a long table.
+    """
+    groups = [np.zeros(0, dtype=np.uint8)]
+    for table in batches(path, ["kind", "feasible", "pareto", "status"]):
+        swept = holds(table, "kind", SWEPT) & holds(table, "status", "ok")
+        feasible, pareto = table["feasible"].to_numpy(), table["pareto"].to_numpy()
+        found = np.select([~swept, feasible & pareto, feasible], [_NOT_SWEPT, _ON_FRONT, _FEASIBLE], _INFEASIBLE)
+        groups.append(found.astype(np.uint8))
+    every = np.concatenate(groups)
+    others = (np.flatnonzero(every == group) for group in (_FEASIBLE, _INFEASIBLE))
+    shares = [some[even(some.size, MOST_POINTS)] for some in others]
+    return np.sort(np.concatenate([np.flatnonzero(every == _ON_FRONT), *shares]))
+
+
 def thinned(
-    path: Path, order: Sequence[str], separation: str, see: Callable[[pa.Table], None] = lambda _: None
+    path: Path,
+    order: Sequence[str],
+    separation: str,
+    keep: IndexArray,
+    see: Callable[[pa.Table], None] = lambda _: None,
 ) -> tuple[pd.DataFrame, Counts]:
     """The table to show and the counts of the whole one; no more than a row group and what is kept are in memory.
 
-    Kept are all rows that are no sweep, the whole Pareto front, the best feasible designs by `order` (columns, all
-    maximized), the best of each CFA in each scenario, the designs of each scenario that have most of `separation`, and
-    most of it for their exposure, whatever the constraints, and of the others every n-th. `see` is handed every row
-    group of the whole table.
+    Kept are all rows that are no sweep, the whole Pareto front, those with the ids `keep`, the best feasible designs by
+    `order` (columns, all maximized), the best of each CFA in each scenario, the designs of each scenario that have most
+    of `separation`, and most of it for their exposure, whatever the constraints, and of the others every n-th. `see` is
+    handed every row group of the whole table.
     """
     try:
         total = int(pq.read_metadata(path).num_rows)
@@ -62,8 +96,9 @@ def thinned(
         feasible += int(ok.sum())
         front += int((ok & on_front).sum())
         failed += int((~holds(table, "status", "ok")).sum())
-        always = ~holds(table, "kind", "sweep") | on_front
-        kept.append(table.filter(pa.array(always | (table["design_id"].to_numpy() % every == 0))))
+        always = ~holds(table, "kind", SWEPT) | on_front
+        ids = table["design_id"].to_numpy()
+        kept.append(table.filter(pa.array(always | (ids % every == 0) | np.isin(ids, keep))))
         if every > 1:
             few = table.filter(pa.array(ok & ~always))
             best = best_rows(few if best is None else pa.concat_tables([best, few]), order, _BEST)
@@ -74,7 +109,7 @@ def thinned(
     frame: pd.DataFrame = pa.concat_tables(kept).unify_dictionaries().to_pandas()
     frame = frame.drop_duplicates("design_id").sort_values("design_id", ignore_index=True)
     frame[per_exposure(separation)] = frame[separation] / (frame[EXPOSURE] * _MS)
-    return frame, Counts(total, feasible, front, failed, total - len(frame))
+    return frame, Counts(total, feasible, front, failed)
 
 
 def leading(table: pa.Table, separation: str) -> pa.Table:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import chain
 from typing import Any
 
@@ -34,6 +34,7 @@ from ..results.tables import (
     sliced,
     write_tables,
 )
+from ..results.thinning import swept_points
 from ..search.limit import Limit
 from ..study import Study
 from .answers import Kept
@@ -187,7 +188,8 @@ class Making:
         rows, on_front = self.gathered.frame(), self.gathered.front_frame()
         looking, known = Looking.of(self.study, names), self.sweep.looks
         looks = looks_of(self.study, looking, rows, on_front, known, self.crew, self.progress)
-        shown = Shown(self.study, rows, on_front, looks, self._limit, self.crew, self._kept, self.progress)
+        points = partial(swept_points, self.inventory.path(RESULTS))
+        shown = Shown(self.study, rows, on_front, looks, points, self._limit, self.crew, self._kept, self.progress)
         for name, table in ROW_TABLES.items():
             if name in names:
                 self.inventory.write_table(name, table.made(shown))
@@ -226,7 +228,7 @@ class Making:
         if answer is not None:
             found["search"] = search_facts(study, answer)
             if study.plans[answer.search.scenario].methods.saturation == "clip":
-                warnings.append("saturation is computed; the search sees the response before it, its row after")
+                warnings.append("pixels may saturate: the search sees them before clipping, its row after")
             if answer.front:
                 found["hypervolume"] = _hypervolumes(answer, gathered.swept)
                 found["hypervolume_least_sensitivity"] = answer.search.levels[0]

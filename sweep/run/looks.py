@@ -40,7 +40,7 @@ class Look:
     place, ndarray[n_signals, n_channels]; `recognized`: see `recognize`.
     """
 
-    limited_by: Mapping[Pair, tuple[str, str]] | None = None
+    limited_by: Mapping[Pair, str | None] | None = None
     dn: FloatArray | None = None
     recognized: Mapping[str, float] | None = None
 
@@ -82,8 +82,9 @@ class Looking:
         imager = imager_of(view)
         limited_by = dn = recognized = None
         if wanted & {LIMITED_BY, POINTS}:
-            cases = imager.read(curves)[0][0]
-            limited_by, dn = limiting_lights(view, cases), cases[0].copy()
+            response = imager.read(curves)[0]
+            limited_by = {pair: lights[0] for pair, lights in limiting_lights(view, response).items()}
+            dn = response[0, 0].copy()
         if RECOGNITION in wanted:
             rng = np.random.default_rng((self.seed, design_id))
             recognized = recognize(imager, curves, self.states, self.patches, rng)

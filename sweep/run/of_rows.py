@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import pandas as pd
 import pyarrow as pa
 
-from ..base.types import Parallel, Progress
+from ..base.types import IndexArray, Parallel, Progress
 from ..results.tables import (
     CROSSINGS,
     CURVES,
@@ -38,13 +38,15 @@ from .recognition import recognition_table
 class Shown:
     """Rows that a report can show, and those `on_front` of them; `limit`: of a search.
 
-    `looks`: at them, by their ids; `kept`: calls whose results a journal keeps under a name.
+    `looks`: at them, by their ids; `points`: ids of the swept designs that figures show as points, ndarray[n_points];
+    `kept`: calls whose results a journal keeps under a name.
     """
 
     study: Study
     rows: pd.DataFrame
     on_front: pd.DataFrame
     looks: Mapping[int, Look]
+    points: Callable[[], IndexArray]
     limit: Callable[[], Limit | None]
     parallel: Parallel
     kept: Callable[[str], Parallel]
@@ -101,7 +103,7 @@ def _has_colors(study: Study) -> bool:
 ROW_TABLES = {
     CURVES: RowTable(_always, _curves),
     POINTS: RowTable(_always, lambda s: points_table(s.study, s.rows, s.on_front, s.looks)),
-    LIMITED_BY: RowTable(_always, lambda s: limited_by_table(s.study, s.looks)),
+    LIMITED_BY: RowTable(_always, lambda s: limited_by_table(s.study, s.looks, s.points(), s.parallel, s.progress)),
     VALIDATED: RowTable(
         lambda study: study.held_out is not None,
         lambda s: held_out_table(s.study, s.rows, s.on_front, s.parallel, s.progress),

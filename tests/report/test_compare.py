@@ -193,7 +193,7 @@ def test_files_of_others_stay(runs: dict[str, Path], tmp_path: Path, name: str) 
 def test_no_feasible_design_and_other_constraints_are_said(runs: dict[str, Path], tmp_path: Path) -> None:
     said, _ = compared([runs["infeasible"], runs["chart"]], tmp_path)
     assert "A infeasible has no feasible design." in said
-    assert "different constraints (A infeasible: sensitivity >= 1.9; B chart: sensitivity >= 0.9)" in said
+    assert "different constraints (A infeasible: sensitivity at least 1.9; B chart: sensitivity at least 0.9)" in said
     assert pd.read_csv(tmp_path / "compare.csv")["value"].isna().tolist() == [True, False]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +54,28 @@ def first_screen(browser: Any, folder: Path, width: int) -> Any:
     return page
 
 
+def apart(page: Any, selector: str) -> bool:
+    """Whether no two of some elements overlap."""
+    boxes = page.evaluate(
+        "(all) => [...document.querySelectorAll(all)].map((e) => e.getBoundingClientRect())"
+        ".map((b) => [b.left, b.top, b.right, b.bottom])",
+        selector,
+    )
+    assert boxes
+    pairs = combinations(boxes, 2)
+    return not any(a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3] for a, b in pairs)
+
+
+def speaks_plainly(page: Any) -> None:
+    """Answer and numbers have no name of a column, no sign for a bound, and each number a comparison."""
+    said = page.inner_text(".answer") + page.inner_text(".numbers")
+    assert not re.search("[<>]=|_per_nm|csd_", said)
+    compared = page.locator(".numbers > div small").all_inner_texts()
+    assert len(compared) == 3
+    assert all(any(letter.isdigit() for letter in text) for text in compared)
+    assert "the distance of the two nearest lights" in page.inner_text(".terms")
+
+
 def fits(page: Any, width: int) -> None:
     """Answer, three numbers and the first plot lie on the screen, and nothing is wider than it."""
     first = page.locator(".screen .plot").first.get_attribute("id")
@@ -76,6 +100,8 @@ def test_the_answer_three_numbers_and_the_plot_are_on_one_screen(
 ) -> None:
     page = first_screen(browser, finished(name), width)
     fits(page, width)
+    speaks_plainly(page)
+    assert apart(page, "#cfas .annotation")
     page.close()
 
 
@@ -83,6 +109,8 @@ def test_the_answer_three_numbers_and_the_plot_are_on_one_screen(
 def test_a_study_of_plain_cfas_has_the_same_screen(plain_cfas: Path, browser: Any, width: int) -> None:
     page = first_screen(browser, plain_cfas, width)
     fits(page, width)
+    speaks_plainly(page)
+    assert apart(page, "#cfas .annotation")
     assert page.locator("#pareto").count() == 0  # nothing trades off
     page.close()
 
@@ -178,6 +206,30 @@ def test_no_figure_is_shown_twice(finished: Finished, standing: Any) -> None:
 def test_nothing_is_drawn_as_a_trade_off_where_nothing_trades_off(finished: Finished, opened: Any, name: str) -> None:
     assert opened(finished(name)).page.locator("#pareto").count() == 0
     assert not (finished(name) / "pareto.png").exists()
+
+
+@pytest.mark.parametrize(
+    "name", ["stopband", *(pytest.param(name, marks=pytest.mark.slow) for name in ("distance", "noise", "dual"))]
+)
+def test_on_paper_the_first_figure_stands_below_the_answer_and_no_legend_is_cut(
+    finished: Finished, browser: Any, name: str
+) -> None:
+    page = first_screen(browser, finished(name), 1032)  # A4 landscape less its margins, 96 pixels to the inch
+    page.emulate_media(media="print")
+    page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    page.wait_for_function("[...document.querySelectorAll('.plot')].every((e) => e.hidden || e.data)")
+    page.wait_for_timeout(500)
+    plot = box(page, ".screen .plot")
+    assert plot["y"] + plot["height"] <= 703
+    assert plot["x"] + plot["width"] <= 1032
+    assert apart(page, "#curves .legend, #curves .xtitle")
+    scrolled = (
+        "[...document.querySelectorAll('.legend .scrollbar')].filter((e) => e.getBoundingClientRect().height > 0)"
+    )
+    assert page.evaluate(f"{scrolled}.length") == 0
+    page.evaluate("window.dispatchEvent(new Event('afterprint'))")
+    assert page.evaluate("document.querySelector('.screen .plot').layout.height") > plot["height"]
+    page.close()
 
 
 @pytest.mark.slow

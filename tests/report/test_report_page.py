@@ -91,6 +91,34 @@ def test_pointing_and_clicking_tell_of_a_design(finished: Finished, opened: Any,
     assert chosen.name == pointed_at.name or (chosen["kind"] != "sweep" and near)
 
 
+def test_the_page_holds_the_limiting_lights_of_every_design(finished: Finished, standing: Any) -> None:
+    folder = finished("stopband")
+    limited = pd.read_parquet(folder / "limited_by.parquet").set_index("design_id")
+    seen = standing(folder)
+    rows = ids(seen)
+    assert len(rows) > 12_000
+    for pair in ("green_yellow", "green_red", "yellow_red"):
+        told = seen.page.evaluate(f"JSON.parse(document.getElementById('data').textContent).limited.csd_{pair}")
+        codes = np.frombuffer(base64.b64decode(told["codes"]["bdata"]), f"<{told['codes']['dtype']}")
+        assert [told["words"][code] for code in codes] == list(limited.loc[rows, f"limited_by_{pair}"])
+
+
+@pytest.mark.parametrize("trace", ["not feasible", "feasible", "Pareto front", "best of the search"])
+def test_pointing_at_any_design_tells_its_limiting_lights(finished: Finished, opened: Any, trace: str) -> None:
+    folder = finished("stopband")
+    limited = pd.read_parquet(folder / "limited_by.parquet").set_index("design_id")
+    seen = opened(folder)
+    seen.page.mouse.move(*seen.point_at(trace)[:2])
+    seen.page.wait_for_selector("#hover", state="visible")
+    title, *pointed = seen.page.inner_text("#hover").splitlines()
+    names = pd.read_parquet(folder / "results.parquet").set_index("design_id")["name"]
+    (design,) = names.index[names == title] if not title.startswith("design ") else [int(title.split()[1])]
+    for pair in ("green_yellow", "green_red", "yellow_red"):
+        at = [line.startswith(f"{pair.replace('_', '/')} CSD: ") for line in pointed].index(True)
+        lights = limited.loc[design, f"limited_by_{pair}"]
+        assert pointed[at + 1] == f"{pair.replace('_', '/')} CSD limited by: {lights}"
+
+
 def test_the_box_leaves_out_what_is_not_feasible(finished: Finished, standing: Any) -> None:
     seen = standing(finished("stopband"))
     before = seen.number_of_points()
@@ -114,7 +142,7 @@ def test_the_best_design_is_that_of_the_table(finished: Finished, standing: Any)
     for name, text in said.items():
         if name.endswith("limited by"):
             continue
-        column = {"CFA sensitivity": "cfa_sensitivity"}.get(name, name)
+        column = {"CFA sensitivity": "cfa_sensitivity", "slope": "slope_per_nm"}.get(name, name)
         if column.endswith(" CSD"):
             column = "csd_" + column.removesuffix(" CSD").replace("/", "_")
         assert agrees(text, float(best[column])), name

@@ -117,7 +117,7 @@ def test_designs_beside_a_bad_one_are_those_of_a_whole_block(
         way = EdgeBlock.product
 
         def broken(self: EdgeBlock, *arguments: Any) -> Any:
-            if (self.space.points(self.start, self.stop)[:, 0] == 600).any():
+            if (self.space.points_of(self.numbers)[:, 0] == 600).any():
                 raise ValueError("no such edge")
             return way(self, *arguments)
 

@@ -27,8 +27,8 @@ class ColorSeparation(ReadoutMetric):
             Quantity(
                 name=csd_name(pair),
                 metric=CSD,
-                meaning="color separation distance (CSD) of two signal types: the smallest distance between a point of "
-                "one and a point of the other, over the CFA's distinct channels",
+                meaning="color separation distance (CSD) of two signal types: the distance of the two nearest lights, "
+                "one of each type, over the CFA's distinct channels",
                 unit=DN,
                 label=f"{pair[0]}/{pair[1]} CSD",
                 digits=1,

@@ -17,6 +17,7 @@ from ...study import folder_name
 from .. import Output, read_output
 from ..answer import who_else
 from ..pages import inlined, page, rows
+from ..terms import constraint_told
 from .best import best_of_runs, parameters_of, plain_differences, quantities_in, ranking, side_by_side
 from .differences import curve_notes, origin_differences, scene_notes, study_differences
 from .drawing import FrontLine, FrontsFigure, Mark, pictures
@@ -182,7 +183,10 @@ def _same_folders(runs: Mapping[str, Output]) -> list[str]:
 
 
 def _constraint_note(runs: Mapping[str, Output]) -> list[str]:
-    each = {run: ", ".join(f"{n} {b}" for n, b in sorted(o.constraints.items())) or "none" for run, o in runs.items()}
+    each = {
+        run: " and ".join(constraint_told(output, *asked) for asked in sorted(output.constraints.items())) or "none"
+        for run, output in runs.items()
+    }
     if len(set(each.values())) < 2:
         return []
     return [f"The best designs meet different constraints ({'; '.join(f'{r}: {c}' for r, c in each.items())})."]

@@ -29,6 +29,8 @@ const group = unpack(data.group), ids = unpack(data.design_id);
 const scenario = unpack(data.scenario.codes), cfa = unpack(data.cfa.codes);
 const wavelength = Array.from(unpack(data.curves.wavelength_nm));
 const G = Object.fromEntries(data.groups.map((name, i) => [name, i]));
+const limited = {};
+for (const [name, lights] of Object.entries(data.limited)) limited[name] = unpack(lights.codes);
 const x = columns[data.axes.x], y = columns[data.axes.y], light = columns.cfa_sensitivity;
 let overview = data.overviews[0], view = data.views[0] || null;
 
@@ -49,16 +51,16 @@ function described(row) {
   const lines = [title(row)];
   for (const name of Object.keys(data.columns)) {
     const value = columns[name][row];
-    if (Number.isFinite(value) && !(name === "violation" && value <= 0))
-      lines.push(`${data.columns[name].label}: ${shown(name, value)}`);
+    if (!Number.isFinite(value) || (name === "violation" && value <= 0)) continue;
+    lines.push(`${data.columns[name].label}: ${shown(name, value)}`);
+    if (lightsOf(name, row)) lines.push(`${data.limited[name].label}: ${lightsOf(name, row)}`);
   }
-  return [...lines, ...limitsOf(row)].slice(0, 30);
+  return lines.slice(0, 30);
 }
 
-/* The two lights that limit each CSD of a design, where the run kept them. */
-function limitsOf(row) {
-  const own = data.limited[ids[row]];
-  return own ? Object.entries(own.texts).map(([name, lights]) => `${name} ${lights}`) : [];
+/* The two lights that limit a CSD of a design; none of another quantity. */
+function lightsOf(name, row) {
+  return name in limited ? data.limited[name].words[limited[name][row]] : "";
 }
 
 /* The design that is meant: one of the front, or with a name, within a few pixels, else the nearest. */
@@ -103,6 +105,28 @@ function levelTraces(drawn) {
   return found;
 }
 
+/* Names of designs, each where it lies on no marker and no other name, as far as there is room; `at`: pixels. */
+function beside(labeled, others, at, width) {
+  const boxOf = (row, r) => { const [u, v] = at(row); return [u - r, v - r, u + r, v + r]; };
+  const markers = [...labeled.map((row) => boxOf(row, 8)), ...others.map((row) => boxOf(row, 3))], placed = [];
+  const meets = (a, b) => a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
+  return labeled.sort((a, b) => y[b] - y[a]).map((row) => {
+    const name = data.names[row] ? data.names[row].short : cfaOf(row), [u, v] = at(row);
+    const text = `${name} ${y[row] < 10 ? y[row].toFixed(1) : y[row].toFixed(0)}`, long = 6.6 * text.length;
+    const places = [9, -9, 22, -22, 35, 48].flatMap((up) => [["left", 10, up], ["right", -10, up], ["center", 0, 1.8 * up]]);
+    const rated = places.map(([anchor, right, up]) => {
+      const start = u + right - {left: 0, center: long / 2, right: long}[anchor];
+      const box = [start, v + up - 8, start + long, v + up + 8];
+      const over = markers.filter((marker) => meets(box, marker)).length + 20 * placed.filter((other) => meets(box, other)).length;
+      return {anchor, right, up, box, over: over + (box[0] < 0 || box[2] > width || box[1] < 0 ? 50 : 0)};
+    });
+    const best = rated.reduce((least, place) => place.over < least.over ? place : least);
+    placed.push(best.box);
+    return {x: light[row], y: y[row], text: plain(text), showarrow: false, xanchor: best.anchor, xshift: best.right, yshift: best.up,
+      font: {size: 12}, bgcolor: "rgba(255,255,255,0.75)", borderpad: 0};
+  });
+}
+
 function drawOverview() {
   const color = data.colors.groups, found = [], labeled = [];
   const add = (name, text, marker, write) => {
@@ -119,13 +143,8 @@ function drawOverview() {
   let top = 1, right = 1;
   for (const i of labeled) { top = Math.max(top, y[i]); right = Math.max(right, light[i]); }
   for (const line of [overview.traced, overview.limit]) if (line) top = Math.max(top, ...line[1]);
-  const placed = [], notes = labeled.sort((a, b) => y[a] - y[b]).map((row) => {
-    const near = placed.filter((i) => Math.abs(light[i] - light[row]) < (narrow() ? 0.3 : 0.11) && Math.abs(y[i] - y[row]) < 0.06 * top).length;
-    placed.push(row);
-    const name = data.names[row] ? data.names[row].short : cfaOf(row);
-    return {x: light[row], y: y[row], text: `${plain(name)} ${y[row] < 10 ? y[row].toFixed(1) : y[row].toFixed(0)}`, showarrow: false,
-      xanchor: light[row] > 0.85 * right ? "right" : "left", xshift: light[row] > 0.85 * right ? -8 : 8, yshift: 9 + 13 * near, font: {size: 12}, bgcolor: "rgba(255,255,255,0.75)", borderpad: 0};
-  });
+  const width = byId("cfas").clientWidth - (narrow() ? 80 : 270), height = narrow() ? 300 : 350;
+  const notes = beside(labeled, rowsOf("front", true), (row) => [light[row] / (1.03 * right) * width, y[row] / (1.1 * top) * height], width);
   Plotly.react("cfas", found, {
     xaxis: Object.assign({title: {text: plain(overview.x_label).replace(": ", narrow() ? ":<br>" : ": ")}, range: [0, 1.03 * right]}, grid),
     yaxis: Object.assign({title: {text: plain(overview.y_label)}, range: [0, 1.1 * top]}, grid),
@@ -182,9 +201,11 @@ function levels() {
   }
   for (const row of rowsOf("named"))
     merged.push({x: x[row], y: y[row], text: plain(data.names[row].short), showarrow: false, yshift: 13, font: {size: 11}});
-  if (view.bound !== null)
+  if (view.bound !== null) {
+    merged.push({x: view.bound, yref: "paper", y: 1, yanchor: "bottom", text: plain(view.bound_text), showarrow: false, font: {size: 11, color: "#555"}});
     shapes.push({type: "line", yref: "paper", y0: 0, y1: 1, x0: view.bound, x1: view.bound,
       line: {color: "#000000", width: 1, dash: "dash"}});
+  }
   return {shapes, annotations: merged};
 }
 
@@ -197,7 +218,7 @@ function drawPareto() {
   const layout = Object.assign({
     xaxis: Object.assign({title: {text: plain(view.x_label).replace(" (", narrow() ? "<br>(" : " (")}}, grid),
     yaxis: Object.assign({title: {text: plain(view.y_label)}}, grid),
-    height: narrow() ? 520 : 560, margin: {l: 60, r: 10, t: 30, b: 60}, legend: legend(), hovermode: "closest",
+    height: narrow() ? 520 : 570, margin: {l: 60, r: 10, t: 50, b: 60}, legend: legend(), hovermode: "closest",
     plot_bgcolor: "#fff",
     title: {text: plain(view.title), font: {size: narrow() ? 12 : 15}},
   }, levels());
@@ -207,25 +228,25 @@ function drawPareto() {
 }
 
 function drawCurves(row) {
-  const own = data.curves.designs[ids[row]] || [], found = [];
+  const own = Object.entries(data.curves.designs[ids[row]] || {}), found = [];
   const line = (name, packed, color, dash, width) => found.push({
     type: "scatter", mode: "lines", name: plain(name), x: wavelength, y: Array.from(unpack(packed)),
     line: {color, dash, width},
   });
   const whole = group[row] === G.plain, names = (whole ? data.curves.plain : data.curves.ends)[cfaOf(row)] || [];
   let top = 0.1;
-  for (const packed of [...names.map((name) => data.curves.sensor[name]), ...own]) top = Math.max(top, ...unpack(packed));
+  for (const packed of [...names.map((name) => data.curves.sensor[name]), ...own.map(([, packed]) => packed)]) top = Math.max(top, ...unpack(packed));
   for (const [type, packed] of Object.entries(data.curves.shades)) found.push({
     type: "scatter", mode: "lines", name: `${plain(type)} lights`, x: wavelength, y: Array.from(unpack(packed), (v) => v * top), fill: "tozeroy",
     line: {width: 0}, fillcolor: `${data.colors.types[type] || "#777777"}22`, hoverinfo: "skip"});
   for (const name of names)
     line(name, data.curves.sensor[name], data.colors.curves[name] || "#777777", whole ? "solid" : "dot", whole ? 2.5 : 1.5);
   if (!whole && data.curves.limits[cfaOf(row)]) line("limit of any filter, unquantized", data.curves.limits[cfaOf(row)], "#000000", "dash", 1.2);
-  own.forEach((packed, i) => line(own.length > 1 ? `${title(row)}, ${"ab"[i]}` : title(row), packed, cycle[i], "solid", 2.5));
+  own.forEach(([channel, packed], i) => line(own.length > 1 ? `${title(row)}, ${channel}` : title(row), packed, cycle[i], "solid", 2.5));
   Plotly.react("curves", found, {
-    title: {text: `QE of ${plain(title(row))}`, font: {size: 14}}, height: 340, margin: {l: 50, r: 10, t: 36, b: 45},
+    title: {text: `QE of ${plain(title(row))}`, font: {size: 14}}, height: 380, margin: {l: 50, r: 10, t: 36, b: 85},
     xaxis: Object.assign({title: {text: "wavelength / nm"}}, grid),
-    yaxis: Object.assign({title: {text: "QE"}, rangemode: "tozero"}, grid), legend: {orientation: "h", y: -0.25},
+    yaxis: Object.assign({title: {text: "QE"}, rangemode: "tozero"}, grid), legend: {orientation: "h", yref: "container", y: 0, yanchor: "bottom"},
   }, config);
 }
 
@@ -254,7 +275,7 @@ function drawClouds(row) {
           color: data.colors.types[type] || cycle[k % 7]},
       });
     });
-    const near = (data.limited[ids[row]] || {}).nearest;
+    const near = data.nearest[ids[row]];
     if (near) {
       const ends = near.slice(0, 2).map(([type, name]) => types.findIndex((t, i) => t === type && data.clouds.names[i] === name));
       found.push({type: "scatter", mode: "lines", name: `nearest lights, ${near[2]} apart`, showlegend: pair === 0, legendgroup: "nearest",
@@ -278,10 +299,11 @@ function choose(row) {
     pair.append(term, text);
     list.append(pair);
   }
-  for (const text of limitsOf(row)) {
+  for (const [name, {label}] of Object.entries(data.limited)) {
+    if (!lightsOf(name, row)) continue;
     const part = document.createElement("div"), term = document.createElement("dt"), lights = document.createElement("dd");
-    term.textContent = text.slice(0, text.indexOf(" limited by ") + 11);
-    lights.textContent = text.slice(text.indexOf(" limited by ") + 12);
+    term.textContent = label;
+    lights.textContent = lightsOf(name, row);
     part.className = "limits";
     part.append(term, lights);
     list.append(part);
@@ -379,7 +401,7 @@ function drawSeries(series, box) {
     line: {color: "#666666", width: 1, dash: "dash"}}];
   Plotly.react(box, found, {
     title: {text: plain(series.title), font: {size: 14}}, height: narrow() ? 460 : 420, shapes, hovermode: "x unified",
-    margin: {l: 60, r: 10, t: 36, b: 50}, legend: narrow() ? {orientation: "h", y: -0.25} : {},
+    margin: {l: 60, r: 10, t: 36, b: 50}, legend: narrow() ? {orientation: "h", y: -0.25} : {tracegroupgap: 2},
     xaxis: Object.assign({title: {text: plain(series.x_label)}, type: series.log_x ? "log" : "linear"}, grid),
     yaxis: Object.assign({title: {text: plain(series.y_label)}, type: series.log_y ? "log" : "linear", exponentformat: "power",
       rangemode: series.from_zero && !series.log_y ? "tozero" : "normal"}, grid),
@@ -487,16 +509,26 @@ drawAll();
 listen("cfas");
 later("history", drawHistory);
 data.series.forEach((series, i) => later(`series-${i}`, () => drawSeries(series, byId(`series-${i}`))));
-/* A page that is printed has every figure, as wide as the paper. */
+/* A page that is printed has every figure, as wide as the paper; the first one beside the answer, two series to a page. */
+const heights = new Map();
+function printed(box) {
+  const wide = {width: 960}, small = {"xaxis.title.font.size": 11, "yaxis.title.font.size": 11};
+  if (box.parentElement.classList.contains("screen")) return {...wide, ...small, height: 330};
+  if (box.id.startsWith("series-")) return {...wide, ...small, height: 270};
+  return box.id === "curves" ? {...wide, height: 340} : wide;
+}
 function print() {
   for (const [box, draw] of drawers) {
     near.unobserve(box);
     draw();
   }
-  document.querySelectorAll(".js-plotly-plot").forEach((box) => Plotly.relayout(box, {width: 960}));
+  document.querySelectorAll(".js-plotly-plot").forEach((box) => {
+    heights.set(box, box.layout.height);
+    Plotly.relayout(box, printed(box));
+  });
 }
 window.addEventListener("beforeprint", print);
 window.addEventListener("afterprint", () => document.querySelectorAll(".js-plotly-plot").forEach((box) =>
-  Plotly.relayout(box, {width: null, autosize: true})));
+  Plotly.relayout(box, {width: null, height: heights.get(box), autosize: true, "xaxis.title.font.size": null, "yaxis.title.font.size": null})));
 document.body.dataset.readyMs = Math.round(performance.now());
 })();

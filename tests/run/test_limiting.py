@@ -1,0 +1,167 @@
+"""The two lights that limit each CSD: of every swept design that a report draws, and of no other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sweep.camera.imager import imager_of
+from sweep.designs.block import EdgeBlock
+from sweep.metrics.nearest import nearest_pairs
+from sweep.results import thinning
+from sweep.results.designs import row_curves
+from sweep.results.tables import LIMITED_BY
+from sweep.results.thinning import even, swept_points
+from sweep.run.files import files_of
+from sweep.study import Study, load_study
+
+from ..build import ran
+
+STUDY = """
+study: limits
+sensor: ar0820
+lights: tl16
+pixel: {read_noise_e: 2}
+scenarios:
+  chart: {exposure: {kind: white_patch}}
+  road: {target: {distance_m: 150, fov_deg: 60, phase_px: any}, optics: {f_number: 2}, noise: true}
+cfas: [RGGB, RYNCy]
+sweeps:
+  edges:
+    {cfa: RYNCy, channel: N, base: Y, to: G,
+     grid: {left_nm: [590, 610, 630], left_width_nm: [5, 20], right_nm: [640, 650, 690], right_width_nm: 10}}
+  drawn: {cfa: RYNCy, channel: N, base: Y, to: G, sobol: 9, box: {left_nm: {min: 580, max: 630}, right_nm: {min: 635, max: 690}}}
+constraints:
+  sensitivity: {min: 0.9}
+"""
+N_SWEPT = 2 * (18 + 9)
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Study:
+    path = tmp_path / "limits.yaml"
+    path.write_text(STUDY)
+    return load_study(path)
+
+
+def rows_with_lights(folder: Path) -> pd.DataFrame:
+    table = pd.read_parquet(folder / "results.parquet")
+    return table.merge(pd.read_parquet(folder / LIMITED_BY), on="design_id", how="left")
+
+
+def distances(study: Study, row: dict[str, Any]) -> Iterator[tuple[str, dict[str, float]]]:
+    """Of each pair of types every pair of lights with its smallest distance over the cases, from the curves alone."""
+    space, curves = row_curves(study, row)
+    view = study.view(space, row["scenario"])
+    cases = imager_of(view).read(curves)[0][0]
+    lights = list(zip(view.lights.names, view.lights.types, np.moveaxis(cases, 1, 0), strict=True))
+    for one, other in study.pairs:
+        found = {
+            f"{a} / {b}": float(np.linalg.norm(u - v, axis=-1).min())
+            for (a, kind, u), (b, different, v) in product(lights, lights)
+            if (kind, different) == (one, other)
+        }
+        yield f"{one}_{other}", found
+
+
+def test_every_swept_design_is_limited_by_its_nearest_lights(study: Study, tmp_path: Path) -> None:
+    ran(study, tmp_path / "out", 1)
+    rows = rows_with_lights(tmp_path / "out")
+    swept = rows[rows["kind"] == "sweep"]
+    assert len(swept) == N_SWEPT
+    assert {*swept["feasible"]} == {True, False}
+    for row in swept.to_dict("records"):
+        for pair, apart in distances(study, row):
+            assert apart[row[f"limited_by_{pair}"]] == pytest.approx(min(apart.values()), rel=1e-12)
+            if row["scenario"] == "chart":  # no places between those of a lattice
+                assert apart[row[f"limited_by_{pair}"]] == pytest.approx(row[f"csd_{pair}"], rel=1e-12)
+
+
+def test_workers_and_routes_change_no_light(study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ran(study, tmp_path / "out", 1)
+    expected = pd.read_parquet(tmp_path / "out" / LIMITED_BY)
+    assert (expected["design_id"].diff().dropna() > 0).all()
+    ran(study, tmp_path / "two", 2)
+    pd.testing.assert_frame_equal(pd.read_parquet(tmp_path / "two" / LIMITED_BY), expected)
+
+    def broken(*_: object) -> None:
+        raise ValueError("no edges today")
+
+    (tmp_path / "out" / LIMITED_BY).unlink()
+    with monkeypatch.context() as patch:
+        patch.setattr(EdgeBlock, "product", broken)
+        ran(study, tmp_path / "out", 1)
+    pd.testing.assert_frame_equal(pd.read_parquet(tmp_path / "out" / LIMITED_BY), expected)
+
+
+def test_a_design_that_cannot_be_read_has_no_lights_and_takes_none_from_others(
+    study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ran(study, tmp_path / "out", 1)
+    expected = pd.read_parquet(tmp_path / "out" / LIMITED_BY).set_index("design_id")
+    rows = pd.read_parquet(tmp_path / "out" / "results.parquet").set_index("design_id")
+    shown = set(pd.read_parquet(tmp_path / "out" / "points.parquet")["design_id"])
+    bad = next(own.index for _, own in rows.groupby("left_nm") if len(own) == 2 and not shown & set(own.index))
+    drawn = study.spaces[-1].filter
+    assert drawn is not None
+    kind, lost = type(drawn.family), rows.loc[bad[0], "left_nm"]
+    way = kind.curves
+
+    def fragile(self: Any, x: np.ndarray) -> Any:
+        if (x[:, 0] == lost).any():
+            raise ValueError("no such filter")
+        return way(self, x)
+
+    (tmp_path / "out" / LIMITED_BY).unlink()
+    with monkeypatch.context() as patch:
+        patch.setattr(kind, "curves", fragile)
+        ran(study, tmp_path / "out", 1)
+    found = pd.read_parquet(tmp_path / "out" / LIMITED_BY).set_index("design_id")
+    assert found.loc[bad].isna().all(axis=None)
+    pd.testing.assert_frame_equal(found.drop(bad), expected.drop(bad))
+    assert list(found.index) == list(expected.index)
+
+
+def test_of_many_designs_those_alone_that_are_drawn_have_lights(
+    study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(thinning, "MOST_POINTS", 5)
+    ran(study, tmp_path / "out", 1)
+    rows = rows_with_lights(tmp_path / "out")
+    swept = rows[rows["kind"] == "sweep"]
+    points = swept_points(tmp_path / "out" / "results.parquet")
+    front = swept[swept["feasible"] & swept["pareto"]]
+    rest = swept.drop(front.index)
+    expected = [own["design_id"].iloc[even(len(own), 5)] for own in (rest[rest["feasible"]], rest[~rest["feasible"]])]
+    assert list(points) == sorted(pd.concat([front["design_id"], *expected]))
+    known = swept[swept["limited_by_yellow_red"].notna()]["design_id"]
+    assert set(points) <= set(known)
+    assert len(known) < N_SWEPT
+    assert LIMITED_BY in files_of(study)
+
+
+BOUNDS = np.array([0, 2, 4])
+
+
+@pytest.mark.parametrize(
+    ("points", "nearest"),
+    [
+        ([[0.0], [9.0], [3.0], [12.0]], [0, 2]),  # 3 apart twice: the first pair
+        ([[0.0], [9.0], [12.0], [11.0]], [1, 3]),
+        ([[0.0], [2e-200], [5e-200], [6e-200]], [1, 2]),  # squares that are 0
+        ([[0.0], [2e200], [5e200], [6e200]], [1, 2]),  # and infinite
+        ([[0.0], [np.nan], [5.0], [6.0]], [-1, -1]),
+        ([[0.0], [np.inf], [5.0], [6.0]], [-1, -1]),
+        ([[7.0], [7.0], [7.0], [7.0]], [0, 2]),
+    ],
+)
+def test_the_nearest_two_points(points: list[list[float]], nearest: list[int]) -> None:
+    found = np.empty((1, 1, 2), dtype=np.intp)
+    nearest_pairs(np.array(points)[None, None], np.arange(4), BOUNDS, found)
+    assert found[0, 0].tolist() == nearest
