@@ -5,21 +5,23 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...base.types import FloatArray, IndexArray
-from ..between import Between, Deviation
 from ..effects import blur, phase, sampling
 from ..effects.base import Change, KernelChange, KernelEffect, Part
 from ..kernel import make_kernel
 from ..kernel_size import pixels_per_place
 from ..methods import REFERENCE, Methods
-from ..place_kernels import PlaceKernels
 from ..registry import EFFECTS, WHOLE_LIGHT
 from ..view import View
 from .bounds import Spread
 from .work import KERNEL_S, Work
+
+if TYPE_CHECKING:
+    from ..between import Deviation
 
 
 class SceneKernels:
@@ -72,6 +74,8 @@ class SceneKernels:
         if wanted not in self._kernels:
             self.spent_s += self._seconds(wanted)
             if phase.one_is_enough(self._view) is None and wanted.sampling != "skip":
+                from ..place_kernels import PlaceKernels  # noqa: PLC0415  (compiled: kept off the start-up path)
+
                 cases = self.corners[0] if self.anywhere(wanted) else phase.cases(self._view, wanted.phase)
                 made = PlaceKernels(self._view, wanted, nodes)
                 light = made.at(cases, Counter())[0] @ made.shares
@@ -95,6 +99,8 @@ class SceneKernels:
 
     def _deviation(self, methods: Methods) -> Deviation:
         """How far the kernel in cells may be from a mean of that at the corners: [cells, channels, channels, 1]."""
+        from ..between import Between, Deviation  # noqa: PLC0415  (compiled: kept off the start-up path)
+
         wanted = self.wanted(methods)
         if wanted not in self._deviations:
             between, cells = Between(self._view, wanted, self._knots_nm), self._cells
@@ -128,7 +134,7 @@ class SceneKernels:
         if not self.anywhere(before):
             return None
         here = self._deviation(before)
-        nothing = Deviation(np.zeros_like(here.kernel), here.tilt)
+        nothing = here._replace(kernel=np.zeros_like(here.kernel))
         there = self._deviation(after) if self.anywhere(after) else nothing
         sizes = here.kernel * scale
         part = what.part if isinstance(what, KernelChange) else None
