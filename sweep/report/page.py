@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import pandas as pd
@@ -22,7 +23,7 @@ from . import values as content
 from .allowed_lamps import lamp_drawings, lamp_table
 from .answer import answer_sentences
 from .colors import color_drawings
-from .figures import draw_curves, draw_pareto, pictures_of
+from .figures import Drawing, draw_curves, draw_pareto, pictures_of
 from .filter_figures import filters_figure
 from .large_numbers import large_numbers
 from .leaders import leaders_of
@@ -41,7 +42,7 @@ from .summary import counts_line, summary_lines
 from .tiles import draw_tiles, tiles_figure
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 
 _FIRST_LINES, _FIRST_LEADS = 1, 2
@@ -151,7 +152,7 @@ def _vision(output: Output) -> dict[str, list[list[str]]]:
     return {title: rows(table) for title, table in vision_parts(benchmark_of(output)).items()}
 
 
-def _vision_drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
+def _vision_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
     """The figures of the benchmark of vision; none where the study asks for none."""
     if output.study.vision is not None:
         from .vision import benchmark_of  # noqa: PLC0415  (only where a study asks for images)
@@ -167,33 +168,34 @@ def _objective(output: Output) -> str:
     return words if name in (words, COMBINED) else f"{words} ({name} in the files)"
 
 
-def _drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
-    """(file name, caption, figure) of everything that is drawn."""
+def _drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
+    """(file name, caption, drawing) of everything that is drawn."""
     scenario = output.scenarios[0]
     cfas = list(dict.fromkeys(m.cfa for m in content.modifications(output)))
-    yield "cfas", "All CFAs", draw_overview(overview_figure(output, scenario))
+    yield "cfas", "All CFAs", partial(draw_overview, overview_figure(output, scenario))
     for number, cfa in enumerate(content.traded_cfas(output)):
-        figure = draw_pareto(content.pareto_figure(output, scenario, cfa))
+        figure = partial(draw_pareto, content.pareto_figure(output, scenario, cfa))
         yield ("pareto" if number == 0 else f"pareto-{number + 1}"), f"Trade-off of {cfa}", figure
     for number, cfa in enumerate(cfas):
-        yield f"filters-{number + 1}", f"Filters of {cfa}", draw_curves(filters_figure(output, cfa))
+        yield f"filters-{number + 1}", f"Filters of {cfa}", partial(draw_curves, filters_figure(output, cfa))
     for number, series in enumerate(all_series(output)):
-        yield f"series-{number + 1}", series.title, draw_series(series)
+        yield f"series-{number + 1}", series.title, partial(draw_series, series)
     card = scorecard(output)
     if card is not None:
-        yield "scorecard", f"Every figure relative to {card.names[card.reference]}", draw_scorecard(card)
+        yield "scorecard", f"Every figure relative to {card.names[card.reference]}", partial(draw_scorecard, card)
     yield from map_drawings(output)
     yield from color_drawings(output)
     yield from price_drawings(output)
     yield from lamp_drawings(output)
-    yield "tiles", "Tiles of the CFAs; a hatched pixel is modified", draw_tiles(tiles_figure(output))
-    yield "sensor", "Quantum efficiency of the sensor", draw_curves(content.sensor_figure(output))
-    yield "signals", "Spectra of the signals", draw_curves(content.lights_figure(output))
-    yield "chart", "The color checker chart", draw_chart(content.chart_figure(output))
+    yield "tiles", "Tiles of the CFAs; a hatched pixel is modified", partial(draw_tiles, tiles_figure(output))
+    yield "sensor", "Quantum efficiency of the sensor", partial(draw_curves, content.sensor_figure(output))
+    yield "signals", "Spectra of the signals", partial(draw_curves, content.lights_figure(output))
+    yield "chart", "The color checker chart", partial(draw_chart, content.chart_figure(output))
     for name, caption, kinds in (
         ("clouds-cfas", "Signals in the channels of the plain CFAs", (PLAIN,)),
         ("clouds-designs", "Signals in the channels of the named and the found designs", (NAMED, FOUND)),
     ):
         found = content.clouds(output, *kinds)
         if found:
-            yield name, caption, draw_clouds(found, caption, max(1.0, 1.05 * float(output.points["dn"].max())))
+            top_dn = max(1.0, 1.05 * float(output.points["dn"].max()))
+            yield name, caption, partial(draw_clouds, found, caption, top_dn)
