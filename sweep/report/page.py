@@ -5,7 +5,8 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from itertools import chain, islice
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 import pyarrow as pa
@@ -79,25 +80,34 @@ def _contents(output: Output, some: Iterable[str] | None, parallel: Parallel) ->
         where = name if name.startswith(("cfas", "pareto")) else f"{FIGURES}/{name}"
         if some is None or {f"{where}.png", f"{where}.svg"} & {*some}:
             wanted.append((name, caption, where, figure))
-    calls = [delayed(pictures_of, figure, ("png", "svg")) for *_, figure in wanted]
-    for (name, caption, where, _), made in zip(wanted, parallel(calls), strict=True):
+    pictures = parallel(delayed(pictures_of, figure, ("png", "svg")) for *_, figure in wanted)
+    begun = [*islice(pictures, 1)]  # workers make the others while the page is written
+    published = comparison_with_published(output)
+    parts = _parts(output, published) if some is None else {}
+    for (name, caption, where, _), made in zip(wanted, chain(begun, pictures), strict=True):
         contents |= {f"{where}.{kind}": content for kind, content in made.items()}
         if some is None and name.startswith((*_PICTURES, *_OF_TASKS, _OF_REGIONS, _OF_PRICE, _MAPS, VISION_FIGURES)):
             images.append((name, caption, inlined(made["png"])))
-    published = comparison_with_published(output)
     if len(published):
         contents[PUBLISHED_CSV] = csv_of(published).encode("utf-8")
         contents[PUBLISHED_PARQUET] = encoded(pa.Table.from_pandas(published, preserve_index=False))
     if some is None:
-        contents[REPORT] = _html(output, images, published).encode("utf-8")
+        contents[REPORT] = page("report.html.j2", **parts, **_images(images)).encode("utf-8")
     return contents
 
 
-def _html(output: Output, images: Sequence[tuple[str, str, str]], published: pd.DataFrame) -> str:
+def _images(images: Sequence[tuple[str, str, str]]) -> dict[str, list[tuple[str, str]]]:
+    """Pictures by where the page has them: caption and address; `images`: their files' names, too."""
+    wheres = {"images": _PICTURES, "price_images": _OF_PRICE, "lamp_images": _OF_REGIONS}
+    wheres |= {"vision_images": VISION_FIGURES, "score_images": _OF_TASKS, "map_images": _MAPS}
+    return {where: [(told, uri) for name, told, uri in images if name.startswith(own)] for where, own in wheres.items()}
+
+
+def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
+    """What the page says, but for its pictures."""
     drawn, card = payload(output), scorecard(output)
     groups, series_first = scene_groups(output), bool(drawn["series"]) and output.best.empty
-    return page(
-        "report.html.j2",
+    return dict(
         study=output.study,
         folder=output.folder.as_posix(),
         quoted=shlex.quote(output.folder.as_posix()),
@@ -118,19 +128,13 @@ def _html(output: Output, images: Sequence[tuple[str, str, str]], published: pd.
         scenes=rows(scene_table(groups)),
         group_rows=[rows(effect_table(group)) for group in groups],
         audited=output.audited is not None,
-        images=[(caption, uri) for name, caption, uri in images if name in _PICTURES],
-        price_images=[(caption, uri) for name, caption, uri in images if name.startswith(_OF_PRICE)],
         lamps=rows(lamp_table(output)),
-        lamp_images=[(caption, uri) for name, caption, uri in images if name.startswith(_OF_REGIONS)],
         vision=_vision(output),
-        vision_images=[(caption, uri) for name, caption, uri in images if name.startswith(VISION_FIGURES)],
         comparison=rows(tables.comparison_table(output)),
         best=rows(tables.best_table(output)),
         recognition=rows(told_apart_table(output)),
         score_names=() if card is None else card.names,
         score_rows=[] if card is None else score_cells(card),
-        score_images=[(caption, uri) for name, caption, uri in images if name.startswith(_OF_TASKS)],
-        map_images=[(caption, uri) for name, caption, uri in images if name.startswith(_MAPS)],
         conditions=output.study.tasks,
         left_out=rows(tables.worst_left_out(output)),
         geometry=rows(tables.geometry_table(output)),
