@@ -98,7 +98,11 @@ def _contents(output: Output, some: Iterable[str] | None, parallel: Parallel) ->
 
 def _images(images: Sequence[tuple[str, str, str]]) -> dict[str, list[tuple[str, str]]]:
     """Pictures by where the page has them: caption and address; `images`: their files' names, too."""
-    wheres = {"images": _PICTURES, "price_images": _OF_PRICE, "lamp_images": _OF_REGIONS}
+    wheres: dict[str, str | tuple[str, ...]] = {
+        "images": _PICTURES,
+        "price_images": _OF_PRICE,
+        "lamp_images": _OF_REGIONS,
+    }
     wheres |= {"vision_images": VISION_FIGURES, "score_images": _OF_TASKS, "map_images": _MAPS}
     return {where: [(told, uri) for name, told, uri in images if name.startswith(own)] for where, own in wheres.items()}
 
@@ -107,43 +111,43 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
     """What the page says, but for its pictures."""
     drawn, card = payload(output), scorecard(output)
     groups, series_first = scene_groups(output), bool(drawn["series"]) and output.best.empty
-    return dict(
-        study=output.study,
-        folder=output.folder.as_posix(),
-        quoted=shlex.quote(output.folder.as_posix()),
-        objective=_objective(output),
-        numbers_in="" if len(output.scenarios) == 1 or output.best.empty else f"in {leaders_of(output).scenario}",
-        series_first=series_first,
-        objective_words=output.goal.words,
-        answer=answer_sentences(output),
-        first_lines=_FIRST_LEADS if series_first and output.study.recognition is None else _FIRST_LINES,
-        numbers=large_numbers(output),
-        counts=counts_line(output),
-        interactive=drawn,
-        profiles={cfa: rows(profile_table(found)) for cfa, found in output.profiles.items()},
-        history=drawn["history"],
-        plotly=library(),
-        script=script("report.js"),
-        groups=groups,
-        scenes=rows(scene_table(groups)),
-        group_rows=[rows(effect_table(group)) for group in groups],
-        audited=output.audited is not None,
-        lamps=rows(lamp_table(output)),
-        vision=_vision(output),
-        comparison=rows(tables.comparison_table(output)),
-        best=rows(tables.best_table(output)),
-        recognition=rows(told_apart_table(output)),
-        score_names=() if card is None else card.names,
-        score_rows=[] if card is None else score_cells(card),
-        conditions=output.study.tasks,
-        left_out=rows(tables.worst_left_out(output)),
-        geometry=rows(tables.geometry_table(output)),
-        published=rows(published),
-        constraints=[f"{output.words(name)} {bound}" for name, bound in output.constraints.items()],
-        summary=summary_lines(output),
-        provenance=output.provenance.model_dump(mode="json"),
-        limited=output.provenance.search is not None and output.provenance.search.limit_proven is not None,
-    )
+    return {
+        "study": output.study,
+        "folder": output.folder.as_posix(),
+        "quoted": shlex.quote(output.folder.as_posix()),
+        "objective": _objective(output),
+        "numbers_in": "" if len(output.scenarios) == 1 or output.best.empty else f"in {leaders_of(output).scenario}",
+        "series_first": series_first,
+        "objective_words": output.goal.words,
+        "answer": answer_sentences(output),
+        "first_lines": _FIRST_LEADS if series_first and output.study.recognition is None else _FIRST_LINES,
+        "numbers": large_numbers(output),
+        "counts": counts_line(output),
+        "interactive": drawn,
+        "profiles": {cfa: rows(profile_table(found)) for cfa, found in output.profiles.items()},
+        "history": drawn["history"],
+        "plotly": library(),
+        "script": script("report.js"),
+        "groups": groups,
+        "scenes": rows(scene_table(groups)),
+        "group_rows": [rows(effect_table(group)) for group in groups],
+        "audited": output.audited is not None,
+        "lamps": rows(lamp_table(output)),
+        "vision": _vision(output),
+        "comparison": rows(tables.comparison_table(output)),
+        "best": rows(tables.best_table(output)),
+        "recognition": rows(told_apart_table(output)),
+        "score_names": () if card is None else card.names,
+        "score_rows": [] if card is None else score_cells(card),
+        "conditions": output.study.tasks,
+        "left_out": rows(tables.worst_left_out(output)),
+        "geometry": rows(tables.geometry_table(output)),
+        "published": rows(published),
+        "constraints": [f"{output.words(name)} {bound}" for name, bound in output.constraints.items()],
+        "summary": summary_lines(output),
+        "provenance": output.provenance.model_dump(mode="json"),
+        "limited": output.provenance.search is not None and output.provenance.search.limit_proven is not None,
+    }
 
 
 def _vision(output: Output) -> dict[str, list[list[str]]]:

@@ -55,7 +55,7 @@ from .tables import (
 )
 from .thinning import Counts, thinned
 
-Made = TypeVar("Made")
+_Made = TypeVar("_Made")
 _OPTIONAL = (
     FRONT,
     PRICE,
@@ -111,11 +111,11 @@ class Output:
     profiles: Mapping[str, Sequence[ParameterProfile]]
     _made: dict[object, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
-    def once(self, key: object, make: Callable[[], Made]) -> Made:
+    def once(self, key: object, make: Callable[[], _Made]) -> _Made:
         """What several parts of a report need of this run, made for the first of them."""
         if key not in self._made:
             self._made[key] = make()
-        found: Made = self._made[key]
+        found: _Made = self._made[key]
         return found
 
     @property
