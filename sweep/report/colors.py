@@ -8,7 +8,6 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from ..base.types import FloatArray, IndexArray
 from ..results.output import Output
@@ -17,6 +16,7 @@ from .figures import CURVE_CYCLE, Drawing, canvas, empty_figure
 from .series import Line
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 _TRUE = "the eye"

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import pandas as pd
-
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
@@ -15,6 +13,7 @@ from .figures import COLORS, LIMIT_NAME, TRACED_NAME, Points, canvas
 from .names import label
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 _STYLES: dict[str, dict[str, Any]] = {

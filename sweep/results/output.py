@@ -7,9 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-import pandas as pd
 from ruamel.yaml import YAML
 
 from ..base.errors import Fault, OutputError
@@ -54,6 +53,9 @@ from .tables import (
     read_table,
 )
 from .thinning import Counts, thinned
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _Made = TypeVar("_Made")
 _OPTIONAL = (

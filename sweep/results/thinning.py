@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
@@ -14,6 +14,9 @@ import pyarrow.parquet as pq
 from ..base.errors import Fault, OutputError
 from ..metrics.columns.exposure import EXPOSURE
 from .tables import batches, best_rows, holds, release_memory
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 MOST_ROWS = 150_000
 """A table of up to this many rows is kept whole."""
