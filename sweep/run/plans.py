@@ -39,7 +39,7 @@ def _found(
     if not names:
         return
     # One scene is planned faster than workers are started.
-    how = Workers(min(n_jobs, len(names)), Stop() if stop is None else stop)
+    how = Workers(n_jobs if len(names) > 1 else 1, Stop() if stop is None else stop)
     with workers(how) as crew:
         yield from crew(delayed(_planned, study, name, tolerance_dn) for name in names)
 
