@@ -26,12 +26,10 @@ from .plans import with_plans
 from .provenance import resolved_yaml
 from .rows import rules_of
 from .stop import Stop, stop_on_signals
-from .workers import Workers, workers
+from .workers import Workers, called_by, workers
 
 _HOW = ("command", "backend", "scheduler", "workers", "duration_s")
 """What provenance and `run.json` both say of how a run went, so that either makes the other again."""
-_CALLED, _SEARCHING = ("sweep.run.sweep", "sweep.metrics.nearest"), "sweep.search.solver"
-"""Modules whose functions a run's workers call, and where it searches."""
 _DETOURS = "detours"
 """Of both as well: which designs took another route than their block's own."""
 
@@ -88,7 +86,7 @@ def run_study(
             inventory.write({RESOLVED: resolved_yaml(study).encode("utf-8")})
         elif wrong or retry:
             try:
-                crew.begin(_CALLED if study.search is None else (*_CALLED, _SEARCHING))
+                crew.begin(called_by(study))
                 study = with_plans(study, crew.count, progress, stop=own)
                 rules = rules_of(study)
                 if retry or not fits(inventory, study, rules):

@@ -22,10 +22,12 @@ from threadpoolctl import ThreadpoolController
 
 from ..base.errors import SweepError
 from ..base.types import Call
+from ..study import Study
 from .stop import Stop, without_interrupts
 from .worker_process import keep_freed_memory, preparing
 
 _LEAST_WINDOW, _WINDOW_PER_WORKER = 64, 16
+_CALLED, _SEARCHING = ("sweep.run.sweep", "sweep.metrics.nearest"), "sweep.search.solver"
 BACKENDS = ("loky", "threading", "dask")
 _Numbered = tuple[int, Call]
 
@@ -154,6 +156,11 @@ class Workers:
             if killed is None:
                 raise
             return killed(call)
+
+
+def called_by(study: Study) -> tuple[str, ...]:
+    """Modules whose functions a run of the study calls in its workers."""
+    return _CALLED if study.search is None else (*_CALLED, _SEARCHING)
 
 
 def usable_backend(backend: str) -> str:
