@@ -21,6 +21,9 @@ from ..study import Study, folder_name, load_study
 from .endings import end_now
 from .progress import ProgressDisplay
 
+_DRAWING = ("sweep.report.overview", "matplotlib.backends.backend_agg", "matplotlib.backends.backend_svg")
+"""Modules that pictures need."""
+
 
 @dataclass(frozen=True)
 class Manner:
@@ -74,6 +77,8 @@ def run_one(path: Path, manner: Manner, began_s: float) -> None:
                 made = runner.run_study(*given, backend=kind, scheduler=manner.scheduler, wishes=how, stop=stop)
             if not made:
                 typer.echo(f"Note: {folder} holds this very study, finished; nothing was computed.", err=True)
+            elif crew is not None:
+                crew.begin(_DRAWING)
             from .audit import mend_audit  # noqa: PLC0415  (what tables need is loaded while workers compute)
             from .finish import finish  # noqa: PLC0415
 

@@ -178,6 +178,15 @@ def _objective(output: Output) -> str:
 
 def _drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
     """(file name, caption, drawing) of everything that is drawn."""
+    # What takes longest comes first, so that no core waits for it in the end.
+    for name, caption, kinds in (
+        ("clouds-cfas", "Signals in the channels of the plain CFAs", (PLAIN,)),
+        ("clouds-designs", "Signals in the channels of the named and the found designs", (NAMED, FOUND)),
+    ):
+        found = content.clouds(output, *kinds)
+        if found:
+            top_dn = max(1.0, 1.05 * float(output.points["dn"].max()))
+            yield name, caption, partial(draw_clouds, found, caption, top_dn)
     scenario = output.scenarios[0]
     cfas = list(dict.fromkeys(m.cfa for m in content.modifications(output)))
     yield "cfas", "All CFAs", partial(draw_overview, overview_figure(output, scenario))
@@ -199,11 +208,3 @@ def _drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
     yield "sensor", "Quantum efficiency of the sensor", partial(draw_curves, content.sensor_figure(output))
     yield "signals", "Spectra of the signals", partial(draw_curves, content.lights_figure(output))
     yield "chart", "The color checker chart", partial(draw_chart, content.chart_figure(output))
-    for name, caption, kinds in (
-        ("clouds-cfas", "Signals in the channels of the plain CFAs", (PLAIN,)),
-        ("clouds-designs", "Signals in the channels of the named and the found designs", (NAMED, FOUND)),
-    ):
-        found = content.clouds(output, *kinds)
-        if found:
-            top_dn = max(1.0, 1.05 * float(output.points["dn"].max()))
-            yield name, caption, partial(draw_clouds, found, caption, top_dn)

@@ -14,7 +14,7 @@ from functools import lru_cache
 from importlib import import_module
 from itertools import islice
 from multiprocessing import get_context
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import joblib
 from joblib.externals.loky import ProcessPoolExecutor
@@ -22,9 +22,11 @@ from threadpoolctl import ThreadpoolController
 
 from ..base.errors import SweepError
 from ..base.types import Call
-from ..study import Study
 from .stop import Stop, without_interrupts
 from .worker_process import keep_freed_memory, preparing
+
+if TYPE_CHECKING:
+    from ..study import Study
 
 _LEAST_WINDOW, _WINDOW_PER_WORKER = 64, 16
 _CALLED, _SEARCHING = ("sweep.run.sweep", "sweep.metrics.nearest"), "sweep.search.solver"
