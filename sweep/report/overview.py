@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
@@ -52,18 +52,23 @@ class OverviewFigure:
 def overview_figure(output: Output, scenario: str) -> OverviewFigure:
     """All CFAs of a scenario."""
     table = output.table[(output.table["scenario"] == scenario) & (output.table["status"] == "ok")]
-    separation = output.trade_off[0]
     swept = table[(table["kind"] == SWEPT) & table["pareto"]]
     kinds = {"plain": PLAIN, "named": NAMED, "best": FOUND}
     groups = {name: _points(output, table[table["kind"] == kind], named=True) for name, kind in kinds.items()}
     for name, rows in (("front", swept[swept["feasible"]]), ("outside", swept[~swept["feasible"]])):
         groups[name] = _points(output, rows)
+    return replace(outline(output, scenario), groups=groups)
+
+
+def outline(output: Output, scenario: str) -> OverviewFigure:
+    """The same without the designs: what stands around them."""
+    separation = output.trade_off[0]
     traced, limit = _trade_off(output, scenario)
     return OverviewFigure(
         title=f"{output.study.study}: {separation.words} against light",
         x_label=f"{output.columns[CFA_SENSITIVITY].words}: light of the whole CFA (clear sensor = 1)",
         y_label=separation.axis,
-        groups=groups,
+        groups={},
         traced=traced,
         limit=limit,
     )

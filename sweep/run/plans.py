@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ..base.types import Progress, delayed
 from ..camera.plan.plan import Plan
-from ..results.kept_plans import KeptPlans, plan_key, study_key
+from ..results.kept_plans import KeptPlans, plan_key, study_keys
 from ..study import Study
 from .stop import Stop
 from .workers import Workers, workers
@@ -22,7 +22,7 @@ def with_plans(
     is planned again. Raises InterruptedRunError after `stop` was asked for.
     """
     kept = KeptPlans()
-    keys = {name: study_key(study, name, tolerance_dn) for name in study.scenarios}
+    keys = study_keys(study, tolerance_dn)
     plans = {name: plan for name, key in keys.items() if (plan := kept.of(key)) is not None}
     missing = [name for name in keys if name not in plans]
     for name, plan in zip(missing, _found(study, missing, n_jobs, tolerance_dn, stop), strict=True):
