@@ -57,10 +57,10 @@ def overview_figure(output: Output, scenario: str) -> OverviewFigure:
     groups = {name: _points(output, table[table["kind"] == kind], named=True) for name, kind in kinds.items()}
     for name, rows in (("front", swept[swept["feasible"]]), ("outside", swept[~swept["feasible"]])):
         groups[name] = _points(output, rows)
-    return replace(outline(output, scenario), groups=groups)
+    return replace(around_designs(output, scenario), groups=groups)
 
 
-def outline(output: Output, scenario: str) -> OverviewFigure:
+def around_designs(output: Output, scenario: str) -> OverviewFigure:
     """The same without the designs: what stands around them."""
     separation = output.trade_off[0]
     traced, limit = _trade_off(output, scenario)

@@ -20,7 +20,7 @@ from .figures import COLORS, CURVE_COLORS, TYPE_COLORS, ParetoFigure, even
 from .filter_figures import end_curves
 from .history import history_of
 from .noise import all_series
-from .overview import OverviewFigure, outline
+from .overview import OverviewFigure, around_designs
 from .series import SeriesFigure
 
 _MOST_POINTS = 6_000
@@ -162,7 +162,7 @@ def _lines(figure: ParetoFigure | OverviewFigure) -> dict[str, Any]:
 
 def _overview(output: Output, scenario: str) -> dict[str, Any]:
     """What is drawn around the points of all CFAs of a scenario."""
-    figure = outline(output, scenario)
+    figure = around_designs(output, scenario)
     words = {"title": figure.title, "x_label": figure.x_label, "y_label": figure.y_label}
     return {"scenario": scenario, **words, **_lines(figure)}
 
