@@ -64,6 +64,7 @@ INSTALLING := @echo "Installing into $(VENV): once, which takes a minute or two.
 $(VENV)/.ready: pyproject.toml | $(VENV)/bin/python
 	$(INSTALLING)
 	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	@$(BIN)/python -m compileall -q sweep
 	@touch $@
 
 $(VENV)/.ready-vision: pyproject.toml | $(VENV)/bin/python

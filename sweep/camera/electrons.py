@@ -27,6 +27,8 @@ from .view import View, background_irradiance, per_photon, signal_irradiance
 
 KEPT = 15_000_000
 """Largest table of signals times kernel that is kept."""
+_MANY = 50_000
+"""Values from which on a compiled pass saves more time than it takes to load."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,16 @@ class Changing:
         found = np.repeat(self.fixed[None], len(self.values), axis=0)
         found[..., self.channel] = self.values
         return found
+
+
+def _expose(rates: FloatArray, fixed: FloatArray, uniform: FloatArray, time_s: float) -> None:
+    """`compiled_readout.expose`, of few values without what is compiled: the same sums."""
+    if rates.size < _MANY:
+        rates[:] = ((fixed + rates) + uniform[..., None]) * time_s
+        return
+    from .compiled_readout import expose  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+    expose(rates, fixed, uniform, time_s)
 
 
 def _background(view: View) -> FloatArray:
@@ -218,8 +230,6 @@ class Electrons:
         Needs a modified channel that no other unit looks through, and a light that does not pulse. Designs whose
         modified channel sets the exposure are left out.
         """
-        from .compiled_readout import expose  # noqa: PLC0415  (compiled: kept off the start-up path)
-
         view = self.view
         touched = np.flatnonzero((self._modified_uniform != 0).any(axis=(0, 2)))
         if len(view.modified) != 1 or self._kept is None or self._touched.size != 1:
@@ -240,7 +250,7 @@ class Electrons:
         uniform = uniform * self._modified_uniform[:, unit, 0]
         uniform = self._fixed_uniform[:, unit] + uniform + view.pixel.dark_e_per_s
         rest = self.fixed + (self._fixed_uniform + view.pixel.dark_e_per_s)[:, None]
-        expose(values, np.ascontiguousarray(self.fixed[:, :, unit]), uniform, float(time_s[0]))
+        _expose(values, np.ascontiguousarray(self.fixed[:, :, unit]), uniform, float(time_s[0]))
         return Changing(rest * time_s[0], unit, values, float(time_s[0]), which)
 
     def light_dn(self, curves: FloatArray, exposure_s: float) -> FloatArray:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from scipy.special import j1
 
 from ..base.cache import Cache
 from ..base.types import FloatArray
@@ -45,6 +44,7 @@ class Encircled:
         those of the profile. ndarray[n_nodes, n_functions].
         """
         from scipy.interpolate import make_interp_spline  # noqa: PLC0415  (slow to import)
+        from scipy.special import j1  # noqa: PLC0415  (slow to import)
 
         profile, r_um = self._profile, self._profile.r_um
         step = r_um[1]

@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -26,9 +27,11 @@ from .field import over_field
 from .kernel import kept_kernel, make_kernel
 from .kernel_size import blocks
 from .noisy_readout import NoisyReadout
-from .places import AnyPlace
 from .readout import Readout
 from .view import View
+
+if TYPE_CHECKING:
+    from .places import AnyPlace
 
 _BLOCK = 2_000_000
 """Values of a block of pixels that are held at once."""
@@ -81,7 +84,11 @@ class Imager:
     @cached_property
     def anywhere(self) -> AnyPlace | None:
         """The scene with the light at any place, where that is asked for and more than a lattice of places counts."""
-        return AnyPlace(self.view, self.work) if phase.all_count(self.view, self.view.methods) else None
+        if not phase.all_count(self.view, self.view.methods):
+            return None
+        from .places import AnyPlace  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+        return AnyPlace(self.view, self.work)
 
     def read(self, curves: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The readout, DN, ndarray[n_designs, n_cases, n_signals, n_channels], and exposure, s, ndarray[n_designs]."""

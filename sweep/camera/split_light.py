@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.types import FloatArray, IndexArray
-from .compiled_split import gather
 
 
 @dataclass(frozen=True)
@@ -68,6 +67,8 @@ class SplitLight:
         `spectra`: QE times signals, ndarray[n_designs, n_channels, n_signals, n_wavelengths], of the `channels`. One
         design is computed as if there was no other.
         """
+        from .compiled_split import gather  # noqa: PLC0415  (compiled: kept off the start-up path)
+
         seen = np.ascontiguousarray(self._seen(spectra))
         row = np.full(self.n_channels, -1)
         row[list(channels)] = np.arange(len(channels))

@@ -14,14 +14,15 @@ import typer
 
 from .. import run as runner
 from ..base.errors import Fault, InterruptedRunError, SweepError
-from ..base.types import Parallel
 from ..results.names import REPORT
-from ..run.workers import Workers, workers
+from ..results.tables import PROVENANCE
+from ..run.workers import Workers, called_by, workers
 from ..study import Study, folder_name, load_study
-from .audit import mend_audit
 from .endings import end_now
-from .finish import finish
 from .progress import ProgressDisplay
+
+_DRAWING = ("sweep.report.overview", "matplotlib.backends.backend_agg", "matplotlib.backends.backend_svg")
+"""Modules that pictures need."""
 
 
 @dataclass(frozen=True)
@@ -64,20 +65,25 @@ def run_one(path: Path, manner: Manner, began_s: float) -> None:
     if kind != manner.backend:
         typer.echo(f"Note: no shared memory (/dev/shm) for worker processes; backend {kind}.", err=True)
     try:
-        with runner.stop_on_signals(ends_process=True) as stop:
+        with runner.stop_on_signals(ends_process=True) as stop, ExitStack() as stack:
+            # The run's worker processes draw, too; threads must not, and to start some takes as long as drawing.
+            pooled = kind == "loky" and manner.workers > 1
+            crew = stack.enter_context(workers(Workers(manner.workers, stop))) if pooled else None
+            if crew is not None and not (folder / PROVENANCE).exists():  # it is not finished, so there is work to do
+                crew.begin(called_by(loaded))
             with ProgressDisplay() as display:
                 given = (loaded, folder, manner.workers, display.update, sys.argv)
                 how = manner.wishes
                 made = runner.run_study(*given, backend=kind, scheduler=manner.scheduler, wishes=how, stop=stop)
             if not made:
                 typer.echo(f"Note: {folder} holds this very study, finished; nothing was computed.", err=True)
+            elif crew is not None:
+                crew.begin(_DRAWING)
+            from .audit import mend_audit  # noqa: PLC0415  (what tables need is loaded while workers compute)
+            from .finish import finish  # noqa: PLC0415
+
             mend_audit(folder, manner.data)
-            with ExitStack() as stack:
-                # The run's worker processes draw, too; threads must not, and to start some takes as long as drawing.
-                drawn: Parallel | None = None
-                if made and kind == "loky" and manner.workers > 1:
-                    drawn = stack.enter_context(workers(Workers(manner.workers, stop)))
-                finish(folder, began_s, mend=True, parallel=drawn)
+            finish(folder, began_s, mend=True, parallel=crew if made else None)
     except InterruptedRunError as error:
         if kind == "threading":  # what its threads are at cannot be broken off
             end_now(error)

@@ -17,6 +17,8 @@ EQUAL_ENERGY = (1 / 3, 1 / 3)
 """White that dominant wavelength and purity are counted from: CIE illuminant E."""
 NEAR_NM = 30.0
 """A light outside every region is taken for a signal color up to this difference of dominant wavelengths."""
+_NO_HUE = 1e-3
+"""Excitation purity of what has no dominant wavelength."""
 LEAST_PURITY = 0.5
 """Below this excitation purity a light is whitish, and its dominant wavelength says little."""
 
@@ -51,8 +53,6 @@ class LightColor:
 
 def light_color(photons: FloatArray) -> LightColor | None:
     """The color of a photon spectrum on VISIBLE, ndarray[471]; None where it has no visible light."""
-    from colour.colorimetry import dominant_wavelength, excitation_purity  # noqa: PLC0415  (slow to import)
-
     peak = float(photons.max())
     if not peak > 0:
         return None
@@ -60,19 +60,37 @@ def light_color(photons: FloatArray) -> LightColor | None:
         xy = chromaticity(VISIBLE, photons[None] / peak)
         if not np.isfinite(xy).all():
             return None
-        purity = float(excitation_purity(xy[0], EQUAL_ENERGY))
-        dominant = float(dominant_wavelength(xy[0], EQUAL_ENERGY)[0])
+        purity, dominant_nm = _hue(xy[0])
     inside = [kind for kind, region in REGIONS.items() if region.violation(xy)[0] <= 0]
     distance, nearest = min((_distance(xy[0], outline(kind)), kind) for kind in REGIONS)
-    has_hue = dominant > 0 and purity > 1e-3
     return LightColor(
         xy=(float(xy[0, 0]), float(xy[0, 1])),
-        dominant_nm=dominant if has_hue else None,
+        dominant_nm=dominant_nm if purity > _NO_HUE else None,
         purity=purity,
         region=inside[0] if inside else None,
         nearest=inside[0] if inside else nearest,
         distance=0.0 if inside else distance,
     )
+
+
+def _hue(xy: FloatArray) -> tuple[float, float | None]:
+    """Excitation purity and dominant wavelength, to a nm, of a chromaticity, ndarray[2] (CIE 15, 9).
+
+    Both are of the point where the line from white through it leaves the spectral locus; there is no such wavelength
+    where that is on the line of purples.
+    """
+    white, locus = np.array(EQUAL_ENERGY), spectral_locus()
+    (dx, dy), (ax, ay) = xy - white, (locus - white).T
+    sx, sy = (np.roll(locus, -1, axis=0) - locus).T  # the last side is the line of purples
+    across = dx * sy - dy * sx
+    along, share = (ax * sy - ay * sx) / across, (ax * dy - ay * dx) / across
+    hits = np.flatnonzero((along > 0) & (share >= 0) & (share <= 1))
+    if not hits.size:
+        return 0.0, None
+    side = int(hits[np.argmin(along[hits])])
+    leaves = white + along[side] * (xy - white)
+    nearest = int(np.hypot(*(locus - leaves).T).argmin())
+    return 1 / float(along[side]), None if side == len(locus) - 1 else float(VISIBLE.nodes_nm[nearest])
 
 
 @cache

@@ -24,6 +24,8 @@ from .space import Space
 _LEFT, _LEFT_WIDTH, _RIGHT, _RIGHT_WIDTH, _DEPTH = range(5)
 _MOST_BYTES = 2**27
 _KEPT_TABLES = 8
+_MANY = 64
+"""From so many designs on, a compiled pass saves more time than it takes to load."""
 
 
 class Block(Protocol):
@@ -73,13 +75,10 @@ class CurveBlock:
 
     def shapes(self, base_qe: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See `Block.shapes`."""
-        from .compiled import shapes  # noqa: PLC0415  (compiled: kept off the start-up path)
-
         steepest, lowest = np.zeros(len(self.qe)), np.full(len(self.qe), np.inf)
         for channel, base in enumerate(np.asarray(base_qe, dtype=float)):
-            step, low = np.empty(len(self.qe)), np.empty(len(self.qe))
             curves = np.ascontiguousarray(self.qe[:, channel], dtype=float)
-            shapes(curves, *_inverse(base), step, low)
+            step, low = _shapes(curves, *_inverse(base))
             bad = np.isnan(curves).any(axis=1)
             step[bad] = low[bad] = np.nan
             steepest, lowest = np.maximum(steepest, step), np.minimum(lowest, low)
@@ -161,6 +160,18 @@ class EdgeBlock:
 def _inverse(base: FloatArray) -> tuple[FloatArray, FloatArray]:
     """1 / base and 0; where the base is 0, 0 and 1, so that the ratio to it is 1."""
     return np.divide(1.0, base, out=np.zeros_like(base), where=base > 0), np.where(base > 0, 0.0, 1.0)
+
+
+def _shapes(curves: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Of each curve what `compiled.shapes` says, of few without what is compiled."""
+    if len(curves) < _MANY:
+        steps = np.abs(np.diff(curves, axis=1))
+        return steps.max(axis=1, initial=0.0), (curves * inverse + dark).min(axis=1)
+    from .compiled import shapes  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+    step, low = np.empty(len(curves)), np.empty(len(curves))
+    shapes(curves, inverse, dark, step, low)
+    return step, low
 
 
 _tables: Cache[bytes, Tables] = Cache(_KEPT_TABLES)

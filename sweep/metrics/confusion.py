@@ -15,7 +15,6 @@ import numpy as np
 from ..base.types import FloatArray, IndexArray
 from ..camera.pixel import Pixel
 from ..curves.lights import class_pairs
-from . import compiled as kernels
 
 FLOOR = 1e-18
 """What tails that are left out may add to an error or to its bound."""
@@ -103,6 +102,8 @@ def affordable(pixel: Pixel, channels: Sequence[IndexArray]) -> bool:
 
 def _numbers(electrons: FloatArray, pixel: Pixel) -> _Numbers:
     """Of a channel whose pixels expect `electrons`, ndarray[n_designs, n_signals, n_pixels]."""
+    from . import compiled as kernels  # noqa: PLC0415  (compiled: kept off the start-up path)
+
     flat = np.ascontiguousarray(np.sort(electrons, axis=-1).reshape(-1, electrons.shape[-1]))
     distinct, rows = np.unique(flat, axis=0, return_inverse=True)
     grid = _Grid.of(pixel)
@@ -123,6 +124,8 @@ def errors(
     of both probabilities over all readouts. The bound is the sum over the signals of other types of their
     Bhattacharyya coefficients, for the signal that errs most often.
     """
+    from . import compiled as kernels  # noqa: PLC0415  (compiled: kept off the start-up path)
+
     n_designs, n_signals = electrons.shape[:2]
     unknown = np.asarray(np.isnan(electrons).any(axis=(1, 2)))
     electrons = np.where(unknown[:, None, None], 0.0, np.minimum(electrons, 100 * pixel.well_e + 1e5))

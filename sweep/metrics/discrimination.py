@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from ..base.types import BoolArray, FloatArray, IndexArray
+from ..camera.noisy.gaussian import share_below
 from .separation import pair_blocks
 
 _LEAST_VARIANCE = 2e-9
@@ -77,7 +77,7 @@ def pairwise_error(
         some = ~np.isinf(whole)
         z = np.where(some[..., None], z, 0.0)
         spread = _length(z * np.sqrt(shares[0])) + _length(z * np.sqrt(shares[1]))
-        error = ndtr(-np.where(some, whole * _ratio(whole, spread), np.inf))
+        error = share_below(-np.where(some, whole * _ratio(whole, spread), np.inf))
         if shape is not None:
             error = np.maximum(error, _LEFT_OUT)
             error = np.minimum(error, shape.bound(block, difference, ours, theirs, first, second))

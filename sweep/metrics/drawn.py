@@ -14,7 +14,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import bdtr
 
 from ..base.types import FloatArray, IndexArray
 from ..curves.lights import Pair
@@ -124,6 +123,8 @@ def rank_below(draws: int, share: float) -> int:
     So many draws or more lie in the rest of all, whose number is binomial (Clopper and Pearson, Biometrika 26, 404,
     1934, one-sided).
     """
+    from scipy.special import bdtr  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
     return bisect_right(range(draws), _MISTAKEN, key=lambda fewer: bdtr(fewer, draws, 1 - share))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,7 +14,6 @@ from ..camera.effects.phase import Cases
 from ..camera.electrons import Changing
 from ..camera.field import scene_at
 from ..camera.imager import Imager, imager_of
-from ..camera.places import Extremes
 from ..camera.registry import EFFECTS
 from ..camera.sensor_places import SensorPlaces
 from ..camera.view import View
@@ -36,6 +36,9 @@ from .quantity import (
 )
 from .registry import METRICS, quantities_of
 from .separation import csd_name, separations, separations_along
+
+if TYPE_CHECKING:
+    from ..camera.places import Extremes
 
 _READOUT = [metric for metric in METRICS if isinstance(metric, ReadoutMetric)]
 _OTHERS = [metric for metric in _READOUT if not isinstance(metric, ColorSeparation)]

@@ -6,10 +6,9 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
 from ..base.types import FloatArray, IndexArray
 from ..camera.imager import Imager
@@ -22,6 +21,9 @@ from ..designs.family import Family
 from ..vision.section import Vision
 from .own import OwnMetric
 from .smooth import Rows, SmoothDesign
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 WORST = "worst_"
 """How the name of a quantity's worst case begins: over shifts of the edges in production, and over the population of

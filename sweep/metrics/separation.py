@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.cache import Cache
-from ..base.types import FloatArray, IndexArray
+from ..base.types import BoolArray, FloatArray, IndexArray
 from ..curves.lights import Pair, class_pairs, pair_name
 
 _BLOCK_PAIRS = 262_144
@@ -112,7 +112,6 @@ def separations_along(
     `fixed`: ndarray[n_signals, n_channels], DN, what they share in the others; `values`: ndarray[n_designs, n_signals],
     that of `channel`.
     """
-    from .nearest import nearest_along_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     def whole(some: IndexArray | slice) -> FloatArray:
         response = np.repeat(fixed[None], len(values[some]), axis=0)
@@ -123,9 +122,7 @@ def separations_along(
     if not np.isfinite(others).all():
         return separations(whole(slice(None)), members)
     apart = pairs_apart(others, members)
-    squared = np.empty((len(apart.starts) - 1, len(values)))
-    faulty = np.zeros(len(values), dtype=bool)
-    nearest_along_squared(np.ascontiguousarray(values), *apart, squared, faulty)
+    squared, faulty = _nearest_along(values, apart)
     found = _distances(squared, members, whole)
     bad = np.flatnonzero(faulty)  # what is wrong with one design changes no other
     if bad.size:
@@ -142,6 +139,21 @@ class Apart(NamedTuple):
     first: IndexArray
     second: IndexArray
     starts: IndexArray
+
+
+def _nearest_along(values: FloatArray, apart: Apart) -> tuple[FloatArray, BoolArray]:
+    """`out` and `bad` of `nearest.nearest_along_squared`, of few designs without what is compiled: the same sums."""
+    if len(values) < _MANY:
+        own = values[:, apart.order]
+        with np.errstate(invalid="ignore", over="ignore"):
+            differences = own[:, apart.first] - own[:, apart.second]
+            squares = apart.fixed + differences * differences
+        return np.minimum.reduceat(squares, apart.starts[:-1], axis=1).T, np.any(~np.isfinite(values), axis=1)
+    from .nearest import nearest_along_squared  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+    squared, faulty = np.empty((len(apart.starts) - 1, len(values))), np.zeros(len(values), dtype=bool)
+    nearest_along_squared(np.ascontiguousarray(values), *apart, squared, faulty)
+    return squared, faulty
 
 
 _apart: Cache[bytes, Apart] = Cache(16)

@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import log_ndtr, logsumexp
 
 from ..base.types import FloatArray
 from ..camera.linear import smooth_imager
@@ -60,6 +59,8 @@ def error_decades(difference: FloatArray, first: FloatArray, second: FloatArray)
 
     w = D' S^-1 D; p and q are the deviations of both signals along the normal S^-1 D.
     """
+    from scipy.special import log_ndtr  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
     s = (first + second) / 2
     normal = difference / s
     w = squared_detectability(difference, first, second)
@@ -113,6 +114,8 @@ def bound_rows(design: SmoothDesign, *, types: Sequence[str]) -> Rows:
 
 
 def _summed(parts: list[Rows]) -> Rows:
+    from scipy.special import logsumexp  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
     values = np.concatenate([rows.values for rows in parts], axis=2)
     by_u = np.concatenate([rows.by_u for rows in parts], axis=2)
     total = logsumexp(-values, axis=2, keepdims=True)

@@ -1,9 +1,17 @@
-"""What a person sees of a finished run: summary lines, figures, the HTML reports."""
+"""What a person sees of a finished run: summary lines, figures, the HTML reports.
 
-from ..results.again import check_kept, study_of
-from ..results.output import Output, read_output
-from .page import make_report
-from .summary import summary_lines
+Names are loaded when they are first used: a worker that draws needs few of them.
+"""
+
+from typing import TYPE_CHECKING
+
+from ..base.later import loaded_later
+
+if TYPE_CHECKING:
+    from ..results.again import check_kept, study_of
+    from ..results.output import Output, read_output
+    from .page import make_report
+    from .summary import summary_lines
 
 __all__ = [
     "Output",
@@ -13,3 +21,14 @@ __all__ = [
     "study_of",
     "summary_lines",
 ]
+__getattr__ = loaded_later(
+    globals(),
+    {
+        "Output": "..results.output",
+        "check_kept": "..results.again",
+        "make_report": ".page",
+        "read_output": "..results.output",
+        "study_of": "..results.again",
+        "summary_lines": ".summary",
+    },
+)

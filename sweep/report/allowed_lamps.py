@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +17,7 @@ from ..metrics.quantity import DN
 from ..metrics.share import told_share
 from ..results.output import Output
 from ..results.tables import PLAIN
-from .figures import empty_figure
+from .figures import Drawing, empty_figure
 from .leaders import Row, leaders_of
 from .names import capital, full_name, label
 
@@ -141,8 +142,8 @@ def lamp_table(output: Output) -> pd.DataFrame:
     )
 
 
-def lamp_drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
-    """(file name, caption, figure) of the map of each norm."""
+def lamp_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
+    """(file name, caption, drawing) of the map of each norm."""
     maps = lamp_maps(output)
     for number, norm in enumerate(dict.fromkeys(each.norm for each in maps), 1):
         own = [each for each in maps if each.norm == norm]
@@ -150,7 +151,7 @@ def lamp_drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
         caption = f"{NORM_NAMES[norm]}: the smallest CSD over all widths of a yellow and a red LED, {_MODELED}"
         if len(own) > len(shown):
             caption += f"; the last {len(shown)} of {len(own)} designs"
-        yield f"regions-{number}", caption, _draw(shown, caption, _asked(output).wanted_dn)
+        yield f"regions-{number}", caption, partial(_draw, shown, caption, _asked(output).wanted_dn)
 
 
 def _draw(maps: list[LampMap], title: str, wanted_dn: float) -> Figure:

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from ..base.types import FloatArray, IndexArray
 from ..results.output import Output
 from ..results.tables import CHART, NIGHT
-from .figures import CURVE_CYCLE, canvas, empty_figure
+from .figures import CURVE_CYCLE, Drawing, canvas, empty_figure
 from .series import Line
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 _TRUE = "the eye"
@@ -160,14 +161,14 @@ def draw_renderings(pictures: list[Rendering], title: str) -> Figure:
     return figure
 
 
-def color_drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
-    """(file name, caption, figure) of everything that is drawn of colors."""
+def color_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
+    """(file name, caption, drawing) of everything that is drawn of colors."""
     for number, figure in enumerate(error_curves(output), 1):
         caption = f"Color error against noise under {figure.light.upper()}, over how much the color matrix weighs noise"
-        yield f"color-noise-{number}", caption, draw_error_curves(figure)
+        yield f"color-noise-{number}", caption, partial(draw_error_curves, figure)
     told = {
         CHART: "A rendering, not a photograph: the chart in daylight through each noise-optimal matrix",
         NIGHT: "A rendering, not a photograph: a street at night under white LEDs, each pixel with the noise of four",
     }
     for number, (picture, seen) in enumerate(renderings(output).items(), 1):
-        yield f"rendered-{number}", told[picture], draw_renderings(seen, told[picture])
+        yield f"rendered-{number}", told[picture], partial(draw_renderings, seen, told[picture])

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
-
-import pandas as pd
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 from ..results.output import Output
 from ..results.tables import FOUND, PLAIN, SWEPT
 from ..results.thinning import per_exposure
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Row = Mapping[Any, Any]
 
@@ -36,10 +38,14 @@ class Leaders:
 
 def leaders_of(output: Output, scenario: str | None = None) -> Leaders:
     """Who leads in a scenario, by default in that of the best design, or in the first one."""
+    if scenario is None:
+        scenario = str(output.best.iloc[0]["scenario"]) if len(output.best) else output.scenarios[0]
+    return output.once(("leaders", scenario), partial(_leaders, output, scenario))
+
+
+def _leaders(output: Output, scenario: str) -> Leaders:
     separation = output.trade_off[0].name
     best = output.best
-    if scenario is None:
-        scenario = str(best.iloc[0]["scenario"]) if len(best) else output.scenarios[0]
     rows = output.table[(output.table["scenario"] == scenario) & (output.table["status"] == "ok")]
     made = rows["kind"].isin([SWEPT, FOUND])
     own = best[best["scenario"] == scenario]

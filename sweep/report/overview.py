@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
-
-import pandas as pd
 
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..results.output import Output
@@ -15,6 +13,7 @@ from .figures import COLORS, LIMIT_NAME, TRACED_NAME, Points, canvas
 from .names import label
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 _STYLES: dict[str, dict[str, Any]] = {
@@ -53,18 +52,23 @@ class OverviewFigure:
 def overview_figure(output: Output, scenario: str) -> OverviewFigure:
     """All CFAs of a scenario."""
     table = output.table[(output.table["scenario"] == scenario) & (output.table["status"] == "ok")]
-    separation = output.trade_off[0]
     swept = table[(table["kind"] == SWEPT) & table["pareto"]]
     kinds = {"plain": PLAIN, "named": NAMED, "best": FOUND}
     groups = {name: _points(output, table[table["kind"] == kind], named=True) for name, kind in kinds.items()}
     for name, rows in (("front", swept[swept["feasible"]]), ("outside", swept[~swept["feasible"]])):
         groups[name] = _points(output, rows)
+    return replace(around_designs(output, scenario), groups=groups)
+
+
+def around_designs(output: Output, scenario: str) -> OverviewFigure:
+    """The same without the designs: what stands around them."""
+    separation = output.trade_off[0]
     traced, limit = _trade_off(output, scenario)
     return OverviewFigure(
         title=f"{output.study.study}: {separation.words} against light",
         x_label=f"{output.columns[CFA_SENSITIVITY].words}: light of the whole CFA (clear sensor = 1)",
         y_label=separation.axis,
-        groups=groups,
+        groups={},
         traced=traced,
         limit=limit,
     )

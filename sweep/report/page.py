@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING
+from functools import partial
+from itertools import chain, islice
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 import pyarrow as pa
@@ -22,7 +24,7 @@ from . import values as content
 from .allowed_lamps import lamp_drawings, lamp_table
 from .answer import answer_sentences
 from .colors import color_drawings
-from .figures import draw_curves, draw_pareto, pictures_of
+from .figures import Drawing, draw_curves, draw_pareto, pictures_of
 from .filter_figures import filters_figure
 from .large_numbers import large_numbers
 from .leaders import leaders_of
@@ -42,7 +44,7 @@ from .terms import constraints_told, terms_of
 from .tiles import draw_tiles, tiles_figure
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 
 _FIRST_LINES, _FIRST_LEADS = 1, 2
@@ -79,69 +81,76 @@ def _contents(output: Output, some: Iterable[str] | None, parallel: Parallel) ->
         where = name if name.startswith(("cfas", "pareto")) else f"{FIGURES}/{name}"
         if some is None or {f"{where}.png", f"{where}.svg"} & {*some}:
             wanted.append((name, caption, where, figure))
-    calls = [delayed(pictures_of, figure, ("png", "svg")) for *_, figure in wanted]
-    for (name, caption, where, _), made in zip(wanted, parallel(calls), strict=True):
+    pictures = parallel(delayed(pictures_of, figure, ("png", "svg")) for *_, figure in wanted)
+    begun = [*islice(pictures, 1)]  # workers make the others while the page is written
+    published = comparison_with_published(output)
+    parts = _parts(output, published) if some is None else {}
+    for (name, caption, where, _), made in zip(wanted, chain(begun, pictures), strict=True):
         contents |= {f"{where}.{kind}": content for kind, content in made.items()}
         if some is None and name.startswith((*_PICTURES, *_OF_TASKS, _OF_REGIONS, _OF_PRICE, _MAPS, VISION_FIGURES)):
             images.append((name, caption, inlined(made["png"])))
-    published = comparison_with_published(output)
     if len(published):
         contents[PUBLISHED_CSV] = csv_of(published).encode("utf-8")
         contents[PUBLISHED_PARQUET] = encoded(pa.Table.from_pandas(published, preserve_index=False))
     if some is None:
-        contents[REPORT] = _html(output, images, published).encode("utf-8")
+        contents[REPORT] = page("report.html.j2", **parts, **_images(images)).encode("utf-8")
     return contents
 
 
-def _html(output: Output, images: Sequence[tuple[str, str, str]], published: pd.DataFrame) -> str:
+def _images(images: Sequence[tuple[str, str, str]]) -> dict[str, list[tuple[str, str]]]:
+    """Pictures by where the page has them: caption and address; `images`: their files' names, too."""
+    wheres: dict[str, str | tuple[str, ...]] = {
+        "images": _PICTURES,
+        "price_images": _OF_PRICE,
+        "lamp_images": _OF_REGIONS,
+    }
+    wheres |= {"vision_images": VISION_FIGURES, "score_images": _OF_TASKS, "map_images": _MAPS}
+    return {where: [(told, uri) for name, told, uri in images if name.startswith(own)] for where, own in wheres.items()}
+
+
+def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
+    """What the page says, but for its pictures."""
     drawn, card = payload(output), scorecard(output)
     groups, series_first = scene_groups(output), bool(drawn["series"]) and output.best.empty
-    return page(
-        "report.html.j2",
-        study=output.study,
-        folder=output.folder.as_posix(),
-        quoted=shlex.quote(output.folder.as_posix()),
-        objective=_objective(output),
-        numbers_in="" if len(output.scenarios) == 1 or output.best.empty else f"in {leaders_of(output).scenario}",
-        series_first=series_first,
-        terms_first=series_first and drawn["series"][0]["y_label"] == output.trade_off[0].axis,
-        objective_words=output.goal.words,
-        answer=answer_sentences(output),
-        first_lines=_FIRST_LEADS if series_first and output.study.recognition is None else _FIRST_LINES,
-        numbers=large_numbers(output),
-        counts=counts_line(output),
-        interactive=drawn,
-        profiles={cfa: rows(profile_table(found)) for cfa, found in output.profiles.items()},
-        history=drawn["history"],
-        plotly=library(),
-        script=script("report.js"),
-        groups=groups,
-        scenes=rows(scene_table(groups)),
-        group_rows=[rows(effect_table(group)) for group in groups],
-        audited=output.audited is not None,
-        images=[(caption, uri) for name, caption, uri in images if name in _PICTURES],
-        price_images=[(caption, uri) for name, caption, uri in images if name.startswith(_OF_PRICE)],
-        lamps=rows(lamp_table(output)),
-        lamp_images=[(caption, uri) for name, caption, uri in images if name.startswith(_OF_REGIONS)],
-        vision=_vision(output),
-        vision_images=[(caption, uri) for name, caption, uri in images if name.startswith(VISION_FIGURES)],
-        comparison=rows(tables.comparison_table(output)),
-        best=rows(tables.best_table(output)),
-        recognition=rows(told_apart_table(output)),
-        score_names=() if card is None else card.names,
-        score_rows=[] if card is None else score_cells(card),
-        score_images=[(caption, uri) for name, caption, uri in images if name.startswith(_OF_TASKS)],
-        map_images=[(caption, uri) for name, caption, uri in images if name.startswith(_MAPS)],
-        conditions=output.study.tasks,
-        left_out=rows(tables.worst_left_out(output)),
-        geometry=rows(tables.geometry_table(output)),
-        published=rows(published),
-        constraints=constraints_told(output),
-        terms=terms_of(output),
-        summary=summary_lines(output),
-        provenance=output.provenance.model_dump(mode="json"),
-        limited=output.provenance.search is not None and output.provenance.search.limit_proven is not None,
-    )
+    return {
+        "study": output.study,
+        "folder": output.folder.as_posix(),
+        "quoted": shlex.quote(output.folder.as_posix()),
+        "objective": _objective(output),
+        "numbers_in": "" if len(output.scenarios) == 1 or output.best.empty else f"in {leaders_of(output).scenario}",
+        "series_first": series_first,
+        "terms_first": series_first and drawn["series"][0]["y_label"] == output.trade_off[0].axis,
+        "objective_words": output.goal.words,
+        "answer": answer_sentences(output),
+        "first_lines": _FIRST_LEADS if series_first and output.study.recognition is None else _FIRST_LINES,
+        "numbers": large_numbers(output),
+        "counts": counts_line(output),
+        "interactive": drawn,
+        "profiles": {cfa: rows(profile_table(found)) for cfa, found in output.profiles.items()},
+        "history": drawn["history"],
+        "plotly": library(),
+        "script": script("report.js"),
+        "groups": groups,
+        "scenes": rows(scene_table(groups)),
+        "group_rows": [rows(effect_table(group)) for group in groups],
+        "audited": output.audited is not None,
+        "lamps": rows(lamp_table(output)),
+        "vision": _vision(output),
+        "comparison": rows(tables.comparison_table(output)),
+        "best": rows(tables.best_table(output)),
+        "recognition": rows(told_apart_table(output)),
+        "score_names": () if card is None else card.names,
+        "score_rows": [] if card is None else score_cells(card),
+        "conditions": output.study.tasks,
+        "left_out": rows(tables.worst_left_out(output)),
+        "geometry": rows(tables.geometry_table(output)),
+        "published": rows(published),
+        "constraints": constraints_told(output),
+        "terms": terms_of(output),
+        "summary": summary_lines(output),
+        "provenance": output.provenance.model_dump(mode="json"),
+        "limited": output.provenance.search is not None and output.provenance.search.limit_proven is not None,
+    }
 
 
 def _vision(output: Output) -> dict[str, list[list[str]]]:
@@ -154,7 +163,7 @@ def _vision(output: Output) -> dict[str, list[list[str]]]:
     return {title: rows(table) for title, table in vision_parts(benchmark_of(output)).items()}
 
 
-def _vision_drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
+def _vision_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
     """The figures of the benchmark of vision; none where the study asks for none."""
     if output.study.vision is not None:
         from .vision import benchmark_of  # noqa: PLC0415  (only where a study asks for images)
@@ -170,33 +179,35 @@ def _objective(output: Output) -> str:
     return words if name in (words, COMBINED) else f"{words} ({name} in the files)"
 
 
-def _drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
-    """(file name, caption, figure) of everything that is drawn."""
-    scenario = output.scenarios[0]
-    cfas = list(dict.fromkeys(m.cfa for m in content.modifications(output)))
-    yield "cfas", "All CFAs", draw_overview(overview_figure(output, scenario))
-    for number, cfa in enumerate(content.traded_cfas(output)):
-        figure = draw_pareto(content.pareto_figure(output, scenario, cfa))
-        yield ("pareto" if number == 0 else f"pareto-{number + 1}"), f"Trade-off of {cfa}", figure
-    for number, cfa in enumerate(cfas):
-        yield f"filters-{number + 1}", f"Filters of {cfa}", draw_curves(filters_figure(output, cfa))
-    for number, series in enumerate(all_series(output)):
-        yield f"series-{number + 1}", series.title, draw_series(series)
-    card = scorecard(output)
-    if card is not None:
-        yield "scorecard", f"Every figure relative to {card.names[card.reference]}", draw_scorecard(card)
-    yield from map_drawings(output)
-    yield from color_drawings(output)
-    yield from price_drawings(output)
-    yield from lamp_drawings(output)
-    yield "tiles", "Tiles of the CFAs; a hatched pixel is modified", draw_tiles(tiles_figure(output))
-    yield "sensor", "Quantum efficiency of the sensor", draw_curves(content.sensor_figure(output))
-    yield "signals", "Spectra of the signals", draw_curves(content.lights_figure(output))
-    yield "chart", "The color checker chart", draw_chart(content.chart_figure(output))
+def _drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
+    """(file name, caption, drawing) of everything that is drawn."""
+    # What takes longest comes first, so that no core waits for it in the end.
     for name, caption, kinds in (
         ("clouds-cfas", "Signals in the channels of the plain CFAs", (PLAIN,)),
         ("clouds-designs", "Signals in the channels of the named and the found designs", (NAMED, FOUND)),
     ):
         found = content.clouds(output, *kinds)
         if found:
-            yield name, caption, draw_clouds(found, caption, max(1.0, 1.05 * float(output.points["dn"].max())))
+            top_dn = max(1.0, 1.05 * float(output.points["dn"].max()))
+            yield name, caption, partial(draw_clouds, found, caption, top_dn)
+    scenario = output.scenarios[0]
+    cfas = list(dict.fromkeys(m.cfa for m in content.modifications(output)))
+    yield "cfas", "All CFAs", partial(draw_overview, overview_figure(output, scenario))
+    for number, cfa in enumerate(content.traded_cfas(output)):
+        figure = partial(draw_pareto, content.pareto_figure(output, scenario, cfa))
+        yield ("pareto" if number == 0 else f"pareto-{number + 1}"), f"Trade-off of {cfa}", figure
+    for number, cfa in enumerate(cfas):
+        yield f"filters-{number + 1}", f"Filters of {cfa}", partial(draw_curves, filters_figure(output, cfa))
+    for number, series in enumerate(all_series(output)):
+        yield f"series-{number + 1}", series.title, partial(draw_series, series)
+    card = scorecard(output)
+    if card is not None:
+        yield "scorecard", f"Every figure relative to {card.names[card.reference]}", partial(draw_scorecard, card)
+    yield from map_drawings(output)
+    yield from color_drawings(output)
+    yield from price_drawings(output)
+    yield from lamp_drawings(output)
+    yield "tiles", "Tiles of the CFAs; a hatched pixel is modified", partial(draw_tiles, tiles_figure(output))
+    yield "sensor", "Quantum efficiency of the sensor", partial(draw_curves, content.sensor_figure(output))
+    yield "signals", "Spectra of the signals", partial(draw_curves, content.lights_figure(output))
+    yield "chart", "The color checker chart", partial(draw_chart, content.chart_figure(output))

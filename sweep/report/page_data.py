@@ -20,7 +20,7 @@ from .figures import COLORS, CURVE_COLORS, TYPE_COLORS, ParetoFigure
 from .filter_figures import end_curves
 from .history import history_of
 from .noise import all_series
-from .overview import OverviewFigure, overview_figure
+from .overview import OverviewFigure, around_designs
 from .series import SeriesFigure
 
 _OF_PARAMETERS, _OF_OTHERS = 2, 4
@@ -148,7 +148,7 @@ def _lines(figure: ParetoFigure | OverviewFigure) -> dict[str, Any]:
 
 def _overview(output: Output, scenario: str) -> dict[str, Any]:
     """What is drawn around the points of all CFAs of a scenario."""
-    figure = overview_figure(output, scenario)
+    figure = around_designs(output, scenario)
     words = {"title": figure.title, "x_label": figure.x_label, "y_label": figure.y_label}
     return {"scenario": scenario, **words, **_lines(figure)}
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import TYPE_CHECKING
 
 import pandas as pd
 
 from ..results.output import Output
 from ..results.tables import NAMED, PLAIN
-from .figures import COLORS, canvas
+from .figures import COLORS, Drawing, canvas
 from .leaders import leaders_of
 
 if TYPE_CHECKING:
@@ -30,15 +31,15 @@ def price_lines(output: Output) -> Iterator[str]:
     )
 
 
-def price_drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
-    """(file name, caption, figure) of the trade-offs; nothing where no levels are asked for."""
+def price_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
+    """(file name, caption, drawing) of the trade-offs; nothing where no levels are asked for."""
     found, light = _parts(output)
     if len(found):
         caption = "What the worst case costs: the largest one that the search finds at each nominal level"
-        yield "price", caption, _draw(output, found, caption)
+        yield "price", caption, partial(_draw, output, found, caption)
     if len(light):
         caption = "Nominal and worst case against light: what the search finds at each level of sensitivity"
-        yield "price-light", caption, _draw_light(output, light, caption)
+        yield "price-light", caption, partial(_draw_light, output, light, caption)
 
 
 def _parts(output: Output) -> tuple[pd.DataFrame, pd.DataFrame]:

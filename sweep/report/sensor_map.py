@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from ..base.types import FloatArray
 from ..results.output import Output
 from ..results.tables import FOUND, PLAIN, SENSOR_MAP
-from .figures import empty_figure
+from .figures import Drawing, empty_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -138,7 +139,7 @@ def draw_map(figure: SensorFigure) -> Figure:
     return drawn
 
 
-def map_drawings(output: Output) -> Iterator[tuple[str, str, Figure]]:
-    """(file name, caption, figure) of every map."""
+def map_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
+    """(file name, caption, drawing) of every map."""
     for number, figure in enumerate(sensor_figures(output), 1):
-        yield f"places-{number}", told_map(figure), draw_map(figure)
+        yield f"places-{number}", told_map(figure), partial(draw_map, figure)

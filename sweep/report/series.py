@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from ..base.types import FloatArray
 from ..metrics.quantity import DN
 from .figures import CURVE_CYCLE, canvas, canvas_grid
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 _WIDE = 15.0

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from ..camera.mosaic import Mosaic
 from ..curves.color import display_colors
@@ -21,6 +20,9 @@ from .figures import TYPE_COLORS, CurvesFigure, ParetoFigure, Points
 from .names import label
 from .series import Line, SeriesFigure
 from .signal_figures import ChartFigure, Cloud
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Nearest = tuple[tuple[str, str], tuple[str, str], str]
 """(type, name) of two lights, and their distance in words."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,7 @@ import pandas as pd
 
 from ..results.output import Output
 from ..results.tables import VISION_MISREAD
-from .figures import CURVE_CYCLE, canvas_grid, empty_figure
+from .figures import CURVE_CYCLE, Drawing, canvas_grid, empty_figure
 from .vision import OBSERVER, READER_NAMES, Benchmark, said_interval
 from .vision_ranks import PREDICTORS, Ranks, ranks_of
 
@@ -24,17 +25,21 @@ _MARKERS = "osD^vP*X<>hp"
 _LABELS = {"csd": "smallest CSD / DN", "dprime": "smallest d'", "pair_error": "pairwise error", OBSERVER: "its error"}
 
 
-def vision_drawings(output: Output, benchmark: Benchmark) -> Iterator[tuple[str, str, Figure]]:
-    """(file name, caption, figure) of a benchmark."""
+def vision_drawings(output: Output, benchmark: Benchmark) -> Iterator[tuple[str, str, Drawing]]:
+    """(file name, caption, drawing) of a benchmark."""
     ranks = ranks_of(benchmark)
     who = READER_NAMES[benchmark.judge]
-    yield "vision-errors", f"Images that the {who} reads wrongly, over the distance", _draw_errors(benchmark, ranks)
+    yield (
+        "vision-errors",
+        f"Images that the {who} reads wrongly, over the distance",
+        partial(_draw_errors, benchmark, ranks),
+    )
     if ranks.between:
-        yield "vision-ranks", f"What predicts the {who}'s errors", _draw_ranks(benchmark, ranks)
+        yield "vision-ranks", f"What predicts the {who}'s errors", partial(_draw_ranks, benchmark, ranks)
     pictures = output.vision[VISION_MISREAD]
     if len(pictures):
         caption = f"Images that the {who} read wrongly, lenses shuffled, in false colors: what it is > what was said"
-        yield "vision-misread", caption, _draw_misread(benchmark, pictures)
+        yield "vision-misread", caption, partial(_draw_misread, benchmark, pictures)
 
 
 def _draw_errors(benchmark: Benchmark, ranks: Ranks) -> Figure:

@@ -68,10 +68,11 @@ class KeptPlans:
         return self._folder / f"{key}.json"
 
 
-def study_key(study: Study, scenario: str, tolerance_dn: float | None) -> str:
-    """SHA-256 of all that the whole study depends on, and the scene: nothing of its families is asked for it.
+def study_keys(study: Study, tolerance_dn: float | None) -> dict[str, str]:
+    """For each scene the SHA-256 of all that the whole study depends on, and the scene.
 
-    What an object may have in place of what its section says (spaces, scenes, pixel, lights) is part of it.
+    Nothing of its families is asked for it. What an object may have in place of what its section says (spaces, scenes,
+    pixel, lights) is part of it.
     """
     digest = hashlib.sha256()
     spaces = [
@@ -79,8 +80,13 @@ def study_key(study: Study, scenario: str, tolerance_dn: float | None) -> str:
         for s in study.spaces
     ]
     held = (study.scenarios, study.pixel, study.lights, spaces)
-    _add(digest, (fingerprint(study), held, _code(), scenario, study.tolerance_dn(tolerance_dn)))
-    return digest.hexdigest()
+    _add(digest, (fingerprint(study), held, _code(), study.tolerance_dn(tolerance_dn)))
+    keys = {}
+    for name in study.scenarios:
+        own = digest.copy()
+        _add(own, name)
+        keys[name] = own.hexdigest()
+    return keys
 
 
 def plan_key(study: Study, scenario: str, tolerance_dn: float | None) -> str:

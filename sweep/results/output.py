@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
-import pandas as pd
 from ruamel.yaml import YAML
 
 from ..base.errors import Fault, OutputError
@@ -56,6 +55,10 @@ from .tables import (
 )
 from .thinning import Counts, swept_points, thinned
 
+if TYPE_CHECKING:
+    import pandas as pd
+
+_Made = TypeVar("_Made")
 _OPTIONAL = (
     FRONT,
     PRICE,
@@ -111,6 +114,14 @@ class Output:
     places: pd.DataFrame | None
     vision: Mapping[str, pd.DataFrame]
     profiles: Mapping[str, Sequence[ParameterProfile]]
+    _made: dict[object, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def once(self, key: object, make: Callable[[], _Made]) -> _Made:
+        """What several parts of a report need of this run, made for the first of them."""
+        if key not in self._made:
+            self._made[key] = make()
+        found: _Made = self._made[key]
+        return found
 
     @property
     def objective(self) -> Objective:

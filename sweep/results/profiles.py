@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 
 from ..base.types import FloatArray
 from .tables import holds
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _KEEPS = 0.95
 _MOST_PLACES, _MOST_PROFILES = 60, 9
@@ -60,6 +63,8 @@ class Profiles:
             self._take(str(cfa), rows)
 
     def _take(self, cfa: str, rows: pd.DataFrame) -> None:
+        import pandas as pd  # noqa: PLC0415  (slow to import: workers do without)
+
         mine = self._best.setdefault(cfa, {})
         for name in self.parameters:
             own = rows.dropna(subset=[name])
@@ -96,6 +101,8 @@ def _places(best: pd.Series) -> pd.Series:
 
 def profile_table(profiles: Sequence[ParameterProfile]) -> pd.DataFrame:
     """What each parameter's value matters, in figures."""
+    import pandas as pd  # noqa: PLC0415  (slow to import: workers do without)
+
     return pd.DataFrame(
         [
             {

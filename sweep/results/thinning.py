@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
@@ -16,6 +16,9 @@ from ..base.errors import Fault, OutputError
 from ..base.types import IndexArray
 from ..metrics.columns.exposure import EXPOSURE
 from .tables import SWEPT, batches, best_rows, holds, release_memory
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 MOST_ROWS = 150_000
 """A table of up to this many rows is kept whole."""

@@ -1,11 +1,19 @@
-"""Run a study over the cores or a cluster and keep what it found."""
+"""Run a study over the cores or a cluster and keep what it found.
 
-from ..results.folder import output_folder
-from .estimate import estimate, estimate_lines
-from .plans import with_plans
-from .stop import stop_on_signals
-from .whole import Wishes, run_study
-from .workers import BACKENDS, usable_backend
+Names are loaded when they are first used: a worker process begins here, and needs few of them.
+"""
+
+from typing import TYPE_CHECKING
+
+from ..base.later import loaded_later
+
+if TYPE_CHECKING:
+    from ..results.folder import output_folder
+    from .estimate import estimate, estimate_lines
+    from .plans import with_plans
+    from .stop import stop_on_signals
+    from .whole import Wishes, run_study
+    from .workers import BACKENDS, usable_backend
 
 __all__ = [
     "BACKENDS",
@@ -18,3 +26,17 @@ __all__ = [
     "usable_backend",
     "with_plans",
 ]
+__getattr__ = loaded_later(
+    globals(),
+    {
+        "BACKENDS": ".workers",
+        "Wishes": ".whole",
+        "estimate": ".estimate",
+        "estimate_lines": ".estimate",
+        "output_folder": "..results.folder",
+        "run_study": ".whole",
+        "stop_on_signals": ".stop",
+        "usable_backend": ".workers",
+        "with_plans": ".plans",
+    },
+)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 
 from ..base.types import FloatArray, Parallel, Progress, delayed
@@ -19,6 +18,9 @@ from ..curves.single_leds import Norm, SingleLeds, every_led
 from ..results.designs import row_curves
 from ..results.tables import FEW
 from ..study import Study
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _TOGETHER = 128
 """LEDs that are read out at once."""

@@ -36,20 +36,20 @@ class Kept:
         self._round += 1
         waiting = list(calls)
         keys = [
-            hashlib.sha256(f"{self.fingerprint} answer {self._round} {at}".encode()).hexdigest()
+            hashlib.sha256(f"{self.fingerprint} answer {self._round}, {at}".encode()).hexdigest()
             for at in range(len(waiting))
         ]
         read = (self._answer(key, call) for key, call in zip(keys, waiting, strict=True))
         known = {at: answer for at, answer in enumerate(read) if answer is not None}
-        fresh = self.crew(call for at, call in enumerate(waiting) if at not in known)
-        for at, key in enumerate(keys):
-            if at in known:
-                yield known[at]
-                continue
-            started = time.monotonic()
-            answer = next(fresh)
-            self.journal.keep(key, to_json(answer), time.monotonic() - started)
-            yield answer
+        missing = [at for at in range(len(waiting)) if at not in known]
+        started = time.monotonic()
+
+        def keep(number: int, answer: Any) -> None:
+            self.journal.keep(keys[missing[number]], to_json(answer), time.monotonic() - started)
+
+        fresh = self.crew((waiting[at] for at in missing), finished=keep)
+        for at in range(len(waiting)):
+            yield known[at] if at in known else next(fresh)
 
     def _answer(self, key: str, call: Call) -> Any:
         """The answer of an earlier, interrupted run to this call, or None."""

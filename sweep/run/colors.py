@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 
 from ..base.types import FloatArray
@@ -15,6 +14,9 @@ from ..curves.tasks import Chart, StudyTasks
 from ..results.designs import row_curves
 from ..results.tables import CHART, FEW, NIGHT
 from ..study import Study
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _TOLD = ("design_id", "name", "scenario")
 _DESIGN = [("design_id", pa.int64()), ("name", pa.string()), ("scenario", pa.string())]

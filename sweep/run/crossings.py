@@ -6,10 +6,9 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 from pydantic import ValidationError
 
@@ -23,6 +22,9 @@ from ..results.designs import row_curves
 from ..results.tables import FEW
 from ..study import Study
 from ..study.axes import series_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _LEAST = 1e-300
 _CLOSE = 1e-3

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 
 from ..results.curves import FilterCurves, KeptCurves
@@ -14,6 +13,9 @@ from ..results.designs import row_curves, row_space
 from ..search.limit import Limit
 from ..study import Study
 from .looks import Look
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def kept_curves(study: Study, rows: pd.DataFrame, on_front: pd.DataFrame, limit: Limit | None) -> KeptCurves:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 
 from ..base.types import BoolArray, FloatArray, IndexArray
@@ -11,6 +12,9 @@ from ..metrics.pareto import non_dominated
 from ..results.tables import FEW, SWEPT, best_rows, holds
 from ..results.thinning import leading
 from .rows import Rules
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 BEST_PER_CFA = 12
 """Best feasible designs of each CFA's sweeps that the report lists and draws."""

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 
 from ..base.types import FloatArray, Parallel, Progress, delayed
@@ -24,6 +23,9 @@ from ..search.solver import search_from, smooth_objective
 from ..search.trade_off import Effort
 from ..study import Search, Study
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 LEFT_OUT_STARTS = 4
 """Of each search without a light."""
 _FIGURES = ("seen", "with_it", "fall")
@@ -36,6 +38,8 @@ def held_out_table(
 
     The scenes are those of the study, by the methods of their plans, with the other lights in place of its own.
     """
+    import pandas as pd  # noqa: PLC0415  (slow to import: workers do without)
+
     assert study.held_out is not None
     lights = study.held_out
     every = pd.concat([rows, on_front]).drop_duplicates("design_id")

@@ -9,11 +9,9 @@ from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
-import pyarrow as pa
 
 from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.imager import imager_of
@@ -25,6 +23,10 @@ from ..results.designs import row_curves
 from ..results.tables import FEW, FOUND, LIMITED_BY, POINTS, RECOGNITION, holds
 from ..study import Study
 from .rows import Job
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
 
 _AT_ONCE = 64
 _Row = Mapping[Hashable, Any]
@@ -144,6 +146,8 @@ def looks_of(
 
 def _shown(looking: Looking, rows: pd.DataFrame, on_front: pd.DataFrame) -> Iterator[tuple[_Row, frozenset[str]]]:
     """Rows that are shown, each once, and for which tables they are looked at; not those that failed."""
+    import pandas as pd  # noqa: PLC0415  (slow to import: workers do without)
+
     front = {*on_front["design_id"]}
     every = pd.concat([rows, on_front]).drop_duplicates("design_id")
     for row in every[every["status"] == "ok"].to_dict("records"):

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-
-import pandas as pd
-import pyarrow as pa
+from typing import TYPE_CHECKING
 
 from ..base.types import IndexArray, Parallel, Progress
 from ..results.tables import (
@@ -32,6 +30,10 @@ from .held_out import held_out_table
 from .limiting import limited_by_table
 from .looks import Look
 from .recognition import recognition_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import pyarrow as pa
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ..base.types import Progress, delayed
 from ..camera.plan.plan import Plan
-from ..results.kept_plans import KeptPlans, plan_key, study_key
+from ..results.kept_plans import KeptPlans, plan_key, study_keys
 from ..study import Study
 from .stop import Stop
 from .workers import Workers, workers
@@ -22,7 +22,7 @@ def with_plans(
     is planned again. Raises InterruptedRunError after `stop` was asked for.
     """
     kept = KeptPlans()
-    keys = {name: study_key(study, name, tolerance_dn) for name in study.scenarios}
+    keys = study_keys(study, tolerance_dn)
     plans = {name: plan for name, key in keys.items() if (plan := kept.of(key)) is not None}
     missing = [name for name in keys if name not in plans]
     for name, plan in zip(missing, _found(study, missing, n_jobs, tolerance_dn, stop), strict=True):
@@ -39,7 +39,7 @@ def _found(
     if not names:
         return
     # One scene is planned faster than workers are started.
-    how = Workers(min(n_jobs, len(names)), Stop() if stop is None else stop)
+    how = Workers(n_jobs if len(names) > 1 else 1, Stop() if stop is None else stop)
     with workers(how) as crew:
         yield from crew(delayed(_planned, study, name, tolerance_dn) for name in names)
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
-import pandas as pd
 import pyarrow as pa
 
 from ..metrics.recognition import columns
 from ..results.tables import FEW
 from ..study import Study
 from .looks import Look
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def recognition_table(study: Study, highlights: pd.DataFrame, looks: Mapping[int, Look]) -> pa.Table:

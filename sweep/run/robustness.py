@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 
 from ..base.types import FloatArray, Parallel, Progress, delayed
@@ -22,6 +21,9 @@ from ..metrics.share import share_interval
 from ..results.designs import row_space
 from ..results.tables import FEW, PLAIN
 from ..study import Study
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _LARGEST, _STEP, _HALVINGS = 3.0, 0.25, 6
 """Times the population that are looked at, the steps in which, and how often the last of these is halved."""

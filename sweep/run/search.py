@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from ..search.limit import Limit, limit_of, why_not
 from ..search.price import PricePoint, price_of_light, worst_case_price
 from ..search.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
 from ..search.solver import best_reachable, search_from
-from ..search.trade_off import Effort, FrontPoint, check_proof, gap_of, trade_off
+from ..search.trade_off import Effort, FrontPoint, calls_at_levels, check_proof, gap_of, trade_off
 from ..study import Search, Study
 from .rows import Job, Rules, run_job
 
@@ -55,21 +56,23 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     n_starts = min(search.starts, search.max_evaluations)
     starts = starting_points(problem, n_starts, study.section.seed)
     each = search.max_evaluations // n_starts
-    tasks = (
-        delayed(search_from, problem, i, u, search.algorithm, each, study.section.seed) for i, u in enumerate(starts)
-    )
+    effort = Effort(search.algorithm, starts, each, study.section.seed)
+    no_limit = why_not(problem)
+    limited = no_limit is None
+    # All at once, so that no core waits for another: few of these calls need what others find.
+    calls = [delayed(search_from, problem, i, u, search.algorithm, each, effort.seed) for i, u in enumerate(starts)]
+    calls += [delayed(limit_of, problem)] if limited else []
+    answers = parallel([*calls, *calls_at_levels(problem, search.levels, effort, limited=limited)])
     runs: list[SearchRun] = []
-    for run in parallel(tasks):
+    for run in islice(answers, n_starts):
         runs.append(run)
         progress("search starts", len(runs), n_starts)
     best = best_feasible([e for run in runs for e in run.log])
     if best is None:
         raise _infeasible(study, problem, starts[:_REACH_STARTS], each)
-    no_limit = why_not(problem)
-    limit = limit_of(problem) if no_limit is None else None
+    limit = next(answers) if limited else None
     check_proof(best, limit)
-    effort = Effort(search.algorithm, starts, each, study.section.seed)
-    front = trade_off(problem, search.levels, effort, parallel, progress) if search.levels else ()
+    front = trade_off(problem, search.levels, effort, answers, parallel, progress, limited=limited)
     price: tuple[PricePoint, ...] = ()
     if search.nominal_levels:
         price = worst_case_price(problem, best, limit, search.nominal_levels, effort, parallel, progress)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 
 from ..base.types import FloatArray, Parallel, Progress, delayed
@@ -16,6 +16,9 @@ from ..metrics.smooth import smooth_response
 from ..results.designs import row_curves
 from ..results.tables import FEW
 from ..study import Study
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _HEIGHTS = 41
 """Image heights at which a map is computed, in equal steps."""

@@ -139,16 +139,22 @@ class Sweep:
         """Jobs by the calls that they are computed in.
 
         Jobs of few designs of one scene go to one worker, since they share its kernels, where there are so many scenes
-        that no worker waits long for the last one.
+        that no worker waits long for the last one. Scenes that take longest, by their plans, come first.
         """
         scenes = [list(own) for _, own in groupby(todo, lambda index: self.jobs[index].scenario)]
+        scenes.sort(key=lambda own: -self._work(self.jobs[own[0]].scenario))
         if len(scenes) < _SCENES_PER_WORKER * self.crew.count:
-            return [[index] for index in todo]
+            return [[index] for own in scenes for index in own]
         found: list[list[int]] = []
         for own in scenes:
             few = sum(self.jobs[index].stop - self.jobs[index].start for index in own) <= _FEW
             found += [own] if few else [[index] for index in own]
         return found
+
+    def _work(self, scenario: str) -> float:
+        """Estimated seconds of a scene; 0 where none are known."""
+        plan = self.study.plans.get(scenario)
+        return 0.0 if plan is None else plan.work
 
     def tables(self) -> Iterator[pa.Table]:
         """All finished chunks in order; one whose file is damaged is computed again. Counts failures and detours."""

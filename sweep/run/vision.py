@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 
 from ..base.types import FloatArray, Parallel, Progress, delayed
@@ -24,6 +23,9 @@ from ..vision.images import view_at
 from ..vision.readers import Answers, SeedReading, read_images
 from ..vision.scenes import ORDERS, SEEN, UNSEEN, states_of
 from ..vision.section import Vision
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _TEXT, _NUMBER, _COUNT = pa.string(), pa.float64(), pa.int64()
 _DESIGN = [("design_id", _COUNT), ("name", _TEXT), ("cfa", _TEXT)]

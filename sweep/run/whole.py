@@ -26,7 +26,7 @@ from .plans import with_plans
 from .provenance import resolved_yaml
 from .rows import rules_of
 from .stop import Stop, stop_on_signals
-from .workers import Workers, workers
+from .workers import Workers, called_by, workers
 
 _HOW = ("command", "backend", "scheduler", "workers", "duration_s")
 """What provenance and `run.json` both say of how a run went, so that either makes the other again."""
@@ -86,6 +86,7 @@ def run_study(
             inventory.write({RESOLVED: resolved_yaml(study).encode("utf-8")})
         elif wrong or retry:
             try:
+                crew.begin(called_by(study))
                 study = with_plans(study, crew.count, progress, stop=own)
                 rules = rules_of(study)
                 if retry or not fits(inventory, study, rules):

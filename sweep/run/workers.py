@@ -9,11 +9,12 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from importlib import import_module
 from itertools import islice
 from multiprocessing import get_context
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import joblib
 from joblib.externals.loky import ProcessPoolExecutor
@@ -24,7 +25,11 @@ from ..base.types import Call
 from .stop import Stop, without_interrupts
 from .worker_process import keep_freed_memory, preparing
 
+if TYPE_CHECKING:
+    from ..study import Study
+
 _LEAST_WINDOW, _WINDOW_PER_WORKER = 64, 16
+_CALLED, _SEARCHING = ("sweep.run.sweep", "sweep.metrics.nearest"), "sweep.search.solver"
 BACKENDS = ("loky", "threading", "dask")
 _Numbered = tuple[int, Call]
 
@@ -44,6 +49,28 @@ class Workers:
     stop: Stop
     backend: str = "loky"
     scheduler: str | None = None
+    _starting: list[Iterator[Any]] = field(default_factory=list, init=False, repr=False, compare=False)
+
+    def begin(self, modules: Iterable[str]) -> None:
+        """Start worker processes, which load some modules of the package while this process does something else.
+
+        Their first call waits for them, as it would without it.
+        """
+        if self.backend == "loky" and self.count > 1:
+            names = tuple(modules)
+            parallel = joblib.Parallel(self.count, return_as="generator_unordered", batch_size=1)
+            with self.stop.held(), without_interrupts():
+                self._starting.append(parallel((_loaded, (names,), {}) for _ in range(self.count)))
+
+    def begun(self) -> None:
+        """Wait for processes that were started; one that died meanwhile is started again when it is needed."""
+        try:
+            while self._starting:
+                for _ in self._gracefully(self._starting.pop()):
+                    pass
+        except Exception as error:
+            if not _is_death(error):
+                raise
 
     @property
     def count(self) -> int:
@@ -63,6 +90,7 @@ class Workers:
         InterruptedRunError after a stop was asked for and what came within its grace has been handed out. A result
         that was handed out may be kept in peace: the stop waits until the next one is asked for.
         """
+        self.begun()
         rest = enumerate(calls)
         early: dict[int, Any] = {}
         turn = 0
@@ -132,6 +160,11 @@ class Workers:
             return killed(call)
 
 
+def called_by(study: Study) -> tuple[str, ...]:
+    """Modules whose functions a run of the study calls in its workers."""
+    return _CALLED if study.search is None else (*_CALLED, _SEARCHING)
+
+
 def usable_backend(backend: str) -> str:
     """The backend; threads, where this machine has no semaphores for worker processes (no or a read-only /dev/shm)."""
     if backend != "loky":
@@ -166,6 +199,7 @@ def workers(how: Workers) -> Iterator[Workers]:
         stack.enter_context(one_thread())
         stack.enter_context(joblib.parallel_config(how.backend, **settings))
         yield how
+        how.begun()
 
 
 def alone(call: Call) -> Any:
@@ -200,6 +234,13 @@ def _one_threaded(function: Callable[..., Any], arguments: tuple[Any, ...], name
     """A call whose libraries use one thread: the same sums in the same order with any number of workers."""
     with one_thread():
         return function(*arguments, **named)
+
+
+def _loaded(modules: tuple[str, ...]) -> bool:
+    """Load modules of the package."""
+    for name in modules:
+        import_module(name)
+    return True
 
 
 def _numbered(at: int, call: Call) -> tuple[int, Any]:

@@ -8,6 +8,9 @@ import numpy as np
 
 from ..base.types import FloatArray, IndexArray
 
+ROUNDING = 1e-9
+"""Filters may exceed their base by this share: rounding."""
+
 
 @dataclass(frozen=True)
 class Sides:

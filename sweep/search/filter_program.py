@@ -15,13 +15,14 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.optimize import linprog
 from scipy.sparse import csr_matrix, hstack, vstack
 
 from ..base.types import FloatArray, IndexArray
 from ..camera.linear import LinearImager, smooth_imager
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
-from .certificate import Certificate, Sides, Solved
+from .certificate import ROUNDING, Certificate, Sides, Solved
 from .least_noise import least_variance
 from .problem import Problem
 from .produced import Distances
@@ -29,8 +30,6 @@ from .produced import Distances
 if TYPE_CHECKING:
     from .member_pairs import MemberPairs
 
-ROUNDING = 1e-9
-"""Filters may exceed their base by this share: rounding."""
 _SUM_ROUNDING = 1e-12
 """Rounding of a sum over rows and wavelengths, relative to the sum of its terms' sizes."""
 _INSIDE_DN = 2e-7
@@ -236,8 +235,6 @@ class FilterProgram:
         self, rows: csr_matrix, floor: FloatArray, rate: FloatArray
     ) -> tuple[int, FloatArray | None, FloatArray | None]:
         """HiGHS' status, row weights and solution (N, m) of: maximize m subject to rows @ N >= floor + rate m."""
-        from scipy.optimize import linprog  # noqa: PLC0415  (slow to import: kept off the start-up path)
-
         found = linprog(
             c=np.append(np.zeros(self.base.size), -1.0),
             A_ub=hstack([-rows, csr_matrix(rate[:, None])]).tocsr(),

@@ -3,11 +3,10 @@
 All filters means: every N between the least transmission and the base curve that meets the study's bounds on slope,
 sensitivities and CSDs, whichever of two signals it makes the brighter one. The limit is that of the response before
 clipping and quantization, in the scene of the search. Of d' it is a bound with the least noise (`least_noise.py`), near
-which no filter need be. The certificate is a bracket: a filter that attains the lower
-end, and linear programs that no filter above the upper end could meet. Worst cases of CSDs are over the population of
-the lights, and over production where that moves the whole shape of a filter, as it does the family's (`produced.py`).
-What only some families have (widths of edges and bands) is left out, and so are other worst cases: that makes the set
-of filters larger, so the upper end stays true for them.
+which no filter need be. The certificate is a bracket: a filter that attains the lower end, and linear programs that no
+filter above the upper end could meet. Worst cases of CSDs are over the population of the lights, and over production
+where that moves the whole shape of a filter, as it does the family's (`produced.py`). What only some families have
+(widths of edges and bands) is left out, and so are other worst cases: of more filters the upper end stays true.
 """
 
 from __future__ import annotations
@@ -31,14 +30,15 @@ from ..metrics.objective import Objective
 from ..metrics.quantity import DN, WORST_CASE
 from ..metrics.smooth import smooth_csd, smooth_response
 from ..metrics.smooth_noise import smooth_detectability
-from .filter_program import ROUNDING, FilterProgram
+from .certificate import ROUNDING
 from .problem import Problem
 from .produced import all_ways, ways_of
-from .sides import Proof, SideSearch
 
 if TYPE_CHECKING:
     from .any_height import AnyHeight
+    from .filter_program import FilterProgram
     from .member_pairs import MemberPairs
+    from .sides import Proof
 
 _SENSITIVITY_TOLERANCE = 1e-6
 _MOST_PROGRAMS = 5000
@@ -55,10 +55,9 @@ class Limit:
 
     `attained`: the objective for `curve` (ndarray[n_wavelengths]), evaluated like any design; no filter at all reaches
     more than `proven`. Both are -inf when no filter meets the constraints; where none is known that does, `attained` is
-    -inf and `curve` is None. `left_out`: what the
-    study asks for beyond the limit's own constraints. `programs`: number of linear programs solved for it;
-    `open_parts`: parts of the proof that were left open, so that the bracket is wider than it was to be; 0: none.
-    `elsewhere`: what the same proof says of filters with other sensitivities at least.
+    -inf and `curve` is None. `left_out`: what the study asks for beyond the limit's own constraints. `programs`: number
+    of linear programs solved for it; `open_parts`: parts of the proof that were left open, so that the bracket is wider
+    than it was to be; 0: none. `elsewhere`: what the same proof says of filters with other sensitivities at least.
     """
 
     attained: float
@@ -93,8 +92,7 @@ def limit_of(
     members, solved = _members_of(relaxed, over) if over else None, 0
     while True:
         relaxed = relaxed if heights is None else heights.problem
-        program = FilterProgram(relaxed, members)
-        proof = _proof(program, members, tolerance, most_programs - solved)
+        program, proof = _proof(relaxed, members, tolerance, most_programs - solved)
         solved += program.solved
         known = members if heights is None else heights
         if known is None or proof.curve is None or solved >= most_programs or not known.more(proof.curve):
@@ -121,14 +119,20 @@ def _any_height_of(problem: Problem) -> AnyHeight:
     return AnyHeight(problem)
 
 
-def _proof(program: FilterProgram, members: MemberPairs | None, tolerance: float, most_programs: int) -> Proof:
-    """What no filter of a program exceeds."""
+def _proof(
+    problem: Problem, members: MemberPairs | None, tolerance: float, most_programs: int
+) -> tuple[FilterProgram, Proof]:
+    """The linear programs of a problem, and what no filter exceeds."""
+    from .filter_program import FilterProgram  # noqa: PLC0415  (slow to import: kept off the start-up path)
+    from .sides import SideSearch  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
+    program = FilterProgram(problem, members)
 
     def value(curve: FloatArray, inside: FloatArray | None) -> tuple[float, FloatArray]:
         attained, moved = _inside(program.problem, np.clip(curve, program.low, program.base), inside, members)
         return (program.reaches(moved) if program.noisy and attained > -np.inf else attained), moved
 
-    return SideSearch(program, value, tolerance, most_programs).run()
+    return program, SideSearch(program, value, tolerance, most_programs).run()
 
 
 def _attaining(
@@ -153,8 +157,7 @@ def _attaining(
         bounds = asked.constraints
         raised = {n: Bound.model_construct(min=(bounds[n].min or 0.0) + 2 * lack) for n, lack in lacking.items()}
         asked = replace(asked, constraints={**bounds, **raised})
-        program = FilterProgram(asked, members)
-        found = _proof(program, members, tolerance, _ATTEMPT_PROGRAMS)
+        program, found = _proof(asked, members, tolerance, _ATTEMPT_PROGRAMS)
         solved += program.solved
         if found.curve is None:
             break

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, pairwise
+from typing import Any
 
 import numpy as np
 
 from ..base.errors import BrokenProofError, Fault
-from ..base.types import FloatArray, Parallel, Progress, delayed
+from ..base.types import Call, FloatArray, Parallel, Progress, delayed
 from ..metrics.bound import Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
-from .limit import Limit, limit_of, why_not
+from .limit import Limit, limit_of
 from .problem import Evaluation, Problem, SearchRun, best_feasible
 from .solver import search_from
 
@@ -71,50 +72,73 @@ def gap_of(best: Evaluation, limit: Limit) -> float | None:
     return None if limit.proven <= _NO_LIMIT else max(0.0, 1 - best.objective / limit.proven)
 
 
+def calls_at_levels(problem: Problem, levels: Sequence[float], effort: Effort, *, limited: bool) -> list[Call]:
+    """The limit at each level, where the problem is `limited`, and then the first searches of each.
+
+    None of them needs what another one finds.
+    """
+    if not levels:
+        return []
+    at_level = [with_least(problem, SENSITIVITY, level) for level in levels]
+    between = _between(levels)
+    around = [(*before, *after) for before, after in zip([(), *between], [*between, ()], strict=True)]
+    calls = zip(at_level, around, strict=True) if limited else ()
+    limits = [delayed(limit_of, p, _FRONT_LIMIT_DN, _FRONT_PROGRAMS, own) for p, own in calls]
+    return [*limits, *(call for own in at_level for call in _searches(own, effort, 0, effort.starts[:_FRONT_STARTS]))]
+
+
 def trade_off(
-    problem: Problem, levels: Sequence[float], effort: Effort, parallel: Parallel, progress: Progress
+    problem: Problem,
+    levels: Sequence[float],
+    effort: Effort,
+    answers: Iterator[Any],
+    parallel: Parallel,
+    progress: Progress,
+    *,
+    limited: bool,
 ) -> tuple[FrontPoint, ...]:
     """The same search with at least each level of sensitivity: from a few points, then from what its neighbors found.
 
-    `parallel` runs calls over the cores. Raises BrokenProofError, see `check_proof`.
+    `answers`: of `calls_at_levels`; `parallel` runs further calls over the cores. Raises BrokenProofError, see
+    `check_proof`.
     """
-    at_level = [with_least(problem, SENSITIVITY, level) for level in levels]
-    limits: list[Limit | None] = [None] * len(at_level)
-    between = [tuple(map(float, np.linspace(a, b, _BETWEEN + 2)[1:-1])) for a, b in pairwise(levels)]
-    if why_not(problem) is None:
-        around = [(*before, *after) for before, after in zip([(), *between], [*between, ()], strict=True)]
-        calls = zip(at_level, around, strict=True)
-        limits = list(parallel(delayed(limit_of, p, _FRONT_LIMIT_DN, _FRONT_PROGRAMS, own) for p, own in calls))
-    runs: list[list[SearchRun]] = [[] for _ in at_level]
-    done, total = 0, 2 * len(at_level)
+    limits: list[Limit | None] = [*islice(answers, len(levels))] if limited else [None] * len(levels)
+    runs: list[list[SearchRun]] = [[] for _ in levels]
+    done, total = 0, 2 * len(levels)
 
-    def searched(points: Sequence[Sequence[FloatArray]]) -> None:
+    def taken(found: Iterator[SearchRun], sizes: Sequence[int]) -> None:
         nonlocal done
-        found = parallel(
-            [
-                delayed(
-                    search_from, at_level[k], len(runs[k]) + i, u, effort.algorithm, effort.evaluations, effort.seed
-                )
-                for k, own in enumerate(points)
-                for i, u in enumerate(own)
-            ]
-        )
-        for k, own in enumerate(points):
-            runs[k] += islice(found, len(own))
+        for own, size in zip(runs, sizes, strict=True):
+            own.extend(islice(found, size))
             done += 1
             progress("front levels", done, total)
 
     def best(k: int) -> Evaluation | None:
         return best_feasible([e for run in runs[k] for e in run.log]) if 0 <= k < len(runs) else None
 
-    searched([[*effort.starts[:_FRONT_STARTS]]] * len(at_level))
-    found = [(best(k - 1), best(k + 1)) for k in range(len(at_level))]
-    searched([[problem.to_unit(e.x) for e in both if e is not None] for both in found])
-    onward = [*_tangents(between, limits), ()]
-    points = tuple(FrontPoint(level, best(k), tuple(runs[k]), limits[k], onward[k]) for k, level in enumerate(levels))
-    for point in points:
+    first = len(effort.starts[:_FRONT_STARTS])
+    taken(answers, [first] * len(levels))
+    found = [(best(k - 1), best(k + 1)) for k in range(len(levels))]
+    points = [[problem.to_unit(e.x) for e in both if e is not None] for both in found]
+    at_level = [with_least(problem, SENSITIVITY, level) for level in levels]
+    calls = [_searches(own, effort, first, us) for own, us in zip(at_level, points, strict=True)]
+    taken(parallel(call for own in calls for call in own), [len(own) for own in calls])
+    onward = [*_tangents(_between(levels), limits), ()]
+    front = tuple(FrontPoint(level, best(k), tuple(runs[k]), limits[k], onward[k]) for k, level in enumerate(levels))
+    for point in front:
         check_proof(point.best, point.limit, f" at a sensitivity of {point.level:g} and more")
-    return points
+    return front
+
+
+def _searches(problem: Problem, effort: Effort, first: int, points: Iterable[FloatArray]) -> list[Call]:
+    """A search from each point; `first`: the number of the first one."""
+    own = effort.algorithm, effort.evaluations, effort.seed
+    return [delayed(search_from, problem, at, u, *own) for at, u in enumerate(points, first)]
+
+
+def _between(levels: Sequence[float]) -> list[tuple[float, ...]]:
+    """Sensitivities between each two levels."""
+    return [tuple(map(float, np.linspace(a, b, _BETWEEN + 2)[1:-1])) for a, b in pairwise(levels)]
 
 
 def _tangents(

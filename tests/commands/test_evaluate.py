@@ -174,17 +174,29 @@ def test_a_design_of_a_run_moves_as_it_did_there(finished: Finished) -> None:
     assert "that works by interference (effective index 1.8)" in str(found)
 
 
-def test_what_an_answer_does_not_need_is_not_loaded(own: Path) -> None:
-    """Half of the time that the command has is that of loading; tables, figures and workers are not for it."""
-    code = (
-        f"import sys; from sweep.commands.app import app\ntry: app(['evaluate', {str(own)!r}, '--relative-to', 'Y'])\n"
-    )
-    code += "except SystemExit: pass\nprint(*{name.partition('.')[0] for name in sys.modules}, file=sys.stderr)"
+def loaded_by(*asked: object) -> tuple[str, set[str]]:
+    """What the command says of these arguments, and all modules that it loads."""
+    code = f"import sys; from sweep.commands.app import app\ntry: app({[*map(str, asked)]!r})\n"
+    code += "except SystemExit: pass\nprint(*sys.modules, file=sys.stderr)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    loaded = set(done.stderr.split())
-    assert "below" in done.stdout  # the gap to the limit: everything was computed
-    assert {"numpy", "scipy", "numba"} <= loaded
-    assert not loaded & {
+    return done.stdout, set(done.stderr.split())
+
+
+def test_what_an_answer_does_not_need_is_not_loaded(own: Path, tmp_path: Path) -> None:
+    """Most of the time that the command takes is that of loading; tables, figures, workers and compiled code are not for
+    it, and linear programs only where there is a limit.
+    """
+    leds = csv(tmp_path, "wavelength_nm,a,b,c", WAVE, *(bell(c, 12) for c in (505, 592, 636)), name="leds.csv")
+    said, loaded = loaded_by("evaluate", own, "--relative-to", "Y")
+    assert "below" in said  # the gap to the limit: everything was computed
+    assert {"numpy", "scipy.optimize"} <= loaded
+    unlimited, few = loaded_by("evaluate", own, "--transmission", "--lights", leds)
+    assert "No limit is computed" in unlimited
+    assert not any(name.partition(".")[0] == "scipy" for name in few)
+    assert not (loaded | few) & {
+        "numba",
+        "scipy.interpolate",
+        "scipy.stats",
         "pandas",
         "pyarrow",
         "matplotlib",

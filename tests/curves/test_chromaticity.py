@@ -5,10 +5,12 @@ from __future__ import annotations
 import colour
 import numpy as np
 import pytest
+from colour.colorimetry import dominant_wavelength, excitation_purity
 
 from sweep.curves.builtin.led import led_photons
 from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
 from sweep.curves.color import REGIONS, chromaticity, color_matching, display_colors, luminance_per_photon_radiance
+from sweep.curves.signal_color import EQUAL_ENERGY, VISIBLE, light_color, spectral_locus
 from sweep.curves.spectrum import WavelengthGrid
 
 GRID = WavelengthGrid()
@@ -80,3 +82,21 @@ def test_display_colors_have_the_hue_of_the_signal() -> None:
     assert colors["red"].argmax() == 0
     assert colors["red"][1] < colors["orange"][1] < colors["yellow"][1]
     assert all((c >= 0).all() and c.max() == pytest.approx(1) for c in colors.values())
+
+
+def test_hues_are_those_of_colour_science() -> None:
+    """Mixtures of white and two monochromatic lights; at the red end, where the locus is a point, either may be right."""
+    rng, locus = np.random.default_rng(3), spectral_locus()
+    hues = 0
+    for _ in range(120):
+        power = np.full(VISIBLE.size, rng.uniform(0, 0.02))
+        power[rng.integers(0, 340, 2)] += rng.dirichlet([0.5, 0.5])
+        color = light_color(power * VISIBLE.nodes_nm)
+        assert color is not None
+        nm, leaves, _ = dominant_wavelength(color.xy, EQUAL_ENERGY)
+        if np.hypot(*(leaves - locus[340])) < 1e-3 or np.hypot(*np.subtract(color.xy, EQUAL_ENERGY)) < 1e-2:
+            continue
+        hues += 1
+        assert color.dominant_nm == (float(nm) if nm > 0 else None)
+        assert color.purity == pytest.approx(float(excitation_purity(color.xy, EQUAL_ENERGY)), abs=1e-6)
+    assert hues > 80

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.interpolate import PchipInterpolator
 
 from sweep.camera.sensor import BUILT_IN_SENSORS
+from sweep.curves.builtin.ar0820 import monotone
 from sweep.curves.builtin.led import led_photons
 from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
 from sweep.curves.lights import peak_normalized_ratio
@@ -85,3 +89,13 @@ def test_photon_ratio_of_peak_normalized_boxes() -> None:
     for row, width in enumerate((20, 30, 70)):
         boxes[row, 100 : 100 + width] = 7.0
     assert peak_normalized_ratio(GRID, boxes) == pytest.approx(30 / 301, rel=1e-14)
+
+
+@given(st.lists(st.tuples(st.floats(0.5, 90), st.floats(0, 1)), min_size=3, max_size=12), st.integers(0, 3))
+def test_the_monotone_cubic_is_the_one_of_scipy(steps: list[tuple[float, float]], digits: int) -> None:
+    nodes = 380 + np.cumsum([step for step, _ in steps])
+    values = np.round([value for _, value in steps], digits)  # some are alike, where it is flat
+    wanted = np.linspace(nodes[0], nodes[-1], 301)
+    with np.errstate(all="ignore"):  # SciPy divides by rises that are none
+        expected = PchipInterpolator(nodes, values)(wanted)
+    np.testing.assert_allclose(monotone(nodes, values, wanted), expected, rtol=0, atol=4 * np.finfo(float).eps)

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
+from sweep.camera import electrons
 from sweep.camera.imager import Imager
 from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
 from sweep.designs import block as blocks
@@ -79,6 +80,23 @@ def test_pairs_that_are_never_the_nearest_are_left_out() -> None:
     computed = nearest_along_squared(values, *apart, *room)
     every = len(apart.fixed) * -(-len(values) // LANES)
     assert 0 < computed < every / 4
+
+
+@pytest.mark.parametrize("name", list(VIEWS))
+def test_few_designs_have_the_same_bits_without_compiled_code(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    edges = edges_of(SPACE, 0, 60)
+    assert edges is not None
+    curves = CurveBlock(edges.curves())
+    found = []
+    for many in (10**9, 0):
+        monkeypatch.setattr(blocks, "_MANY", many)
+        monkeypatch.setattr(separation, "_MANY", many)
+        monkeypatch.setattr(electrons, "_MANY", many)
+        found.append([evaluate(Imager(VIEWS[name]), block) for block in (curves, edges)])
+    for plain, compiled in zip(*found, strict=True):
+        assert list(plain) == list(compiled)
+        for column, values in plain.items():
+            np.testing.assert_array_equal(values, compiled[column], err_msg=column)
 
 
 def test_no_spectrum_is_made_by_the_separable_route(monkeypatch: pytest.MonkeyPatch) -> None:

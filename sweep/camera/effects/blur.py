@@ -14,12 +14,10 @@ from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
-from scipy.special import j0, j1
 
 from ...base.cache import Cache
 from ...base.types import FloatArray
 from .. import legendre
-from ..compiled_splines import sums_of_cubic
 from ..pixel import Pixel
 from ..scene import Scene
 from ..shot import Shot
@@ -119,6 +117,7 @@ class Profile:
         self, radius_um: float, reach_um: float, wavelength_um: FloatArray, f_number: float, w20_um: float
     ) -> None:
         from scipy.interpolate import make_interp_spline  # noqa: PLC0415  (slow to import: kept off the start-up path)
+        from scipy.special import j0, j1  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
         nu, weight = _frequencies(radius_um + reach_um, wavelength_um, f_number)
         step = 1 / (_SPLINE_PER_CYCLE * nu[-1])
@@ -145,6 +144,8 @@ class Profile:
 
         The weights go to the spline's coefficients first, so that no more is done at each wavelength than one product.
         """
+        from ..compiled_splines import sums_of_cubic  # noqa: PLC0415  (compiled: kept off the start-up path)
+
         found = np.empty((len(r_um), self.n_wavelengths))
         sums_of_cubic(r_um, weights, self._spline.t, self._spline.c, found)
         return found
@@ -175,6 +176,8 @@ def mean_over_disc(
 
     (2 R / R') integral J1(2 pi R nu) J1(2 pi R' nu) OTF(nu) / nu dnu; at the very center the encircled energy.
     """
+    from scipy.special import j1  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
     nu, weight = _frequencies(radius_um + readout_um, wavelength_um, f_number)
     inner = j1(2 * math.pi * radius_um * nu) * weight
     inner *= (2 * radius_um / readout_um) * j1(2 * math.pi * readout_um * nu) / nu

@@ -8,7 +8,6 @@ from functools import lru_cache
 import numpy as np
 
 from ...base.types import FloatArray
-from ..compiled import poisson_means
 from ..noisy import gaussian, moments
 from ..pixel import Pixel
 from ..shot import Shot
@@ -50,6 +49,8 @@ def under_noise(pixel: Pixel, brightest_e: float) -> tuple[float, float]:
     Shifts at a table's nodes, with what they may miss in between; from the last counted electron on those of a
     Gaussian. The slope of a Poisson mean is the mean of the steps from count to count. PRNU averages over both.
     """
+    from ..compiled import poisson_means  # noqa: PLC0415  (compiled: kept off the start-up path)
+
     even, most_e = moments.without_prnu(pixel), brightest_e * (1 + moments.DRAWN * pixel.prnu)
     electrons = moments.table_nodes(even) ** 2
     electrons = electrons[: 1 + int(np.searchsorted(electrons, most_e))]

@@ -9,7 +9,6 @@ import numpy as np
 
 from ...base.types import BoolArray, FloatArray, IndexArray
 from .. import legendre
-from ..compiled_light import covered_by_disc, covered_shares
 from ..mosaic import Mosaic
 from ..scene import Target
 from ..shot import Shot
@@ -28,6 +27,8 @@ _AT_ONCE = 200
 
 def covered(x: FloatArray, y: FloatArray, half: float, radius: float) -> FloatArray:
     """Share of a square of half side `half` around (x, y) that lies in the disc of `radius` around 0, exact."""
+    from ..compiled_light import covered_shares  # noqa: PLC0415  (compiled: kept off the start-up path)
+
     x, y = np.broadcast_arrays(x, y)
     return covered_shares(x.ravel(), y.ravel(), half, radius).reshape(x.shape)
 
@@ -83,6 +84,8 @@ def window(mosaic: Mosaic, phases_px: FloatArray, reach_px: float) -> Window:
 
 def mean_weights(seen: Window, half: float, readout_px: float, n_channels: int) -> FloatArray:
     """Weight of each pixel in the mean of its channel, ndarray[n_cases, rows, columns]; each channel's sum to 1."""
+    from ..compiled_light import covered_by_disc  # noqa: PLC0415  (compiled: kept off the start-up path)
+
     weights = covered_by_disc(seen.columns, seen.rows, half, readout_px)
     for channel in range(n_channels):
         own = seen.channel == channel

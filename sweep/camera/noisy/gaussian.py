@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.special import ndtr
 
 from ...base.types import FloatArray
-from ..compiled import rounded_gaussian
 
 TAILS = 9.0
 """Beyond so many standard deviations everything is taken to be at the end."""
@@ -24,9 +22,16 @@ def density(z: FloatArray) -> FloatArray:
     return np.asarray(np.exp(-0.5 * z**2) / math.sqrt(2 * math.pi), dtype=float)
 
 
+def share_below(z: FloatArray) -> FloatArray:
+    """Share of the standard normal distribution below `z`, of any shape."""
+    from scipy.special import ndtr  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
+    return np.asarray(ndtr(z), dtype=float)
+
+
 def ramp(z: FloatArray) -> FloatArray:
     """Mean of max(0, z + Z) for a standard normal Z."""
-    return np.asarray(z * ndtr(z) + density(z), dtype=float)
+    return np.asarray(z * share_below(z) + density(z), dtype=float)
 
 
 def clipped_gaussian(mean: FloatArray, sigma: float, low: float, high: float) -> tuple[FloatArray, FloatArray]:
@@ -37,7 +42,7 @@ def clipped_gaussian(mean: FloatArray, sigma: float, low: float, high: float) ->
     shift = ramp(z_low) - ramp(-z_high)
     square = np.ones_like(mean)  # E[(clip(z) - 0)^2]: z^2 between the ends, an end's square beyond it
     for z in (z_low, -z_high):
-        square += (z**2 - 1) * ndtr(z) + z * density(z)
+        square += (z**2 - 1) * share_below(z) + z * density(z)
     outside = (mean <= low - TAILS * sigma) | (mean >= high + TAILS * sigma)
     held = np.where(outside, np.clip(mean, low, high), mean + sigma * shift)
     return held, np.where(outside, 0.0, sigma**2 * np.maximum(square - shift**2, 0.0))
@@ -52,6 +57,8 @@ def clipped_and_rounded(mean: FloatArray, sigma: float, top: float) -> tuple[Flo
     if sigma == 0:
         return np.clip(np.floor(mean + 0.5), 0.0, top), np.zeros_like(mean)
     if sigma < _EULER_DN:
+        from ..compiled import rounded_gaussian  # noqa: PLC0415  (compiled: kept off the start-up path)
+
         out = np.empty((2, mean.size))
         rounded_gaussian(np.ascontiguousarray(mean), sigma, top, out)
         return out[0], out[1]
@@ -63,7 +70,7 @@ def clipped_and_rounded(mean: FloatArray, sigma: float, top: float) -> tuple[Flo
         hermite = [np.ones_like(z), z]
         for k in range(1, 8):
             hermite.append(z * hermite[k] - k * hermite[k - 1])
-        f = [ndtr(-z), *((-1) ** k * hermite[k - 1] * density(z) / sigma**k for k in range(1, 8))]
+        f = [share_below(-z), *((-1) ** k * hermite[k - 1] * density(z) / sigma**k for k in range(1, 8))]
         for order, weight in ((1, 1 / 24), (3, -7 / 5760), (5, 31 / 967680), (7, -127 / 154828800)):
             first += sign * weight * f[order]
             second += sign * weight * (2 * order * f[order - 1] + 2 * (end - held) * f[order])
@@ -91,7 +98,7 @@ def _by_steps(rest: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArr
     mean, square = np.zeros_like(rest), np.zeros_like(rest)
     least = np.maximum(sigma, 1e-12)
     for step in range(_TERMS):
-        up, down = ndtr((rest - step - 0.5) / least), ndtr((-rest - step - 0.5) / least)
+        up, down = share_below((rest - step - 0.5) / least), share_below((-rest - step - 0.5) / least)
         mean += up - down
         square += (2 * step + 1) * (up + down)
     return mean - rest, np.maximum(square - mean**2, 0.0)

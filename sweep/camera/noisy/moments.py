@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...base.types import BoolArray, FloatArray
-from ..compiled import means_over_gains, poisson_means
 from ..pixel import Pixel
 from . import gaussian
 
@@ -98,6 +97,8 @@ def without_prnu(pixel: Pixel) -> Pixel:
 
 def counted(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     """`moments` of pixels without PRNU: ndarray[3, n] of ndarray[n] expected electrons, ascending."""
+    from ..compiled import poisson_means  # noqa: PLC0415  (compiled: kept off the start-up path)
+
     found = straight(electrons, pixel)
     for run, first, each in runs(electrons, pixel):
         found[:, run] = poisson_means(electrons[run], first, each[:2], each[2])
@@ -153,6 +154,8 @@ def with_prnu(electrons: FloatArray, pixel: Pixel) -> FloatArray:
     The integrand is a Gaussian times a function that is smooth over a deviation 2 / (prnu root of the electrons), so
     that the rule converges exponentially; its step leaves less than 1e-13.
     """
+    from ..compiled import means_over_gains  # noqa: PLC0415  (compiled: kept off the start-up path)
+
     even = without_prnu(pixel)
     table = table_without_prnu(even)
     found = straight(electrons, pixel)

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.types import FloatArray, IndexArray
-from ..compiled import cubic_of_electrons
 from ..pixel import Pixel
 from . import moments
 
@@ -55,6 +54,8 @@ def unclipped_e(pixel: Pixel) -> tuple[float, float]:
 
 
 def _looked_up(electrons: FloatArray, pixel: Pixel, row: int) -> FloatArray:
+    from ..compiled import cubic_of_electrons  # noqa: PLC0415  (compiled: kept off the start-up path)
+
     table, found = tables(pixel), np.empty(electrons.shape)
     of = table.nodes, table.coefficients[row], table.piece
     last_e = moments.Ends.of(pixel).last_e

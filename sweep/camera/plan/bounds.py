@@ -20,7 +20,6 @@ from ..effects import blur, flicker
 from ..exposure import exposure_times, white_irradiance
 from ..seen import METHODS, SeenFilters
 from ..view import View, background_irradiance, per_photon, signal_irradiance
-from .compiled import largest_change, longest_moves
 
 
 @dataclass(frozen=True)
@@ -248,6 +247,8 @@ class Reach:
         Cells whose pairs move most come first: one whose pairs all move less than the largest change so far cannot
         raise it, so that what is left is looked at only in the few before.
         """
+        from .compiled import largest_change, longest_moves  # noqa: PLC0415  (compiled: kept off the start-up path)
+
         nothing = np.zeros((len(change), change.shape[1], len(self.first)))
         corners, more = np.arange(len(change))[:, None], nothing
         if between is not None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,12 +15,13 @@ from ..effects.base import Change, KernelChange, KernelEffect, Part
 from ..kernel import make_kernel
 from ..kernel_size import pixels_per_place
 from ..methods import REFERENCE, Methods
-from ..place_kernels import PlaceKernels
 from ..registry import EFFECTS, WHOLE_LIGHT
 from ..view import View
 from .bounds import Spread
-from .places_between import PlacesBetween, beside_corners
 from .work import KERNEL_S, Work
+
+if TYPE_CHECKING:
+    from .places_between import PlacesBetween
 
 
 class SceneKernels:
@@ -29,7 +32,6 @@ class SceneKernels:
         self._view, self._knots_nm = view, blur.knots(view.grid.nodes_nm, blur.COARSE)
         self._wanted: dict[Methods, Methods] = {}
         self._kernels: dict[Methods, FloatArray] = {}
-        self._places = PlacesBetween(view, self._knots_nm)
         self._gaps: dict[tuple[str, float], float] = {}
         self._works: dict[tuple[object, ...], dict[Methods, Work]] = {}
         self.spent_s = 0.0
@@ -42,6 +44,12 @@ class SceneKernels:
     def anywhere(self, methods: Methods) -> bool:
         """Whether the light may fall anywhere, and more than a lattice of places is looked at."""
         return phase.all_count(self._view, methods)
+
+    @cached_property
+    def _places(self) -> PlacesBetween:
+        from .places_between import PlacesBetween  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+        return PlacesBetween(self._view, self._knots_nm)
 
     @property
     def corners(self) -> IndexArray:
@@ -68,6 +76,8 @@ class SceneKernels:
             if self.anywhere(wanted):
                 light = self._places.at_corners(wanted)
             elif phase.one_is_enough(self._view) is None and wanted.sampling != "skip":
+                from ..place_kernels import PlaceKernels  # noqa: PLC0415  (compiled: kept off the start-up path)
+
                 made = PlaceKernels(self._view, wanted, nodes)
                 light = made.at(phase.cases(self._view, wanted.phase), Counter())[0] @ made.shares
             else:
@@ -119,6 +129,8 @@ class SceneKernels:
         """
         if not self.anywhere(before):
             return None
+        from .places_between import beside_corners  # noqa: PLC0415  (compiled: kept off the start-up path)
+
         part = what.part if isinstance(what, KernelChange) else None
         corners, (here, off) = self.corners, self._in_cells(before)
         there, off_there = self._in_cells(after)

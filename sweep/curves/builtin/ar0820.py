@@ -19,16 +19,39 @@ _LOGISTIC_PER_WIDTH = 2 * math.log(9)
 """A logistic rises from 0.1 to 0.9 within 2 ln 9 of its scale."""
 
 
-def _monotone(nodes_nm: ArrayLike, values: ArrayLike, wavelength_nm: FloatArray) -> FloatArray:
-    """The monotone cubic through some nodes."""
-    from scipy.interpolate import PchipInterpolator  # noqa: PLC0415  (slow to import: kept off the start-up path)
+def monotone(nodes_nm: ArrayLike, values: ArrayLike, wavelength_nm: FloatArray) -> FloatArray:
+    """The monotone cubic through three nodes or more: Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5, 300 (1984).
 
-    return np.asarray(PchipInterpolator(nodes_nm, values)(wavelength_nm), dtype=float)
+    That of `scipy.interpolate.PchipInterpolator`, whose import would take longer than all that is read from a file.
+    """
+    x, y = np.asarray(nodes_nm, dtype=float), np.asarray(values, dtype=float)
+    step = np.diff(x)
+    rise = np.diff(y) / step
+    slope = np.zeros_like(y)
+    same = rise[:-1] * rise[1:] > 0  # where it turns, it is flat
+    left, right = (2 * step[1:] + step[:-1])[same], (step[1:] + 2 * step[:-1])[same]
+    mean = (left / rise[:-1][same] + right / rise[1:][same]) / (left + right)
+    slope[1:-1][same] = 1 / mean
+    slope[0] = _end_slope(step[0], step[1], rise[0], rise[1])
+    slope[-1] = _end_slope(step[-1], step[-2], rise[-1], rise[-2])
+    bend = (slope[:-1] + slope[1:] - 2 * rise) / step
+    at = np.clip(np.searchsorted(x, wavelength_nm, side="right") - 1, 0, step.size - 1)
+    s = wavelength_nm - x[at]
+    second = (rise - slope[:-1]) / step - bend
+    return np.asarray(y[at] + slope[at] * s + second[at] * (s * s) + (bend / step)[at] * (s * s * s), dtype=float)
+
+
+def _end_slope(step: float, next_step: float, rise: float, next_rise: float) -> float:
+    """Slope at an end: that of the parabola through three nodes, but of the first rise's sign and no steeper than 3."""
+    slope = ((2 * step + next_step) * rise - step * next_rise) / (step + next_step)
+    if slope * rise <= 0:
+        return 0.0
+    return 3 * rise if rise * next_rise < 0 and abs(slope) > 3 * abs(rise) else slope
 
 
 def clear_qe(wavelength_nm: FloatArray, clear: ClearPixel) -> FloatArray:
     """QE of the unfiltered pixel, ndarray[n_wavelengths]."""
-    return _monotone(clear.wavelength_nm, clear.qe, wavelength_nm)
+    return monotone(clear.wavelength_nm, clear.qe, wavelength_nm)
 
 
 def transmission(wavelength_nm: FloatArray, parameters: FilterParameters) -> FloatArray:
@@ -38,7 +61,7 @@ def transmission(wavelength_nm: FloatArray, parameters: FilterParameters) -> Flo
         sign = 1 if edge.passes == "above" else -1
         offset = sign * (wavelength_nm - edge.center_nm) / edge.width_nm
         opened = opened * _logistic(offset)
-    leak = _monotone(LEAK_NODES_NM, parameters.leak, wavelength_nm)
+    leak = monotone(LEAK_NODES_NM, parameters.leak, wavelength_nm)
     return leak + (parameters.peak - leak) * opened
 
 

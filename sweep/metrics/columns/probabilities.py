@@ -17,10 +17,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.special import ndtr
 
 from ...base.types import FloatArray, IndexArray
 from ...camera.imager import Imager
+from ...camera.noisy.gaussian import share_below
 from ...camera.noisy_readout import NoisyReadout
 from ...curves.lights import class_pairs, pair_name
 from ..discrimination import NoiseShape, pairwise_error
@@ -99,7 +99,7 @@ def detection(mean: FloatArray, variance: FloatArray, first: IndexArray, second:
         contrast = np.divide(apart, dark, out=np.full(apart.shape, _MOST), where=dark > 0)
         ratios = [1 + contrast * (1 + side * _SHARE) for side in (1, -1)]
         above, below = (_beyond(_SHARE * apart, bright_noise, dark_noise, ratio) for ratio in ratios)
-        inside = np.maximum(ndtr(above) - ndtr(-below), 0.0)
+        inside = np.maximum(share_below(above) - share_below(-below), 0.0)
         least = np.minimum(least, inside.max(axis=2).min(axis=1))
     return least
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
 from ...base.types import FloatArray
 from ...camera.view import View
@@ -100,7 +99,7 @@ def _row(design: SmoothDesign, *, name: str) -> Rows:
 def _own_share(view: View) -> LinearRows:
     """Of a filter in the only modified channel."""
     base = view.base_qe[0]
-    return LinearRows(csr_matrix(np.full((1, base.size), 1 / base.sum())))
+    return _one_row(np.full(base.size, 1 / base.sum()))
 
 
 def _whole_share(view: View) -> LinearRows:
@@ -108,4 +107,10 @@ def _whole_share(view: View) -> LinearRows:
     counts, modified = view.mosaic.counts, view.modified[0]
     whole = counts.sum() * view.clear_qe.sum()
     others = float(np.delete(view.qe.sum(axis=1) * counts, modified).sum())
-    return LinearRows(csr_matrix(np.full((1, view.grid.size), counts[modified] / whole)), others / whole)
+    return _one_row(np.full(view.grid.size, counts[modified] / whole), others / whole)
+
+
+def _one_row(weights: FloatArray, constant: float = 0.0) -> LinearRows:
+    from scipy.sparse import csr_matrix  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
+    return LinearRows(csr_matrix(weights[None]), constant)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags_array, vstack
 
 from ...camera.view import View
 from ...designs.block import Block
@@ -73,6 +72,8 @@ def _ratios(design: SmoothDesign) -> Rows:
 
 def _steps(view: View) -> LinearRows:
     """Differences of neighboring wavelengths, down and up."""
+    from scipy.sparse import csr_matrix, diags_array, vstack  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
     size = view.grid.size
     up = csr_matrix(diags_array([-1.0, 1.0], offsets=[0, 1], shape=(size - 1, size)))
     return LinearRows(vstack([-up, up]).tocsr(), scale=view.grid.step_nm)

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.special import ndtr
 
 from ...base.types import IndexArray
+from ...camera.noisy.gaussian import share_below
 from .color import ChannelNoise
 from .colorimetry import Smooth
 
@@ -46,7 +46,7 @@ def margins(electrons: Smooth, pairs: Pairs, noise: ChannelNoise) -> Smooth:
 
 def pair_errors(margin: Smooth) -> Smooth:
     """Probability that Gaussian noise goes beyond the plane, with its derivative."""
-    error = ndtr(-margin.real)
+    error = share_below(-margin.real)
     if not np.iscomplexobj(margin):
         return np.asarray(error)
     return np.asarray(error - 1j * np.exp(-(margin.real**2) / 2) / math.sqrt(2 * math.pi) * margin.imag)
