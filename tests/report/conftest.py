@@ -11,7 +11,7 @@ import pytest
 from .pages import BROWSER, Opened, open_report
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def browser() -> Iterator[Any]:
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     with playwright.sync_playwright() as started:
@@ -34,13 +34,19 @@ def opened(browser: Any) -> Iterator[Any]:
         seen.page.close()
 
 
-@pytest.fixture(scope="module")
+MOST_STANDING = 3
+"""Pages that stay open at once: a browser has few places for plots drawn by its graphics."""
+
+
+@pytest.fixture(scope="package")
 def standing(browser: Any) -> Iterator[Any]:
     """A report for tests that only look, or leave all as it was: opened once for all of them."""
     pages: dict[tuple[Path, int], Opened] = {}
 
-    def one(folder: Path, width: int = 1280) -> Opened:
+    def one(folder: Path, width: int = 1440) -> Opened:
         if (folder, width) not in pages:
+            if len(pages) == MOST_STANDING:
+                pages.pop(next(iter(pages))).page.close()
             pages[folder, width] = open_report(browser, folder, width)
         return pages[folder, width]
 

@@ -13,13 +13,14 @@ from sweep.report import make_report, read_output
 from sweep.study import load_study
 
 from ..build import ran
-from ..conftest import Finished
+from ..conftest import Finished, draw_nothing
 from .pages import needs_browser
 
 pytestmark = needs_browser
 
 SCREENS = [
-    *(("stopband", width) for width in (1440, 400)),
+    ("stopband", 1440),
+    pytest.param("stopband", 400, marks=pytest.mark.slow),
     *(
         pytest.param(name, width, marks=pytest.mark.slow)
         for name in ("fog", "dual", "distance", "noise")
@@ -31,11 +32,13 @@ PLAIN = "study: plain\nsensor: ar0820\nlights: tl16\ncfas: [RGGB, RCCC, RYYCy]\n
 
 @pytest.fixture(scope="module")
 def plain_cfas(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The finished run of a study of plain CFAs alone."""
+    """The finished run of a study of plain CFAs alone; its page has plots, and no pictures."""
     folder = tmp_path_factory.mktemp("plain")
     (folder / "plain.yaml").write_text(PLAIN)
     ran(load_study(folder / "plain.yaml"), folder / "out", 1)
-    make_report(read_output(folder / "out"))
+    with pytest.MonkeyPatch.context() as patch:
+        draw_nothing(patch)
+        make_report(read_output(folder / "out"))
     return folder / "out"
 
 
@@ -45,15 +48,9 @@ def box(page: Any, selector: str) -> dict[str, float]:
     return dict(found)
 
 
-def first_screen(browser: Any, folder: Path, width: int) -> Any:
-    page = browser.new_page(viewport={"width": width, "height": 900})
-    page.goto((folder / "report.html").as_uri())
-    page.wait_for_selector("body[data-ready-ms]")
-    return page
-
-
 def fits(page: Any, width: int) -> None:
     """Answer, three numbers and the first plot lie on the screen, and nothing is wider than it."""
+    page.evaluate("window.scrollTo(0, 0)")
     first = page.locator(".screen .plot").first.get_attribute("id")
     page.wait_for_function("(id) => document.getElementById(id).data", arg=first)
     assert page.evaluate("document.documentElement.scrollWidth") == width
@@ -72,24 +69,21 @@ def fits(page: Any, width: int) -> None:
 
 @pytest.mark.parametrize(("name", "width"), SCREENS)
 def test_the_answer_three_numbers_and_the_plot_are_on_one_screen(
-    finished: Finished, browser: Any, name: str, width: int
+    finished: Finished, standing: Any, name: str, width: int
 ) -> None:
-    page = first_screen(browser, finished(name), width)
-    fits(page, width)
-    page.close()
+    fits(standing(finished(name), width).page, width)
 
 
-@pytest.mark.parametrize("width", [1440, 400])
-def test_a_study_of_plain_cfas_has_the_same_screen(plain_cfas: Path, browser: Any, width: int) -> None:
-    page = first_screen(browser, plain_cfas, width)
+@pytest.mark.parametrize("width", [pytest.param(1440, marks=pytest.mark.slow), 400])
+def test_a_study_of_plain_cfas_has_the_same_screen(plain_cfas: Path, opened: Any, width: int) -> None:
+    page = opened(plain_cfas, width).page
     fits(page, width)
     assert page.locator("#pareto").count() == 0  # nothing trades off
-    page.close()
 
 
 def test_the_first_plot_has_every_cfa_at_its_light(finished: Finished, standing: Any) -> None:
     folder = finished("stopband")
-    seen, table = standing(folder, 1440), pd.read_parquet(folder / "results.parquet")
+    seen, table = standing(folder), pd.read_parquet(folder / "results.parquet")
     traces = seen.page.evaluate(
         "document.getElementById('cfas').data.map((t) => [t.name, Array.from(t.x), Array.from(t.y)])"
     )
@@ -130,7 +124,7 @@ def test_a_plain_cfa_is_chosen_by_a_click(finished: Finished, opened: Any) -> No
 
 def test_the_limiting_lights_stand_in_hover_details_and_clouds(finished: Finished, standing: Any) -> None:
     folder = finished("stopband")
-    seen = standing(folder, 1440)
+    seen = standing(folder)
     design = int(seen.page.get_attribute("#details", "data-design"))
     limited = pd.read_parquet(folder / "limited_by.parquet").set_index("design_id")
     lights = limited.loc[design, "limited_by_yellow_red"]
@@ -150,7 +144,7 @@ def test_the_limiting_lights_stand_in_hover_details_and_clouds(finished: Finishe
 
 
 def test_the_lights_stand_shaded_behind_the_qe(finished: Finished, standing: Any) -> None:
-    seen = standing(finished("stopband"), 1440)
+    seen = standing(finished("stopband"))
     shades = seen.page.evaluate(
         "document.getElementById('curves').data.filter((t) => t.fill === 'tozeroy').map((t) => t.name)"
     )
@@ -159,7 +153,7 @@ def test_the_lights_stand_shaded_behind_the_qe(finished: Finished, standing: Any
 
 @pytest.mark.parametrize("name", ["stopband", pytest.param("paper", marks=pytest.mark.slow)])
 def test_no_table_is_cut_off(finished: Finished, standing: Any, name: str) -> None:
-    seen = standing(finished(name), 1440)
+    seen = standing(finished(name))
     cut = seen.page.evaluate(
         "[...document.querySelectorAll('.scroll')].filter((e) => e.offsetParent && e.querySelector('table')"
         " && e.scrollWidth > e.clientWidth + 1).map((e) => e.innerText.slice(0, 60))"
@@ -168,7 +162,7 @@ def test_no_table_is_cut_off(finished: Finished, standing: Any, name: str) -> No
 
 
 def test_no_figure_is_shown_twice(finished: Finished, standing: Any) -> None:
-    seen = standing(finished("stopband"), 1440)
+    seen = standing(finished("stopband"))
     pictures = seen.page.evaluate("[...document.querySelectorAll('figure figcaption')].map((e) => e.textContent)")
     assert len(pictures) == 4
     assert not any("Trade-off" in text or "Filters" in text or "All CFAs" in text for text in pictures)
