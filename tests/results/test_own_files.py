@@ -23,6 +23,7 @@ from sweep.run import output_folder, run_study
 from sweep.study import Study, load_study
 
 from ..build import ran, study_file
+from ..cases import thinned
 from ..conftest import Finished
 from ..mischief import StoppedError, half_done, rows
 
@@ -47,7 +48,7 @@ def expected(few: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFra
     return rows(folder)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", thinned(NAMES, 4))
 def test_a_file_that_was_there_before_is_told_and_stays(few: Study, tmp_path: Path, name: str) -> None:
     base = tmp_path / "tiny"
     (base / name).parent.mkdir(parents=True, exist_ok=True)
@@ -89,7 +90,7 @@ def test_a_file_put_there_while_a_run_is_interrupted_is_told(
 
 
 @pytest.mark.usefixtures("plain_pictures")
-@pytest.mark.parametrize("name", ["report.html", "pareto.svg", "figures/sensor.png"])
+@pytest.mark.parametrize("name", thinned(["report.html", "pareto.svg", "figures/sensor.png"], 3))
 def test_a_file_put_there_before_the_report_is_told(few: Study, tmp_path: Path, name: str) -> None:
     ran(few, tmp_path, 1)
     (tmp_path / "figures").mkdir()

@@ -50,7 +50,7 @@ LONG = [("pulsed", False), ("pulsed", True)]
 @pytest.mark.parametrize(
     ("name", "separable", "step"),
     [
-        pytest.param(name, separable, step, marks=[pytest.mark.slow] if step == 1 else [])
+        pytest.param(name, separable, step, marks=[pytest.mark.slow] if step == 1 or not separable else [])
         for name in (*VIEWS, *MORE)
         for separable in (True, False)
         for step in ((1,) if (name, separable) in LONG else (1, 11))

@@ -250,10 +250,16 @@ def test_workers_never_outnumber_the_cores(plain: Study, tmp_path: Path) -> None
     assert facts["workers"] * facts["threads_per_worker"] <= facts["cores"]
 
 
-def test_dask_needs_a_scheduler_that_answers() -> None:
-    for scheduler, said in ((None, "needs --scheduler"), ("tcp://127.0.0.1:9", "--scheduler tcp://127.0.0.1:9: ")):
-        with pytest.raises(SweepError, match=said), workers(Workers(2, Stop(), "dask", scheduler)):
-            pass
+@pytest.mark.parametrize(
+    ("scheduler", "said"),
+    [
+        (None, "needs --scheduler"),
+        pytest.param("tcp://127.0.0.1:9", "--scheduler tcp://127.0.0.1:9: ", marks=pytest.mark.slow),
+    ],
+)
+def test_dask_needs_a_scheduler_that_answers(scheduler: str | None, said: str) -> None:
+    with pytest.raises(SweepError, match=said), workers(Workers(2, Stop(), "dask", scheduler)):
+        pass
 
 
 @pytest.mark.slow

@@ -172,6 +172,7 @@ def test_any_number_of_workers_gives_the_same_and_a_break_is_where_the_worst_cas
     assert drift[0] - 3 * mine["breaks_at"] <= mine["breaks_first_nm"] <= drift[1] + 3 * mine["breaks_at"]
 
 
+@pytest.mark.slow
 def test_a_kill_among_the_yields_loses_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     study = street(tmp_path, 1000)
     ran(study, tmp_path / "whole", 1)

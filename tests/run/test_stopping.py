@@ -188,7 +188,10 @@ def asleep(_stop: Stop) -> None:
     time.sleep(30)
 
 
-@pytest.mark.parametrize("work", [in_peace, with_grace, swallowed, asked_twice, asleep])
+@pytest.mark.parametrize(
+    "work",
+    [in_peace, asked_twice, asleep, *(pytest.param(work, marks=pytest.mark.slow) for work in (with_grace, swallowed))],
+)
 def test_a_stop_breaks_off_at_once_but_what_is_held_or_has_grace(work: Callable[[Stop], None]) -> None:
     def run() -> None:
         with stop_on_signals() as stop:
@@ -206,11 +209,15 @@ def later(seconds: float, number: int) -> int:
     return number
 
 
-@pytest.mark.parametrize("backend", ["loky", "threading"])
+SLOWER_S = {"loky": 2.0, "threading": 0.2}
+"""What the others are handed on before: for processes, their start."""
+
+
+@pytest.mark.parametrize("backend", SLOWER_S)
 def test_results_are_handed_on_as_they_finish_and_given_in_order(backend: str) -> None:
     finished: list[int] = []
     with workers(Workers(2, Stop(), backend)) as crew:
-        calls = (joblib.delayed(later)(2.0 if number == 0 else 0.0, number) for number in range(6))
+        calls = (joblib.delayed(later)(SLOWER_S[backend] if number == 0 else 0.0, number) for number in range(6))
         assert list(crew(calls, finished=lambda at, _: finished.append(at))) == list(range(6))
     assert sorted(finished) == list(range(6))
     assert finished[0] != 0  # the slow one did not hold up what was finished beside it
