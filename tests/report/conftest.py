@@ -34,7 +34,7 @@ def opened(browser: Any) -> Iterator[Any]:
         seen.page.close()
 
 
-MOST_STANDING = 3
+MOST_STANDING = 4
 """Pages that stay open at once: a browser has few places for plots drawn by its graphics."""
 
 
@@ -44,11 +44,11 @@ def standing(browser: Any) -> Iterator[Any]:
     pages: dict[tuple[Path, int], Opened] = {}
 
     def one(folder: Path, width: int = 1440) -> Opened:
-        if (folder, width) not in pages:
-            if len(pages) == MOST_STANDING:
-                pages.pop(next(iter(pages))).page.close()
-            pages[folder, width] = open_report(browser, folder, width)
-        return pages[folder, width]
+        seen = pages.pop((folder, width), None) or open_report(browser, folder, width)
+        pages[folder, width] = seen  # behind those that nobody looked at since
+        if len(pages) > MOST_STANDING:
+            pages.pop(next(iter(pages))).page.close()
+        return seen
 
     yield one
     for seen in pages.values():
