@@ -61,8 +61,17 @@ def parsed(text: str) -> ast.Module:
 
 @cache
 def nodes(text: str) -> list[ast.AST]:
-    """All nodes of a file's tree that the tests ask for: imports and functions."""
-    return [n for n in ast.walk(parsed(text)) if isinstance(n, ast.Import | ast.ImportFrom | ast.FunctionDef)]
+    """All nodes of a file's tree that the tests ask for: imports and functions, which stand among statements alone."""
+    return [n for n in statements(parsed(text).body) if isinstance(n, ast.Import | ast.ImportFrom | ast.FunctionDef)]
+
+
+def statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
+    """All statements, and those within them."""
+    for one in body:
+        yield one
+        for part in (one, *getattr(one, "handlers", ()), *getattr(one, "cases", ())):
+            for inner in ("body", "orelse", "finalbody"):
+                yield from statements(getattr(part, inner, []))
 
 
 @pytest.fixture(scope="module", autouse=True)

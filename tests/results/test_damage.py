@@ -147,6 +147,7 @@ def test_an_output_that_cannot_be_written_is_one_line(plain: Study, tmp_path: Pa
             ran(plain, folder, 1)
 
 
+@pytest.mark.slow
 def test_other_folders_beside_the_chunks_stay(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
     (tmp_path / SHARDS / ".ipynb_checkpoints").mkdir(parents=True)
     ran(plain, tmp_path, 1)

@@ -223,7 +223,7 @@ def refusing(monkeypatch: pytest.MonkeyPatch, at: int, number: int) -> list[str]
     return asked
 
 
-@pytest.mark.parametrize("step", [6, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("step", thinned([9, 1]))
 def test_wherever_the_disk_refuses_nothing_finished_is_lost(
     few: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int
 ) -> None:

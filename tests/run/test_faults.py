@@ -130,6 +130,7 @@ def test_a_named_design_that_fails_is_a_row(plain: Study, tmp_path: Path, all_fa
     make_report(read_output(tmp_path / "out"))
 
 
+@pytest.mark.slow
 def test_a_clock_that_goes_back_changes_nothing(
     plain: Study, whole: pd.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -59,6 +59,7 @@ def test_its_filter_has_it_at_the_worst_place_and_more_at_the_others() -> None:
     assert min(each) == pytest.approx(found.attained, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_over_all_places_it_is_a_bracket_of_the_worst_one() -> None:
     """Of 200 image heights, each a scene of its own, none is worse for its filter; named places have no lower limit."""
     given, optics = problem(), problem().view.scenario.optics
