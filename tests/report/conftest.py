@@ -40,7 +40,7 @@ MOST_STANDING = 4
 
 @pytest.fixture(scope="package")
 def standing(browser: Any) -> Iterator[Any]:
-    """A report for tests that only look, or leave all as it was: opened once for all of them."""
+    """A report that is opened once for many tests: at 1440 px for those that only look, or leave all as it was."""
     pages: dict[tuple[Path, int], Opened] = {}
 
     def one(folder: Path, width: int = 1440) -> Opened:

@@ -48,7 +48,7 @@ LONGER = (("stopband", 1280), ("stopband", 400), ("fog", 1280), ("fog", 400), ("
 def test_a_report_opens_without_an_error_or_a_request(
     finished: Finished, opened: Any, standing: Any, name: str, width: int
 ) -> None:
-    seen = (standing if width == 1440 else opened)(finished(name), width)
+    seen = (opened if width == 400 else standing)(finished(name), width)
     through(seen)
     assert seen.errors == []
     assert seen.requests == [(finished(name) / "report.html").as_uri()]
@@ -61,8 +61,8 @@ def test_a_report_opens_without_an_error_or_a_request(
     [("stopband", "Pareto front"), ("fog", "named designs"), ("paper", "named designs")],
 )
 @pytest.mark.slow
-def test_pointing_and_clicking_tell_of_a_design(finished: Finished, opened: Any, name: str, trace: str) -> None:
-    seen = opened(finished(name))
+def test_pointing_and_clicking_tell_of_a_design(finished: Finished, standing: Any, name: str, trace: str) -> None:
+    seen = standing(finished(name), 1280)
     table = pd.read_parquet(finished(name) / "results.parquet").set_index("design_id")
     x, y, row = seen.point_at(trace)
     seen.page.mouse.move(x, y)  # in one step: a design on the way would be told, and clicked, first
@@ -137,8 +137,8 @@ def test_the_saved_front_has_every_digit(finished: Finished, standing: Any) -> N
 
 
 @pytest.mark.slow
-def test_brushing_an_axis_counts_what_is_left(finished: Finished, opened: Any) -> None:
-    seen = opened(finished("stopband"))
+def test_brushing_an_axis_counts_what_is_left(finished: Finished, standing: Any) -> None:
+    seen = standing(finished("stopband"), 1280)
     through(seen)
     before = seen.page.inner_text("#brushed")
     seen.page.evaluate("Plotly.restyle('parallel', {'dimensions[0].constraintrange': [[[610, 616]]]}, [0])")
@@ -150,9 +150,9 @@ def test_brushing_an_axis_counts_what_is_left(finished: Finished, opened: Any) -
 
 
 @pytest.mark.slow
-def test_another_scenario_is_drawn_when_it_is_chosen(finished: Finished, opened: Any) -> None:
+def test_another_scenario_is_drawn_when_it_is_chosen(finished: Finished, standing: Any) -> None:
     folder = finished("fog")
-    seen = opened(folder)
+    seen = standing(folder, 1280)
     table = pd.read_parquet(folder / "results.parquet")
     last = list(dict.fromkeys(table["scenario"]))[-1]
     seen.page.select_option("#scenario", last)
