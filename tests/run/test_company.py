@@ -44,17 +44,19 @@ def assert_same(found: dict[str, Any], which: Any, alone: dict[str, Any]) -> Non
         np.testing.assert_array_equal(found[name][which], values, err_msg=name)
 
 
-LONG = [("pulsed", False), ("pulsed", True)]
-"""Blocks that take seconds as a whole: for the long tests alone."""
+SOME = [*((name, True) for name in (*VIEWS, *MORE) if name != "pulsed"), ("chart", False)]
+"""Scenes, and whether blocks know their edges, of which `make test` sees some parts; the others take seconds."""
 
 
 @pytest.mark.parametrize(
     ("name", "separable", "step"),
     [
-        pytest.param(name, separable, step, marks=[pytest.mark.slow] if step == 1 or not separable else [])
-        for name in (*VIEWS, *MORE)
-        for separable in (True, False)
-        for step in ((1,) if (name, separable) in LONG else (1, 11))
+        *((name, separable, 11) for name, separable in SOME),
+        *(
+            pytest.param(name, separable, 1, marks=pytest.mark.slow)
+            for name in (*VIEWS, *MORE)
+            for separable in (True, False)
+        ),
     ],
 )
 def test_a_design_alone_is_the_one_of_its_block(name: str, separable: bool, step: int) -> None:

@@ -258,6 +258,16 @@ def begun(folder: Path, jobs: int) -> subprocess.Popen[bytes]:
     return run
 
 
+@pytest.fixture(scope="module")
+def whole_s(tmp_path_factory: pytest.TempPathFactory) -> float:
+    """Seconds that a run takes which nobody disturbs."""
+    folder = tmp_path_factory.mktemp("whole")
+    noisy_study(folder)
+    started_s = time.monotonic()
+    assert begun(folder, 2).wait(timeout=120) == 0
+    return time.monotonic() - started_s
+
+
 def emptied(folder: Path) -> None:
     for made in sorted(folder.rglob("*"), reverse=True):
         made.rmdir() if made.is_dir() else made.unlink()
@@ -267,7 +277,7 @@ def emptied(folder: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("plain_pictures")
 @pytest.mark.parametrize("seed", range(4))
-def test_forty_kills_in_every_phase(tmp_path: Path, undisturbed: Path, seed: int) -> None:
+def test_forty_kills_in_every_phase(tmp_path: Path, undisturbed: Path, whole_s: float, seed: int) -> None:
     """Parents and workers, by three signals, at random moments; the rows are those of an undisturbed run each time.
 
     Ten kills of each seed; a run that goes on may have another number of workers than the one that was killed.
@@ -275,10 +285,6 @@ def test_forty_kills_in_every_phase(tmp_path: Path, undisturbed: Path, seed: int
     rng = np.random.default_rng([17, seed])
     kills, out = {"run": 0, "worker": 0}, tmp_path / "out" / "tiny"
     noisy_study(tmp_path)
-    started_s = time.monotonic()
-    assert begun(tmp_path, 2).wait(timeout=120) == 0
-    whole_s = time.monotonic() - started_s
-    emptied(out)
     while sum(kills.values()) < 10:
         run = begun(tmp_path, 1 + int(rng.integers(2)))
         time.sleep(float(rng.uniform(0, whole_s)))
