@@ -172,11 +172,11 @@ def test_no_test_module_imports_another() -> None:
     """What several of them need has a module of its own."""
     root, found = Path(__file__).parent, []
     for path in root.rglob("*.py"):
-        for node in nodes(path.read_text(encoding="utf-8")):
-            if isinstance(node, ast.ImportFrom):
-                names = [*(node.module or "").split("."), *(alias.name for alias in node.names)]
-                if any(name.startswith("test_") for name in names):
-                    found.append(f"{path.relative_to(root)}:{node.lineno}")
+        for line in re.findall(
+            r"^ *(?:from|import) (?:[^\n(]*\([^)]*\)|[^\n]*)", path.read_text("utf-8"), re.MULTILINE
+        ):
+            if re.search(r"\btest_", line):
+                found.append(f"{path.relative_to(root)}: {line}")
     assert found == []
 
 

@@ -187,6 +187,7 @@ def test_the_triangles_of_two_lights_fill_their_region(given: dict[str, object],
     assert region.cells.max() + 1 < members.n_steps
 
 
+@pytest.mark.slow
 def test_without_a_population_nothing_of_it_is_imported() -> None:
     code = (
         "import sys\n"

@@ -49,9 +49,9 @@ def without_trade_off(content: bytes) -> bytes:
         ("results.parquet", cut, True),
         pytest.param("curves.parquet", cut, False, marks=pytest.mark.slow),
         pytest.param("points.parquet", None, False, marks=pytest.mark.slow),
-        ("provenance.json", cut, False),
+        pytest.param("provenance.json", cut, False, marks=pytest.mark.slow),
         pytest.param("provenance.json", without_trade_off, False, marks=pytest.mark.slow),
-        ("study.resolved.yaml", None, False),
+        pytest.param("study.resolved.yaml", None, False, marks=pytest.mark.slow),
     ],
 )
 def test_a_damaged_result_is_one_line_and_the_same_command_mends_it(

@@ -101,6 +101,7 @@ def test_a_file_put_there_before_the_report_is_told(few: Study, tmp_path: Path, 
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file() and path.name != LOCK} == before
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("plain_pictures")
 def test_other_files_of_the_folder_stay(few: Study, tmp_path: Path) -> None:
     mine = (
@@ -151,6 +152,7 @@ def test_a_lock_that_says_something_else_stays(few: Study, tmp_path: Path) -> No
         ran(few, tmp_path, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("plain_pictures")
 def test_links_in_the_place_of_files_are_replaced_not_followed(
     few: Study, expected: pd.DataFrame, tmp_path: Path

@@ -147,6 +147,7 @@ def test_the_interval_of_a_share() -> None:
                 assert abs(kept / n - end) == pytest.approx(1.959964 * np.sqrt(end * (1 - end) / n), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_any_number_of_workers_gives_the_same_and_a_break_is_where_the_worst_cases_cross(tmp_path: Path) -> None:
     study = street(tmp_path, 1000)
     tables = []

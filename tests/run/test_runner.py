@@ -165,7 +165,7 @@ def test_two_runs_at_once_are_refused(study: Study, tmp_path: Path) -> None:
     ran(study, tmp_path, 1)
 
 
-MANY = 101
+MANY = 61
 """Left edges of a sweep that takes long enough to be killed in it."""
 
 
