@@ -1,7 +1,7 @@
 # make study NAME=stopband   run studies/stopband.yaml, results in outputs/stopband
 # make report NAME=stopband  draw the report of outputs/stopband again
-# make test                  install and run the tests: three minutes on two cores, once all is installed and compiled
-# make slow                  run the other tests and the other cases of these, which take a third of an hour
+# make test                  install and run the tests, which take about three minutes on two cores
+# make slow                  run the tests that take longer, and the other cases of these
 # make check                 ruff, mypy --strict
 # make accuracy              run the hard cases, measure what accuracy costs in time, outputs/accuracy/accuracy.html
 # make documents           print the tables of studies/README.md and outputs/README.md anew

@@ -124,6 +124,7 @@ def test_plan_says_what_a_scene_calls_for(tmp_path: Path, monkeypatch: pytest.Mo
     assert "2 scenes" in lines[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("plain_pictures")
 def test_hostile_names_come_out_as_text(tmp_path: Path) -> None:
     name = "<script>alert(1)</script>"

@@ -107,6 +107,7 @@ def thick(folder: Path) -> Study:
     return load_study(path)
 
 
+@pytest.mark.slow
 def test_a_yield_is_over_films_that_are_too_thick_or_too_thin(tmp_path: Path) -> None:
     agree(thick(tmp_path), 20_000, 0.008)
 

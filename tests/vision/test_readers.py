@@ -123,6 +123,7 @@ def test_lamps_of_one_spectrum_stay_together() -> None:
     assert not parts[TEST].digests(twins) & (parts[TRAIN].digests(twins) | parts[CHECK].digests(twins))
 
 
+@pytest.mark.slow
 def test_scenes_are_the_same_for_all_cfas() -> None:
     """The brightest pixels of one channel that two CFAs share, at the same place of the tile, are the same numbers."""
     asked = vision()
