@@ -1,7 +1,7 @@
 # make study NAME=stopband   run studies/stopband.yaml, results in outputs/stopband
 # make report NAME=stopband  draw the report of outputs/stopband again
-# make test                  install and run the tests
-# make slow                  run the tests that take minutes
+# make test                  install and run the tests, which take about three minutes on two cores
+# make slow                  run the tests that take longer, and the other cases of these
 # make check                 ruff, mypy --strict
 # make accuracy              run the hard cases, measure what accuracy costs in time, outputs/accuracy/accuracy.html
 # make documents           print the tables of studies/README.md and outputs/README.md anew
@@ -17,7 +17,7 @@ EXTRA = $(if $(shell grep -s "^vision:" studies/$(NAME).yaml),-vision)
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 # Tests start hundreds of processes, which would each compile the package's source anew.
 unexport PYTHONDONTWRITEBYTECODE
-TESTS := $(ONE_THREAD) $(BIN)/python -m pytest -n logical --dist
+TESTS := $(ONE_THREAD) $(BIN)/python -m pytest -n logical --dist worksteal
 KERNELS := $(shell grep -rl --include=*.py "from numba" sweep)
 
 .PHONY: study report test slow accuracy check documents bench clean
@@ -30,10 +30,10 @@ report: $(VENV)/.ready
 	$(BIN)/sweep report outputs/$(NAME)
 
 test: $(VENV)/.compiled
-	$(TESTS) loadfile $(ARGS)
+	$(TESTS) $(ARGS)
 
 slow: $(VENV)/.compiled
-	$(TESTS) worksteal -m slow $(ARGS)
+	$(TESTS) -m slow $(ARGS)
 
 accuracy: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest tests/hard/test_hard_cases.py -m "slow or not slow" --hard-cases outputs/accuracy/hard_cases.json

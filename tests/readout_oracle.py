@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.stats import norm, poisson
+from scipy.special import ndtr
+from scipy.stats import poisson
 
 from sweep.camera.pixel import Pixel
 
@@ -17,8 +18,8 @@ def digital_numbers(electrons: float, pixel: Pixel) -> tuple[np.ndarray, np.ndar
     weights = poisson.pmf(counts, electrons)
     dn = np.minimum(counts, pixel.well_e) * pixel.dn_per_e + pixel.offset_dn
     sigma, top = pixel.read_noise_e * pixel.dn_per_e, pixel.full_scale_dn
-    ends = dn.min() - 15 * sigma - 2, dn.max() + 15 * sigma + 2
-    first, last = np.clip([math.floor(ends[0]), math.ceil(ends[1])], 0, top).astype(int)
+    reach = 15 * sigma + 2
+    first, last = np.clip([math.floor(dn.min() - reach), math.ceil(dn.max() + reach)], 0, top).astype(int)
     numbers = np.arange(first, last + 1)
     found = np.zeros(numbers.size)
     if sigma == 0:
@@ -27,9 +28,12 @@ def digital_numbers(electrons: float, pixel: Pixel) -> tuple[np.ndarray, np.ndar
     kept = weights > 1e-60
     weights, dn = weights[kept, None], dn[kept, None]
     near = np.round(dn).astype(int) + np.arange(-math.ceil(14 * sigma) - 1, math.ceil(14 * sigma) + 2)
-    low, high = (near - 0.5 - dn) / sigma, (near + 0.5 - dn) / sigma
-    shares = np.where(low > 0, norm.sf(low) - norm.sf(high), norm.cdf(high) - norm.cdf(low))
-    np.add.at(found, np.clip(near, 0, top) - first, weights * shares)
+    ends = (np.hstack([near, near[:, -1:] + 1]) - 0.5 - dn) / sigma
+    tail = ndtr(-np.abs(ends))  # beyond each end, on the side where it keeps its digits
+    apart = np.abs(np.diff(tail, axis=1))
+    across = (ends[:, :-1] <= 0) & (ends[:, 1:] > 0)
+    shares = np.where(across, 1 - tail[:, :-1] - tail[:, 1:], apart)
+    found += np.bincount((np.clip(near, 0, top) - first).ravel(), (weights * shares).ravel(), numbers.size)
     return numbers, found
 
 

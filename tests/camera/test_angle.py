@@ -23,6 +23,7 @@ from sweep.designs.technology import Technology
 from sweep.metrics.evaluate import evaluate
 from sweep.study import load_study
 
+from ..cases import thinned
 from ..conftest import STUDIES
 from ..hard.scenes import FAR, FINE, Scene, promised_names, scene
 
@@ -63,7 +64,7 @@ def over_pupil(wave: float, knots: np.ndarray, values: np.ndarray, half: float, 
     return total
 
 
-@pytest.mark.parametrize(("f_number", "cra_deg"), _CONES)
+@pytest.mark.parametrize(("f_number", "cra_deg"), thinned(_CONES))
 def test_the_mean_over_a_cone_is_that_over_the_pupil(f_number: float, cra_deg: float) -> None:
     grid = WavelengthGrid(start_nm=500, stop_nm=700, step_nm=10)
     made = scene("cone", "RYNCy", {"optics": {"f_number": f_number, "cra_deg": cra_deg}}, grid=grid, index=1.7)

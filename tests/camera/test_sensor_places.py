@@ -26,6 +26,7 @@ from sweep.metrics.evaluate import evaluate
 from sweep.metrics.separation import csd_name, separations
 from sweep.metrics.smooth import smooth_csd, smooth_response
 
+from ..cases import thinned
 from ..hard.scenes import FAR, FINE, FIXED, SENSOR, Scene, scene
 
 WAYS = ImageHeight.methods[1:]
@@ -118,9 +119,7 @@ def test_the_steepest_slope_in_a_range() -> None:
     np.testing.assert_array_equal(steepest.among(first, last), expected)
 
 
-@pytest.mark.parametrize(
-    "case", ["patch", "dim corner", *(pytest.param(name, marks=pytest.mark.slow) for name in ("target", "pulsed"))]
-)
+@pytest.mark.parametrize("case", thinned(["dim corner", "patch", "target", "pulsed"], 4))
 def test_no_place_is_worse_than_the_worst_that_is_found(case: str) -> None:
     """Against 61 heights, each a scene of its own; and the worst is what the camera has at the height that is told."""
     made = everywhere(*CASES[case])
@@ -143,7 +142,7 @@ def test_no_place_is_worse_than_the_worst_that_is_found(case: str) -> None:
     assert between > 0 or case == "pulsed"  # not only the middle and the corner are the worst
 
 
-@pytest.mark.parametrize("noise", [False, True])
+@pytest.mark.parametrize("noise", thinned([True, False]))
 def test_columns_keep_what_the_plan_promises(noise: bool) -> None:
     """Each way to look at all places, behind rounding, too; closer ways look at more of them."""
     made = everywhere({"noise": noise, "off_axis_deg": 20.0}, {"cra_max_deg": 30.0})

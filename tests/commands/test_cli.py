@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pandas as pd
@@ -107,7 +108,8 @@ def test_check_counts_designs() -> None:
     assert "116,286 designs" in out
 
 
-def test_plan_says_what_a_scene_calls_for(tmp_path: Path) -> None:
+def test_plan_says_what_a_scene_calls_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "cpu_count", lambda: 1)  # two scenes are planned before workers have started
     path = tmp_path / "scenes.yaml"
     path.write_text(SCENES.replace("[150, 250]", "[20, 300]"))
     code, out, said = commanded("plan", path, "--explain", "--tolerance", "50")
@@ -122,6 +124,7 @@ def test_plan_says_what_a_scene_calls_for(tmp_path: Path) -> None:
     assert "2 scenes" in lines[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("plain_pictures")
 def test_hostile_names_come_out_as_text(tmp_path: Path) -> None:
     name = "<script>alert(1)</script>"

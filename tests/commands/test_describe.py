@@ -19,6 +19,7 @@ from sweep.curves.files import scan_curves
 from sweep.curves.signal_color import VISIBLE, dominant_ranges_nm, light_color, outline
 from sweep.study.editors import schema_text
 
+from ..cases import thinned
 from ..commanded import commanded
 from ..conftest import SHARED, needs_measured
 from ..curve_texts import WAVE, bell, csv
@@ -118,14 +119,19 @@ def test_distance_is_to_the_nearest_point_of_a_region() -> None:
 
 @pytest.mark.parametrize(
     ("text", "words"),
-    [
-        ("wavelength_nm,R\n400,1\n410,nan\n420,-1\n430,-2\n", ["not a usable number", "negative value, and 1 more"]),
-        ("wavelength_nm,R\n420,1\n430,1\n400,1\n400,1\n", ["not sorted", "occurs twice"]),
-        ("wavelength_km,R\n0.4,1\n0.7,1\n", ["no column wavelength", "looks like um"]),
-        ("wavelength_nm,R,G\n0.4,1,1\n0.7,1,1\n", ["R, G: wavelength unit: looks like um"]),
-        ("wavelength_nm;R\n400;0,5\n700;0.25\n", ["not a usable number (got '0,5')"]),
-        ("wavelength_nm,R,R,\n400,1,1,x\n700,1,1,1\n", ["occurs twice", "no name", "not a usable number"]),
-    ],
+    thinned(
+        [
+            (
+                "wavelength_nm,R\n400,1\n410,nan\n420,-1\n430,-2\n",
+                ["not a usable number", "negative value, and 1 more"],
+            ),
+            ("wavelength_nm,R\n420,1\n430,1\n400,1\n400,1\n", ["not sorted", "occurs twice"]),
+            ("wavelength_km,R\n0.4,1\n0.7,1\n", ["no column wavelength", "looks like um"]),
+            ("wavelength_nm,R,G\n0.4,1,1\n0.7,1,1\n", ["R, G: wavelength unit: looks like um"]),
+            ("wavelength_nm;R\n400;0,5\n700;0.25\n", ["not a usable number (got '0,5')"]),
+            ("wavelength_nm,R,R,\n400,1,1,x\n700,1,1,1\n", ["occurs twice", "no name", "not a usable number"]),
+        ]
+    ),
 )
 def test_every_fault_is_one_line_and_the_rest_is_described(tmp_path: Path, text: str, words: list[str]) -> None:
     path = tmp_path / "wrong.csv"

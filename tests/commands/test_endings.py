@@ -65,6 +65,7 @@ def test_a_stop_while_the_command_is_loaded_ends_it_without_a_word() -> None:
     assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
 
 
+@pytest.mark.slow
 def test_a_command_that_is_done_leaves_no_worker_behind(tmp_path: Path) -> None:
     study = tmp_path / "tiny.yaml"
     study.write_text(SWEPT)

@@ -272,9 +272,19 @@ for given, before in [*((each, REFERENCE) for each in noisy), *((each, straight)
 """
 
 
-def with_file(package: str, file: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
-    """The command, with one more file in a package."""
-    program = f"import sys, {package} as room; room.__path__.append(sys.argv.pop(1)); from sweep.commands.app import main; main()"
+ROOM = """\
+import sys, {package} as room
+room.__path__.append(sys.argv.pop(1))
+{drawings}
+from sweep.commands.app import main
+main()
+"""
+NO_DRAWINGS = "import sweep.report.page; sweep.report.page._drawings = lambda _: ()"
+
+
+def with_file(package: str, file: Path, *arguments: object, drawn: bool = False) -> subprocess.CompletedProcess[str]:
+    """The command, with one more file in a package; its reports have pictures where that is asked for."""
+    program = ROOM.format(package=package, drawings="" if drawn else NO_DRAWINGS)
     command = [sys.executable, "-c", program, str(file.parent), *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
@@ -286,7 +296,7 @@ def test_a_family_is_one_new_file(tmp_path: Path) -> None:
     file.write_text(GRAY)
     study.write_text(STUDY)
     package = "sweep.designs.families"
-    done = with_file(package, file, "run", study, "--output", tmp_path / "out", "--jobs", 1)
+    done = with_file(package, file, "run", study, "--output", tmp_path / "out", "--jobs", 1, drawn=True)
     assert done.returncode == 0, done.stderr
     rows = pd.read_parquet(tmp_path / "out" / "gray" / "results.parquet")
     swept = rows[rows["kind"] == "sweep"]
@@ -317,9 +327,9 @@ def test_a_new_effect_promises_what_it_changes(tmp_path: Path) -> None:
 def test_a_command_is_one_new_file(tmp_path: Path) -> None:
     file = tmp_path / "hello.py"
     file.write_text(HELLO)
-    done = with_file("sweep.commands.verbs", file, "hello", "world")
+    done = with_file("sweep.commands.verbs", file, "hello", "world", drawn=True)
     assert (done.returncode, done.stdout, done.stderr) == (0, "Hello, world.\n", "")
-    assert " hello " in with_file("sweep.commands.verbs", file, "--help").stdout
+    assert " hello " in with_file("sweep.commands.verbs", file, "--help", drawn=True).stdout
 
 
 def run_with(tmp_path: Path, package: str, file: str, program: str, study: str, *more: str) -> Path:

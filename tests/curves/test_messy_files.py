@@ -16,6 +16,7 @@ from sweep.curves.instrument_files import read_xml
 from sweep.study import load_study
 
 from ..build import one_line
+from ..cases import thinned
 from ..commanded import commanded
 from ..curve_texts import WAVE, bell
 
@@ -105,7 +106,7 @@ VARIANTS: dict[str, tuple[str, str, str]] = {
 
 
 @pytest.mark.usefixtures("plain_pictures")
-@pytest.mark.parametrize("name", list(VARIANTS))
+@pytest.mark.parametrize("name", thinned(VARIANTS, 3))
 def test_a_variant_reaches_a_study_or_ends_with_what_helps(tmp_path: Path, name: str) -> None:
     file, content, said = VARIANTS[name]
     path = tmp_path / file

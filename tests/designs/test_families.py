@@ -20,6 +20,8 @@ from sweep.designs.registry import FAMILIES as REGISTERED
 from sweep.designs.registry import FamilyOptions, build_family
 from sweep.designs.tolerance import Off
 
+from ..cases import thinned
+
 WAVE = np.arange(400.0, 701.0)
 BASE = 0.3 + 0.4 / (1 + np.exp(-(WAVE - 500) / 20))
 TARGET = 0.2 + 0.1 * np.sin(WAVE / 40)
@@ -85,7 +87,7 @@ def exact_curves(name: str, x: list[mp.mpf], index: int) -> list[mp.mpf]:
     return [base + (target - base) * shape]
 
 
-@pytest.mark.parametrize("name", list(FAMILIES))
+@pytest.mark.parametrize("name", thinned(FAMILIES))
 def test_curves_and_gradients_agree_with_their_definitions_at_fifty_digits(name: str) -> None:
     family, x = FAMILIES[name]
     at = [int(i) for i in np.random.default_rng(3).choice(np.arange(90, 295), 12, replace=False)]

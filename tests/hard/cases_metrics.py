@@ -131,6 +131,7 @@ def one_against_many() -> Result:
     "a class of 500 members and one of 100,000: no table of all pairs",
     oracle="SciPy's k-d tree",
     why="2 eps for each of the two sums of squares and roots",
+    slow=True,
 )
 def many_against_many() -> Result:
     points = np.random.default_rng(6).uniform(0, 4095, (100_500, 3))

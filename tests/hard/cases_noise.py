@@ -178,6 +178,7 @@ def steps(mean: mp.mpf, sigma: mp.mpf) -> Moments:
     "variance of a rounded value, little and much noise",
     oracle="probability of every integer, 50 digits",
     why="up to 6 terms left out below exp(-2 (7 pi / 2)^2), or tails beyond 11 sigma; 60 roundings of a variance + 1",
+    slow=True,
 )
 def rounded_variance() -> Result:
     results = []

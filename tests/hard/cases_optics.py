@@ -222,6 +222,7 @@ def response_of(scenario: dict[str, object], cfa: str = "RGGB") -> np.ndarray:
     "a light of a tenth of a pixel, on a pixel, between two and between four",
     oracle="exact overlaps of disc, readout and pixels by integration, 50 digits",
     why="shares of a pixel within 8 eps each, a sum over at most 25 pixels, 16 roundings of the response: 64 eps of full light",
+    slow=True,
 )
 def tiny_light() -> Result:
     whole, results, r = response_of(FIXED), [], 0.05

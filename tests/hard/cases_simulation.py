@@ -14,6 +14,7 @@ from .registry import Result, hard_case, worst
     "error of a pair by simulation",
     oracle="a million Gaussian draws of each point along the normal, split where both err equally often",
     why="4 standard deviations of a share of a million",
+    slow=True,
 )
 def error_by_simulation() -> Result:
     rng = np.random.default_rng(9)

@@ -16,6 +16,7 @@ from sweep.curves.population import Population
 from sweep.metrics.members import population_imager
 from sweep.study import load_study
 
+from ..cases import thinned
 from ..conftest import STUDIES
 
 STUDY = load_study(STUDIES / "stopband.yaml")
@@ -103,7 +104,7 @@ def drawn(name: str, n: int) -> tuple[np.ndarray, list[tuple[int, int]], list[tu
     return found, signals, widths, u  # type: ignore[return-value]
 
 
-@pytest.mark.parametrize("name", POPULATIONS)
+@pytest.mark.parametrize("name", thinned(POPULATIONS))
 def test_neither_random_members_nor_a_local_search_are_nearer(name: str) -> None:
     found, signals, widths, u = drawn(name, 600)
     assert (found >= worst(name)[:, None] - 1e-9).all()
@@ -186,6 +187,7 @@ def test_the_triangles_of_two_lights_fill_their_region(given: dict[str, object],
     assert region.cells.max() + 1 < members.n_steps
 
 
+@pytest.mark.slow
 def test_without_a_population_nothing_of_it_is_imported() -> None:
     code = (
         "import sys\n"

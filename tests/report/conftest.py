@@ -11,7 +11,7 @@ import pytest
 from .pages import BROWSER, Opened, open_report
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def browser() -> Iterator[Any]:
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     with playwright.sync_playwright() as started:
@@ -34,15 +34,21 @@ def opened(browser: Any) -> Iterator[Any]:
         seen.page.close()
 
 
-@pytest.fixture(scope="module")
+MOST_STANDING = 4
+"""Pages that stay open at once: a browser has few places for plots drawn by its graphics."""
+
+
+@pytest.fixture(scope="package")
 def standing(browser: Any) -> Iterator[Any]:
-    """A report for tests that only look, or leave all as it was: opened once for all of them."""
+    """A report that is opened once for many tests: at 1440 px for those that only look, or leave all as it was."""
     pages: dict[tuple[Path, int], Opened] = {}
 
-    def one(folder: Path, width: int = 1280) -> Opened:
-        if (folder, width) not in pages:
-            pages[folder, width] = open_report(browser, folder, width)
-        return pages[folder, width]
+    def one(folder: Path, width: int = 1440) -> Opened:
+        seen = pages.pop((folder, width), None) or open_report(browser, folder, width)
+        pages[folder, width] = seen  # behind those that nobody looked at since
+        if len(pages) > MOST_STANDING:
+            pages.pop(next(iter(pages))).page.close()
+        return seen
 
     yield one
     for seen in pages.values():

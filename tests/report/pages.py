@@ -49,7 +49,7 @@ class Opened:
 
 
 def open_report(browser: Any, folder: Path, width: int) -> Opened:
-    page = browser.new_page(viewport={"width": width, "height": 1000})
+    page = browser.new_page(viewport={"width": width, "height": 900})
     seen = Opened(page)
     page.on("console", lambda m: seen.errors.append(m.text) if m.type == "error" else None)
     page.on("pageerror", lambda error: seen.errors.append(str(error)))

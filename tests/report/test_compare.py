@@ -30,6 +30,12 @@ CHART = SWEEP.replace("  dim: {exposure: {kind: fixed, exposure_s: 0.002}}\n", "
 PLAIN = CHART.split("designs:")[0].replace(", RYNCy]", "]")
 
 
+@pytest.fixture
+def plain_fronts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures that take no time, for tests that do not look at them."""
+    monkeypatch.setattr("sweep.report.compare.make.pictures", lambda _: {"png": b"fronts", "svg": b"fronts"})
+
+
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Small finished runs, by what is special about them."""
@@ -112,6 +118,7 @@ def test_two_runs_say_who_is_best_and_by_how_much(runs: dict[str, Path], tmp_pat
     assert "Best yellow/red CSD under the constraints: A chart" in page
 
 
+@pytest.mark.usefixtures("plain_fronts")
 def test_the_same_folder_twice_is_equal(runs: dict[str, Path], tmp_path: Path) -> None:
     said, page = compared([runs["tiny"], runs["tiny"]], tmp_path)
     assert "A tiny and B tiny are the same folder." in said
@@ -121,6 +128,7 @@ def test_the_same_folder_twice_is_equal(runs: dict[str, Path], tmp_path: Path) -
     assert "Nothing: the studies are the same." in page
 
 
+@pytest.mark.usefixtures("plain_fronts")
 def test_scenarios_and_fronts_that_all_have_are_compared(runs: dict[str, Path], tmp_path: Path) -> None:
     said, _ = compared([runs["tiny"], runs["chart"], runs["brighter"]], tmp_path)
     assert "Fronts are compared in the scenarios that all have: chart." in said
@@ -144,6 +152,7 @@ def test_plain_cfas_alone_are_compared(runs: dict[str, Path], tmp_path: Path) ->
     assert "Best yellow/red CSD under the constraints: B chart with" in said
 
 
+@pytest.mark.usefixtures("plain_fronts")
 def test_other_objectives_and_axes_are_not_mixed(runs: dict[str, Path], tmp_path: Path) -> None:
     said, _ = compared([runs["chart"], runs["orange"]], tmp_path)
     assert "different objectives" in said
@@ -153,11 +162,13 @@ def test_other_objectives_and_axes_are_not_mixed(runs: dict[str, Path], tmp_path
     assert "compared are those of B chart and C brighter." in said
 
 
+@pytest.mark.usefixtures("plain_fronts")
 def test_a_combined_objective_has_its_own_words(runs: dict[str, Path], tmp_path: Path) -> None:
     said, _ = compared([runs["combined"], runs["combined"]], tmp_path)
     assert "Best csd_yellow_red + 2 csd_orange_red under the constraints: A combined with" in said
 
 
+@pytest.mark.usefixtures("plain_fronts")
 def test_best_designs_of_different_scenarios_name_them(runs: dict[str, Path], tmp_path: Path) -> None:
     copytree(runs["chart"], tmp_path / "other")
     path = tmp_path / "other" / "results.parquet"
@@ -172,6 +183,7 @@ def test_best_designs_of_different_scenarios_name_them(runs: dict[str, Path], tm
     assert re.search(r"A chart with [0-9.]+ DN in chart; B chart is equal in dusk", said)
 
 
+@pytest.mark.usefixtures("plain_fronts")
 def test_dn_of_other_meaning_are_not_ranked(runs: dict[str, Path], tmp_path: Path) -> None:
     said, _ = compared([runs["chart"], runs["deep"]], tmp_path)
     assert "Best yellow/red CSD in DN of 20 bits under the constraints: B deep with" in said
@@ -190,6 +202,7 @@ def test_files_of_others_stay(runs: dict[str, Path], tmp_path: Path, name: str) 
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {name: b"mine"}
 
 
+@pytest.mark.usefixtures("plain_fronts")
 def test_no_feasible_design_and_other_constraints_are_said(runs: dict[str, Path], tmp_path: Path) -> None:
     said, _ = compared([runs["infeasible"], runs["chart"]], tmp_path)
     assert "A infeasible has no feasible design." in said
@@ -206,6 +219,7 @@ def test_hostile_names_are_text(runs: dict[str, Path], tmp_path: Path) -> None:
     assert (tmp_path / "fronts.svg").stat().st_size > 1000
 
 
+@pytest.mark.usefixtures("plain_fronts")
 def test_other_curves_are_said(runs: dict[str, Path], tmp_path: Path) -> None:
     copytree(runs["chart"], tmp_path / "other")
     curves = pd.read_parquet(tmp_path / "other" / "curves.parquet")
@@ -243,6 +257,7 @@ def test_differences_are_shown_where_they_begin(runs: dict[str, Path]) -> None:
     assert len({a, b, c}) == 3
 
 
+@pytest.mark.usefixtures("plain_fronts")
 def test_what_cannot_be_compared_is_one_line(runs: dict[str, Path], tmp_path: Path) -> None:
     for folders in ([runs["chart"]], [runs["chart"]] * 27, [runs["chart"], tmp_path]):
         with pytest.raises(SweepError) as caught:

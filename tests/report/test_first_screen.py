@@ -15,17 +15,18 @@ from sweep.report import make_report, read_output
 from sweep.study import load_study
 
 from ..build import ran
-from ..conftest import Finished
+from ..conftest import Finished, draw_nothing
 from .pages import needs_browser
 
 pytestmark = needs_browser
 
 SCREENS = [
-    *(("stopband", width) for width in (1440, 400)),
+    ("stopband", 1440),
+    pytest.param("stopband", 400, marks=pytest.mark.slow),
     *(
         pytest.param(name, width, marks=pytest.mark.slow)
-        for name in ("fog", "dual", "distance", "noise")
-        for width in (1440, 400)
+        for width in (400, 1440)
+        for name in ("noise", "distance", "dual", "fog")
     ),
 ]
 PLAIN = "study: plain\nsensor: ar0820\nlights: tl16\ncfas: [RGGB, RCCC, RYYCy]\n"
@@ -33,11 +34,13 @@ PLAIN = "study: plain\nsensor: ar0820\nlights: tl16\ncfas: [RGGB, RCCC, RYYCy]\n
 
 @pytest.fixture(scope="module")
 def plain_cfas(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The finished run of a study of plain CFAs alone."""
+    """The finished run of a study of plain CFAs alone; its page has plots, and no pictures."""
     folder = tmp_path_factory.mktemp("plain")
     (folder / "plain.yaml").write_text(PLAIN)
     ran(load_study(folder / "plain.yaml"), folder / "out", 1)
-    make_report(read_output(folder / "out"))
+    with pytest.MonkeyPatch.context() as patch:
+        draw_nothing(patch)
+        make_report(read_output(folder / "out"))
     return folder / "out"
 
 
@@ -45,13 +48,6 @@ def box(page: Any, selector: str) -> dict[str, float]:
     found = page.locator(selector).first.bounding_box()
     assert found is not None, selector
     return dict(found)
-
-
-def first_screen(browser: Any, folder: Path, width: int) -> Any:
-    page = browser.new_page(viewport={"width": width, "height": 900})
-    page.goto((folder / "report.html").as_uri())
-    page.wait_for_selector("body[data-ready-ms]")
-    return page
 
 
 def apart(page: Any, selector: str) -> bool:
@@ -78,6 +74,7 @@ def speaks_plainly(page: Any) -> None:
 
 def fits(page: Any, width: int) -> None:
     """Answer, three numbers and the first plot lie on the screen, and nothing is wider than it."""
+    page.evaluate("window.scrollTo(0, 0)")
     first = page.locator(".screen .plot").first.get_attribute("id")
     page.wait_for_function("(id) => document.getElementById(id).data", arg=first)
     assert page.evaluate("document.documentElement.scrollWidth") == width
@@ -96,28 +93,32 @@ def fits(page: Any, width: int) -> None:
 
 @pytest.mark.parametrize(("name", "width"), SCREENS)
 def test_the_answer_three_numbers_and_the_plot_are_on_one_screen(
-    finished: Finished, browser: Any, name: str, width: int
+    finished: Finished, standing: Any, name: str, width: int
 ) -> None:
-    page = first_screen(browser, finished(name), width)
+    page = standing(finished(name), width).page
     fits(page, width)
     speaks_plainly(page)
     assert apart(page, "#cfas .annotation")
-    page.close()
 
 
-@pytest.mark.parametrize("width", [1440, 400])
-def test_a_study_of_plain_cfas_has_the_same_screen(plain_cfas: Path, browser: Any, width: int) -> None:
-    page = first_screen(browser, plain_cfas, width)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) for name in ("fog", "dual", "paper")])
+def test_nothing_is_drawn_as_a_trade_off_where_nothing_trades_off(finished: Finished, standing: Any, name: str) -> None:
+    assert standing(finished(name)).page.locator("#pareto").count() == 0
+    assert not (finished(name) / "pareto.png").exists()
+
+
+@pytest.mark.parametrize("width", [pytest.param(1440, marks=pytest.mark.slow), 400])
+def test_a_study_of_plain_cfas_has_the_same_screen(plain_cfas: Path, opened: Any, width: int) -> None:
+    page = opened(plain_cfas, width).page
     fits(page, width)
     speaks_plainly(page)
     assert apart(page, "#cfas .annotation")
     assert page.locator("#pareto").count() == 0  # nothing trades off
-    page.close()
 
 
 def test_the_first_plot_has_every_cfa_at_its_light(finished: Finished, standing: Any) -> None:
     folder = finished("stopband")
-    seen, table = standing(folder, 1440), pd.read_parquet(folder / "results.parquet")
+    seen, table = standing(folder), pd.read_parquet(folder / "results.parquet")
     traces = seen.page.evaluate(
         "document.getElementById('cfas').data.map((t) => [t.name, Array.from(t.x), Array.from(t.y)])"
     )
@@ -158,7 +159,7 @@ def test_a_plain_cfa_is_chosen_by_a_click(finished: Finished, opened: Any) -> No
 
 def test_the_limiting_lights_stand_in_hover_details_and_clouds(finished: Finished, standing: Any) -> None:
     folder = finished("stopband")
-    seen = standing(folder, 1440)
+    seen = standing(folder)
     design = int(seen.page.get_attribute("#details", "data-design"))
     limited = pd.read_parquet(folder / "limited_by.parquet").set_index("design_id")
     lights = limited.loc[design, "limited_by_yellow_red"]
@@ -178,7 +179,7 @@ def test_the_limiting_lights_stand_in_hover_details_and_clouds(finished: Finishe
 
 
 def test_the_lights_stand_shaded_behind_the_qe(finished: Finished, standing: Any) -> None:
-    seen = standing(finished("stopband"), 1440)
+    seen = standing(finished("stopband"))
     shades = seen.page.evaluate(
         "document.getElementById('curves').data.filter((t) => t.fill === 'tozeroy').map((t) => t.name)"
     )
@@ -187,7 +188,7 @@ def test_the_lights_stand_shaded_behind_the_qe(finished: Finished, standing: Any
 
 @pytest.mark.parametrize("name", ["stopband", pytest.param("paper", marks=pytest.mark.slow)])
 def test_no_table_is_cut_off(finished: Finished, standing: Any, name: str) -> None:
-    seen = standing(finished(name), 1440)
+    seen = standing(finished(name))
     cut = seen.page.evaluate(
         "[...document.querySelectorAll('.scroll')].filter((e) => e.offsetParent && e.querySelector('table')"
         " && e.scrollWidth > e.clientWidth + 1).map((e) => e.innerText.slice(0, 60))"
@@ -196,25 +197,19 @@ def test_no_table_is_cut_off(finished: Finished, standing: Any, name: str) -> No
 
 
 def test_no_figure_is_shown_twice(finished: Finished, standing: Any) -> None:
-    seen = standing(finished("stopband"), 1440)
+    seen = standing(finished("stopband"))
     pictures = seen.page.evaluate("[...document.querySelectorAll('figure figcaption')].map((e) => e.textContent)")
     assert len(pictures) == 4
     assert not any("Trade-off" in text or "Filters" in text or "All CFAs" in text for text in pictures)
-
-
-@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) for name in ("fog", "dual", "paper")])
-def test_nothing_is_drawn_as_a_trade_off_where_nothing_trades_off(finished: Finished, opened: Any, name: str) -> None:
-    assert opened(finished(name)).page.locator("#pareto").count() == 0
-    assert not (finished(name) / "pareto.png").exists()
 
 
 @pytest.mark.parametrize(
     "name", ["stopband", *(pytest.param(name, marks=pytest.mark.slow) for name in ("distance", "noise", "dual"))]
 )
 def test_on_paper_the_first_figure_stands_below_the_answer_and_no_legend_is_cut(
-    finished: Finished, browser: Any, name: str
+    finished: Finished, opened: Any, name: str
 ) -> None:
-    page = first_screen(browser, finished(name), 1032)  # A4 landscape less its margins, 96 pixels to the inch
+    page = opened(finished(name), 1032).page  # A4 landscape less its margins, 96 pixels to the inch
     page.emulate_media(media="print")
     page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
     page.wait_for_function("[...document.querySelectorAll('.plot')].every((e) => e.hidden || e.data)")
@@ -229,7 +224,6 @@ def test_on_paper_the_first_figure_stands_below_the_answer_and_no_legend_is_cut(
     assert page.evaluate(f"{scrolled}.length") == 0
     page.evaluate("window.dispatchEvent(new Event('afterprint'))")
     assert page.evaluate("document.querySelector('.screen .plot').layout.height") > plot["height"]
-    page.close()
 
 
 @pytest.mark.slow

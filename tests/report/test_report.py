@@ -252,6 +252,7 @@ def test_a_study_whose_designs_all_failed_says_why(tmp_path: Path) -> None:
     assert payload(output)["front"]["rows"] == []
 
 
+@pytest.mark.usefixtures("plain_pictures")
 def test_a_single_design_has_a_report(tmp_path: Path) -> None:
     from sweep.report import make_report
 

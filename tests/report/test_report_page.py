@@ -16,7 +16,7 @@ from sweep.report import make_report, read_output
 from sweep.study import load_study
 
 from ..build import ran
-from ..conftest import Finished
+from ..conftest import Finished, draw_nothing
 from .pages import Opened, needs_browser, through
 
 pytestmark = needs_browser
@@ -34,19 +34,21 @@ def agrees(printed: str, value: float) -> bool:
     return abs(float(printed) - value) <= 0.5 * 10**-digits + abs(value) * 2**-23
 
 
-LONGER = (("stopband", 400), ("fog", 1280), ("fog", 400), ("paper", 1280), ("paper", 400))
+LONGER = (("stopband", 1280), ("stopband", 400), ("fog", 1280), ("fog", 400), ("paper", 1280), ("paper", 400))
 """Pages and their widths for the long tests."""
 
 
 @pytest.mark.parametrize(
     ("name", "width"),
     [
-        ("stopband", 1280),
+        ("stopband", 1440),
         *(pytest.param(name, width, marks=pytest.mark.slow) for name, width in LONGER),
     ],
 )
-def test_a_report_opens_without_an_error_or_a_request(finished: Finished, opened: Any, name: str, width: int) -> None:
-    seen = opened(finished(name), width)
+def test_a_report_opens_without_an_error_or_a_request(
+    finished: Finished, opened: Any, standing: Any, name: str, width: int
+) -> None:
+    seen = (opened if width == 400 else standing)(finished(name), width)
     through(seen)
     assert seen.errors == []
     assert seen.requests == [(finished(name) / "report.html").as_uri()]
@@ -56,13 +58,11 @@ def test_a_report_opens_without_an_error_or_a_request(finished: Finished, opened
 
 @pytest.mark.parametrize(
     ("name", "trace"),
-    [
-        ("stopband", "Pareto front"),
-        *(pytest.param(name, "named designs", marks=pytest.mark.slow) for name in ("fog", "paper")),
-    ],
+    [("stopband", "Pareto front"), ("fog", "named designs"), ("paper", "named designs")],
 )
-def test_pointing_and_clicking_tell_of_a_design(finished: Finished, opened: Any, name: str, trace: str) -> None:
-    seen = opened(finished(name))
+@pytest.mark.slow
+def test_pointing_and_clicking_tell_of_a_design(finished: Finished, standing: Any, name: str, trace: str) -> None:
+    seen = standing(finished(name), 1280)
     table = pd.read_parquet(finished(name) / "results.parquet").set_index("design_id")
     x, y, row = seen.point_at(trace)
     seen.page.mouse.move(x, y)  # in one step: a design on the way would be told, and clicked, first
@@ -165,8 +165,8 @@ def test_the_saved_front_has_every_digit(finished: Finished, standing: Any) -> N
 
 
 @pytest.mark.slow
-def test_brushing_an_axis_counts_what_is_left(finished: Finished, opened: Any) -> None:
-    seen = opened(finished("stopband"))
+def test_brushing_an_axis_counts_what_is_left(finished: Finished, standing: Any) -> None:
+    seen = standing(finished("stopband"), 1280)
     through(seen)
     before = seen.page.inner_text("#brushed")
     seen.page.evaluate("Plotly.restyle('parallel', {'dimensions[0].constraintrange': [[[610, 616]]]}, [0])")
@@ -178,9 +178,9 @@ def test_brushing_an_axis_counts_what_is_left(finished: Finished, opened: Any) -
 
 
 @pytest.mark.slow
-def test_another_scenario_is_drawn_when_it_is_chosen(finished: Finished, opened: Any) -> None:
+def test_another_scenario_is_drawn_when_it_is_chosen(finished: Finished, standing: Any) -> None:
     folder = finished("fog")
-    seen = opened(folder)
+    seen = standing(folder, 1280)
     table = pd.read_parquet(folder / "results.parquet")
     last = list(dict.fromkeys(table["scenario"]))[-1]
     seen.page.select_option("#scenario", last)
@@ -237,9 +237,12 @@ def hostile(folder: Path) -> Path:
     return path
 
 
-def test_names_come_out_as_text(tmp_path: Path, opened: Any) -> None:
+@pytest.mark.parametrize("drawn", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_names_come_out_as_text(tmp_path: Path, opened: Any, drawn: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = tmp_path / "out"
     ran(load_study(hostile(tmp_path)), folder, 1)
+    if not drawn:
+        draw_nothing(monkeypatch)
     make_report(read_output(folder))
     seen = opened(folder)
     through(seen)

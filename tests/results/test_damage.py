@@ -48,9 +48,9 @@ def without_trade_off(content: bytes) -> bytes:
         ("results.parquet", cut, True),
         pytest.param("curves.parquet", cut, False, marks=pytest.mark.slow),
         pytest.param("points.parquet", None, False, marks=pytest.mark.slow),
-        ("provenance.json", cut, False),
+        pytest.param("provenance.json", cut, False, marks=pytest.mark.slow),
         pytest.param("provenance.json", without_trade_off, False, marks=pytest.mark.slow),
-        ("study.resolved.yaml", None, False),
+        pytest.param("study.resolved.yaml", None, False, marks=pytest.mark.slow),
     ],
 )
 def test_a_damaged_result_is_one_line_and_the_same_command_mends_it(
@@ -127,7 +127,8 @@ def test_damaged_shards_are_computed_again_and_named(plain: Study, whole: pd.Dat
     assert not (tmp_path / SHARDS).exists()
 
 
-@pytest.mark.parametrize("cut", [1, 20, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("cut", [1, 20, 200])
 def test_a_torn_journal_costs_its_last_line_alone(plain: Study, whole: pd.DataFrame, tmp_path: Path, cut: int) -> None:
     known = len(half_done(plain, tmp_path).entries)
     path = tmp_path / SHARDS / "_journal.jsonl"
@@ -146,6 +147,7 @@ def test_an_output_that_cannot_be_written_is_one_line(plain: Study, tmp_path: Pa
             ran(plain, folder, 1)
 
 
+@pytest.mark.slow
 def test_other_folders_beside_the_chunks_stay(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
     (tmp_path / SHARDS / ".ipynb_checkpoints").mkdir(parents=True)
     ran(plain, tmp_path, 1)

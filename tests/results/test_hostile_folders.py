@@ -29,6 +29,7 @@ from sweep.search.problem import Evaluation, SearchRun
 from sweep.study import Study, load_study
 
 from ..build import study_file
+from ..cases import thinned
 from ..mischief import StoppedError, rows
 from ..tampering import hostile
 
@@ -373,7 +374,7 @@ def ways(*groups: tuple[Attack, ...]) -> Iterator[Any]:
 @pytest.mark.parametrize(
     "attacks",
     [
-        *ways(*CONTINUED.values()),
+        *thinned(ways(*CONTINUED.values()), 3),
         *(pytest.param((attack,), id=f"{attack.__name__}-alone", marks=pytest.mark.slow) for attack in ALONE),
     ],
 )

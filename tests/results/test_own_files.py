@@ -23,6 +23,7 @@ from sweep.run import output_folder, run_study
 from sweep.study import Study, load_study
 
 from ..build import ran, study_file
+from ..cases import thinned
 from ..conftest import Finished
 from ..mischief import StoppedError, half_done, rows
 
@@ -47,7 +48,7 @@ def expected(few: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFra
     return rows(folder)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", thinned(NAMES, 4))
 def test_a_file_that_was_there_before_is_told_and_stays(few: Study, tmp_path: Path, name: str) -> None:
     base = tmp_path / "tiny"
     (base / name).parent.mkdir(parents=True, exist_ok=True)
@@ -89,7 +90,7 @@ def test_a_file_put_there_while_a_run_is_interrupted_is_told(
 
 
 @pytest.mark.usefixtures("plain_pictures")
-@pytest.mark.parametrize("name", ["report.html", "pareto.svg", "figures/sensor.png"])
+@pytest.mark.parametrize("name", thinned(["report.html", "pareto.svg", "figures/sensor.png"], 3))
 def test_a_file_put_there_before_the_report_is_told(few: Study, tmp_path: Path, name: str) -> None:
     ran(few, tmp_path, 1)
     (tmp_path / "figures").mkdir()
@@ -100,6 +101,7 @@ def test_a_file_put_there_before_the_report_is_told(few: Study, tmp_path: Path, 
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file() and path.name != LOCK} == before
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("plain_pictures")
 def test_other_files_of_the_folder_stay(few: Study, tmp_path: Path) -> None:
     mine = (
@@ -150,6 +152,7 @@ def test_a_lock_that_says_something_else_stays(few: Study, tmp_path: Path) -> No
         ran(few, tmp_path, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("plain_pictures")
 def test_links_in_the_place_of_files_are_replaced_not_followed(
     few: Study, expected: pd.DataFrame, tmp_path: Path
@@ -222,7 +225,7 @@ def refusing(monkeypatch: pytest.MonkeyPatch, at: int, number: int) -> list[str]
     return asked
 
 
-@pytest.mark.parametrize("step", [6, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("step", thinned([9, 1]))
 def test_wherever_the_disk_refuses_nothing_finished_is_lost(
     few: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int
 ) -> None:

@@ -57,6 +57,15 @@ def test_a_map_is_that_of_every_pair_read_out(tmp_path: Path) -> None:
             assert row["least_dn"] == pytest.approx(min(apart.values()))
             assert apart[row["yellow_fwhm_nm"], row["red_fwhm_nm"]] == pytest.approx(row["least_dn"])
     assert (own["pairs"] == 3 * 3).any()
+
+
+@pytest.mark.slow
+def test_a_map_is_told_and_drawn(tmp_path: Path) -> None:
+    path = tmp_path / "allowed.yaml"
+    path.write_text(TEXT)
+    ran(load_study(path), tmp_path / "out", 1)
+    found = pd.read_parquet(tmp_path / "out" / REGIONS_MAP)
+    own = found[found["design_id"] == 0]
     output = read_output(tmp_path / "out")
     make_report(output)
     share = own["separated"].sum() / own["pairs"].sum()

@@ -22,6 +22,7 @@ from sweep.designs.space import Filter, Space
 from sweep.metrics.evaluate import evaluate, family_quantities
 
 from ..blocks import SPACE, VIEWS, view_of
+from ..cases import thinned
 from ..hard.scenes import DARK, F2, FAMILY, FAR, FIXED, GRID, SENSOR, lights
 
 # Crossed edges among them, which lift N above Y, so that it sets the exposure.
@@ -43,17 +44,19 @@ def assert_same(found: dict[str, Any], which: Any, alone: dict[str, Any]) -> Non
         np.testing.assert_array_equal(found[name][which], values, err_msg=name)
 
 
-LONG = [("pulsed", False), ("pulsed", True)]
-"""Blocks that take seconds as a whole: for the long tests alone."""
+SOME = [*((name, True) for name in (*VIEWS, *MORE) if name not in ("pulsed", "noise")), ("chart", False)]
+"""Scenes, and whether blocks know their edges, of which `make test` sees some parts; the others take seconds."""
 
 
 @pytest.mark.parametrize(
     ("name", "separable", "step"),
     [
-        pytest.param(name, separable, step, marks=[pytest.mark.slow] if step == 1 else [])
-        for name in (*VIEWS, *MORE)
-        for separable in (True, False)
-        for step in ((1,) if (name, separable) in LONG else (1, 11))
+        *((name, separable, 11) for name, separable in SOME),
+        *(
+            pytest.param(name, separable, 1, marks=pytest.mark.slow)
+            for name in (*VIEWS, *MORE)
+            for separable in (True, False)
+        ),
     ],
 )
 def test_a_design_alone_is_the_one_of_its_block(name: str, separable: bool, step: int) -> None:
@@ -153,7 +156,7 @@ def test_two_modified_channels(scenario: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
-@pytest.mark.parametrize(("k", "m"), [(1, 1), (7, 3), (61, 51), (301, 1), (301, 51), (602, 102), (301, 2000)])
+@pytest.mark.parametrize(("k", "m"), thinned([(7, 3), (1, 1), (61, 51), (301, 1), (301, 51), (301, 2000), (602, 102)]))
 def test_products_of_rows(k: int, m: int, dtype: type) -> None:
     rng = np.random.default_rng(k + m)
     rows, matrix = (rng.random(shape).astype(dtype) for shape in ((150, k), (k, m)))

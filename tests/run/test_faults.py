@@ -28,6 +28,7 @@ from sweep.run.workers import Workers, workers
 from sweep.study import Study, load_study
 
 from ..build import ran, study_file
+from ..cases import thinned
 from ..mischief import StoppedError, half_done, mischievous, rows
 
 
@@ -111,7 +112,7 @@ def test_failing_designs_stop_a_run_or_are_tried_again(fewer: Study, unharmed: p
 
 
 @pytest.mark.usefixtures("plain_pictures")
-@pytest.mark.parametrize("all_fail", [False, True])
+@pytest.mark.parametrize("all_fail", thinned([False, True]))
 def test_a_named_design_that_fails_is_a_row(plain: Study, tmp_path: Path, all_fail: bool) -> None:
     wish = tmp_path / "wish"
     named = next(space for space in plain.spaces if space.kind == "design")
@@ -130,6 +131,7 @@ def test_a_named_design_that_fails_is_a_row(plain: Study, tmp_path: Path, all_fa
     make_report(read_output(tmp_path / "out"))
 
 
+@pytest.mark.slow
 def test_a_clock_that_goes_back_changes_nothing(
     plain: Study, whole: pd.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -250,10 +252,16 @@ def test_workers_never_outnumber_the_cores(plain: Study, tmp_path: Path) -> None
     assert facts["workers"] * facts["threads_per_worker"] <= facts["cores"]
 
 
-def test_dask_needs_a_scheduler_that_answers() -> None:
-    for scheduler, said in ((None, "needs --scheduler"), ("tcp://127.0.0.1:9", "--scheduler tcp://127.0.0.1:9: ")):
-        with pytest.raises(SweepError, match=said), workers(Workers(2, Stop(), "dask", scheduler)):
-            pass
+@pytest.mark.parametrize(
+    ("scheduler", "said"),
+    [
+        (None, "needs --scheduler"),
+        pytest.param("tcp://127.0.0.1:9", "--scheduler tcp://127.0.0.1:9: ", marks=pytest.mark.slow),
+    ],
+)
+def test_dask_needs_a_scheduler_that_answers(scheduler: str | None, said: str) -> None:
+    with pytest.raises(SweepError, match=said), workers(Workers(2, Stop(), "dask", scheduler)):
+        pass
 
 
 @pytest.mark.slow
@@ -304,7 +312,7 @@ def test_a_search_that_was_killed_is_not_repeated(tmp_path: Path) -> None:
 
     run_study(study, tmp_path / "out", 1, look)
     assert seen == [kept]
-    ran(study, tmp_path / "whole", 2)
+    ran(study, tmp_path / "whole", 1)
     for name in ("results", "search"):
         tables = [pq.read_table(tmp_path / folder / f"{name}.parquet") for folder in ("out", "whole")]
         assert tables[0].equals(tables[1])

@@ -17,6 +17,7 @@ from sweep.run import run_study
 from sweep.study import Study, load_study
 
 from ..build import one_line
+from ..cases import thinned
 from ..commanded import commanded
 from .own_codes import CODE, OWN_FAMILY, STOPBAND, rows_of
 
@@ -75,9 +76,10 @@ def study(folder: Path, text: str = STUDY, *, allow: bool = True) -> Study:
     return load_study(path, allow_code=allow)
 
 
-def test_a_family_and_a_metric_of_a_package_are_like_those_of_files(package: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("jobs", thinned([1, 2]))
+def test_a_family_and_a_metric_of_a_package_are_like_those_of_files(package: Path, tmp_path: Path, jobs: int) -> None:
     made = study(tmp_path)
-    run_study(made, tmp_path / "named", 2, lambda *_: None)
+    run_study(made, tmp_path / "named", jobs, lambda *_: None)
     (tmp_path / "filters.py").write_text(STOPBAND)
     (tmp_path / "mine.py").write_text(CODE)
     of_files = study(

@@ -12,6 +12,8 @@ from sweep.results.tables import LIMITED_BY, POINTS, RECOGNITION
 from sweep.run import run_study
 from sweep.study import load_study
 
+from ..cases import thinned
+
 STUDY = """
 study: looks
 sensor: ar0820
@@ -52,9 +54,9 @@ def test_each_scene_of_each_cfa_is_made_ready_once(folder: Path, monkeypatch: py
     assert [len(found[name]) for name in (LIMITED_BY, RECOGNITION)] == [4, 4]
 
 
-def test_what_is_looked_at_later_or_elsewhere_is_the_same(folder: Path) -> None:
+@pytest.mark.parametrize("jobs", thinned([1, 2]))
+def test_what_is_looked_at_later_or_elsewhere_is_the_same(folder: Path, jobs: int) -> None:
     before = ran(folder)
     for name in TABLES:
         (folder / "out1" / name).unlink()
-    assert ran(folder) == before
-    assert ran(folder, 2) == before
+    assert ran(folder, jobs) == before

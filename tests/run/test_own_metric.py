@@ -24,6 +24,7 @@ from sweep.study import Study, load_study
 from sweep.study.own_metrics import RESERVED
 
 from ..build import one_line, ran
+from ..cases import thinned
 from ..commanded import commanded
 from ..hard.scenes import FAMILY, scene
 from .own_codes import CODE, OWN_METRIC, PLAIN, rows_of
@@ -36,8 +37,9 @@ def study(folder: Path, text: str = OWN_METRIC, code: str = CODE, *, allow: bool
     return load_study(path, allow_code=allow)
 
 
-def test_a_csd_written_again_has_the_same_numbers_and_the_same_optimum(tmp_path: Path) -> None:
-    ran(study(tmp_path), tmp_path / "own", 2)
+@pytest.mark.parametrize("jobs", thinned([1, 2]))
+def test_a_csd_written_again_has_the_same_numbers_and_the_same_optimum(tmp_path: Path, jobs: int) -> None:
+    ran(study(tmp_path), tmp_path / "own", jobs)
     ran(study(tmp_path, PLAIN), tmp_path / "plain", 1)
     own, plain = rows_of(tmp_path / "own"), rows_of(tmp_path / "plain")
     np.testing.assert_allclose(own["apart"], own["csd_yellow_red"], rtol=1e-12)

@@ -52,6 +52,7 @@ def both(study: Study, found: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.
     return smooth_csd(view, curves, pair), worst, designed_quantities(view, curves)["sensitivity"]
 
 
+@pytest.mark.slow
 def test_a_dry_run_knows_the_searches_of_a_price(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     lights(tmp_path, "own", 592, 632)
     (tmp_path / "price.yaml").write_text(TEXT.replace("max_evaluations: 120", "max_evaluations: 24"))

@@ -107,6 +107,7 @@ def thick(folder: Path) -> Study:
     return load_study(path)
 
 
+@pytest.mark.slow
 def test_a_yield_is_over_films_that_are_too_thick_or_too_thin(tmp_path: Path) -> None:
     agree(thick(tmp_path), 20_000, 0.008)
 
@@ -147,6 +148,7 @@ def test_the_interval_of_a_share() -> None:
                 assert abs(kept / n - end) == pytest.approx(1.959964 * np.sqrt(end * (1 - end) / n), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_any_number_of_workers_gives_the_same_and_a_break_is_where_the_worst_cases_cross(tmp_path: Path) -> None:
     study = street(tmp_path, 1000)
     tables = []
@@ -172,6 +174,7 @@ def test_any_number_of_workers_gives_the_same_and_a_break_is_where_the_worst_cas
     assert drift[0] - 3 * mine["breaks_at"] <= mine["breaks_first_nm"] <= drift[1] + 3 * mine["breaks_at"]
 
 
+@pytest.mark.slow
 def test_a_kill_among_the_yields_loses_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     study = street(tmp_path, 1000)
     ran(study, tmp_path / "whole", 1)

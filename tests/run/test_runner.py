@@ -165,7 +165,7 @@ def test_two_runs_at_once_are_refused(study: Study, tmp_path: Path) -> None:
     ran(study, tmp_path, 1)
 
 
-MANY = 201
+MANY = 61
 """Left edges of a sweep that takes long enough to be killed in it."""
 
 
@@ -230,6 +230,7 @@ def test_a_full_disk_is_one_line_and_loses_nothing(study: Study, output: Path, t
     assert pq.read_table(folder / "results.parquet").equals(pq.read_table(output / "results.parquet"))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("plain_pictures")
 def test_worst_cases_and_combined_objectives_are_columns(tmp_path: Path) -> None:
     text = STUDY.replace("COUNT", "3").replace(

@@ -23,6 +23,7 @@ from sweep.study import Study, load_study
 from ..build import large, ran
 
 
+@pytest.mark.slow
 def test_a_hundred_thousand_chunks_have_keys_of_their_own(tmp_path: Path) -> None:
     study: Study = load_study(large(tmp_path, 8200))
     jobs = list(jobs_of(study))

@@ -32,6 +32,7 @@ from sweep.search.solver import search_from
 from sweep.study import Search, Study, load_study
 
 from ..build import one_line, ran
+from ..cases import thinned
 from ..conftest import STUDIES
 
 TEXT = """\
@@ -86,7 +87,7 @@ def test_what_is_told_of_a_share_is_more_than_it_has_in_a_twentieth_of_all_cases
     assert chances[0] <= 0.05 < chances[1]
 
 
-@pytest.mark.parametrize("thickness", [0.0, 0.004])
+@pytest.mark.parametrize("thickness", thinned([0.0, 0.004]))
 def test_its_derivative_is_exact(thickness: float) -> None:
     model = Model(replace(problem(), thickness=thickness), SearchRun(0), 1000)
     for u in starting_points(problem(), 2, 5)[: 2 if not thickness else 1]:

@@ -188,7 +188,10 @@ def asleep(_stop: Stop) -> None:
     time.sleep(30)
 
 
-@pytest.mark.parametrize("work", [in_peace, with_grace, swallowed, asked_twice, asleep])
+@pytest.mark.parametrize(
+    "work",
+    [in_peace, asked_twice, asleep, *(pytest.param(work, marks=pytest.mark.slow) for work in (with_grace, swallowed))],
+)
 def test_a_stop_breaks_off_at_once_but_what_is_held_or_has_grace(work: Callable[[Stop], None]) -> None:
     def run() -> None:
         with stop_on_signals() as stop:
@@ -206,11 +209,15 @@ def later(seconds: float, number: int) -> int:
     return number
 
 
-@pytest.mark.parametrize("backend", ["loky", "threading"])
+SLOWER_S = {"loky": 2.0, "threading": 0.2}
+"""What the others are handed on before: for processes, their start."""
+
+
+@pytest.mark.parametrize("backend", SLOWER_S)
 def test_results_are_handed_on_as_they_finish_and_given_in_order(backend: str) -> None:
     finished: list[int] = []
     with workers(Workers(2, Stop(), backend)) as crew:
-        calls = (joblib.delayed(later)(2.0 if number == 0 else 0.0, number) for number in range(6))
+        calls = (joblib.delayed(later)(SLOWER_S[backend] if number == 0 else 0.0, number) for number in range(6))
         assert list(crew(calls, finished=lambda at, _: finished.append(at))) == list(range(6))
     assert sorted(finished) == list(range(6))
     assert finished[0] != 0  # the slow one did not hold up what was finished beside it
@@ -251,6 +258,16 @@ def begun(folder: Path, jobs: int) -> subprocess.Popen[bytes]:
     return run
 
 
+@pytest.fixture(scope="module")
+def whole_s(tmp_path_factory: pytest.TempPathFactory) -> float:
+    """Seconds that a run takes which nobody disturbs."""
+    folder = tmp_path_factory.mktemp("whole")
+    noisy_study(folder)
+    started_s = time.monotonic()
+    assert begun(folder, 2).wait(timeout=120) == 0
+    return time.monotonic() - started_s
+
+
 def emptied(folder: Path) -> None:
     for made in sorted(folder.rglob("*"), reverse=True):
         made.rmdir() if made.is_dir() else made.unlink()
@@ -260,7 +277,7 @@ def emptied(folder: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("plain_pictures")
 @pytest.mark.parametrize("seed", range(4))
-def test_forty_kills_in_every_phase(tmp_path: Path, undisturbed: Path, seed: int) -> None:
+def test_forty_kills_in_every_phase(tmp_path: Path, undisturbed: Path, whole_s: float, seed: int) -> None:
     """Parents and workers, by three signals, at random moments; the rows are those of an undisturbed run each time.
 
     Ten kills of each seed; a run that goes on may have another number of workers than the one that was killed.
@@ -268,10 +285,6 @@ def test_forty_kills_in_every_phase(tmp_path: Path, undisturbed: Path, seed: int
     rng = np.random.default_rng([17, seed])
     kills, out = {"run": 0, "worker": 0}, tmp_path / "out" / "tiny"
     noisy_study(tmp_path)
-    started_s = time.monotonic()
-    assert begun(tmp_path, 2).wait(timeout=120) == 0
-    whole_s = time.monotonic() - started_s
-    emptied(out)
     while sum(kills.values()) < 10:
         run = begun(tmp_path, 1 + int(rng.integers(2)))
         time.sleep(float(rng.uniform(0, whole_s)))

@@ -100,6 +100,7 @@ def test_no_random_filter_beats_the_limit_over_the_population() -> None:
     assert 0.3 * limit().proven < best <= limit().proven
 
 
+@pytest.mark.slow
 def test_the_table_of_the_documentation() -> None:
     """Each figure in `studies/README.md`, but those of the answer and the limit: nominal, over temperature, over all."""
     text = (STUDIES / "README.md").read_text(encoding="utf-8")

@@ -20,6 +20,7 @@ from sweep.search.solver import search_from
 from sweep.search.trade_off import check_proof
 from sweep.study import load_study
 
+from ..cases import thinned
 from ..conftest import STUDIES
 from .noisy_problems import problem_of
 
@@ -49,7 +50,7 @@ def values(problem: Problem, names: list[str]) -> list[dict[str, float]]:
     return [{name: problem.quantities[name].value(rows) for name, rows in point.quantities.items()} for point in points]
 
 
-@pytest.mark.parametrize("made", [share, noisy])
+@pytest.mark.parametrize("made", thinned([noisy, share]))
 def test_what_meets_a_bound_of_the_study_meets_those_of_the_limit(made: Callable[[], Problem]) -> None:
     problem = made()
     asked = {name: quantity for name, quantity in problem.quantities.items() if quantity.ends and quantity.smooth}

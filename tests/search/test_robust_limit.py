@@ -59,6 +59,7 @@ def test_its_filter_has_it_at_the_worst_place_and_more_at_the_others() -> None:
     assert min(each) == pytest.approx(found.attained, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_over_all_places_it_is_a_bracket_of_the_worst_one() -> None:
     """Of 200 image heights, each a scene of its own, none is worse for its filter; named places have no lower limit."""
     given, optics = problem(), problem().view.scenario.optics
@@ -188,6 +189,7 @@ FREE_FORM = (
 )
 
 
+@pytest.mark.slow
 def test_free_form_filters_come_near_the_limit_over_the_whole_sensor() -> None:
     """`sweep run angle --set boxes.edges=FREE_FORM`: the figure of the documentation, at all places of the sensor."""
     study = load_study(STUDIES / "angle.yaml", changes={"boxes.edges": FREE_FORM})
@@ -217,6 +219,7 @@ def test_kernels_of_filters_that_move_are_their_own() -> None:
     np.testing.assert_array_equal(moving.smooth(curves), LinearImager(moving.view).smooth(curves))
 
 
+@pytest.mark.slow
 def test_the_table_of_the_documentation() -> None:
     """Each figure in `studies/README.md`: where nothing moves, on axis, at the worst of all places."""
     text = (STUDIES / "README.md").read_text(encoding="utf-8")

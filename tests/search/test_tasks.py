@@ -39,7 +39,7 @@ SMI, DELTA_E, LUX = "color_smi", "color_delta_e_mean_d65", "low_light_lux_a"
     [
         pytest.param(SMI, SMI, "SLSQP", marks=pytest.mark.slow),
         (DELTA_E, {"least": {DELTA_E: 1}}, "SLSQP"),
-        (DELTA_E, {"least": {DELTA_E: 1}}, "COBYLA"),
+        pytest.param(DELTA_E, {"least": {DELTA_E: 1}}, "COBYLA", marks=pytest.mark.slow),
         (LUX, {"least": {LUX: 0.01}}, "SLSQP"),
     ],
 )

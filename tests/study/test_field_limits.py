@@ -152,13 +152,6 @@ def check_refused(tmp_path: Path, path: tuple[Any, ...], value: object) -> None:
 
 
 @pytest.mark.slow
-def test_what_is_no_number_of_this_world_is_one_line(tmp_path: Path) -> None:
-    """Each field with one such value, the next field with the next."""
-    for index, path in enumerate(NUMBERS):
-        check_refused(tmp_path, path, NONE[index % len(NONE)])
-
-
-@pytest.mark.slow
 def test_whatever_is_no_number_of_this_world_is_one_line(tmp_path: Path) -> None:
     for path in NUMBERS:
         for value in NONE:

@@ -22,6 +22,7 @@ from sweep.run.rows import rules_of, run_job
 from sweep.run.sweep import Sweep
 from sweep.study import Study, load_study
 
+from ..cases import thinned
 from ..commanded import commanded
 from ..conftest import STUDIES
 from ..mutations import EXTREMES, changed, one_of, torn, written
@@ -116,7 +117,7 @@ def tried(path: Path, *, compute: bool) -> str:
     return "computed"
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", thinned(range(4)))
 def test_changed_studies(studies: list[dict[str, Any]], tmp_path: Path, seed: int) -> None:
     rng, path, found = np.random.default_rng([1, seed]), tmp_path / "changed.yaml", Counter()
     for index in range(15):

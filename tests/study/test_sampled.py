@@ -71,6 +71,7 @@ def test_zip_and_list_take_values_together(tmp_path: Path) -> None:
     np.testing.assert_array_equal(points(tmp_path, f"list: [{designs}]"), expected)
 
 
+@pytest.mark.slow
 def test_a_run_of_drawn_designs_is_the_same_with_two_workers(tmp_path: Path) -> None:
     study = load_study(written(tmp_path, f"sobol: 300\n    box: {BOX}"))
     for jobs in (1, 2):
@@ -86,7 +87,8 @@ def test_a_run_of_drawn_designs_is_the_same_with_two_workers(tmp_path: Path) -> 
     assert read_output(tmp_path / "1").profiles == {}  # no value of a parameter is held while the others vary
 
 
-@pytest.mark.parametrize("method", ["sobol", pytest.param("lhs", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["sobol", "lhs"])
 def test_a_run_of_drawn_designs_that_is_broken_off_is_continued(tmp_path: Path, method: str) -> None:
     study = load_study(written(tmp_path, f"{method}: 4200\n    box: {BOX}"))
 

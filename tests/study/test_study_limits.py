@@ -98,13 +98,20 @@ TOO_MUCH: dict[str, tuple[Callable[[], str | bytes], str]] = {
 }
 
 
+LONGER = ("a shorter list", "an endless quote")
+"""Texts that are read for a second or more, for the long tests."""
+
+
 def refused(path: Path) -> list[str]:
     with pytest.raises(StudyError) as caught, within(HANG_S):
         load_study(path)
     return [str(fault).replace(str(path), "FILE") for fault in caught.value.faults]
 
 
-@pytest.mark.parametrize("name", TOO_MUCH)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow if name in LONGER else ()) for name in TOO_MUCH],
+)
 def test_too_much_is_one_line(tmp_path: Path, name: str) -> None:
     made, expected = TOO_MUCH[name]
     text = made()
