@@ -40,15 +40,7 @@ ONLY_USER = {
     "sklearn": ["metrics/recognition"],
     "jax": ["vision/network"],
     "optax": ["vision/network"],
-    "numba": [
-        "designs/compiled",
-        "camera/compiled",
-        "camera/plan/compiled",
-        "vision/compiled",
-        "metrics/compiled",
-        "metrics/nearest",
-        "designs/vectorized",
-    ],
+    "numba": ["base/machine_code", "designs/vectorized"],
 }
 """Who alone may import a library: files, or all of a folder."""
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ..base.machine_code import njit
 from ..base.types import FloatArray, IndexArray
 from .compiled_areas import BOTH_AXES, JUMP, SLOPE, THIRD, CellWeights
-from .compiled_light import add, mixed
-from .compiled_slopes import Light, Seen, light_in_cell, node
+from .compiled_light import add, to_channels
+from .compiled_slopes import Light, LightInCell, light_in_cell, node
 
 
 @njit(cache=True, nogil=True)
@@ -33,15 +33,17 @@ def _mix_rim(own: CellWeights, channel: IndexArray, row: int, column: int, share
     how much it changes, second derivative, its jumps and third derivative, along either axis.
     """
     for axis in range(2):
-        mixed(own.slope[:, :, axis], channel, row, column, share, of_rim[0, axis])
-        mixed(own.sudden[:, :, axis], channel, row, column, share, of_rim[1, axis])
-        mixed(own.bend[:, :, axis], channel, row, column, share, of_rim[2, axis])
-        mixed(own.jump[:, :, axis], channel, row, column, share, of_rim[3, axis])
-        mixed(own.third[:, :, axis], channel, row, column, share, of_rim[4, axis])
+        to_channels(own.slope[:, :, axis], channel, row, column, share, of_rim[0, axis])
+        to_channels(own.sudden[:, :, axis], channel, row, column, share, of_rim[1, axis])
+        to_channels(own.bend[:, :, axis], channel, row, column, share, of_rim[2, axis])
+        to_channels(own.jump[:, :, axis], channel, row, column, share, of_rim[3, axis])
+        to_channels(own.third[:, :, axis], channel, row, column, share, of_rim[4, axis])
 
 
 @njit(cache=True, nogil=True)
-def _add_inner(weight: float, dx: float, dy: float, h: float, light: Light, seen: Seen, found: FloatArray) -> None:
+def _add_inner(
+    weight: float, dx: float, dy: float, h: float, light: Light, seen: LightInCell, found: FloatArray
+) -> None:
     """Add what the light of a pixel whose weight is the same in the whole cell may be off, ndarray[n_parts]."""
     images = light.images
     if images.steep.shape[0]:
@@ -57,7 +59,9 @@ def _add_inner(weight: float, dx: float, dy: float, h: float, light: Light, seen
 
 
 @njit(cache=True, nogil=True)
-def _add_rim(weight: float, of_rim: FloatArray, seen: Seen, ratio: FloatArray, h: float, found: FloatArray) -> None:
+def _add_rim(
+    weight: float, of_rim: FloatArray, seen: LightInCell, ratio: FloatArray, h: float, found: FloatArray
+) -> None:
     """Add what the light of a pixel, less `ratio`, times its changing weight in a channel may be off, ndarray[n_parts].
 
     `of_rim`: ndarray[5, 2] (`_mix_rim`); `ratio`: the lowest and the highest of the channel for a weight that goes
@@ -87,7 +91,7 @@ def _of_cell(
     light: Light,
     h: float,
     nodes: FloatArray,
-    seen: Seen,
+    seen: LightInCell,
     found: FloatArray,
 ) -> None:
     """`deviations` of one cell. `nodes`: ndarray[2, n_channels, n_channels, n_parts]."""
@@ -97,7 +101,7 @@ def _of_cell(
     found[:] = 0.0
     for row in range(y.size):
         for column in range(x.size):
-            if not mixed(own.high, channel, row, column, light.share, weight):
+            if not to_channels(own.high, channel, row, column, light.share, weight):
                 continue
             to = channel[row, column]
             # Elsewhere than at the rim of the readout the weights are the same in the whole cell.
@@ -136,7 +140,7 @@ def deviations(
     ndarray[n_cells, n_channels, n_channels, n_parts].
     """
     values, slopes, sudden, bends, jumps, thirds = np.empty((6, 2, found.shape[3]))
-    seen = Seen(values, slopes, sudden, bends, jumps, thirds)
+    seen = LightInCell(values, slopes, sudden, bends, jumps, thirds)
     for cell in range(len(x)):
         own = CellWeights(
             weights.high[cell],

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..base.machine_code import njit
 from ..base.types import FloatArray, IndexArray
 from .compiled_light import add
 from .compiled_patches import to_control

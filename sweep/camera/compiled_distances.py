@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..base.machine_code import njit
 from ..base.types import BoolArray, FloatArray, IndexArray
 from .compiled_patches import N_CONTROL, PARTS, largest_derivatives, to_control, to_parts
 
@@ -16,7 +16,7 @@ _MOST_DIVIDED = 16
 """Pairs of a cell whose patches are divided."""
 
 
-class Distances(NamedTuple):
+class CellDistances(NamedTuple):
     """Of cells: the lower bound of the distance of each pair of signals, ndarray[n_cells, n_pairs], the least of their
     upper bounds, ndarray[n_cells], and the smallest distance at each node, ndarray[n_cells, 9].
     """
@@ -139,7 +139,7 @@ def distances(
     moves: FloatArray,
     h: float,
     ends: tuple[float, float],
-    found: Distances,
+    found: CellDistances,
 ) -> None:
     """Bound the distances in cells of half width `h`.
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ..base.machine_code import njit
 from ..base.types import BoolArray, FloatArray, IndexArray
 
 Table = tuple[FloatArray, float]
@@ -138,7 +138,9 @@ def covered_by_disc(x: FloatArray, y: FloatArray, half: float, radius: float) ->
 
 
 @njit(cache=True, nogil=True)
-def mixed(values: FloatArray, channel: IndexArray, row: int, column: int, share: float, found: FloatArray) -> bool:
+def to_channels(
+    values: FloatArray, channel: IndexArray, row: int, column: int, share: float, found: FloatArray
+) -> bool:
     """Put what of a pixel's light is in each channel's value into `found`, neighbors' weights, too; whether any is."""
     found[:] = 0.0
     found[channel[row, column]] += (1 - share) * values[row, column]

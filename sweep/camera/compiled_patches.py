@@ -7,8 +7,8 @@ chapter 6), and so does each part of it within those of the part.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..base.machine_code import njit
 from ..base.types import FloatArray
 
 PARTS = 4

@@ -6,10 +6,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..base.machine_code import njit
 from ..base.types import FloatArray, IndexArray
-from .compiled_light import EdgeRule, Table, add, along_edge, mixed
+from .compiled_light import EdgeRule, Table, add, along_edge, to_channels
 
 
 class Rings(NamedTuple):
@@ -106,7 +106,7 @@ def kernels_by_ring(
             for column in range(channel.shape[1]):
                 to = channel[row, column]
                 sums[place, to] += weights[place, row, column]
-                if mixed(weights[place], channel, row, column, share, own):
+                if to_channels(weights[place], channel, row, column, share, own):
                     ring = _mean_over_pixel(x[place, column], y[place, row], rings, light)
                     for u in range(n_channels):
                         if own[u] > 0:

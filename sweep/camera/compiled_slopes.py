@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..base.machine_code import njit
 from ..base.types import FloatArray
 from .compiled_areas import bends_of_disc, slope_of_disc
 from .compiled_light import add, covered_share
@@ -52,7 +52,7 @@ class Light(NamedTuple):
     taken: FloatArray
 
 
-class Seen(NamedTuple):
+class LightInCell(NamedTuple):
     """Of a pixel's light over a cell, ndarray[2, n_parts] each: the lowest and the highest; along either axis the
     largest slope, how much it changes at most, the largest second derivative, by how much that jumps in all, and the
     largest third one. Those of a sharp image may be infinite.
@@ -139,7 +139,7 @@ def _between_values(dx: float, dy: float, half: float, h: float, images: Envelop
 
 
 @njit(cache=True, nogil=True)
-def _of_sharp(dx: float, dy: float, h: float, light: Light, seen: Seen) -> None:
+def _of_sharp(dx: float, dy: float, h: float, light: Light, seen: LightInCell) -> None:
     """`light_in_cell` of a sharp image."""
     half, radius = light.half, light.radius
     seen.values[0, 0] = covered_share(abs(dx) + h, abs(dy) + h, half, radius)
@@ -152,7 +152,7 @@ def _of_sharp(dx: float, dy: float, h: float, light: Light, seen: Seen) -> None:
 
 
 @njit(cache=True, nogil=True)
-def light_in_cell(dx: float, dy: float, h: float, light: Light, seen: Seen) -> None:
+def light_in_cell(dx: float, dy: float, h: float, light: Light, seen: LightInCell) -> None:
     """Put what is known of a pixel's light over a cell into `seen`."""
     half, images = light.half, light.images
     if not images.steep.shape[0]:

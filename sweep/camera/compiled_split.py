@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from numba import njit
-
+from ..base.machine_code import njit
 from ..base.types import FloatArray, IndexArray
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..base.types import FloatArray, IndexArray
 from ..curves.lights import Pair, class_pairs
-from .compiled_distances import Distances, distances
+from .compiled_distances import CellDistances, distances
 from .effects import phase
 from .place_cells import CellKernels, kept_cells
 from .registry import factor_of_light
@@ -130,7 +130,7 @@ class _Search:
         """Look at some cells and pairs next."""
         self.cells, self.pairs = cells, pairs
         n = len(cells.centers)
-        self._known = Distances(np.empty((n, pairs.size)), np.empty(n), np.empty((n, len(phase.NODES))))
+        self._known = CellDistances(np.empty((n, pairs.size)), np.empty(n), np.empty((n, len(phase.NODES))))
 
     def take(self, some: IndexArray, which: IndexArray, seen: FloatArray, known: CellKernels) -> None:
         """Bound the distances in some of the cells, which are those of `known`.
@@ -142,7 +142,7 @@ class _Search:
         rest = known.deviation.kernel[which]
         rest = rest.reshape(*rest.shape[:2], -1) @ self._amounts[self.pairs].T
         pairs = self._one[self.pairs], self._other[self.pairs]
-        found = Distances(*(np.empty((len(some), *values.shape[1:])) for values in self._known))
+        found = CellDistances(*(np.empty((len(some), *values.shape[1:])) for values in self._known))
         ends = self._least[0] - self._within_dn, self._most[0] + self._within_dn
         moves, half = known.deviation.moves[which], self.cells.half
         distances(seen, known.nodes[which], pairs, rest, moves, half, ends, found)

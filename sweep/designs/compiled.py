@@ -7,8 +7,8 @@ of the same sums in NumPy.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..base.machine_code import njit
 from ..base.types import FloatArray, IndexArray
 from .vectorized import larger, smaller
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ..base.machine_code import njit
 from ..base.types import BoolArray, FloatArray, IndexArray
 from ..designs.vectorized import larger, smaller
 

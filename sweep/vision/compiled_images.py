@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ..base.machine_code import njit
 
 _MARGIN = 50.0
 """What is less likely than the most likely by more than this factor's logarithm counts as impossible."""

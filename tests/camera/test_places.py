@@ -17,7 +17,7 @@ from scipy.optimize import minimize
 
 from sweep.camera import places
 from sweep.camera.between import Between, Deviation, of_channels
-from sweep.camera.compiled_distances import Distances, distances
+from sweep.camera.compiled_distances import CellDistances, distances
 from sweep.camera.effects import phase
 from sweep.camera.forget import forget_scenes
 from sweep.camera.imager import Imager
@@ -41,7 +41,7 @@ LATTICE = replace(REFERENCE, phase="half pixel")
 
 
 def at_place(made: Scene, x: float, y: float, methods: Methods = REFERENCE) -> dict[str, float]:
-    """Distances with the light at one named place."""
+    """CellDistances with the light at one named place."""
     given = made.view.scenario
     assert given.target is not None
     there = given.model_copy(update={"target": given.target.model_copy(update={"phase_px": (x, y)})})
@@ -342,7 +342,7 @@ def test_distances_in_a_cell_are_within_their_bounds(n_pairs: int) -> None:
     seen = middle + rng.normal(size=(n_cells, 9, n_channels, 2 * n_pairs)) * rng.choice([0.1, 1.0], (n_cells, 1, 1, 1))
     pairs = np.arange(n_pairs), n_pairs + np.arange(n_pairs)
     away = seen[..., pairs[0]] - seen[..., pairs[1]]
-    found = Distances(np.empty((n_cells, n_pairs)), np.empty(n_cells), np.empty((n_cells, 9)))
+    found = CellDistances(np.empty((n_cells, n_pairs)), np.empty(n_cells), np.empty((n_cells, 9)))
     left = np.full((n_cells, n_channels, n_pairs), rest)
     at = np.arange(n_cells * 9).reshape(n_cells, 9)
     moves = np.zeros((n_cells, n_channels, 3))

@@ -115,10 +115,12 @@ def test_plan_says_what_a_scene_calls_for(tmp_path: Path, monkeypatch: pytest.Mo
     code, out, said = commanded("plan", path, "--explain", "--tolerance", "50")
     assert code == 0, said
     lines = out.splitlines()
-    assert lines[0].startswith("road distance_m=20: promised ")
+    assert lines[0].startswith(
+        "road distance_m=20 ... road distance_m=300 (2 scenes): promised "
+    )  # one plan suits both
     assert " of 50 DN" in lines[0]
     for effect in ("noise", "blur", "sampling", "phase", "extinction"):
-        assert sum(line.strip().startswith(f"{effect} ") for line in lines) == 2
+        assert sum(line.strip().startswith(f"{effect} ") for line in lines) == 1
     assert any(line.strip() == "extinction    skip                     0 DN  clear air" for line in lines)
     assert any(line.strip().startswith("rejected: ") for line in lines)
     assert "2 scenes" in lines[-1]
