@@ -103,6 +103,7 @@ def test_the_page_holds_the_limiting_lights_of_every_design(finished: Finished, 
         assert [told["words"][code] for code in codes] == list(limited.loc[rows, f"limited_by_{pair}"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("trace", ["not feasible", "feasible", "Pareto front", "best of the search"])
 def test_pointing_at_any_design_tells_its_limiting_lights(finished: Finished, opened: Any, trace: str) -> None:
     folder = finished("stopband")

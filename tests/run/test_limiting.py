@@ -83,6 +83,7 @@ def test_every_swept_design_is_limited_by_its_nearest_lights(study: Study, tmp_p
                 assert apart[row[f"limited_by_{pair}"]] == pytest.approx(row[f"csd_{pair}"], rel=1e-12)
 
 
+@pytest.mark.slow
 def test_workers_and_routes_change_no_light(study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ran(study, tmp_path / "out", 1)
     expected = pd.read_parquet(tmp_path / "out" / LIMITED_BY)
