@@ -19,8 +19,8 @@ _RESIDUAL = 1e-10
 """No value of the image is further from its expansion, relative to that of a uniform field."""
 _LANES = 4
 """Functions are filled up to a multiple of so many."""
-_BEYOND = 10
-"""Nodes before and behind the table's ends, where its spline is not uniform."""
+BEYOND = 24
+"""Nodes before and behind the table's ends, near which its spline is not uniform."""
 
 
 class Encircled:
@@ -48,15 +48,15 @@ class Encircled:
 
         profile, r_um = self._profile, self._profile.r_um
         step = r_um[1]
-        nodes = np.arange(r_um.size + _BEYOND) * step
+        nodes = np.arange(r_um.size + BEYOND) * step
         nu, spectrum = profile.spectrum
         phase = 2 * np.pi * np.outer(nodes, nu)
         kernel = np.divide(j1(phase), phase, out=np.full_like(phase, 0.5), where=phase > 0)
         values = kernel @ (spectrum @ self.shares.T)
-        mirrored = np.concatenate([values[_BEYOND:0:-1], values])  # the image is round
-        at = np.concatenate([-nodes[_BEYOND:0:-1], nodes])
+        mirrored = np.concatenate([values[BEYOND:0:-1], values])  # the image is round
+        at = np.concatenate([-nodes[BEYOND:0:-1], nodes])
         spline = make_interp_spline(at, mirrored, k=5, axis=0)
-        return np.ascontiguousarray(spline.c[_BEYOND - 2 : -2])
+        return np.ascontiguousarray(spline.c[BEYOND - 2 : -2])
 
 
 ENCIRCLED: Cache[Profile, Encircled] = Cache(8)

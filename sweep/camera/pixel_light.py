@@ -17,7 +17,7 @@ from ..base.types import FloatArray
 from . import legendre
 from .compiled_pixels import Rings, means_on_rays
 from .effects.blur import Profile
-from .encircled import encircled
+from .encircled import BEYOND, encircled
 
 _RESIDUAL = 1e-10
 """No harmonic or function of the radius that is left out is larger, relative to a uniform field."""
@@ -25,10 +25,10 @@ _EDGE_LESS = 2
 """An integral along an edge needs so many nodes less than one over a pixel, along each axis."""
 _LANES = 4
 """Functions are filled up to a multiple of so many."""
-_BEYOND = 10
-"""Nodes before and behind the table's ends, where its spline is not uniform."""
-_BASIS_STEP = 4
-"""The functions of a ring are those of every such node."""
+_MIRRORED = 10
+"""Nodes before the first, where the spline is not uniform."""
+_FINE = 32
+"""Nodes per pixel from which on those of a ring are told by every fourth."""
 
 
 def edge_rule(profile: Profile, half_um: float) -> tuple[FloatArray, FloatArray]:
@@ -38,8 +38,8 @@ def edge_rule(profile: Profile, half_um: float) -> tuple[FloatArray, FloatArray]
 
 def _rings(profile: Profile, half_px: float, pitch_um: float) -> Rings:
     light, per_px = encircled(profile), pitch_um / float(profile.r_um[1])
-    # A pixel's corner is the furthest from the light's center of what is read.
-    radii = np.arange(profile.r_um.size - math.ceil(2**0.5 * half_px * per_px)) / per_px
+    # Half of the nodes beyond are for the corners of pixels whose centers are on the other half.
+    radii = np.arange(profile.r_um.size + BEYOND // 2 - math.ceil(2**0.5 * half_px * per_px)) / per_px
     finest = 2 * math.pi * 2**0.5 * half_px * profile.highest_per_um * pitch_um
     most = math.ceil((finest + 4 * finest ** (1 / 3) + 16) / 4)  # J_n(x) falls fast from n = x on
     angles = np.arange(most + 1) * (math.pi / 4 / most)
@@ -61,13 +61,13 @@ def _compressed(harmonics: FloatArray, per_px: float) -> Rings:
     n_rings = max(1, int((n_radii - 1) / per_px))
     starts = (np.arange(n_rings) * per_px).astype(int)
     ends = np.append(starts[1:] + 2, n_radii - 6 + 2)
-    mirrored = np.concatenate([harmonics[_BEYOND:0:-1], harmonics])  # the image is round
-    spline = make_interp_spline(np.arange(-_BEYOND, n_radii), mirrored.reshape(len(mirrored), -1), k=5, axis=0)
-    every = spline.c[_BEYOND - 2 : -2].reshape(-1, n_harmonics, n_functions)
-    parts = []
+    mirrored = np.concatenate([harmonics[_MIRRORED:0:-1], harmonics])  # the image is round
+    spline = make_interp_spline(np.arange(-_MIRRORED, n_radii), mirrored.reshape(len(mirrored), -1), k=5, axis=0)
+    every = spline.c[_MIRRORED - 2 : -2].reshape(-1, n_harmonics, n_functions)
+    parts, step = [], 4 if per_px >= _FINE else 1
     for start, end in zip(starts, ends, strict=True):
         own = every[start : end + 6]
-        _, sizes, basis = np.linalg.svd(own[::_BASIS_STEP].reshape(-1, n_functions), full_matrices=False)
+        _, sizes, basis = np.linalg.svd(own[::step].reshape(-1, n_functions), full_matrices=False)
         basis = basis[: max(1, int((sizes > _RESIDUAL).sum()))]
         parts.append((own @ basis.T, basis))
     n = -(-max(len(basis) for _, basis in parts) // _LANES) * _LANES

@@ -194,6 +194,8 @@ def test_kernels_by_the_edges_of_pixels_are_those_by_their_areas(blurred: str) -
         scene("b", "3x3", SMALL | {"optics": F2 | {"focus_m": 3.0}}, {"fill_factor": 0.5}),
         scene("c", "quad", {"target": FAR | {"phase_px": "any", "readout": "center"}, "optics": F2}),
         scene("d", "1x3", {"target": NEAR | {"phase_px": "any"}, "optics": F2}, {"crosstalk": 0.02}),
+        scene("e", "RGGB", SMALL | {"optics": {"f_number": 60}}, {"crosstalk": 0.1}),
+        scene("f", "RGGB", {"target": NEAR | {"phase_px": "any"}, "optics": {"f_number": 400}}, {"fill_factor": 0.7}),
     ):
         places = rng.uniform(-1, 3, (5, 2))
         cases, methods = phase.Cases(places, np.floor(places + 0.5)), replace(REFERENCE, blur=blurred)
@@ -321,7 +323,7 @@ def test_what_lies_between_the_nodes_is_within_its_bound() -> None:
                 bound = bounded(between, few, values)
                 most = bound.kernel[..., :1] + bound.kernel[..., 1:].max(axis=3, initial=0.0, keepdims=True)
                 most = most + np.einsum("nus,snuc->nuc", bound.moves, sizes_of(values, half))[..., None]
-                for _ in range(8):
+                for _ in range(4):
                     at = rng.uniform(-1, 1, (6, 2))
                     there = kernel(phase.Cases(few.centers + half * at, few.homes))
                     off = np.abs(there - interpolated(at, values))

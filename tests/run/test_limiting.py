@@ -70,6 +70,7 @@ def distances(study: Study, row: dict[str, Any]) -> Iterator[tuple[str, dict[str
         yield f"{one}_{other}", found
 
 
+@pytest.mark.slow
 def test_every_swept_design_is_limited_by_its_nearest_lights(study: Study, tmp_path: Path) -> None:
     ran(study, tmp_path / "out", 1)
     rows = rows_with_lights(tmp_path / "out")
@@ -129,6 +130,7 @@ def test_a_design_that_cannot_be_read_has_no_lights_and_takes_none_from_others(
     assert list(found.index) == list(expected.index)
 
 
+@pytest.mark.slow
 def test_of_many_designs_those_alone_that_are_drawn_have_lights(
     study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
