@@ -6,7 +6,7 @@ import os
 import sys
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
@@ -49,7 +49,7 @@ class Workers:
     stop: Stop
     backend: str = "loky"
     scheduler: str | None = None
-    _starting: list[Iterator[Any]] = field(default_factory=list, init=False, repr=False, compare=False)
+    _starting: list[Generator[Any]] = field(default_factory=list, init=False, repr=False, compare=False)
 
     def begin(self, modules: Iterable[str]) -> None:
         """Start worker processes, which load some modules of the package while this process does something else.
@@ -66,11 +66,19 @@ class Workers:
         """Wait for processes that were started; one that died meanwhile is started again when it is needed."""
         try:
             while self._starting:
-                for _ in self._gracefully(self._starting.pop()):
+                for _ in self._gracefully(self._starting[-1]):
                     pass
+                self._starting.pop()
         except Exception as error:
             if not _is_death(error):
                 raise
+            self._starting.clear()
+
+    def not_awaited(self) -> None:
+        """End what was started and is not awaited, as after a stop."""
+        for started in self._starting:
+            started.close()
+        self._starting.clear()
 
     @property
     def count(self) -> int:
@@ -198,6 +206,7 @@ def workers(how: Workers) -> Iterator[Workers]:
         # This process computes, too; and a thread that ends gives back what it found, also to those beside it.
         stack.enter_context(one_thread())
         stack.enter_context(joblib.parallel_config(how.backend, **settings))
+        stack.callback(how.not_awaited)
         yield how
         how.begun()
 
