@@ -134,7 +134,9 @@ def test_accuracy_measures_a_ladder_of_tolerances(tmp_path: Path, place: str, di
     assert (table["realized_dn"] <= table["promised_dn"] * (1 + 1e-9) + 1e-9).all()
     for _, rows in table.groupby(["scenario", "designs"]):
         assert list(rows["work"]) == sorted(rows["work"])  # from the coarsest tolerance to the finest
-        assert (rows["work"] < rows["reference_work"]).all()
+        # Where nothing is saved, a plan adds no more than the tenth that it may take.
+        assert (rows["work"] < 1.1 * rows["reference_work"]).all()
+        assert rows["work"].iloc[0] < 0.9 * rows["reference_work"].iloc[0]
         assert rows["plan"].nunique() >= 2
     assert f"{len(table)} of {len(table)} realized errors are within their promise." in lines
     assert (tmp_path / "out" / "accuracy.svg").is_file()
