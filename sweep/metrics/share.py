@@ -23,5 +23,5 @@ def told_share(share: float, digits: int = 1) -> str:
     """Percent with `digits` after the point, and with more where rounding would say none or all of what is neither."""
     if min(abs(share), abs(1 - share)) < _ROUNDING:
         return f"{share:.0%}"
-    enough = (few for few in range(digits, _MOST_DIGITS) if float(f"{share:.{few + 2}f}") not in (0, 1))
+    enough = (few for few in range(digits, _MOST_DIGITS) if float(f"{share:.{few}%}"[:-1]) not in (0, 100))
     return f"{share:.{next(enough, _MOST_DIGITS)}%}"

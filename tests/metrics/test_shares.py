@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as some
 
 from sweep.metrics.share import told_share
@@ -13,6 +13,7 @@ def test_what_is_not_all_is_not_said_to_be_all() -> None:
     assert told == ["99.98%", "99.997%", "97.7%", "99.96%", "100%", "0%", "0.04%", "100%"]
 
 
+@example(share=5e-9, digits=0)
 @given(share=some.floats(1e-9, 1 - 1e-9), digits=some.integers(0, 3))
 def test_a_share_is_told_near_what_it_is(share: float, digits: int) -> None:
     told = float(told_share(share, digits).removesuffix("%"))
