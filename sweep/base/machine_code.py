@@ -30,8 +30,11 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 def sources() -> list[Path]:
     """Files with kernels, in order."""
-    found = [Path(folder) / name for folder, _, names in os.walk(_ROOT) for name in names if name.startswith(_NAMES)]
-    return sorted(path for path in found if path.suffix == ".py")
+    found = []
+    for folder, folders, names in os.walk(_ROOT):
+        folders[:] = [name for name in folders if name != "__pycache__"]
+        found += [Path(folder) / name for name in names if name.startswith(_NAMES) and name.endswith(".py")]
+    return sorted(found)
 
 
 def njit(**options: Any) -> Callable[[_F], _F]:
