@@ -145,8 +145,8 @@ def distances(
 
     `seen`: what channels see of all signals at places, ndarray[n_places, n_channels, n_signals]; `at`: the places at
     the nodes of each cell, ndarray[n_cells, 9]. `pairs`: two signals each. `rest`: how far their difference may be from
-    its interpolation, ndarray[n_cells, n_channels, n_pairs]; `moves`: see `Deviation`. `ends`: a cell in which no
-    distance is below the first of these, and at every place one is not above the second, is not looked at more closely.
+    its interpolation, ndarray[n_cells, n_channels, n_pairs]; `moves`: see `Deviation`. `ends`: a cell that
+    can hold neither a distance below the first of these nor one above the second is not looked at more closely.
     """
     n_channels, n_pairs = seen.shape[1], pairs[0].size
     values = np.empty((n_pairs, n_channels, _N_NODES))

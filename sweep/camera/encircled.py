@@ -20,7 +20,9 @@ _RESIDUAL = 1e-10
 _LANES = 4
 """Functions are filled up to a multiple of so many."""
 BEYOND = 24
-"""Nodes before and behind the table's ends, near which its spline is not uniform."""
+"""Nodes behind the profile's end: near the table's end its spline is not uniform."""
+_MIRRORED = 10
+"""Nodes before the first, for the same reason."""
 
 
 class Encircled:
@@ -43,20 +45,24 @@ class Encircled:
         """Of a uniform spline of the fifth order, from the second node before a radius of nothing on; the nodes are
         those of the profile. ndarray[n_nodes, n_functions].
         """
-        from scipy.interpolate import make_interp_spline  # noqa: PLC0415  (slow to import)
         from scipy.special import j1  # noqa: PLC0415  (slow to import)
 
-        profile, r_um = self._profile, self._profile.r_um
-        step = r_um[1]
-        nodes = np.arange(r_um.size + BEYOND) * step
-        nu, spectrum = profile.spectrum
-        phase = 2 * np.pi * np.outer(nodes, nu)
+        r_um, (nu, spectrum) = self._profile.r_um, self._profile.spectrum
+        phase = 2 * np.pi * np.outer(np.arange(r_um.size + BEYOND) * r_um[1], nu)
         kernel = np.divide(j1(phase), phase, out=np.full_like(phase, 0.5), where=phase > 0)
-        values = kernel @ (spectrum @ self.shares.T)
-        mirrored = np.concatenate([values[BEYOND:0:-1], values])  # the image is round
-        at = np.concatenate([-nodes[BEYOND:0:-1], nodes])
-        spline = make_interp_spline(at, mirrored, k=5, axis=0)
-        return np.ascontiguousarray(spline.c[BEYOND - 2 : -2])
+        return uniform_spline(kernel @ (spectrum @ self.shares.T))
+
+
+def uniform_spline(values: FloatArray) -> FloatArray:
+    """Coefficients of a spline of the fifth order, from the second node before the first value on.
+
+    `values`: ndarray[n_nodes, n_functions], of even functions at equidistant nodes from 0 on.
+    """
+    from scipy.interpolate import make_interp_spline  # noqa: PLC0415  (slow to import)
+
+    mirrored = np.concatenate([values[_MIRRORED:0:-1], values])
+    spline = make_interp_spline(np.arange(-_MIRRORED, len(values)), mirrored, k=5, axis=0)
+    return np.ascontiguousarray(spline.c[_MIRRORED - 2 : -2])
 
 
 ENCIRCLED: Cache[Profile, Encircled] = Cache(8)

@@ -10,14 +10,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from ..base.cache import Cache
 from ..base.types import FloatArray
 from . import legendre
 from .compiled_pixels import Rings, means_on_rays
 from .effects.blur import Profile
-from .encircled import BEYOND, encircled
+from .encircled import BEYOND, encircled, uniform_spline
 
 _RESIDUAL = 1e-10
 """No harmonic or function of the radius that is left out is larger, relative to a uniform field."""
@@ -25,8 +24,6 @@ _EDGE_LESS = 2
 """An integral along an edge needs so many nodes less than one over a pixel, along each axis."""
 _LANES = 4
 """Functions are filled up to a multiple of so many."""
-_MIRRORED = 10
-"""Nodes before the first, where the spline is not uniform."""
 _FINE = 32
 """Nodes per pixel from which on those of a ring are told by every fourth."""
 
@@ -61,9 +58,7 @@ def _compressed(harmonics: FloatArray, per_px: float) -> Rings:
     n_rings = max(1, int((n_radii - 1) / per_px))
     starts = (np.arange(n_rings) * per_px).astype(int)
     ends = np.append(starts[1:] + 2, n_radii - 6 + 2)
-    mirrored = np.concatenate([harmonics[_MIRRORED:0:-1], harmonics])  # the image is round
-    spline = make_interp_spline(np.arange(-_MIRRORED, n_radii), mirrored.reshape(len(mirrored), -1), k=5, axis=0)
-    every = spline.c[_MIRRORED - 2 : -2].reshape(-1, n_harmonics, n_functions)
+    every = uniform_spline(harmonics.reshape(n_radii, -1)).reshape(-1, n_harmonics, n_functions)
     parts, step = [], 4 if per_px >= _FINE else 1
     for start, end in zip(starts, ends, strict=True):
         own = every[start : end + 6]

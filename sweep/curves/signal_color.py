@@ -83,7 +83,8 @@ def _hue(xy: FloatArray) -> tuple[float, float | None]:
     (dx, dy), (ax, ay) = xy - white, (locus - white).T
     sx, sy = (np.roll(locus, -1, axis=0) - locus).T  # the last side is the line of purples
     across = dx * sy - dy * sx
-    along, share = (ax * sy - ay * sx) / across, (ax * dy - ay * dx) / across
+    with np.errstate(divide="ignore", invalid="ignore"):  # white itself, and sides along the line, have no crossing
+        along, share = (ax * sy - ay * sx) / across, (ax * dy - ay * dx) / across
     hits = np.flatnonzero((along > 0) & (share >= 0) & (share <= 1))
     if not hits.size:
         return 0.0, None

@@ -56,7 +56,7 @@ class PlacesBetween:
 
     @property
     def n_nodes(self) -> int:
-        """Places at which a kernel is computed, but for those that see the same."""
+        """Nodes of all cells, each once."""
         return len(self._nodes[0].places_px)
 
     @property
