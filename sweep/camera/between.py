@@ -37,7 +37,12 @@ _AT_ONCE = 4_000_000
 
 def _exceeded(values: FloatArray) -> FloatArray:
     """Sizes at the nodes of the profile, ndarray[n_radii, n_parts], and by how much they are exceeded between them."""
-    return np.asarray(values + _BETWEEN_NODES * values.max(axis=0))
+    return np.asarray(values + _more(_BETWEEN_NODES) * values.max(axis=0))
+
+
+def _more(share: float) -> float:
+    """What the largest of some values may lack, relative to it, where that is at most a share of what it should be."""
+    return share / (1 - share)
 
 
 def _bent(slopes: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
@@ -51,10 +56,10 @@ def _bent(slopes: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
     along[1:-1] = (slopes[2:] - slopes[:-2]) / (2 * step)
     along[0], along[-1] = slopes[1] / step, along[-2]  # slopes are odd
     sizes = np.abs(along).max(axis=1)
-    sizes += (8 * _BETWEEN_NODES / 6 + _BETWEEN_NODES) * sizes.max()
+    sizes += _more(8 * _BETWEEN_NODES / 6 + _BETWEEN_NODES) * sizes.max()
     steep = np.abs(slopes).max(axis=1)
     across = np.empty_like(sizes)
-    across[1:] = (steep + _BETWEEN_NODES * steep.max())[1:] / (step * (np.arange(1, len(steep)) - 0.5))
+    across[1:] = _exceeded(steep)[1:] / (step * (np.arange(1, len(steep)) - 0.5))
     across[0] = sizes[:2].max()
     return sizes, np.minimum(across, np.maximum.accumulate(sizes))
 

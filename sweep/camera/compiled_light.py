@@ -54,6 +54,21 @@ def covered_shares(x: FloatArray, y: FloatArray, half: float, radius: float) -> 
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
+def fifth_order(t: float) -> tuple[float, float, float, float, float, float]:
+    """The six pieces of a uniform B-spline of the fifth order, times 120, `t` of the way from one node to the next."""
+    s = 1.0 - t
+    t2, s2 = t * t, s * s
+    return (
+        s2 * s2 * s,
+        1 + s * (5 + s * (10 + s * (10 + s * (5 - 5 * s)))),
+        26 + s * (50 + s * (20 + s * (-20 + s * (-20 + 10 * s)))),
+        26 + t * (50 + t * (20 + t * (-20 + t * (-20 + 10 * t)))),
+        1 + t * (5 + t * (10 + t * (10 + t * (5 - 5 * t)))),
+        t2 * t2 * t,
+    )
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
 def along_edge(away: float, middle: float, half: float, table: Table, rule: EdgeRule, found: FloatArray) -> None:
     """What flows through an edge that is `away` from the light's center and `half` to both sides of `middle` long."""
     coefficients, per_px = table
@@ -64,17 +79,9 @@ def along_edge(away: float, middle: float, half: float, table: Table, rule: Edge
         y = middle + half * nodes[at]
         r = math.sqrt(away * away + y * y) * per_px
         first = int(r)
-        t = r - first
-        s = 1.0 - t
-        t2, s2 = t * t, s * s
         share = weights[at] * half * away / 120
-        # The six pieces of a uniform B-spline of the fifth order.
-        a = s2 * s2 * s * share
-        f = t2 * t2 * t * share
-        e = (1 + t * (5 + t * (10 + t * (10 + t * (5 - 5 * t))))) * share
-        b = (1 + s * (5 + s * (10 + s * (10 + s * (5 - 5 * s))))) * share
-        d = (26 + t * (50 + t * (20 + t * (-20 + t * (-20 + 10 * t))))) * share
-        c = (26 + s * (50 + s * (20 + s * (-20 + s * (-20 + 10 * s))))) * share
+        a, b, c, d, e, f = fifth_order(r - first)
+        a, b, c, d, e, f = a * share, b * share, c * share, d * share, e * share, f * share
         for k in range(n):
             found[k] += (
                 a * coefficients[first, k]

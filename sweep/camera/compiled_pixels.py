@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.machine_code import njit
 from ..base.types import FloatArray, IndexArray
-from .compiled_light import EdgeRule, Table, add, along_edge, to_channels
+from .compiled_light import EdgeRule, Table, add, along_edge, fifth_order, to_channels
 
 
 class Rings(NamedTuple):
@@ -57,21 +57,13 @@ def _mean_over_pixel(x: float, y: float, rings: Rings, light: FloatArray) -> int
     cosine = 2 * cosine * cosine - 1  # of four times the angle
     at = r * rings.per_px
     first = int(at)
-    t = at - first
-    s = 1.0 - t
-    t2, s2 = t * t, s * s
-    # The six pieces of a uniform B-spline of the fifth order.
-    a, f = s2 * s2 * s / 120, t2 * t2 * t / 120
-    b = (1 + s * (5 + s * (10 + s * (10 + s * (5 - 5 * s))))) / 120
-    e = (1 + t * (5 + t * (10 + t * (10 + t * (5 - 5 * t))))) / 120
-    c = (26 + s * (50 + s * (20 + s * (-20 + s * (-20 + 10 * s))))) / 120
-    d = (26 + t * (50 + t * (20 + t * (-20 + t * (-20 + 10 * t))))) / 120
+    a, b, c, d, e, f = fifth_order(at - first)
     own = rings.coefficients[ring, first - rings.starts[ring] :]
     before, harmonic = cosine, 1.0  # cosines of -1, 0 and 1 times the angle
     light[:] = 0.0
     for k in range(own.shape[1]):
         for at_function in range(light.size):
-            light[at_function] += harmonic * (
+            light[at_function] += (harmonic / 120) * (
                 a * own[0, k, at_function]
                 + b * own[1, k, at_function]
                 + c * own[2, k, at_function]
