@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 
 from ..base.types import BoolArray, FloatArray, IndexArray
 from ..camera.noisy.gaussian import share_below
+from ..camera.noisy_readout import NoisyReadout
+from ..curves.lights import Pair, class_pairs
 from .separation import pair_blocks
 
 _LEAST_VARIANCE = 2e-9
@@ -61,13 +63,20 @@ def detectability(mean: FloatArray, variance: FloatArray, first: IndexArray, sec
 def pairwise_error(
     mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray, shape: NoiseShape | None = None
 ) -> FloatArray:
-    """Probability that noise moves one point over to the other, the largest over the pairs of the two types.
+    """The largest of `errors_of_pairs`."""
+    return np.asarray(errors_of_pairs(mean, variance, first, second, shape).max(axis=1), dtype=float)
+
+
+def errors_of_pairs(
+    mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray, shape: NoiseShape | None = None
+) -> FloatArray:
+    """Probability that noise moves one point of a pair over to the other, ndarray[n_designs, n_pairs].
 
     The pair is divided by a plane with normal S^-1 D, S the mean covariance, placed so that both points err equally
     often: Q(D' S^-1 D / (s_a + s_b)), with the standard deviation s of each along the normal (Fukunaga,
     "Introduction to Statistical Pattern Recognition", linear classifiers). 0.5 for coincident points.
     """
-    found = np.empty(len(mean))
+    found = np.empty((len(mean), len(first) * len(second)))
     for block, difference, ours, theirs in _pairs(mean, variance, first, second):
         seen = difference if shape is None else shape.seen(block, difference, first, second)
         total = ours + theirs
@@ -81,7 +90,7 @@ def pairwise_error(
         if shape is not None:
             error = np.maximum(error, _LEFT_OUT)
             error = np.minimum(error, shape.bound(block, difference, ours, theirs, first, second))
-        found[block] = error.max(axis=1)
+        found[block] = error
     return found
 
 
@@ -91,6 +100,13 @@ class NoiseShape:
 
     gaussian: BoolArray
     reach_dn: FloatArray
+
+    @classmethod
+    def of_cases(cls, read: NoisyReadout) -> tuple[FloatArray, FloatArray, NoiseShape]:
+        """Mean, variance and shape of a readout, whose cases stand one after the other as if they were designs."""
+        shape = (-1, *read.mean.shape[2:])
+        noise = cls(read.gaussian.reshape(shape), read.reach_dn.reshape(shape))
+        return read.mean.reshape(shape), read.variance.reshape(shape), noise
 
     def seen(self, block: slice, difference: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
         """Differences in the channels in which both points have Gaussian noise, 0 in the others."""
@@ -112,10 +128,14 @@ class NoiseShape:
         (1962) for the logarithms L of the moment generating functions: v / m^2 (exp(s m) - 1 - s m) for a sum of
         variance v whose terms are within m of their means.
         """
-        if self.gaussian[block].all():
-            return np.array(np.inf)
-        reach = np.maximum(*_both(self.reach_dn[block], first, second))
-        total = np.maximum(ours + theirs, _LEAST_VARIANCE)
+        found = np.full(difference.shape[:2], np.inf)
+        # Each design for itself: what stands beside it in a block changes nothing.
+        some = ~self.gaussian[block].all(axis=(1, 2))
+        if not some.any():
+            return found
+        difference = difference[some]
+        reach = np.maximum(*_both(self.reach_dn[block][some], first, second))
+        total = np.maximum(ours[some] + theirs[some], _LEAST_VARIANCE)
         normal = difference / np.maximum(total, reach**2 / 50)  # a plane that suits terms as rare as Bennett allows
         apart = (normal * difference).sum(axis=-1)
         least = np.zeros(apart.shape)
@@ -123,42 +143,39 @@ class NoiseShape:
             x = s * normal * reach
             with np.errstate(over="ignore"):
                 least = np.minimum(least, (total / reach**2 * (np.expm1(x) - x)).sum(axis=-1) - s * apart)
-        return np.asarray(np.minimum(np.exp(least / 2) + _LEFT_OUT, 0.5), dtype=float)
+        found[some] = np.minimum(np.exp(least / 2) + _LEFT_OUT, 0.5)
+        return found
 
 
-def error_bound(
-    mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray, shape: NoiseShape | None = None
-) -> FloatArray:
-    """Bound on how often the best rule takes a signal of two types for one of the wrong type, for the worst signal.
-
-    The sum over the signals of the other type of each pair's Bhattacharyya coefficient (Kailath, 1967), at most 1.
-    """
-    return state_error_bound(mean, variance, {"first": first, "second": second}, shape)
-
-
-def state_error_bound(
+def error_bounds(
     mean: FloatArray, variance: FloatArray, members: Mapping[str, IndexArray], noise: NoiseShape | None = None
-) -> FloatArray:
-    """`error_bound` over all types of `members` (type -> signal indices): how often the state is told wrong at most."""
-    sums = np.zeros(mean.shape[:2])
-    types = list(members.values())
-    for at, first in enumerate(types):
-        for second in types[at + 1 :]:
-            for block, difference, ours, theirs in _pairs(mean, variance, first, second):
-                shape = (len(difference), len(first), len(second))
-                if noise is None:
-                    overlap = np.exp(-_distance(difference, ours, theirs))
-                else:
-                    seen = noise.seen(block, difference, first, second)
-                    alike = np.broadcast_to(ours, seen.shape)
-                    gaussian = np.exp(-_distance(seen, alike, np.where(seen > 0, theirs, alike))) + _LEFT_OUT
-                    sides = noise.bound(block, difference, ours, theirs, first, second)
-                    overlap = np.minimum(gaussian, np.where(sides < 0.5, sides, 1.0))
-                overlap = overlap.reshape(shape)
-                sums[block, first] += overlap.sum(axis=2)
-                sums[block, second] += overlap.sum(axis=1)
-    used = np.concatenate(types)
-    return np.asarray(np.minimum(sums[:, used].max(axis=1), 1.0), dtype=float)
+) -> tuple[dict[Pair, FloatArray], FloatArray]:
+    """Bounds on how often the best rule takes a signal for one of the wrong type, for the worst signal.
+
+    Of each pair of the types of `members` (type -> signal indices), and of all types at once: how often the state is
+    told wrong at most. The sum over the signals of the other types of each pair's Bhattacharyya coefficient (Kailath,
+    1967), at most 1.
+    """
+    each = {}
+    state = np.zeros(mean.shape[:2])
+    for pair in class_pairs(list(members)):
+        first, second = (members[name] for name in pair)
+        sums = np.zeros(mean.shape[:2])
+        for block, difference, ours, theirs in _pairs(mean, variance, first, second):
+            if noise is None:
+                overlap = np.exp(-_distance(difference, ours, theirs))
+            else:
+                seen = noise.seen(block, difference, first, second)
+                alike = np.broadcast_to(ours, seen.shape)
+                gaussian = np.exp(-_distance(seen, alike, np.where(seen > 0, theirs, alike))) + _LEFT_OUT
+                sides = noise.bound(block, difference, ours, theirs, first, second)
+                overlap = np.minimum(gaussian, np.where(sides < 0.5, sides, 1.0))
+            overlap = overlap.reshape(len(difference), len(first), len(second))
+            sums[block, first] += overlap.sum(axis=2)
+            sums[block, second] += overlap.sum(axis=1)
+        each[pair] = np.minimum(sums.max(axis=1), 1.0)
+        state += sums
+    return each, np.minimum(state.max(axis=1), 1.0)
 
 
 def _distance(difference: FloatArray, ours: FloatArray, theirs: FloatArray) -> FloatArray:
@@ -184,7 +201,11 @@ def _ratio(over: FloatArray, under: FloatArray) -> FloatArray:
 
 def _length(vectors: FloatArray) -> FloatArray:
     """L2 norm over the last axis without squares; NaN where any component is (to `hypot` an infinite one is enough)."""
-    return np.where(np.isnan(vectors).any(axis=-1), np.nan, np.hypot.reduce(vectors, axis=-1))
+    length, unknown = np.abs(vectors[..., 0]), np.isnan(vectors[..., 0])
+    for at in range(1, vectors.shape[-1]):  # few, and a reduction over few is slow
+        length = np.hypot(length, vectors[..., at])
+        unknown |= np.isnan(vectors[..., at])
+    return np.where(unknown, np.nan, length)
 
 
 def _pairs(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -21,21 +20,30 @@ _AT_ONCE = 4_000_000
 """Pixels that are drawn at once."""
 
 
-def _nearest_centroid(_: int) -> Any:
-    from sklearn.neighbors import NearestCentroid
+def _nearest_centroid(train: FloatArray, truth: IndexArray, test: FloatArray) -> IndexArray:
+    """The state whose mean patch is nearest."""
+    from scipy.spatial.distance import cdist
 
-    return NearestCentroid()
+    centers = np.stack([train[truth == state].mean(axis=0, dtype=float) for state in range(truth.max() + 1)])
+    return np.asarray(cdist(test, centers).argmin(axis=1))
 
 
-def _lda(n_states: int) -> Any:
+def _lda(train: FloatArray, truth: IndexArray, test: FloatArray) -> IndexArray:
     """Fisher's discriminant; shrinkage (Ledoit and Wolf) keeps it stable with more pixels than patches."""
     from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 
-    return LinearDiscriminantAnalysis(solver="lsqr", shrinkage="auto", priors=np.full(n_states, 1 / n_states))
+    n_states = int(truth.max()) + 1
+    rule = LinearDiscriminantAnalysis(solver="lsqr", shrinkage="auto", priors=np.full(n_states, 1 / n_states))
+    with warnings.catch_warnings():  # scikit-learn's, where a pixel reads the same in every patch of a state
+        warnings.simplefilter("ignore", UserWarning)
+        return np.asarray(rule.fit(train, truth).predict(test))
 
 
-CLASSIFIERS: Mapping[str, Callable[[int], Any]] = {"nearest_centroid": _nearest_centroid, "lda": _lda}
-"""Classifiers that are trained on raw patches."""
+CLASSIFIERS: Mapping[str, Callable[[FloatArray, IndexArray, FloatArray], IndexArray]] = {
+    "nearest_centroid": _nearest_centroid,
+    "lda": _lda,
+}
+"""What patches, ndarray[n, n_pixels], are taken for by rules that are trained on others: numbers of states."""
 DECIDERS = (MOST_LIKELY, *CLASSIFIERS)
 
 
@@ -59,9 +67,9 @@ def recognize(
     other. The most likely rule takes the channels' readout and the signal with the largest Gaussian likelihood at the
     patch's place, and says its state. Intervals: see `share_interval`.
     """
-    members = {name: imager.view.members[name] for name in states}
-    signals = np.concatenate(list(members.values()))
-    state = np.concatenate([np.full(len(own), name) for name, own in members.items()])
+    members = [imager.view.members[name] for name in states]
+    signals = np.concatenate(members)
+    state = np.repeat(np.arange(len(states)), [len(own) for own in members])
     electrons = imager.pixel_electrons(curves)[0]
     place = rng.integers(len(electrons), size=(patches, len(signals)))
     truth = np.broadcast_to(state, place.shape)
@@ -78,14 +86,12 @@ def recognize(
     found = dict(_accuracy(MOST_LIKELY, truth, said))
     half = patches // 2
     train, test = (part.reshape(-1, part.shape[-1]) for part in (drawn[:half], drawn[half:]))
-    for name, make in CLASSIFIERS.items():
+    for name, classifier in CLASSIFIERS.items():
         if np.ptp(train, axis=0).any():
-            with warnings.catch_warnings():  # scikit-learn's, where a pixel reads the same in every patch of a state
-                warnings.simplefilter("ignore", UserWarning)
-                said = make(len(states)).fit(train, truth[:half].ravel()).predict(test)
+            taken_for = classifier(train, truth[:half].ravel(), test)
         else:  # every pixel of every patch reads the same
-            said = np.full(len(test), states[0])
-        found |= dict(_accuracy(name, truth[half:].ravel(), said))
+            taken_for = np.zeros(len(test), dtype=np.intp)
+        found |= dict(_accuracy(name, truth[half:].ravel(), taken_for))
     return found
 
 
@@ -105,13 +111,14 @@ class _MostLikely:
             here = place == at
             kernel = int(at) * self._readout.n_cases // len(self._mean)
             values = self._readout.channels_of(drawn[here], kernel)  # [n, n_channels]
-            m, v = self._mean[at], self._variance[at]
-            likelihood = -0.5 * ((values[:, None] - m) ** 2 / v + np.log(v)).sum(axis=2)
-            best[here] = likelihood.argmax(axis=1)
+            unlike = np.zeros((len(values), self._mean.shape[1]))
+            for channel, (m, v) in enumerate(zip(self._mean[at].T, self._variance[at].T, strict=True)):
+                unlike += (values[:, channel, None] - m) ** 2 / v + np.log(v)
+            best[here] = unlike.argmin(axis=1)
         return best
 
 
-def _accuracy(rule: str, truth: Any, said: Any) -> Iterator[tuple[str, float]]:
+def _accuracy(rule: str, truth: IndexArray, said: IndexArray) -> Iterator[tuple[str, float]]:
     right = np.asarray(truth == said)
     worst = min(float(right[truth == state].mean()) for state in np.unique(truth))
     values = (float(right.mean()), *share_interval(int(right.sum()), right.size), worst)

@@ -147,20 +147,21 @@ def _crossing(
     """
     from scipy.optimize import brentq  # noqa: PLC0415  (few studies ask for it)
 
-    known = dict(zip(ends, errors, strict=True))
     by_ratio = min(ends) > 0
+    places = tuple(float(np.log(end)) if by_ratio else end for end in ends)
+    known = dict(zip(places, errors, strict=True))
+
+    def error_at(place: float) -> float:
+        if place not in known:
+            number = float(np.exp(place)) if by_ratio else place
+            known[place] = state_error_of(between.at(number), curves, states)
+        return known[place]
 
     def decades(place: float) -> float:
-        number = float(np.exp(place)) if by_ratio else place
-        number = min(ends, key=lambda end: abs(end - number)) if place in places else number
-        if number not in known:
-            known[number] = state_error_of(between.at(number), curves, states)
-        return float(np.log10(max(known[number], _LEAST) / allowed))
+        return float(np.log10(max(error_at(place), _LEAST) / allowed))
 
-    places = tuple(float(np.log(end)) if by_ratio else end for end in ends)
     try:
         place = brentq(decades, *places, xtol=_CLOSE * (1.0 if by_ratio else abs(ends[1] - ends[0])))
-        at = float(np.exp(place)) if by_ratio else float(place)
-        return {"at": at, "error": state_error_of(between.at(at), curves, states)}
+        return {"at": float(np.exp(place)) if by_ratio else float(place), "error": error_at(place)}
     except ValidationError:
         return {}

@@ -17,7 +17,7 @@ from sweep.camera.imager import Imager
 from sweep.camera.linear import smooth_imager
 from sweep.camera.methods import Methods
 from sweep.camera.view import View
-from sweep.metrics.discrimination import error_bound
+from sweep.metrics.discrimination import error_bounds
 from sweep.metrics.evaluate import evaluate, family_quantities
 from sweep.metrics.quantity import WORST_CASE, Asked, Quantity
 from sweep.metrics.registry import quantities_of
@@ -262,7 +262,7 @@ def test_smooth_rows_under_noise_are_the_quantity(name: str) -> None:
     if quantity.metric == "error_bound":
         members = DITHERED.members
         both = made.noisy.mean[:, 0], made.noisy.variance[:, 0]
-        expected = error_bound(*both, members["yellow"], members["red"])
+        expected = error_bounds(*both, {state: members[state] for state in ("yellow", "red")})[1]
     else:
         expected = DEFINITIONS[quantity.metric][0](made, quantity)
     # Of the contrast to noise the search takes the least of all pairs, here that of the nearest one.

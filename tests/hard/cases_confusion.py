@@ -7,7 +7,7 @@ from itertools import product
 import mpmath as mp
 import numpy as np
 
-from sweep.metrics.discrimination import contrast_to_noise, detectability, error_bound, pairwise_error
+from sweep.metrics.discrimination import contrast_to_noise, detectability, error_bounds, pairwise_error
 
 from .registry import EPS, Result, hard_case, outcome, relative, worst
 
@@ -15,6 +15,10 @@ ONE, OTHER = np.array([0]), np.array([1])
 Point = tuple[list[mp.mpf], list[mp.mpf]]
 TAIL = 1e-13
 """Relative accuracy of SciPy's normal tail (Cephes states 5e-14 for its erfc)."""
+
+
+def error_bound(mean: np.ndarray, variance: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    return error_bounds(mean, variance, {"first": first, "second": second})[1]
 
 
 def points(mean: np.ndarray, variance: np.ndarray) -> list[Point]:

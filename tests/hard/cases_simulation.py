@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sweep.metrics.discrimination import error_bound, pairwise_error, state_error_bound
+from sweep.metrics.discrimination import error_bounds, pairwise_error
 
 from .cases_confusion import FIRST, ONE, OTHER, SECOND, random_designs
 from .registry import Result, hard_case, worst
@@ -56,10 +56,11 @@ def bounds_hold() -> Result:
         mean, variance = random_designs(20 + seed, 1, spread=float(rng.uniform(20, 200)))
         kinds = np.array([0, 0, 0, 1, 1, 1, 1])
         allowed = 4 * np.sqrt(0.25 / n)
-        excess = wrong_types(mean[0], variance[0], kinds, rng, n) - error_bound(mean, variance, FIRST, SECOND)[0]
+        bound = error_bounds(mean, variance, {"first": FIRST, "second": SECOND})[1][0]
+        excess = wrong_types(mean[0], variance[0], kinds, rng, n) - bound
         results.append((max(0.0, excess), allowed))
         kinds = np.array([0, 0, 1, 1, 1, 2, 2])
         members = {str(kind): np.flatnonzero(kinds == kind) for kind in range(3)}
-        excess = wrong_types(mean[0], variance[0], kinds, rng, n) - state_error_bound(mean, variance, members)[0]
+        excess = wrong_types(mean[0], variance[0], kinds, rng, n) - error_bounds(mean, variance, members)[1][0]
         results.append((max(0.0, excess), allowed))
     return worst(results)

@@ -11,7 +11,7 @@ import pytest
 from sweep.camera.imager import Imager
 from sweep.camera.pixel import Pixel
 from sweep.metrics import confusion
-from sweep.metrics.discrimination import NoiseShape, error_bound, pairwise_error
+from sweep.metrics.discrimination import NoiseShape, error_bounds, pairwise_error
 from sweep.metrics.evaluate import evaluate
 from sweep.study import load_study
 
@@ -170,7 +170,7 @@ def test_a_bound_of_many_pixels_holds_where_they_are_few_too(pixels: int) -> Non
         reach = np.minimum(pixel.dn_per_e * reach_e + 1, pixel.full_scale_dn) / pixels
         shape = NoiseShape(np.zeros(mean.shape, dtype=bool), reach)
         assert pairwise_error(mean, variance, ONE, OTHER, shape)[0] >= least
-        assert error_bound(mean, variance, ONE, OTHER, shape)[0] >= least
+        assert error_bounds(mean, variance, {"one": ONE, "other": OTHER}, shape)[1][0] >= least
 
 
 def test_noise_is_not_gaussian_where_a_pixel_is_cut_or_few_steps_flicker() -> None:

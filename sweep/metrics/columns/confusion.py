@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -17,9 +16,8 @@ from ..discrimination import (
     NoiseShape,
     contrast_to_noise,
     detectability,
-    error_bound,
+    error_bounds,
     pairwise_error,
-    state_error_bound,
 )
 from ..quantity import Asked, Columns, NoiseMetric, Quantity
 from ..smooth_noise import bound_rows, error_decades, pair_rows, squared_contrast, squared_detectability
@@ -60,13 +58,14 @@ class Confusion(NoiseMetric):
         self, imager: Imager, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
     ) -> Columns:
         """Exact sums over the digital numbers of a few pixels; where these are too many, Gaussian errors or bounds."""
-        cases = [(read.mean[:, case], read.variance[:, case]) for case in range(read.mean.shape[1])]
+        mean, variance, _ = NoiseShape.of_cases(read)
         error, bound, state_bound = _errors(imager, curves, read, members)
         found: Columns = {}
         for pair in class_pairs(list(members)):
             both = members[pair[0]], members[pair[1]]
             for metric, quantity in ((CNR, contrast_to_noise), (D_PRIME, detectability)):
-                found[pair_name(metric, pair)] = np.min([quantity(*case, *both) for case in cases], axis=0)
+                each = quantity(mean, variance, *both)
+                found[pair_name(metric, pair)] = each.reshape(read.mean.shape[:2]).min(axis=1)
             found[pair_name(ERROR, pair)] = error[pair]
             found[pair_name(ERROR_BOUND, pair)] = bound[pair]
         found[STATE_ERROR] = np.max(list(error.values()), axis=0)
@@ -118,23 +117,13 @@ def _exact(imager: Imager, curves: FloatArray, members: Mapping[str, IndexArray]
     return [confusion.errors(case, few, imager.readout.pixel, members) for case in np.moveaxis(electrons, 1, 0)]
 
 
-def _largest(quantity: Callable[..., FloatArray], read: NoisyReadout, *of: Any) -> FloatArray:
-    """The largest over the cases of a quantity of the readout, ndarray[n_designs]."""
-    found = [
-        quantity(
-            read.mean[:, case],
-            read.variance[:, case],
-            *of,
-            NoiseShape(read.gaussian[:, case], read.reach_dn[:, case]),
-        )
-        for case in range(read.mean.shape[1])
-    ]
-    return np.asarray(np.max(found, axis=0), dtype=float)
-
-
 def _gaussian(read: NoisyReadout, members: Mapping[str, IndexArray]) -> _ByPair:
-    """The error of each pair, Gaussian or a bound."""
-    return {(a, b): _largest(pairwise_error, read, members[a], members[b]) for a, b in class_pairs(list(members))}
+    """The error of each pair, Gaussian or a bound: the largest over the cases."""
+    mean, variance, shape = NoiseShape.of_cases(read)
+    return {
+        (a, b): pairwise_error(mean, variance, members[a], members[b], shape).reshape(read.mean.shape[:2]).max(axis=1)
+        for a, b in class_pairs(list(members))
+    }
 
 
 def _errors(
@@ -148,5 +137,8 @@ def _errors(
             {pair: np.max([each.bound[pair] for each in exact], axis=0) for pair in pairs},
             np.max([each.state_bound for each in exact], axis=0),
         )
-    bound = {(a, b): _largest(error_bound, read, members[a], members[b]) for a, b in pairs}
-    return _gaussian(read, members), bound, _largest(state_error_bound, read, members)
+    mean, variance, shape = NoiseShape.of_cases(read)
+    bounds, state_bound = error_bounds(mean, variance, members, shape)
+    cases = read.mean.shape[:2]
+    bound = {pair: own.reshape(cases).max(axis=1) for pair, own in bounds.items()}
+    return _gaussian(read, members), bound, state_bound.reshape(cases).max(axis=1)

@@ -23,7 +23,7 @@ from ...camera.imager import Imager
 from ...camera.noisy.gaussian import share_below
 from ...camera.noisy_readout import NoisyReadout
 from ...curves.lights import class_pairs, pair_name
-from ..discrimination import NoiseShape, pairwise_error
+from ..discrimination import NoiseShape, errors_of_pairs
 from ..quantity import Asked, Columns, NoiseMetric, Quantity
 
 CDP, CSP = "cdp", "csp"
@@ -69,15 +69,13 @@ class Probabilities(NoiseMetric):
         """From mean and variance of the digital numbers."""
         del curves
         found: Columns = {}
-        pedestal_dn, cases = imager.readout.pixel.offset_dn, range(read.mean.shape[1])
+        mean, variance, shape = NoiseShape.of_cases(read)
         for pair in class_pairs(list(members)):
             both = members[pair[0]], members[pair[1]]
-            each = [(read.mean[:, case], read.variance[:, case]) for case in cases]
-            shapes = [NoiseShape(read.gaussian[:, case], read.reach_dn[:, case]) for case in cases]
-            detected = [detection(mean - pedestal_dn, variance, *both) for mean, variance in each]
-            separated = [_separation(*own, *both, shape) for own, shape in zip(each, shapes, strict=True)]
-            found[pair_name(CDP, pair)] = np.min(detected, axis=0)
-            found[pair_name(CSP, pair)] = np.min(separated, axis=0)
+            detected = detection(mean - imager.readout.pixel.offset_dn, variance, *both)
+            separated = 1 - errors_of_pairs(mean, variance, *both, shape).mean(axis=1)
+            for metric, each in ((CDP, detected), (CSP, separated)):
+                found[pair_name(metric, pair)] = each.reshape(read.mean.shape[:2]).min(axis=1)
         return found
 
 
@@ -108,11 +106,3 @@ def _beyond(apart: FloatArray, bright: FloatArray, dark: FloatArray, ratio: Floa
     """A distance over the noise of bright - ratio x dark; 0 where there is no distance, infinite without noise."""
     noise = np.sqrt(bright + np.where(dark > 0, ratio**2 * dark, 0.0))
     return np.where(apart > 0, np.divide(apart, noise, out=np.full(apart.shape, np.inf), where=noise > 0), 0.0)
-
-
-def _separation(
-    mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray, shape: NoiseShape
-) -> FloatArray:
-    """CSP of two types, ndarray[n_designs]."""
-    errors = [pairwise_error(mean, variance, np.array([a]), np.array([b]), shape) for a in first for b in second]
-    return np.asarray(1 - np.mean(errors, axis=0), dtype=float)
