@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from ..base.errors import Fault, OutputError
@@ -255,12 +254,6 @@ def batches(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Tab
             yield pa.Table.from_batches([batch])
     except (OSError, pa.ArrowException) as error:
         raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
-
-
-def best_rows(table: pa.Table, order: Sequence[str], most: int) -> pa.Table:
-    """The best rows by columns that are maximized, in their order; of equal ones the smallest `design_id`."""
-    keys = [*((name, "descending") for name in dict.fromkeys(order)), ("design_id", "ascending")]
-    return table.take(pc.sort_indices(table, sort_keys=keys)[:most]).combine_chunks()
 
 
 def sliced(path: Path, sizes: Iterable[int]) -> Iterator[pa.Table]:

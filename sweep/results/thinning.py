@@ -13,9 +13,9 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from ..base.errors import Fault, OutputError
-from ..base.types import IndexArray
+from ..base.types import BoolArray, IndexArray
 from ..metrics.columns.exposure import EXPOSURE
-from .tables import SWEPT, batches, best_rows, holds, release_memory
+from .tables import SWEPT, batches, holds, release_memory
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,7 +26,6 @@ MOST_POINTS = 6_000
 """Swept designs off the front, of those that are feasible and of the others each, that a report draws as points."""
 _BEST = 100
 _MS = 1e3
-_RATE = "separation_over_exposure"
 _NOT_SWEPT, _INFEASIBLE, _FEASIBLE, _ON_FRONT = range(4)
 
 
@@ -115,15 +114,50 @@ def thinned(
     return frame, Counts(total, feasible, front, failed)
 
 
-def leading(table: pa.Table, separation: str) -> pa.Table:
-    """In each scenario the design that separates most, and the one that separates most for its exposure."""
-    rate = pc.divide(table[separation], table[EXPOSURE])
-    rated = table.append_column(_RATE, rate)
-    found = [rated.schema.empty_table()]
+def best_at(table: pa.Table, order: Sequence[str], most: int, among: BoolArray | None = None) -> IndexArray:
+    """Where the best rows are by columns that are maximized, in their order; of equal ones the smallest `design_id`.
+
+    `among`: rows to look at, ndarray[n_rows]; all without it.
+    """
+    at = np.arange(table.num_rows) if among is None else np.flatnonzero(among)
+    if len(at) > most:
+        first = table[order[0]].to_numpy()[at]
+        first = np.where(np.isnan(first), -np.inf, first)
+        at = at[first >= np.partition(first, -most)[-most]]
+    keys = [*((name, "descending") for name in dict.fromkeys(order)), ("design_id", "ascending")]
+    few = table.select([name for name, _ in keys]).take(pa.array(at))
+    return np.asarray(at[pc.sort_indices(few, sort_keys=keys)[:most].to_numpy()])
+
+
+def best_rows(table: pa.Table, order: Sequence[str], most: int) -> pa.Table:
+    """The rows of `best_at`."""
+    return table.take(pa.array(best_at(table, order, most))).combine_chunks()
+
+
+def leading_at(table: pa.Table, separation: str, among: BoolArray | None = None) -> IndexArray:
+    """Where, in each scenario, the design is that separates most, and the one that separates most for its exposure.
+
+    Of equal ones the smallest `design_id`; `among`: rows to look at, ndarray[n_rows]; all without it.
+    """
+    seen = np.ones(table.num_rows, dtype=bool) if among is None else among
+    apart, ids = table[separation].to_numpy(), table["design_id"].to_numpy()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        measures = [
+            np.nan_to_num(v, nan=-np.inf, posinf=np.inf, neginf=-np.inf)
+            for v in (apart, apart / table[EXPOSURE].to_numpy())
+        ]
+    found = []
     for scenario in table["scenario"].unique().to_pylist():
-        own = rated.filter(pa.array(holds(rated, "scenario", scenario)))
-        found += [best_rows(own, [measure], 1) for measure in (separation, _RATE)]
-    return pa.concat_tables(found).drop_columns([_RATE])
+        own = np.flatnonzero(seen & holds(table, "scenario", scenario))
+        for values in measures if own.size else ():
+            most = own[values[own] == values[own].max()]
+            found.append(most[ids[most].argmin()])
+    return np.array(found, dtype=np.intp)
+
+
+def leading(table: pa.Table, separation: str) -> pa.Table:
+    """The rows of `leading_at`."""
+    return table.take(pa.array(leading_at(table, separation)))
 
 
 def _best_of_each(table: pa.Table, order: Sequence[str]) -> pa.Table:

@@ -9,8 +9,8 @@ import pyarrow as pa
 
 from ..base.types import BoolArray, FloatArray, IndexArray
 from ..metrics.pareto import non_dominated
-from ..results.tables import FEW, SWEPT, best_rows, holds
-from ..results.thinning import leading
+from ..results.tables import FEW, SWEPT, holds
+from ..results.thinning import best_at, best_rows, leading, leading_at
 from .rows import Rules
 
 if TYPE_CHECKING:
@@ -151,9 +151,7 @@ class Gathered:
 def few_of(table: pa.Table, rules: Rules) -> pa.Table:
     """The rows of a chunk that `Gathered` may keep: its front, those that are no sweep, its best designs, who leads."""
     wanted = table["pareto"].to_numpy() | holds(table, "kind", *FEW)
-    rest = table.filter(pa.array(table["feasible"].to_numpy() & ~wanted))
-    best = best_rows(rest, rules.order, BEST_PER_CFA)
-    leaders = leading(table.filter(pa.array(~wanted)), rules.front[0])
-    others = pa.concat_tables([best, leaders.filter(pa.array(~np.isin(leaders["design_id"], best["design_id"])))])
-    few = pa.concat_tables([table.filter(pa.array(wanted)), others])
-    return few.combine_chunks()
+    best = best_at(table, rules.order, BEST_PER_CFA, table["feasible"].to_numpy() & ~wanted)
+    leaders = leading_at(table, rules.front[0], ~wanted)
+    found = dict.fromkeys([*np.flatnonzero(wanted).tolist(), *best.tolist(), *leaders.tolist()])
+    return table.take(pa.array(found, type=pa.int64())).combine_chunks()
