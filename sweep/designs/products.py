@@ -7,10 +7,19 @@ import numpy as np
 from ..base.types import FloatArray
 
 
+_FEW_TERMS = 8
+"""Sums of so many products are taken one after the other, all rows at once."""
+
+
 def row_products(rows: FloatArray, matrix: FloatArray) -> FloatArray:
     """`rows @ matrix`, in which the same row gives the same bits alone and in any block.
 
     `rows`: ndarray[n, k]; `matrix`: ndarray[k, m]. BLAS sums in an order that depends on shapes, strides and, on some
     processors, a row's place among others. So every row is multiplied by itself, by the same call.
     """
+    if 0 < len(matrix) <= _FEW_TERMS:
+        found = rows[:, :1] * matrix[0]
+        for at in range(1, len(matrix)):
+            found += rows[:, at, None] * matrix[at]
+        return np.asarray(found)
     return np.asarray(np.matmul(np.ascontiguousarray(rows)[:, None, :], matrix)[:, 0])
