@@ -6,7 +6,6 @@ import numpy as np
 
 from ..base.types import FloatArray
 
-
 _FEW_TERMS = 8
 """Sums of so many products are taken one after the other, all rows at once."""
 
