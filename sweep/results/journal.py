@@ -159,6 +159,13 @@ class Journal:
         """Do not use a finished piece again."""
         self.entries.pop(key, None)
 
+    def drop(self, key: str) -> None:
+        """Forget a finished piece for good: no later run finds it."""
+        entry = self.entries.pop(key, None)
+        if entry is not None:
+            with suppress(OSError):
+                (self.folder / entry.file).unlink()
+
     def remove(self) -> None:
         """Drop all of it, after the rows stand in the result table; the journal goes last. Files of others stay."""
         if is_real_folder(self.folder):

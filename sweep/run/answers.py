@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -30,6 +30,7 @@ class Kept:
     journal: Journal
     fingerprint: str
     _round: int = 0
+    _limits: list[str] = field(default_factory=list)
 
     def __call__(self, calls: Iterable[Call]) -> Iterator[Any]:
         """Answers of delayed calls in their order; errors as for `Workers` and `Journal.keep`."""
@@ -48,8 +49,15 @@ class Kept:
             self.journal.keep(keys[missing[number]], to_json(answer), time.monotonic() - started)
 
         fresh = self.crew((waiting[at] for at in missing), finished=keep)
-        for at in range(len(waiting)):
-            yield known[at] if at in known else next(fresh)
+        for at, key in enumerate(keys):
+            answer = known[at] if at in known else next(fresh)
+            self._limits += [key] * isinstance(answer, Limit)
+            yield answer
+
+    def drop_limits(self) -> None:
+        """Limits that cannot be right are not kept: the same command looks for them again."""
+        while self._limits:
+            self.journal.drop(self._limits.pop())
 
     def _answer(self, key: str, call: Call) -> Any:
         """The answer of an earlier, interrupted run to this call, or None."""

@@ -13,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from ..base.errors import BrokenProofError
 from ..base.types import Progress
 from ..metrics.bound import FEASIBLE
 from ..metrics.pareto import hypervolume
@@ -133,7 +134,11 @@ class Making:
         if self.study.search is None:
             return None
         parallel = Kept(self.crew, self.journal, self.sweep.fingerprint)
-        return run_search(self.study, self.study.search, parallel, self.progress)
+        try:
+            return run_search(self.study, self.study.search, parallel, self.progress)
+        except BrokenProofError:
+            parallel.drop_limits()
+            raise
 
     @cached_property
     def gathered(self) -> Gathered:
