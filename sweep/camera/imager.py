@@ -9,10 +9,10 @@ from __future__ import annotations
 import hashlib
 import pickle
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -33,6 +33,7 @@ from .view import View
 if TYPE_CHECKING:
     from .places import AnyPlace
 
+_Found = TypeVar("_Found")
 _BLOCK = 2_000_000
 """Values of a block of pixels that are held at once."""
 
@@ -72,6 +73,7 @@ class Imager:
         self.n_places = self.n_cases + each * sum(len(block.places_px) for block in self._others)
         self.electrons = Electrons(view, kernel, self.work, dtype, once=once)
         self.readout = Readout(view, kernel, self.work)
+        self._latest: dict[str, tuple[bytes, Any]] = {}
 
     def read_changing(self, block: Block) -> Changing | None:
         """`Electrons.changing` as read, DN; None, too, where a channel is read from several units."""
@@ -92,9 +94,23 @@ class Imager:
 
     def read(self, curves: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The readout, DN, ndarray[n_designs, n_cases, n_signals, n_channels], and exposure, s, ndarray[n_designs]."""
+        return self._read_once("read", curves, self._read)
+
+    def _read(self, curves: FloatArray) -> tuple[FloatArray, FloatArray]:
         exposure_s = self.electrons.exposure_s(curves)
         own = np.concatenate([self.readout.folded(self.readout.transfer(e)) for e in self._blocks(curves, exposure_s)])
         return np.concatenate([own, *(other.read(curves)[0] for other in self._rest())], axis=1), exposure_s
+
+    def _read_once(self, how: str, curves: FloatArray, read: Callable[[FloatArray], _Found]) -> _Found:
+        """What `read` gives; of one design, of which several tables are made one after the other, not made again."""
+        if len(curves) != 1 or self._others:
+            return read(curves)
+        asked = curves.tobytes()
+        kept = self._latest.get(how)
+        if kept is None or kept[0] != asked:
+            kept = self._latest[how] = asked, read(curves)
+        found: _Found = kept[1]
+        return found
 
     def _rest(self) -> Iterator[Imager]:
         """The places whose kernels are not held, block by block."""
@@ -105,6 +121,9 @@ class Imager:
 
         Pixels are read one by one, so saturation and quantization must be among the view's methods.
         """
+        return self._read_once("noise", curves, self._read_with_noise)
+
+    def _read_with_noise(self, curves: FloatArray) -> NoisyReadout:
         exposure_s = self.electrons.exposure_s(curves)
         parts = [self.readout.with_noise(electrons) for electrons in self._blocks(curves, exposure_s)]
         found = [tuple(np.concatenate(values) for values in zip(*parts, strict=True))]

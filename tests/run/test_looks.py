@@ -7,7 +7,9 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
+from sweep.base.types import FloatArray
 from sweep.camera.imager import Imager
+from sweep.camera.readout import Readout
 from sweep.results.tables import LIMITED_BY, POINTS, RECOGNITION
 from sweep.run import run_study
 from sweep.study import load_study
@@ -52,6 +54,18 @@ def test_each_scene_of_each_cfa_is_made_ready_once(folder: Path, monkeypatch: py
     found = ran(folder)
     assert len(made) == 2 * 2  # RGGB and the design
     assert [len(found[name]) for name in (LIMITED_BY, RECOGNITION)] == [4, 4]
+
+
+def test_a_row_and_its_recognition_share_a_readout(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    read, usual = [], Readout.with_noise
+
+    def counted(self: Readout, electrons: FloatArray) -> object:
+        read.append(electrons.shape)
+        return usual(self, electrons)
+
+    monkeypatch.setattr(Readout, "with_noise", counted)
+    ran(folder)
+    assert len(read) == 2 * 2
 
 
 @pytest.mark.parametrize("jobs", thinned([1, 2]))
