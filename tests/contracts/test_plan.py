@@ -23,7 +23,6 @@ from sweep.metrics.evaluate import evaluate
 from sweep.study import load_study
 
 from ..conftest import STUDIES
-from ..crew import side_by_side
 from ..hard.scenes import F2, FAR, HARD, Scene, asks_for_any_place, columns, scene
 from ..hard.scenes_alone import ALONE as SCENES_ALONE
 
@@ -112,8 +111,7 @@ few_and_all = pytest.mark.parametrize("which", ["few", pytest.param("all", marks
 
 @cache
 def contracts(which: str) -> tuple[Row, ...]:
-    found = side_by_side(contract, MEASURED[which], 1 if which == "few" else 2)
-    return tuple(row for rows in found for row in rows)
+    return tuple(row for made in MEASURED[which] for row in contract(made))
 
 
 def unseen(rows: Iterable[Row], effects: Mapping[str, Any]) -> dict[tuple[str, str], list[str]]:
