@@ -65,6 +65,19 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--hard-cases", metavar="PATH", help="write a table of the hard cases that ran to PATH, as JSON")
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Of the part that a process tests first, the long ones come first: at the end none waits for a long one of another."""
+    processes = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+    kinds = [[item for item in items if (item.get_closest_marker("long") is None) is short] for short in (False, True)]
+    ends = [[len(kind) * at // processes for at in range(processes + 1)] for kind in kinds]
+    items[:] = [
+        item
+        for at in range(processes)
+        for kind, end in zip(kinds, ends, strict=True)
+        for item in kind[end[at] : end[at + 1]]
+    ]
+
+
 def pytest_sessionfinish(session: pytest.Session) -> None:
     path, rows = session.config.getoption("--hard-cases"), session.config.stash.get(ROWS, [])
     if path and rows:

@@ -106,7 +106,7 @@ MEASURED = {
 }
 """Scenes whose contracts are looked at together: a few in which every method is seen, all that name a place, and those
 that ask for any, which take minutes."""
-few_and_all = pytest.mark.parametrize("which", ["few", pytest.param("all", marks=pytest.mark.slow)])
+few_and_all = pytest.mark.parametrize("which", ["few", pytest.param("all", marks=[pytest.mark.slow, pytest.mark.long])])
 
 
 @cache
@@ -157,6 +157,7 @@ def test_no_method_changes_more_than_it_promises(which: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_no_method_changes_more_than_it_promises_where_any_place_counts() -> None:
     """And every way to look at places is seen, but for the one that the others are compared with here."""
     rows = contracts("any place")

@@ -93,11 +93,13 @@ def test_plans_that_are_found_in_haste_keep_their_promise(seeds: range) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_ways_to_look_at_the_rays_of_many_random_scenes_keep_their_promise() -> None:
     check_angles(range(_FEW, _FEW + 150))
 
 
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("part", range(_PARTS))
 def test_plans_of_a_thousand_random_scenes_with_angles_keep_their_promise(part: int) -> None:
     seeds = range(_FEW, _FEW + _MANY)

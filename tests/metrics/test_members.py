@@ -43,7 +43,7 @@ def population(name: str) -> Population:
 def worst(name: str) -> np.ndarray:
     lights = replace(STUDY.lights, population=population(name))
     curves = PROBLEM.family.curves(DESIGNS)
-    return population_imager(replace(PROBLEM.view, lights=lights)).worst(curves)["csd_yellow_red"]
+    return population_imager(replace(PROBLEM.view, lights=lights)).worst(curves, [("yellow", "red")])["csd_yellow_red"]
 
 
 def responses(spectra: np.ndarray) -> np.ndarray:

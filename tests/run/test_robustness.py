@@ -134,6 +134,7 @@ def test_a_worst_case_is_over_edges_and_films_together(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_yields_agree_with_a_million_draws(tmp_path: Path) -> None:
     agree(street(tmp_path, 1_000_000), 1_000_000)
 

@@ -269,6 +269,7 @@ def emptied(folder: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.usefixtures("plain_pictures")
 @pytest.mark.parametrize("seed", range(4))
 def test_forty_kills_in_every_phase(tmp_path: Path, undisturbed: Path, whole_s: float, seed: int) -> None:

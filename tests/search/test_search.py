@@ -309,8 +309,8 @@ def test_a_limit_below_what_the_search_found_stops_the_run(
         found = limit_of(problem, tolerance, *rest)
         return replace(found, proven=0.5 * found.proven) if tolerance == tolerance_dn else found
 
-    def ended() -> object:
-        command = ["sweep", "run", str(tmp_path / "tiny.yaml"), "--output", str(tmp_path), "--jobs", "1"]
+    def ended(output: Path = tmp_path) -> object:
+        command = ["sweep", "run", str(tmp_path / "tiny.yaml"), "--output", str(output), "--jobs", "1"]
         monkeypatch.setattr(sys, "argv", command)
         with pytest.raises(SystemExit) as stopped:
             main()
@@ -330,7 +330,7 @@ def test_a_limit_below_what_the_search_found_stops_the_run(
         assert ended() == 5
         assert len(searched) == first
     assert not (tmp_path / "tiny" / "results.parquet").exists()
-    if tolerance_dn == 1e-3:  # the limit of the search itself is not kept
-        assert ended() == 0
-        assert (tmp_path / "tiny" / "results.parquet").exists()
-        assert searched[first:].count(0) == 3  # the levels of the front alone
+    if tolerance_dn == 1e-3:
+        assert ended() == 5  # what was said to be proven is kept, too
+        assert ended(tmp_path / "elsewhere") == 0
+        assert (tmp_path / "elsewhere" / "tiny" / "results.parquet").exists()

@@ -21,7 +21,7 @@ from sweep.vision.scores import mean_of
 from ..commanded import sweep
 from ..warm import Warm
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.long]
 
 STUDY = """\
 study: smoke
