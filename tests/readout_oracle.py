@@ -25,9 +25,9 @@ def digital_numbers(electrons: float, pixel: Pixel) -> tuple[np.ndarray, np.ndar
     if sigma == 0:
         np.add.at(found, np.clip(np.floor(dn + 0.5), 0, top).astype(int) - first, weights)
         return numbers, found
-    kept = weights > 1e-60
+    kept = weights > 1e-30
     weights, dn = weights[kept, None], dn[kept, None]
-    near = np.round(dn).astype(int) + np.arange(-math.ceil(14 * sigma) - 1, math.ceil(14 * sigma) + 2)
+    near = np.round(dn).astype(int) + np.arange(-math.ceil(11 * sigma) - 1, math.ceil(11 * sigma) + 2)
     ends = (np.hstack([near, near[:, -1:] + 1]) - 0.5 - dn) / sigma
     tail = ndtr(-np.abs(ends))  # beyond each end, on the side where it keeps its digits
     apart = np.abs(np.diff(tail, axis=1))
@@ -44,7 +44,7 @@ def moments(electrons: float, pixel: Pixel) -> tuple[float, float]:
     shares = np.exp(-(gains**2) / 2)
     shares /= shares.sum()
     means, squares = [], []
-    center = round(digital_numbers(electrons, pixel)[0].mean())
+    center = round(min(electrons, pixel.well_e) * pixel.dn_per_e + pixel.offset_dn)  # digits are kept beside it
     for gain in gains:
         numbers, often = digital_numbers(electrons * (1 + pixel.prnu * gain), pixel)
         often = often / often.sum()

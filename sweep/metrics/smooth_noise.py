@@ -103,7 +103,7 @@ def bound_rows(design: SmoothDesign, *, types: Sequence[str]) -> Rows:
     See `discrimination.state_error_bound`.
     """
     sums: dict[str, list[Rows]] = {name: [] for name in types}  # [n_cases x n_own x n_others] of each other type
-    n_cases, sizes = len(design.response), {name: len(design.view.members[name]) for name in types}
+    n_cases, sizes = len(design.response), {name: len(index) for name, index in design.view.members.items()}
     for a, b in class_pairs(tuple(types)):
         rows = _between(design, (a, b), overlap)
         values = rows.values.reshape(n_cases, sizes[a], sizes[b])
@@ -126,7 +126,12 @@ def _summed(parts: list[Rows]) -> Rows:
 
 def _between(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:
     """Rows of two types, [n_cases x n_first x n_second]."""
-    one, other = (design.view.members[name] for name in pair)
+    return design.once(f"{of.__name__} of {' and '.join(pair)}", lambda: _of_signals(design, pair, of))
+
+
+def _of_signals(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:
+    members = design.view.members
+    one, other = (members[name] for name in pair)
 
     def of_both(values: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Of the first and of the second signal of every pair; the axes but signals and channels come first."""

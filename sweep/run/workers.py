@@ -23,7 +23,7 @@ from threadpoolctl import ThreadpoolController
 from ..base.errors import SweepError
 from ..base.types import Call
 from .stop import Stop, without_interrupts
-from .worker_process import keep_freed_memory, preparing
+from .worker_process import give_back_freed_memory, keep_freed_memory, preparing
 
 if TYPE_CHECKING:
     from ..study import Study
@@ -246,7 +246,8 @@ def _one_threaded(function: Callable[..., Any], arguments: tuple[Any, ...], name
 
 
 def _loaded(modules: tuple[str, ...]) -> bool:
-    """Load modules of the package."""
+    """Load modules of the package, for other work than before."""
+    give_back_freed_memory()
     for name in modules:
         import_module(name)
     return True

@@ -111,7 +111,7 @@ def test_figures_are_what_the_evaluation_gives(paper: Path) -> None:
     ("photon_ratio", "centers_nm"),
     [
         pytest.param(None, {}, id="those of the prior"),
-        pytest.param(0.090, {"R": 584.0, "Rx": 583.0}, id="others", marks=pytest.mark.slow),
+        pytest.param(0.090, {"R": 584.0, "Rx": 583.0}, id="others", marks=[pytest.mark.slow, pytest.mark.long]),
     ],
 )
 def test_a_fit_recovers_parameters_that_it_was_given(photon_ratio: float | None, centers_nm: dict[str, float]) -> None:

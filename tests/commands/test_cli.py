@@ -69,6 +69,7 @@ def test_report_stands_alone(stopband: tuple[Path, list[str]]) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_report_command_makes_it_again(stopband: tuple[Path, list[str]]) -> None:
     folder, lines = stopband
     page = folder / "report.html"

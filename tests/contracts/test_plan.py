@@ -23,7 +23,6 @@ from sweep.metrics.evaluate import evaluate
 from sweep.study import load_study
 
 from ..conftest import STUDIES
-from ..crew import side_by_side
 from ..hard.scenes import F2, FAR, HARD, Scene, asks_for_any_place, columns, scene
 from ..hard.scenes_alone import ALONE as SCENES_ALONE
 
@@ -107,13 +106,12 @@ MEASURED = {
 }
 """Scenes whose contracts are looked at together: a few in which every method is seen, all that name a place, and those
 that ask for any, which take minutes."""
-few_and_all = pytest.mark.parametrize("which", ["few", pytest.param("all", marks=pytest.mark.slow)])
+few_and_all = pytest.mark.parametrize("which", ["few", pytest.param("all", marks=[pytest.mark.slow, pytest.mark.long])])
 
 
 @cache
 def contracts(which: str) -> tuple[Row, ...]:
-    found = side_by_side(contract, MEASURED[which], 1 if which == "few" else 2)
-    return tuple(row for rows in found for row in rows)
+    return tuple(row for made in MEASURED[which] for row in contract(made))
 
 
 def unseen(rows: Iterable[Row], effects: Mapping[str, Any]) -> dict[tuple[str, str], list[str]]:
@@ -159,6 +157,7 @@ def test_no_method_changes_more_than_it_promises(which: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_no_method_changes_more_than_it_promises_where_any_place_counts() -> None:
     """And every way to look at places is seen, but for the one that the others are compared with here."""
     rows = contracts("any place")

@@ -22,6 +22,9 @@ from ..conftest import STUDIES
 STUDY = load_study(STUDIES / "stopband.yaml")
 assert STUDY.search is not None
 PROBLEM = STUDY.problem(STUDY.search)
+WAVE = STUDY.grid.nodes_nm
+ENDS = np.array([WAVE[0] - 1, *WAVE, WAVE[-1] + 1])
+"""A grid of 1 nm, at whose ends a spectrum falls to nothing."""
 DESIGNS = np.array([[612.8, 6.0, 651.1, 6.3, 1.0], [617.0, 6.1, 655.0, 6.2, 1.0], [600.0, 20.0, 660.0, 10.0, 1.0]])
 STREET = {"temperature_c": [-40, 85], "self_heating_k": 20}
 POPULATIONS = {
@@ -40,7 +43,7 @@ def population(name: str) -> Population:
 def worst(name: str) -> np.ndarray:
     lights = replace(STUDY.lights, population=population(name))
     curves = PROBLEM.family.curves(DESIGNS)
-    return population_imager(replace(PROBLEM.view, lights=lights)).worst(curves)["csd_yellow_red"]
+    return population_imager(replace(PROBLEM.view, lights=lights)).worst(curves, [("yellow", "red")])["csd_yellow_red"]
 
 
 def responses(spectra: np.ndarray) -> np.ndarray:
@@ -53,13 +56,11 @@ def responses(spectra: np.ndarray) -> np.ndarray:
 
 
 def shifted(photons: np.ndarray, nm: float, width: float = 1.0) -> np.ndarray:
-    wave = STUDY.grid.nodes_nm
     if width != 1:
-        middle = (wave * photons).sum() / photons.sum()
-        wide = np.interp(middle + (wave - middle) / width, wave, photons, left=0, right=0)
+        middle = (WAVE * photons).sum() / photons.sum()
+        wide = np.interp(middle + (WAVE - middle) / width, WAVE, photons, left=0, right=0)
         photons = wide * photons.sum() / wide.sum()
-    ends = (wave[0] - 1, *wave, wave[-1] + 1)  # a grid of 1 nm, at whose ends a spectrum falls to nothing
-    return np.interp(wave - nm, ends, (0, *photons, 0), left=0, right=0)
+    return np.interp(WAVE - nm, ENDS, np.concatenate([[0.0], photons, [0.0]]), left=0, right=0)
 
 
 def ends(value: object, name: str, kind: str, default: object) -> object:

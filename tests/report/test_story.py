@@ -25,6 +25,7 @@ from ..build import ran
 from ..conftest import STUDIES, Finished, needs_measured
 
 FAST = ("stopband",)
+LONG = ("robust", "noise", "angle")
 SLOW = (
     "fog",
     "dual",
@@ -34,17 +35,15 @@ SLOW = (
     "rccb",
     "exposure",
     "night",
-    "noise",
     "distance",
     "accuracy",
-    "angle",
     "glass",
-    "robust",
     "scorecard",
     "balanced",
 )
 EVERY = [
     *FAST,
+    *(pytest.param(name, marks=[pytest.mark.slow, pytest.mark.long]) for name in LONG),
     *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW),
     pytest.param("measured", marks=[pytest.mark.slow, needs_measured]),
 ]

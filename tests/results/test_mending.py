@@ -19,8 +19,9 @@ from sweep.run import output_folder, run_study
 from sweep.study import load_study
 
 from ..build import stopband_study
-from ..commanded import commanded, sweep
+from ..commanded import commanded
 from ..conftest import draw_nothing
+from ..warm import Warm
 
 GRID = "{left_nm: [590, 600, 610], left_width_nm: 5, right_nm: {min: 640, max: 690, count: 51}, right_width_nm: 5}"
 LIMITS = "constraints:\n  sensitivity: {min: 0.9}\n"
@@ -97,6 +98,11 @@ def cases() -> list[object]:
     ]
 
 
+def drawing(*arguments: object) -> int:
+    """Exit code of a command in a process of its own that draws pictures."""
+    return Warm(*arguments, said=Path("said").absolute(), drawn=True).wait(timeout=300)
+
+
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Callable[[bool], Path]:
     """Whether pictures are drawn -> a folder with a study and its finished run."""
@@ -109,7 +115,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Callable[[bool], Path]
             draw_nothing(patch)
             run_study(load_study(Path("small.yaml")), folder, 1, lambda *_: None, ["sweep", "run"])
             assert commanded("audit", folder)[0] == 0
-            assert (sweep("report", str(folder)).returncode if drawn else commanded("report", folder)[0]) == 0
+            assert (drawing("report", folder) if drawn else commanded("report", folder)[0]) == 0
             made = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
             assert made >= {*LISTS, *DRAWN, *(() if drawn else READ)}
             assert made - {".lock", *LISTS} == Inventory(folder).files.keys()
@@ -170,7 +176,7 @@ def test_a_damage_is_named_and_mended_alone(
             assert (code, out, named_in(said, folder)) == (2, "", [file]), command
     again = ("run", study, "--output", folder.parent, "--jobs", 1)
     if file in PICTURED:  # pictures are the same from process to process, not from one drawing to the next in one
-        assert sweep(*map(str, again)).returncode == 0
+        assert drawing(*again) == 0
     else:
         assert commanded(*again)[0] == 0
     after = state(folder)

@@ -58,6 +58,7 @@ def test_a_worker_that_is_killed_once_costs_nothing(fewer: Study, unharmed: pd.D
 
 
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("scenes", ["a", "abcd"])
 def test_a_design_that_kills_its_worker_is_a_row(plain: Study, tmp_path: Path, scenes: str) -> None:
     """Of four scenes or more, two workers compute whole ones."""
@@ -265,6 +266,7 @@ def test_dask_needs_a_scheduler_that_answers(scheduler: str | None, said: str) -
 
 
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore")
 def test_a_cluster_gives_the_same_rows_with_a_worker_killed(tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")

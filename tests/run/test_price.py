@@ -48,7 +48,7 @@ def both(study: Study, found: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.
     space, pair = study.spaces[-1], ("yellow", "red")
     curves = space.curves(found[list(space.parameters)].to_numpy(), study.grid.size)
     view = study.view(space, "chart")
-    worst = population_imager(view).worst(curves)["csd_yellow_red"]
+    worst = population_imager(view).worst(curves, [pair])["csd_yellow_red"]
     return smooth_csd(view, curves, pair), worst, designed_quantities(view, curves)["sensitivity"]
 
 

@@ -75,6 +75,7 @@ def peak_bytes(path: Path, output: Path) -> float:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(not Path("/proc/self/smaps").exists(), reason="this system does not say who shares which memory")
 def test_ten_million_designs_take_no_more_memory_than_one_million(tmp_path: Path) -> None:
     peaks = [peak_bytes(large(tmp_path, left), tmp_path / str(left)) for left in (20, 200)]

@@ -106,6 +106,7 @@ def test_an_audit_of_nothing_finds_nothing_broken() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("place", "distances", "designs"),
     [

@@ -25,7 +25,8 @@ from sweep.run.workers import Workers, workers
 from sweep.study import load_study
 
 from ..build import STUDY, ran
-from ..commanded import UNDRAWN, commanded
+from ..commanded import commanded
+from ..warm import Warm
 
 SLOWED = Path(__file__).parent.parent / "slowed"
 SAID = "sweep: interrupted; finished chunks are kept, the same command continues\n"
@@ -59,7 +60,7 @@ def command(folder: Path, *extra: str) -> list[str]:
 
 
 def started(folder: Path, jobs: int, place: str, call: int) -> subprocess.Popen[bytes]:
-    """A run that is busy for a minute in one call."""
+    """A run that is for a minute in one call."""
     slow = {"SWEEP_SLOW_AT": place, "SWEEP_SLOW_CALL": str(call), "SWEEP_SLOW_FILE": str(folder / "slow.calls")}
     slow["SWEEP_CACHE"] = str(folder / "kept")  # so that the plans are looked for
     with (folder / "said").open("w") as said:
@@ -72,7 +73,7 @@ def started(folder: Path, jobs: int, place: str, call: int) -> subprocess.Popen[
         )
 
 
-def wait_for(path: Path, run: subprocess.Popen[bytes], folder: Path) -> None:
+def wait_for(path: Path, run: subprocess.Popen[bytes] | Warm, folder: Path) -> None:
     deadline = time.monotonic() + 120
     while not path.exists():
         assert run.poll() is None, (folder / "said").read_text()
@@ -243,28 +244,21 @@ def workers_of(mark: str) -> list[psutil.Process]:
     return found
 
 
-def begun(folder: Path, jobs: int) -> subprocess.Popen[bytes]:
-    """A run without pictures, which has said that it began; its processes bear the folder as a mark."""
-    arguments = command(folder, "--jobs", str(jobs))[3:]
-    with (folder / "said").open("w") as said:
-        run = subprocess.Popen(
-            [sys.executable, "-c", UNDRAWN, *arguments],
-            stdout=subprocess.DEVNULL,
-            stderr=said,
-            start_new_session=True,
-            env=os.environ | {"SWEEP_MARK": str(folder)},
-        )
+def begun(folder: Path, jobs: int) -> Warm:
+    """A run without pictures, which has said that it began; its workers bear the folder as a mark."""
+    run = Warm(*command(folder, "--jobs", str(jobs))[3:], said=folder / "said", SWEEP_MARK=str(folder))
     wait_for(folder / "out" / "tiny" / "run.json", run, folder)
     return run
 
 
 @pytest.fixture(scope="module")
 def whole_s(tmp_path_factory: pytest.TempPathFactory) -> float:
-    """Seconds that a run takes which nobody disturbs."""
+    """Seconds that a run takes which nobody disturbs, once it has said that it began."""
     folder = tmp_path_factory.mktemp("whole")
     noisy_study(folder)
+    run = begun(folder, 2)
     started_s = time.monotonic()
-    assert begun(folder, 2).wait(timeout=120) == 0
+    assert run.wait(timeout=120) == 0
     return time.monotonic() - started_s
 
 
@@ -275,6 +269,7 @@ def emptied(folder: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.usefixtures("plain_pictures")
 @pytest.mark.parametrize("seed", range(4))
 def test_forty_kills_in_every_phase(tmp_path: Path, undisturbed: Path, whole_s: float, seed: int) -> None:

@@ -67,6 +67,7 @@ def digests(folder: Path, jobs: int, threads: int) -> dict[str, str]:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_threads_and_workers_change_no_bit(tmp_path: Path) -> None:
     first = digests(tmp_path, 1, 1)
     for jobs, threads in ((1, 2), (1, 4), (2, 1), (2, 4)):

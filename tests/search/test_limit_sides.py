@@ -69,6 +69,7 @@ def test_a_proof_bounds_filters_of_other_sensitivities(coarse: Problem, seed: in
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_two_hundred_limits_are_those_of_a_milp(coarse: Problem) -> None:
     mixed = 0
     for seed in range(200):

@@ -179,6 +179,7 @@ def test_sides_at_every_place_are_those_of_a_milp(moving: Problem) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_sides_at_every_place_are_those_of_a_milp_in_thirty_problems(moving: Problem) -> None:
     assert sum(agrees_over_the_sensor(moving, seed) for seed in range(8, 38)) >= 20
 

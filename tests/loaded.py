@@ -1,0 +1,17 @@
+"""What a command loads until its run has a report; see `warm`."""
+
+from importlib import import_module
+
+for name in (
+    "matplotlib.backends.backend_agg",
+    "matplotlib.backends.backend_svg",
+    "scipy.stats",
+    "sweep.commands.app",
+    "sweep.commands.audit",
+    "sweep.commands.finish",
+    "sweep.commands.runs",
+    "sweep.report.overview",
+    "sweep.run.sweep",
+    "sweep.search.solver",
+):
+    import_module(name)
