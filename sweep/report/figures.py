@@ -42,8 +42,6 @@ CURVE_CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9",
 _LABEL_BOX = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0}
 _DRAWN_POINTS = 10_000
 _DPI = 160
-_PNG_LEVEL = 3
-"""Of zlib: the usual one takes three times as long for files that are a few percent smaller."""
 Drawing = Callable[[], "Figure"]
 """A drawing that is put off: a process that draws nothing need not load what draws."""
 _TICK = r"$\mathdefault"
@@ -262,7 +260,6 @@ def rendered(figure: Figure, kind: str) -> bytes:
         if kind == "svg":
             FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})  # type: ignore[no-untyped-call]
         else:
-            how = {"compress_level": _PNG_LEVEL}
-            FigureCanvasAgg(figure).print_png(buffer, metadata={"Software": None}, pil_kwargs=how)  # type: ignore[no-untyped-call]
+            FigureCanvasAgg(figure).print_png(buffer, metadata={"Software": None})  # type: ignore[no-untyped-call]
     figure.set_layout_engine("none")  # found once, the layout holds for the other kind, too
     return buffer.getvalue()

@@ -10,11 +10,16 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import cache, partial
 
+from joblib.externals.loky import process_executor
+
 _PR_SET_PDEATHSIG = 1
 """Number of prctl's option in Linux's sys/prctl.h."""
 _KEPT_BYTES, _LARGE_BYTES = 2**26, 2**24
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 """Numbers of mallopt's options in glibc's malloc.h."""
+_LEAST_GROWTH_BYTES, _MOST_GROWTH_BYTES = 300_000_000, 2**30
+"""loky's own limit of what a worker may grow after its first call, and ours."""
+_OF_MEMORY = 0.25
 
 
 @cache
@@ -24,9 +29,10 @@ def preparing(parent_pid: int) -> Callable[[], None]:
 
 
 def prepare_worker(parent_pid: int) -> None:
-    """Leave signals to the parent, end with it, and keep freed memory."""
+    """Leave signals to the parent, end with it, and keep caches and freed memory."""
     leave_signals_to_the_parent()
     end_with(parent_pid)
+    keep_caches()
     keep_freed_memory()
 
 
@@ -41,6 +47,25 @@ def end_with(parent_pid: int) -> None:
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
         if os.getppid() != parent_pid:  # it was killed before
             os._exit(1)
+
+
+def keep_caches() -> None:
+    """Let this worker grow by more than loky's 300 MB before it is taken for one that leaks, and started anew.
+
+    What the libraries and caches of a run hold is bounded, but more than that. A worker that was started anew would
+    load and make it all again, and would grow as much. loky looks at memory only where psutil is installed.
+    """
+    process_executor._MAX_MEMORY_LEAK_SIZE = growth_bytes(os.cpu_count() or 1)
+
+
+def growth_bytes(workers: int) -> int:
+    """What each worker may grow: 1 GiB where a quarter of the memory suffices for all of them, never less than loky's
+    own limit.
+    """
+    memory = 0
+    with suppress(OSError, ValueError, AttributeError):
+        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    return max(_LEAST_GROWTH_BYTES, min(_MOST_GROWTH_BYTES, int(_OF_MEMORY * memory / workers)))
 
 
 def give_back_freed_memory() -> None:

@@ -24,6 +24,7 @@ from sweep.results.lock import locked
 from sweep.run import Wishes, estimate, estimate_lines, output_folder, run_study, with_plans
 from sweep.run.stop import Stop
 from sweep.run.sweep import KILLED
+from sweep.run.worker_process import growth_bytes
 from sweep.run.workers import Workers, workers
 from sweep.study import Study, load_study
 
@@ -244,6 +245,29 @@ def test_threads_beside_each_other_do_not_give_their_libraries_more() -> None:
     with threadpool_limits(2), workers(Workers(2, Stop(), "threading")) as crew:  # whatever the environment says
         calls = (joblib.delayed(most_threads)(0.001 * (i % 3 + 1)) for i in range(20))
         assert set(crew(calls)) == {1}
+
+
+def held(bytes_: int) -> int:
+    """The process that now holds so much more; loky looks at its memory once a second."""
+    HELD.append(b"x" * bytes_)
+    time.sleep(1.1)
+    return os.getpid()
+
+
+HELD: list[bytes] = []
+
+
+def test_what_a_worker_may_grow_by() -> None:
+    assert 3e8 <= growth_bytes(1) <= 2**30
+    assert growth_bytes(10**6) == 3e8
+
+
+@pytest.mark.skipif(growth_bytes(os.cpu_count() or 1) < 6e8, reason="less memory than caches may hold")
+def test_a_worker_is_not_started_anew_for_what_its_caches_hold() -> None:
+    """Twice as much as loky itself would let it hold."""
+    with workers(Workers(2, Stop())) as crew:
+        found = list(crew(joblib.delayed(held)(each) for each in (0, 0, *[250_000_000] * 4)))
+    assert len(set(found)) == 2
 
 
 def test_workers_never_outnumber_the_cores(plain: Study, tmp_path: Path) -> None:

@@ -309,8 +309,8 @@ def test_a_limit_below_what_the_search_found_stops_the_run(
         found = limit_of(problem, tolerance, *rest)
         return replace(found, proven=0.5 * found.proven) if tolerance == tolerance_dn else found
 
-    def ended(output: Path = tmp_path) -> object:
-        command = ["sweep", "run", str(tmp_path / "tiny.yaml"), "--output", str(output), "--jobs", "1"]
+    def ended() -> object:
+        command = ["sweep", "run", str(tmp_path / "tiny.yaml"), "--output", str(tmp_path), "--jobs", "1"]
         monkeypatch.setattr(sys, "argv", command)
         with pytest.raises(SystemExit) as stopped:
             main()
