@@ -266,7 +266,7 @@ def test_what_a_worker_may_grow_by() -> None:
 def test_a_worker_is_not_started_anew_for_what_its_caches_hold() -> None:
     """Twice as much as loky itself would let it hold."""
     with workers(Workers(2, Stop())) as crew:
-        found = list(crew(joblib.delayed(held)(each) for each in (0, 0, *[250_000_000] * 4)))
+        found = list(crew(joblib.delayed(held)(each) for each in (0, 0, *[160_000_000] * 8)))
     assert len(set(found)) == 2
 
 
