@@ -112,8 +112,7 @@ class ClassCells:
         def made(new: IndexArray) -> _Rows:
             work["cells"] += len(new)
             some = phase.Cells(images[new], cells.homes[new], cells.half)
-            low, high = self._ranges(some, classes, work)
-            return tuple(self.between.bounds(some.centers, some.half, some.homes, low, high))
+            return tuple(self.between.bounds(some.centers, some.half, some.homes, *self._at_nodes(some, classes, work)))
 
         with self._one_at_a_time:
             self._forget_many()
@@ -136,17 +135,20 @@ class ClassCells:
 
         return self._places.which(names_of(self._view, images, cases.home_px), made), which
 
-    def _ranges(self, cells: phase.Cells, classes: Classes, work: Counter[str]) -> tuple[FloatArray, FloatArray]:
-        """Range of each part of the kernel over the nodes of cells, ndarray[n_cells, n_classes, n_classes, n_parts]
-        both.
+    def _at_nodes(
+        self, cells: phase.Cells, classes: Classes, work: Counter[str]
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The sum of the weights of each class at the nodes of cells, ndarray[n_cells, 9, n_classes], and the range of
+        each part of the kernel over these, ndarray[n_cells, n_classes, n_classes, n_parts] both.
         """
         rows, which = self._rows(cells.nodes, classes, work)
+        n = len(cells.centers)
         to, through = which[:, :, None], which[:, None, :]
         ends = []
         for values, end in zip(self._places.rows[2:], (np.min, np.max), strict=True):
             own = values[rows[:, None, None], to, through]
-            ends.append(end(own.reshape(len(cells.centers), -1, *own.shape[1:]), axis=1))
-        return ends[0], ends[1]
+            ends.append(end(own.reshape(n, -1, *own.shape[1:]), axis=1))
+        return self._places.rows[1][rows[:, None], which].reshape(n, -1, which.shape[1]), ends[0], ends[1]
 
 
 class KeptCells:

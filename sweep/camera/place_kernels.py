@@ -72,9 +72,8 @@ class PlaceKernels:
             sizes = (self._half, self._radii[0], self._share)
             compiled_light.kernels(x, y, weights, seen.channel, *sizes, self._table, self._rule, found, sums)
         else:
-            by_ring = np.zeros((*found.shape[:3], *self._rings.shares.shape[:2]))
+            by_ring = np.zeros((*found.shape[:3], len(self._rings.shares)))
             kernels_by_ring(x, y, weights, seen.channel, self._share, self._rings, by_ring, sums)
-            flat = self._rings.shares.reshape(-1, found.shape[3])
-            found = (by_ring.reshape(-1, len(flat)) @ flat).reshape(found.shape) / sums[:, :, None, None]
+            found = by_ring @ self._rings.shares / sums[:, :, None, None]
         work["sampling"] += weights.size * len(self.shares)
         return found, sums

@@ -18,9 +18,11 @@ import numpy as np
 from ...base.cache import Cache
 from ...base.types import FloatArray
 from .. import legendre
+from ..bessel import sums_of_j0
 from ..pixel import Pixel
 from ..scene import Scene
 from ..shot import Shot
+from ..splines import spline_through
 from .base import Change, Chosen, Designs, KernelChange, KernelEffect, Load, Part, Stage
 
 COARSE = "every 10 nm"
@@ -116,16 +118,16 @@ class Profile:
     def __init__(
         self, radius_um: float, reach_um: float, wavelength_um: FloatArray, f_number: float, w20_um: float
     ) -> None:
-        from scipy.interpolate import make_interp_spline  # noqa: PLC0415  (slow to import: kept off the start-up path)
-        from scipy.special import j0, j1  # noqa: PLC0415  (slow to import: kept off the start-up path)
+        from scipy.interpolate import BSpline  # noqa: PLC0415  (slow to import: kept off the start-up path)
+        from scipy.special import j1  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
         nu, weight = _frequencies(radius_um + reach_um, wavelength_um, f_number)
         step = 1 / (_SPLINE_PER_CYCLE * nu[-1])
         r = np.linspace(0.0, reach_um + step, max(8, 2 + int(reach_um / step)))
         disc = (2 * math.pi * radius_um * j1(2 * math.pi * radius_um * nu) * weight)[:, None]
         self.spectrum = nu, disc * transfer(nu, wavelength_um, f_number, w20_um)
-        table = j0(2 * math.pi * np.outer(r, nu)) @ self.spectrum[1]
-        self._spline = make_interp_spline(r, table, k=3, axis=0)
+        table = sums_of_j0(r, *self.spectrum)
+        self._spline = BSpline(*spline_through(r, table, 3), 3)
         self.r_um, self.values = r, table
         self.highest_per_um = float(nu[-1])
         self.n_wavelengths = wavelength_um.size
