@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.machine_code import njit
-from ..base.types import FloatArray, IndexArray
+from ..base.types import BoolArray, FloatArray, IndexArray
 from .compiled_light import EdgeRule, Table, fifth_order, to_channels
 
 
@@ -113,18 +113,21 @@ def kernels_by_ring(
     y: FloatArray,
     weights: FloatArray,
     channel: IndexArray,
+    left_out: BoolArray,
     share: float,
     rings: Rings,
+    first_ring: int,
     found: FloatArray,
     sums: FloatArray,
 ) -> None:
     """`compiled_light.kernels` of a blurred image, pixel by pixel, by the functions of each ring.
 
-    `found`: ndarray[n_places, n_channels, n_channels, n], of the functions of all rings, which is nothing before.
+    `left_out`: pixels whose light does not count, ndarray[n_rows, n_columns]; the others are in rings from `first_ring`
+    on. `found`: ndarray[n_places, n_channels, n_channels, n], of the functions of these, which is nothing before.
     """
     coefficients, sizes, per_px = rings.coefficients, rings.sizes, rings.per_px
     n_channels, last = found.shape[1], len(sizes) - 1
-    most = 0
+    most, before = 0, sizes[first_ring, 4]
     for ring in range(len(sizes)):
         most = max(most, sizes[ring, 2] * sizes[ring, 3])
     light, values, own = np.empty(most), np.empty(most), np.empty(n_channels)
@@ -135,7 +138,7 @@ def kernels_by_ring(
             for column in range(channel.shape[1]):
                 to = channel[row, column]
                 sums[place, to] += mine[row, column]
-                if not to_channels(mine, channel, row, column, share, own):
+                if left_out[row, column] or not to_channels(mine, channel, row, column, share, own):
                     continue
                 along, across = x[place, column], y[place, row]
                 squared = along * along + across * across
@@ -148,4 +151,4 @@ def kernels_by_ring(
                 _sum_harmonics(values, harmonics, n, 2 * cosine * cosine - 1, light)
                 for u in range(n_channels):
                     if own[u] > 0:
-                        _add_some(found[place, u, to, sizes[ring, 4] :], own[u], light, n)
+                        _add_some(found[place, u, to, sizes[ring, 4] - before :], own[u], light, n)

@@ -58,7 +58,7 @@ def _harmonics(
     """
     k = np.arange(most + 1)
     values = np.empty((radii.size, k.size, table[0].shape[1]))
-    means_on_rays(radii, k * (math.pi / 4 / most), half_px, table, rule, values)
+    means_on_rays(radii, np.asarray(k * (math.pi / 4 / most), dtype=float), half_px, table, rule, values)
     cosines = np.cos(math.pi / most * np.outer(k, k)) * (2 / most)
     cosines[:, [0, -1]] /= 2
     cosines[[0, -1]] /= 2

@@ -81,11 +81,13 @@ class CellKernels(NamedTuple):
 class ClassCells:
     """Kernels of classes of pixels, at places and in cells of places: what the CFAs of a scene share."""
 
-    def __init__(self, view: View, knots_nm: FloatArray) -> None:
-        """`view`: of a mosaic whose channels are the classes; `knots_nm`: wavelengths at which the light is made."""
+    def __init__(self, view: View, knots_nm: FloatArray, *, folded: bool) -> None:
+        """`view`: of a mosaic whose channels are the classes; `knots_nm`: wavelengths at which the light is made;
+        `folded`: whether `Classes` tells the pixels of the tile apart.
+        """
         self._view = view
         self.between = Between(view, view.methods, knots_nm)
-        self._light = PlaceKernels(view, view.methods, knots_nm, many=True)
+        self._light = PlaceKernels(view, view.methods, knots_nm, many=True, folded=folded)
         self._places, self._cells = _Kept(), _Kept()
         self._one_at_a_time = threading.RLock()
 
@@ -239,6 +241,8 @@ def kept_cells(view: View) -> KeptCells:
 
     def made() -> KeptCells:
         apart, classes = classes_of(bare)
-        return KeptCells(_SHARED.get(named(apart), lambda: ClassCells(apart, _knots_nm(apart))), bare, classes)
+        folded = classes.tile is not None
+        shared = _SHARED.get(named(apart), lambda: ClassCells(apart, _knots_nm(apart), folded=folded))
+        return KeptCells(shared, bare, classes)
 
     return _SCENES.get(named(bare), made)

@@ -200,16 +200,20 @@ def interpolation_bound(
     In focus |d2h/dlambda2| step^2 / 8, else |dh/dlambda| step / 2 (a derivative of the OTF by lambda at given nu is
     never larger with defocus than without). Both derivatives are bounded by the integral of the absolute integrand,
     with an envelope of |J1|; for s = lambda N nu fixed that falls with lambda, so each interval's shorter end counts,
-    but
-    for the pixel aperture, whose transfer falls with nu, where the longer end does.
+    but for the pixel aperture, whose transfer falls with nu, where the longer end does. In focus the bound falls from
+    one interval to the next: its factors change by lambda^-3, by lambda^(1/2) at most (the envelope), and by lambda^2
+    at most (the aperture); so of intervals that are no longer than one before, none counts.
     """
     u, weight = legendre.rule(200)
     u, weight = (u + 1) * math.pi / 4, weight * math.pi / 4
     s = np.sin(u)
     theta = (np.arange(32) + 0.5) / 64 * (math.pi / 2)  # what is beyond 45 degrees is a mirror image
     axes = np.cos(theta), np.sin(theta)
-    worst = 0.0
+    worst = longest = 0.0
     for short, long in pairwise(knots_um):
+        if w20_um == 0 and long - short <= longest * (1 + 1e-9):
+            continue
+        longest = long - short
         nu = s / (short * f_number)
         aperture = 1.0
         if aperture_um > 0:
