@@ -1,7 +1,7 @@
 """Sums over Bessel functions of radii times frequencies, of which an image needs millions: from a table.
 
-Each function is a Taylor polynomial of the seventh order on pieces of 1/16. None of its derivatives is larger than 1, so
-that the polynomial is off by less than (1/32)^8 / 8! = 2e-17.
+Each function is a Taylor polynomial of the seventh order on pieces of 1/16. None of its derivatives is larger than 1,
+so that the polynomial is off by less than (1/32)^8 / 8! = 2e-17.
 """
 
 from __future__ import annotations

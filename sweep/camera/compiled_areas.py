@@ -13,8 +13,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from ..base.machine_code import njit
 from ..base.types import FloatArray, IndexArray
 from .compiled_light import covered_share
@@ -114,7 +112,7 @@ def bends_of_disc(along: float, across: float, half: float, radius: float, h: fl
 
 @njit(cache=True, nogil=True)
 def _share_in_cell(dx: float, dy: float, half: float, radius: float, h: float, change: FloatArray) -> float:
-    """Put what is known of the share of a pixel at the disc's rim into `change`, ndarray[N_CHANGES]; the largest one."""
+    """Put what is known of the share of a pixel at the disc's rim into `change`, ndarray[N_CHANGES]; the largest."""
     for axis in range(2):
         along, across = (dx, dy) if axis == 0 else (dy, dx)
         change[_SLOPE + axis], change[_SUDDEN + axis] = slope_of_disc(along, across, half, radius, h)

@@ -140,13 +140,15 @@ def _add_rim(
         apart[part] = max(seen[HIGH, part] - ratios[u, to, 0, part], ratios[u, to, 1, part] - seen[LOW, part])
     for axis in range(2):
         third, rough, even = change[u, 8 + axis], BOTH_AXES * SLOPE * h, BOTH_AXES * THIRD * h**3
-        of_value, of_slope, of_bend = rough * change[u, 2 + axis], rough * 4 * h * change[u, axis], rough * 2 * h * weight
+        of_value, of_slope, of_bend = (
+            rough * change[u, 2 + axis],
+            rough * 4 * h * change[u, axis],
+            rough * 2 * h * weight,
+        )
         if not third < math.inf:
             for part in range(LANES):
                 found[u, to, part] += (
-                    of_value * apart[part]
-                    + of_slope * seen[SLOPES + axis, part]
-                    + of_bend * seen[BENDS + axis, part]
+                    of_value * apart[part] + of_slope * seen[SLOPES + axis, part] + of_bend * seen[BENDS + axis, part]
                 )
             continue
         smooth = even * third + BOTH_AXES * JUMP * h**2 * change[u, 6 + axis]

@@ -54,9 +54,7 @@ def room_for_radii() -> tuple[FloatArray, IndexArray]:
 
 
 @njit(cache=True, nogil=True, fastmath=_FINITE)
-def _radii_of_pixel(
-    dx: float, dy: float, half: float, h: float, segments: int, squares: int, room: FloatArray
-) -> None:
+def _radii_of_pixel(dx: float, dy: float, half: float, h: float, segments: int, squares: int, room: FloatArray) -> None:
     """Put the radii of a pixel's pieces and squares, wherever the light is in a cell, into `room`.
 
     The nearest, the middle and the furthest one of each piece of the edges to the left and right, and of those below

@@ -51,7 +51,8 @@ class _Kept:
         if new:
             made, size = make(np.array(list(new.values()))), len(self._at)
             if not self.rows or size + len(new) > len(self.rows[0]):
-                more = (np.empty((size + 2 * len(new), *rows.shape[1:]), dtype=rows.dtype) for rows in made)
+                room = 2 * (size + len(new))
+                more = (np.empty((room, *rows.shape[1:]), dtype=rows.dtype) for rows in made)
                 rows = self.rows or made
                 self.rows = tuple(_filled(larger, old[:size]) for larger, old in zip(more, rows, strict=True))
             for kept, own in zip(self.rows, made, strict=True):

@@ -138,7 +138,9 @@ class Planner:
         if isinstance(effect, ReadoutEffect) and self._anywhere:
             return True  # behind a straight readout the search for the worst place is much shorter, as no count tells
         saved = self._work(methods) - self._work(after)
-        return max(saved, self._work(self._completed(methods, rest)) - self._work(self._completed(after, rest))) > look_s
+        return (
+            max(saved, self._work(self._completed(methods, rest)) - self._work(self._completed(after, rest))) > look_s
+        )
 
     @cached_property
     def _anywhere(self) -> bool:
@@ -239,7 +241,9 @@ class Planner:
     def _completed(self, methods: Methods, rest: Sequence[str]) -> Methods:
         """The methods with the cheapest one, of those that are looked at, of each effect of which none is chosen."""
         for name in rest:
-            every = (m for m in EFFECTS[name].methods if not (self._without_kernels and _needs_kernels(EFFECTS[name], m)))
+            every = (
+                m for m in EFFECTS[name].methods if not (self._without_kernels and _needs_kernels(EFFECTS[name], m))
+            )
             methods = switched(methods, name, next(every))
         return methods
 
