@@ -16,23 +16,19 @@ import numpy as np
 
 from ..base.types import FloatArray, IndexArray
 from . import kernel
-from .compiled_areas import CellWeights, areas
-from .compiled_cells import deviations, ranges
+from .compiled_cells import Light, deviations, ranges
 from .compiled_classes import CellBounds, deviations_of_channels
 from .compiled_distances import amounts_of_pairs
-from .compiled_slopes import SEGMENTS, SHARP, Envelopes, Light
+from .compiled_slopes import BENT, INNER, LANES, SEGMENTS, SHARP, STEEP, Envelopes
 from .effects import blur, crosstalk, demosaic, sampling
-from .kernel_size import pixels_per_place
 from .methods import Methods
 from .view import View
 
 _BETWEEN_NODES = (math.pi / 12) ** 2 / 8
 """A function of one highest frequency, at 24 nodes per period of it, exceeds its nodes by at most this much of its
 largest value (Bernstein: its second derivative is at most the square of that frequency times this value)."""
-_BANDS = 12
+_BANDS = LANES - 1
 """Bands of wavelengths in which the light is bounded apart."""
-_AT_ONCE = 4_000_000
-"""Values of pixels that are held at once."""
 
 
 def _exceeded(values: FloatArray) -> FloatArray:
@@ -77,7 +73,14 @@ def _envelopes(profile: blur.Profile, pitch_um: float, parts: list[tuple[FloatAr
     above, below = (np.stack([f(values, axis=1) for values, _ in parts], axis=1) for f in (np.max, np.min))
     above = np.maximum.accumulate(above[::-1], axis=0)[::-1] + margin
     below = np.minimum.accumulate(below, axis=0) - margin
-    return Envelopes(above, below, steep, bent.max(axis=1).T, bent.sum(axis=1).T, 1 / step)
+    return Envelopes(_with_lanes(np.stack([above, below, steep, bent.max(axis=1).T, bent.sum(axis=1).T])), 1 / step)
+
+
+def _with_lanes(values: FloatArray) -> FloatArray:
+    """The parts, ndarray[..., n_parts], and more that are nothing, up to the number that compiled loops expect."""
+    found = np.zeros((*values.shape[:-1], LANES))
+    found[..., : values.shape[-1]] = values
+    return found
 
 
 class Deviation(NamedTuple):
@@ -139,14 +142,12 @@ class Between:
         if h not in self._nearby:
             from scipy.ndimage import maximum_filter1d  # noqa: PLC0415  (slow to import)
 
-            def around(values: FloatArray, reach_px: float) -> FloatArray:
-                width = 3 + 2 * math.ceil(reach_px * self._images.per_px)
-                return np.ascontiguousarray(maximum_filter1d(values, width, axis=0, mode="nearest"))
-
-            images = self._images
+            images, table = self._images, self._images.table.copy()
             piece, pixel = math.hypot(h, h + self._half / SEGMENTS), math.sqrt(2) * (h + self._half)
-            steep, bent = around(images.steep, piece), around(images.bent, piece)
-            self._nearby[h] = images._replace(steep=steep, bent=bent, inner=around(images.inner, pixel))
+            for which, reach_px in ((STEEP, piece), (BENT, piece), (INNER, pixel)):
+                width = 3 + 2 * math.ceil(reach_px * images.per_px)
+                maximum_filter1d(images.table[which], width, axis=0, mode="nearest", output=table[which])
+            self._nearby[h] = images._replace(table=table)
         return self._nearby[h]
 
     @property
@@ -172,42 +173,27 @@ class Between:
         middle = min(self._middle, flat.shape[1] - 1)
         return ranges(flat, middle, self._ends).reshape(2, *kernels.shape[:-1], self.n_parts)
 
-    def bounds(self, centers: FloatArray, h: float, homes: FloatArray, low: FloatArray, high: FloatArray) -> CellBounds:
+    def bounds(
+        self, centers: FloatArray, h: float, homes: FloatArray, sums: FloatArray, low: FloatArray, high: FloatArray
+    ) -> CellBounds:
         """What channels have in cells, before it is related to the sums of their weights.
 
-        `low`, `high`: range of the kernel over the nodes, ndarray[n, n_channels, n_channels, n_parts].
-        """
-        step = max(1, _AT_ONCE // (pixels_per_place(self._view) * self.n_parts))
-        parts = []
-        for at in range(0, len(centers), step):
-            some = slice(at, at + step)
-            parts.append(self._of_block(centers[some], h, homes[some], low[some], high[some]))
-        return CellBounds(*(np.concatenate(each) for each in zip(*parts, strict=True)))
+        `sums`: of the weights of each channel's pixels at the nodes, ndarray[n, 9, n_channels]; `low`, `high`: range of
+        the kernel over these, ndarray[n, n_channels, n_channels, n_parts].
 
-    def _of_block(
-        self, centers: FloatArray, h: float, homes: FloatArray, low: FloatArray, high: FloatArray
-    ) -> CellBounds:
-        """See the head of this file. Of a ratio k = M / D with the interpolation i, k - i is dev(M - i D) / D, and
+        See the head of this file. Of a ratio k = M / D with the interpolation i, k - i is dev(M - i D) / D, and
         dev(M - r D), with the mean r of i, the sum of dev(weight x (light - r)) over the pixels.
         """
-        mosaic = self._view.mosaic
-        n = len(mosaic.channels)
+        mosaic, n = self._view.mosaic, len(centers)
         seen = sampling.window(mosaic, centers, self._reach)
-        x, y = seen.columns, seen.rows
-        sums, moves = np.zeros((len(x), 9, n)), np.zeros((len(x), n, 3))
+        weights = np.empty((0, 0, 0))
         if self._target.readout == "center":  # the weights of a demosaicked pixel are the same in the whole cell
-            weights = CellWeights.constant(
-                demosaic.center_weights(seen, homes - centers, self._methods.demosaic, mosaic)
-            )
-            sums[:] = 1.0
-        else:
-            shape = (len(x), *seen.channel.shape)
-            weights = CellWeights(np.zeros(shape), *np.zeros((5, *shape, 2)))
-            areas(x, y, seen.channel, self._half, self._radii[1], h, weights, sums, moves)
-        found = np.empty((len(x), n, n, self.n_parts))
-        light = Light(self._near(h), self._half, self._radii[0], self._share, self._taken)
-        deviations(x, y, seen.channel, weights, light, h, np.stack([low, high], axis=1), found)
-        return CellBounds(found, sums, moves, low, high)
+            weights = demosaic.center_weights(seen, homes - centers, self._methods.demosaic, mosaic)
+        light = Light(*self._near(h), self._half, self._radii[0], self._share, self._taken)
+        nodes = _with_lanes(np.stack([low, high], axis=1))
+        found, moves = np.empty(nodes[:, 0].shape), np.empty((n, len(mosaic.channels), 3))
+        deviations(seen.columns, seen.rows, seen.channel, weights, light, self._radii[1], h, nodes, found, moves)
+        return CellBounds(found[..., : low.shape[-1]], sums, moves, low, high)
 
 
 def of_channels(

@@ -72,6 +72,25 @@ def poisson_shares(electrons: float, start: int, rare: float, shares: FloatArray
     return low, high + 1
 
 
+@njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
+def _sum_off(shares: FloatArray, values: FloatArray, about: float) -> float:
+    """Sum of values less one of them, by their shares."""
+    total = 0.0
+    for k in range(shares.size):
+        total += shares[k] * (values[k] - about)
+    return total
+
+
+@njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
+def _sum_square(shares: FloatArray, values: FloatArray, about: float, variance: FloatArray) -> float:
+    """Sum of variances and of the squares of values less another one, by their shares."""
+    total = 0.0
+    for k in range(shares.size):
+        off = values[k] - about
+        total += shares[k] * (variance[k] + off * off)
+    return total
+
+
 @njit(cache=True, nogil=True)
 def poisson_moments(
     electrons: FloatArray, start: int, values: FloatArray, variance: FloatArray, out: FloatArray
@@ -86,20 +105,15 @@ def poisson_moments(
     shares = np.empty(counts)
     for i in range(electrons.size):
         low, high = poisson_shares(electrons[i], start, _RARE, shares)
-        weight = shares[low:high].sum()
+        own = shares[low:high]
+        weight = own.sum()
         at = min(int(electrons[i]) - start, counts - 1)
         for q in range(quantities):
             # About the value at the most frequent count, so that no digits are lost.
-            total = 0.0
-            for k in range(low, high):
-                total += shares[k] * (values[q, k] - values[q, at])
-            out[q, i] = values[q, at] + total / weight
+            out[q, i] = values[q, at] + _sum_off(own, values[q, low:high], values[q, at]) / weight
         if variance.size:
-            total = 0.0
-            for k in range(low, high):
-                off = values[quantities - 1, k] - out[quantities - 1, i]
-                total += shares[k] * (variance[k] + off * off)
-            out[quantities, i] = total / weight
+            last = values[quantities - 1, low:high]
+            out[quantities, i] = _sum_square(own, last, out[quantities - 1, i], variance[low:high]) / weight
 
 
 @njit(cache=True, nogil=True)

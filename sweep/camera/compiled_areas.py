@@ -13,8 +13,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from ..base.machine_code import njit
 from ..base.types import FloatArray, IndexArray
 from .compiled_light import covered_share
@@ -25,26 +23,23 @@ SLOPE = 3 / 8
 BOTH_AXES = 9 / 8
 
 
-class CellWeights(NamedTuple):
-    """Weights of pixels in the readout over cells of places, ndarray[n_cells, n_rows, n_columns].
+DARK, WHOLE, RIM = 0, 1, 2
+"""Kinds of pixels in a cell: with no weight, with the same at all its places, and with one that changes."""
+_SLOPE, _SUDDEN, _BEND, _JUMP, THIRD_AT = 0, 2, 4, 6, 8
+N_CHANGES = 10
 
-    `high`: the largest. `slope`, `sudden`, `bend`, `jump`, `third`: for either axis (column, row) the largest slope,
-    how much it changes, the largest second derivative, by how much that jumps in all, and the largest third one, [...,
-    2] each; the last three are infinite where they have no bound.
+
+class CellWeights(NamedTuple):
+    """Weights of pixels in the readout over a cell of places, ndarray[n_rows, n_columns].
+
+    `kind`: of each pixel. `high`: the largest weight. `change`: of those at the rim, ndarray[..., N_CHANGES], for
+    either axis (column, row) the largest slope, how much it changes, the largest second derivative, by how much that
+    jumps in all, and the largest third one; the last three are infinite where they have no bound.
     """
 
+    kind: IndexArray
     high: FloatArray
-    slope: FloatArray
-    sudden: FloatArray
-    bend: FloatArray
-    jump: FloatArray
-    third: FloatArray
-
-    @staticmethod
-    def constant(high: FloatArray) -> CellWeights:
-        """Weights that are the same in the whole cell."""
-        nothing = np.zeros((*high.shape, 2))
-        return CellWeights(high, nothing, nothing, nothing, nothing, nothing)
+    change: FloatArray
 
 
 @njit(cache=True, nogil=True)
@@ -116,32 +111,24 @@ def bends_of_disc(along: float, across: float, half: float, radius: float, h: fl
 
 
 @njit(cache=True, nogil=True)
-def _share_in_cell(
-    dx: float, dy: float, half: float, radius: float, h: float, own: CellWeights, at: tuple[int, int, int]
-) -> None:
-    """Put what is known of the share of a pixel at the disc's rim into the weights."""
-    cell, row, column = at
-    own.high[cell, row, column] = covered_share(max(abs(dx) - h, 0.0), max(abs(dy) - h, 0.0), half, radius)
+def _share_in_cell(dx: float, dy: float, half: float, radius: float, h: float, change: FloatArray) -> float:
+    """Put what is known of the share of a pixel at the disc's rim into `change`, ndarray[N_CHANGES]; the largest."""
     for axis in range(2):
         along, across = (dx, dy) if axis == 0 else (dy, dx)
-        own.slope[cell, row, column, axis], own.sudden[cell, row, column, axis] = slope_of_disc(
-            along, across, half, radius, h
-        )
+        change[_SLOPE + axis], change[_SUDDEN + axis] = slope_of_disc(along, across, half, radius, h)
         bend, jump, third = bends_of_disc(along, across, half, radius, h)
-        own.bend[cell, row, column, axis], own.jump[cell, row, column, axis] = bend, jump
-        own.third[cell, row, column, axis] = third
+        change[_BEND + axis], change[_JUMP + axis], change[THIRD_AT + axis] = bend, jump, third
+    return float(covered_share(max(abs(dx) - h, 0.0), max(abs(dy) - h, 0.0), half, radius))
 
 
 @njit(cache=True, nogil=True)
-def _add_moves(own: CellWeights, at: tuple[int, int, int], h: float, moves: FloatArray) -> None:
+def _add_moves(high: float, change: FloatArray, h: float, moves: FloatArray) -> None:
     """Add how far a share times a parabola may be from its interpolation, for the size of the parabola, of its slope
     and of its second derivative: ndarray[3].
     """
-    cell, row, column = at
     for axis in range(2):
-        slope, sudden = own.slope[cell, row, column, axis], own.sudden[cell, row, column, axis]
-        bend, jump = own.bend[cell, row, column, axis], own.jump[cell, row, column, axis]
-        third = own.third[cell, row, column, axis]
+        slope, sudden, bend = change[_SLOPE + axis], change[_SUDDEN + axis], change[_BEND + axis]
+        jump, third = change[_JUMP + axis], change[THIRD_AT + axis]
         if THIRD * h**3 * third + JUMP * h**2 * jump <= SLOPE * h * sudden:
             smooth = BOTH_AXES * THIRD * h**3
             moves[0] += smooth * third + BOTH_AXES * JUMP * h**2 * jump
@@ -150,7 +137,7 @@ def _add_moves(own: CellWeights, at: tuple[int, int, int], h: float, moves: Floa
         else:
             moves[0] += BOTH_AXES * SLOPE * h * sudden
             moves[1] += BOTH_AXES * SLOPE * 4 * h**2 * slope
-            moves[2] += BOTH_AXES * SLOPE * 2 * h**2 * own.high[cell, row, column]
+            moves[2] += BOTH_AXES * SLOPE * 2 * h**2 * high
 
 
 @njit(cache=True, nogil=True)
@@ -162,30 +149,29 @@ def areas(
     radius: float,
     h: float,
     weights: CellWeights,
-    sums: FloatArray,
     moves: FloatArray,
 ) -> None:
-    """Of a mean over a disc of `radius`: the weights of the pixels.
+    """Put the weights of the pixels in a mean over a disc of `radius` into `weights`, for a cell.
 
-    And the sum of each channel's weights at the nodes, ndarray[n_cells, 9, n_channels], and how far this sum times a
-    parabola may be in a cell from the interpolation through the nodes, ndarray[n_cells, n_channels, 3] (`_add_moves`).
-    All are nothing before. `x`: ndarray[n_cells, n_columns], `y`: ndarray[n_cells, n_rows], pixels from the centers of
-    the cells; `channel`: ndarray[n_rows, n_columns].
+    And how far the sum of each channel's weights, times a parabola, may be in the cell from the interpolation through
+    the nodes into `moves`, ndarray[n_channels, 3] (`_add_moves`). `x`: ndarray[n_columns], `y`: ndarray[n_rows], pixels
+    from the center of the cell; `channel`: ndarray[n_rows, n_columns].
     """
-    for cell in range(len(x)):
-        for row in range(y.shape[1]):
-            for column in range(x.shape[1]):
-                dx, dy, own = x[cell, column], y[cell, row], channel[row, column]
-                nearest = math.hypot(max(abs(dx) - h - half, 0.0), max(abs(dy) - h - half, 0.0))
-                if nearest >= radius:
-                    continue
-                if math.hypot(abs(dx) + h + half, abs(dy) + h + half) <= radius:
-                    weights.high[cell, row, column] = 1.0
-                    for node in range(9):
-                        sums[cell, node, own] += 1.0
-                    continue
-                _share_in_cell(dx, dy, half, radius, h, weights, (cell, row, column))
-                _add_moves(weights, (cell, row, column), h, moves[cell, own])
-                for node in range(9):
-                    to_x, to_y = h * (node % 3 - 1), h * (node // 3 - 1)
-                    sums[cell, node, own] += covered_share(dx - to_x, dy - to_y, half, radius)
+    moves[:] = 0.0
+    reach = h + half
+    for row in range(y.size):
+        for column in range(x.size):
+            dx, dy = abs(x[column]), abs(y[row])
+            near_x, near_y = max(dx - reach, 0.0), max(dy - reach, 0.0)
+            kind = RIM
+            if near_x * near_x + near_y * near_y >= radius * radius:
+                kind = DARK
+            elif (dx + reach) * (dx + reach) + (dy + reach) * (dy + reach) <= radius * radius:
+                kind = WHOLE
+            weights.kind[row, column] = kind
+            weights.high[row, column] = 1.0 if kind == WHOLE else 0.0
+            if kind == RIM:
+                change = weights.change[row, column]
+                high = _share_in_cell(x[column], y[row], half, radius, h, change)
+                weights.high[row, column] = high
+                _add_moves(high, change, h, moves[channel[row, column]])

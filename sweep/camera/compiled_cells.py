@@ -3,83 +3,183 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from ..base.machine_code import njit
-from ..base.types import FloatArray, IndexArray
-from .compiled_areas import BOTH_AXES, JUMP, SLOPE, THIRD, CellWeights
-from .compiled_light import add, to_channels
-from .compiled_slopes import Light, LightInCell, light_in_cell, node
+from ..base.types import BoolArray, FloatArray, IndexArray
+from .compiled_areas import BOTH_AXES, DARK, JUMP, N_CHANGES, RIM, SLOPE, THIRD, WHOLE, CellWeights, areas
+from .compiled_light import add
+from .compiled_slopes import (
+    BENDS,
+    HIGH,
+    INNER,
+    JUMPS,
+    LANES,
+    LOW,
+    N_SEEN,
+    SLOPES,
+    SUDDEN,
+    THIRDS,
+    add_row,
+    of_blurred,
+    of_sharp,
+    room_for_radii,
+)
+
+_FINITE = {"contract", "nnan", "nsz"}
 
 
-@njit(cache=True, nogil=True)
-def _is_at_rim(own: CellWeights, row: int, column: int, share: float) -> bool:
-    """Whether the weights of a pixel's light change in a cell: its own, or those of its neighbors."""
-    if own.sudden[row, column, 0] > 0 or own.sudden[row, column, 1] > 0:
-        return True
-    if share > 0:
-        rows, columns = own.high.shape
-        for to_row, to_column in ((row - 1, column), (row + 1, column), (row, column - 1), (row, column + 1)):
-            inside = 0 <= to_row < rows and 0 <= to_column < columns
-            if inside and (own.sudden[to_row, to_column, 0] > 0 or own.sudden[to_row, to_column, 1] > 0):
-                return True
-    return False
+class Light(NamedTuple):
+    """What is known of the light of a cell's pixels.
 
-
-@njit(cache=True, nogil=True)
-def _mix_rim(own: CellWeights, channel: IndexArray, row: int, column: int, share: float, of_rim: FloatArray) -> None:
-    """Put what is known of how the weights of a pixel's light change in a cell into ndarray[5, 2, n_channels]: slope,
-    how much it changes, second derivative, its jumps and third derivative, along either axis.
+    `table`, `per_px`: `Envelopes` of a blurred light; a sharp one is a disc of `radius`. `half`: of a pixel's side;
+    `share`: of its light that comes through its neighbors' filters. `taken`: what a pixel of each channel takes of the
+    light through each channel's filter, ndarray[n_channels, n_channels].
     """
-    for axis in range(2):
-        to_channels(own.slope[:, :, axis], channel, row, column, share, of_rim[0, axis])
-        to_channels(own.sudden[:, :, axis], channel, row, column, share, of_rim[1, axis])
-        to_channels(own.bend[:, :, axis], channel, row, column, share, of_rim[2, axis])
-        to_channels(own.jump[:, :, axis], channel, row, column, share, of_rim[3, axis])
-        to_channels(own.third[:, :, axis], channel, row, column, share, of_rim[4, axis])
+
+    table: FloatArray
+    per_px: float
+    half: float
+    radius: float
+    share: float
+    taken: FloatArray
 
 
 @njit(cache=True, nogil=True)
-def _add_inner(
-    weight: float, dx: float, dy: float, h: float, light: Light, seen: LightInCell, found: FloatArray
-) -> None:
-    """Add what the light of a pixel whose weight is the same in the whole cell may be off, ndarray[n_parts]."""
-    images = light.images
-    if images.steep.shape[0]:
-        smooth = BOTH_AXES * THIRD * h**3 / light.half
-        add(found, weight * smooth, images.inner[node(math.hypot(dx, dy), images)])
-        return
-    light_in_cell(dx, dy, h, light, seen)
-    for axis in range(2):
-        off = SLOPE * h * seen.sudden[axis, 0]
-        if seen.thirds[axis, 0] < math.inf:
-            off = min(off, THIRD * h**3 * seen.thirds[axis, 0] + JUMP * h**2 * seen.jumps[axis, 0])
-        found[0] += BOTH_AXES * weight * off
+def _mix(
+    kind: IndexArray,
+    weights: FloatArray,
+    changes: FloatArray,
+    channel: IndexArray,
+    row: int,
+    column: int,
+    share: float,
+    high: FloatArray,
+    does_change: BoolArray,
+    change: FloatArray,
+) -> tuple[bool, bool]:
+    """Put what is known of the weights with which a pixel's light is in each channel's value into the last three: the
+    largest, ndarray[n_channels], whether they change in the cell, and how (of those that do), ndarray[n_channels,
+    N_CHANGES]. `kind`, `weights`, `changes`: `CellWeights`.
+
+    Whether the light has any weight, and whether any changes.
+    """
+    some = at_rim = False
+    high[:] = 0.0
+    does_change[:] = False
+    rows, columns = kind.shape
+    for source in range(5 if share > 0 else 1):
+        to_row, to_column = row + (source == 1) - (source == 2), column + (source == 3) - (source == 4)
+        if not (0 <= to_row < rows and 0 <= to_column < columns) or kind[to_row, to_column] == DARK:
+            continue
+        some = True
+        to, part = channel[to_row, to_column], 1 - share if source == 0 else share / 4
+        high[to] += part * weights[to_row, to_column]
+        if kind[to_row, to_column] == RIM:
+            if not does_change[to]:
+                change[to] = 0.0
+            at_rim = does_change[to] = True
+            add(change[to], part, changes[to_row, to_column])
+    return some, at_rim
 
 
 @njit(cache=True, nogil=True)
+def _off_within(weight: float, h: float, seen: FloatArray) -> float:
+    """What a sharp light on a pixel whose weight is the same in the whole cell may be off."""
+    found = 0.0
+    for axis in range(2):
+        off = SLOPE * h * seen[SUDDEN + axis, 0]
+        if seen[THIRDS + axis, 0] < math.inf:
+            off = min(off, THIRD * h**3 * seen[THIRDS + axis, 0] + JUMP * h**2 * seen[JUMPS + axis, 0])
+        found += BOTH_AXES * weight * off
+    return found
+
+
+@njit(cache=True, nogil=True)
+def _off_at_rim(weight: float, change: FloatArray, seen: FloatArray, ratio: FloatArray, h: float) -> float:
+    """`_add_rim` of a sharp light, whose slope may jump: where a third derivative has no bound, how much a slope
+    changes has.
+    """
+    found, apart = 0.0, max(seen[HIGH, 0] - ratio[0, 0], ratio[1, 0] - seen[LOW, 0])
+    for axis in range(2):
+        slope, sudden, bend = change[axis], change[2 + axis], change[4 + axis]
+        jump, third = change[6 + axis], change[8 + axis]
+        one, two, three = seen[SLOPES + axis, 0], seen[BENDS + axis, 0], seen[THIRDS + axis, 0]
+        off = SLOPE * h * (sudden * apart + 4 * h * slope * one + weight * seen[SUDDEN + axis, 0])
+        if third < math.inf and three < math.inf:
+            even = third * apart + 3 * bend * one + 3 * slope * two + weight * three
+            jumps = jump * apart + weight * seen[JUMPS + axis, 0]
+            off = min(off, THIRD * h**3 * even + JUMP * h**2 * jumps)
+        found += BOTH_AXES * off
+    return found
+
+
+@njit(cache=True, nogil=True, fastmath=_FINITE)
 def _add_rim(
-    weight: float, of_rim: FloatArray, seen: LightInCell, ratio: FloatArray, h: float, found: FloatArray
+    weight: float,
+    change: FloatArray,
+    u: int,
+    to: int,
+    seen: FloatArray,
+    ratios: FloatArray,
+    h: float,
+    apart: FloatArray,
+    found: FloatArray,
 ) -> None:
-    """Add what the light of a pixel, less `ratio`, times its changing weight in a channel may be off, ndarray[n_parts].
+    """Add what a blurred light on a pixel, less the ratio of its channel, times its changing weight in a channel `u`
+    may be off to `found[u, to]`.
 
-    `of_rim`: ndarray[5, 2] (`_mix_rim`); `ratio`: the lowest and the highest of the channel for a weight that goes
-    through one filter alone, ndarray[2, n_parts]. A product's derivatives are Leibniz's sums; where a third one has no
-    bound, how much its slope changes has.
+    `change`: ndarray[n_channels, N_CHANGES] (`CellWeights`); `ratios`: the lowest and the highest for a weight that
+    goes through one filter alone, ndarray[n_channels, n_channels, 2, LANES]; `apart`: ndarray[LANES], to work in. A
+    product's derivatives are Leibniz's sums; where a third one has no bound, how much its slope changes has. A blurred
+    image has no jumps, and its slope changes by at most twice the half width times its second derivative.
     """
-    for part in range(found.size):
-        apart = max(seen.values[1, part] - ratio[0, part], ratio[1, part] - seen.values[0, part])
-        for axis in range(2):
-            slope, sudden, bend = of_rim[0, axis], of_rim[1, axis], of_rim[2, axis]
-            jump, third = of_rim[3, axis], of_rim[4, axis]
-            one, two, three = seen.slopes[axis, part], seen.bends[axis, part], seen.thirds[axis, part]
-            off = SLOPE * h * (sudden * apart + 4 * h * slope * one + weight * seen.sudden[axis, part])
-            if third < math.inf and three < math.inf:
-                even = third * apart + 3 * bend * one + 3 * slope * two + weight * three
-                jumps = jump * apart + weight * seen.jumps[axis, part]
-                off = min(off, THIRD * h**3 * even + JUMP * h**2 * jumps)
-            found[part] += BOTH_AXES * off
+    for part in range(LANES):
+        apart[part] = max(seen[HIGH, part] - ratios[u, to, 0, part], ratios[u, to, 1, part] - seen[LOW, part])
+    for axis in range(2):
+        third, rough, even = change[u, 8 + axis], BOTH_AXES * SLOPE * h, BOTH_AXES * THIRD * h**3
+        of_value, of_slope, of_bend = (
+            rough * change[u, 2 + axis],
+            rough * 4 * h * change[u, axis],
+            rough * 2 * h * weight,
+        )
+        if not third < math.inf:
+            for part in range(LANES):
+                found[u, to, part] += (
+                    of_value * apart[part] + of_slope * seen[SLOPES + axis, part] + of_bend * seen[BENDS + axis, part]
+                )
+            continue
+        smooth = even * third + BOTH_AXES * JUMP * h**2 * change[u, 6 + axis]
+        by_slope, by_bend, by_third = 3 * even * change[u, 4 + axis], 3 * even * change[u, axis], even * weight
+        for part in range(LANES):
+            a, b, c = apart[part], seen[SLOPES + axis, part], seen[BENDS + axis, part]
+            off = of_value * a + of_slope * b + of_bend * c
+            other = smooth * a + by_slope * b + by_bend * c + by_third * seen[THIRDS + axis, part]
+            found[u, to, part] += min(off, other)
+
+
+@njit(cache=True, nogil=True)
+def _ratios(nodes: FloatArray, taken: FloatArray, found: FloatArray) -> None:
+    """Put the range of the kernel for weights that go through one filter alone into `found`, ndarray[n_channels,
+    n_channels, 2, n_parts]; `nodes`: ndarray[2, n_channels, n_channels, n_parts].
+    """
+    found[:] = 0.0
+    for u in range(taken.shape[0]):
+        for to in range(taken.shape[1]):
+            if taken[u, to] > 0:
+                for end in range(2):
+                    add(found[u, to, end], 1 / taken[u, to], nodes[end, u, to])
+
+
+@njit(cache=True, nogil=True)
+def _given(weights: FloatArray, own: CellWeights) -> None:
+    """Take weights that are the same in a whole cell."""
+    for row in range(weights.shape[0]):
+        for column in range(weights.shape[1]):
+            own.high[row, column] = weights[row, column]
+            own.kind[row, column] = WHOLE if weights[row, column] > 0 else DARK
 
 
 @njit(cache=True, nogil=True)
@@ -90,36 +190,42 @@ def _of_cell(
     own: CellWeights,
     light: Light,
     h: float,
-    nodes: FloatArray,
-    seen: LightInCell,
+    ratios: FloatArray,
     found: FloatArray,
 ) -> None:
-    """`deviations` of one cell. `nodes`: ndarray[2, n_channels, n_channels, n_parts]."""
-    n_channels, n_parts = found.shape[0], found.shape[2]
-    ratio = np.empty((2, n_parts))
-    weight, of_rim = np.empty(n_channels), np.empty((5, 2, n_channels))
+    """`deviations` of one cell. `ratios`: of `_ratios`."""
+    kind, weights, changes = own.kind, own.high, own.change
+    table, per_px, half, radius, share = light.table, light.per_px, light.half, light.radius, light.share
+    n, blurred, last = len(ratios), table.shape[1] > 0, table.shape[1] - 1.0
+    high, does_change, change = np.empty(n), np.empty(n, dtype=np.bool_), np.empty((n, N_CHANGES))
+    room, nodes = room_for_radii()
+    seen, apart = np.zeros((N_SEEN, LANES)), np.empty(LANES)
+    flat = found.reshape(n * n, -1)
+    smooth = BOTH_AXES * THIRD * h**3 / half
     found[:] = 0.0
     for row in range(y.size):
         for column in range(x.size):
-            if not to_channels(own.high, channel, row, column, light.share, weight):
+            some, at_rim = _mix(kind, weights, changes, channel, row, column, share, high, does_change, change)
+            if not some:
                 continue
-            to = channel[row, column]
-            # Elsewhere than at the rim of the readout the weights are the same in the whole cell.
-            if not _is_at_rim(own, row, column, light.share):
-                for u in range(n_channels):
-                    if weight[u] > 0:
-                        _add_inner(weight[u], x[column], y[row], h, light, seen, found[u, to])
-                continue
-            _mix_rim(own, channel, row, column, light.share, of_rim)
-            light_in_cell(x[column], y[row], h, light, seen)
-            for u in range(n_channels):
-                if weight[u] <= 0:  # no part of the cell gives it one
+            dx, dy, to = x[column], y[row], channel[row, column]
+            if not blurred:
+                of_sharp(dx, dy, half, radius, h, seen)
+            elif at_rim:  # little of the light of a pixel beside one at the rim has a weight that changes
+                of_blurred(dx, dy, half, h, table, per_px, kind[row, column] == RIM, room, nodes, seen)
+            inner = int(min(math.sqrt(dx * dx + dy * dy) * per_px + 0.5, last))
+            for u in range(n):
+                weight = high[u]
+                if weight <= 0:  # no part of the cell gives it one
                     continue
-                own_share = 1 / light.taken[u, to] if light.taken[u, to] > 0 else 0.0
-                ratio[:] = 0.0
-                for end in range(2):
-                    add(ratio[end], own_share, nodes[end, u, to])
-                _add_rim(weight[u], of_rim[:, :, u], seen, ratio, h, found[u, to])
+                if blurred and does_change[u]:
+                    _add_rim(weight, change, u, to, seen, ratios, h, apart, found)
+                elif blurred:
+                    add_row(weight * smooth, table, INNER, inner, flat, u * n + to)
+                elif does_change[u]:
+                    found[u, to, 0] += _off_at_rim(weight, change[u], seen, ratios[u, to], h)
+                else:
+                    found[u, to, 0] += _off_within(weight, h, seen)
 
 
 @njit(cache=True, nogil=True)
@@ -127,30 +233,33 @@ def deviations(
     x: FloatArray,
     y: FloatArray,
     channel: IndexArray,
-    weights: CellWeights,
+    given: FloatArray,
     light: Light,
+    readout: float,
     h: float,
     nodes: FloatArray,
     found: FloatArray,
+    moves: FloatArray,
 ) -> None:
     """How far the weighted light less that share of the weights which it is at the nodes may be, in cells of half width
     `h`, from the interpolation through its values there: see `compiled_areas`.
 
-    `nodes`: range of each part of the kernel there, ndarray[n_cells, 2, n_channels, n_channels, n_parts]. `found`:
-    ndarray[n_cells, n_channels, n_channels, n_parts].
+    `given`: the weights of pixels, where they are the same in a whole cell, ndarray[n_cells, n_rows, n_columns], else
+    none: they are those of a mean over a disc of the radius `readout`. `nodes`: range of each part of the kernel there,
+    ndarray[n_cells, 2, n_channels, n_channels, LANES]. `found`: ndarray[n_cells, n_channels, n_channels, LANES];
+    `moves`: how far the sum of the weights, times a parabola, may be, ndarray[n_cells, n_channels, 3].
     """
-    values, slopes, sudden, bends, jumps, thirds = np.empty((6, 2, found.shape[3]))
-    seen = LightInCell(values, slopes, sudden, bends, jumps, thirds)
+    shape, n_channels = channel.shape, found.shape[1]
+    own = CellWeights(np.empty(shape, dtype=np.int64), np.empty(shape), np.empty((*shape, N_CHANGES)))
+    ratios = np.empty((n_channels, n_channels, 2, LANES))
     for cell in range(len(x)):
-        own = CellWeights(
-            weights.high[cell],
-            weights.slope[cell],
-            weights.sudden[cell],
-            weights.bend[cell],
-            weights.jump[cell],
-            weights.third[cell],
-        )
-        _of_cell(x[cell], y[cell], channel, own, light, h, nodes[cell], seen, found[cell])
+        if len(given):
+            moves[cell] = 0.0
+            _given(given[cell], own)
+        else:
+            areas(x[cell], y[cell], channel, light.half, readout, h, own, moves[cell])
+        _ratios(nodes[cell], light.taken, ratios)
+        _of_cell(x[cell], y[cell], channel, own, light, h, ratios, found[cell])
 
 
 @njit(cache=True, nogil=True)

@@ -8,10 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.machine_code import njit
-from ..base.types import BoolArray, FloatArray, IndexArray
-from .compiled_patches import N_CONTROL, PARTS, largest_derivatives, to_control, to_parts
+from ..base.types import FloatArray, IndexArray
+from .compiled_patches import N_CONTROL, PARTS, to_parts
 
 _N_NODES = 9
+LANES = 16
+"""Pairs that are bounded together: loops over them have so many rounds, which is known when they are compiled."""
+_SQUARES, _ALONG, _LENGTHS, _SUMS, _LEFT, _LOW, _MOST, _ROOM = 9, 18, 27, 36, 39, 40, 41, 42
+"""Where what is known of these pairs stands, behind their control points: in one array, so that all these numbers are
+known when it is compiled."""
 _MOST_DIVIDED = 16
 """Pairs of a cell whose patches are divided."""
 
@@ -74,27 +79,10 @@ def _bounds(control: FloatArray, left: FloatArray, along: FloatArray, squared: F
     return low, math.sqrt(furthest) + math.sqrt(beside)
 
 
-@njit(cache=True, nogil=True, fastmath=_FINITE)
-def _left_over(
-    values: FloatArray, control: FloatArray, rest: FloatArray, moves: FloatArray, h: float, left: FloatArray
-) -> None:
-    """Put how far the difference of two signals may be from its patch into `left`, ndarray[n_channels].
-
-    `values`, `control`: ndarray[n_channels, 9]; `rest`: ndarray[n_channels], `moves`: ndarray[n_channels, 3].
-    """
-    for u in range(left.size):
-        mean, least, most = 0.0, control[u, 0], control[u, 0]
-        for at in range(_N_NODES):
-            mean += values[u, at] / _N_NODES
-            least, most = min(least, control[u, at]), max(most, control[u, at])
-        slope, bend = largest_derivatives(control[u], h)
-        left[u] = rest[u] + moves[u, 0] * max(most - mean, mean - least) + moves[u, 1] * slope + moves[u, 2] * bend
-
-
 @njit(cache=True, nogil=True)
-def _divided(every: FloatArray, lefts: FloatArray, some: BoolArray, low: FloatArray, nearest: float) -> float:
-    """Bound the distances of some pairs from the parts of their patches: put the lower ones into `low`, ndarray[
-    n_pairs], and return the least upper one.
+def _divided(every: FloatArray, lefts: FloatArray, low: FloatArray, nearest: float) -> float:
+    """Bound the distances of pairs from the parts of their patches: put the lower ones, where they are larger, into
+    `low`, ndarray[n_pairs], and return the least upper one.
 
     `every`: values at the nodes, ndarray[n_pairs, n_channels, 9]; `lefts`: ndarray[n_pairs, n_channels].
     """
@@ -103,8 +91,6 @@ def _divided(every: FloatArray, lefts: FloatArray, some: BoolArray, low: FloatAr
     part, (along, squared) = np.empty((n_channels, _N_NODES)), np.empty((2, _N_NODES))
     above = np.full((PARTS, PARTS), np.inf)
     for pair in range(n_pairs):
-        if not some[pair]:
-            continue
         for u in range(n_channels):
             to_parts(every[pair, u], half_way, control[u])
         least = math.inf
@@ -120,14 +106,141 @@ def _divided(every: FloatArray, lefts: FloatArray, some: BoolArray, low: FloatAr
 
 
 @njit(cache=True, nogil=True, fastmath=_FINITE)
-def _differences(one: FloatArray, other: FloatArray, found: FloatArray, squared: FloatArray) -> None:
-    """Put the difference of two signals at the nodes, ndarray[n_channels, 9], and the square of its length there."""
-    squared[:] = 0.0
-    for u in range(len(one)):
-        for node in range(_N_NODES):
-            away = one[u, node] - other[u, node]
-            found[u, node] = away
-            squared[node] += away * away
+def _take_lanes(own: FloatArray, one: IndexArray, other: IndexArray, start: int, values: FloatArray) -> None:
+    """Put the differences of some pairs, channel by channel and node by node, into `values`, ndarray[9 n_channels
+    LANES].
+
+    `own`: of all signals, ndarray[n_signals, 9 n_channels]. Where less pairs are left than lanes, the last one counts
+    again.
+    """
+    last, n = one.size - 1, own.shape[1]
+    for lane in range(LANES):
+        pair = min(start + lane, last)
+        here, there, to = own[one[pair]], own[other[pair]], values[lane:]
+        for at in range(n):
+            to[at * LANES] = here[at] - there[at]
+
+
+@njit(cache=True, nogil=True, fastmath=_FINITE)
+def _add_channel(values: FloatArray, rest: FloatArray, moves: FloatArray, h: float, room: FloatArray) -> None:
+    """Add what a channel has of the bounds of some pairs to `room`, ndarray[_ROOM LANES].
+
+    There are its control points (`compiled_patches.to_control`), how far the differences may be from their patches
+    (`_LEFT`), and sums over the channels: the squares of the lengths at the nodes and of the control points, how far
+    these are along the middle one, the square of that, of what is left, and the product of both sizes (`_SUMS`).
+
+    `values`: ndarray[9 LANES], `rest`: ndarray[LANES]; `moves`: ndarray[3], for the size of a patch, its largest slope
+    and its largest second derivative.
+    """
+    of_size, of_slope, of_bend = moves[0], moves[1] / h, moves[2] / (2 * h**2)
+    for k in range(LANES):
+        a, b, c = values[k], values[LANES + k], values[2 * LANES + k]
+        d, e, f = values[3 * LANES + k], values[4 * LANES + k], values[5 * LANES + k]
+        g, i, j = values[6 * LANES + k], values[7 * LANES + k], values[8 * LANES + k]
+        mean = (a + b + c + d + e + f + g + i + j) / _N_NODES
+        b, e, i = 2 * b - (a + c) / 2, 2 * e - (d + f) / 2, 2 * i - (g + j) / 2
+        d, e, f = 2 * d - (a + g) / 2, 2 * e - (b + i) / 2, 2 * f - (c + j) / 2
+        least = min(a, b, c, d, e, f, g, i, j)
+        most = max(a, b, c, d, e, f, g, i, j)
+        slope = max(abs(b - a), abs(c - b), abs(e - d), abs(f - e))
+        slope = max(slope, abs(i - g), abs(j - i), abs(d - a), abs(g - d))
+        slope = max(slope, abs(e - b), abs(i - e), abs(f - c), abs(j - f))
+        bend = max(abs(c - 2 * b + a), abs(f - 2 * e + d), abs(j - 2 * i + g))
+        bend = max(bend, abs(g - 2 * d + a), abs(i - 2 * e + b), abs(j - 2 * f + c))
+        left = rest[k] + of_size * max(most - mean, mean - least) + of_slope * slope + of_bend * bend
+        room[_LEFT * LANES + k] = left
+        room[_SUMS * LANES + k] += e * e
+        room[(_SUMS + 1) * LANES + k] += left * left
+        room[(_SUMS + 2) * LANES + k] += abs(e) * left
+        room[k], room[LANES + k], room[2 * LANES + k] = a, b, c
+        room[3 * LANES + k], room[4 * LANES + k], room[5 * LANES + k] = d, e, f
+        room[6 * LANES + k], room[7 * LANES + k], room[8 * LANES + k] = g, i, j
+    for node in range(_N_NODES):
+        own, seen, along = room[node * LANES :], values[node * LANES :], room[(_ALONG + node) * LANES :]
+        length, squared = room[(_LENGTHS + node) * LANES :], room[(_SQUARES + node) * LANES :]
+        for k in range(LANES):
+            along[k] += own[k] * room[4 * LANES + k]
+        for k in range(LANES):
+            length[k] += own[k] * own[k]
+        for k in range(LANES):
+            squared[k] += seen[k] * seen[k]
+
+
+@njit(cache=True, nogil=True, fastmath=_FINITE)
+def _end_lanes(room: FloatArray, shortest: FloatArray) -> None:
+    """Put the bounds of the lengths of some pairs (`_bounds`) into `_LOW` and `_MOST` of what `_add_channel` has, and
+    the squares of the lengths at the nodes into `shortest`, ndarray[9], where they are shorter.
+    """
+    for k in range(LANES):
+        beyond, furthest = room[_ALONG * LANES + k], room[_LENGTHS * LANES + k]
+        for node in range(1, _N_NODES):
+            beyond = min(beyond, room[(_ALONG + node) * LANES + k])
+            furthest = max(furthest, room[(_LENGTHS + node) * LANES + k])
+        length = math.sqrt(max(room[_SUMS * LANES + k], 1e-300))
+        room[_LOW * LANES + k] = max((beyond - room[(_SUMS + 2) * LANES + k]) / length, 0.0)
+        room[_MOST * LANES + k] = math.sqrt(furthest) + math.sqrt(room[(_SUMS + 1) * LANES + k])
+    for node in range(_N_NODES):
+        own = room[(_SQUARES + node) * LANES :]
+        least = own[0]
+        for k in range(1, LANES):
+            least = min(least, own[k])
+        shortest[node] = min(shortest[node], least)
+
+
+@njit(cache=True, nogil=True)
+def _of_pairs(
+    own: FloatArray,
+    one: IndexArray,
+    other: IndexArray,
+    rest: FloatArray,
+    moves: FloatArray,
+    h: float,
+    room: FloatArray,
+    values: FloatArray,
+    lefts: FloatArray,
+    low: FloatArray,
+    shortest: FloatArray,
+) -> float:
+    """Bound the distances of all pairs in a cell: the lower bounds, what is left and the squares of the distances at
+    the nodes go into the last three; the least of the upper bounds.
+    """
+    nearest, n = math.inf, _N_NODES * LANES
+    some_rest = np.empty(LANES)
+    for start in range(0, one.size, LANES):
+        _take_lanes(own, one, other, start, values)
+        some = min(LANES, one.size - start)
+        room[:] = 0.0
+        for u in range(len(rest)):
+            for lane in range(LANES):
+                some_rest[lane] = rest[u, min(start + lane, one.size - 1)]
+            _add_channel(values[u * n :], some_rest, moves[u], h, room)
+            for lane in range(some):
+                lefts[u, start + lane] = room[_LEFT * LANES + lane]
+        _end_lanes(room, shortest)
+        for lane in range(some):
+            low[start + lane] = room[_LOW * LANES + lane]
+            nearest = min(nearest, room[_MOST * LANES + lane])
+    return nearest
+
+
+@njit(cache=True, nogil=True)
+def _closer(
+    own: FloatArray, one: IndexArray, other: IndexArray, lefts: FloatArray, low: FloatArray, nearest: float
+) -> float:
+    """`_divided` of the pairs of a cell that may be the nearest, where these are few."""
+    some = low <= nearest
+    if some.sum() > _MOST_DIVIDED:
+        return nearest
+    which, n_channels = np.flatnonzero(some), len(lefts)
+    every, own_low = np.empty((which.size, n_channels, _N_NODES)), np.empty(which.size)
+    few = np.empty((which.size, n_channels))
+    for at in range(which.size):
+        pair = which[at]
+        own_low[at], few[at] = low[pair], lefts[:, pair]
+        every[at] = (own[one[pair]] - own[other[pair]]).reshape(n_channels, _N_NODES)
+    nearest = _divided(every, few, own_low, nearest)
+    low[which] = own_low
+    return nearest
 
 
 @njit(cache=True, nogil=True)
@@ -148,31 +261,20 @@ def distances(
     its interpolation, ndarray[n_cells, n_channels, n_pairs]; `moves`: see `Deviation`. `ends`: a cell that
     can hold neither a distance below the first of these nor one above the second is not looked at more closely.
     """
-    n_channels, n_pairs = seen.shape[1], pairs[0].size
-    values = np.empty((n_pairs, n_channels, _N_NODES))
-    control, lefts = np.empty((n_channels, _N_NODES)), np.empty((n_pairs, n_channels))
-    some, (along, squared) = np.empty(n_pairs, dtype=np.bool_), np.empty((2, _N_NODES))
-    own = np.empty((seen.shape[2], n_channels, _N_NODES))
+    (one, other), (lows, upper, at_nodes) = pairs, found
+    n_channels, n_pairs = seen.shape[1], one.size
+    own, values = np.empty((seen.shape[2], n_channels * _N_NODES)), np.empty(n_channels * _N_NODES * LANES)
+    room, lefts, shortest = np.empty(_ROOM * LANES), np.empty((n_channels, n_pairs)), np.empty(_N_NODES)
     for cell in range(len(at)):
         for node in range(_N_NODES):
-            for u in range(n_channels):
-                for signal in range(seen.shape[2]):
-                    own[signal, u, node] = seen[at[cell, node], u, signal]
-        nearest = math.inf
-        shortest = np.full(_N_NODES, np.inf)
-        for pair in range(n_pairs):
-            _differences(own[pairs[0][pair]], own[pairs[1][pair]], values[pair], squared)
-            for node in range(_N_NODES):
-                shortest[node] = min(shortest[node], squared[node])
-            for u in range(n_channels):
-                to_control(values[pair, u], control[u])
-            _left_over(values[pair], control, rest[cell, :, pair], moves[cell], h, lefts[pair])
-            found.low[cell, pair], most = _bounds(control, lefts[pair], along, squared)
-            nearest = min(nearest, most)
-        found.nodes[cell] = np.sqrt(shortest)
-        if found.low[cell].min() < ends[0] or nearest > ends[1]:
-            for pair in range(n_pairs):
-                some[pair] = found.low[cell, pair] <= nearest
-            if some.sum() <= _MOST_DIVIDED:
-                nearest = _divided(values, lefts, some, found.low[cell], nearest)
-        found.nearest[cell] = nearest
+            here = seen[at[cell, node]]
+            for signal in range(seen.shape[2]):
+                for u in range(n_channels):
+                    own[signal, u * _N_NODES + node] = here[u, signal]
+        shortest[:] = math.inf
+        low = lows[cell]
+        nearest = _of_pairs(own, one, other, rest[cell], moves[cell], h, room, values, lefts, low, shortest)
+        at_nodes[cell] = np.sqrt(shortest)
+        if low.min() < ends[0] or nearest > ends[1]:
+            nearest = _closer(own, one, other, lefts, low, nearest)
+        upper[cell] = nearest

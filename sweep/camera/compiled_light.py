@@ -34,10 +34,11 @@ def _area(x: float, y: float, radius: float) -> float:
 @njit(cache=True, nogil=True)
 def covered_share(x: float, y: float, half: float, radius: float) -> float:
     """Share of a square of half side `half` around (x, y) that lies in the disc of `radius` around 0, exact."""
-    x, y = abs(x), abs(y)
-    if math.hypot(x + half, y + half) <= radius:
+    x, y, squared = abs(x), abs(y), radius * radius
+    if (x + half) * (x + half) + (y + half) * (y + half) <= squared:
         return 1.0
-    if math.hypot(max(x - half, 0.0), max(y - half, 0.0)) >= radius:
+    near_x, near_y = max(x - half, 0.0), max(y - half, 0.0)
+    if near_x * near_x + near_y * near_y >= squared:
         return 0.0
     area = _area(x + half, y + half, radius) - _area(x + half, y - half, radius)
     area += _area(x - half, y - half, radius) - _area(x - half, y + half, radius)

@@ -1,4 +1,7 @@
-"""Compiled inner loops of the slopes of a pixel's light over cells of places. They release the GIL."""
+"""Compiled inner loops of the slopes of a pixel's light over cells of places. They release the GIL.
+
+What they work on are plain arrays: taking one out of a tuple would take longer than what is done with it.
+"""
 
 from __future__ import annotations
 
@@ -8,164 +11,168 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.machine_code import njit
-from ..base.types import FloatArray
+from ..base.types import FloatArray, IndexArray
 from .compiled_areas import bends_of_disc, slope_of_disc
-from .compiled_light import add, covered_share
+from .compiled_light import covered_share
 
 SEGMENTS = 4
 """Parts of a pixel's edge over which the image's slope is bounded one by one."""
 SQUARES = 3
 """Parts of a pixel along either axis over which the image is bounded one by one."""
+LANES = 16
+"""Parts of an image: loops over them have so many rounds, which is known when they are compiled."""
+ABOVE, BELOW, STEEP, BENT, INNER = range(5)
+"""The envelopes of an image."""
+N_SEEN = 12
+LOW, HIGH, SLOPES, BENDS, THIRDS, SUDDEN, JUMPS = 0, 1, 2, 4, 6, 8, 10
+"""What is known of a pixel's light over a cell: the lowest and the highest; along either axis the largest slope, second
+and third derivative, and, of a sharp image alone, how much the slope changes at most, and by how much the second
+derivative jumps in all. Those of a sharp image may be infinite."""
+_FINITE = {"contract", "nnan", "nsz"}
 
 
 class Envelopes(NamedTuple):
-    """Of parts of a blurred image, as functions of the radius, ndarray[n_radii, n_parts] each.
+    """Of parts of a blurred image, as functions of the radius, `table`: ndarray[5, n_radii, LANES].
 
-    No value from a radius on is above `above`, none up to it below `below`; near it no slope is steeper than `steep`,
-    no second derivative along any line larger than `bent`, and those along two lines across are `inner` together at
-    most, over a whole pixel. `per_px`: radii per pixel. A sharp image has none.
+    No value from a radius on is larger than `ABOVE`, none up to it smaller than `BELOW`; near it no slope is steeper
+    than `STEEP`, no second derivative along any line larger than `BENT`, and those along two lines across are `INNER`
+    together at most, over a whole pixel. `per_px`: radii per pixel. A sharp image has none.
     """
 
-    above: FloatArray
-    below: FloatArray
-    steep: FloatArray
-    bent: FloatArray
-    inner: FloatArray
+    table: FloatArray
     per_px: float
 
 
-_NONE = np.empty((0, 1))
-SHARP = Envelopes(_NONE, _NONE, _NONE, _NONE, _NONE, 0.0)
-
-
-class Light(NamedTuple):
-    """What is known of the light of a cell's pixels. `images`: of a blurred light; a sharp one is a disc of `radius`.
-
-    `half`: of a pixel's side; `share`: of its light that comes through its neighbors' filters. `taken`: what a pixel
-    of each channel takes of the light through each channel's filter, ndarray[n_channels, n_channels].
-    """
-
-    images: Envelopes
-    half: float
-    radius: float
-    share: float
-    taken: FloatArray
-
-
-class LightInCell(NamedTuple):
-    """Of a pixel's light over a cell, ndarray[2, n_parts] each: the lowest and the highest; along either axis the
-    largest slope, how much it changes at most, the largest second derivative, by how much that jumps in all, and the
-    largest third one. Those of a sharp image may be infinite.
-    """
-
-    values: FloatArray
-    slopes: FloatArray
-    sudden: FloatArray
-    bends: FloatArray
-    jumps: FloatArray
-    thirds: FloatArray
+SHARP = Envelopes(np.empty((5, 0, LANES)), 0.0)
 
 
 @njit(cache=True, nogil=True)
-def node(r: float, images: Envelopes) -> int:
-    """The node nearest to a radius."""
-    return int(min(r * images.per_px + 0.5, images.steep.shape[0] - 1.0))
+def room_for_radii() -> tuple[FloatArray, IndexArray]:
+    """Where `light_in_cell` works: radii and shares, and the nodes nearest to radii."""
+    most = 12 * SEGMENTS + 2 * SQUARES**2
+    return np.empty((2, most)), np.empty(most, dtype=np.int64)
 
 
-@njit(cache=True, nogil=True)
-def _bends_of_edge(
-    away: float, middle: float, half: float, h: float, images: Envelopes, bends: FloatArray, thirds: FloatArray
-) -> None:
-    """Add what an edge, `away` from the light's center and `half` to both sides of `middle` long, has of the second and
-    of the third derivative of a pixel's light across it.
+@njit(cache=True, nogil=True, fastmath=_FINITE)
+def _radii_of_pixel(dx: float, dy: float, half: float, h: float, segments: int, squares: int, room: FloatArray) -> None:
+    """Put the radii of a pixel's pieces and squares, wherever the light is in a cell, into `room`.
+
+    The nearest, the middle and the furthest one of each piece of the edges to the left and right, and of those below
+    and above; and the furthest and nearest of each square. Behind them, how much of a slope along the radius is across
+    each piece at most.
     """
-    piece = 2 * half / SEGMENTS
-    edge = abs(away)
-    near = max(edge - h, 0.0)
-    scale = 1 / (SEGMENTS * 2 * half)
-    for segment in range(SEGMENTS):
-        across = abs(middle + (segment + 0.5) * piece - half)
-        low = max(across - piece / 2 - h, 0.0)
-        low_r = math.sqrt(near * near + low * low)
-        towards = scale * min(1.0, (edge + h) / max(low_r, 1e-9))
-        at = node(math.sqrt(edge * edge + across * across), images)
-        steep, bent = images.steep[at], images.bent[at]
-        for part in range(bends.size):
-            bends[part] += steep[part] * towards
-            thirds[part] += bent[part] * scale
-
-
-@njit(cache=True, nogil=True)
-def _slope_between_edges(
-    along: float, middle: float, half: float, h: float, images: Envelopes, found: FloatArray
-) -> None:
-    """Put the largest slope along one axis of a pixel's light over a cell into `found`, by part."""
-    piece = 2 * half / SEGMENTS
-    left, right = abs(along - half), abs(along + half)
-    found[:] = 0.0
-    for segment in range(SEGMENTS):
-        # Of this piece of both edges, wherever the light is in the cell: nearest and furthest radius.
-        away = abs(middle + (segment + 0.5) * piece - half)
-        low, high = max(away - piece / 2 - h, 0.0), away + piece / 2 + h
-        nodes = (
-            node(math.sqrt(max(left - h, 0.0) ** 2 + low * low), images),
-            node(math.sqrt((left + h) ** 2 + high * high), images),
-            node(math.sqrt(max(right - h, 0.0) ** 2 + low * low), images),
-            node(math.sqrt((right + h) ** 2 + high * high), images),
-        )
-        above_left, below_left = images.above[nodes[0]], images.below[nodes[1]]
-        above_right, below_right = images.above[nodes[2]], images.below[nodes[3]]
-        for part in range(found.size):
-            found[part] += max(above_left[part] - below_right[part], above_right[part] - below_left[part])
-    for part in range(found.size):
-        found[part] /= SEGMENTS * 2 * half
-
-
-@njit(cache=True, nogil=True)
-def _between_values(dx: float, dy: float, half: float, h: float, images: Envelopes, values: FloatArray) -> None:
-    """Put the lowest and the highest mean over a pixel in a cell into `values`, ndarray[2, n_parts]: the means of those
-    of its squares.
-    """
-    side = 2 * half / SQUARES
+    squared, n, piece = room[0], 4 * segments, 2 * half / segments
+    for edge in range(4):
+        along, across = (dx, dy) if edge < 2 else (dy, dx)
+        away = abs(along - half) if edge % 2 == 0 else abs(along + half)
+        near, far = max(away - h, 0.0), away + h
+        for segment in range(segments):
+            middle = abs(across + (segment + 0.5) * piece - half)
+            low, high, at = max(middle - piece / 2 - h, 0.0), middle + piece / 2 + h, edge * segments + segment
+            squared[at] = near * near + low * low
+            squared[n + at] = away * away + middle * middle
+            squared[2 * n + at] = far * far + high * high
+            room[1, at] = far
+    side = 2 * half / squares
     reach = side / 2 + h
-    values[:] = 0.0
-    for row in range(SQUARES):
+    for row in range(squares):
         y = abs(dy - half + (row + 0.5) * side)
-        for column in range(SQUARES):
+        near_y, far_y = max(y - reach, 0.0), y + reach
+        for column in range(squares):
             x = abs(dx - half + (column + 0.5) * side)
-            near_x, near_y, far_x, far_y = max(x - reach, 0.0), max(y - reach, 0.0), x + reach, y + reach
-            add(values[0], 1 / SQUARES**2, images.below[node(math.sqrt(far_x * far_x + far_y * far_y), images)])
-            add(values[1], 1 / SQUARES**2, images.above[node(math.sqrt(near_x * near_x + near_y * near_y), images)])
+            near_x, far_x, at = max(x - reach, 0.0), x + reach, 3 * n + 2 * (row * squares + column)
+            squared[at], squared[at + 1] = far_x * far_x + far_y * far_y, near_x * near_x + near_y * near_y
+    for at in range(3 * n + 2 * squares**2):
+        squared[at] = math.sqrt(squared[at])
+    for at in range(n):
+        room[1, at] = min(1.0, room[1, at] / max(squared[at], 1e-9))
+
+
+@njit(cache=True, nogil=True, fastmath=_FINITE)
+def add_row(factor: float, table: FloatArray, which: int, node: int, found: FloatArray, to: int) -> None:
+    """Add an envelope at a radius, times a factor, to a row."""
+    for part in range(LANES):
+        found[to, part] += factor * table[which, node, part]
+
+
+@njit(cache=True, nogil=True, fastmath=_FINITE)
+def _add_two(
+    one: float, node: int, other: float, beyond: int, table: FloatArray, which: int, found: FloatArray, to: int
+) -> None:
+    """Add an envelope at two radii, times factors, to a row."""
+    for part in range(LANES):
+        found[to, part] += one * table[which, node, part] + other * table[which, beyond, part]
+
+
+@njit(cache=True, nogil=True, fastmath=_FINITE)
+def _add_steepest(
+    near: int, far: int, near_beyond: int, far_beyond: int, table: FloatArray, found: FloatArray, to: int
+) -> None:
+    """Add the largest difference of a piece of one edge and that of the other one to a row."""
+    for part in range(LANES):
+        found[to, part] += max(
+            table[ABOVE, near, part] - table[BELOW, far_beyond, part],
+            table[ABOVE, near_beyond, part] - table[BELOW, far, part],
+        )
+
+
+@njit(cache=True, nogil=True, fastmath=_FINITE)
+def _scale(factor: float, found: FloatArray, to: int) -> None:
+    """Multiply a row."""
+    for part in range(LANES):
+        found[to, part] *= factor
+
+
+@njit(cache=True, nogil=True, fastmath=_FINITE)
+def of_blurred(
+    dx: float,
+    dy: float,
+    half: float,
+    h: float,
+    table: FloatArray,
+    per_px: float,
+    closely: bool,
+    room: FloatArray,
+    nodes: IndexArray,
+    seen: FloatArray,
+) -> None:
+    """Put what is known of a blurred light on a pixel over a cell into `seen`, ndarray[N_SEEN, LANES].
+
+    `closely`: by parts of its edges and of its area, one by one.
+    """
+    segments, squares = (SEGMENTS, SQUARES) if closely else (1, 1)
+    n, last = 4 * segments, table.shape[1] - 1.0
+    _radii_of_pixel(dx, dy, half, h, segments, squares, room)
+    for at in range(3 * n + 2 * squares**2):
+        nodes[at] = int(min(room[0, at] * per_px + 0.5, last))
+    for to in range(SUDDEN):
+        for part in range(LANES):
+            seen[to, part] = 0.0
+    for at in range(3 * n, 3 * n + 2 * squares**2, 2):  # the mean over a pixel is that of those over its squares
+        add_row(1 / squares**2, table, BELOW, nodes[at], seen, LOW)
+        add_row(1 / squares**2, table, ABOVE, nodes[at + 1], seen, HIGH)
+    scale = 1 / (segments * 2 * half)
+    for axis in range(2):
+        for segment in range(segments):
+            one = 2 * axis * segments + segment
+            other = one + segments
+            near, far, middle = nodes[one], nodes[2 * n + one], nodes[n + one]
+            near_beyond, far_beyond, beyond = nodes[other], nodes[2 * n + other], nodes[n + other]
+            _add_steepest(near, far, near_beyond, far_beyond, table, seen, SLOPES + axis)
+            _add_two(room[1, one], middle, room[1, other], beyond, table, STEEP, seen, BENDS + axis)
+            _add_two(1.0, middle, 1.0, beyond, table, BENT, seen, THIRDS + axis)
+        _scale(scale, seen, SLOPES + axis)
+        _scale(scale, seen, BENDS + axis)
+        _scale(scale, seen, THIRDS + axis)
 
 
 @njit(cache=True, nogil=True)
-def _of_sharp(dx: float, dy: float, h: float, light: Light, seen: LightInCell) -> None:
-    """`light_in_cell` of a sharp image."""
-    half, radius = light.half, light.radius
-    seen.values[0, 0] = covered_share(abs(dx) + h, abs(dy) + h, half, radius)
-    seen.values[1, 0] = covered_share(max(abs(dx) - h, 0.0), max(abs(dy) - h, 0.0), half, radius)
+def of_sharp(dx: float, dy: float, half: float, radius: float, h: float, seen: FloatArray) -> None:
+    """Put what is known of a sharp light on a pixel over a cell into the first lane of `seen`."""
+    seen[LOW, 0] = covered_share(abs(dx) + h, abs(dy) + h, half, radius)
+    seen[HIGH, 0] = covered_share(max(abs(dx) - h, 0.0), max(abs(dy) - h, 0.0), half, radius)
     for axis in range(2):
         along, across = (dx, dy) if axis == 0 else (dy, dx)
-        seen.slopes[axis, 0], seen.sudden[axis, 0] = slope_of_disc(along, across, half, radius, h)
+        seen[SLOPES + axis, 0], seen[SUDDEN + axis, 0] = slope_of_disc(along, across, half, radius, h)
         bend, jump, third = bends_of_disc(along, across, half, radius, h)
-        seen.bends[axis, 0], seen.jumps[axis, 0], seen.thirds[axis, 0] = bend, jump, third
-
-
-@njit(cache=True, nogil=True)
-def light_in_cell(dx: float, dy: float, h: float, light: Light, seen: LightInCell) -> None:
-    """Put what is known of a pixel's light over a cell into `seen`."""
-    half, images = light.half, light.images
-    if not images.steep.shape[0]:
-        _of_sharp(dx, dy, h, light, seen)
-        return
-    _between_values(dx, dy, half, h, images, seen.values)
-    seen.bends[:] = 0.0
-    seen.jumps[:] = 0.0
-    seen.thirds[:] = 0.0
-    for axis in range(2):
-        along, across = (dx, dy) if axis == 0 else (dy, dx)
-        _slope_between_edges(along, across, half, h, images, seen.slopes[axis])
-        for side in (-half, half):
-            _bends_of_edge(along + side, across, half, h, images, seen.bends[axis], seen.thirds[axis])
-        for part in range(seen.bends.shape[1]):
-            seen.sudden[axis, part] = 2 * h * seen.bends[axis, part]
+        seen[BENDS + axis, 0], seen[JUMPS + axis, 0], seen[THIRDS + axis, 0] = bend, jump, third

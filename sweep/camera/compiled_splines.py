@@ -61,3 +61,29 @@ def sums_of_cubic(
             for value in range(out.shape[1]):
                 out[row, value] += share * coefficients[node, value]
             folded[node] = 0.0
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def solve_banded(band: FloatArray, values: FloatArray) -> None:
+    """Solve a system of equations whose matrix has a band and needs no exchange of rows; both are overwritten.
+
+    `band`: ndarray[n, 2 w + 1], the diagonal in the middle; `values`: ndarray[n, n_functions], then the solution.
+    """
+    n, w = len(band), band.shape[1] // 2
+    for row in range(n):
+        for below in range(1, min(w, n - 1 - row) + 1):
+            share = band[row + below, w - below] / band[row, w]
+            if share != 0:
+                for at in range(1, w + 1):
+                    band[row + below, w - below + at] -= share * band[row, w + at]
+                for k in range(values.shape[1]):
+                    values[row + below, k] -= share * values[row, k]
+    for row in range(n - 1, -1, -1):
+        for beyond in range(1, min(w, n - 1 - row) + 1):
+            share = band[row, w + beyond]
+            if share != 0:
+                for k in range(values.shape[1]):
+                    values[row, k] -= share * values[row + beyond, k]
+        scale = 1 / band[row, w]
+        for k in range(values.shape[1]):
+            values[row, k] *= scale

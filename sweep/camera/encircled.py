@@ -13,7 +13,9 @@ import numpy as np
 
 from ..base.cache import Cache
 from ..base.types import FloatArray
+from .bessel import sums_of_j1_over_x
 from .effects.blur import Profile
+from .splines import spline_through
 
 _RESIDUAL = 1e-10
 """No value of the image is further from its expansion, relative to that of a uniform field."""
@@ -45,12 +47,9 @@ class Encircled:
         """Of a uniform spline of the fifth order, from the second node before a radius of nothing on; the nodes are
         those of the profile. ndarray[n_nodes, n_functions].
         """
-        from scipy.special import j1  # noqa: PLC0415  (slow to import)
-
         r_um, (nu, spectrum) = self._profile.r_um, self._profile.spectrum
-        phase = 2 * np.pi * np.outer(np.arange(r_um.size + BEYOND) * r_um[1], nu)
-        kernel = np.divide(j1(phase), phase, out=np.full_like(phase, 0.5), where=phase > 0)
-        return uniform_spline(kernel @ (spectrum @ self.shares.T))
+        radii = np.arange(r_um.size + BEYOND) * r_um[1]
+        return uniform_spline(sums_of_j1_over_x(radii, nu, spectrum @ self.shares.T))
 
 
 def uniform_spline(values: FloatArray) -> FloatArray:
@@ -58,11 +57,9 @@ def uniform_spline(values: FloatArray) -> FloatArray:
 
     `values`: ndarray[n_nodes, n_functions], of even functions at equidistant nodes from 0 on.
     """
-    from scipy.interpolate import make_interp_spline  # noqa: PLC0415  (slow to import)
-
     mirrored = np.concatenate([values[_MIRRORED:0:-1], values])
-    spline = make_interp_spline(np.arange(-_MIRRORED, len(values)), mirrored, k=5, axis=0)
-    return np.ascontiguousarray(spline.c[_MIRRORED - 2 : -2])
+    _, found = spline_through(np.arange(-_MIRRORED, len(values), dtype=float), mirrored, 5)
+    return np.ascontiguousarray(found[_MIRRORED - 2 : -2])
 
 
 ENCIRCLED: Cache[Profile, Encircled] = Cache(8)

@@ -14,6 +14,7 @@ import numpy as np
 from ..base.cache import Cache
 from ..base.types import FloatArray
 from . import legendre
+from .compiled_light import Table
 from .compiled_pixels import Rings, means_on_rays
 from .effects.blur import Profile
 from .encircled import BEYOND, encircled, uniform_spline
@@ -24,6 +25,8 @@ _EDGE_LESS = 2
 """An integral along an edge needs so many nodes less than one over a pixel, along each axis."""
 _LANES = 4
 """Functions are filled up to a multiple of so many."""
+_FEW_RADII = 8
+"""So much further apart than the nodes of a spline, radii still tell which harmonics an image has."""
 _FINE = 32
 """Nodes per pixel from which on those of a ring are told by every fourth."""
 
@@ -39,17 +42,32 @@ def _rings(profile: Profile, half_px: float, pitch_um: float) -> Rings:
     radii = np.arange(profile.r_um.size + BEYOND // 2 - math.ceil(2**0.5 * half_px * per_px)) / per_px
     finest = 2 * math.pi * 2**0.5 * half_px * profile.highest_per_um * pitch_um
     most = math.ceil((finest + 4 * finest ** (1 / 3) + 16) / 4)  # J_n(x) falls fast from n = x on
-    angles = np.arange(most + 1) * (math.pi / 4 / most)
-    values = np.empty((radii.size, angles.size, light.coefficients.shape[1]))
-    table, rule = (light.coefficients, per_px), edge_rule(profile, half_px * pitch_um)
-    means_on_rays(radii, angles, half_px, table, rule, values)
+    sizes = half_px, (light.coefficients, per_px), edge_rule(profile, half_px * pitch_um)
+    # Images have next to nothing of their finest detail, so that a few radii tell how much fewer harmonics there are.
+    needed = _n_above(_harmonics(radii[::_FEW_RADII], most, *sizes), _RESIDUAL / 4)
+    harmonics = _harmonics(radii, min(needed + 1, most), *sizes)
+    n = _n_above(harmonics, _RESIDUAL)
+    return _compressed(harmonics[:, :n], per_px)
+
+
+def _harmonics(
+    radii: FloatArray, most: int, half_px: float, table: Table, rule: tuple[FloatArray, FloatArray]
+) -> FloatArray:
+    """The first `most` + 1 harmonics a_k of the mean over a pixel, ndarray[n_radii, most + 1, n_functions]; there are
+    no more than twice as many.
+    """
     k = np.arange(most + 1)
+    values = np.empty((radii.size, k.size, table[0].shape[1]))
+    means_on_rays(radii, np.asarray(k * (math.pi / 4 / most), dtype=float), half_px, table, rule, values)
     cosines = np.cos(math.pi / most * np.outer(k, k)) * (2 / most)
     cosines[:, [0, -1]] /= 2
     cosines[[0, -1]] /= 2
-    harmonics = np.einsum("kj,rjf->rkf", cosines, values)
-    n = 1 + int(np.flatnonzero(np.abs(harmonics).max(axis=(0, 2)) > _RESIDUAL)[-1])
-    return _compressed(harmonics[:, :n], per_px)
+    return np.asarray(np.matmul(cosines, values))
+
+
+def _n_above(harmonics: FloatArray, residual: float) -> int:
+    """How many harmonics there are up to the last that is larger."""
+    return 1 + int(np.flatnonzero(np.abs(harmonics).max(axis=(0, 2)) > residual)[-1])
 
 
 def _compressed(harmonics: FloatArray, per_px: float) -> Rings:
@@ -59,18 +77,21 @@ def _compressed(harmonics: FloatArray, per_px: float) -> Rings:
     starts = (np.arange(n_rings) * per_px).astype(int)
     ends = np.append(starts[1:] + 2, n_radii - 6 + 2)
     every = uniform_spline(harmonics.reshape(n_radii, -1)).reshape(-1, n_harmonics, n_functions)
-    parts, step = [], 4 if per_px >= _FINE else 1
+    step, n_before, n_coefficients = 4 if per_px >= _FINE else 1, 0, 0
+    coefficients, shares, sizes = [], [], []
     for start, end in zip(starts, ends, strict=True):
         own = every[start : end + 6]
-        _, sizes, basis = np.linalg.svd(own[::step].reshape(-1, n_functions), full_matrices=False)
-        basis = basis[: max(1, int((sizes > _RESIDUAL).sum()))]
-        parts.append((own @ basis.T, basis))
-    n = -(-max(len(basis) for _, basis in parts) // _LANES) * _LANES
-    coefficients = np.zeros((n_rings, max(len(own) for own, _ in parts), n_harmonics, n))
-    shares = np.zeros((n_rings, n, n_functions))
-    for at, (own, basis) in enumerate(parts):
-        coefficients[at, : len(own), :, : len(basis)], shares[at, : len(basis)] = own, basis
-    return Rings(coefficients, shares, starts, per_px)
+        _, strengths, basis = np.linalg.svd(own[::step].reshape(-1, n_functions), full_matrices=False)
+        kept = basis[: max(1, int((strengths > _RESIDUAL).sum()))]
+        basis = np.zeros((-(-len(kept) // _LANES) * _LANES, n_functions))
+        basis[: len(kept)] = kept
+        by_function = own @ basis.T
+        few = _n_above(by_function, _RESIDUAL)
+        coefficients.append(by_function[:, :few].ravel())
+        shares.append(basis)
+        sizes.append((n_coefficients, start, few, len(basis), n_before))
+        n_before, n_coefficients = n_before + len(basis), n_coefficients + coefficients[-1].size
+    return Rings(np.concatenate(coefficients), np.array(sizes), np.concatenate(shares), per_px)
 
 
 RINGS: Cache[tuple[Profile, float], Rings] = Cache(8)

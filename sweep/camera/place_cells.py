@@ -51,7 +51,8 @@ class _Kept:
         if new:
             made, size = make(np.array(list(new.values()))), len(self._at)
             if not self.rows or size + len(new) > len(self.rows[0]):
-                more = (np.empty((size + 2 * len(new), *rows.shape[1:]), dtype=rows.dtype) for rows in made)
+                room = 2 * (size + len(new))
+                more = (np.empty((room, *rows.shape[1:]), dtype=rows.dtype) for rows in made)
                 rows = self.rows or made
                 self.rows = tuple(_filled(larger, old[:size]) for larger, old in zip(more, rows, strict=True))
             for kept, own in zip(self.rows, made, strict=True):
@@ -81,11 +82,13 @@ class CellKernels(NamedTuple):
 class ClassCells:
     """Kernels of classes of pixels, at places and in cells of places: what the CFAs of a scene share."""
 
-    def __init__(self, view: View, knots_nm: FloatArray) -> None:
-        """`view`: of a mosaic whose channels are the classes; `knots_nm`: wavelengths at which the light is made."""
+    def __init__(self, view: View, knots_nm: FloatArray, *, folded: bool) -> None:
+        """`view`: of a mosaic whose channels are the classes; `knots_nm`: wavelengths at which the light is made;
+        `folded`: whether `Classes` tells the pixels of the tile apart.
+        """
         self._view = view
         self.between = Between(view, view.methods, knots_nm)
-        self._light = PlaceKernels(view, view.methods, knots_nm, many=True)
+        self._light = PlaceKernels(view, view.methods, knots_nm, many=True, folded=folded)
         self._places, self._cells = _Kept(), _Kept()
         self._one_at_a_time = threading.RLock()
 
@@ -112,8 +115,7 @@ class ClassCells:
         def made(new: IndexArray) -> _Rows:
             work["cells"] += len(new)
             some = phase.Cells(images[new], cells.homes[new], cells.half)
-            low, high = self._ranges(some, classes, work)
-            return tuple(self.between.bounds(some.centers, some.half, some.homes, low, high))
+            return tuple(self.between.bounds(some.centers, some.half, some.homes, *self._at_nodes(some, classes, work)))
 
         with self._one_at_a_time:
             self._forget_many()
@@ -136,17 +138,20 @@ class ClassCells:
 
         return self._places.which(names_of(self._view, images, cases.home_px), made), which
 
-    def _ranges(self, cells: phase.Cells, classes: Classes, work: Counter[str]) -> tuple[FloatArray, FloatArray]:
-        """Range of each part of the kernel over the nodes of cells, ndarray[n_cells, n_classes, n_classes, n_parts]
-        both.
+    def _at_nodes(
+        self, cells: phase.Cells, classes: Classes, work: Counter[str]
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The sum of the weights of each class at the nodes of cells, ndarray[n_cells, 9, n_classes], and the range of
+        each part of the kernel over these, ndarray[n_cells, n_classes, n_classes, n_parts] both.
         """
         rows, which = self._rows(cells.nodes, classes, work)
+        n = len(cells.centers)
         to, through = which[:, :, None], which[:, None, :]
         ends = []
         for values, end in zip(self._places.rows[2:], (np.min, np.max), strict=True):
             own = values[rows[:, None, None], to, through]
-            ends.append(end(own.reshape(len(cells.centers), -1, *own.shape[1:]), axis=1))
-        return ends[0], ends[1]
+            ends.append(end(own.reshape(n, -1, *own.shape[1:]), axis=1))
+        return self._places.rows[1][rows[:, None], which].reshape(n, -1, which.shape[1]), ends[0], ends[1]
 
 
 class KeptCells:
@@ -237,6 +242,8 @@ def kept_cells(view: View) -> KeptCells:
 
     def made() -> KeptCells:
         apart, classes = classes_of(bare)
-        return KeptCells(_SHARED.get(named(apart), lambda: ClassCells(apart, _knots_nm(apart))), bare, classes)
+        folded = classes.tile is not None
+        shared = _SHARED.get(named(apart), lambda: ClassCells(apart, _knots_nm(apart), folded=folded))
+        return KeptCells(shared, bare, classes)
 
     return _SCENES.get(named(bare), made)

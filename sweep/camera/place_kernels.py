@@ -7,6 +7,7 @@ than a value per wavelength is computed.
 from __future__ import annotations
 
 from collections import Counter
+from functools import cached_property
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from . import compiled_light, legendre
 from .compiled_pixels import kernels_by_ring
 from .effects import crosstalk, demosaic, phase, sampling
 from .encircled import encircled
+from .inner_light import InnerLight, taken_by_channels
 from .kernel import profile_of
 from .kernel_size import pixels_per_place
 from .methods import Methods
@@ -23,14 +25,20 @@ from .view import View
 
 _AT_ONCE = 1_000_000
 """Pixels that are held at once."""
+_FEW_PER_PIXEL = 32
+"""Places that are no multiples of so many parts of a pixel are those of small cells, of which there are many."""
 _SHARP: compiled_light.Table = (np.empty((0, 0)), 0.0)
 
 
 class PlaceKernels:
     """Kernels at places, for one way to compute a scene's light at some wavelengths."""
 
-    def __init__(self, view: View, methods: Methods, knots_nm: FloatArray, *, many: bool = False) -> None:
-        """`many`: so many places are asked for that a table of the light of all pixels pays (`pixel_light`)."""
+    def __init__(
+        self, view: View, methods: Methods, knots_nm: FloatArray, *, many: bool = False, folded: bool = False
+    ) -> None:
+        """`many`: so many places are asked for that a table of the light of all pixels pays (`pixel_light`). `folded`:
+        all between the center of a pixel and its corner, and every pixel of the tile is a channel of its own.
+        """
         target, pixel = view.scenario.target, view.pixel
         assert target is not None
         self._view, self._methods, self._target = view, methods, target
@@ -46,19 +54,36 @@ class PlaceKernels:
             self.shares = light.shares
             self._rule = edge_rule(profile, self._half * pixel.pitch_um)
             self._rings = rings(profile, self._half, pixel.pitch_um) if many else None
+            self._finest_per_px = profile.highest_per_um * pixel.pitch_um
+        self._has_inner = folded and self._rings is not None and InnerLight.pays(self._half, self._radii[1])
 
     def at(self, cases: phase.Cases, work: Counter[str]) -> tuple[FloatArray, FloatArray]:
         """What each channel gets through each channel's filter of each function of the light, ndarray[n_cases,
         n_channels, n_channels, n_functions]; times `shares`, ndarray[n_functions, n_knots], at each wavelength. And
         the sum of weights of each channel's pixels, ndarray[n_cases, n_channels].
         """
-        step = max(1, _AT_ONCE // pixels_per_place(self._view))
-        starts = range(0, len(cases.places_px), step)
-        blocks = [self._of_block(cases.some(slice(at, at + step)), work) for at in starts]
-        kernels, sums = zip(*blocks, strict=True)
-        return np.concatenate(kernels), np.concatenate(sums)
+        n, step = len(self._view.mosaic.channels), max(1, _AT_ONCE // pixels_per_place(self._view))
+        found, sums = np.empty((len(cases.places_px), n, n, len(self.shares))), np.empty((len(cases.places_px), n))
+        # The same way for a place in whatever company it is asked for.
+        scaled = cases.places_px * _FEW_PER_PIXEL
+        are_many = (scaled != np.floor(scaled)).any(axis=1) & self._has_inner
+        for some, inner in ((np.flatnonzero(~are_many), None), (np.flatnonzero(are_many), self._inner)):
+            for start in range(0, some.size, step):
+                block = some[start : start + step]
+                found[block], sums[block] = self._of_block(cases.some(block), inner, work)
+        return found, sums
 
-    def _of_block(self, cases: phase.Cases, work: Counter[str]) -> tuple[FloatArray, FloatArray]:
+    @cached_property
+    def _inner(self) -> InnerLight | None:
+        """The light of inner pixels, of a large light."""
+        if not self._has_inner:
+            return None
+        assert self._rings is not None
+        return InnerLight(self._rings, self._finest_per_px, self._half, self._radii[1], self._view.mosaic)
+
+    def _of_block(
+        self, cases: phase.Cases, inner: InnerLight | None, work: Counter[str]
+    ) -> tuple[FloatArray, FloatArray]:
         mosaic = self._view.mosaic
         seen = sampling.window(mosaic, cases.places_px, sampling.reach_px(self._view, self._target))
         x, y = seen.columns, seen.rows
@@ -68,13 +93,18 @@ class PlaceKernels:
             weights = demosaic.center_weights(seen, cases.home_px - cases.places_px, self._methods.demosaic, mosaic)
         n = len(mosaic.channels)
         found, sums = np.empty((len(x), n, n, len(self.shares))), np.empty((len(x), n))
+        work["sampling"] += weights.size * len(self.shares)
         if self._rings is None:
             sizes = (self._half, self._radii[0], self._share)
             compiled_light.kernels(x, y, weights, seen.channel, *sizes, self._table, self._rule, found, sums)
-        else:
-            by_ring = np.zeros((*found.shape[:3], *self._rings.shares.shape[:2]))
-            kernels_by_ring(x, y, weights, seen.channel, self._share, self._rings, by_ring, sums)
-            flat = self._rings.shares.reshape(-1, found.shape[3])
-            found = (by_ring.reshape(-1, len(flat)) @ flat).reshape(found.shape) / sums[:, :, None, None]
-        work["sampling"] += weights.size * len(self.shares)
-        return found, sums
+            return found, sums
+        ring, left_out = 0, np.zeros(seen.channel.shape, dtype=bool)
+        if inner is not None:
+            ring, left_out = min(int(inner.nearest_px), len(self._rings.sizes) - 1), inner.among(seen, cases.places_px)
+        shares = self._rings.shares[self._rings.sizes[ring, 4] :]
+        by_ring = np.zeros((*found.shape[:3], len(shares)))
+        kernels_by_ring(x, y, weights, seen.channel, left_out, self._share, self._rings, ring, by_ring, sums)
+        np.matmul(by_ring, shares, out=found)
+        if inner is not None:
+            found += taken_by_channels(mosaic, self._share)[:, :, None] * inner.at(cases.places_px)[:, None]
+        return found / sums[:, :, None, None], sums

@@ -16,6 +16,7 @@ import numpy as np
 from ..base.types import FloatArray, IndexArray
 from ..curves.lights import Pair, class_pairs
 from .compiled_distances import CellDistances, distances
+from .compiled_search import ends_of, still_open
 from .effects import phase
 from .place_cells import CellKernels, kept_cells
 from .registry import factor_of_light
@@ -86,14 +87,16 @@ class AnyPlace:
         union, cells = _together([search.cells for search in searches])
         each = len(phase.NODES) * light.shape[1] * len(self._mosaic.channels)
         step = max(1, _AT_ONCE // max(each, *(16 * search.pairs.size for search in searches)))
+        # Of the signals, those of pairs that may still be the nearest.
+        signals = np.unique(np.concatenate([signals for search in searches for signals in search.of_pairs]))
         for at in range(0, len(union.centers), step):
             known = self._cells.of_cells(union.some(slice(at, at + step)), self._work)
-            kernels = known.kernels.reshape(*known.kernels.shape[:2], -1)
-            seen = np.ascontiguousarray(kernels @ light.T)
+            kernels = known.kernels.reshape(-1, light.shape[1])
+            seen = (kernels @ light[signals].T).reshape(*known.kernels.shape[:2], signals.size)
             for search, own in zip(searches, cells, strict=True):
                 some = np.flatnonzero((own >= at) & (own < at + step))
                 if some.size:
-                    search.take(some, own[some] - at, seen, known)
+                    search.take(some, own[some] - at, seen, signals, known)
 
 
 def _together(every: Sequence[phase.Cells]) -> tuple[phase.Cells, list[IndexArray]]:
@@ -107,8 +110,8 @@ def _together(every: Sequence[phase.Cells]) -> tuple[phase.Cells, list[IndexArra
 class _Search:
     """The extremes of one pair of types, for one design.
 
-    `cells`: those to look at next; `pairs`: which pairs of signals may still be the nearest in them; `found`: the
-    extremes, once they are known.
+    `cells`: those to look at next; `pairs`: which pairs of signals may still be the nearest in them, `of_pairs`: the
+    signals of these; `found`: the extremes, once they are known.
     """
 
     def __init__(
@@ -129,19 +132,23 @@ class _Search:
     def _begin(self, cells: phase.Cells, pairs: IndexArray) -> None:
         """Look at some cells and pairs next."""
         self.cells, self.pairs = cells, pairs
+        self.of_pairs = self._one[pairs], self._other[pairs]
         n = len(cells.centers)
         self._known = CellDistances(np.empty((n, pairs.size)), np.empty(n), np.empty((n, len(phase.NODES))))
 
-    def take(self, some: IndexArray, which: IndexArray, seen: FloatArray, known: CellKernels) -> None:
+    def take(
+        self, some: IndexArray, which: IndexArray, seen: FloatArray, signals: IndexArray, known: CellKernels
+    ) -> None:
         """Bound the distances in some of the cells, which are those of `known`.
 
-        `seen`: what the channels see of each signal at its places, DN, ndarray[n_places, n_channels, n_signals]. The
-        difference of two signals' responses is within `rest`, and what its own slopes add, of the biquadratic function
-        through those at the nodes, in each channel.
+        `seen`: what the channels see of some signals at its places, DN, ndarray[n_places, n_channels, n_signals];
+        `signals`: which these are. The difference of two signals' responses is within `rest`, and what its own slopes
+        add, of the biquadratic function through those at the nodes, in each channel.
         """
-        rest = known.deviation.kernel[which]
-        rest = rest.reshape(*rest.shape[:2], -1) @ self._amounts[self.pairs].T
-        pairs = self._one[self.pairs], self._other[self.pairs]
+        kernel = known.deviation.kernel
+        rest = kernel[which].reshape(-1, self._amounts.shape[1]) @ self._amounts[self.pairs].T
+        rest = rest.reshape(some.size, -1, self.pairs.size)
+        pairs = np.searchsorted(signals, self.of_pairs[0]), np.searchsorted(signals, self.of_pairs[1])
         found = CellDistances(*(np.empty((len(some), *values.shape[1:])) for values in self._known))
         ends = self._least[0] - self._within_dn, self._most[0] + self._within_dn
         moves, half = known.deviation.moves[which], self.cells.half
@@ -153,18 +160,16 @@ class _Search:
         """Whether cells are left to look at, once those before are bounded: not when all is found, or too much."""
         cells, (low, nearest, values) = self.cells, self._known
         self._counted += len(cells.centers)
-        for at, (found, sign) in enumerate(((self._least, 1.0), (self._most, -1.0))):
-            cell, node = np.unravel_index((sign * values).argmin(), values.shape)
+        for at, sign, found in zip(ends_of(values), (1.0, -1.0), (self._least, self._most), strict=True):
+            cell, node = divmod(at, len(phase.NODES))
             if sign * values[cell, node] < sign * found[0]:
                 place = cells.centers[cell] + cells.half * phase.NODES[node]
                 better = (float(values[cell, node]), np.stack([place, cells.homes[cell]]))
-                self._least, self._most = (better, self._most) if at == 0 else (self._least, better)
+                self._least, self._most = (better, self._most) if sign > 0 else (self._least, better)
         least, most = self._least, self._most
-        undecided = low.min(axis=1) < least[0] - self._within_dn
-        undecided |= nearest > most[0] + self._within_dn
+        undecided, pairs = still_open(low, nearest, least[0] - self._within_dn, most[0] + self._within_dn)
         if not undecided.any():
             self.found = Extremes(least[0], most[0], least[1], most[1])
             return False
-        pairs = self.pairs[(low[undecided] <= nearest[undecided, None]).any(axis=0)]
-        self._begin(cells.divided(undecided), pairs)
+        self._begin(cells.divided(undecided), self.pairs[pairs])
         return self._counted < _MOST_CELLS

@@ -214,11 +214,13 @@ def test_kernels_by_the_edges_of_pixels_are_those_by_their_areas(blurred: str) -
         np.testing.assert_allclose(quick.at(moved, Counter())[0] @ quick.shares, found, rtol=0, atol=1e-10)
 
 
-def bounded(between: Between, cells: phase.Cells, values: np.ndarray) -> Deviation:
-    """Of a CFA's own channels. `values`: of its kernel at the nodes, ndarray[n_cells, 9, ...]."""
+def bounded(between: Between, cells: phase.Cells, sums: np.ndarray, values: np.ndarray) -> Deviation:
+    """Of a CFA's own channels. `sums`: of their weights at the nodes, ndarray[n_cells, 9, n_channels]; `values`: of its
+    kernel there, ndarray[n_cells, 9, ...].
+    """
     low, high = between.ranges(values.reshape(-1, *values.shape[2:]))
     low, high = (ends.reshape(*values.shape[:2], *ends.shape[1:]) for ends in (low, high))
-    known = between.bounds(cells.centers, cells.half, cells.homes, low.min(axis=1), high.max(axis=1))
+    known = between.bounds(cells.centers, cells.half, cells.homes, sums, low.min(axis=1), high.max(axis=1))
     n_cells, every = len(values), np.arange(values.shape[2])
     return of_channels(known, between.uneven, np.arange(n_cells), np.tile(every, (n_cells, 1)), every)
 
@@ -236,10 +238,11 @@ def test_what_cfas_share_gives_the_kernels_of_each(name: str) -> None:
     centers = np.random.default_rng(2).integers(0, 32, (40, 2)) / 32 * [columns, rows] + 1 / 64
     cells = phase.Cells(centers, np.floor(centers + 0.5), 1 / 64)
     found = kept.of_cells(cells, Counter())
-    own = direct.at(cells.nodes, Counter())[0] @ direct.shares
+    own, sums = direct.at(cells.nodes, Counter())
+    own = own @ direct.shares
     at_nodes = (found.kernels @ kept.functions)[found.nodes].reshape(own.shape)
     np.testing.assert_allclose(at_nodes, own, rtol=0, atol=1e-9)
-    bound = bounded(between, cells, own.reshape(40, 9, *own.shape[1:]))
+    bound = bounded(between, cells, sums.reshape(40, 9, -1), own.reshape(40, 9, *own.shape[1:]))
     np.testing.assert_allclose(found.deviation.moves, bound.moves, rtol=1e-9)
     some = bound.kernel > 0
     assert (found.deviation.kernel[~some] == 0).all()
@@ -311,7 +314,7 @@ def test_what_lies_between_the_nodes_is_within_its_bound() -> None:
         view, nodes = made.view, np.linspace(400, 700, 7)
         for blurred in ("every wavelength", "skip"):
             methods = replace(REFERENCE, blur=blurred, noise="skip", quantization="skip", saturation="skip")
-            between = Between(view, methods, nodes)
+            between, direct = Between(view, methods, nodes), PlaceKernels(view, methods, nodes)
             kernel = partial(kernel_at, view, methods, nodes)
             cells = phase.whole(view.mosaic)
             ratios = []
@@ -320,7 +323,7 @@ def test_what_lies_between_the_nodes_is_within_its_bound() -> None:
                 inside = rng.uniform(-1, 1, (6, 2)) * (1 / 4 - half)
                 few = phase.Cells(cells.centers[some] + inside, cells.homes[some], half)
                 values = kernel(few.nodes).reshape(6, 9, *kernel(few.nodes).shape[1:])
-                bound = bounded(between, few, values)
+                bound = bounded(between, few, direct.at(few.nodes, Counter())[1].reshape(6, 9, -1), values)
                 most = bound.kernel[..., :1] + bound.kernel[..., 1:].max(axis=3, initial=0.0, keepdims=True)
                 most = most + np.einsum("nus,snuc->nuc", bound.moves, sizes_of(values, half))[..., None]
                 for _ in range(4):

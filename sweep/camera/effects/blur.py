@@ -18,9 +18,11 @@ import numpy as np
 from ...base.cache import Cache
 from ...base.types import FloatArray
 from .. import legendre
+from ..bessel import sums_of_j0
 from ..pixel import Pixel
 from ..scene import Scene
 from ..shot import Shot
+from ..splines import spline_through
 from .base import Change, Chosen, Designs, KernelChange, KernelEffect, Load, Part, Stage
 
 COARSE = "every 10 nm"
@@ -116,16 +118,16 @@ class Profile:
     def __init__(
         self, radius_um: float, reach_um: float, wavelength_um: FloatArray, f_number: float, w20_um: float
     ) -> None:
-        from scipy.interpolate import make_interp_spline  # noqa: PLC0415  (slow to import: kept off the start-up path)
-        from scipy.special import j0, j1  # noqa: PLC0415  (slow to import: kept off the start-up path)
+        from scipy.interpolate import BSpline  # noqa: PLC0415  (slow to import: kept off the start-up path)
+        from scipy.special import j1  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
         nu, weight = _frequencies(radius_um + reach_um, wavelength_um, f_number)
         step = 1 / (_SPLINE_PER_CYCLE * nu[-1])
         r = np.linspace(0.0, reach_um + step, max(8, 2 + int(reach_um / step)))
         disc = (2 * math.pi * radius_um * j1(2 * math.pi * radius_um * nu) * weight)[:, None]
         self.spectrum = nu, disc * transfer(nu, wavelength_um, f_number, w20_um)
-        table = j0(2 * math.pi * np.outer(r, nu)) @ self.spectrum[1]
-        self._spline = make_interp_spline(r, table, k=3, axis=0)
+        table = sums_of_j0(r, *self.spectrum)
+        self._spline = BSpline(*spline_through(r, table, 3), 3)
         self.r_um, self.values = r, table
         self.highest_per_um = float(nu[-1])
         self.n_wavelengths = wavelength_um.size
@@ -198,16 +200,20 @@ def interpolation_bound(
     In focus |d2h/dlambda2| step^2 / 8, else |dh/dlambda| step / 2 (a derivative of the OTF by lambda at given nu is
     never larger with defocus than without). Both derivatives are bounded by the integral of the absolute integrand,
     with an envelope of |J1|; for s = lambda N nu fixed that falls with lambda, so each interval's shorter end counts,
-    but
-    for the pixel aperture, whose transfer falls with nu, where the longer end does.
+    but for the pixel aperture, whose transfer falls with nu, where the longer end does. In focus the bound falls from
+    one interval to the next: its factors change by lambda^-3, by lambda^(1/2) at most (the envelope), and by lambda^2
+    at most (the aperture); so of intervals that are no longer than one before, none counts.
     """
     u, weight = legendre.rule(200)
     u, weight = (u + 1) * math.pi / 4, weight * math.pi / 4
     s = np.sin(u)
     theta = (np.arange(32) + 0.5) / 64 * (math.pi / 2)  # what is beyond 45 degrees is a mirror image
     axes = np.cos(theta), np.sin(theta)
-    worst = 0.0
+    worst = longest = 0.0
     for short, long in pairwise(knots_um):
+        if w20_um == 0 and long - short <= longest * (1 + 1e-9):
+            continue
+        longest = long - short
         nu = s / (short * f_number)
         aperture = 1.0
         if aperture_um > 0:

@@ -51,6 +51,8 @@ class Amounts:
 
 _AT_ONCE = 4_000_000
 """Values of pairs' differences that are bounded at once."""
+_FEW_PAIRS = 64
+"""Pairs whose lights stay in the processor's cache."""
 
 
 @dataclass(frozen=True)
@@ -139,7 +141,7 @@ class Reach:
         """Largest response of each channel to any signal whose image is whole, DN, ndarray[n_channels]."""
         return np.asarray((self.signals_dn @ self._highest.T).max(axis=0), dtype=float)
 
-    @property
+    @cached_property
     def brightest_pixels_dn(self) -> FloatArray:
         """The same with background, dark current and the filters of the neighbors, DN, ndarray[n_channels]."""
         view = self.box.view
@@ -181,6 +183,13 @@ class Reach:
             most=apart @ most.T,
             most_each=np.abs(light) @ most.T,
         )
+
+    def most_apart(self, factor: FloatArray, low: FloatArray, high: FloatArray) -> float:
+        """The largest sum over the channels of `Amounts.most` of any pair, DN."""
+        light = self.signals_dn * factor * np.maximum(np.abs(low), np.abs(high)).sum(axis=0)
+        starts = range(0, len(self.first), _FEW_PAIRS)
+        pairs = ((self.first[at : at + _FEW_PAIRS], self.second[at : at + _FEW_PAIRS]) for at in starts)
+        return max((float(np.abs(light[one] - light[other]).sum(axis=1).max()) for one, other in pairs), default=0.0)
 
     def _on_hats(self, light: FloatArray, qe: FloatArray) -> FloatArray:
         """Sums of lights times QE on each hat, ndarray[n_lights, n_channels, n_knots]."""

@@ -75,7 +75,11 @@ class PlacesBetween:
         """The kernel of some methods."""
         if methods not in self._known:
             apart, classes = classes_of(replace(self._view, methods=methods))
-            shared, cells, work = ClassCells(apart, self._knots_nm), self.cells, Counter[str]()
+            shared, cells, work = (
+                ClassCells(apart, self._knots_nm, folded=classes.tile is not None),
+                self.cells,
+                Counter[str](),
+            )
             cases, which = self._nodes
             kernel = shared.at_places(cases, classes, work) @ shared.shares
             nodes = np.broadcast_to(kernel, (*kernel.shape[:3], self._knots_nm.size))[which]

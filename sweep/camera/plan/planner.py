@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import cached_property
 
-from ..effects.base import Effect, KernelEffect, ReadoutEffect, Stage
+from ..effects.base import Effect, LinearEffect, ReadoutEffect, Stage
 from ..effects.blur import Blur
 from ..effects.image_height import HEIGHTS, all_heights_count
 from ..field import over_field
@@ -19,7 +19,7 @@ from .filters import at_any_height
 from .plan import NOT_ASKED, Choice, Plan
 from .promises import Promises
 from .scene_kernels import SceneKernels
-from .work import LOOKING_SHARE, READOUT_S, in_all, noise_s
+from .work import LOOKING_SHARE, QUICK_S, READOUT_S, in_all, noise_s
 
 _NOTHING_DN = 1e-9
 _EVERYWHERE = "on wherever all places of the sensor count"
@@ -55,7 +55,8 @@ class Planner:
         if isinstance(EFFECTS[effect], ReadoutEffect) or EFFECTS[effect].is_limit:
             self._noise_s = self._first_noise_s
         for at, scene in enumerate(self._asked):
-            found = max(found, scene.promise(effect, before, after))
+            quick = scene.quick_promise(effect, before, after) if self._limited else None
+            found = max(found, scene.promise(effect, before, after) if quick is None else quick)
             if found > enough_dn:
                 self._asked.insert(0, self._asked.pop(at))  # it may well be too much for what comes next, too
                 break
@@ -77,8 +78,9 @@ class Planner:
             kept = self._cheapest(tolerance_dn, tried, besides=True)
         elif self._limited:  # no more may still be saved than this plan takes
             self._budget_s = min(self._budget_s, self.spent_s + LOOKING_SHARE * self._work(kept[0]))
-            self._without_kernels = False
-            kept = self._cheapest(tolerance_dn, tried, kept)
+            self._without_kernels = self.spent_s + self._kernels_s(kept[0]) > self._budget_s
+            if not self._without_kernels:
+                kept = self._cheapest(tolerance_dn, tried, kept)
         if kept is None:  # everything on changes nothing but what is left open: the budget was too small for any other
             assert self._limited
             kept = self._start, {e: self.promise(e, self._start, self._start) for e in _LIMITS}
@@ -110,24 +112,35 @@ class Planner:
         """Seconds that the first bound of a noisy readout takes, counted."""
         return max((noise_s(scene.view) for scene in self._scenes), default=0.0)
 
-    def _look_s(self, effect: Effect) -> float:
-        """Seconds that it takes to bound what a method of an effect changes, counted."""
+    def _look_s(self, effect: Effect, methods: Methods, after: Methods) -> float:
+        """Seconds that it takes to bound what another method of an effect changes, counted."""
         if isinstance(effect, ReadoutEffect):
             return READOUT_S * len(self._scenes) + self._first_noise_s - self._noise_s
-        return sum(scene.linear_s for scene in self._scenes)
+        if _needs_kernels(effect, getattr(after, effect.name)):
+            return self._kernels_s(methods, after)
+        return QUICK_S * len(self._scenes)
+
+    def _kernels_s(self, *methods: Methods) -> float:
+        """Seconds that it takes to compare kernels of some methods, those made before counting no more."""
+        kernels_s = sum(kernels.missing_s(*methods) for kernels in self._kernels.values())
+        return kernels_s + sum(scene.linear_s for scene in self._scenes)
 
     def _worth(self, effect: Effect, methods: Methods, after: Methods, rest: Sequence[str]) -> bool:
         """Whether a method may save more than it takes to look at it: beside the others at their cheapest, or all on.
 
         `rest`: the effects of which nothing is chosen yet.
         """
-        look_s = self._look_s(effect)
-        if self.spent_s + look_s > self._budget_s or (self._without_kernels and self._needs_kernels(effect, after)):
+        if self._without_kernels and _needs_kernels(effect, getattr(after, effect.name)):
+            return False
+        look_s = self._look_s(effect, methods, after)
+        if self.spent_s + look_s > self._budget_s:
             return False
         if isinstance(effect, ReadoutEffect) and self._anywhere:
             return True  # behind a straight readout the search for the worst place is much shorter, as no count tells
         saved = self._work(methods) - self._work(after)
-        return max(saved, self._work(_with_cheapest(methods, rest)) - self._work(_with_cheapest(after, rest))) > look_s
+        return (
+            max(saved, self._work(self._completed(methods, rest)) - self._work(self._completed(after, rest))) > look_s
+        )
 
     @cached_property
     def _anywhere(self) -> bool:
@@ -194,7 +207,7 @@ class Planner:
 
         def deeper(at: int, methods: Methods, promises: dict[str, float]) -> None:
             # Every further effect at its cheapest: no completion of these methods costs less.
-            least = self._work(_with_cheapest(methods, active[at:]))
+            least = self._work(self._completed(methods, active[at:]))
             if best and least >= best[0][0] - self._too_little_s:
                 return
             if at == len(active):
@@ -225,16 +238,19 @@ class Planner:
         deeper(0, start, {})
         return best[0][1:] if best else None
 
-    @staticmethod
-    def _needs_kernels(effect: Effect, methods: Methods) -> bool:
-        """Whether the bound of a method compares the light of pixels: those are looked at when all others have been."""
-        compared = isinstance(effect, KernelEffect) and effect.limit_dn(getattr(methods, effect.name)) is None
-        return compared and not (isinstance(effect, Blur) and methods.blur != effect.off)
+    def _completed(self, methods: Methods, rest: Sequence[str]) -> Methods:
+        """The methods with the cheapest one, of those that are looked at, of each effect of which none is chosen."""
+        for name in rest:
+            every = (
+                m for m in EFFECTS[name].methods if not (self._without_kernels and _needs_kernels(EFFECTS[name], m))
+            )
+            methods = switched(methods, name, next(every))
+        return methods
 
     @property
     def _too_little_s(self) -> float:
         """What no plan is looked for to save, s."""
-        return min(map(self._look_s, EFFECTS.values())) if self._limited else 0.0
+        return QUICK_S * len(self._scenes) if self._limited else 0.0
 
     @property
     def _noisy(self) -> bool:
@@ -267,11 +283,11 @@ class Planner:
         return f"else ({nearest}) a CSD may change by {cheaper[nearest]:.2g} DN or more"
 
 
-def _with_cheapest(methods: Methods, rest: Sequence[str]) -> Methods:
-    """The methods with the cheapest one of each effect of which nothing is chosen yet."""
-    for name in rest:
-        methods = switched(methods, name, EFFECTS[name].methods[0])
-    return methods
+def _needs_kernels(effect: Effect, method: str) -> bool:
+    """Whether the bound of a method compares the light of pixels: those are looked at when all others have been."""
+    if isinstance(effect, Blur):
+        return method == effect.off
+    return isinstance(effect, LinearEffect) and effect.limit_dn(method) is None and method != effect.reference
 
 
 def _promises(boxes: Sequence[Box], kernels: dict[tuple[tuple[int, ...], ...], SceneKernels]) -> list[Promises]:

@@ -34,7 +34,7 @@ from .bounds import Box, Reach
 from .pixelwise import Moves
 from .scene_kernels import SceneKernels
 from .steps import Step, Steps
-from .work import COMPARED_S, LINEAR_S, REACH_S, READOUT_S, Work, estimated_work
+from .work import COMPARED_S, LINEAR_S, QUICK_S, REACH_S, READOUT_S, Work, estimated_work
 
 _OF_READOUT = tuple(name for name, effect in EFFECTS.items() if effect.stage is Stage.READOUT)
 
@@ -64,6 +64,7 @@ class Promises:
         self._kernels = kernels
         self._steps = Steps(self.view, self.reach, self._kernels)
         self._promises: dict[tuple[str, Methods, Methods], float] = {}
+        self._quick: dict[tuple[str, Methods, Methods], float] = {}
         self._ranges: dict[tuple[str, ...], float] = {}
         self._readouts: dict[tuple[str, ...], float] = {}
         self._moves = Moves(self.view, self.reach)
@@ -89,6 +90,25 @@ class Promises:
             self.spent_s += self.linear_s
             self._promises[key] = self._linear_promise(effect, *key[1:])
         return self._promises[key]
+
+    def quick_promise(self, name: str, before: Methods, after: Methods) -> float | None:
+        """`promise` of wavelengths between which kernels are interpolated, without a kernel; None of any other change.
+
+        All pairs of signals count, and not only those that can be the smallest.
+        """
+        effect = EFFECTS[name]
+        if not isinstance(effect, KernelEffect) or getattr(before, name) == getattr(after, name):
+            return None
+        what = effect.change(self.view, getattr(before, name), getattr(after, name), self.reach, straight=True)
+        if not isinstance(what, KernelChange) or what.knots is None:
+            return None
+        key = (name, *_seen(name, before, after))
+        if key not in self._quick:
+            self.spent_s += QUICK_S
+            found = self._kernels.gap(after, what.knots) * self._steps.most(before)
+            bent = found > 0 and not after.straight and not self._kernels.anywhere(after)
+            self._quick[key] = found + 2 * self._as_read(after) * bent
+        return self._quick[key]
 
     def _readout_promise(self, effect: ReadoutEffect, after: Methods) -> float:
         """Ranges of the change in each channel, put together over the channels."""

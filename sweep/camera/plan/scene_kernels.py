@@ -94,6 +94,10 @@ class SceneKernels:
         found = self.of(methods)
         return found[:1, None], np.zeros(found.shape[1:3])
 
+    def missing_s(self, *methods: Methods) -> float:
+        """Seconds of the kernels that are not made yet, counted."""
+        return sum(self._seconds(wanted) for wanted in {self.wanted(one) for one in methods} - set(self._kernels))
+
     def _seconds(self, wanted: Methods) -> float:
         """Of a kernel, counted."""
         if self._view.scenario.target is None or wanted.sampling == "skip":

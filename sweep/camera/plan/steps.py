@@ -44,6 +44,7 @@ class Steps:
     def __init__(self, view: View, reach: Reach, kernels: SceneKernels) -> None:
         self._view, self._reach, self._kernels = view, reach, kernels
         self._amounts: dict[bytes, Amounts] = {}
+        self._most: dict[bytes, float] = {}
 
     def step(self, effect: LinearEffect, before: Methods, after: Methods, *, straight: bool) -> Step:
         """What switching an effect changes; `straight`: as seen by a straight readout."""
@@ -77,6 +78,15 @@ class Steps:
                 background = background_of_filters(reach, dimmed, what)
         left = np.broadcast_to(left, change.shape)
         return Step(what, changed, change, remainder, base, left, scale, background)
+
+    def most(self, methods: Methods) -> float:
+        """How much the distance of any pair changes at most, DN, for each unit by which kernels change everywhere."""
+        light = self._factors(methods)[0]
+        key = light.tobytes() + methods.angle.encode()
+        if key not in self._most:
+            most = self._reach.most_apart(light, *self._reach.seen(methods.angle))
+            self._most[key] = most * len(self._view.mosaic.channels) ** 0.5
+        return self._most[key]
 
     def _factors(self, methods: Methods) -> tuple[FloatArray, FloatArray]:
         """What is left of a signal's light and of the background at every wavelength, ndarray[n_wavelengths] each."""
