@@ -19,7 +19,7 @@ from . import kernel
 from .compiled_cells import Light, deviations, ranges
 from .compiled_classes import CellBounds, deviations_of_channels
 from .compiled_distances import amounts_of_pairs
-from .compiled_slopes import BENT, INNER, LANES, SEGMENTS, SHARP, STEEP, Envelopes
+from .compiled_slopes import BENT, BOUNDED, INNER, SEGMENTS, SHARP, STEEP, Envelopes
 from .effects import blur, crosstalk, demosaic, sampling
 from .methods import Methods
 from .view import View
@@ -27,7 +27,7 @@ from .view import View
 _BETWEEN_NODES = (math.pi / 12) ** 2 / 8
 """A function of one highest frequency, at 24 nodes per period of it, exceeds its nodes by at most this much of its
 largest value (Bernstein: its second derivative is at most the square of that frequency times this value)."""
-_BANDS = LANES - 1
+_BANDS = BOUNDED - 1
 """Bands of wavelengths in which the light is bounded apart."""
 
 
@@ -78,7 +78,7 @@ def _envelopes(profile: blur.Profile, pitch_um: float, parts: list[tuple[FloatAr
 
 def _with_lanes(values: FloatArray) -> FloatArray:
     """The parts, ndarray[..., n_parts], and more that are nothing, up to the number that compiled loops expect."""
-    found = np.zeros((*values.shape[:-1], LANES))
+    found = np.zeros((*values.shape[:-1], BOUNDED))
     found[..., : values.shape[-1]] = values
     return found
 

@@ -13,10 +13,10 @@ from .compiled_areas import BOTH_AXES, DARK, JUMP, N_CHANGES, RIM, SLOPE, THIRD,
 from .compiled_light import add
 from .compiled_slopes import (
     BENDS,
+    BOUNDED,
     HIGH,
     INNER,
     JUMPS,
-    LANES,
     LOW,
     N_SEEN,
     SLOPES,
@@ -132,11 +132,11 @@ def _add_rim(
     may be off to `found[u, to]`.
 
     `change`: ndarray[n_channels, N_CHANGES] (`CellWeights`); `ratios`: the lowest and the highest for a weight that
-    goes through one filter alone, ndarray[n_channels, n_channels, 2, LANES]; `apart`: ndarray[LANES], to work in. A
+    goes through one filter alone, ndarray[n_channels, n_channels, 2, BOUNDED]; `apart`: ndarray[BOUNDED], to work in. A
     product's derivatives are Leibniz's sums; where a third one has no bound, how much its slope changes has. A blurred
     image has no jumps, and its slope changes by at most twice the half width times its second derivative.
     """
-    for part in range(LANES):
+    for part in range(BOUNDED):
         apart[part] = max(seen[HIGH, part] - ratios[u, to, 0, part], ratios[u, to, 1, part] - seen[LOW, part])
     for axis in range(2):
         third, rough, even = change[u, 8 + axis], BOTH_AXES * SLOPE * h, BOTH_AXES * THIRD * h**3
@@ -146,14 +146,14 @@ def _add_rim(
             rough * 2 * h * weight,
         )
         if not third < math.inf:
-            for part in range(LANES):
+            for part in range(BOUNDED):
                 found[u, to, part] += (
                     of_value * apart[part] + of_slope * seen[SLOPES + axis, part] + of_bend * seen[BENDS + axis, part]
                 )
             continue
         smooth = even * third + BOTH_AXES * JUMP * h**2 * change[u, 6 + axis]
         by_slope, by_bend, by_third = 3 * even * change[u, 4 + axis], 3 * even * change[u, axis], even * weight
-        for part in range(LANES):
+        for part in range(BOUNDED):
             a, b, c = apart[part], seen[SLOPES + axis, part], seen[BENDS + axis, part]
             off = of_value * a + of_slope * b + of_bend * c
             other = smooth * a + by_slope * b + by_bend * c + by_third * seen[THIRDS + axis, part]
@@ -199,7 +199,7 @@ def _of_cell(
     n, blurred, last = len(ratios), table.shape[1] > 0, table.shape[1] - 1.0
     high, does_change, change = np.empty(n), np.empty(n, dtype=np.bool_), np.empty((n, N_CHANGES))
     room, nodes = room_for_radii()
-    seen, apart = np.zeros((N_SEEN, LANES)), np.empty(LANES)
+    seen, apart = np.zeros((N_SEEN, BOUNDED)), np.empty(BOUNDED)
     flat = found.reshape(n * n, -1)
     smooth = BOTH_AXES * THIRD * h**3 / half
     found[:] = 0.0
@@ -246,12 +246,12 @@ def deviations(
 
     `given`: the weights of pixels, where they are the same in a whole cell, ndarray[n_cells, n_rows, n_columns], else
     none: they are those of a mean over a disc of the radius `readout`. `nodes`: range of each part of the kernel there,
-    ndarray[n_cells, 2, n_channels, n_channels, LANES]. `found`: ndarray[n_cells, n_channels, n_channels, LANES];
+    ndarray[n_cells, 2, n_channels, n_channels, BOUNDED]. `found`: ndarray[n_cells, n_channels, n_channels, BOUNDED];
     `moves`: how far the sum of the weights, times a parabola, may be, ndarray[n_cells, n_channels, 3].
     """
     shape, n_channels = channel.shape, found.shape[1]
     own = CellWeights(np.empty(shape, dtype=np.int64), np.empty(shape), np.empty((*shape, N_CHANGES)))
-    ratios = np.empty((n_channels, n_channels, 2, LANES))
+    ratios = np.empty((n_channels, n_channels, 2, BOUNDED))
     for cell in range(len(x)):
         if len(given):
             moves[cell] = 0.0

@@ -12,7 +12,7 @@ from ..base.types import FloatArray, IndexArray
 from .compiled_patches import N_CONTROL, PARTS, to_parts
 
 _N_NODES = 9
-LANES = 16
+ABREAST = 16
 """Pairs that are bounded together: loops over them have so many rounds, which is known when they are compiled."""
 _SQUARES, _ALONG, _LENGTHS, _SUMS, _LEFT, _LOW, _MOST, _ROOM = 9, 18, 27, 36, 39, 40, 41, 42
 """Where what is known of these pairs stands, behind their control points: in one array, so that all these numbers are
@@ -108,35 +108,35 @@ def _divided(every: FloatArray, lefts: FloatArray, low: FloatArray, nearest: flo
 @njit(cache=True, nogil=True, fastmath=_FINITE)
 def _take_lanes(own: FloatArray, one: IndexArray, other: IndexArray, start: int, values: FloatArray) -> None:
     """Put the differences of some pairs, channel by channel and node by node, into `values`, ndarray[9 n_channels
-    LANES].
+    ABREAST].
 
     `own`: of all signals, ndarray[n_signals, 9 n_channels]. Where less pairs are left than lanes, the last one counts
     again.
     """
     last, n = one.size - 1, own.shape[1]
-    for lane in range(LANES):
+    for lane in range(ABREAST):
         pair = min(start + lane, last)
         here, there, to = own[one[pair]], own[other[pair]], values[lane:]
         for at in range(n):
-            to[at * LANES] = here[at] - there[at]
+            to[at * ABREAST] = here[at] - there[at]
 
 
 @njit(cache=True, nogil=True, fastmath=_FINITE)
 def _add_channel(values: FloatArray, rest: FloatArray, moves: FloatArray, h: float, room: FloatArray) -> None:
-    """Add what a channel has of the bounds of some pairs to `room`, ndarray[_ROOM LANES].
+    """Add what a channel has of the bounds of some pairs to `room`, ndarray[_ROOM ABREAST].
 
     There are its control points (`compiled_patches.to_control`), how far the differences may be from their patches
     (`_LEFT`), and sums over the channels: the squares of the lengths at the nodes and of the control points, how far
     these are along the middle one, the square of that, of what is left, and the product of both sizes (`_SUMS`).
 
-    `values`: ndarray[9 LANES], `rest`: ndarray[LANES]; `moves`: ndarray[3], for the size of a patch, its largest slope
-    and its largest second derivative.
+    `values`: ndarray[9 ABREAST], `rest`: ndarray[ABREAST]; `moves`: ndarray[3], for the size of a patch its largest
+    slope and second derivative.
     """
     of_size, of_slope, of_bend = moves[0], moves[1] / h, moves[2] / (2 * h**2)
-    for k in range(LANES):
-        a, b, c = values[k], values[LANES + k], values[2 * LANES + k]
-        d, e, f = values[3 * LANES + k], values[4 * LANES + k], values[5 * LANES + k]
-        g, i, j = values[6 * LANES + k], values[7 * LANES + k], values[8 * LANES + k]
+    for k in range(ABREAST):
+        a, b, c = values[k], values[ABREAST + k], values[2 * ABREAST + k]
+        d, e, f = values[3 * ABREAST + k], values[4 * ABREAST + k], values[5 * ABREAST + k]
+        g, i, j = values[6 * ABREAST + k], values[7 * ABREAST + k], values[8 * ABREAST + k]
         mean = (a + b + c + d + e + f + g + i + j) / _N_NODES
         b, e, i = 2 * b - (a + c) / 2, 2 * e - (d + f) / 2, 2 * i - (g + j) / 2
         d, e, f = 2 * d - (a + g) / 2, 2 * e - (b + i) / 2, 2 * f - (c + j) / 2
@@ -148,21 +148,21 @@ def _add_channel(values: FloatArray, rest: FloatArray, moves: FloatArray, h: flo
         bend = max(abs(c - 2 * b + a), abs(f - 2 * e + d), abs(j - 2 * i + g))
         bend = max(bend, abs(g - 2 * d + a), abs(i - 2 * e + b), abs(j - 2 * f + c))
         left = rest[k] + of_size * max(most - mean, mean - least) + of_slope * slope + of_bend * bend
-        room[_LEFT * LANES + k] = left
-        room[_SUMS * LANES + k] += e * e
-        room[(_SUMS + 1) * LANES + k] += left * left
-        room[(_SUMS + 2) * LANES + k] += abs(e) * left
-        room[k], room[LANES + k], room[2 * LANES + k] = a, b, c
-        room[3 * LANES + k], room[4 * LANES + k], room[5 * LANES + k] = d, e, f
-        room[6 * LANES + k], room[7 * LANES + k], room[8 * LANES + k] = g, i, j
+        room[_LEFT * ABREAST + k] = left
+        room[_SUMS * ABREAST + k] += e * e
+        room[(_SUMS + 1) * ABREAST + k] += left * left
+        room[(_SUMS + 2) * ABREAST + k] += abs(e) * left
+        room[k], room[ABREAST + k], room[2 * ABREAST + k] = a, b, c
+        room[3 * ABREAST + k], room[4 * ABREAST + k], room[5 * ABREAST + k] = d, e, f
+        room[6 * ABREAST + k], room[7 * ABREAST + k], room[8 * ABREAST + k] = g, i, j
     for node in range(_N_NODES):
-        own, seen, along = room[node * LANES :], values[node * LANES :], room[(_ALONG + node) * LANES :]
-        length, squared = room[(_LENGTHS + node) * LANES :], room[(_SQUARES + node) * LANES :]
-        for k in range(LANES):
-            along[k] += own[k] * room[4 * LANES + k]
-        for k in range(LANES):
+        own, seen, along = room[node * ABREAST :], values[node * ABREAST :], room[(_ALONG + node) * ABREAST :]
+        length, squared = room[(_LENGTHS + node) * ABREAST :], room[(_SQUARES + node) * ABREAST :]
+        for k in range(ABREAST):
+            along[k] += own[k] * room[4 * ABREAST + k]
+        for k in range(ABREAST):
             length[k] += own[k] * own[k]
-        for k in range(LANES):
+        for k in range(ABREAST):
             squared[k] += seen[k] * seen[k]
 
 
@@ -171,18 +171,18 @@ def _end_lanes(room: FloatArray, shortest: FloatArray) -> None:
     """Put the bounds of the lengths of some pairs (`_bounds`) into `_LOW` and `_MOST` of what `_add_channel` has, and
     the squares of the lengths at the nodes into `shortest`, ndarray[9], where they are shorter.
     """
-    for k in range(LANES):
-        beyond, furthest = room[_ALONG * LANES + k], room[_LENGTHS * LANES + k]
+    for k in range(ABREAST):
+        beyond, furthest = room[_ALONG * ABREAST + k], room[_LENGTHS * ABREAST + k]
         for node in range(1, _N_NODES):
-            beyond = min(beyond, room[(_ALONG + node) * LANES + k])
-            furthest = max(furthest, room[(_LENGTHS + node) * LANES + k])
-        length = math.sqrt(max(room[_SUMS * LANES + k], 1e-300))
-        room[_LOW * LANES + k] = max((beyond - room[(_SUMS + 2) * LANES + k]) / length, 0.0)
-        room[_MOST * LANES + k] = math.sqrt(furthest) + math.sqrt(room[(_SUMS + 1) * LANES + k])
+            beyond = min(beyond, room[(_ALONG + node) * ABREAST + k])
+            furthest = max(furthest, room[(_LENGTHS + node) * ABREAST + k])
+        length = math.sqrt(max(room[_SUMS * ABREAST + k], 1e-300))
+        room[_LOW * ABREAST + k] = max((beyond - room[(_SUMS + 2) * ABREAST + k]) / length, 0.0)
+        room[_MOST * ABREAST + k] = math.sqrt(furthest) + math.sqrt(room[(_SUMS + 1) * ABREAST + k])
     for node in range(_N_NODES):
-        own = room[(_SQUARES + node) * LANES :]
+        own = room[(_SQUARES + node) * ABREAST :]
         least = own[0]
-        for k in range(1, LANES):
+        for k in range(1, ABREAST):
             least = min(least, own[k])
         shortest[node] = min(shortest[node], least)
 
@@ -204,22 +204,22 @@ def _of_pairs(
     """Bound the distances of all pairs in a cell: the lower bounds, what is left and the squares of the distances at
     the nodes go into the last three; the least of the upper bounds.
     """
-    nearest, n = math.inf, _N_NODES * LANES
-    some_rest = np.empty(LANES)
-    for start in range(0, one.size, LANES):
+    nearest, n = math.inf, _N_NODES * ABREAST
+    some_rest = np.empty(ABREAST)
+    for start in range(0, one.size, ABREAST):
         _take_lanes(own, one, other, start, values)
-        some = min(LANES, one.size - start)
+        some = min(ABREAST, one.size - start)
         room[:] = 0.0
         for u in range(len(rest)):
-            for lane in range(LANES):
+            for lane in range(ABREAST):
                 some_rest[lane] = rest[u, min(start + lane, one.size - 1)]
             _add_channel(values[u * n :], some_rest, moves[u], h, room)
             for lane in range(some):
-                lefts[u, start + lane] = room[_LEFT * LANES + lane]
+                lefts[u, start + lane] = room[_LEFT * ABREAST + lane]
         _end_lanes(room, shortest)
         for lane in range(some):
-            low[start + lane] = room[_LOW * LANES + lane]
-            nearest = min(nearest, room[_MOST * LANES + lane])
+            low[start + lane] = room[_LOW * ABREAST + lane]
+            nearest = min(nearest, room[_MOST * ABREAST + lane])
     return nearest
 
 
@@ -263,8 +263,8 @@ def distances(
     """
     (one, other), (lows, upper, at_nodes) = pairs, found
     n_channels, n_pairs = seen.shape[1], one.size
-    own, values = np.empty((seen.shape[2], n_channels * _N_NODES)), np.empty(n_channels * _N_NODES * LANES)
-    room, lefts, shortest = np.empty(_ROOM * LANES), np.empty((n_channels, n_pairs)), np.empty(_N_NODES)
+    own, values = np.empty((seen.shape[2], n_channels * _N_NODES)), np.empty(n_channels * _N_NODES * ABREAST)
+    room, lefts, shortest = np.empty(_ROOM * ABREAST), np.empty((n_channels, n_pairs)), np.empty(_N_NODES)
     for cell in range(len(at)):
         for node in range(_N_NODES):
             here = seen[at[cell, node]]

@@ -19,7 +19,7 @@ SEGMENTS = 4
 """Parts of a pixel's edge over which the image's slope is bounded one by one."""
 SQUARES = 3
 """Parts of a pixel along either axis over which the image is bounded one by one."""
-LANES = 16
+BOUNDED = 16
 """Parts of an image: loops over them have so many rounds, which is known when they are compiled."""
 ABOVE, BELOW, STEEP, BENT, INNER = range(5)
 """The envelopes of an image."""
@@ -32,7 +32,7 @@ _FINITE = {"contract", "nnan", "nsz"}
 
 
 class Envelopes(NamedTuple):
-    """Of parts of a blurred image, as functions of the radius, `table`: ndarray[5, n_radii, LANES].
+    """Of parts of a blurred image, as functions of the radius, `table`: ndarray[5, n_radii, BOUNDED].
 
     No value from a radius on is larger than `ABOVE`, none up to it smaller than `BELOW`; near it no slope is steeper
     than `STEEP`, no second derivative along any line larger than `BENT`, and those along two lines across are `INNER`
@@ -43,7 +43,7 @@ class Envelopes(NamedTuple):
     per_px: float
 
 
-SHARP = Envelopes(np.empty((5, 0, LANES)), 0.0)
+SHARP = Envelopes(np.empty((5, 0, BOUNDED)), 0.0)
 
 
 @njit(cache=True, nogil=True)
@@ -91,7 +91,7 @@ def _radii_of_pixel(dx: float, dy: float, half: float, h: float, segments: int, 
 @njit(cache=True, nogil=True, fastmath=_FINITE)
 def add_row(factor: float, table: FloatArray, which: int, node: int, found: FloatArray, to: int) -> None:
     """Add an envelope at a radius, times a factor, to a row."""
-    for part in range(LANES):
+    for part in range(BOUNDED):
         found[to, part] += factor * table[which, node, part]
 
 
@@ -100,7 +100,7 @@ def _add_two(
     one: float, node: int, other: float, beyond: int, table: FloatArray, which: int, found: FloatArray, to: int
 ) -> None:
     """Add an envelope at two radii, times factors, to a row."""
-    for part in range(LANES):
+    for part in range(BOUNDED):
         found[to, part] += one * table[which, node, part] + other * table[which, beyond, part]
 
 
@@ -109,7 +109,7 @@ def _add_steepest(
     near: int, far: int, near_beyond: int, far_beyond: int, table: FloatArray, found: FloatArray, to: int
 ) -> None:
     """Add the largest difference of a piece of one edge and that of the other one to a row."""
-    for part in range(LANES):
+    for part in range(BOUNDED):
         found[to, part] += max(
             table[ABOVE, near, part] - table[BELOW, far_beyond, part],
             table[ABOVE, near_beyond, part] - table[BELOW, far, part],
@@ -119,7 +119,7 @@ def _add_steepest(
 @njit(cache=True, nogil=True, fastmath=_FINITE)
 def _scale(factor: float, found: FloatArray, to: int) -> None:
     """Multiply a row."""
-    for part in range(LANES):
+    for part in range(BOUNDED):
         found[to, part] *= factor
 
 
@@ -136,7 +136,7 @@ def of_blurred(
     nodes: IndexArray,
     seen: FloatArray,
 ) -> None:
-    """Put what is known of a blurred light on a pixel over a cell into `seen`, ndarray[N_SEEN, LANES].
+    """Put what is known of a blurred light on a pixel over a cell into `seen`, ndarray[N_SEEN, BOUNDED].
 
     `closely`: by parts of its edges and of its area, one by one.
     """
@@ -146,7 +146,7 @@ def of_blurred(
     for at in range(3 * n + 2 * squares**2):
         nodes[at] = int(min(room[0, at] * per_px + 0.5, last))
     for to in range(SUDDEN):
-        for part in range(LANES):
+        for part in range(BOUNDED):
             seen[to, part] = 0.0
     for at in range(3 * n, 3 * n + 2 * squares**2, 2):  # the mean over a pixel is that of those over its squares
         add_row(1 / squares**2, table, BELOW, nodes[at], seen, LOW)

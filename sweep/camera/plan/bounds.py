@@ -49,10 +49,8 @@ class Amounts:
     most_each: FloatArray
 
 
-_AT_ONCE = 4_000_000
-"""Values of pairs' differences that are bounded at once."""
-_FEW_PAIRS = 64
-"""Pairs whose lights stay in the processor's cache."""
+_AT_ONCE, _FEW_PAIRS = 4_000_000, 64
+"""Values of pairs' differences that are bounded at once, and pairs whose lights stay in the processor's cache."""
 
 
 @dataclass(frozen=True)
@@ -187,9 +185,10 @@ class Reach:
     def most_apart(self, factor: FloatArray, low: FloatArray, high: FloatArray) -> float:
         """The largest sum over the channels of `Amounts.most` of any pair, DN."""
         light = self.signals_dn * factor * np.maximum(np.abs(low), np.abs(high)).sum(axis=0)
-        starts = range(0, len(self.first), _FEW_PAIRS)
-        pairs = ((self.first[at : at + _FEW_PAIRS], self.second[at : at + _FEW_PAIRS]) for at in starts)
-        return max((float(np.abs(light[one] - light[other]).sum(axis=1).max()) for one, other in pairs), default=0.0)
+        few = np.split(np.arange(len(self.first)), range(_FEW_PAIRS, len(self.first), _FEW_PAIRS))
+        return max(
+            float(np.abs(light[self.first[i]] - light[self.second[i]]).sum(axis=1).max(initial=0.0)) for i in few
+        )
 
     def _on_hats(self, light: FloatArray, qe: FloatArray) -> FloatArray:
         """Sums of lights times QE on each hat, ndarray[n_lights, n_channels, n_knots]."""

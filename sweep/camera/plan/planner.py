@@ -116,9 +116,8 @@ class Planner:
         """Seconds that it takes to bound what another method of an effect changes, counted."""
         if isinstance(effect, ReadoutEffect):
             return READOUT_S * len(self._scenes) + self._first_noise_s - self._noise_s
-        if _needs_kernels(effect, getattr(after, effect.name)):
-            return self._kernels_s(methods, after)
-        return QUICK_S * len(self._scenes)
+        compared = _needs_kernels(effect, getattr(after, effect.name))
+        return self._kernels_s(methods, after) if compared else QUICK_S * len(self._scenes)
 
     def _kernels_s(self, *methods: Methods) -> float:
         """Seconds that it takes to compare kernels of some methods, those made before counting no more."""
@@ -138,9 +137,8 @@ class Planner:
         if isinstance(effect, ReadoutEffect) and self._anywhere:
             return True  # behind a straight readout the search for the worst place is much shorter, as no count tells
         saved = self._work(methods) - self._work(after)
-        return (
-            max(saved, self._work(self._completed(methods, rest)) - self._work(self._completed(after, rest))) > look_s
-        )
+        beside = self._work(self._completed(methods, rest)) - self._work(self._completed(after, rest))
+        return max(saved, beside) > look_s
 
     @cached_property
     def _anywhere(self) -> bool:
@@ -241,9 +239,8 @@ class Planner:
     def _completed(self, methods: Methods, rest: Sequence[str]) -> Methods:
         """The methods with the cheapest one, of those that are looked at, of each effect of which none is chosen."""
         for name in rest:
-            every = (
-                m for m in EFFECTS[name].methods if not (self._without_kernels and _needs_kernels(EFFECTS[name], m))
-            )
+            of = EFFECTS[name]
+            every = (m for m in of.methods if not (self._without_kernels and _needs_kernels(of, m)))
             methods = switched(methods, name, next(every))
         return methods
 
