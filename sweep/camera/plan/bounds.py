@@ -185,10 +185,10 @@ class Reach:
     def most_apart(self, factor: FloatArray, low: FloatArray, high: FloatArray) -> float:
         """The largest sum over the channels of `Amounts.most` of any pair, DN."""
         light = self.signals_dn * factor * np.maximum(np.abs(low), np.abs(high)).sum(axis=0)
-        few = np.split(np.arange(len(self.first)), range(_FEW_PAIRS, len(self.first), _FEW_PAIRS))
-        return max(
-            float(np.abs(light[self.first[i]] - light[self.second[i]]).sum(axis=1).max(initial=0.0)) for i in few
+        pairs = zip(
+            *(np.split(i, range(_FEW_PAIRS, i.size, _FEW_PAIRS)) for i in (self.first, self.second)), strict=True
         )
+        return max(float(np.abs(light[a] - light[b]).sum(axis=1).max(initial=0.0)) for a, b in pairs)
 
     def _on_hats(self, light: FloatArray, qe: FloatArray) -> FloatArray:
         """Sums of lights times QE on each hat, ndarray[n_lights, n_channels, n_knots]."""
