@@ -185,10 +185,8 @@ class Reach:
     def most_apart(self, factor: FloatArray, low: FloatArray, high: FloatArray) -> float:
         """The largest sum over the channels of `Amounts.most` of any pair, DN."""
         light = self.signals_dn * factor * np.maximum(np.abs(low), np.abs(high)).sum(axis=0)
-        pairs = zip(
-            *(np.split(i, range(_FEW_PAIRS, i.size, _FEW_PAIRS)) for i in (self.first, self.second)), strict=True
-        )
-        return max(float(np.abs(light[a] - light[b]).sum(axis=1).max(initial=0.0)) for a, b in pairs)
+        every = (np.abs(light[one] - light[other]).sum(axis=1) for one, other in self._by_block(_FEW_PAIRS))
+        return max((float(each.max()) for each in every), default=0.0)
 
     def _on_hats(self, light: FloatArray, qe: FloatArray) -> FloatArray:
         """Sums of lights times QE on each hat, ndarray[n_lights, n_channels, n_knots]."""
@@ -232,11 +230,11 @@ class Reach:
         DN. A point's channels move by at most this much, so the difference of two points by at most the sum of both.
         """
         each = np.swapaxes(moved, 0, 1)
-        return max((float(_norms(each[some] + each[to]).max()) for some, to in self._by_block(moved)), default=0.0)
+        pairs = self._by_block(max(1, _AT_ONCE // max(1, moved[:, 0].size)))
+        return max((float(_norms(each[some] + each[to]).max()) for some, to in pairs), default=0.0)
 
-    def _by_block(self, moved: FloatArray) -> list[tuple[IndexArray, IndexArray]]:
-        """Pairs, so many at once that their values fit into memory."""
-        step = max(1, _AT_ONCE // max(1, moved[:, 0].size))
+    def _by_block(self, step: int) -> list[tuple[IndexArray, IndexArray]]:
+        """Pairs, so many at once."""
         starts = range(0, len(self.first), step)
         return [(self.first[at : at + step], self.second[at : at + step]) for at in starts]
 
