@@ -1,6 +1,6 @@
 # make study NAME=stopband   run studies/stopband.yaml, results in outputs/stopband
 # make report NAME=stopband  draw the report of outputs/stopband again
-# make test                  install and run the tests, which take about three minutes on two cores
+# make test                  install and run the tests, which take about two minutes on two cores
 # make slow                  run the tests that take longer, and the other cases of these
 # make check                 ruff, mypy --strict
 # make accuracy              run the hard cases, measure what accuracy costs in time, outputs/accuracy/accuracy.html

@@ -3,7 +3,7 @@
 On one thread. Prints each constant of the effects' `work` and of `camera/plan/work.py` beside what it is here; a factor of 3
 either way is said. Then every scene of every shipped study (or of those named), at its study's tolerance, for one design
 and for all: everything on, and as a run does it, with the time to find its plan. Writes outputs/bench/plans.json, and
-fails where plan and run take more than 1.1 times everything on.
+fails where plan and run take more than 1.1 times everything on, and do so again in five times as many measurements.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from sweep.base.errors import StudyError
 from sweep.base.types import FloatArray
 from sweep.camera.effects import base, blur, noise, phase, quantization, sampling, saturation
 from sweep.camera.forget import forget_scenes
+from sweep.camera.imager import Imager
 from sweep.camera.kernel_size import pixels_per_place
 from sweep.camera.methods import REFERENCE
 from sweep.camera.mosaic import Mosaic
@@ -33,6 +34,7 @@ from sweep.camera.plan import work
 from sweep.camera.plan.bounds import Box
 from sweep.camera.plan.promises import Promises
 from sweep.camera.plan.scene_kernels import SceneKernels
+from sweep.camera.plan.work import DesignCount
 from sweep.camera.scenario import Scenario
 from sweep.camera.scene import FixedExposure, Noise, Target
 from sweep.camera.sensor import BUILT_IN_SENSORS
@@ -47,6 +49,8 @@ from sweep.study.shipped import shipped_names, study_path
 REPEATS = 5
 MOST = 1.1
 """Plan and run may take this many times everything on."""
+CLOCK_S = 5e-4
+"""Seconds that do not count."""
 OFF = 3.0
 OUTPUT = Path(__file__).parent.parent / "outputs" / "bench" / "plans.json"
 GRID = WavelengthGrid(step_nm=1)
@@ -114,12 +118,25 @@ def search(made: View, light_dn: FloatArray, counted: Counter[str] | None = None
     AnyPlace(made, Counter() if counted is None else counted).extremes(light_dn)
 
 
+def of_lattices() -> Iterator[tuple[str, float, float]]:
+    """What each pixel takes that a light may cover, at each place of a lattice."""
+    for distance_m in (20.0, 100.0):
+        made = view(distance_m)
+        one, every = (replace(made, methods=replace(REFERENCE, phase=name)) for name in ("one", "quarter pixel"))
+        across = 2 * sampling.radii_px(made, made.scenario.target)[1] + 1  # type: ignore[arg-type]
+        values = (phase.n_places(every, "quarter pixel") - 1) * across**2 * len(made.mosaic.channels) * GRID.size
+        more_s = shortest_s(partial(Imager, every), cold=True) - shortest_s(partial(Imager, one), cold=True)
+        yield f"a pixel of a place, through a filter, {distance_m:g} m", sampling.PIXEL_S, more_s / values
+
+
 def of_searches() -> Iterator[tuple[str, float, float]]:
-    """The worst of all places of a light that is near or far: for each new place, and again for each design."""
-    for distance_m in (60.0, 300.0):
+    """The worst of all places of a light that is near or far: to begin, for each new place, and for each design."""
+    for distance_m in (20.0, 60.0, 300.0):
         made = view(distance_m)
         light_dn = signal_irradiance(made)[:, None] * made.qe * per_photon(made) * 2e-3 * PIXEL.dn_per_e
-        across = 2 * sampling.radii_px(made, made.scenario.target)[1] + 7  # type: ignore[arg-type]
+        across = 2 * sampling.radii_px(made, made.scenario.target)[1] + 1  # type: ignore[arg-type]
+        around = (across + sampling.AROUND_PX) ** 2 * sampling.MOST_FUNCTIONS
+        new_s, new = [], []
         for method in LIMITS:
             chosen, counted, deep = (
                 replace(made, methods=replace(REFERENCE, phase=method)),
@@ -127,29 +144,30 @@ def of_searches() -> Iterator[tuple[str, float, float]]:
                 phase.decades(method),
             )
             forget_scenes()
-            start = time.process_time()
             search(chosen, light_dn, counted)
-            first_s = time.process_time() - start
             again_s = shortest_s(partial(search, chosen, light_dn))
-            place_s = sampling.PLACE_S + sampling.PLACE_PIXEL_S * across**2 * 32
+            new_s.append(shortest_s(partial(search, chosen, light_dn), cold=True) - again_s)
+            new.append(counted["places"])
             at = f"{method}, {distance_m:g} m"
-            places = phase.PER_DECADE * deep**2
-            yield (
-                f"places per place of the lattice, {at}",
-                places,
-                counted["places"] / len(phase.places_px(made, method)),
-            )
-            yield f"a place, {at}", place_s, (first_s - again_s) / counted["places"]
+            ratio = new[-1] / len(phase.places_px(made, method))
+            yield f"places per place of the lattice, {at}", phase.PER_DECADE * deep**2, ratio
             yield f"a design, {at}", phase.SEARCH_S + phase.SEARCH_DECADE_S * deep, again_s
+        place_s = (new_s[-1] - new_s[0]) / (new[-1] - new[0])
+        yield f"a place, {distance_m:g} m", sampling.PLACE_S + sampling.PLACE_PIXEL_S * around, place_s
+        begun_s = sampling.SEARCHED_S + sampling.SEARCHED_PIXEL_S * around
+        yield f"to begin a search, {distance_m:g} m", begun_s, new_s[0] - new[0] * place_s
 
 
 def of_plans() -> Iterator[tuple[str, float, float]]:
     """What bounds take."""
     far, patch = view(250.0, (0.0, 0.0), noisy=True), replace(view(250.0), scenario=Scenario())
-    uneven = replace(far, pixel=PIXEL.model_copy(update={"prnu": 0.01}))
+    bright = replace(
+        far, scenario=far.scenario.model_copy(update={"exposure": FixedExposure(exposure_s=1.0)})
+    )  # beyond the full well no closed form will do
+    uneven = replace(bright, pixel=PIXEL.model_copy(update={"prnu": 0.01}))
 
     def promises(made: View) -> Promises:
-        return Promises(Box(made, made.qe, made.qe, 1), SceneKernels(made))
+        return Promises(Box(made, made.qe, made.qe, DesignCount(1)), SceneKernels(made))
 
     yield "the reach of a box", work.REACH_S, shortest_s(lambda: promises(patch).reach.brightest_pixels_dn)
     skipped = replace(REFERENCE, noise="skip")
@@ -160,7 +178,7 @@ def of_plans() -> Iterator[tuple[str, float, float]]:
         looked.promise("noise", REFERENCE, skipped)
         looked.promise("quantization", skipped, unrounded)
 
-    yield "the first bounds of a noisy readout", work.NOISE_S, shortest_s(lambda: readout(far), cold=True)
+    yield "the first bounds of a noisy readout", work.NOISE_S, shortest_s(lambda: readout(bright), cold=True)
     yield "the same with PRNU", work.UNEVEN_NOISE_S, shortest_s(lambda: readout(uneven), cold=True)
     straight = replace(unrounded, saturation="skip")
 
@@ -180,7 +198,7 @@ def of_plans() -> Iterator[tuple[str, float, float]]:
 
 def constants() -> None:
     """Print the table of constants."""
-    for part in (of_values(), of_images(), of_searches(), of_plans()):
+    for part in (of_values(), of_images(), of_lattices(), of_searches(), of_plans()):
         for name, constant, measured in part:
             ratio = measured / constant
             said = "" if 1 / OFF <= ratio <= OFF else f"  off by more than {OFF:g} times"
@@ -199,6 +217,18 @@ def paid(names: list[str]) -> Iterator[Payment]:
             yield from payments(study, list(study.scenarios), [study.tolerance_dn()], REPEATS)
 
 
+def loses(one: Payment) -> bool:
+    """Whether plan and run take too long, by more than the clock says of work as short."""
+    return one.plan_s + one.run_s > MOST * one.everything_s + CLOCK_S
+
+
+def once_more(one: Payment) -> Payment:
+    """The same, measured more often: a virtual machine is not always as fast."""
+    study = load_study(study_path(Path(one.study)))
+    (again,) = payments(study, [one.scenario], [one.tolerance_dn], 5 * REPEATS, [one.designs])
+    return again
+
+
 def main() -> int:
     """Print both tables; 1 where a plan does not pay."""
     constants()
@@ -214,7 +244,7 @@ def main() -> int:
         )
     OUTPUT.parent.mkdir(parents=True, exist_ok=True)
     OUTPUT.write_text(json.dumps([asdict(one) | {"factor": one.factor} for one in found], indent=1))
-    lost = [one for one in found if one.factor < 1 / MOST]
+    lost = [again for one in found if loses(one) and loses(again := once_more(one))]
     for one in lost:
         print(f"{one.study}, {one.scenario}, {one.designs}: plan and run take more than {MOST:g} times everything on")
     return int(bool(lost))

@@ -7,14 +7,16 @@ current, a pulse's moment, the exposure. Nothing is clipped, rounded or noisy ye
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import DTypeLike
 
 from ..base.types import BoolArray, FloatArray, IndexArray
-from ..designs.block import Block
+from ..designs.block import Block, EdgeBlock
 from ..designs.products import row_products
 from .effects import flicker, quadrature
 from .exposure import exposure_times, fixed_white, white_irradiance
@@ -31,19 +33,41 @@ _MANY = 50_000
 """Values from which on a compiled pass saves more time than it takes to load."""
 
 
+class ByEdges(NamedTuple):
+    """What a channel's electrons/s are sums of, in one case: base + depth (left - right) + fixed + uniform.
+
+    `table`: of the base, ndarray[n_signals], of left and of right edges, ndarray[n_edges, n_signals]; `block`: which
+    edges each design has; `fixed`: ndarray[n_signals], `uniform`: ndarray[n_designs]. `line`: how they are read, see
+    `Readout.line`.
+    """
+
+    table: tuple[FloatArray, FloatArray, FloatArray]
+    block: EdgeBlock
+    fixed: FloatArray
+    uniform: FloatArray
+    line: tuple[float, float, float, float] | None = None
+
+
 @dataclass(frozen=True)
 class Changing:
     """Those designs of a block that differ in one channel alone: electrons, or the digital numbers read from them.
 
-    `fixed`: ndarray[n_cases, n_signals, n_channels], what they share (that channel's values mean nothing); `values`:
-    ndarray[n, n_cases, n_signals] of `channel`; `exposure_s`: that of each. `which`: ndarray[n_designs], the n designs.
+    `fixed`: ndarray[n_cases, n_signals, n_channels], what they share (that channel's values mean nothing); `make`
+    gives those of `channel`, ndarray[n, n_cases, n_signals]; `exposure_s`: that of each. `which`: ndarray[n_designs],
+    the n designs. `by_edges`: what the channel's values are sums of, where designs are told by their edges.
     """
 
     fixed: FloatArray
     channel: int
-    values: FloatArray
+    make: Callable[[], FloatArray]
     exposure_s: float
     which: BoolArray
+    by_edges: ByEdges | None = None
+
+    @cached_property
+    def values(self) -> FloatArray:
+        """That channel of each, made when it is asked for."""
+        return self.make()
 
     @property
     def whole(self) -> FloatArray:
@@ -237,21 +261,28 @@ class Electrons:
         if not np.array_equal(touched, self._touched):
             return None
         everywhere = np.arange(view.grid.size)
-        time_s = exposure_times(view, np.zeros((1, 1)))
-        which = exposure_times(view, block.product(self.white[:, None], everywhere)) == time_s
+        time_s = exposure_times(view, np.zeros((1, 1)), self._fixed_white)
+        which = exposure_times(view, block.product(self.white[:, None], everywhere), self._fixed_white) == time_s
         if not which.any() or not np.isfinite(time_s[0]) or self.scales(time_s).shape[1] > 1:
             return None
         some = block if which.all() else block.some(np.flatnonzero(which))
         unit = int(self._touched[0])
         self._work["response"] += len(some) * self._kept.size
-        values = some.product(self._kept, self._nodes).reshape(len(some), len(self.fixed), -1)
-        values = values.astype(float, copy=False)
         uniform = some.product(np.ascontiguousarray(self.background[:, 0].T), everywhere)[:, self.place]
         uniform = uniform * self._modified_uniform[:, unit, 0]
         uniform = self._fixed_uniform[:, unit] + uniform + view.pixel.dark_e_per_s
         rest = self.fixed + (self._fixed_uniform + view.pixel.dark_e_per_s)[:, None]
-        _expose(values, np.ascontiguousarray(self.fixed[:, :, unit]), uniform, float(time_s[0]))
-        return Changing(rest * time_s[0], unit, values, float(time_s[0]), which)
+        fixed, kept, nodes = np.ascontiguousarray(self.fixed[:, :, unit]), self._kept, self._nodes
+
+        def make() -> FloatArray:
+            values = some.product(kept, nodes).reshape(len(some), len(fixed), -1).astype(float, copy=False)
+            _expose(values, fixed, uniform, float(time_s[0]))
+            return values
+
+        by_edges = None
+        if isinstance(some, EdgeBlock) and len(fixed) == 1 and kept.dtype == float and len(some) * kept.size > _MANY:
+            by_edges = ByEdges(some.tables.product(kept, nodes), some, fixed[0], uniform[:, 0])
+        return Changing(rest * time_s[0], unit, make, float(time_s[0]), which, by_edges)
 
     def light_dn(self, curves: FloatArray, exposure_s: float) -> FloatArray:
         """What each signal gives through each channel's filter where its image is whole, in a pulse's darkest moment.

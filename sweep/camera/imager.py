@@ -80,8 +80,11 @@ class Imager:
         found = self.electrons.changing(block) if self.readout.by_channel else None
         if found is None:
             return None
-        transfer = self.readout.transfer
-        return replace(found, fixed=transfer(found.fixed), values=transfer(found.values))
+        transfer, electrons, by_edges = self.readout.transfer, found, found.by_edges
+        if by_edges is not None:
+            line = self.readout.line(len(by_edges.uniform) * by_edges.fixed.size)
+            by_edges = None if line is None else by_edges._replace(line=line)
+        return replace(found, fixed=transfer(found.fixed), make=lambda: transfer(electrons.values), by_edges=by_edges)
 
     @cached_property
     def anywhere(self) -> AnyPlace | None:

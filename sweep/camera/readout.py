@@ -65,12 +65,25 @@ class Readout:
         """The same in one pass, without noise."""
         from .compiled_readout import whole_numbers  # noqa: PLC0415  (compiled: kept off the start-up path)
 
-        pixel, many = self.pixel, np.ascontiguousarray(electrons)
+        many = np.ascontiguousarray(electrons)
         found = np.empty_like(many)
-        top_e = saturation.top_e(pixel) if clips else math.inf
-        line = (top_e, pixel.dn_per_e, pixel.offset_dn, float(pixel.full_scale_dn))
-        whole_numbers(many.reshape(-1), *line, found.reshape(-1))
+        whole_numbers(many.reshape(-1), *self._line(clips), found.reshape(-1))
         return found
+
+    def _line(self, clips: bool) -> tuple[float, float, float, float]:
+        """Electrons from which nothing more is read, DN per electron, pedestal and full scale, DN."""
+        top_e = saturation.top_e(self.pixel) if clips else math.inf
+        return top_e, self.pixel.dn_per_e, self.pixel.offset_dn, float(self.pixel.full_scale_dn)
+
+    def line(self, n_values: int) -> tuple[float, float, float, float] | None:
+        """`_line` for whoever reads `n_values` of it by himself; None where a readout is more than whole numbers."""
+        methods = self.view.methods
+        if methods.quantization == "skip" or self.view.scenario.noise is not None:
+            return None
+        clips = methods.saturation != "skip"
+        self._work["saturation"] += n_values * clips
+        self._work["quantization"] += n_values
+        return self._line(clips)
 
     def variance_dn(self, electrons: FloatArray) -> FloatArray:
         """Variance of the units' digital numbers, DN^2, with their rounding."""

@@ -11,7 +11,7 @@ import hashlib
 import pickle
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -24,6 +24,8 @@ from .space import Space
 _LEFT, _LEFT_WIDTH, _RIGHT, _RIGHT_WIDTH, _DEPTH = range(5)
 _MOST_BYTES = 2**27
 _KEPT_TABLES = 8
+_FEW_WEIGHTS = 2_000
+"""Numbers that are compared one by one sooner than they are multiplied with the edges again."""
 _MANY = 64
 """From so many designs on, a compiled pass saves more time than it takes to load."""
 
@@ -93,7 +95,7 @@ class Tables:
     change: FloatArray
     left: FloatArray
     right: FloatArray
-    _products: Cache[bytes, tuple[FloatArray, FloatArray, FloatArray]] = field(
+    _products: Cache[tuple[Any, ...], tuple[FloatArray, tuple[FloatArray, FloatArray, FloatArray]]] = field(
         default_factory=lambda: Cache(_KEPT_TABLES)
     )
 
@@ -112,7 +114,9 @@ class Tables:
             edges = (self.left[:, nodes] @ changed, self.right[:, nodes] @ changed)
             return (self.base[nodes] @ weights, *edges)
 
-        return self._products.get(hashlib.sha256(weights.tobytes() + nodes.tobytes()).digest(), made)
+        # Many weights are told by where they are: they are held as long as what they give, and nobody changes them.
+        data = weights.__array_interface__["data"][0] if weights.size > _FEW_WEIGHTS else weights.tobytes()
+        return self._products.get((data, weights.shape, weights.strides, nodes.tobytes()), lambda: (weights, made()))[1]
 
 
 @dataclass(frozen=True)
@@ -152,8 +156,10 @@ class EdgeBlock:
 
         steepest, lowest = np.empty(len(self)), np.empty(len(self))
         tables = self.tables
-        edges = (tables.left, tables.right, *tables.spans, self.at_left, self.at_right, self.depth)
-        shapes_of_edges(tables.base, tables.change, *edges, *_inverse(base_qe[0]), steepest, lowest)
+        deep = self.depth[np.isfinite(self.depth)][:1].sum()  # most grids have one depth
+        edges = (tables.left, tables.right, *tables.spans, self.at_left, self.at_right)
+        depths = (self.depth, float(deep), self.depth == deep)
+        shapes_of_edges(tables.base, tables.change, *edges, *depths, *_inverse(base_qe[0]), steepest, lowest)
         return steepest, lowest
 
 

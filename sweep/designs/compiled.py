@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.machine_code import njit
-from ..base.types import FloatArray, IndexArray
+from ..base.types import BoolArray, FloatArray, IndexArray
 from .vectorized import larger, smaller
 
 _NUMBERS = {"nnan", "nsz"}
@@ -98,6 +98,56 @@ def _between_edges(
 
 
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
+def _ranges_of(curve: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Steepest step and lowest value, as of `_shape`, of 2^k wavelengths from each on: ndarray[k, n_wavelengths]."""
+    n = curve.size
+    levels = 1
+    while 2**levels <= n:
+        levels += 1
+    steps, lows = np.zeros((levels, n)), np.empty((levels, n))
+    for w in range(n):
+        lows[0, w] = curve[w] * inverse[w] + dark[w]
+    for w in range(n - 1):
+        steps[0, w] = abs(curve[w + 1] - curve[w])
+    for k in range(1, levels):
+        half = 2 ** (k - 1)
+        for w in range(n - 2 * half + 1):
+            steps[k, w] = larger(steps[k - 1, w], steps[k - 1, w + half])
+            lows[k, w] = smaller(lows[k - 1, w], lows[k - 1, w + half])
+    return steps, lows
+
+
+@njit(cache=True, nogil=True, fastmath=_NUMBERS)
+def _inner_shape(steps: FloatArray, lows: FloatArray, begin: int, end: int) -> tuple[float, float]:
+    """`_shape` of the wavelengths begin..end-1, at least one, by `_ranges_of`."""
+    n, k, step = end - begin, 0, 0.0
+    while 2 ** (k + 1) <= n:
+        k += 1
+    low = smaller(lows[k, begin], lows[k, end - 2**k])
+    if n > 1:  # one step less than values
+        k -= 2**k > n - 1
+        step = larger(steps[k, begin], steps[k, end - 1 - 2**k])
+    return step, low
+
+
+@njit(cache=True, nogil=True, fastmath=_NUMBERS)
+def _one_edge(
+    base: FloatArray,
+    change: FloatArray,
+    edge: FloatArray,
+    span: IndexArray,
+    inverse: FloatArray,
+    dark: FloatArray,
+    curve: FloatArray,
+) -> tuple[float, float]:
+    """`_shape` where an edge rises, with the steps to both sides; `edge`: what the change is multiplied by."""
+    own = slice(max(span[0] - 1, 0), min(span[1] + 1, base.size))
+    for w in range(own.start, own.stop):
+        curve[w] = base[w] + change[w] * edge[w]
+    return _shape(curve[own], inverse[own], dark[own])
+
+
+@njit(cache=True, nogil=True, fastmath=_NUMBERS)
 def shapes_of_edges(
     base: FloatArray,
     change: FloatArray,
@@ -108,6 +158,8 @@ def shapes_of_edges(
     at_left: IndexArray,
     at_right: IndexArray,
     depth: FloatArray,
+    deep: float,
+    alike: BoolArray,
     inverse: FloatArray,
     dark: FloatArray,
     steepest: FloatArray,
@@ -116,12 +168,30 @@ def shapes_of_edges(
     """`shapes` of base + change depth (left - right), without keeping a curve.
 
     `base`, `change`: ndarray[n_wavelengths]; `left`, `right`: ndarray[n_edges, n_wavelengths]; their `spans`; the rest
-    as in `through_edges`. Where both edges are 0, or both 1, the curve is its base, and is not looked at again.
+    as in `through_edges`. Where both edges are 0, or both 1, the curve is its base, and is not looked at again. Where
+    one edge rises before the other, each is looked at once, and so is what lies between: of designs that are `alike`,
+    ndarray[n_designs], in their depth, `deep`.
     """
     before, after = _outside(base, inverse, dark)
-    curve = np.empty(base.size)
+    curve, n = np.empty(base.size), base.size
+    steps, lows = _ranges_of(base + change * deep, inverse, dark)
+    of_left, of_right = np.full((len(left), 2), -1.0), np.full((len(right), 2), -1.0)
     for d in range(depth.size):
         one, other = at_left[d], at_right[d]
+        risen, falls = left_spans[one, 1], right_spans[other, 0]
+        if alike[d] and 0 < left_spans[one, 0] < risen < falls < right_spans[other, 1] < n:
+            if of_left[one, 0] < 0:
+                of_left[one] = _one_edge(base, change, deep * left[one], left_spans[one], inverse, dark, curve)
+            if of_right[other, 0] < 0:
+                of_right[other] = _one_edge(
+                    base, change, deep * (1.0 - right[other]), right_spans[other], inverse, dark, curve
+                )
+            step, low = _inner_shape(steps, lows, risen, falls)
+            step = larger(larger(step, of_left[one, 0]), of_right[other, 0])
+            low = smaller(smaller(low, of_left[one, 1]), of_right[other, 1])
+            steepest[d] = larger(step, larger(before[left_spans[one, 0], 0], after[right_spans[other, 1], 0]))
+            lowest[d] = smaller(low, smaller(before[left_spans[one, 0], 1], after[right_spans[other, 1], 1]))
+            continue
         begin = min(left_spans[one, 0], right_spans[other, 0])
         end = max(left_spans[one, 1], right_spans[other, 1])
         own = slice(max(begin - 1, 0), min(end + 1, base.size))  # with the steps to both sides

@@ -22,13 +22,14 @@ if TYPE_CHECKING:
 else:
 
     def _of_llvm(name: str) -> Any:
-        def typed(_context: Any, _one: Any, _other: Any) -> tuple[Any, Any]:
+        def typed(_context: Any, one: Any, other: Any) -> tuple[Any, Any]:
             def code(_target: Any, builder: Any, _signature: Any, args: Any) -> Any:
                 kind = ir.FunctionType(args[0].type, [args[0].type] * 2)
                 own = builder.module.declare_intrinsic(name, [args[0].type], kind)
                 return builder.call(own, args, fastmath=("nnan", "nsz"))
 
-            return types.float64(types.float64, types.float64), code
+            both = types.float32 if one == other == types.float32 else types.float64
+            return both(both, both), code
 
         return intrinsic(typed)
 

@@ -35,7 +35,7 @@ from .quantity import (
     VisionMetric,
 )
 from .registry import METRICS, quantities_of
-from .separation import csd_name, separations, separations_along
+from .separation import csd_name, separations, separations_along, separations_by_edges
 
 if TYPE_CHECKING:
     from ..camera.places import Extremes
@@ -181,12 +181,17 @@ def evaluate(
 
 def _distances_along(imager: Imager, changing: Changing, own: Sequence[OwnMetric]) -> Columns:
     """CSDs and exposure of designs that differ in one channel alone, and own metrics."""
-    cases = [
-        separations_along(fixed, changing.channel, changing.values[:, case], imager.view.members)
-        for case, fixed in enumerate(changing.fixed)
-    ]
+    by_edges = separations_by_edges(changing, imager.view.members)
+    cases = (
+        [by_edges]
+        if by_edges is not None
+        else [
+            separations_along(fixed, changing.channel, changing.values[:, case], imager.view.members)
+            for case, fixed in enumerate(changing.fixed)
+        ]
+    )
     each = {csd_name(pair): np.stack([case[pair] for case in cases]) for pair in cases[0]}
-    found = _over(imager, each) | {EXPOSURE: np.full(len(changing.values), changing.exposure_s)}
+    found = _over(imager, each) | {EXPOSURE: np.full(int(changing.which.sum()), changing.exposure_s)}
     return found | own_quantities(own, imager.view, changing.whole) if own else found
 
 

@@ -8,6 +8,7 @@ that results are those of the same sums in NumPy.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,8 @@ _NUMBERS = {"nnan", "nsz"}
 """Lets the compiler take the smaller of several numbers at once; callers hand in no NaN."""
 _LEAST_SQUARE, _MOST_SQUARE = 1e-280, 1e280
 """Squared distances below and above are those of differences whose squares a float does not hold well."""
+Floats = np.ndarray[tuple[int, ...], np.dtype[Any]]
+"""Float64, or float32 where that is exact."""
 LANES = 64
 """Designs that `nearest_along_squared` takes side by side."""
 
@@ -129,8 +132,8 @@ def _ranges(lanes: FloatArray, low: FloatArray, high: FloatArray) -> None:
 
 
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
-def _bounds(
-    fixed: FloatArray, first: IndexArray, second: IndexArray, low: FloatArray, high: FloatArray, bound: FloatArray
+def bounds_of_pairs(
+    fixed: FloatArray, first: IndexArray, second: IndexArray, low: Floats, high: Floats, bound: FloatArray
 ) -> tuple[int, int]:
     """Lower bound of each pair's squared distance in any lane, for as many as may be the nearest, and their number.
 
@@ -151,8 +154,8 @@ def _bounds(
 
 
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
-def _nearest_in_lanes(
-    lanes: FloatArray, fixed: FloatArray, first: IndexArray, second: IndexArray, some: IndexArray, best: FloatArray
+def nearest_in_lanes(
+    lanes: Floats, fixed: Floats, first: IndexArray, second: IndexArray, some: IndexArray, best: Floats
 ) -> None:
     """Take `some` pairs into account, four at a time; their number is a multiple of four."""
     for at in range(0, some.size, 4):
@@ -204,10 +207,10 @@ def nearest_along_squared(
         _ranges(lanes, low, high)
         for pair in range(starts.size - 1):
             own = slice(starts[pair], starts[pair + 1])
-            count, lead = _bounds(fixed[own], first[own], second[own], low, high, bound)
+            count, lead = bounds_of_pairs(fixed[own], first[own], second[own], low, high, bound)
             best[:] = np.inf
             some[:4] = lead
-            _nearest_in_lanes(lanes, fixed[own], first[own], second[own], some[:4], best)
+            nearest_in_lanes(lanes, fixed[own], first[own], second[own], some[:4], best)
             enough, left = best[0], 0
             for lane in range(1, LANES):
                 enough = larger(enough, best[lane])
@@ -215,7 +218,7 @@ def nearest_along_squared(
                 some[left] = k
                 left += bound[k] < enough
             some[left : left + 3] = lead  # to a multiple of four
-            _nearest_in_lanes(lanes, fixed[own], first[own], second[own], some[: (left + 3) & ~3], best)
+            nearest_in_lanes(lanes, fixed[own], first[own], second[own], some[: (left + 3) & ~3], best)
             computed += 4 + ((left + 3) & ~3)
             for lane in range(min(LANES, values.shape[0] - begin)):
                 out[pair, begin + lane] = best[lane]

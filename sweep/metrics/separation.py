@@ -10,6 +10,7 @@ import numpy as np
 
 from ..base.cache import Cache
 from ..base.types import BoolArray, FloatArray, IndexArray
+from ..camera.electrons import Changing
 from ..curves.lights import Pair, class_pairs, pair_name
 
 _BLOCK_PAIRS = 262_144
@@ -123,8 +124,37 @@ def separations_along(
         return separations(whole(slice(None)), members)
     apart = pairs_apart(others, members)
     squared, faulty = _nearest_along(values, apart)
-    found = _distances(squared, members, whole)
-    bad = np.flatnonzero(faulty)  # what is wrong with one design changes no other
+    return _mended(_distances(squared, members, whole), faulty, whole, members)
+
+
+def separations_by_edges(changing: Changing, members: Mapping[str, IndexArray]) -> dict[Pair, FloatArray] | None:
+    """`separations_along` of designs by their edges, without an array of their values; None where that will not do."""
+    edges, others = changing.by_edges, np.delete(changing.fixed[0], changing.channel, axis=1)
+    if edges is None or edges.line is None or not np.isfinite(others).all():
+        return None
+    from .compiled_edges import MOST_DN, nearest_by_edges  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+    if edges.line[-1] > MOST_DN:
+        return None
+    apart, block = pairs_apart(others, members), edges.block
+    squared, faulty = np.empty((len(apart.starts) - 1, len(block))), np.zeros(len(block), dtype=bool)
+    table = *edges.table, block.at_left, block.at_right, block.depth
+    nearest_by_edges(table, (edges.fixed, edges.uniform, changing.exposure_s), edges.line, *apart, squared, faulty)
+
+    def whole(some: IndexArray | slice) -> FloatArray:
+        return np.asarray(changing.whole[some, 0])
+
+    return _mended(_distances(squared, members, whole), faulty, whole, members)
+
+
+def _mended(
+    found: dict[Pair, FloatArray],
+    faulty: BoolArray,
+    whole: Callable[[IndexArray], FloatArray],
+    members: Mapping[str, IndexArray],
+) -> dict[Pair, FloatArray]:
+    """The distances; again those of designs with a value that is not finite, which changes no other design."""
+    bad = np.flatnonzero(faulty)
     if bad.size:
         for pair, distance in separations(whole(bad), members).items():
             found[pair][bad] = distance
@@ -197,9 +227,10 @@ def _distances(
     found = {}
     for (a, b), row in zip(class_pairs(list(members)), squared, strict=True):
         distance = np.sqrt(row)
-        doubtful = np.flatnonzero((distance < _SMALLEST) | (distance > 1 / _SMALLEST))
-        if doubtful.size:
-            distance[doubtful] = _nearest(response(doubtful), members[a], members[b], _add_leg)
+        if distance.size and not (distance.min() >= _SMALLEST and distance.max() <= 1 / _SMALLEST):
+            doubtful = np.flatnonzero((distance < _SMALLEST) | (distance > 1 / _SMALLEST))
+            if doubtful.size:
+                distance[doubtful] = _nearest(response(doubtful), members[a], members[b], _add_leg)
         found[a, b] = distance
     return found
 

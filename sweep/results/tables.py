@@ -17,6 +17,7 @@ import pyarrow.parquet as pq
 
 from ..base.errors import Fault, OutputError
 from ..base.types import BoolArray
+from .arrays import which
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -275,7 +276,7 @@ def holds(table: pa.Table, column: str, *words: str) -> BoolArray:
     found = [np.zeros(0, dtype=bool)]
     for chunk in table[column].chunks:
         at = [index for index, word in enumerate(chunk.dictionary.to_pylist()) if word in words]
-        found.append(np.isin(chunk.indices.fill_null(-1).to_numpy(), at))
+        found.append(np.isin(which(chunk), at))
     return np.concatenate(found)
 
 

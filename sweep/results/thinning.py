@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 from ..base.errors import Fault, OutputError
 from ..base.types import BoolArray, IndexArray
 from ..metrics.columns.exposure import EXPOSURE
+from .arrays import places, values_of
 from .tables import SWEPT, batches, holds, release_memory
 
 if TYPE_CHECKING:
@@ -121,17 +122,17 @@ def best_at(table: pa.Table, order: Sequence[str], most: int, among: BoolArray |
     """
     at = np.arange(table.num_rows) if among is None else np.flatnonzero(among)
     if len(at) > most:
-        first = table[order[0]].to_numpy()[at]
+        first = values_of(table[order[0]])[at]
         first = np.where(np.isnan(first), -np.inf, first)
         at = at[first >= np.partition(first, -most)[-most]]
     keys = [*((name, "descending") for name in dict.fromkeys(order)), ("design_id", "ascending")]
-    few = table.select([name for name, _ in keys]).take(pa.array(at))
-    return np.asarray(at[pc.sort_indices(few, sort_keys=keys)[:most].to_numpy()])
+    few = table.select([name for name, _ in keys]).take(places(at))
+    return np.asarray(at[values_of(pc.sort_indices(few, sort_keys=keys)[:most])])
 
 
 def best_rows(table: pa.Table, order: Sequence[str], most: int) -> pa.Table:
     """The rows of `best_at`."""
-    return table.take(pa.array(best_at(table, order, most))).combine_chunks()
+    return table.take(places(best_at(table, order, most))).combine_chunks()
 
 
 def leading_at(table: pa.Table, separation: str, among: BoolArray | None = None) -> IndexArray:
@@ -140,24 +141,24 @@ def leading_at(table: pa.Table, separation: str, among: BoolArray | None = None)
     Of equal ones the smallest `design_id`; `among`: rows to look at, ndarray[n_rows]; all without it.
     """
     seen = np.ones(table.num_rows, dtype=bool) if among is None else among
-    apart, ids = table[separation].to_numpy(), table["design_id"].to_numpy()
+    apart, ids = values_of(table[separation]), values_of(table["design_id"])
     with np.errstate(divide="ignore", invalid="ignore"):
         measures = [
             np.nan_to_num(v, nan=-np.inf, posinf=np.inf, neginf=-np.inf)
-            for v in (apart, apart / table[EXPOSURE].to_numpy())
+            for v in (apart, apart / values_of(table[EXPOSURE]))
         ]
     found = []
     for scenario in table["scenario"].unique().to_pylist():
         own = np.flatnonzero(seen & holds(table, "scenario", scenario))
-        for values in measures if own.size else ():
-            most = own[values[own] == values[own].max()]
+        for measured in measures if own.size else ():
+            most = own[measured[own] == measured[own].max()]
             found.append(most[ids[most].argmin()])
     return np.array(found, dtype=np.intp)
 
 
 def leading(table: pa.Table, separation: str) -> pa.Table:
     """The rows of `leading_at`."""
-    return table.take(pa.array(leading_at(table, separation)))
+    return table.take(places(leading_at(table, separation)))
 
 
 def _best_of_each(table: pa.Table, order: Sequence[str]) -> pa.Table:

@@ -166,7 +166,7 @@ class Making:
             self.sweep.refill(results)
         answer, gathered, sweep = self.answer, self._gathering(), self.sweep
         sweep.run(gathered, self.progress, fail_fast=self.fail_fast, retry_failed=self.retry_failed)
-        answered = [] if answer is None else [answer_row(self.study, answer, self.rules, self.study.n_designs)]
+        answered = [] if answer is None else [answer_row(self.study, answer, self.rules, self.crew)]
         for row in answered:
             gathered.add(row)
         gathered.finish()

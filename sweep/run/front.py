@@ -9,6 +9,7 @@ import pyarrow as pa
 
 from ..base.types import BoolArray, FloatArray, IndexArray
 from ..metrics.pareto import non_dominated
+from ..results.arrays import places, values_of
 from ..results.tables import FEW, SWEPT, holds
 from ..results.thinning import best_at, best_rows, leading, leading_at
 from .rows import Rules
@@ -150,8 +151,8 @@ class Gathered:
 
 def few_of(table: pa.Table, rules: Rules) -> pa.Table:
     """The rows of a chunk that `Gathered` may keep: its front, those that are no sweep, its best designs, who leads."""
-    wanted = table["pareto"].to_numpy() | holds(table, "kind", *FEW)
-    best = best_at(table, rules.order, BEST_PER_CFA, table["feasible"].to_numpy() & ~wanted)
+    wanted = values_of(table["pareto"]) | holds(table, "kind", *FEW)
+    best = best_at(table, rules.order, BEST_PER_CFA, values_of(table["feasible"]) & ~wanted)
     leaders = leading_at(table, rules.front[0], ~wanted)
     found = dict.fromkeys([*np.flatnonzero(wanted).tolist(), *best.tolist(), *leaders.tolist()])
-    return table.take(pa.array(found, type=pa.int64())).combine_chunks()
+    return table.take(places(np.array([*found], dtype=np.intp))).combine_chunks()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,12 +19,14 @@ from ..designs.block import by_edges
 from ..designs.space import Space
 from ..metrics.bound import FEASIBLE, Bound, total_violation
 from ..metrics.pareto import non_dominated
+from ..results.arrays import flags, numbers, places, words
 from ..results.identity import CHUNK
 from ..results.tables import holds, result_schema
 from ..study import Study
 from .routes import Detours, Found, Request, block_of
 
 _WORDS = pa.dictionary(pa.int32(), pa.string())
+_ARRAYS: dict[pa.DataType, Callable[[Any], pa.Array]] = {pa.float64(): numbers, pa.bool_(): flags, pa.int64(): places}
 _MOST_CHUNKS, _LEAST_JOBS = 16, 64
 _DRAWN_DESIGNS = 32
 """Of a job where each design is seen by many random lamps and cameras."""
@@ -127,7 +129,7 @@ def with_local_front(table: pa.Table, job: Job, rules: Rules) -> pa.Table:
         columns, holds(table, "status", "ok"), job.space.violation(job.space.points(job.start, job.stop)), rules
     )
     found = [
-        pa.array(marked) if f.name == "pareto" else table[f.name].cast(pa.string() if f.type == _WORDS else f.type)
+        flags(marked) if f.name == "pareto" else table[f.name].cast(pa.string() if f.type == _WORDS else f.type)
         for f in rules.schema
     ]
     return pa.table(found, names=rules.schema.names).cast(rules.schema)
@@ -192,16 +194,16 @@ def _with_detours(table: pa.Table, detours: Detours) -> pa.Table:
 
 def _word(text: str | None, n: int) -> pa.Array:
     """The same word, or none, in n rows."""
-    if text is None:
-        return pa.nulls(n, _WORDS)
-    return pa.DictionaryArray.from_arrays(pa.array(np.zeros(n, dtype=np.int32)), pa.array([text]))
+    return pa.nulls(n, _WORDS) if text is None else words([text], np.zeros(n, dtype=np.intp))
 
 
 def _status(faults: Mapping[int, str], n: int) -> pa.Array:
     """`ok`, but for the designs with a fault."""
     if not faults:
         return _word("ok", n)
-    return pa.array([faults.get(index, "ok") for index in range(n)], type=_WORDS)
+    texts = [faults.get(index, "ok") for index in range(n)]
+    numbered = {text: at for at, text in enumerate(dict.fromkeys(texts))}
+    return words([*numbered], np.array([numbered[text] for text in texts]))
 
 
 def _labels(job: Job) -> dict[str, Any]:
@@ -228,6 +230,6 @@ def _table(values: Mapping[str, pa.Array | FloatArray | BoolArray], n: int, sche
         made = values.get(field.name)
         if made is None:
             return pa.nulls(n, field.type)
-        return made if isinstance(made, pa.Array) else pa.array(made, type=field.type, from_pandas=True)
+        return made if isinstance(made, pa.Array) else _ARRAYS[field.type](made)
 
     return pa.Table.from_arrays([column(field) for field in schema], schema=schema)

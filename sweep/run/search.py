@@ -96,15 +96,16 @@ def _infeasible(study: Study, problem: Problem, starts: FloatArray, each: int) -
     return InfeasibleError(faults)
 
 
-def answer_row(study: Study, answer: SearchAnswer, rules: Rules, first_id: int) -> pa.Table:
-    """The search's answer as the camera reads it out, with its limit and gap."""
+def answer_row(study: Study, answer: SearchAnswer, rules: Rules, parallel: Parallel) -> pa.Table:
+    """The search's answer as the camera reads it out, behind all other rows, with its limit and gap."""
     space = answer.search.space
     axes = tuple((float(value),) for value in answer.best.x)
     assert space.filter is not None
     name = f"best {kind_in_words(space.filter.family.kind)}"
     found = Space("search", name, space.cfa, space.filter, axes)
-    job = Job(found, answer.search.scenario, 0, 1, first_id)
-    row = run_job(job, study.view(found, job.scenario), rules)
+    job = Job(found, answer.search.scenario, 0, 1, study.n_designs)
+    # Workers have loaded what this takes, and this process has not.
+    (row,) = parallel([delayed(run_job, job, study.view(found, job.scenario), rules)])
     if answer.limit is not None:
         for name, value in (("limit", answer.limit.proven), ("gap", answer.gap)):
             index = row.schema.get_field_index(name)

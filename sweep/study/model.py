@@ -13,10 +13,11 @@ from ..base.errors import Fault, StudyError
 from ..camera.methods import REFERENCE
 from ..camera.mosaic import Mosaic
 from ..camera.pixel import Pixel
-from ..camera.plan.at_once import everything_on
+from ..camera.plan.at_once import counted_s, everything_on, looking_s
 from ..camera.plan.bounds import Box
 from ..camera.plan.plan import Plan
 from ..camera.plan.planner import Planner
+from ..camera.plan.work import DesignCount
 from ..camera.scenario import Scenario
 from ..camera.scene import Geometry
 from ..camera.sensor import SensorCurves
@@ -24,6 +25,7 @@ from ..camera.view import View
 from ..curves.lights import Lights, Pair, class_pairs
 from ..curves.spectrum import WavelengthGrid
 from ..curves.tasks import StudyTasks
+from ..designs.block import by_edges
 from ..designs.space import Space
 from ..designs.technology import Technology
 from ..designs.tolerance import Tolerance
@@ -206,15 +208,16 @@ class Study:
         """`view` by the methods of the reference, whatever plans there are."""
         return replace(self.view(space, scenario), methods=REFERENCE)
 
-    def _evaluated(self, space: Space, scenario: str) -> int:
-        """How many designs of a space are looked at in a scenario, at most: its own, and those of a search."""
+    def _evaluated(self, space: Space, scenario: str) -> DesignCount:
+        """The designs of a space that are looked at in a scenario, at most: its own, and those of a search."""
         searched = self.search is not None and self.search.space is space and self.search.scenario == scenario
-        return space.size + (self.search.max_evaluations if searched and self.search is not None else 0)
+        more = self.search.max_evaluations if searched and self.search is not None else 0
+        return DesignCount(space.size + more, by_edges(space))
 
-    def _asked(self, scenario: str) -> list[tuple[Space, int]]:
+    def _asked(self, scenario: str) -> list[tuple[Space, DesignCount]]:
         """The spaces that count in a scenario, each with `_evaluated`: all of them where none has a design."""
         spaces = [(space, self._evaluated(space, scenario)) for space in self.spaces]
-        return [(space, n) for space, n in spaces if n] or spaces
+        return [(space, designs) for space, designs in spaces if designs.n] or spaces
 
     def boxes(self, scenario: str) -> list[Box]:
         """What the designs of all spaces can be; spaces without a design count where there are no others.
@@ -237,16 +240,16 @@ class Study:
 
         Raises StudyError as `boxes` does.
         """
-        tolerance, budget_s = self.tolerance_dn(tolerance_dn), math.inf
+        tolerance = self.tolerance_dn(tolerance_dn)
         with _holding(scenario):
-            if not always:
-                views = [(self._everything_on(space, scenario), n) for space, n in self._asked(scenario)]
-                found = everything_on(views, scenario, tolerance)
-                if isinstance(found, Plan):
-                    return found
-                budget_s = found
-            planner = Planner(self.boxes(scenario), for_noise=bool(self.states), budget_s=budget_s)
-            return planner.plan(scenario, tolerance)
+            views = [(self._everything_on(space, scenario), designs) for space, designs in self._asked(scenario)]
+            everything_s = counted_s(views)
+            budget_s = math.inf if always else looking_s(views, everything_s)
+            if budget_s:
+                planner = Planner(self.boxes(scenario), for_noise=bool(self.states), budget_s=budget_s)
+                if planner.has_time:
+                    return planner.plan(scenario, tolerance)
+            return everything_on(views, everything_s, scenario, tolerance)
 
     def problem(self, search: Search) -> Problem:
         """The search as a mathematical problem."""

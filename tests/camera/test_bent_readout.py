@@ -11,6 +11,7 @@ from sweep.camera.methods import REFERENCE
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.plan.bounds import Box
 from sweep.camera.plan.planner import Planner
+from sweep.camera.plan.work import DesignCount
 
 from ..hard.scenes import SENSOR, Scene, columns, scene, target
 
@@ -29,7 +30,7 @@ def saturated(place: list[float] | str, readout: str, level: float) -> Scene:
         given["exposure"] = {"kind": "fixed", "exposure_s": exposure_s}
         found = scene("saturated", "RCCC", given, {"crosstalk": 0.1})
         view = replace(found.view, mosaic=MOSAIC, qe=SENSOR.mosaic_qe(MOSAIC, None))
-        return Scene("saturated", view, found.curves, Box(view, view.qe, view.qe, 1))
+        return Scene("saturated", view, found.curves, Box(view, view.qe, view.qe, DesignCount(1)))
 
     brightest = float(Planner([made(1e-3).box])._scenes[0].reach.brightest_dn.max())
     return made(1e-3 * 4095 * level / brightest)

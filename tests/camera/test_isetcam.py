@@ -21,6 +21,7 @@ from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Optics, Pixel, irradiance_factor
 from sweep.camera.plan.bounds import Box
 from sweep.camera.plan.planner import Planner
+from sweep.camera.plan.work import DesignCount
 from sweep.camera.scenario import Scenario
 from sweep.camera.scene import FixedExposure
 from sweep.camera.view import View
@@ -164,7 +165,7 @@ def test_a_uniform_field_agrees_through_the_whole_image_chain(cfa: str) -> None:
     columns, constants = columns_of(mosaic), ref["constants"]
     kept = kept_at_the_center(float(constants["f_number"]))
     view = isetcam_view(mosaic, constants["magnification"], run["exposure_s"], kept)
-    plan = Planner([Box(view, view.qe, view.qe, 1)]).plan("uniform", 0.1)
+    plan = Planner([Box(view, view.qe, view.qe, DesignCount(1))]).plan("uniform", 0.1)
     assert "quantization" in plan.computed
     smooth = smooth_imager(view).smooth(NOTHING)[0, 0]
     volts = np.array(run["uniform_volts_unclipped"], dtype=float)[:, columns]

@@ -14,8 +14,9 @@ from sweep.camera.bent_chords import Steepest, edge_of_cone
 from sweep.camera.effects.image_height import ImageHeight
 from sweep.camera.imager import Imager
 from sweep.camera.methods import REFERENCE
-from sweep.camera.plan.at_once import everything_on
+from sweep.camera.plan.at_once import counted_s, looking_s
 from sweep.camera.plan.planner import Planner
+from sweep.camera.plan.work import DesignCount
 from sweep.camera.rays import Cone
 from sweep.camera.scenario import Scenario
 from sweep.camera.seen import SeenFilters
@@ -172,7 +173,8 @@ def test_a_plan_says_how_closely_all_places_are_looked_at() -> None:
     # Behind a readout that is not straight, something stays open however closely is looked.
     assert tight.methods.field == "within 0.1 DN"
     # What stays open is looked for, however little is saved.
-    assert isinstance(everything_on([(made.view, 1)], "", 0.5), float)
+    views = [(made.view, DesignCount(1))]
+    assert looking_s(views, counted_s(views)) > 0
     assert tight.methods.angle == "cone"
     assert not planner._allowed("angle", replace(tight.methods, angle="skip"))
     assert planner.promise("field", REFERENCE, replace(REFERENCE, field="named places")) == math.inf

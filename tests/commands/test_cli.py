@@ -112,12 +112,12 @@ def test_check_counts_designs() -> None:
 def test_plan_says_what_a_scene_calls_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "cpu_count", lambda: 1)  # two scenes are planned before workers have started
     path = tmp_path / "scenes.yaml"
-    path.write_text(SCENES.replace("[150, 250]", "[20, 300]"))
+    path.write_text(SCENES.replace("[150, 250]", "[280, 300]"))
     code, out, said = commanded("plan", path, "--explain", "--tolerance", "50")
     assert code == 0, said
     lines = out.splitlines()
     assert lines[0].startswith(
-        "road distance_m=20 ... road distance_m=300 (2 scenes): promised "
+        "road distance_m=280 ... road distance_m=300 (2 scenes): promised "
     )  # one plan suits both
     assert " of 50 DN" in lines[0]
     for effect in ("noise", "blur", "sampling", "phase", "extinction"):

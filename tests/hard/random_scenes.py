@@ -14,6 +14,7 @@ from sweep.camera.methods import Methods
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.plan.bounds import Box
+from sweep.camera.plan.work import DesignCount
 from sweep.camera.scenario import Scenario
 from sweep.camera.seen import moves
 from sweep.camera.view import View
@@ -108,7 +109,7 @@ def random_scene(seed: int, *, moved: bool = False) -> RandomScene:
         curves, lower, upper = _designs(rng, len(modified))
         low[list(modified)], high[list(modified)] = lower, upper
     tolerance = float(10 ** rng.uniform(-2, 2.5))
-    return RandomScene(f"random {seed}", view, curves, Box(view, low, high, 1000), tolerance)
+    return RandomScene(f"random {seed}", view, curves, Box(view, low, high, DesignCount(1000)), tolerance)
 
 
 def _technologies(seed: int, mosaic: Mosaic, *, moved: bool) -> tuple[Technology, ...]:

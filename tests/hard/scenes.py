@@ -13,6 +13,7 @@ from sweep.camera.methods import Methods
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.plan.bounds import Box
+from sweep.camera.plan.work import DesignCount
 from sweep.camera.scenario import Scenario
 from sweep.camera.sensor import BUILT_IN_SENSORS
 from sweep.camera.view import View
@@ -99,7 +100,7 @@ def scene(
     if modified:
         hull = family.hull(LOW, HIGH) if wide else (curves[0], curves[0])
         low[list(modified)], high[list(modified)] = hull
-    return Scene(name, view, curves, Box(view, low, high, 1000))
+    return Scene(name, view, curves, Box(view, low, high, DesignCount(1000)))
 
 
 def target(distance_m: float, fov_deg: float, **more: Any) -> dict[str, Any]:

@@ -126,9 +126,14 @@ def test_settled_search_misses_nothing(study: Study, monkeypatch: pytest.MonkeyP
 def test_a_search_whose_budget_is_spent_says_so(study: Study) -> None:
     """Where it lies in one place just then, too; algorithms without gradients never end for that."""
     assert study.search is not None
-    problem = study.problem(study.search)
-    run = search_from(problem, 0, starting_points(problem, 1, 1)[0], "COBYLA", 420)
-    assert len(run.log) == 420
+    problem, start = study.problem(study.search), starting_points(study.problem(study.search), 1, 1)[0]
+    whole = search_from(problem, 0, start, "COBYLA", 2000)
+    assert whole.status == "xtol_reached"
+    budget = len(whole.log) - 1
+    latest = [problem.to_unit(each.x) for each in whole.log[budget - 16 : budget]]
+    assert np.ptp(latest, axis=0).max() <= 1e-6
+    run = search_from(problem, 0, start, "COBYLA", budget)
+    assert len(run.log) == budget
     assert run.status == "maxeval_reached"
 
 

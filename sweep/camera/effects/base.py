@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
 
-MULTIPLICATION_S = 1.2e-10
+NEXT_TO_NOTHING_DN = 1e-5
+"""A bound in closed form that is no larger is not looked at more sharply."""
+MULTIPLICATION_S = 1.5e-10
 """Seconds of a multiplication of the response of designs; `tests/bench_work.py` measures them."""
 
 

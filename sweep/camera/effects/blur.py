@@ -29,7 +29,7 @@ COARSE = "every 10 nm"
 """The interpolated method on whose wavelengths kernels are compared when a plan is made."""
 _SPACING_NM = {"every 10 nm": 10.0, "every 5 nm": 5.0, "every 2 nm": 2.0}
 _SHORTEST_UM = 0.4
-PROFILE_S, WHOLE_IMAGE_S = 2.5e-10, 1.4e-5
+PROFILE_S, WHOLE_IMAGE_S = 7e-11, 3.2e-6
 """Seconds: of a radius, a frequency and a wavelength of the image, and of a wavelength of its mean over a readout
 without pixels; `tests/bench_work.py` measures them."""
 _PANEL_NODES = 32

@@ -11,13 +11,14 @@ from functools import lru_cache
 import numpy as np
 
 from ...base.types import FloatArray
-from ..noisy import gaussian, moments
+from ..noisy import gaussian, moments, tails
 from ..pixel import Pixel
 from ..shot import Shot
-from .base import Chosen, Load, ReadoutEffect
+from . import quantization
+from .base import NEXT_TO_NOTHING_DN, Chosen, Load, ReadoutEffect
 from .saturation import top_e
 
-LOOKED_UP_S, TABLE_S = 1.2e-8, 0.04
+LOOKED_UP_S, TABLE_S = 5e-9, 0.017
 """Seconds of looking a value up in the table of noise, and of making the table; `tests/bench_work.py` measures them."""
 _MOST_POISSON_E = 1e18
 """NumPy's Poisson generator takes no larger mean."""
@@ -34,12 +35,33 @@ def draws_dn(electrons: FloatArray, pixel: Pixel, rng: np.random.Generator) -> F
 @lru_cache(maxsize=1024)
 def range_of_pixel(pixel: Pixel, brightest_dn: float) -> float:
     """See `NoisyMean.range_dn`; scenes of one exposure share it."""
-    gain, read_dn = pixel.dn_per_e, pixel.dn_per_e * pixel.read_noise_e
-    at_e = min(brightest_dn / gain, top_e(pixel))
+    at_most = _range_at_most(pixel, brightest_dn)
+    if at_most <= NEXT_TO_NOTHING_DN:
+        return at_most
+    at_e, added = min(brightest_dn / pixel.dn_per_e, top_e(pixel)), _added_dn(pixel)
     mean = moments.moments(np.array([at_e]), pixel)[moments.UNROUNDED, 0]
-    added = read_dn * float(gaussian.ramp(np.array(-pixel.offset_dn / read_dn))) if read_dn else 0.0
-    lost = gain * at_e + pixel.offset_dn - mean
+    lost = pixel.dn_per_e * at_e + pixel.offset_dn - mean
     return min(float(added + max(lost + added, 0.0)), float(pixel.full_scale_dn))
+
+
+def in_closed_form(pixel: Pixel, brightest_dn: float) -> bool:
+    """Whether noise, and rounding under noise, change next to nothing, as closed forms tell."""
+    rounding_dn = quantization.smoothed(pixel, brightest_dn / pixel.dn_per_e)
+    return max(rounding_dn, _range_at_most(pixel, brightest_dn)) <= NEXT_TO_NOTHING_DN
+
+
+def _range_at_most(pixel: Pixel, brightest_dn: float) -> float:
+    """`range_of_pixel` at most, in closed form."""
+    gain = pixel.dn_per_e
+    at_e, end_e = min(brightest_dn / gain, top_e(pixel)), (pixel.full_scale_dn - pixel.offset_dn) / gain
+    lost_e = tails.mean_above(pixel.well_e, at_e, pixel, 0.0) + tails.mean_above(end_e, at_e, pixel, pixel.read_noise_e)
+    return 2 * _added_dn(pixel) + gain * lost_e
+
+
+def _added_dn(pixel: Pixel) -> float:
+    """What the dark end of the ADC's range adds to a mean at most."""
+    read_dn = pixel.dn_per_e * pixel.read_noise_e
+    return read_dn * float(gaussian.ramp(np.array(-pixel.offset_dn / read_dn))) if read_dn else 0.0
 
 
 class NoisyMean(ReadoutEffect):

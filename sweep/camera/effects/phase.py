@@ -30,9 +30,9 @@ MOST = 1024
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
 NODES = np.array([[x, y] for y in (-1.0, 0.0, 1.0) for x in (-1.0, 0.0, 1.0)])
 """A cell's corners and its nodes from its center (column, row), in units of its half width."""
-PER_DECADE = 0.4
+PER_DECADE = 0.3
 """Places of a search, in those of the lattice, for the square of its limit's decades below 100 DN, about."""
-SEARCH_S, SEARCH_DECADE_S = 0.01, 0.009
+SEARCH_S, SEARCH_DECADE_S = 0.007, 0.002
 """Seconds that a search takes for each design, at all and for each decade; `tests/bench_work.py` measures all three."""
 PER_PIXEL = 4
 """Places per pixel, along a row and a column, of the finest lattice."""

@@ -15,12 +15,12 @@ from ..shot import Shot
 from .base import Chosen, KernelEffect, Load, Part, Stage
 from .blur import Profile
 
-PIXEL_S = 6e-8
+PIXEL_S = 7e-10
 """Seconds of a pixel at a place of the light, through a channel's filter, at a wavelength."""
-SEARCHED_S, PLACE_S, PLACE_PIXEL_S = 0.1, 1e-4, 4.7e-8
-"""Seconds that a search for the worst of all places takes: to begin with, for each place, and for each of its pixels
-and the functions of the image; `tests/bench_work.py` measures all of these."""
-_AROUND_PX, _MOST_FUNCTIONS = 6.0, 32
+SEARCHED_S, SEARCHED_PIXEL_S, PLACE_S, PLACE_PIXEL_S = 0.04, 2.4e-6, 6e-5, 4e-9
+"""Seconds that a search for the worst of all places takes: to begin with, at all and for each pixel around the light
+and function of its image, and the same for each place; `tests/bench_work.py` measures all of these."""
+AROUND_PX, MOST_FUNCTIONS = 6.0, 32
 """How many more pixels a search looks at than are read, across, and of how many functions an image is a sum, about."""
 _AT_ONCE = 200
 
@@ -190,9 +190,9 @@ class Sampling(KernelEffect):
         apart = shot.grid.size if not methods.straight else load.knots
         shared_s, own_s = load.shared_s, PIXEL_S * load.cases * pixels * len(shot.mosaic.channels) * apart
         if load.searched:
-            around = (across + _AROUND_PX) ** 2 * min(load.knots, _MOST_FUNCTIONS)
+            around = (across + AROUND_PX) ** 2 * min(load.knots, MOST_FUNCTIONS)
             places_s = load.searched * (PLACE_S + PLACE_PIXEL_S * around)
-            own_s += SEARCHED_S + places_s / 2
+            own_s += SEARCHED_S + SEARCHED_PIXEL_S * around + places_s / 2
             shared_s += places_s / 2  # CFAs whose tiles are alike look at about half of their places together
         units = load.units if methods.straight else pixels
         return load._replace(units=units, own_s=load.own_s + own_s, shared_s=shared_s)

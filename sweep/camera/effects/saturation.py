@@ -10,7 +10,7 @@ from ..shot import Shot
 from .base import Chosen, Load, ReadoutEffect
 from .quantization import rounded
 
-CLIPPED_S = 1e-9
+CLIPPED_S = 6.5e-10
 """Seconds of clipping a value; `tests/bench_work.py` measures them."""
 JUST_ABOVE = 1 + 1e-12
 """Bounds of a value that is rounded leave this room for the arithmetic of both."""

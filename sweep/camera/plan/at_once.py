@@ -12,22 +12,36 @@ from ..methods import REFERENCE
 from ..registry import EFFECTS
 from ..view import View
 from .plan import NOT_ASKED, Choice, Plan
-from .work import LEAST_LOOK_S, LOOKING_SHARE, estimated_work, in_all, noise_s
+from .work import LEAST_LOOK_S, LOOKING_SHARE, DesignCount, estimated_work, in_all, noise_s
 
 
-def everything_on(views: Sequence[tuple[View, int]], scenario: str, tolerance_dn: float) -> Plan | float:
-    """Everything on, where to look for a plan takes longer than it may; else how many seconds that may take.
+def counted_s(views: Sequence[tuple[View, DesignCount]]) -> float:
+    """Seconds of everything on, estimated; `views`: each CFA before the scene, and its designs, by its methods."""
+    return in_all([(estimated_work(view, REFERENCE), designs) for view, designs in _over_field(views)])
 
-    `views`: each CFA before the scene, and its number of designs, by the methods of the reference.
-    Only what the scene says by itself is left out. Of a light at any place no more is promised of the worst place than
-    that its distance, as any, ends with the readout's range.
+
+def looking_s(views: Sequence[tuple[View, DesignCount]], everything_s: float) -> float:
+    """How many seconds it may take to look for a plan; 0 where that is too short to find any.
+
+    `views`, `everything_s`: of `counted_s`.
     """
     everywhere = any(all_heights_count(view) for view, _ in views)
-    views = [(place, n) for view, n in views for place in over_field(view)]
-    everything_s = in_all([(estimated_work(view, REFERENCE), n) for view, n in views])
+    views = _over_field(views)
+    found = LOOKING_SHARE * everything_s
     least_s = LEAST_LOOK_S * len(views) + max((noise_s(view) for view, _ in views), default=0.0)
-    if everywhere or least_s <= LOOKING_SHARE * everything_s:  # what all places of the sensor leave open must be known
-        return LOOKING_SHARE * everything_s
+    # What all places of the sensor leave open must be known.
+    return found if everywhere or least_s <= found else 0.0
+
+
+def everything_on(
+    views: Sequence[tuple[View, DesignCount]], everything_s: float, scenario: str, tolerance_dn: float
+) -> Plan:
+    """Everything on, but for what the scene says by itself; `views`, `everything_s`: of `counted_s`.
+
+    Of a light at any place no more is promised of the worst place than that its distance, as any, ends with the
+    readout's range.
+    """
+    views = _over_field(views)
     exact = {e: [effect.exact(view) for view, _ in views] for e, effect in EFFECTS.items()}
     longest = (math.sqrt(len(view.mosaic.channels)) * view.pixel.full_scale_dn for view, _ in views)
     open_dn = max(longest, default=0.0) * any(phase.all_count(view, REFERENCE) for view, _ in views)
@@ -38,3 +52,8 @@ def everything_on(views: Sequence[tuple[View, int]], scenario: str, tolerance_dn
         for e, effect in EFFECTS.items()
     )
     return Plan(scenario, tolerance_dn, choices, everything_s, everything_s)
+
+
+def _over_field(views: Sequence[tuple[View, DesignCount]]) -> list[tuple[View, DesignCount]]:
+    """The same at each named place of the field."""
+    return [(place, designs) for view, designs in views for place in over_field(view)]

@@ -20,6 +20,8 @@ from ..effects import blur, flicker
 from ..exposure import exposure_times, white_irradiance
 from ..seen import METHODS, SeenFilters
 from ..view import View, background_irradiance, per_photon, signal_irradiance
+from .moves import largest_change, longest_moves
+from .work import DesignCount
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,7 @@ class Box:
     view: View
     low: FloatArray
     high: FloatArray
-    n_designs: int
+    designs: DesignCount
 
 
 @dataclass(frozen=True)
@@ -253,8 +255,6 @@ class Reach:
         Cells whose pairs move most come first: one whose pairs all move less than the largest change so far cannot
         raise it, so that what is left is looked at only in the few before.
         """
-        from .compiled import largest_change, longest_moves  # noqa: PLC0415  (compiled: kept off the start-up path)
-
         nothing = np.zeros((len(change), change.shape[1], len(self.first)))
         corners, more = np.arange(len(change))[:, None], nothing
         if between is not None:
@@ -277,7 +277,7 @@ class Reach:
                 more = self._in(between.after[some], base.largest) + between.left[some] @ base.most.T
             left = (self._in(kernel, base.middle), off, more)
             changes = largest_change(moved[some], left, at, self.first, self.second, self._ends, shortened, worst)
-            start, size, worst = start + size, size * 4, float(changes)
+            start, size, worst = start + size, size * 4, changes
         return worst
 
     @staticmethod

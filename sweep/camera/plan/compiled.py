@@ -33,18 +33,11 @@ def _lengths(
         out[p] = scale * np.sqrt(out[p])
 
 
-Parts = tuple[FloatArray, FloatArray, FloatArray]
-"""What each signal is, ndarray[n_cases, n_values, n_signals]; by how much the difference of each pair may be off,
-ndarray[n_cases, n_values, n_pairs]; and by how much more in a cell of places, ndarray[n_cells, n_values, n_pairs]."""
-
-
 @njit(cache=True, nogil=True)
-def longest_moves(change: Parts, corners: IndexArray, first: IndexArray, second: IndexArray) -> FloatArray:
-    """How far the difference of each pair moves at most in each cell of places, ndarray[n_cells, n_pairs].
-
-    `change`: what changes. `corners`: the cases at the corners of each cell, ndarray[n_cells, n_corners]. `first`,
-    `second`: the signals of each pair.
-    """
+def moves_of_cells(
+    change: tuple[FloatArray, FloatArray, FloatArray], corners: IndexArray, first: IndexArray, second: IndexArray
+) -> FloatArray:
+    """`moves.longest_moves` of many cells."""
     one = np.empty(first.size)
     far = np.zeros((corners.shape[0], first.size))
     for cell in range(corners.shape[0]):
@@ -56,9 +49,9 @@ def longest_moves(change: Parts, corners: IndexArray, first: IndexArray, second:
 
 
 @njit(cache=True, nogil=True)
-def largest_change(
+def change_of_cells(
     moves: FloatArray,
-    after: Parts,
+    after: tuple[FloatArray, FloatArray, FloatArray],
     corners: IndexArray,
     first: IndexArray,
     second: IndexArray,
@@ -66,11 +59,7 @@ def largest_change(
     shortened: float,
     least: float,
 ) -> float:
-    """Largest change of the smallest distance of any group of pairs, in any cell of places; `least` where it is less.
-
-    `moves`: of `longest_moves`; `after`: what is left. `ends`: where each group of pairs begins, and the end.
-    `shortened`: how much shorter the smallest possible distance is.
-    """
+    """`moves.largest_change` of many cells."""
     low, high = np.zeros(first.size), np.zeros(first.size)
     worst = least
     for cell in range(corners.shape[0]):

@@ -9,15 +9,12 @@ from functools import cached_property
 
 from ..effects.base import Effect, LinearEffect, ReadoutEffect, Stage
 from ..effects.blur import Blur
-from ..effects.image_height import HEIGHTS, all_heights_count
-from ..field import over_field
-from ..kernel import colorless
+from ..effects.image_height import HEIGHTS
 from ..methods import REFERENCE, Methods, switched
 from ..registry import EFFECTS
 from .bounds import Box
-from .filters import at_any_height
 from .plan import NOT_ASKED, Choice, Plan
-from .promises import Promises
+from .promises import promises_of
 from .scene_kernels import SceneKernels
 from .work import LOOKING_SHARE, QUICK_S, READOUT_S, in_all, noise_s
 
@@ -37,7 +34,7 @@ class Planner:
         """
         self._for_noise, self._budget_s = for_noise, budget_s
         self._kernels: dict[tuple[tuple[int, ...], ...], SceneKernels] = {}
-        self._scenes = _promises(boxes, self._kernels)
+        self._scenes = promises_of(boxes, self._kernels)
         self._asked = list(self._scenes)
         self._exact = {name: self._why_exact(effect) for name, effect in EFFECTS.items()}
         self._works: dict[Methods, float] = {}
@@ -94,8 +91,13 @@ class Planner:
 
     def _work(self, methods: Methods) -> float:
         if methods not in self._works:
-            self._works[methods] = in_all([(scene.work_of(methods), scene.box.n_designs) for scene in self._scenes])
+            self._works[methods] = in_all([(scene.work_of(methods), scene.box.designs) for scene in self._scenes])
         return self._works[methods]
+
+    @property
+    def has_time(self) -> bool:
+        """Whether what must be known of any plan can be found out in time."""
+        return self._everywhere or not self._anywhere or self.spent_s + self._first_noise_s <= self._budget_s
 
     @property
     def _limited(self) -> bool:
@@ -110,7 +112,7 @@ class Planner:
     @cached_property
     def _first_noise_s(self) -> float:
         """Seconds that the first bound of a noisy readout takes, counted."""
-        return max((noise_s(scene.view) for scene in self._scenes), default=0.0)
+        return max((noise_s(scene.view, scene.brightest_dn) for scene in self._scenes), default=0.0)
 
     def _look_s(self, effect: Effect, methods: Methods, after: Methods) -> float:
         """Seconds that it takes to bound what another method of an effect changes, counted."""
@@ -131,11 +133,14 @@ class Planner:
         """
         if self._without_kernels and _needs_kernels(effect, getattr(after, effect.name)):
             return False
-        look_s = self._look_s(effect, methods, after)
-        if self.spent_s + look_s > self._budget_s:
+        look_s, straight = self._look_s(effect, methods, after), isinstance(effect, ReadoutEffect) and self._anywhere
+        # Behind a straight readout the search for the worst place is much shorter, as no count tells, and behind one
+        # that is nearly straight it is not: all of it is looked at, or nothing.
+        with_it = sum(isinstance(EFFECTS[name], ReadoutEffect) for name in rest) if straight else 0
+        if self.spent_s + look_s + with_it * READOUT_S * len(self._scenes) > self._budget_s:
             return False
-        if isinstance(effect, ReadoutEffect) and self._anywhere:
-            return True  # behind a straight readout the search for the worst place is much shorter, as no count tells
+        if straight:
+            return True
         saved = self._work(methods) - self._work(after)
         beside = self._work(self._completed(methods, rest)) - self._work(self._completed(after, rest))
         return max(saved, beside) > look_s
@@ -285,16 +290,3 @@ def _needs_kernels(effect: Effect, method: str) -> bool:
     if isinstance(effect, Blur):
         return method == effect.off
     return isinstance(effect, LinearEffect) and effect.limit_dn(method) is None and method != effect.reference
-
-
-def _promises(boxes: Sequence[Box], kernels: dict[tuple[tuple[int, ...], ...], SceneKernels]) -> list[Promises]:
-    """Those of each box; boxes whose CFAs have the same tile share their kernels."""
-    found = []
-    for box in boxes:
-        if (tile := box.view.mosaic.tile) not in kernels:
-            kernels[tile] = SceneKernels(colorless(over_field(box.view)[0]))
-        # Each named place of the field sees a scene of its own; the worst changes by no more than any of them.
-        everywhere = all_heights_count(box.view)
-        own = [at_any_height(box)] if everywhere else [replace(box, view=place) for place in over_field(box.view)]
-        found += [Promises(one, kernels[tile]) for one in own]
-    return found

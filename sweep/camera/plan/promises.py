@@ -11,6 +11,7 @@ already holds the latter: its extremes are those of the straight response, so th
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache
 
@@ -28,9 +29,12 @@ from ..effects.base import (
     Stage,
 )
 from ..effects.image_height import all_heights_count
+from ..field import over_field
+from ..kernel import colorless
 from ..methods import REFERENCE, Methods
 from ..registry import EFFECTS
 from .bounds import Box, Reach
+from .filters import at_any_height
 from .pixelwise import Moves
 from .scene_kernels import SceneKernels
 from .steps import Step, Steps
@@ -119,10 +123,14 @@ class Promises:
             self._ranges[key] = float(np.linalg.norm(each))
         return self._ranges[key]
 
+    @property
+    def brightest_dn(self) -> float:
+        """Of all pixels."""
+        return float(self.reach.brightest_pixels_dn.max())
+
     def why_exact(self, effect: Effect, signals_dn: float) -> str | None:
         """Why an effect's cheapest method changes nothing; `signals_dn`: the brightest signal of all boxes."""
-        top = float(self.reach.brightest_pixels_dn.max())
-        return effect.exact(self.view) or effect.never_reached(self.view, top, signals_dn)
+        return effect.exact(self.view) or effect.never_reached(self.view, self.brightest_dn, signals_dn)
 
     def _as_read(self, methods: Methods) -> float:
         """By how much a distance of the readout may differ from that of a straight one at the same place, DN.
@@ -211,3 +219,16 @@ class Promises:
         """Seconds of a bound of the optics, counted."""
         corners = 1 if not self._kernels.anywhere(REFERENCE) else self._kernels.corners.size
         return LINEAR_S + COMPARED_S * corners * len(self.view.mosaic.channels) * len(self.reach.first)
+
+
+def promises_of(boxes: Sequence[Box], kernels: dict[tuple[tuple[int, ...], ...], SceneKernels]) -> list[Promises]:
+    """Those of each box; boxes whose CFAs have the same tile share their kernels, which `kernels` takes."""
+    found = []
+    for box in boxes:
+        if (tile := box.view.mosaic.tile) not in kernels:
+            kernels[tile] = SceneKernels(colorless(over_field(box.view)[0]))
+        # Each named place of the field sees a scene of its own; the worst changes by no more than any of them.
+        everywhere = all_heights_count(box.view)
+        own = [at_any_height(box)] if everywhere else [replace(box, view=place) for place in over_field(box.view)]
+        found += [Promises(one, kernels[tile]) for one in own]
+    return found

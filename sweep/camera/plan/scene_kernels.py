@@ -102,9 +102,11 @@ class SceneKernels:
         """Of a kernel, counted."""
         if self._view.scenario.target is None or wanted.sampling == "skip":
             return 0.0
-        n_cases = self._places.n_nodes if self.anywhere(wanted) else phase.n_places(self._view, wanted.phase)
-        functions = pixels_per_place(self._view) * self._knots_nm.size
-        return KERNEL_S + n_cases * (sampling.PLACE_S + sampling.PLACE_PIXEL_S * functions)
+        functions, begun_s = pixels_per_place(self._view) * self._knots_nm.size, KERNEL_S
+        n_cases = phase.n_places(self._view, wanted.phase)
+        if self.anywhere(wanted):
+            n_cases, begun_s = self._places.n_nodes, sampling.SEARCHED_S + sampling.SEARCHED_PIXEL_S * functions
+        return begun_s + n_cases * (sampling.PLACE_S + sampling.PLACE_PIXEL_S * functions)
 
     def nearest(self, methods: Methods) -> FloatArray:
         """The kernel at the place of a lattice that is nearest to the center of each cell."""

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ..effects.base import MULTIPLICATION_S, Effect, Load
+from ..effects.noise import in_closed_form
 from ..electrons import KEPT
 from ..methods import Methods
 from ..registry import EFFECTS
@@ -17,11 +18,11 @@ from ..view import View
 
 BOX_S, TABLED_S, FOLDED_S = 2.5e-3, 3e-9, 1.4e-8
 """Seconds: of the imager of a CFA, and of a value of its table at a wavelength, on the grid and between fewer nodes."""
-REACH_S, READOUT_S, QUICK_S, LINEAR_S, COMPARED_S, KERNEL_S = 1e-3, 2.5e-3, 5e-4, 1.5e-3, 5e-9, 0.01
+REACH_S, READOUT_S, QUICK_S, LINEAR_S, COMPARED_S, KERNEL_S = 6.5e-4, 8e-4, 5e-4, 7e-4, 5e-9, 4e-3
 """Seconds of a planner: for the reach of a box, a bound of the readout, one of the optics without kernels and with
 them, each value that it compares, and a kernel of a light at a distance; `tests/bench_work.py` measures what they come
 to."""
-NOISE_S, UNEVEN_NOISE_S = 0.008, 0.06
+NOISE_S, UNEVEN_NOISE_S = 0.03, 0.06
 """Seconds of the first bounds of a noisy readout, without PRNU and with it; `tests/bench_work.py` measures them."""
 LEAST_LOOK_S = 2 * REACH_S
 """Seconds for each CFA, with which hardly anything can be found."""
@@ -32,28 +33,42 @@ LOOKING_SHARE = 0.05
 _WORKING = [effect for effect in reversed(EFFECTS.values()) if type(effect).work is not Effect.work]
 
 
-def noise_s(view: View) -> float:
-    """Seconds of the first bounds of a scene's readout, counted: its pixel is then known."""
-    if view.scenario.noise is None:
+def noise_s(view: View, brightest_dn: float = 0.0) -> float:
+    """Seconds of the first bounds of a scene's readout, counted: its pixel is then known.
+
+    `brightest_dn`: of its pixels, as far as that is known. None where closed forms tell all.
+    """
+    if view.scenario.noise is None or in_closed_form(view.pixel, brightest_dn):
         return 0.0
     return UNEVEN_NOISE_S if view.pixel.prnu else NOISE_S
 
 
+class DesignCount(NamedTuple):
+    """How many designs a CFA has; `by_edges`: their responses are those of their edges, which a table holds."""
+
+    n: int
+    by_edges: bool = False
+
+
 class Work(NamedTuple):
-    """Seconds: `shared` once, for CFAs whose tiles are alike; `own` for each CFA, `each` for every design."""
+    """Seconds: `shared` once, for CFAs whose tiles are alike; `own` for each CFA, `each` for every design.
+
+    `curve`: for the response to each design's curve.
+    """
 
     shared: float
     own: float
     each: float
+    curve: float
 
-    def of(self, n_designs: int) -> float:
+    def of(self, designs: DesignCount) -> float:
         """Of a run of some designs."""
-        return self.own + n_designs * self.each
+        return self.own + designs.n * (self.each + (0.0 if designs.by_edges else self.curve))
 
 
-def in_all(works: Sequence[tuple[Work, int]]) -> float:
-    """Seconds of the CFAs of a scene, each with its number of designs."""
-    return max((work.shared for work, _ in works), default=0.0) + sum(work.of(n) for work, n in works)
+def in_all(works: Sequence[tuple[Work, DesignCount]]) -> float:
+    """Seconds of the CFAs of a scene, each with its designs."""
+    return max((work.shared for work, _ in works), default=0.0) + sum(work.of(designs) for work, designs in works)
 
 
 def estimated_work(view: View, methods: Methods) -> Work:
@@ -68,6 +83,6 @@ def estimated_work(view: View, methods: Methods) -> Work:
     table, tabled_s = lights * changed * load.nodes, 0.0
     if 0 < table <= KEPT:
         tabled_s = lights * changed * view.grid.size * (TABLED_S if load.nodes == view.grid.size else FOLDED_S)
-    each = table * MULTIPLICATION_S + load.scales * lights * (channels * signals / 2 * MULTIPLICATION_S)
+    each = load.scales * lights * (channels * signals / 2 * MULTIPLICATION_S)
     each += load.scales * lights * load.units * load.value_s + load.search_s
-    return Work(load.shared_s, BOX_S + load.own_s + products + tabled_s, each)
+    return Work(load.shared_s, BOX_S + load.own_s + products + tabled_s, each, table * MULTIPLICATION_S)
