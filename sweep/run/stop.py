@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import partial
-from types import FrameType
+from types import FrameType, TracebackType
 
 from ..base.errors import InterruptedRunError
 
@@ -91,6 +91,10 @@ class Stop:
             return False
         return self._broken_off is None or now > self._broken_off + _AGAIN_S
 
+    def again(self) -> None:
+        """The exception was swallowed: the next knock may raise it once more."""
+        self._broken_off = None
+
     def watch(self, signals: int, main_thread: int) -> None:
         """In a thread of its own: interrupt the main thread as soon as it may be broken off.
 
@@ -129,8 +133,7 @@ def stop_on_signals(outer: Stop | None = None, *, ends_process: bool = False) ->
     os.set_blocking(at_once, False)
     watcher = threading.Thread(target=stop.watch, args=(signals, threading.get_ident()), daemon=True)
     watcher.start()
-    usual = threading.excepthook
-    threading.excepthook = partial(_told_unless_stopped, stop, usual)
+    give_back = _news_of(stop)
     earlier = signal.set_wakeup_fd(at_once, warn_on_full_buffer=False)
     before = [(number, signal.signal(number, stop._asked)) for number in SIGNALS]
     try:
@@ -139,8 +142,7 @@ def stop_on_signals(outer: Stop | None = None, *, ends_process: bool = False) ->
         raise InterruptedRunError(_SAID) from None
     finally:
         stop._over.set()
-        if not stop.requested:  # else the process ends, and the pool's thread may end after this
-            threading.excepthook = usual
+        give_back()
         with stop._sending:
             for number, handler in before:
                 signal.signal(number, handler)
@@ -151,12 +153,36 @@ def stop_on_signals(outer: Stop | None = None, *, ends_process: bool = False) ->
         os.close(at_once)
 
 
-def _told_unless_stopped(
-    stop: Stop, usual: Callable[[threading.ExceptHookArgs], object], fault: threading.ExceptHookArgs
-) -> None:
-    """Say what went wrong in a thread, but where a pool of workers finds them gone that a stop has ended."""
-    if not (stop.requested and fault.thread is not None and fault.thread.name == _POOL):
-        usual(fault)
+def _news_of(stop: Stop) -> Callable[[], None]:
+    """Nobody is told of what a stop has caused; what gives the usual hooks back.
+
+    In a pool's thread: that the workers are gone. In compiled code that can't hand an exception on, which Cython and
+    Python print and forget: that it was broken off; the main thread is broken off once more then.
+    """
+    in_threads, printed, ignored = threading.excepthook, sys.excepthook, sys.unraisablehook
+
+    def in_thread(fault: threading.ExceptHookArgs) -> None:
+        if not (stop.requested and fault.thread is not None and fault.thread.name == _POOL):
+            in_threads(fault)
+
+    def print_(kind: type[BaseException], fault: BaseException, trace: TracebackType | None) -> None:
+        if not issubclass(kind, BrokenOffError):
+            printed(kind, fault, trace)
+
+    def ignore(fault: sys.UnraisableHookArgs) -> None:
+        if issubclass(fault.exc_type, BrokenOffError):
+            stop.again()
+        else:
+            ignored(fault)
+
+    threading.excepthook, sys.excepthook, sys.unraisablehook = in_thread, print_, ignore
+
+    def give_back() -> None:
+        sys.excepthook, sys.unraisablehook = printed, ignored
+        if not stop.requested:  # else the process ends, and the pool's thread may end after this
+            threading.excepthook = in_threads
+
+    return give_back
 
 
 @contextmanager

@@ -322,3 +322,30 @@ def test_a_pool_that_misses_its_workers_after_a_stop_is_no_news(
         stop._request()
         assert told("ExecutorManagerThread") == ""
         assert "handle is closed" in told("another")
+
+
+FORGETFUL = """
+import os, signal, time
+import numpy as np
+from scipy.stats import qmc
+from sweep.base.errors import InterruptedRunError
+from sweep.run.stop import stop_on_signals
+
+def asked(*_):
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(30)
+
+np.lib.npyio.NpzFile.__getitem__ = asked  # SciPy's compiled code reads its table by this and cannot hand an exception on
+try:
+    with stop_on_signals():
+        qmc.Sobol(2, rng=1)
+        time.sleep(30)
+        print("forgotten")
+except InterruptedRunError as stopped:
+    print(stopped)
+"""
+
+
+def test_what_compiled_code_forgets_is_broken_off_again_without_news() -> None:
+    done = subprocess.run([sys.executable, "-c", FORGETFUL], capture_output=True, text=True, timeout=60, check=True)
+    assert (done.stderr, done.stdout) == ("", "interrupted; finished chunks are kept, the same command continues\n")
