@@ -161,8 +161,14 @@ class Imager:
 
 
 _imagers: Cache[bytes, Imager] = Cache(16)
+_known: Cache[int, tuple[View, Imager]] = Cache(4)
+"""Those of the views of the last blocks, by the views themselves, which nobody changes."""
 
 
 def imager_of(view: View) -> Imager:
     """The imager of a view; the latest ones are kept, so that a kernel is made once in a process."""
-    return _imagers.get(hashlib.sha256(pickle.dumps(view)).digest(), lambda: Imager(view))
+
+    def made() -> tuple[View, Imager]:
+        return view, _imagers.get(hashlib.sha256(pickle.dumps(view)).digest(), lambda: Imager(view))
+
+    return _known.get(id(view), made)[1]

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import gc
 import os
 import signal
 import sys
 
-_BETWEEN_COLLECTIONS = 100_000
-"""New objects until garbage is looked for. Modules make many that stay: at Python's 700 that is a tenth of what a short
-command takes."""
+from ..base.garbage import collect_rarely
 
 
 def start() -> None:
@@ -21,7 +18,7 @@ def start() -> None:
     usual = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # not where the caller had it ignored
     if usual:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
-    gc.set_threshold(_BETWEEN_COLLECTIONS, *gc.get_threshold()[1:])
+    collect_rarely()
     from .app import main as command  # noqa: PLC0415  (it takes long enough for a Ctrl-C)
 
     if usual:

@@ -11,7 +11,7 @@ import hashlib
 import pickle
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -87,6 +87,19 @@ class CurveBlock:
         return steepest, lowest
 
 
+class KnownShapes(NamedTuple):
+    """What `compiled.shapes_of_edges` knows of a grid before it sees a design."""
+
+    inverse: FloatArray
+    dark: FloatArray
+    before: FloatArray
+    after: FloatArray
+    steps: FloatArray
+    lows: FloatArray
+    of_left: FloatArray
+    of_right: FloatArray
+
+
 @dataclass
 class Tables:
     """All edges of a grid, ndarray[n_edges, n_wavelengths] each, and what they give with weights."""
@@ -98,6 +111,7 @@ class Tables:
     _products: Cache[tuple[Any, ...], tuple[FloatArray, tuple[FloatArray, FloatArray, FloatArray]]] = field(
         default_factory=lambda: Cache(_KEPT_TABLES)
     )
+    _shapes: Cache[tuple[float, bytes], KnownShapes] = field(default_factory=lambda: Cache(_KEPT_TABLES))
 
     @cached_property
     def spans(self) -> tuple[IndexArray, IndexArray]:
@@ -105,6 +119,19 @@ class Tables:
         from .compiled import spans  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         return spans(self.left), spans(self.right)
+
+    def shapes(self, base_qe: FloatArray, deep: float) -> KnownShapes:
+        """What is known of the shapes of designs of a depth; `base_qe`: ndarray[n_wavelengths]."""
+        from .compiled import edge_shapes, outside, ranges_of  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+        def made() -> KnownShapes:
+            ratio, (left, right) = _inverse(base_qe), self.spans
+            of_left = edge_shapes(self.base, self.change, deep * self.left, left, *ratio)
+            of_right = edge_shapes(self.base, self.change, deep * (1.0 - self.right), right, *ratio)
+            between = ranges_of(self.base + self.change * deep, *ratio)
+            return KnownShapes(*ratio, *outside(self.base, *ratio), *between, of_left, of_right)
+
+        return self._shapes.get((deep, base_qe.tobytes()), made)
 
     def product(self, weights: FloatArray, nodes: IndexArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The weighted sums of the base, and of the change times each edge."""
@@ -156,10 +183,10 @@ class EdgeBlock:
 
         steepest, lowest = np.empty(len(self)), np.empty(len(self))
         tables = self.tables
-        deep = self.depth[np.isfinite(self.depth)][:1].sum()  # most grids have one depth
+        deep = float(self.depth[np.isfinite(self.depth)][:1].sum())  # most grids have one depth
         edges = (tables.left, tables.right, *tables.spans, self.at_left, self.at_right)
-        depths = (self.depth, float(deep), self.depth == deep)
-        shapes_of_edges(tables.base, tables.change, *edges, *depths, *_inverse(base_qe[0]), steepest, lowest)
+        known = tables.shapes(np.asarray(base_qe[0], dtype=float), deep)
+        shapes_of_edges(tables.base, tables.change, *edges, self.depth, deep, *known, steepest, lowest)
         return steepest, lowest
 
 
@@ -181,6 +208,8 @@ def _shapes(curves: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple[
 
 
 _tables: Cache[bytes, Tables] = Cache(_KEPT_TABLES)
+_known: Cache[int, tuple[Space, Tables | None]] = Cache(_KEPT_TABLES)
+"""Those of the spaces of the last blocks, by the spaces themselves, which nobody changes."""
 
 
 def by_edges(space: Space) -> bool:
@@ -205,6 +234,17 @@ def edges_of(space: Space, start: int, stop: int) -> EdgeBlock | None:
 
 def edges_of_some(space: Space, numbers: IndexArray) -> EdgeBlock | None:
     """Designs of a grid by their edges; None where the family is not separable, or its tables were too large."""
+    _, tables = _known.get(id(space), lambda: (space, _tables_of(space)))
+    if tables is None:
+        return None
+    left, left_width, right, right_width, depth = space.digits(numbers)
+    at_left = left * len(space.axes[_LEFT_WIDTH]) + left_width
+    at_right = right * len(space.axes[_RIGHT_WIDTH]) + right_width
+    return EdgeBlock(space, numbers, tables, at_left, at_right, np.asarray(space.axes[_DEPTH], dtype=float)[depth])
+
+
+def _tables_of(space: Space) -> Tables | None:
+    """The tables of a grid's edges; those of equal grids are the same ones."""
     found = _separable(space)
     if found is None:
         return None
@@ -219,8 +259,4 @@ def edges_of_some(space: Space, numbers: IndexArray) -> EdgeBlock | None:
         left_edges, right_edges = (family.edges(pair) for pair in pairs)
         return Tables(base, change, left_edges, right_edges)
 
-    tables = _tables.get(key, made)
-    left, left_width, right, right_width, depth = space.digits(numbers)
-    at_left = left * len(space.axes[_LEFT_WIDTH]) + left_width
-    at_right = right * len(space.axes[_RIGHT_WIDTH]) + right_width
-    return EdgeBlock(space, numbers, tables, at_left, at_right, np.asarray(space.axes[_DEPTH], dtype=float)[depth])
+    return _tables.get(key, made)

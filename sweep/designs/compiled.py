@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.machine_code import njit
-from ..base.types import BoolArray, FloatArray, IndexArray
+from ..base.types import FloatArray, IndexArray
 from .vectorized import larger, smaller
 
 _NUMBERS = {"nnan", "nsz"}
@@ -72,7 +72,7 @@ def spans(edges: FloatArray) -> IndexArray:
 
 
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
-def _outside(base: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple[FloatArray, FloatArray]:
+def outside(base: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple[FloatArray, FloatArray]:
     """`_shape` of the base curve's first w wavelengths, and of those from w on: two ndarray[n_wavelengths + 1, 2]."""
     n = base.size
     before, after = np.empty((n + 1, 2)), np.empty((n + 1, 2))
@@ -90,6 +90,43 @@ def _outside(base: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple[F
 
 
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
+def ranges_of(curve: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Steepest step and lowest value, as of `_shape`, of 2^k wavelengths from each on: ndarray[k, n_wavelengths]."""
+    n = curve.size
+    levels = 1
+    while 1 << levels <= n:
+        levels += 1
+    steps, lows = np.zeros((levels, n)), np.empty((levels, n))
+    for w in range(n):
+        lows[0, w] = curve[w] * inverse[w] + dark[w]
+    for w in range(n - 1):
+        steps[0, w] = abs(curve[w + 1] - curve[w])
+    for k in range(1, levels):
+        half = 1 << (k - 1)
+        for w in range(n - 2 * half + 1):
+            steps[k, w] = larger(steps[k - 1, w], steps[k - 1, w + half])
+            lows[k, w] = smaller(lows[k - 1, w], lows[k - 1, w + half])
+    return steps, lows
+
+
+@njit(cache=True, nogil=True, fastmath=_NUMBERS)
+def edge_shapes(
+    base: FloatArray, change: FloatArray, edges: FloatArray, spans: IndexArray, inverse: FloatArray, dark: FloatArray
+) -> FloatArray:
+    """`_shape` where each edge rises or falls alone, with the steps to both sides: ndarray[n_edges, 2].
+
+    `edges`: what the change is multiplied by, ndarray[n_edges, n_wavelengths].
+    """
+    found, curve = np.empty((edges.shape[0], 2)), np.empty(base.size)
+    for e in range(edges.shape[0]):
+        own = slice(max(spans[e, 0] - 1, 0), min(spans[e, 1] + 1, base.size))
+        for w in range(own.start, own.stop):
+            curve[w] = base[w] + change[w] * edges[e, w]
+        found[e] = _shape(curve[own], inverse[own], dark[own])
+    return found
+
+
+@njit(cache=True, nogil=True, fastmath=_NUMBERS)
 def _between_edges(
     base: FloatArray, change: FloatArray, deep: float, left: FloatArray, right: FloatArray, curve: FloatArray
 ) -> None:
@@ -98,53 +135,16 @@ def _between_edges(
 
 
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
-def _ranges_of(curve: FloatArray, inverse: FloatArray, dark: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Steepest step and lowest value, as of `_shape`, of 2^k wavelengths from each on: ndarray[k, n_wavelengths]."""
-    n = curve.size
-    levels = 1
-    while 2**levels <= n:
-        levels += 1
-    steps, lows = np.zeros((levels, n)), np.empty((levels, n))
-    for w in range(n):
-        lows[0, w] = curve[w] * inverse[w] + dark[w]
-    for w in range(n - 1):
-        steps[0, w] = abs(curve[w + 1] - curve[w])
-    for k in range(1, levels):
-        half = 2 ** (k - 1)
-        for w in range(n - 2 * half + 1):
-            steps[k, w] = larger(steps[k - 1, w], steps[k - 1, w + half])
-            lows[k, w] = smaller(lows[k - 1, w], lows[k - 1, w + half])
-    return steps, lows
-
-
-@njit(cache=True, nogil=True, fastmath=_NUMBERS)
 def _inner_shape(steps: FloatArray, lows: FloatArray, begin: int, end: int) -> tuple[float, float]:
-    """`_shape` of the wavelengths begin..end-1, at least one, by `_ranges_of`."""
+    """`_shape` of the wavelengths begin..end-1, at least one, by `ranges_of`."""
     n, k, step = end - begin, 0, 0.0
-    while 2 ** (k + 1) <= n:
+    while 1 << (k + 1) <= n:
         k += 1
-    low = smaller(lows[k, begin], lows[k, end - 2**k])
+    low = smaller(lows[k, begin], lows[k, end - (1 << k)])
     if n > 1:  # one step less than values
-        k -= 2**k > n - 1
-        step = larger(steps[k, begin], steps[k, end - 1 - 2**k])
+        k -= 1 << k > n - 1
+        step = larger(steps[k, begin], steps[k, end - 1 - (1 << k)])
     return step, low
-
-
-@njit(cache=True, nogil=True, fastmath=_NUMBERS)
-def _one_edge(
-    base: FloatArray,
-    change: FloatArray,
-    edge: FloatArray,
-    span: IndexArray,
-    inverse: FloatArray,
-    dark: FloatArray,
-    curve: FloatArray,
-) -> tuple[float, float]:
-    """`_shape` where an edge rises, with the steps to both sides; `edge`: what the change is multiplied by."""
-    own = slice(max(span[0] - 1, 0), min(span[1] + 1, base.size))
-    for w in range(own.start, own.stop):
-        curve[w] = base[w] + change[w] * edge[w]
-    return _shape(curve[own], inverse[own], dark[own])
 
 
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
@@ -159,43 +159,38 @@ def shapes_of_edges(
     at_right: IndexArray,
     depth: FloatArray,
     deep: float,
-    alike: BoolArray,
     inverse: FloatArray,
     dark: FloatArray,
+    before: FloatArray,
+    after: FloatArray,
+    steps: FloatArray,
+    lows: FloatArray,
+    of_left: FloatArray,
+    of_right: FloatArray,
     steepest: FloatArray,
     lowest: FloatArray,
 ) -> None:
     """`shapes` of base + change depth (left - right), without keeping a curve.
 
     `base`, `change`: ndarray[n_wavelengths]; `left`, `right`: ndarray[n_edges, n_wavelengths]; their `spans`; the rest
-    as in `through_edges`. Where both edges are 0, or both 1, the curve is its base, and is not looked at again. Where
-    one edge rises before the other, each is looked at once, and so is what lies between: of designs that are `alike`,
-    ndarray[n_designs], in their depth, `deep`.
+    as in `through_edges`. Where both edges are 0, or both 1, the curve is its base: `before` and `after`, of `outside`.
+    Where one edge rises before the other, the curve between them is known from `steps` and `lows`, of `ranges_of`, and
+    where one rises, from the `edge_shapes` `of_left`, `of_right`: those of designs whose depth is `deep`.
     """
-    before, after = _outside(base, inverse, dark)
     curve, n = np.empty(base.size), base.size
-    steps, lows = _ranges_of(base + change * deep, inverse, dark)
-    of_left, of_right = np.full((len(left), 2), -1.0), np.full((len(right), 2), -1.0)
     for d in range(depth.size):
         one, other = at_left[d], at_right[d]
         risen, falls = left_spans[one, 1], right_spans[other, 0]
-        if alike[d] and 0 < left_spans[one, 0] < risen < falls < right_spans[other, 1] < n:
-            if of_left[one, 0] < 0:
-                of_left[one] = _one_edge(base, change, deep * left[one], left_spans[one], inverse, dark, curve)
-            if of_right[other, 0] < 0:
-                of_right[other] = _one_edge(
-                    base, change, deep * (1.0 - right[other]), right_spans[other], inverse, dark, curve
-                )
+        if depth[d] == deep and 0 < left_spans[one, 0] < risen < falls < right_spans[other, 1] < n:
+            begin, end = left_spans[one, 0], right_spans[other, 1]
             step, low = _inner_shape(steps, lows, risen, falls)
             step = larger(larger(step, of_left[one, 0]), of_right[other, 0])
             low = smaller(smaller(low, of_left[one, 1]), of_right[other, 1])
-            steepest[d] = larger(step, larger(before[left_spans[one, 0], 0], after[right_spans[other, 1], 0]))
-            lowest[d] = smaller(low, smaller(before[left_spans[one, 0], 1], after[right_spans[other, 1], 1]))
-            continue
-        begin = min(left_spans[one, 0], right_spans[other, 0])
-        end = max(left_spans[one, 1], right_spans[other, 1])
-        own = slice(max(begin - 1, 0), min(end + 1, base.size))  # with the steps to both sides
-        _between_edges(base[own], change[own], depth[d], left[one, own], right[other, own], curve[own])
-        step, low = _shape(curve[own], inverse[own], dark[own])
+        else:
+            begin = min(left_spans[one, 0], right_spans[other, 0])
+            end = max(left_spans[one, 1], right_spans[other, 1])
+            own = slice(max(begin - 1, 0), min(end + 1, base.size))  # with the steps to both sides
+            _between_edges(base[own], change[own], depth[d], left[one, own], right[other, own], curve[own])
+            step, low = _shape(curve[own], inverse[own], dark[own])
         steepest[d] = larger(step, larger(before[begin, 0], after[end, 0]))
         lowest[d] = smaller(low, smaller(before[begin, 1], after[end, 1]))

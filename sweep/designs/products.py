@@ -17,8 +17,9 @@ def row_products(rows: FloatArray, matrix: FloatArray) -> FloatArray:
     processors, a row's place among others. So every row is multiplied by itself, by the same call.
     """
     if 0 < len(matrix) <= _FEW_TERMS:
-        found = rows[:, :1] * matrix[0]
+        columns = np.ascontiguousarray(rows.T)
+        found = matrix[0][:, None] * columns[0]
         for at in range(1, len(matrix)):
-            found += rows[:, at, None] * matrix[at]
-        return np.asarray(found)
+            found += matrix[at][:, None] * columns[at]
+        return np.asarray(found.T)
     return np.asarray(np.matmul(np.ascontiguousarray(rows)[:, None, :], matrix)[:, 0])

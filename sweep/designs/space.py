@@ -66,8 +66,9 @@ class Space:
         rest = numbers
         found = []
         for axis in reversed(self.axes):  # mixed radix: NumPy's own unravel_index stops at 64 axes
-            rest, digit = np.divmod(rest, len(axis))
-            found.append(digit)
+            whole = rest // len(axis)  # several times as fast as divmod
+            found.append(rest - whole * len(axis))
+            rest = whole
         return found[::-1]
 
     def points(self, start: int, stop: int) -> FloatArray:

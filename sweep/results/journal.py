@@ -145,7 +145,7 @@ class Journal:
 
     def table(self, key: str, schema: pa.Schema, rows: int) -> pa.Table | None:
         """The table kept under `key`; None, and forgotten, when it is missing, damaged or of other columns or size."""
-        content = self._intact(key)
+        content = self.content(key)
         table = None if content is None else decoded(content, schema, rows)
         if table is None:
             self.entries.pop(key, None)
@@ -153,7 +153,7 @@ class Journal:
 
     def answer(self, key: str) -> bytes | None:
         """The text of the answer kept under `key`, or None."""
-        return self._intact(key)
+        return self.content(key)
 
     def forget(self, key: str) -> None:
         """Do not use a finished piece again."""
@@ -177,8 +177,8 @@ class Journal:
                 self.folder.rmdir()
         self.entries.clear()
 
-    def _intact(self, key: str) -> bytes | None:
-        """What is kept under `key`, or None when its file is missing or does not hold what was written."""
+    def content(self, key: str) -> bytes | None:
+        """The bytes kept under `key`, or None when their file is missing or does not hold what was written."""
         entry = self.entries.get(key)
         if entry is None:
             return None

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -67,7 +65,6 @@ FEW = (PLAIN, NAMED, FOUND)
 """Kinds of which there are few rows."""
 ROW_GROUP = 131_072
 """Rows that are read and written at once."""
-_TABLES_AHEAD = 3
 Seal = Callable[[Path], None]
 """Sees a file that is written to its end, before it takes its name."""
 
@@ -103,12 +100,12 @@ def front_schema(parameters: Sequence[str]) -> pa.Schema:
     return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION})
 
 
-def _unsealed(_: Path) -> None:
+def unsealed(_: Path) -> None:
     """Nothing is noted of a file before it takes its name."""
 
 
 @contextmanager
-def atomic(path: Path, seal: Seal = _unsealed) -> Iterator[Path]:
+def atomic(path: Path, seal: Seal = unsealed) -> Iterator[Path]:
     """Give a hidden name beside `path`; on success it is synced and takes the name of `path`, else it is removed.
 
     `seal` sees the whole hidden file before it takes its name. A symbolic link at `path` is replaced, not followed.
@@ -132,13 +129,13 @@ def atomic(path: Path, seal: Seal = _unsealed) -> Iterator[Path]:
             hidden.unlink()
 
 
-def write_table(table: pa.Table, path: Path, seal: Seal = _unsealed) -> None:
+def write_table(table: pa.Table, path: Path, seal: Seal = unsealed) -> None:
     """Write one Parquet file atomically, with a checksum of each page; `seal` and errors as for `atomic`."""
     with atomic(path, seal) as hidden:
         _write_table(table, hidden, row_group_size=ROW_GROUP)
 
 
-def write_bytes(content: bytes, path: Path, seal: Seal = _unsealed) -> None:
+def write_bytes(content: bytes, path: Path, seal: Seal = unsealed) -> None:
     """Write one file atomically; `seal` and errors as for `atomic`."""
     with atomic(path, seal) as hidden:
         hidden.write_bytes(content)
@@ -202,40 +199,6 @@ def decoded(content: bytes, schema: pa.Schema, rows: int) -> pa.Table | None:
         return table.replace_schema_metadata({**(table.schema.metadata or {}), **(schema.metadata or {})})
     except (OSError, pa.ArrowException):
         return None
-
-
-def write_tables(tables: Iterable[pa.Table], schema: pa.Schema, path: Path, seal: Seal = _unsealed) -> None:
-    """Write tables as one Parquet file, in full row groups, one of which is in memory; else as `write_table`.
-
-    The next table is made while one is written.
-    """
-    words = _repeating(schema)
-    with (
-        atomic(path, seal) as hidden,
-        pq.ParquetWriter(hidden, schema, use_dictionary=words, write_page_checksum=True) as writer,
-    ):
-        waiting: list[pa.Table] = []
-
-        def write() -> None:
-            writer.write_table(pa.concat_tables(waiting).unify_dictionaries(), row_group_size=ROW_GROUP)
-            waiting.clear()
-            release_memory()
-
-        for table in _ahead(iter(tables)):
-            waiting.append(table)
-            if sum(part.num_rows for part in waiting) >= ROW_GROUP:
-                write()
-        if waiting:
-            write()
-
-
-def _ahead(tables: Iterator[pa.Table]) -> Iterator[pa.Table]:
-    """The same tables; a thread makes the next few while one is used."""
-    with ThreadPoolExecutor(1) as thread:
-        coming = deque(thread.submit(next, tables, None) for _ in range(_TABLES_AHEAD))
-        while (table := coming.popleft().result()) is not None:
-            coming.append(thread.submit(next, tables, None))
-            yield table
 
 
 def _repeating(schema: pa.Schema) -> list[str] | bool:

@@ -19,6 +19,7 @@ from ..metrics.bound import FEASIBLE
 from ..metrics.pareto import hypervolume
 from ..results.facts import Provenance
 from ..results.inventory import Inventory
+from ..results.joined import EncodedRows, write_joined
 from ..results.journal import Journal
 from ..results.names import TABLES
 from ..results.tables import (
@@ -30,10 +31,10 @@ from ..results.tables import (
     RESULTS,
     SEARCH_LOG,
     VISION_TABLES,
+    encoded,
     holds,
     json_of,
     sliced,
-    write_tables,
 )
 from ..results.thinning import swept_points
 from ..search.limit import Limit
@@ -170,8 +171,8 @@ class Making:
         for row in answered:
             gathered.add(row)
         gathered.finish()
-        tables = map(gathered.front.marked, chain(sweep.tables(), answered))
-        write_tables(tables, self.rules.schema, results, self.inventory.seal(RESULTS))
+        parts = chain(sweep.parts(), (EncodedRows(encoded(row), row.num_rows) for row in answered))
+        write_joined(parts, gathered.front.late, self.rules.schema, results, self.inventory.seal(RESULTS))
         detours: Detours = sum(map(detours_of, answered), sweep.detours)
         self.inventory.facts["detours"] = [{"how": how, "why": why, "designs": n} for (how, why), n in detours.items()]
         self.gathered, self._failed, self._warnings = gathered, sweep.failed, sweep.warnings

@@ -10,6 +10,7 @@ import pyarrow as pa
 from ..base.types import BoolArray, FloatArray, IndexArray
 from ..metrics.pareto import non_dominated
 from ..results.arrays import places, values_of
+from ..results.joined import Late
 from ..results.tables import FEW, SWEPT, holds
 from ..results.thinning import best_at, best_rows, leading, leading_at
 from .rows import Rules
@@ -53,6 +54,11 @@ class Front:
     def points(self, cfa: str, scenario: str) -> FloatArray:
         """The two quantities of a front's rows, ndarray[n, 2], each pair once."""
         return self._groups.get((cfa, scenario), np.empty((0, 2)))
+
+    @property
+    def late(self) -> Late:
+        """The column `pareto` of a whole table."""
+        return Late("pareto", ["pareto", "kind", "cfa", "scenario", *self._axes], self.marked)
 
     def marked(self, table: pa.Table) -> pa.Table:
         """The table with `pareto` only where a row is on the whole front, which is finished."""

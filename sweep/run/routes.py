@@ -169,12 +169,13 @@ def _not_finite(columns: Columns, view: View, request: Request) -> dict[int, str
     """Designs with a quantity that is no finite number, though each of them has it."""
     lacking = _may_lack(view, request)
     infinite = {name for name, quantity in request.quantities.items() if quantity.infinite}
-    numbers = [
-        np.where(values == np.inf, 0.0, values) if name in infinite else values
-        for name, values in columns.items()
-        if name not in lacking
-    ]
-    return {int(index): "not finite" for index in np.flatnonzero(~np.isfinite(numbers).all(axis=0))}
+    faulty: set[int] = set()
+    for name in columns.keys() - lacking:
+        finite = np.isfinite(columns[name])
+        if not finite.all():
+            finite |= (columns[name] == np.inf) & (name in infinite)
+            faulty |= set(np.flatnonzero(~finite).tolist())
+    return dict.fromkeys(sorted(faulty), "not finite")
 
 
 def _may_lack(view: View, request: Request) -> set[str]:

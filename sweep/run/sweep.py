@@ -16,6 +16,7 @@ from ..base.errors import FailedDesignError, Fault, OutputError
 from ..base.types import Call, Progress, delayed
 from ..camera.view import View
 from ..results.identity import fingerprint
+from ..results.joined import EncodedRows
 from ..results.journal import Journal, Shard
 from ..results.tables import sliced
 from ..study import Study
@@ -105,14 +106,15 @@ class Sweep:
     def run(self, gathered: Gathered, progress: Progress, *, fail_fast: bool, retry_failed: bool) -> None:
         """Compute what is not kept yet; `gathered` takes in all rows.
 
-        Raises FailedDesignError, after its chunk is kept, if it is to `fail_fast`.
+        Raises FailedDesignError, after its chunk is kept, if it is to `fail_fast`. Counts failures and detours.
         """
+        self.failed, self.detours = 0, Counter()
         entries = self.journal.entries
         for index, key in enumerate(self.keys):
             if key in entries and retry_failed and entries[key].failed:
                 self.journal.forget(key)
             elif key in entries and (table := self._kept(index)) is not None:
-                gathered.add(few_of(table, self.rules))
+                self._take_in(few_of(table, self.rules), entries[key].failed, gathered)
         todo = [index for index, key in enumerate(self.keys) if key not in entries]
         done = sum(entries[key].rows for key in self.keys if key in entries)
         progress("designs", done, self.study.n_designs)
@@ -128,7 +130,7 @@ class Sweep:
 
         for found in self.crew(calls, _quarantined, keep):
             for shard, few, looks in found:
-                gathered.add(few)
+                self._take_in(few, shard.failed, gathered)
                 self.looks |= looks
                 done += shard.rows
                 if shard.failed and fail_fast:
@@ -156,26 +158,33 @@ class Sweep:
         plan = self.study.plans.get(scenario)
         return 0.0 if plan is None else plan.work
 
-    def tables(self) -> Iterator[pa.Table]:
-        """All finished chunks in order; one whose file is damaged is computed again. Counts failures and detours."""
-        self.failed, self.detours = 0, Counter()
+    def parts(self) -> Iterator[EncodedRows]:
+        """All finished chunks in order, as files; one whose file was damaged since is computed again."""
         for index, (job, key) in enumerate(zip(self.jobs, self.keys, strict=True)):
-            table = self._kept(index)
-            if table is None:
+            content = self.journal.content(key)
+            if content is None:
+                self._tell_damaged(index)
                 ((shard, *_),) = _shards([(job, self._view(job))], self.rules)
                 self.journal.save(key, index, shard)
-                table = shard.table()
-            self.failed += self.journal.entries[key].failed
-            self.detours += detours_of(table)
-            yield table
+                content = shard.content
+            yield EncodedRows(content, job.stop - job.start)
 
     def _kept(self, index: int) -> pa.Table | None:
         """A finished chunk; None, and it counts as not finished, if its file is damaged."""
         job = self.jobs[index]
         table = self.journal.table(self.keys[index], self.rules.schema, job.stop - job.start)
         if table is None:
-            self.warnings.append(f"chunk {index} was damaged on the disk and is computed again")
+            self._tell_damaged(index)
         return table
+
+    def _tell_damaged(self, index: int) -> None:
+        self.warnings.append(f"chunk {index} was damaged on the disk and is computed again")
+
+    def _take_in(self, few: pa.Table, failed: int, gathered: Gathered) -> None:
+        """A finished chunk, of which `few_of` gives these rows."""
+        self.failed += failed
+        self.detours += detours_of(few)
+        gathered.add(few)
 
 
 def _shards(batch: Sequence[tuple[Job, View]], rules: Rules, looking: Looking | None = None) -> list[_Finished]:

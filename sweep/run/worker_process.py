@@ -12,6 +12,8 @@ from functools import cache, partial
 
 from joblib.externals.loky import process_executor
 
+from ..base.garbage import collect_rarely
+
 _PR_SET_PDEATHSIG = 1
 """Number of prctl's option in Linux's sys/prctl.h."""
 _KEPT_BYTES, _LARGE_BYTES = 2**26, 2**24
@@ -29,11 +31,12 @@ def preparing(parent_pid: int) -> Callable[[], None]:
 
 
 def prepare_worker(parent_pid: int) -> None:
-    """Leave signals to the parent, end with it, and keep caches and freed memory."""
+    """Leave signals to the parent, end with it, keep caches and freed memory, and look for garbage rarely."""
     leave_signals_to_the_parent()
     end_with(parent_pid)
     keep_caches()
     keep_freed_memory()
+    collect_rarely()
 
 
 def leave_signals_to_the_parent() -> None:

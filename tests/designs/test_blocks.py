@@ -134,7 +134,7 @@ def test_the_separable_route_refuses_what_is_not_separable(monkeypatch: pytest.M
     assert edges_of(Space("reference", "RGGB", "RGGB"), 0, 1) is None
     assert edges_of(replace(SPACE, gridded=False), 0, 1) is None
     monkeypatch.setattr(blocks, "_MOST_BYTES", 1000)
-    assert edges_of(SPACE, 0, 1) is None
+    assert edges_of(replace(SPACE), 0, 1) is None  # a space that was not seen before
 
 
 @settings(max_examples=60, deadline=None)
