@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from ..base.types import BoolArray, FloatArray, IndexArray
-from ..designs.block import Block, EdgeBlock
+from ..designs.block import Block, EdgeBlock, EdgeSums
 from ..designs.products import row_products
 from .effects import flicker, quadrature
 from .exposure import exposure_times, fixed_white, white_irradiance
@@ -36,12 +36,11 @@ _MANY = 50_000
 class ByEdges(NamedTuple):
     """What a channel's electrons/s are sums of, in one case: base + depth (left - right) + fixed + uniform.
 
-    `table`: of the base, ndarray[n_signals], of left and of right edges, ndarray[n_edges, n_signals]; `block`: which
-    edges each design has; `fixed`: ndarray[n_signals], `uniform`: ndarray[n_designs]. `line`: how they are read, see
-    `Readout.line`.
+    `sums`: of base and edges, for each signal; `block`: which edges each design has; `fixed`: ndarray[n_signals],
+    `uniform`: ndarray[n_designs]. `line`: how they are read, see `Readout.line`.
     """
 
-    table: tuple[FloatArray, FloatArray, FloatArray]
+    sums: EdgeSums
     block: EdgeBlock
     fixed: FloatArray
     uniform: FloatArray
@@ -262,14 +261,20 @@ class Electrons:
             return None
         everywhere = np.arange(view.grid.size)
         time_s = exposure_times(view, np.zeros((1, 1)), self._fixed_white)
-        which = exposure_times(view, block.product(self.white[:, None], everywhere), self._fixed_white) == time_s
+        white = block.product(self.white[:, None], everywhere)
+        if white.max(initial=0.0) <= self._fixed_white:
+            which = np.ones(len(block), dtype=bool)
+        else:
+            which = exposure_times(view, white, self._fixed_white) == time_s
         if not which.any() or not np.isfinite(time_s[0]) or self.scales(time_s).shape[1] > 1:
             return None
         some = block if which.all() else block.some(np.flatnonzero(which))
         unit = int(self._touched[0])
         self._work["response"] += len(some) * self._kept.size
-        uniform = some.product(np.ascontiguousarray(self.background[:, 0].T), everywhere)[:, self.place]
-        uniform = uniform * self._modified_uniform[:, unit, 0]
+        uniform = np.zeros((len(some), len(self.place)))
+        if self.background.any():
+            uniform = some.product(np.ascontiguousarray(self.background[:, 0].T), everywhere)[:, self.place]
+            uniform *= self._modified_uniform[:, unit, 0]
         uniform = self._fixed_uniform[:, unit] + uniform + view.pixel.dark_e_per_s
         rest = self.fixed + (self._fixed_uniform + view.pixel.dark_e_per_s)[:, None]
         fixed, kept, nodes = np.ascontiguousarray(self.fixed[:, :, unit]), self._kept, self._nodes

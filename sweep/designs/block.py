@@ -87,6 +87,25 @@ class CurveBlock:
         return steepest, lowest
 
 
+@dataclass(frozen=True)
+class EdgeSums:
+    """Weighted sums: of the base, ndarray[n], and of the change times each edge, ndarray[n_edges, n]."""
+
+    base: FloatArray
+    left: FloatArray
+    right: FloatArray
+
+    @cached_property
+    def across(self) -> FloatArray:
+        """`right` with the edges side by side, ndarray[n, n_edges]."""
+        return np.ascontiguousarray(self.right.T)
+
+    @cached_property
+    def largest(self) -> float:
+        """The largest of all; NaN where one is."""
+        return float(np.max([np.abs(part).max() for part in (self.base, self.left, self.right)]))
+
+
 class KnownShapes(NamedTuple):
     """What `compiled.shapes_of_edges` knows of a grid before it sees a design."""
 
@@ -108,9 +127,7 @@ class Tables:
     change: FloatArray
     left: FloatArray
     right: FloatArray
-    _products: Cache[tuple[Any, ...], tuple[FloatArray, tuple[FloatArray, FloatArray, FloatArray]]] = field(
-        default_factory=lambda: Cache(_KEPT_TABLES)
-    )
+    _products: Cache[tuple[Any, ...], tuple[FloatArray, EdgeSums]] = field(default_factory=lambda: Cache(_KEPT_TABLES))
     _shapes: Cache[tuple[float, bytes], KnownShapes] = field(default_factory=lambda: Cache(_KEPT_TABLES))
 
     @cached_property
@@ -133,13 +150,12 @@ class Tables:
 
         return self._shapes.get((deep, base_qe.tobytes()), made)
 
-    def product(self, weights: FloatArray, nodes: IndexArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def product(self, weights: FloatArray, nodes: IndexArray) -> EdgeSums:
         """The weighted sums of the base, and of the change times each edge."""
 
-        def made() -> tuple[FloatArray, FloatArray, FloatArray]:
+        def made() -> EdgeSums:
             changed = self.change[nodes, None] * weights
-            edges = (self.left[:, nodes] @ changed, self.right[:, nodes] @ changed)
-            return (self.base[nodes] @ weights, *edges)
+            return EdgeSums(self.base[nodes] @ weights, self.left[:, nodes] @ changed, self.right[:, nodes] @ changed)
 
         # Many weights are told by where they are: they are held as long as what they give, and nobody changes them.
         data = weights.__array_interface__["data"][0] if weights.size > _FEW_WEIGHTS else weights.tobytes()
@@ -174,7 +190,8 @@ class EdgeBlock:
         from .compiled import through_edges  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         found = np.empty((len(self), weights.shape[1]))
-        through_edges(*self.tables.product(weights, nodes), self.at_left, self.at_right, self.depth, found)
+        sums = self.tables.product(weights, nodes)
+        through_edges(sums.base, sums.left, sums.right, self.at_left, self.at_right, self.depth, found)
         return found
 
     def shapes(self, base_qe: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -22,9 +22,12 @@ _EXACT = 2.0**24
 _NUMBERS = {"nnan", "nsz"}
 
 Floats32 = np.ndarray[tuple[int, ...], np.dtype[np.float32]]
-Edges = tuple[FloatArray, FloatArray, FloatArray, IndexArray, IndexArray, FloatArray]
+_MOST_RUNS = 8
+"""Of designs side by side: with more of them, each design is read by itself."""
+Edges = tuple[FloatArray, FloatArray, FloatArray, FloatArray, IndexArray, IndexArray, FloatArray]
 """Electrons/s of the channel by the edges: of the base, ndarray[n_signals], what the left and what the right edges
-change, ndarray[n_edges, n_signals] each; which edges each design has, and its depth, ndarray[n_designs] each."""
+change, ndarray[n_edges, n_signals] each, and the latter the other way round, ndarray[n_signals, n_edges]; which edges
+each design has, and its depth, ndarray[n_designs] each."""
 Exposed = tuple[FloatArray, FloatArray, float]
 """Electrons/s of the channel that no design changes, ndarray[n_signals], those of each design that are the same for
 every signal, ndarray[n_designs], and the exposure, s."""
@@ -38,7 +41,7 @@ def _read(edges: Edges, exposed: Exposed, line: ReadAs, begin: int, rows: Floats
 
     The sums of `designs.compiled.through_edges`, `camera.compiled_readout.expose` and `whole_numbers`, in their order.
     """
-    base, left, right, at_left, at_right, depth = edges
+    base, left, right, _, at_left, at_right, depth = edges
     fixed, uniform, time_s = exposed
     top_e, dn_per_e, offset_dn, full_scale_dn = line
     whole = math.floor(offset_dn)
@@ -52,6 +55,72 @@ def _read(edges: Edges, exposed: Exposed, line: ReadAs, begin: int, rows: Floats
             steps = np.floor((held * dn_per_e + rest) + 0.5) + whole
             steps = 0.0 if steps < 0.0 else steps
             rows[lane, s] = np.float32(full_scale_dn if steps > full_scale_dn else steps)
+
+
+@njit(cache=True, nogil=True)
+def _runs(edges: Edges, begin: int, starts: IndexArray) -> int:
+    """How many runs of one left edge and right edges one after the other the designs from `begin` on are.
+
+    `starts`: lanes where they begin, and the end of the last; not filled where there are more than _MOST_RUNS.
+    """
+    at_left, at_right = edges[4], edges[5]
+    count, until = 1, min(LANES, at_left.size - begin)
+    starts[0] = 0
+    for lane in range(1, until):
+        d = begin + lane
+        if at_left[d] != at_left[d - 1] or at_right[d] != at_right[d - 1] + 1:
+            if count == _MOST_RUNS:
+                return count + 1
+            starts[count] = lane
+            count += 1
+    starts[count] = until
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _read_runs(
+    edges: Edges, exposed: Exposed, line: ReadAs, begin: int, starts: IndexArray, order: IndexArray, lanes: Floats32
+) -> None:
+    """`_read` of runs of designs, signal by signal in some order, ndarray[n_signals, LANES]."""
+    base, left, _, across, at_left, at_right, depth = edges
+    fixed, uniform, time_s = exposed
+    top_e, dn_per_e, offset_dn, full_scale_dn = line
+    whole = math.floor(offset_dn)
+    rest = offset_dn - whole
+    for run in range(starts.size - 1):
+        d = begin + starts[run]
+        n, edge, other = starts[run + 1] - starts[run], left[at_left[d]], at_right[d]
+        deep, more = depth[d : d + n], uniform[d : d + n]
+        for s in range(order.size):
+            signal = order[s]
+            one, own, light = edge[signal], fixed[signal], base[signal]
+            fall, out = across[signal, other : other + n], lanes[s, starts[run] : starts[run + 1]]
+            for k in range(n):
+                held = ((own + (light + deep[k] * (one - fall[k]))) + more[k]) * time_s
+                held = top_e if held > top_e else held
+                steps = np.floor((held * dn_per_e + rest) + 0.5) + whole
+                steps = 0.0 if steps < 0.0 else steps
+                out[k] = np.float32(full_scale_dn if steps > full_scale_dn else steps)
+    for s in range(order.size):
+        lanes[s, starts[-1] :] = lanes[s, 0]
+
+
+@njit(cache=True, nogil=True, fastmath=_NUMBERS)
+def _ranges_of_runs(lanes: Floats32, least: Floats32, most: Floats32, low: Floats32, high: Floats32) -> None:
+    """Smallest and largest value of each signal over the lanes; `least`, `most`: ndarray[8], to work in."""
+    for s in range(lanes.shape[0]):
+        row = lanes[s]
+        for k in range(8):
+            a, b, c, d = row[k], row[k + 8], row[k + 16], row[k + 24]
+            e, f, g, h = row[k + 32], row[k + 40], row[k + 48], row[k + 56]
+            least[k] = smaller(smaller(smaller(a, b), smaller(c, d)), smaller(smaller(e, f), smaller(g, h)))
+            most[k] = larger(larger(larger(a, b), larger(c, d)), larger(larger(e, f), larger(g, h)))
+        a, b, c, d = least[0], least[1], least[2], least[3]
+        e, f, g, h = least[4], least[5], least[6], least[7]
+        low[s] = smaller(smaller(smaller(a, b), smaller(c, d)), smaller(smaller(e, f), smaller(g, h)))
+        a, b, c, d = most[0], most[1], most[2], most[3]
+        e, f, g, h = most[4], most[5], most[6], most[7]
+        high[s] = larger(larger(larger(a, b), larger(c, d)), larger(larger(e, f), larger(g, h)))
 
 
 @njit(cache=True, nogil=True)
@@ -122,6 +191,7 @@ def nearest_by_edges(
     edges: Edges,
     exposed: Exposed,
     line: ReadAs,
+    finite: bool,
     order: IndexArray,
     fixed: FloatArray,
     first: IndexArray,
@@ -132,7 +202,8 @@ def nearest_by_edges(
 ) -> int:
     """`nearest.nearest_along_squared` of designs by their edges, whose digital numbers are whole and at most MOST_DN.
 
-    `order`: the signals of `edges` and `exposed`, one class after the other.
+    `finite`: whether no number of `edges` and `exposed` is NaN, nor so large that a sum of them may be infinite.
+    `order`: the signals of both, one class after the other.
     """
     n_signals = edges[0].size
     rows, lanes = np.empty((LANES, n_signals), np.float32), np.empty((n_signals, LANES), np.float32)
@@ -142,12 +213,17 @@ def nearest_by_edges(
     for pair in range(starts.size - 1):
         most = max(most, starts[pair + 1] - starts[pair])
     bound, some, halved = np.empty(most), np.empty(most + 3, np.intp), fixed.astype(np.float32)
-    computed = 0
+    computed, runs = 0, np.empty(_MOST_RUNS + 1, np.intp)
     for begin in range(0, out.shape[1], LANES):
-        _read(edges, exposed, line, begin, rows)
-        _mend(rows, room, begin, bad)
-        _turn(rows, order, lanes)
-        _ranges(rows, order, room, low, high)
+        count = _runs(edges, begin, runs) if finite else _MOST_RUNS + 1
+        if count <= _MOST_RUNS:
+            _read_runs(edges, exposed, line, begin, runs[: count + 1], order, lanes)
+            _ranges_of_runs(lanes, best[:8], folded[:8], low, high)
+        else:
+            _read(edges, exposed, line, begin, rows)
+            _mend(rows, room, begin, bad)
+            _turn(rows, order, lanes)
+            _ranges(rows, order, room, low, high)
         for pair in range(starts.size - 1):
             own = slice(starts[pair], starts[pair + 1])
             count, lead = bounds_of_pairs(fixed[own], first[own], second[own], low, high, bound)

@@ -19,6 +19,8 @@ _MANY, _MOST_CHANNELS = 64, 4
 """From so many designs of so few channels on, the compiled pass saves more time than it takes to load."""
 _SMALLEST = 1e-140
 """Distances below this, and above its inverse, are computed without squares."""
+_NEVER_INFINITE = 1e150
+"""Sums and products of a few numbers below this are finite."""
 
 
 def csd_name(pair: Pair) -> str:
@@ -138,8 +140,13 @@ def separations_by_edges(changing: Changing, members: Mapping[str, IndexArray]) 
         return None
     apart, block = pairs_apart(others, members), edges.block
     squared, faulty = np.empty((len(apart.starts) - 1, len(block))), np.zeros(len(block), dtype=bool)
-    table = *edges.table, block.at_left, block.at_right, block.depth
-    nearest_by_edges(table, (edges.fixed, edges.uniform, changing.exposure_s), edges.line, *apart, squared, faulty)
+    sums = edges.sums
+    table = sums.base, sums.left, sums.right, sums.across, block.at_left, block.at_right, block.depth
+    exposed = edges.fixed, edges.uniform, changing.exposure_s
+    # A NaN compares with nothing, and is not below.
+    finite = all(np.abs(part).max() < _NEVER_INFINITE for part in (edges.fixed, edges.uniform, block.depth))
+    finite = finite and sums.largest < _NEVER_INFINITE
+    nearest_by_edges(table, exposed, edges.line, finite, *apart, squared, faulty)
 
     def whole(some: IndexArray | slice) -> FloatArray:
         return np.asarray(changing.whole[some, 0])
