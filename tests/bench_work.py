@@ -1,8 +1,8 @@
 """The seconds by which plans are compared, and whether plans pay: `make bench`, or `python tests/bench_work.py [STUDY ...]`.
 
 On one thread. Prints each constant of the effects' `work` and of `camera/plan/work.py` beside what it is here; a factor of 3
-either way is said. Then every scene of every shipped study (or of those named), at its study's tolerance, for one design
-and for all: everything on, and as a run does it, with the time to find its plan. Writes outputs/bench/plans.json, and
+either way is said. Then every scene of every shipped study (or of those named), at four tolerances, for one design and
+for all: everything on, and as a run does it, with the time to find its plan. Writes outputs/bench/plans.json, and
 fails where plan and run take more than 1.1 times everything on, and do so again in five times as many measurements.
 """
 
@@ -39,10 +39,13 @@ from sweep.camera.scenario import Scenario
 from sweep.camera.scene import FixedExposure, Noise, Target
 from sweep.camera.sensor import BUILT_IN_SENSORS
 from sweep.camera.view import View, per_photon, signal_irradiance
-from sweep.commands.accuracy.payments import Payment, payments
+from sweep.commands.accuracy.payments import PAID_AT_DN, Payment, payments
 from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
 from sweep.curves.spectrum import WavelengthGrid
+from sweep.designs.block import edges_of
 from sweep.designs.products import row_products
+from sweep.metrics.evaluate import evaluate
+from sweep.results.identity import CHUNK
 from sweep.study import load_study
 from sweep.study.shipped import shipped_names, study_path
 
@@ -101,6 +104,17 @@ def of_values() -> Iterator[tuple[str, float, float]]:
     looked_up_s = shortest_s(lambda: table.mean_rounded(electrons, PIXEL)) * each
     yield "a value through the table of noise", noise.LOOKED_UP_S, looked_up_s
     yield "the table of noise", noise.TABLE_S, shortest_s(lambda: table.mean_rounded(np.ones(1), PIXEL), cold=True)
+
+
+def of_designs() -> Iterator[tuple[str, float, float]]:
+    """A design by its edges."""
+    study = load_study(study_path(Path("stopband")))
+    space = next(space for space in study.spaces if space.kind == "sweep")
+    made = study.view(space, next(iter(study.scenarios)))
+    imager, block = Imager(made), edges_of(space, 0, CHUNK)
+    assert block is not None
+    each_s = shortest_s(lambda: evaluate(imager, block)) / (len(block) * len(made.lights.photons))
+    yield "a value of a design by its edges", work.BY_EDGES_S, each_s
 
 
 def of_images() -> Iterator[tuple[str, float, float]]:
@@ -198,7 +212,7 @@ def of_plans() -> Iterator[tuple[str, float, float]]:
 
 def constants() -> None:
     """Print the table of constants."""
-    for part in (of_values(), of_images(), of_lattices(), of_searches(), of_plans()):
+    for part in (of_values(), of_designs(), of_images(), of_lattices(), of_searches(), of_plans()):
         for name, constant, measured in part:
             ratio = measured / constant
             said = "" if 1 / OFF <= ratio <= OFF else f"  off by more than {OFF:g} times"
@@ -214,7 +228,7 @@ def paid(names: list[str]) -> Iterator[Payment]:
             print(f"{name} is left out: {error.faults[0]}")
             continue
         if any(space.size for space in study.spaces):
-            yield from payments(study, list(study.scenarios), [study.tolerance_dn()], REPEATS)
+            yield from payments(study, list(study.scenarios), PAID_AT_DN, REPEATS)
 
 
 def loses(one: Payment) -> bool:
@@ -238,7 +252,7 @@ def main() -> int:
         off = one.estimated_s / one.everything_s
         said = "" if 1 / OFF <= off <= OFF else f"  estimated {one.estimated_s:.3g} s"
         print(
-            f"{one.study:<10} {one.scenario:<28} {one.n_designs:>7} designs: everything on {one.everything_s:8.4f} s, "
+            f"{one.study:<10} {one.scenario:<28} {one.n_designs:>7} designs, {one.tolerance_dn:5g} DN: everything on {one.everything_s:8.4f} s, "
             f"plan {one.plan_s:7.4f}, run {one.run_s:8.4f}, {one.factor:6.2f} times faster{said}",
             flush=True,
         )
@@ -246,7 +260,7 @@ def main() -> int:
     OUTPUT.write_text(json.dumps([asdict(one) | {"factor": one.factor} for one in found], indent=1))
     lost = [again for one in found if loses(one) and loses(again := once_more(one))]
     for one in lost:
-        print(f"{one.study}, {one.scenario}, {one.designs}: plan and run take more than {MOST:g} times everything on")
+        print(f"{one.study}, {one.scenario}, {one.designs}, {one.tolerance_dn:g} DN: plan and run take more than {MOST:g} times everything on")
     return int(bool(lost))
 
 

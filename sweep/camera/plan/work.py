@@ -18,6 +18,8 @@ from ..view import View
 
 BOX_S, TABLED_S, FOLDED_S = 2.5e-3, 3e-9, 1.4e-8
 """Seconds: of the imager of a CFA, and of a value of its table at a wavelength, on the grid and between fewer nodes."""
+BY_EDGES_S = 9e-9
+"""Seconds of a light's value in a design by its edges, with its distances; `tests/bench_work.py` measures them."""
 REACH_S, READOUT_S, QUICK_S, LINEAR_S, COMPARED_S, KERNEL_S = 6.5e-4, 8e-4, 5e-4, 7e-4, 5e-9, 4e-3
 """Seconds of a planner: for the reach of a box, a bound of the readout, one of the optics without kernels and with
 them, each value that it compares, and a kernel of a light at a distance; `tests/bench_work.py` measures what they come
@@ -53,17 +55,18 @@ class DesignCount(NamedTuple):
 class Work(NamedTuple):
     """Seconds: `shared` once, for CFAs whose tiles are alike; `own` for each CFA, `each` for every design.
 
-    `curve`: for the response to each design's curve.
+    `curve`: for the response to each design's curve; `by_edges`: for every design that is told by its edges.
     """
 
     shared: float
     own: float
     each: float
     curve: float
+    by_edges: float
 
     def of(self, designs: DesignCount) -> float:
         """Of a run of some designs."""
-        return self.own + designs.n * (self.each + (0.0 if designs.by_edges else self.curve))
+        return self.own + designs.n * (self.by_edges if designs.by_edges else self.each + self.curve)
 
 
 def in_all(works: Sequence[tuple[Work, DesignCount]]) -> float:
@@ -85,4 +88,8 @@ def estimated_work(view: View, methods: Methods) -> Work:
         tabled_s = lights * changed * view.grid.size * (TABLED_S if load.nodes == view.grid.size else FOLDED_S)
     each = load.scales * lights * (channels * signals / 2 * MULTIPLICATION_S)
     each += load.scales * lights * load.units * load.value_s + load.search_s
-    return Work(load.shared_s, BOX_S + load.own_s + products + tabled_s, each, table * MULTIPLICATION_S)
+    own = BOX_S + load.own_s + products + tabled_s
+    # Whole numbers are read and compared in one pass, other ones as those of any design.
+    whole = view.scenario.noise is None and methods.quantization != "skip" and load.cases * load.scales == 1
+    by_edges = signals * BY_EDGES_S if whole else each
+    return Work(load.shared_s, own, each, table * MULTIPLICATION_S, by_edges)

@@ -26,7 +26,7 @@ from ...report.series import draw_knobs, draw_work_precision
 from ...results.tables import write_bytes, write_table
 from ...study import Study
 from .knobs import Regridded, Setting, knob_measurements
-from .payments import Payment, cpu_s, one_design, payments
+from .payments import PAID_AT_DN, Payment, cpu_s, one_design, payments
 from .report import AccuracyReport, make_accuracy_report, read_hard_cases
 
 TOLERANCES_DN = (100.0, 30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001)
@@ -151,7 +151,7 @@ def _lines(table: pd.DataFrame) -> list[str]:
     """A line per scenario for a few tolerances, plan and run together, and whether every promise was kept."""
     lines = []
     for (scenario, designs), rows in table.groupby(["scenario", "designs"], sort=False):
-        shown = rows[rows["tolerance_dn"].isin([10.0, 1.0, 0.1, 0.01])]
+        shown = rows[rows["tolerance_dn"].isin(PAID_AT_DN)]
         speedups = (
             (row["tolerance_dn"], row["reference_s"] / (row["plan_s"] + row["seconds"]))
             for row in shown.to_dict("records")
@@ -164,12 +164,12 @@ def _lines(table: pd.DataFrame) -> list[str]:
 
 
 def _paid(studies: Sequence[Study], progress: Progress) -> list[Payment]:
-    """Payments of a few scenes of each study, at its own tolerance: the first, the middle and the last one."""
+    """Payments of a few scenes of each study: the first, the middle and the last one."""
     found: list[Payment] = []
     for done, study in enumerate(studies):
         names = list(study.scenarios)
         few = dict.fromkeys((names[0], names[len(names) // 2], names[-1]))
         if any(space.size for space in study.spaces):
-            found += payments(study, list(few), [study.tolerance_dn()], _REPEATS)
+            found += payments(study, list(few), PAID_AT_DN, _REPEATS)
         progress("studies", done + 1, len(studies))
     return found

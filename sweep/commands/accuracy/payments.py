@@ -18,6 +18,8 @@ from ...results.identity import CHUNK
 from ...study import Study
 
 ALL, ONE = "all", "one"
+PAID_AT_DN = (10.0, 1.0, 0.1, 0.01)
+"""Tolerances at which plans are judged."""
 _SHORT_S = 2.0
 """Measurements that take longer together are not repeated."""
 
@@ -66,29 +68,40 @@ def payments(
         own = study if kind == ALL else one_design(study)
         n_designs = sum(space.size for space in own.spaces)
         for scenario in scenarios:
-            for tolerance in tolerances_dn:
-                everything_s, plan_s, run_s, plan = _measured(own, scenario, tolerance, repeats)
+            measured = _measured(own, scenario, tolerances_dn, repeats)
+            for tolerance, (plan, everything_s, plan_s, run_s) in measured.items():
                 left_out = ", ".join(choice.effect for choice in plan.choices if choice.promised_dn > 0)
                 times = plan.reference_work, everything_s, plan_s, run_s
                 yield Payment(study.name, scenario, kind, n_designs, tolerance, *times, left_out)
 
 
-def _measured(study: Study, scenario: str, tolerance_dn: float, repeats: int) -> tuple[float, float, float, Plan]:
-    """Median CPU times of everything on, of planning and of the run by the plan, one after the other; the plan.
+def _measured(
+    study: Study, scenario: str, tolerances_dn: Sequence[float], repeats: int
+) -> dict[float, tuple[Plan, float, float, float]]:
+    """For each tolerance the plan, and median CPU times of everything on, of planning and of the run by the plan.
 
-    As in a run with one worker, what was made while planning is there for the run.
+    Turn by turn. As in a run with one worker, what was made while planning is there for the run.
     """
-    plan = study.plan(scenario, tolerance_dn)
-    without, by_plan = replace(study, plans={}), replace(study, plans={scenario: plan})
-    times: list[list[float]] = []
-    while len(times) < repeats and sum(map(sum, times)) < _SHORT_S:
-        everything_s = cpu_s(partial(compute, without, scenario), 1)
-        plan_s = cpu_s(partial(study.plan, scenario, tolerance_dn), 1)
-        started = time.process_time()
-        compute(by_plan, scenario)
-        times.append([everything_s, plan_s, time.process_time() - started])
-    everything_s, plan_s, run_s = (statistics.median(each) for each in zip(*times, strict=True))
-    return everything_s, plan_s, run_s, plan
+    without = replace(study, plans={})
+    plans = {tolerance: study.plan(scenario, tolerance) for tolerance in tolerances_dn}
+    everything_s: list[float] = []
+    each: dict[float, list[tuple[float, float]]] = {tolerance: [] for tolerance in tolerances_dn}
+    spent_s = 0.0
+    while len(everything_s) < repeats and spent_s < _SHORT_S:
+        everything_s.append(cpu_s(partial(compute, without, scenario), 1))
+        spent_s += everything_s[-1]
+        for tolerance, plan in plans.items():
+            plan_s = cpu_s(partial(study.plan, scenario, tolerance), 1)
+            started = time.process_time()
+            compute(replace(study, plans={scenario: plan}), scenario)
+            each[tolerance].append((plan_s, time.process_time() - started))
+            spent_s += sum(each[tolerance][-1])
+    whole_s = statistics.median(everything_s)
+    found = {}
+    for tolerance, both in each.items():
+        plan_s, run_s = (statistics.median(times) for times in zip(*both, strict=True))
+        found[tolerance] = plans[tolerance], whole_s, plan_s, run_s
+    return found
 
 
 def cpu_s(work: Callable[[], object], repeats: int) -> float:
