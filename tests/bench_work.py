@@ -45,7 +45,10 @@ from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.block import edges_of
 from sweep.designs.products import row_products
 from sweep.metrics.evaluate import evaluate
+from sweep.metrics.separation import separations_by_edges
 from sweep.results.identity import CHUNK
+from sweep.results.journal import Shard
+from sweep.run.rows import jobs_of, rules_of, run_job
 from sweep.study import load_study
 from sweep.study.shipped import shipped_names, study_path
 
@@ -107,14 +110,34 @@ def of_values() -> Iterator[tuple[str, float, float]]:
 
 
 def of_designs() -> Iterator[tuple[str, float, float]]:
-    """A design by its edges."""
+    """Designs by their edges."""
     study = load_study(study_path(Path("stopband")))
     space = next(space for space in study.spaces if space.kind == "sweep")
     made = study.view(space, next(iter(study.scenarios)))
-    imager, block = Imager(made), edges_of(space, 0, CHUNK)
+    block, rules = edges_of(space, 0, CHUNK), rules_of(study)
     assert block is not None
-    each_s = shortest_s(lambda: evaluate(imager, block)) / (len(block) * len(made.lights.photons))
-    yield "a value of a design by its edges", work.BY_EDGES_S, each_s
+    job = next(job for job in jobs_of(study) if job.space is space)
+
+    def rows() -> None:
+        Shard.of(run_job(job, made, rules), 0.0)
+
+    imager = Imager(made)
+
+    def distances() -> None:
+        changing = imager.read_changing(block)
+        assert changing is not None
+        separations_by_edges(changing, made.members)
+
+    numbers_s = shortest_s(distances)
+    row_s = shortest_s(rows) / (job.stop - job.start) - numbers_s / len(block)
+    yield "a design's other columns and its row", work.ROW_S, row_s
+    whole, unrounded = (
+        Imager(replace(made, methods=replace(REFERENCE, quantization=name)))
+        for name in (REFERENCE.quantization, "skip")
+    )
+    more_s = shortest_s(lambda: evaluate(unrounded, block)) - shortest_s(lambda: evaluate(whole, block))
+    each_s = more_s / (len(block) * len(made.lights.photons))
+    yield "a value that is not rounded, of a design by its edges", work.UNROUNDED_S, each_s
 
 
 def of_images() -> Iterator[tuple[str, float, float]]:
@@ -260,7 +283,9 @@ def main() -> int:
     OUTPUT.write_text(json.dumps([asdict(one) | {"factor": one.factor} for one in found], indent=1))
     lost = [again for one in found if loses(one) and loses(again := once_more(one))]
     for one in lost:
-        print(f"{one.study}, {one.scenario}, {one.designs}, {one.tolerance_dn:g} DN: plan and run take more than {MOST:g} times everything on")
+        print(
+            f"{one.study}, {one.scenario}, {one.designs}, {one.tolerance_dn:g} DN: plan and run take more than {MOST:g} times everything on"
+        )
     return int(bool(lost))
 
 

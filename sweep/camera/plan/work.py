@@ -18,8 +18,9 @@ from ..view import View
 
 BOX_S, TABLED_S, FOLDED_S = 2.5e-3, 3e-9, 1.4e-8
 """Seconds: of the imager of a CFA, and of a value of its table at a wavelength, on the grid and between fewer nodes."""
-BY_EDGES_S = 9e-9
-"""Seconds of a light's value in a design by its edges, with its distances; `tests/bench_work.py` measures them."""
+ROW_S, UNROUNDED_S = 1e-6, 1.5e-8
+"""Seconds: of a design's other columns and its row, and what a light's value in a design by its edges takes more if it
+is not rounded: whole numbers are read and compared in one pass. `tests/bench_work.py` measures them."""
 REACH_S, READOUT_S, QUICK_S, LINEAR_S, COMPARED_S, KERNEL_S = 6.5e-4, 8e-4, 5e-4, 7e-4, 5e-9, 4e-3
 """Seconds of a planner: for the reach of a box, a bound of the readout, one of the optics without kernels and with
 them, each value that it compares, and a kernel of a light at a distance; `tests/bench_work.py` measures what they come
@@ -86,10 +87,10 @@ def estimated_work(view: View, methods: Methods) -> Work:
     table, tabled_s = lights * changed * load.nodes, 0.0
     if 0 < table <= KEPT:
         tabled_s = lights * changed * view.grid.size * (TABLED_S if load.nodes == view.grid.size else FOLDED_S)
-    each = load.scales * lights * (channels * signals / 2 * MULTIPLICATION_S)
-    each += load.scales * lights * load.units * load.value_s + load.search_s
+    values = load.scales * lights
+    always_s = values * (channels * signals / 2 * MULTIPLICATION_S) + load.search_s + ROW_S
+    each = always_s + values * load.units * load.value_s
     own = BOX_S + load.own_s + products + tabled_s
-    # Whole numbers are read and compared in one pass, other ones as those of any design.
-    whole = view.scenario.noise is None and methods.quantization != "skip" and load.cases * load.scales == 1
-    by_edges = signals * BY_EDGES_S if whole else each
+    unrounded_s = UNROUNDED_S if methods.quantization == "skip" else 0.0
+    by_edges = always_s + values * (changed * load.value_s + unrounded_s)
     return Work(load.shared_s, own, each, table * MULTIPLICATION_S, by_edges)
