@@ -37,7 +37,6 @@ ONLY_USER = {
     "plotly": ["report/"],
     "jinja2": ["report/"],
     "typer": ["commands/"],
-    "sklearn": ["metrics/recognition"],
     "jax": ["vision/network"],
     "optax": ["vision/network"],
     "numba": ["base/machine_code", "designs/vectorized"],
