@@ -1,4 +1,4 @@
-"""Compiled inner loops of errors: how far the digital numbers of two signals overlap."""
+"""Compiled inner loops of errors: how far the digital numbers of two signals overlap, and which signal is likeliest."""
 
 from __future__ import annotations
 
@@ -145,3 +145,19 @@ def largest_error(
         found = max(found, _least_error(firsts, starts, roots, rows, a, b, step))
         bound[at] = 0.0
     return found
+
+
+@njit(cache=True, nogil=True)
+def likeliest(values: FloatArray, mean: FloatArray, variance: FloatArray, out: IndexArray) -> None:
+    """The signal with the largest Gaussian likelihood at readouts, ndarray[n, n_channels]; of several the first.
+
+    `mean`, `variance`: of each channel's signals, C-ordered ndarray[n_channels, n_signals].
+    """
+    logarithms, unlike = np.log(variance), np.empty(mean.shape[1])
+    for i in range(len(values)):
+        unlike[:] = 0.0
+        for c in range(len(mean)):
+            for s in range(unlike.size):
+                apart = values[i, c] - mean[c, s]
+                unlike[s] += apart * apart / variance[c, s] + logarithms[c, s]
+        out[i] = np.argmin(unlike)

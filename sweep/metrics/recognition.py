@@ -75,24 +75,22 @@ class _MostLikely:
     def __init__(self, imager: Imager, curves: FloatArray, signals: IndexArray) -> None:
         read = imager.read_with_noise(curves)
         self._readout = imager.readout
-        self._mean = read.mean[0][:, signals]
-        self._variance = np.maximum(read.variance[0][:, signals], _LEAST_VARIANCE)
+        mean, variance = (np.moveaxis(of[0][:, signals], 2, 1) for of in (read.mean, read.variance))
+        self._mean = np.ascontiguousarray(mean)  # [n_places, n_channels, n_signals]
+        self._variance = np.ascontiguousarray(np.maximum(variance, _LEAST_VARIANCE))
 
     def of(self, drawn: FloatArray, place: IndexArray) -> IndexArray:
         """Its index for each patch, ndarray[n_patches, n_signals]; `drawn` has an axis more, of the pixels."""
+        from .compiled_errors import likeliest  # noqa: PLC0415  (compiled: kept off the start-up path)
+
         best = np.empty(place.shape, dtype=np.intp)
         for at in np.unique(place):
             here = place == at
             kernel = int(at) * self._readout.n_cases // len(self._mean)
             values = self._readout.channels_of(drawn[here], kernel)  # [n, n_channels]
-            unlike = np.zeros((len(values), self._mean.shape[1]))
-            for channel, (m, v) in enumerate(zip(self._mean[at].T, self._variance[at].T, strict=True)):
-                apart = values[:, channel, None] - m
-                apart *= apart
-                apart /= v
-                apart += np.log(v)
-                unlike += apart
-            best[here] = unlike.argmin(axis=1)
+            found = np.empty(len(values), dtype=np.intp)
+            likeliest(values, self._mean[at], self._variance[at], found)
+            best[here] = found
         return best
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import warnings
 
 import numpy as np
@@ -43,3 +45,20 @@ def test_patches_are_taken_for_what_scikit_learn_says(n_pixels: int, n_states: i
             expected = oracle.fit(train.astype(float), truth).predict(test.astype(float))
         assert np.array_equal(said, expected)
         assert len(np.unique(said)) == n_states
+
+
+CODE = """
+import sys
+import numpy as np
+from sweep.metrics.classifiers import CLASSIFIERS
+
+train, truth = np.arange(12.0).reshape(6, 2), np.repeat([0, 1], 3)
+for classifier in CLASSIFIERS.values():
+    classifier(train, truth, train)
+print(*({"pandas", "scipy.stats", "sklearn"} & sys.modules.keys()))
+"""
+
+
+def test_a_worker_loads_no_statistics_to_classify() -> None:
+    ran = subprocess.run([sys.executable, "-c", CODE], capture_output=True, text=True, check=True)
+    assert ran.stdout.split() == []
