@@ -37,7 +37,7 @@ ONLY_USER = {
     "plotly": ["report/"],
     "jinja2": ["report/"],
     "typer": ["commands/"],
-    "sklearn": ["metrics/recognition"],
+    "sklearn": ["metrics/classifiers"],
     "jax": ["vision/network"],
     "optax": ["vision/network"],
     "numba": ["base/machine_code", "designs/vectorized"],

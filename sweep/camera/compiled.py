@@ -14,6 +14,9 @@ _TAIL = 9.5
 _NONE = np.empty(0)
 _RARE = 1e-22
 """Numbers of electrons that occur less often than this, relative to the most frequent one, are left out."""
+_KEPT_BITS = 14
+_KEPT, _SHIFT, _MIXED = 2**_KEPT_BITS, np.uint64(64 - _KEPT_BITS), np.uint64(0x9E3779B97F4A7C15)
+"""Values of a table that are kept, and how the bits of a number give one of their places: Fibonacci hashing."""
 
 
 @njit(cache=True, nogil=True)
@@ -179,8 +182,16 @@ def cubic_of_electrons(
     step: float,
     out: FloatArray,
 ) -> None:
-    """Values of a table at expected electrons, ndarray[n]: see `noisy.table.MomentTable`. Beyond `last_e` they stay."""
+    """Values of a table at expected electrons, ndarray[n]: see `noisy.table.MomentTable`. Beyond `last_e` they stay.
+
+    Places and pixels that mirror each other expect the same: the latest values are kept by the bits of the electrons.
+    """
+    bits, asked, kept = electrons.view(np.uint64), np.full(_KEPT, np.nan), np.empty(_KEPT)
     for i in range(electrons.size):
+        slot = (bits[i] * _MIXED) >> _SHIFT
+        if asked[slot] == electrons[i]:
+            out[i] = kept[slot]
+            continue
         held = electrons[i]
         held = last_e if held > last_e else held
         at = np.sqrt(held)
@@ -192,3 +203,4 @@ def cubic_of_electrons(
         k = piece[min(int(at / step), piece.size - 1)]
         s = at - nodes[k]
         out[i] = ((coefficients[0, k] * s + coefficients[1, k]) * s + coefficients[2, k]) * s + coefficients[3, k]
+        asked[slot], kept[slot] = electrons[i], out[i]

@@ -8,6 +8,7 @@ import time
 import webbrowser
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import typer
@@ -21,7 +22,12 @@ from ..study import Study, folder_name, load_study
 from .endings import end_now
 from .progress import ProgressDisplay
 
-_DRAWING = ("sweep.report.overview", "matplotlib.backends.backend_agg", "matplotlib.backends.backend_svg")
+_DRAWING = (
+    "sweep.report.overview",
+    "matplotlib.figure",
+    "matplotlib.backends.backend_agg",
+    "matplotlib.backends.backend_svg",
+)
 """Modules that pictures need."""
 
 
@@ -72,13 +78,20 @@ def run_one(path: Path, manner: Manner, began_s: float) -> None:
             if crew is not None and not (folder / PROVENANCE).exists():  # it is not finished, so there is work to do
                 crew.begin(called_by(loaded))
             with ProgressDisplay() as display:
-                given = (loaded, folder, manner.workers, display.update, sys.argv)
-                how = manner.wishes
-                made = runner.run_study(*given, backend=kind, scheduler=manner.scheduler, wishes=how, stop=stop)
+                made = runner.run_study(
+                    loaded,
+                    folder,
+                    manner.workers,
+                    display.update,
+                    sys.argv,
+                    backend=kind,
+                    scheduler=manner.scheduler,
+                    wishes=manner.wishes,
+                    stop=stop,
+                    swept=(lambda: None) if crew is None else partial(crew.begin, _DRAWING),
+                )
             if not made:
                 typer.echo(f"Note: {folder} holds this very study, finished; nothing was computed.", err=True)
-            elif crew is not None:
-                crew.begin(_DRAWING)
             from .audit import mend_audit  # noqa: PLC0415  (what tables need is loaded while workers compute)
             from .finish import finish  # noqa: PLC0415
 

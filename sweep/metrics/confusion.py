@@ -124,7 +124,7 @@ def errors(
     of both probabilities over all readouts. The bound is the sum over the signals of other types of their
     Bhattacharyya coefficients, for the signal that errs most often.
     """
-    from . import compiled as kernels  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from . import compiled_errors as kernels  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     n_designs, n_signals = electrons.shape[:2]
     unknown = np.asarray(np.isnan(electrons).any(axis=(1, 2)))

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from ..base.types import FloatArray, IndexArray
 from ..camera.effects import noise
 from ..camera.imager import Imager
+from .classifiers import CLASSIFIERS
 from .share import share_interval
 
 MOST_LIKELY = "most_likely"
@@ -18,32 +18,6 @@ _LEAST_VARIANCE = 1e-6
 _MOST_PIXELS = 1024
 _AT_ONCE = 4_000_000
 """Pixels that are drawn at once."""
-
-
-def _nearest_centroid(train: FloatArray, truth: IndexArray, test: FloatArray) -> IndexArray:
-    """The state whose mean patch is nearest."""
-    from scipy.spatial.distance import cdist
-
-    centers = np.stack([train[truth == state].mean(axis=0, dtype=float) for state in range(truth.max() + 1)])
-    return np.asarray(cdist(test, centers).argmin(axis=1))
-
-
-def _lda(train: FloatArray, truth: IndexArray, test: FloatArray) -> IndexArray:
-    """Fisher's discriminant; shrinkage (Ledoit and Wolf) keeps it stable with more pixels than patches."""
-    from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
-
-    n_states = int(truth.max()) + 1
-    rule = LinearDiscriminantAnalysis(solver="lsqr", shrinkage="auto", priors=np.full(n_states, 1 / n_states))
-    with warnings.catch_warnings():  # scikit-learn's, where a pixel reads the same in every patch of a state
-        warnings.simplefilter("ignore", UserWarning)
-        return np.asarray(rule.fit(train, truth).predict(test))
-
-
-CLASSIFIERS: Mapping[str, Callable[[FloatArray, IndexArray, FloatArray], IndexArray]] = {
-    "nearest_centroid": _nearest_centroid,
-    "lda": _lda,
-}
-"""What patches, ndarray[n, n_pixels], are taken for by rules that are trained on others: numbers of states."""
 DECIDERS = (MOST_LIKELY, *CLASSIFIERS)
 
 
@@ -101,20 +75,22 @@ class _MostLikely:
     def __init__(self, imager: Imager, curves: FloatArray, signals: IndexArray) -> None:
         read = imager.read_with_noise(curves)
         self._readout = imager.readout
-        self._mean = read.mean[0][:, signals]
-        self._variance = np.maximum(read.variance[0][:, signals], _LEAST_VARIANCE)
+        mean, variance = (np.moveaxis(of[0][:, signals], 2, 1) for of in (read.mean, read.variance))
+        self._mean = np.ascontiguousarray(mean)  # [n_places, n_channels, n_signals]
+        self._variance = np.ascontiguousarray(np.maximum(variance, _LEAST_VARIANCE))
 
     def of(self, drawn: FloatArray, place: IndexArray) -> IndexArray:
         """Its index for each patch, ndarray[n_patches, n_signals]; `drawn` has an axis more, of the pixels."""
+        from .compiled_errors import likeliest  # noqa: PLC0415  (compiled: kept off the start-up path)
+
         best = np.empty(place.shape, dtype=np.intp)
         for at in np.unique(place):
             here = place == at
             kernel = int(at) * self._readout.n_cases // len(self._mean)
             values = self._readout.channels_of(drawn[here], kernel)  # [n, n_channels]
-            unlike = np.zeros((len(values), self._mean.shape[1]))
-            for channel, (m, v) in enumerate(zip(self._mean[at].T, self._variance[at].T, strict=True)):
-                unlike += (values[:, channel, None] - m) ** 2 / v + np.log(v)
-            best[here] = unlike.argmin(axis=1)
+            found = np.empty(len(values), dtype=np.intp)
+            likeliest(values, self._mean[at], self._variance[at], found)
+            best[here] = found
         return best
 
 

@@ -30,7 +30,7 @@ _BY_NOISE = (D_PRIME, CNR)
 
 def answer_sentences(output: Output) -> list[str]:
     """What images say first; then over scenarios that differ in one number who leads where, else who is best."""
-    return [*_of_images(output), *_of_designs(output)]
+    return output.once("answer", lambda: [*_of_images(output), *_of_designs(output)])
 
 
 def _of_images(output: Output) -> Iterator[str]:

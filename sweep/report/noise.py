@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import pandas as pd
 
 from ..base.types import BoolArray, FloatArray
+from ..metrics.classifiers import CLASSIFIERS
 from ..metrics.columns.confusion import D_PRIME, STATE_ERROR, STATE_ERROR_BOUND
-from ..metrics.recognition import CLASSIFIERS, MOST_LIKELY
+from ..metrics.recognition import MOST_LIKELY
 from ..results.output import Output
 from ..study.axes import series_of
 from .series import Line, SeriesFigure, quantity_of
@@ -43,8 +45,12 @@ def all_series(output: Output) -> list[SeriesFigure]:
     return [*noise_figures(output), *series_figures(output)]
 
 
-def noise_figures(output: Output) -> Iterator[SeriesFigure]:
+def noise_figures(output: Output) -> list[SeriesFigure]:
     """For each series of scenarios the error of the worst pair of states, and accuracies of classifiers on patches."""
+    return output.once("noise over series", lambda: list(_noise_figures(output)))
+
+
+def _noise_figures(output: Output) -> Iterator[SeriesFigure]:
     allowed = _allowed(output)
     if allowed is None:
         return
@@ -134,12 +140,15 @@ def _rounded(value: float, *, up: bool) -> str:
 
 def _crossing(output: Output, series: str, key: str, design: str) -> tuple[float, float] | None:
     """The number at which a design's error is what is allowed, and its error there, as the run has computed them."""
-    table = output.crossings
-    if table is None:
-        return None
-    own = table[(table["series"] == series) & (table["key"] == key) & (table["name"] == design)]
-    own = own.dropna(subset=["at", "error"])
-    return (float(own["at"].iloc[0]), float(own["error"].iloc[0])) if len(own) == 1 else None
+    return output.once("crossings", partial(_crossings, output)).get((series, key, design))
+
+
+def _crossings(output: Output) -> dict[tuple[str, str, str], tuple[float, float]]:
+    """The same of each series, key and design."""
+    if output.crossings is None:
+        return {}
+    known = output.crossings.dropna(subset=["at", "error"])
+    return {(row["series"], row["key"], row["name"]): (row["at"], row["error"]) for row in known.to_dict("records")}
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -68,6 +69,10 @@ class Scorecard:
 
 def scorecard(output: Output) -> Scorecard | None:
     """Of the plain CFAs, named designs and the search's answer in the first scenario; None without tasks."""
+    return output.once("scorecard", partial(_scorecard, output))
+
+
+def _scorecard(output: Output) -> Scorecard | None:
     columns = list(_shown(output.columns))
     rows = output.few[(output.few["scenario"] == output.scenarios[0]) & (output.few["status"] == "ok")]
     if not columns or rows.empty:

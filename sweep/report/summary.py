@@ -44,7 +44,7 @@ def _scene_lines(output: Output) -> list[str]:
 
 def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
     """What a run found and where its files are; `took_s`: what the whole command took, s."""
-    lines = answer_sentences(output)
+    lines = [*answer_sentences(output)]
     lines += _scene_lines(output)
     if not output.best.empty:
         best = output.best.iloc[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -98,15 +99,23 @@ def _points(output: Output, rows: pd.DataFrame, labels: Sequence[str] = ()) -> P
 
 def over_series(rows: pd.DataFrame, scenarios: Mapping[str, float], column: str) -> dict[str, np.ndarray]:
     """Values of a column over a series' numbers for every design that has them all, ndarray[n_scenarios] each."""
-    found = {}
-    for name, own in rows[rows["scenario"].isin(list(scenarios))].groupby("name", observed=True, sort=False):
-        if len(own) == len(scenarios):
-            found[str(name)] = own.set_index("scenario")[column].reindex(list(scenarios)).to_numpy(dtype=float)
-    return found
+    found: dict[str, dict[str, float]] = {}
+    for name, scenario, value in zip(rows["name"], rows["scenario"], rows[column].to_numpy(dtype=float), strict=True):
+        if scenario in scenarios and isinstance(name, str):
+            found.setdefault(name, {})[scenario] = value
+    return {
+        name: np.array([own[scenario] for scenario in scenarios])
+        for name, own in found.items()
+        if len(own) == len(scenarios)
+    }
 
 
 def series_figures(output: Output) -> list[SeriesFigure]:
     """A figure for each set of scenarios that differ in one number: the separation of every named design over it."""
+    return output.once("separations over series", partial(_series_figures, output))
+
+
+def _series_figures(output: Output) -> list[SeriesFigure]:
     rows, separation = output.few, output.trade_off[0]
     best_place = next(
         (c.name for c in output.columns.values() if (c.extreme, c.of) == ("best place", separation.name)), ""
@@ -190,17 +199,14 @@ def nearest_lights(output: Output, row: Mapping[Any, Any]) -> Nearest | None:
 
 
 def _cloud(points: pd.DataFrame, title: str, first: str, other: str, near: Nearest | None) -> Cloud:
-    types = {}
-    for kind, signals in points.groupby("signal_type", sort=False):
-        by_channel = {name: values["dn"].to_numpy() for name, values in signals.groupby("channel")}
-        types[str(kind)] = (by_channel[first], by_channel[other])
+    both = [points[points["channel"] == channel] for channel in (first, other)]
+    x, y = (own["dn"].to_numpy() for own in both)
+    kinds, names = (both[0][column].to_numpy() for column in ("signal_type", "signal"))
+    types = {str(kind): (x[kinds == kind], y[kinds == kind]) for kind in dict.fromkeys(kinds)}
     nearest = None
     if near is not None:
-        at = [points[(points["signal_type"] == kind) & (points["signal"] == name)] for kind, name in near[:2]]
-        x, y = (
-            np.array([float(own.loc[own["channel"] == name, "dn"].iloc[0]) for own in at]) for name in (first, other)
-        )
-        nearest = (x, y, near[2])
+        at = [int(np.flatnonzero((kinds == kind) & (names == name))[0]) for kind, name in near[:2]]
+        nearest = (x[at], y[at], near[2])
     return Cloud(title, f"{first} / DN", f"{other} / DN", types, nearest)
 
 

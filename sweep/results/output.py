@@ -197,12 +197,12 @@ class Output:
         """Rows of some kinds: see `tables.PLAIN` and what stands beside it."""
         return self.table[self.table["kind"].isin(kinds)]
 
-    @property
+    @cached_property
     def named(self) -> pd.DataFrame:
         """Plain CFAs and named designs."""
         return self.kind(PLAIN, NAMED)
 
-    @property
+    @cached_property
     def few(self) -> pd.DataFrame:
         """The same and the search's answer."""
         return self.kind(*FEW)

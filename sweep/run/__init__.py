@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from .estimate import estimate, estimate_lines
     from .plans import with_plans
     from .stop import stop_on_signals
-    from .whole import Wishes, run_study
+    from .whole import run_study
+    from .wishes import Wishes
     from .workers import BACKENDS, usable_backend
 
 __all__ = [
@@ -30,7 +31,7 @@ __getattr__ = loaded_later(
     globals(),
     {
         "BACKENDS": ".workers",
-        "Wishes": ".whole",
+        "Wishes": ".wishes",
         "estimate": ".estimate",
         "estimate_lines": ".estimate",
         "output_folder": "..results.folder",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from itertools import chain
@@ -58,6 +59,7 @@ from .search import (
     search_log,
 )
 from .sweep import Sweep
+from .wishes import Wishes
 from .workers import Workers
 
 
@@ -75,7 +77,7 @@ def files_of(study: Study) -> set[str]:
 class Making:
     """One run of a study whose scenes are planned, in a folder that it holds.
 
-    `fail_fast`, `retry_failed` as for `Sweep.run`; `started`: when the run began, by the monotonic clock, seconds.
+    `started`: when the run began, by the monotonic clock, seconds; `swept` is called when all rows are computed.
     """
 
     study: Study
@@ -83,9 +85,9 @@ class Making:
     inventory: Inventory
     crew: Workers
     progress: Progress
-    fail_fast: bool
-    retry_failed: bool
+    wishes: Wishes
     started: float
+    swept: Callable[[], None]
     made: set[str] = field(default_factory=set)
     _failed: int = 0
     _warnings: list[str] = field(default_factory=list)
@@ -166,8 +168,9 @@ class Making:
         if intact and not self.inventory.facts.pop("detours", []):
             self.sweep.refill(results)
         answer, gathered, sweep = self.answer, self._gathering(), self.sweep
-        sweep.run(gathered, self.progress, fail_fast=self.fail_fast, retry_failed=self.retry_failed)
+        sweep.run(gathered, self.progress, self.wishes)
         answered = [] if answer is None else [answer_row(self.study, answer, self.rules, self.crew)]
+        self.swept()
         for row in answered:
             gathered.add(row)
         gathered.finish()

@@ -98,7 +98,7 @@ class Gathered:
         """`scenario`: the first one, in which swept designs are drawn."""
         self.rules, self.scenario = rules, scenario
         self.front, self.swept = Front(rules.front), Front(rules.front, "sweep")
-        self._always: list[pa.Table] = [self.rules.schema.empty_table()]
+        self._always: list[pa.Table] = []
         self._best: dict[str, pa.Table] = {}
         self._feasible: dict[str, pa.Table] = {}
         self._leading: dict[str, pa.Table] = {}
@@ -124,6 +124,11 @@ class Gathered:
             both = pa.concat_tables([self._feasible[cfa], marked]) if cfa in self._feasible else marked
             self._feasible[cfa] = self._non_dominated(both) if both.num_rows > _MOST_CANDIDATES else both
 
+    @property
+    def _kept(self) -> list[pa.Table]:
+        """Rows that are always drawn. An empty table, for which PyArrow loads pandas, is made when workers are done."""
+        return [self.rules.schema.empty_table(), *self._always]
+
     def _non_dominated(self, table: pa.Table) -> pa.Table:
         values = np.stack([table[name].to_numpy() for name in self.rules.front], axis=1)
         return table.filter(pa.array(non_dominated(values))).combine_chunks()
@@ -135,12 +140,12 @@ class Gathered:
 
     def frame(self) -> pd.DataFrame:
         """The rows to draw, `pareto` as on the whole front; ordered by their ids."""
-        return self._frame([*self._always, *self._best.values()])
+        return self._frame([*self._kept, *self._best.values()])
 
     def front_frame(self) -> pd.DataFrame:
         """Swept rows: feasible ones of the whole front in the first scenario, evenly up to FRONT_ROWS; who leads."""
         every = leading(
-            pa.concat_tables([*self._always, *self._leading.values()]).unify_dictionaries(), self.rules.front[0]
+            pa.concat_tables([*self._kept, *self._leading.values()]).unify_dictionaries(), self.rules.front[0]
         )
         tables = [every.filter(pa.array(holds(every, "kind", SWEPT)))]
         for table in self._feasible.values():

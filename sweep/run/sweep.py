@@ -24,6 +24,7 @@ from .front import Gathered, few_of
 from .looks import Look, Looking
 from .routes import Detours
 from .rows import Job, Rules, detours_of, failed_rows, job_key, jobs_of, joined, run_job, with_local_front
+from .wishes import Wishes
 from .workers import WorkerKilledError, Workers, alone
 
 _SCENES_PER_WORKER, _FEW = 2, 64
@@ -103,15 +104,15 @@ class Sweep:
                     with self.crew.stop.held():
                         self.journal.save(key, index, shard)
 
-    def run(self, gathered: Gathered, progress: Progress, *, fail_fast: bool, retry_failed: bool) -> None:
+    def run(self, gathered: Gathered, progress: Progress, wishes: Wishes) -> None:
         """Compute what is not kept yet; `gathered` takes in all rows.
 
-        Raises FailedDesignError, after its chunk is kept, if it is to `fail_fast`. Counts failures and detours.
+        Raises FailedDesignError, after its chunk is kept, if that is wished. Counts failures and detours.
         """
         self.failed, self.detours = 0, Counter()
         entries = self.journal.entries
         for index, key in enumerate(self.keys):
-            if key in entries and retry_failed and entries[key].failed:
+            if key in entries and wishes.retry_failed and entries[key].failed:
                 self.journal.forget(key)
             elif key in entries and (table := self._kept(index)) is not None:
                 self._take_in(few_of(table, self.rules), entries[key].failed, gathered)
@@ -133,7 +134,7 @@ class Sweep:
                 self._take_in(few, shard.failed, gathered)
                 self.looks |= looks
                 done += shard.rows
-                if shard.failed and fail_fast:
+                if shard.failed and wishes.fail_fast:
                     raise _first_failure(shard.table())
             progress("designs", done, self.study.n_designs)
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,23 +25,13 @@ from .plans import with_plans
 from .provenance import resolved_yaml
 from .rows import rules_of
 from .stop import Stop, stop_on_signals
+from .wishes import NONE, Wishes
 from .workers import Workers, called_by, workers
 
 _HOW = ("command", "backend", "scheduler", "workers", "duration_s")
 """What provenance and `run.json` both say of how a run went, so that either makes the other again."""
 _DETOURS = "detours"
 """Of both as well: which designs took another route than their block's own."""
-
-
-@dataclass(frozen=True)
-class Wishes:
-    """How a run goes about failing designs.
-
-    `fail_fast`: stop at the first one; `retry_failed`: compute the chunks again in which an earlier run had some.
-    """
-
-    fail_fast: bool = False
-    retry_failed: bool = False
 
 
 def run_study(
@@ -54,15 +43,17 @@ def run_study(
     *,
     backend: str = "loky",
     scheduler: str | None = None,
-    wishes: Wishes = Wishes(),
+    wishes: Wishes = NONE,
     stop: Stop | None = None,
+    swept: Callable[[], None] = lambda: None,
 ) -> tuple[str, ...]:
     """Run a study into `output`; what an earlier run of the same study finished is kept, if it is not damaged.
 
     Writes `results.parquet`, `search.parquet` and `front.parquet` (when the study searches), `curves.parquet`,
     `points.parquet`, `recognition.parquet` (when the study asks for it), `study.resolved.yaml` and `provenance.json`,
     each atomically, and lists them with their digests in `run.json` and `SHA256SUMS`. Files that the lists do not name
-    are not touched. Returns the names of the files that were made, none when nothing was left to do.
+    are not touched. Returns the names of the files that were made, none when nothing was left to do. `swept` is called
+    as soon as all rows are computed: few calls follow, and workers can be made ready for other work.
 
     Raises OutputError when the folder is in use, holds another study, holds something else under the name of a file of
     the run, or cannot be written; InfeasibleError, before anything is left behind, when the search finds no feasible
@@ -91,7 +82,7 @@ def run_study(
                 rules = rules_of(study)
                 if retry or not fits(inventory, study, rules):
                     wrong.add(RESULTS)
-                making = Making(study, rules, inventory, crew, progress, wishes.fail_fast, wishes.retry_failed, started)
+                making = Making(study, rules, inventory, crew, progress, wishes, started, swept)
                 making.make(wrong)
                 wrong |= making.made
             except (StudyError, InfeasibleError):

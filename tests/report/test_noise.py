@@ -27,7 +27,12 @@ def ends(errors: dict[str, list[float]], passes: dict[str, float]) -> list[Usabl
     ]
     asked = SimpleNamespace(recognition=SimpleNamespace(error_max=0.01), study="night")
     output: Any = SimpleNamespace(
-        study=asked, few=pd.DataFrame(rows), scenarios=SCENES, crossings=pd.DataFrame(found), recognition=None
+        study=asked,
+        few=pd.DataFrame(rows),
+        scenarios=SCENES,
+        crossings=pd.DataFrame(found),
+        recognition=None,
+        once=lambda _, make: make(),
     )
     return list(usable_ends(output))
 

@@ -46,6 +46,15 @@ def output(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def test_workers_are_free_before_the_table_is_written(tmp_path: Path) -> None:
+    study, table, before = load_study(study_file(tmp_path, 3)), tmp_path / "out" / "results.parquet", []
+    run_study(study, table.parent, 1, lambda *_: None, swept=lambda: before.append(table.exists()))
+    assert before == [False]
+    assert table.exists()
+    run_study(study, table.parent, 1, lambda *_: None, swept=lambda: before.append(True))
+    assert before == [False]  # nothing was left to do
+
+
 def test_rows_stand_in_order_with_their_columns(output: Path) -> None:
     frame = pd.read_parquet(output / "results.parquet")
     assert len(frame) == 2 * (2 + 1 + 26 * 2 * 51 * 2) + 1

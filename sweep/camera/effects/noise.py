@@ -26,10 +26,19 @@ _MOST_POISSON_E = 1e18
 
 def draws_dn(electrons: FloatArray, pixel: Pixel, rng: np.random.Generator) -> FloatArray:
     """Monte Carlo: a readout of each pixel, which expects `electrons` and has its own gain error; rounded."""
-    gains = 1 + pixel.prnu * rng.standard_normal(electrons.shape)
-    held = np.minimum(rng.poisson(np.clip(electrons * gains, 0.0, _MOST_POISSON_E)), pixel.well_e)
-    dn = (held + pixel.read_noise_e * rng.standard_normal(electrons.shape)) * pixel.dn_per_e + pixel.offset_dn
-    return np.clip(np.floor(dn + 0.5), 0, pixel.full_scale_dn)
+    # In place: to give memory to an array of millions of pixels takes as long as a sum over them.
+    expected = rng.standard_normal(electrons.shape)
+    expected *= pixel.prnu
+    expected += 1
+    expected *= electrons
+    held = rng.poisson(np.clip(expected, 0.0, _MOST_POISSON_E, out=expected))
+    dn = rng.standard_normal(out=expected)
+    dn *= pixel.read_noise_e
+    dn += np.minimum(held, pixel.well_e)
+    dn *= pixel.dn_per_e
+    dn += pixel.offset_dn
+    dn += 0.5
+    return np.clip(np.floor(dn, out=dn), 0, pixel.full_scale_dn, out=dn)
 
 
 @lru_cache(maxsize=1024)
