@@ -46,6 +46,33 @@ class Envelopes(NamedTuple):
 SHARP = Envelopes(np.empty((5, 0, BOUNDED)), 0.0)
 
 
+@njit(cache=True, nogil=True, fastmath=_FINITE)
+def extremes_of_parts(values: FloatArray, slopes: FloatArray, middle: int, ends: IndexArray, found: FloatArray) -> None:
+    """Put what parts of a round image are at radii one after the other from 0 on into `found`, ndarray[4, n_radii,
+    n_parts]: the largest and the smallest value, the largest size of a slope, and of the difference of those before and
+    behind.
+
+    `values`, `slopes`: ndarray[n_radii, n_wavelengths]. The first part is that at the `middle` wavelength, the others
+    are what differs from it at the wavelengths from one of `ends` to the next.
+    """
+    last = len(values) - 1
+    for at in range(len(values)):
+        # Slopes are odd; at the last radius the difference is that before it.
+        before, behind = (slopes[max(at, 2) - 2], slopes[last]) if at == last else (slopes[abs(at - 1)], slopes[at + 1])
+        turned = -1.0 if at == 0 else 1.0
+        for part in range(ends.size):
+            first, end = (middle, middle) if part == 0 else (ends[part - 1], ends[part])
+            own = 0.0 if part == 0 else 1.0
+            value, slope = own * values[at, middle], own * slopes[at, middle]
+            bend = own * (behind[middle] - turned * before[middle])
+            above, below, steep, bent = -math.inf, math.inf, 0.0, 0.0
+            for wave in range(first, end + 1):
+                above, below = max(above, values[at, wave] - value), min(below, values[at, wave] - value)
+                steep = max(steep, abs(slopes[at, wave] - slope))
+                bent = max(bent, abs(behind[wave] - turned * before[wave] - bend))
+            found[0, at, part], found[1, at, part], found[2, at, part], found[3, at, part] = above, below, steep, bent
+
+
 @njit(cache=True, nogil=True)
 def room_for_radii() -> tuple[FloatArray, IndexArray]:
     """Where `light_in_cell` works: radii and shares, and the nodes nearest to radii."""

@@ -133,7 +133,7 @@ class ClassCells:
         def made(new: IndexArray) -> _Rows:
             work["places"] += len(new)
             kernels, sums = self._light.at(phase.Cases(images[new], cases.home_px[new]), work)
-            low, high = self.between.ranges(kernels @ self.shares)
+            low, high = self.between.ranges(kernels, self.shares)
             return kernels, sums, low, high
 
         return self._places.which(names_of(self._view, images, cases.home_px), made), which
