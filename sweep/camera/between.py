@@ -73,6 +73,14 @@ def _with_lanes(values: FloatArray) -> FloatArray:
     return found
 
 
+def _largest_near(values: FloatArray, reach: int) -> FloatArray:
+    """The largest of each row and up to so many before and behind it; ndarray[n, n_parts]."""
+    largest, span, width = np.pad(values, ((reach, reach), (0, 0)), mode="edge"), 1, 2 * reach + 1
+    while 2 * span <= width:
+        largest, span = np.maximum(largest[:-span], largest[span:]), 2 * span
+    return np.asarray(np.maximum(largest[: len(values)], largest[width - span :]))
+
+
 class Deviation(NamedTuple):
     """How far the kernel in cells of places may be from its interpolation through their nodes.
 
@@ -119,13 +127,10 @@ class Between:
         if self._is_sharp:
             return SHARP
         if h not in self._nearby:
-            from scipy.ndimage import maximum_filter1d  # noqa: PLC0415  (slow to import)
-
             images, table = self._images, self._images.table.copy()
             piece, pixel = math.hypot(h, h + self._half / SEGMENTS), math.sqrt(2) * (h + self._half)
             for which, reach_px in ((STEEP, piece), (BENT, piece), (INNER, pixel)):
-                width = 3 + 2 * math.ceil(reach_px * images.per_px)
-                maximum_filter1d(images.table[which], width, axis=0, mode="nearest", output=table[which])
+                table[which] = _largest_near(images.table[which], 1 + math.ceil(reach_px * images.per_px))
             self._nearby[h] = images._replace(table=table)
         return self._nearby[h]
 

@@ -16,7 +16,7 @@ from ..shot import Shot
 from .base import Chosen, KernelEffect, Load, Part, Stage
 from .blur import Profile
 
-PIXEL_S = 7e-10
+PIXEL_S = 5e-10
 """Seconds of a pixel at a place of the light, through a channel's filter, at a wavelength."""
 SEARCHED_S, SEARCHED_PIXEL_S, PLACE_S, PLACE_PIXEL_S = 0.04, 2.4e-6, 6e-5, 4e-9
 """Seconds that a search for the worst of all places takes: to begin with, at all and for each pixel around the light
