@@ -450,7 +450,7 @@ space = study.spaces[0]
 if sys.argv[2] == "plan":
     print(study.plan("road").promised_dn)
 else:
-    imager = Imager(study.view(space, "road"))
+    imager = Imager(study.view(space, "road")).with_all_places
     print(len(imager.read(space.curves(space.points(0, 1), study.grid.size))[0][0]))
 """
 
