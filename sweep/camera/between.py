@@ -9,7 +9,6 @@ up to an interval in every cell), that of a pixel's light a difference of two li
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +18,7 @@ from . import kernel
 from .compiled_cells import Light, deviations, ranges
 from .compiled_classes import CellBounds, deviations_of_channels
 from .compiled_distances import amounts_of_pairs
-from .compiled_slopes import BENT, BOUNDED, INNER, SEGMENTS, SHARP, STEEP, Envelopes
+from .compiled_slopes import BENT, BOUNDED, INNER, SEGMENTS, SHARP, STEEP, Envelopes, extremes_of_parts
 from .effects import blur, crosstalk, demosaic, sampling
 from .methods import Methods
 from .view import View
@@ -29,6 +28,8 @@ _BETWEEN_NODES = (math.pi / 12) ** 2 / 8
 largest value (Bernstein: its second derivative is at most the square of that frequency times this value)."""
 _BANDS = BOUNDED - 1
 """Bands of wavelengths in which the light is bounded apart."""
+_AT_ONCE = 256
+"""Kernels whose wavelengths are held at once: they stay in the processor's cache."""
 
 
 def _exceeded(values: FloatArray) -> FloatArray:
@@ -41,39 +42,28 @@ def _more(share: float) -> float:
     return share / (1 - share)
 
 
-def _bent(slopes: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
-    """The size of the second derivative of a round image along its radii, and across them, of the largest of several
-    wavelengths, ndarray[n_radii]; `slopes`: at the radii, ndarray[n_radii, n_wavelengths].
+def _envelopes(profile: blur.Profile, pitch_um: float, middle: int, ends: IndexArray) -> Envelopes:
+    """Of parts of a blurred image: that at the `middle` wavelength, and what differs from it from one of `ends` to the
+    next.
 
-    Central differences of slopes are off by at most step^2 / 6 times the fourth derivative of the image, and that is at
-    most the square of its highest frequency times its second (Bernstein). Across a radius it is slope / radius.
+    Of its second derivative, along a radius and across it: central differences of slopes are off by at most step^2 / 6
+    times the fourth derivative of the image, and that is at most the square of its highest frequency times its second
+    (Bernstein). Across a radius it is slope / radius.
     """
-    along = np.empty_like(slopes)
-    along[1:-1] = (slopes[2:] - slopes[:-2]) / (2 * step)
-    along[0], along[-1] = slopes[1] / step, along[-2]  # slopes are odd
-    sizes = np.abs(along).max(axis=1)
-    sizes += _more(8 * _BETWEEN_NODES / 6 + _BETWEEN_NODES) * sizes.max()
-    steep = np.abs(slopes).max(axis=1)
-    across = np.empty_like(sizes)
-    across[1:] = _exceeded(steep)[1:] / (step * (np.arange(1, len(steep)) - 0.5))
-    across[0] = sizes[:2].max()
-    return sizes, np.minimum(across, np.maximum.accumulate(sizes))
-
-
-def _envelopes(profile: blur.Profile, pitch_um: float, parts: list[tuple[FloatArray, FloatArray]]) -> Envelopes:
-    """Of parts of a blurred image; a part is one wavelength or several.
-
-    `parts`: values and slopes at the profile's radii, ndarray[n_radii, n_wavelengths] each.
-    """
-    step = float(profile.r_um[1]) / pitch_um
-    steep = np.stack([np.abs(slopes).max(axis=1) for _, slopes in parts], axis=1) * pitch_um
-    steep = _exceeded(steep)
-    bent = np.array([_bent(slopes * pitch_um, step) for _, slopes in parts])  # [n_parts, 2, n_radii]
+    step, n = float(profile.r_um[1]) / pitch_um, profile.r_um.size
+    found = np.empty((4, n, ends.size))
+    extremes_of_parts(profile.values, profile.slopes * pitch_um, middle, ends, found)
+    above, below, steep, along = found
+    steep, along = _exceeded(steep), along / (2 * step)
+    along += _more(8 * _BETWEEN_NODES / 6 + _BETWEEN_NODES) * along.max(axis=0)
+    across = np.empty_like(along)
+    across[1:] = steep[1:] / (step * (np.arange(1, n) - 0.5))[:, None]
+    across[0] = along[:2].max(axis=0)
+    across = np.minimum(across, np.maximum.accumulate(along, axis=0))
     margin = step * steep.max(axis=0)  # what a part changes between two nodes
-    above, below = (np.stack([f(values, axis=1) for values, _ in parts], axis=1) for f in (np.max, np.min))
     above = np.maximum.accumulate(above[::-1], axis=0)[::-1] + margin
     below = np.minimum.accumulate(below, axis=0) - margin
-    return Envelopes(_with_lanes(np.stack([above, below, steep, bent.max(axis=1).T, bent.sum(axis=1).T])), 1 / step)
+    return Envelopes(_with_lanes(np.stack([above, below, steep, np.maximum(along, across), along + across])), 1 / step)
 
 
 def _with_lanes(values: FloatArray) -> FloatArray:
@@ -81,6 +71,14 @@ def _with_lanes(values: FloatArray) -> FloatArray:
     found = np.zeros((*values.shape[:-1], BOUNDED))
     found[..., : values.shape[-1]] = values
     return found
+
+
+def _largest_near(values: FloatArray, reach: int) -> FloatArray:
+    """The largest of each row and up to so many before and behind it; ndarray[n, n_parts]."""
+    largest, span, width = np.pad(values, ((reach, reach), (0, 0)), mode="edge"), 1, 2 * reach + 1
+    while 2 * span <= width:
+        largest, span = np.maximum(largest[:-span], largest[span:]), 2 * span
+    return np.asarray(np.maximum(largest[: len(values)], largest[width - span :]))
 
 
 class Deviation(NamedTuple):
@@ -114,39 +112,25 @@ class Between:
         total = view.lights.photons.sum(axis=0)
         self._middle = int(np.abs(knots_nm - view.grid.nodes_nm @ total / total.sum()).argmin())
         self._is_sharp = profile is None
-        self._images = SHARP if profile is None else self._images_of(profile)
+        self._images = SHARP if profile is None else _envelopes(profile, self._pitch_um, self._middle, self._ends)
         self._nearby: dict[float, Envelopes] = {}
         # What each pixel of a channel takes of the light through each channel's filter: mean, and by how much of it
         # pixels differ.
-        whole = (view.mosaic.indices[..., None] == np.arange(n)).astype(float)
-        taken = crosstalk.mixed(whole[None], self._share, periodic=True)[0]
-        own = [taken[whole[..., to] > 0] for to in range(n)]
+        taken = crosstalk.taken(view.mosaic, self._share)
+        own = [taken[view.mosaic.indices == to] for to in range(n)]
         self._taken = np.stack([pixels.mean(axis=0) for pixels in own])
         apart = np.stack([np.abs(pixels - pixels.mean(axis=0)).max(axis=0) for pixels in own])
         self.uneven = np.divide(apart, self._taken, out=np.zeros_like(apart), where=self._taken > 0)
-
-    def _images_of(self, profile: blur.Profile) -> Envelopes:
-        """That at the middle wavelength, and what differs from it in each band."""
-        values, slopes = profile.values, profile.slopes
-        middle = slice(self._middle, self._middle + 1)
-        parts = [(values[:, middle], slopes[:, middle])]
-        for a, b in pairwise(self._ends):
-            some = slice(a, b + 1)
-            parts.append((values[:, some] - values[:, middle], slopes[:, some] - slopes[:, middle]))
-        return _envelopes(profile, self._pitch_um, parts)
 
     def _near(self, h: float) -> Envelopes:
         """The envelopes for cells of half width `h`: slopes are those of all radii that a piece of an edge may have."""
         if self._is_sharp:
             return SHARP
         if h not in self._nearby:
-            from scipy.ndimage import maximum_filter1d  # noqa: PLC0415  (slow to import)
-
             images, table = self._images, self._images.table.copy()
             piece, pixel = math.hypot(h, h + self._half / SEGMENTS), math.sqrt(2) * (h + self._half)
             for which, reach_px in ((STEEP, piece), (BENT, piece), (INNER, pixel)):
-                width = 3 + 2 * math.ceil(reach_px * images.per_px)
-                maximum_filter1d(images.table[which], width, axis=0, mode="nearest", output=table[which])
+                table[which] = _largest_near(images.table[which], 1 + math.ceil(reach_px * images.per_px))
             self._nearby[h] = images._replace(table=table)
         return self._nearby[h]
 
@@ -165,13 +149,19 @@ class Between:
         amounts_of_pairs(light, first, second, 1 + band, found)
         return found
 
-    def ranges(self, kernels: FloatArray) -> FloatArray:
-        """Range of each part of kernels, ndarray[n, n_channels, n_channels, n_knots or 1] -> ndarray[2, n,
-        n_channels, n_channels, n_parts].
+    def ranges(self, kernels: FloatArray, shares: FloatArray) -> FloatArray:
+        """Range of each part of kernels, ndarray[n, n_channels, n_channels, n_functions] -> ndarray[2, n, n_channels,
+        n_channels, n_parts]; `shares`: how much of each function is at each knot, ndarray[n_functions, n_knots or 1].
         """
-        flat = np.ascontiguousarray(kernels.reshape(-1, kernels.shape[-1]))
-        middle = min(self._middle, flat.shape[1] - 1)
-        return ranges(flat, middle, self._ends).reshape(2, *kernels.shape[:-1], self.n_parts)
+        flat = kernels.reshape(-1, len(shares))
+        middle, lit = min(self._middle, shares.shape[1] - 1), np.flatnonzero(flat.any(axis=1))
+        found = np.zeros((2, len(flat), self.n_parts))
+        for start in range(0, lit.size, _AT_ONCE):
+            some = lit[start : start + _AT_ONCE]
+            own = np.empty((2, some.size, self.n_parts))
+            ranges(flat[some] @ shares, middle, self._ends, own)
+            found[:, some] = own
+        return found.reshape(2, *kernels.shape[:-1], self.n_parts)
 
     def bounds(
         self, centers: FloatArray, h: float, homes: FloatArray, sums: FloatArray, low: FloatArray, high: FloatArray
@@ -189,7 +179,8 @@ class Between:
         weights = np.empty((0, 0, 0))
         if self._target.readout == "center":  # the weights of a demosaicked pixel are the same in the whole cell
             weights = demosaic.center_weights(seen, homes - centers, self._methods.demosaic, mosaic)
-        light = Light(*self._near(h), self._half, self._radii[0], self._share, self._taken)
+        sizes = self._half, self._radii[0], self._share
+        light = Light(*self._near(h), *sizes, self._taken, not self.uneven.any())
         nodes = _with_lanes(np.stack([low, high], axis=1))
         found, moves = np.empty(nodes[:, 0].shape), np.empty((n, len(mosaic.channels), 3))
         deviations(seen.columns, seen.rows, seen.channel, weights, light, self._radii[1], h, nodes, found, moves)

@@ -201,6 +201,6 @@ def cubic_of_electrons(
             out[i] = at
             continue
         k = piece[min(int(at / step), piece.size - 1)]
-        s = at - nodes[k]
-        out[i] = ((coefficients[0, k] * s + coefficients[1, k]) * s + coefficients[2, k]) * s + coefficients[3, k]
+        s, own = at - nodes[k], coefficients[k]
+        out[i] = ((own[0] * s + own[1]) * s + own[2]) * s + own[3]
         asked[slot], kept[slot] = electrons[i], out[i]

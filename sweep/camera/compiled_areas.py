@@ -72,10 +72,11 @@ def slope_of_disc(along: float, across: float, half: float, radius: float, h: fl
 @njit(cache=True, nogil=True)
 def _always(x: float, y: float, radius: float, h: float) -> int:
     """Whether a point is inside the disc (1) or outside (-1) at all places of a cell, or neither (0)."""
-    x, y = abs(x), abs(y)
-    if math.hypot(x + h, y + h) <= radius:
+    x, y, squared = abs(x), abs(y), radius * radius
+    if (x + h) * (x + h) + (y + h) * (y + h) <= squared:
         return 1
-    return -1 if math.hypot(max(x - h, 0.0), max(y - h, 0.0)) >= radius else 0
+    x, y = max(x - h, 0.0), max(y - h, 0.0)
+    return -1 if x * x + y * y >= squared else 0
 
 
 @njit(cache=True, nogil=True)

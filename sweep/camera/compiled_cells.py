@@ -36,7 +36,7 @@ class Light(NamedTuple):
 
     `table`, `per_px`: `Envelopes` of a blurred light; a sharp one is a disc of `radius`. `half`: of a pixel's side;
     `share`: of its light that comes through its neighbors' filters. `taken`: what a pixel of each channel takes of the
-    light through each channel's filter, ndarray[n_channels, n_channels].
+    light through each channel's filter, ndarray[n_channels, n_channels], on average; `even`: whether all take the same.
     """
 
     table: FloatArray
@@ -45,6 +45,7 @@ class Light(NamedTuple):
     radius: float
     share: float
     taken: FloatArray
+    even: bool
 
 
 @njit(cache=True, nogil=True)
@@ -86,34 +87,36 @@ def _mix(
 
 
 @njit(cache=True, nogil=True)
-def _off_within(weight: float, h: float, seen: FloatArray) -> float:
-    """What a sharp light on a pixel whose weight is the same in the whole cell may be off."""
-    found = 0.0
-    for axis in range(2):
-        off = SLOPE * h * seen[SUDDEN + axis, 0]
-        if seen[THIRDS + axis, 0] < math.inf:
-            off = min(off, THIRD * h**3 * seen[THIRDS + axis, 0] + JUMP * h**2 * seen[JUMPS + axis, 0])
-        found += BOTH_AXES * weight * off
-    return found
-
-
-@njit(cache=True, nogil=True)
-def _off_at_rim(weight: float, change: FloatArray, seen: FloatArray, ratio: FloatArray, h: float) -> float:
-    """`_add_rim` of a sharp light, whose slope may jump: where a third derivative has no bound, how much a slope
-    changes has.
+def _add_sharp(
+    high: FloatArray,
+    does_change: BoolArray,
+    change: FloatArray,
+    to: int,
+    seen: FloatArray,
+    ratios: FloatArray,
+    h: float,
+    found: FloatArray,
+) -> None:
+    """`_add_rim` of a sharp light on a pixel in all channels, whose slope may jump: where a third derivative has no
+    bound, how much a slope changes has.
     """
-    found, apart = 0.0, max(seen[HIGH, 0] - ratio[0, 0], ratio[1, 0] - seen[LOW, 0])
-    for axis in range(2):
-        slope, sudden, bend = change[axis], change[2 + axis], change[4 + axis]
-        jump, third = change[6 + axis], change[8 + axis]
-        one, two, three = seen[SLOPES + axis, 0], seen[BENDS + axis, 0], seen[THIRDS + axis, 0]
-        off = SLOPE * h * (sudden * apart + 4 * h * slope * one + weight * seen[SUDDEN + axis, 0])
-        if third < math.inf and three < math.inf:
-            even = third * apart + 3 * bend * one + 3 * slope * two + weight * three
-            jumps = jump * apart + weight * seen[JUMPS + axis, 0]
-            off = min(off, THIRD * h**3 * even + JUMP * h**2 * jumps)
-        found += BOTH_AXES * off
-    return found
+    for u in range(high.size):
+        if high[u] <= 0:  # no part of the cell gives it a weight
+            continue
+        if not does_change[u]:
+            change[u] = 0.0
+        weight, ratio, own = high[u], ratios[u, to], change[u]
+        apart = max(seen[HIGH, 0] - ratio[0, 0], ratio[1, 0] - seen[LOW, 0])
+        for axis in range(2):
+            slope, sudden, bend = own[axis], own[2 + axis], own[4 + axis]
+            jump, third = own[6 + axis], own[8 + axis]
+            one, two, three = seen[SLOPES + axis, 0], seen[BENDS + axis, 0], seen[THIRDS + axis, 0]
+            off = SLOPE * h * (sudden * apart + 4 * h * slope * one + weight * seen[SUDDEN + axis, 0])
+            if third < math.inf and three < math.inf:
+                even = third * apart + 3 * bend * one + 3 * slope * two + weight * three
+                jumps = jump * apart + weight * seen[JUMPS + axis, 0]
+                off = min(off, THIRD * h**3 * even + JUMP * h**2 * jumps)
+            found[u, to, 0] += BOTH_AXES * off
 
 
 @njit(cache=True, nogil=True, fastmath=_FINITE)
@@ -183,6 +186,17 @@ def _given(weights: FloatArray, own: CellWeights) -> None:
 
 
 @njit(cache=True, nogil=True)
+def _is_deep(kind: IndexArray, row: int, column: int, share: float) -> bool:
+    """Whether a pixel and, where they share their light, its neighbors have the same weight at all places of a cell."""
+    if kind[row, column] != WHOLE:
+        return False
+    if share == 0:
+        return True
+    above, below = kind[row - 1, column], kind[row + 1, column]  # pixels at the border are dark
+    return bool(above == below == kind[row, column - 1] == kind[row, column + 1] == WHOLE)
+
+
+@njit(cache=True, nogil=True)
 def _of_cell(
     x: FloatArray,
     y: FloatArray,
@@ -191,41 +205,48 @@ def _of_cell(
     light: Light,
     h: float,
     ratios: FloatArray,
+    alike: bool,
     found: FloatArray,
 ) -> None:
-    """`deviations` of one cell. `ratios`: of `_ratios`."""
+    """`deviations` of one cell. `ratios`: of `_ratios`; `alike`: whether pixels with the same weight in the whole cell
+    have the same one, and give it alike to the channels.
+    """
     kind, weights, changes = own.kind, own.high, own.change
     table, per_px, half, radius, share = light.table, light.per_px, light.half, light.radius, light.share
     n, blurred, last = len(ratios), table.shape[1] > 0, table.shape[1] - 1.0
     high, does_change, change = np.empty(n), np.empty(n, dtype=np.bool_), np.empty((n, N_CHANGES))
     room, nodes = room_for_radii()
-    seen, apart = np.zeros((N_SEEN, BOUNDED)), np.empty(BOUNDED)
+    seen, apart, deep = np.zeros((N_SEEN, BOUNDED)), np.empty(BOUNDED), np.zeros((n, BOUNDED))
     flat = found.reshape(n * n, -1)
     smooth = BOTH_AXES * THIRD * h**3 / half
     found[:] = 0.0
     for row in range(y.size):
         for column in range(x.size):
+            dx, dy, to = x[column], y[row], channel[row, column]
+            if alike and _is_deep(kind, row, column, share):
+                inner = int(min(math.sqrt(dx * dx + dy * dy) * per_px + 0.5, last))
+                add_row(smooth, table, INNER, inner, deep, to)
+                continue
             some, at_rim = _mix(kind, weights, changes, channel, row, column, share, high, does_change, change)
             if not some:
                 continue
-            dx, dy, to = x[column], y[row], channel[row, column]
             if not blurred:
                 of_sharp(dx, dy, half, radius, h, seen)
-            elif at_rim:  # little of the light of a pixel beside one at the rim has a weight that changes
+                _add_sharp(high, does_change, change, to, seen, ratios, h, found)
+                continue
+            if at_rim:  # little of the light of a pixel beside one at the rim has a weight that changes
                 of_blurred(dx, dy, half, h, table, per_px, kind[row, column] == RIM, room, nodes, seen)
             inner = int(min(math.sqrt(dx * dx + dy * dy) * per_px + 0.5, last))
             for u in range(n):
-                weight = high[u]
-                if weight <= 0:  # no part of the cell gives it one
+                if high[u] <= 0:  # no part of the cell gives it one
                     continue
-                if blurred and does_change[u]:
-                    _add_rim(weight, change, u, to, seen, ratios, h, apart, found)
-                elif blurred:
-                    add_row(weight * smooth, table, INNER, inner, flat, u * n + to)
-                elif does_change[u]:
-                    found[u, to, 0] += _off_at_rim(weight, change[u], seen, ratios[u, to], h)
+                if does_change[u]:
+                    _add_rim(high[u], change, u, to, seen, ratios, h, apart, found)
                 else:
-                    found[u, to, 0] += _off_within(weight, h, seen)
+                    add_row(high[u] * smooth, table, INNER, inner, flat, u * n + to)
+    for u in range(n):
+        for to in range(n):
+            add(found[u, to], light.taken[to, u], deep[to])
 
 
 @njit(cache=True, nogil=True)
@@ -252,6 +273,7 @@ def deviations(
     shape, n_channels = channel.shape, found.shape[1]
     own = CellWeights(np.empty(shape, dtype=np.int64), np.empty(shape), np.empty((*shape, N_CHANGES)))
     ratios = np.empty((n_channels, n_channels, 2, BOUNDED))
+    alike = light.even and len(given) == 0 and light.table.shape[1] > 0
     for cell in range(len(x)):
         if len(given):
             moves[cell] = 0.0
@@ -259,15 +281,14 @@ def deviations(
         else:
             areas(x[cell], y[cell], channel, light.half, readout, h, own, moves[cell])
         _ratios(nodes[cell], light.taken, ratios)
-        _of_cell(x[cell], y[cell], channel, own, light, h, ratios, found[cell])
+        _of_cell(x[cell], y[cell], channel, own, light, h, ratios, alike, found[cell])
 
 
-@njit(cache=True, nogil=True)
-def ranges(values: FloatArray, middle: int, ends: IndexArray) -> FloatArray:
-    """Smallest and largest of values, ndarray[n, n_knots], at the middle knot, and of what differs from it in each band
-    from one of `ends` to the next: ndarray[2, n, n_parts].
+@njit(cache=True, nogil=True, fastmath=_FINITE)
+def ranges(values: FloatArray, middle: int, ends: IndexArray, found: FloatArray) -> None:
+    """Put the smallest and largest of values, ndarray[n, n_knots], at the middle knot, and of what differs from it in
+    each band from one of `ends` to the next into `found`, ndarray[2, n, n_parts].
     """
-    found = np.empty((2, len(values), ends.size))
     for at in range(len(values)):
         own = values[at]
         found[:, at, 0] = own[middle]
@@ -276,4 +297,3 @@ def ranges(values: FloatArray, middle: int, ends: IndexArray) -> FloatArray:
             for knot in range(ends[band - 1], ends[band] + 1):
                 least, most = min(least, own[knot]), max(most, own[knot])
             found[0, at, band], found[1, at, band] = least - own[middle], most - own[middle]
-    return found

@@ -49,12 +49,12 @@ def kernels_of_channels(
             total[channel[own]] += weight
             for other in range(n_classes):
                 through = which[place, other]
-                for k in range(out.shape[3]):
-                    out[place, channel[own], channel[other], k] += weight * kernels[row, to, through, k]
+                add(out[place, channel[own], channel[other]], weight, kernels[row, to, through])
         for u in range(out.shape[1]):
             for c in range(out.shape[2]):
-                for k in range(out.shape[3]):
-                    out[place, u, c, k] /= total[u]
+                of_channel = out[place, u, c]
+                for k in range(of_channel.size):
+                    of_channel[k] /= total[u]
 
 
 @njit(cache=True, nogil=True)

@@ -24,11 +24,9 @@ def _area(x: float, y: float, radius: float) -> float:
     corner = math.sqrt((radius - y) * (radius + y))  # from here on the circle is lower than y
     if x <= corner:
         return float(sign * x * y)
-    ends = corner * y
-    for t, side in ((x, 1.0), (corner, -1.0)):
-        height = math.sqrt((radius - t) * (radius + t))
-        ends += side * 0.5 * (t * height + radius**2 * math.atan2(t, height))
-    return float(sign * ends)
+    height = math.sqrt((radius - x) * (radius + x))
+    sector = radius**2 * math.atan2(x * y - corner * height, height * y + x * corner)
+    return float(sign * 0.5 * (corner * y + x * height + sector))
 
 
 @njit(cache=True, nogil=True)

@@ -117,16 +117,18 @@ def kernels_by_ring(
     share: float,
     rings: Rings,
     first_ring: int,
+    pairs: IndexArray,
     found: FloatArray,
     sums: FloatArray,
 ) -> None:
     """`compiled_light.kernels` of a blurred image, pixel by pixel, by the functions of each ring.
 
     `left_out`: pixels whose light does not count, ndarray[n_rows, n_columns]; the others are in rings from `first_ring`
-    on. `found`: ndarray[n_places, n_channels, n_channels, n], of the functions of these, which is nothing before.
+    on. `found`: ndarray[n_places, n_pairs, n], of the functions of these, which is nothing before; `pairs`: which of it
+    each channel's light through each channel's filter is, ndarray[n_channels, n_channels].
     """
     coefficients, sizes, per_px = rings.coefficients, rings.sizes, rings.per_px
-    n_channels, last = found.shape[1], len(sizes) - 1
+    n_channels, last = len(pairs), len(sizes) - 1
     most, before = 0, sizes[first_ring, 4]
     for ring in range(len(sizes)):
         most = max(most, sizes[ring, 2] * sizes[ring, 3])
@@ -151,4 +153,4 @@ def kernels_by_ring(
                 _sum_harmonics(values, harmonics, n, 2 * cosine * cosine - 1, light)
                 for u in range(n_channels):
                     if own[u] > 0:
-                        _add_some(found[place, u, to, sizes[ring, 4] - before :], own[u], light, n)
+                        _add_some(found[place, pairs[u, to], sizes[ring, 4] - before :], own[u], light, n)

@@ -46,6 +46,33 @@ class Envelopes(NamedTuple):
 SHARP = Envelopes(np.empty((5, 0, BOUNDED)), 0.0)
 
 
+@njit(cache=True, nogil=True, fastmath=_FINITE)
+def extremes_of_parts(values: FloatArray, slopes: FloatArray, middle: int, ends: IndexArray, found: FloatArray) -> None:
+    """Put what parts of a round image are at radii one after the other from 0 on into `found`, ndarray[4, n_radii,
+    n_parts]: the largest and the smallest value, the largest size of a slope, and of the difference of those before and
+    behind.
+
+    `values`, `slopes`: ndarray[n_radii, n_wavelengths]. The first part is that at the `middle` wavelength, the others
+    are what differs from it at the wavelengths from one of `ends` to the next.
+    """
+    last = len(values) - 1
+    for at in range(len(values)):
+        # Slopes are odd; at the last radius the difference is that before it.
+        before, behind = (slopes[max(at, 2) - 2], slopes[last]) if at == last else (slopes[abs(at - 1)], slopes[at + 1])
+        turned = -1.0 if at == 0 else 1.0
+        for part in range(ends.size):
+            first, end = (middle, middle) if part == 0 else (ends[part - 1], ends[part])
+            own = 0.0 if part == 0 else 1.0
+            value, slope = own * values[at, middle], own * slopes[at, middle]
+            bend = own * (behind[middle] - turned * before[middle])
+            above, below, steep, bent = -math.inf, math.inf, 0.0, 0.0
+            for wave in range(first, end + 1):
+                above, below = max(above, values[at, wave] - value), min(below, values[at, wave] - value)
+                steep = max(steep, abs(slopes[at, wave] - slope))
+                bent = max(bent, abs(behind[wave] - turned * before[wave] - bend))
+            found[0, at, part], found[1, at, part], found[2, at, part], found[3, at, part] = above, below, steep, bent
+
+
 @njit(cache=True, nogil=True)
 def room_for_radii() -> tuple[FloatArray, IndexArray]:
     """Where `light_in_cell` works: radii and shares, and the nodes nearest to radii."""
@@ -96,24 +123,25 @@ def add_row(factor: float, table: FloatArray, which: int, node: int, found: Floa
 
 
 @njit(cache=True, nogil=True, fastmath=_FINITE)
-def _add_two(
-    one: float, node: int, other: float, beyond: int, table: FloatArray, which: int, found: FloatArray, to: int
+def _add_piece(
+    nodes: IndexArray, piece: int, segments: int, across: FloatArray, table: FloatArray, seen: FloatArray, axis: int
 ) -> None:
-    """Add an envelope at two radii, times factors, to a row."""
-    for part in range(BOUNDED):
-        found[to, part] += one * table[which, node, part] + other * table[which, beyond, part]
+    """Add what a piece of one edge and that of the other one across an axis have of the slope, and of the second and
+    the third derivative, to their rows: the largest difference of the light, the sums of its slopes and of its bends.
 
-
-@njit(cache=True, nogil=True, fastmath=_FINITE)
-def _add_steepest(
-    near: int, far: int, near_beyond: int, far_beyond: int, table: FloatArray, found: FloatArray, to: int
-) -> None:
-    """Add the largest difference of a piece of one edge and that of the other one to a row."""
+    `nodes`: of the nearest, the middle and the furthest radius of each piece; `across`: see `_radii_of_pixel`.
+    """
+    n, other = 4 * segments, piece + segments
+    near, middle, far = nodes[piece], nodes[n + piece], nodes[2 * n + piece]
+    near_beyond, beyond, far_beyond = nodes[other], nodes[n + other], nodes[2 * n + other]
+    one, two = across[piece], across[other]
     for part in range(BOUNDED):
-        found[to, part] += max(
+        seen[SLOPES + axis, part] += max(
             table[ABOVE, near, part] - table[BELOW, far_beyond, part],
             table[ABOVE, near_beyond, part] - table[BELOW, far, part],
         )
+        seen[BENDS + axis, part] += one * table[STEEP, middle, part] + two * table[STEEP, beyond, part]
+        seen[THIRDS + axis, part] += table[BENT, middle, part] + table[BENT, beyond, part]
 
 
 @njit(cache=True, nogil=True, fastmath=_FINITE)
@@ -154,13 +182,7 @@ def of_blurred(
     scale = 1 / (segments * 2 * half)
     for axis in range(2):
         for segment in range(segments):
-            one = 2 * axis * segments + segment
-            other = one + segments
-            near, far, middle = nodes[one], nodes[2 * n + one], nodes[n + one]
-            near_beyond, far_beyond, beyond = nodes[other], nodes[2 * n + other], nodes[n + other]
-            _add_steepest(near, far, near_beyond, far_beyond, table, seen, SLOPES + axis)
-            _add_two(room[1, one], middle, room[1, other], beyond, table, STEEP, seen, BENDS + axis)
-            _add_two(1.0, middle, 1.0, beyond, table, BENT, seen, THIRDS + axis)
+            _add_piece(nodes, 2 * axis * segments + segment, segments, room[1], table, seen, axis)
         _scale(scale, seen, SLOPES + axis)
         _scale(scale, seen, BENDS + axis)
         _scale(scale, seen, THIRDS + axis)

@@ -33,6 +33,20 @@ def _inner_basis(t: float, found: FloatArray) -> None:
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
+def _add_four(shares: FloatArray, coefficients: FloatArray, found: FloatArray) -> None:
+    """Add up to four rows of coefficients, ndarray[n, n_values], times their shares."""
+    if len(coefficients) < 4:
+        for node in range(len(coefficients)):
+            for value in range(found.size):
+                found[value] += shares[node] * coefficients[node, value]
+        return
+    a, b, c, d = shares[0], shares[1], shares[2], shares[3]
+    one, two, three, four = coefficients[0], coefficients[1], coefficients[2], coefficients[3]
+    for value in range(found.size):
+        found[value] += (a * one[value] + b * two[value]) + (c * three[value] + d * four[value])
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
 def sums_of_cubic(
     x: FloatArray, weights: FloatArray, knots: FloatArray, coefficients: FloatArray, out: FloatArray
 ) -> None:
@@ -42,25 +56,23 @@ def sums_of_cubic(
     leaves out; `coefficients`: ndarray[n_knots - 4, n_values]; `out`: ndarray[n, n_values]. Beyond the end the last
     piece goes on. Each row is summed by itself: the same values in whatever company it is asked for.
     """
-    last, step = len(coefficients) - 1, knots[5] - knots[4]
+    last, per_unit = len(coefficients) - 1, 1 / (knots[5] - knots[4])
     four, folded = np.empty(4), np.zeros(len(coefficients))
     for row in range(len(x)):
         low, high = last, 3
         for at in range(weights.size):
-            first = min(max(int(x[row, at] / step) + 2, 3), last)
+            first = min(max(int(x[row, at] * per_unit) + 2, 3), last)
             if 6 <= first <= last - 3:
-                _inner_basis((x[row, at] - knots[first]) / step, four)
+                _inner_basis((x[row, at] - knots[first]) * per_unit, four)
             else:
                 _basis(x[row, at], first, knots, four)
             for part in range(4):
                 folded[first - 3 + part] += weights[at] * four[part]
             low, high = min(low, first), max(high, first)
         out[row] = 0.0
-        for node in range(low - 3, high + 1):
-            share = folded[node]
-            for value in range(out.shape[1]):
-                out[row, value] += share * coefficients[node, value]
-            folded[node] = 0.0
+        for node in range(low - 3, high + 1, 4):
+            _add_four(folded[node : node + 4], coefficients[node : node + 4], out[row])
+        folded[low - 3 : high + 1] = 0.0
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})

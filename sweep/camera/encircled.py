@@ -13,7 +13,7 @@ import numpy as np
 
 from ..base.cache import Cache
 from ..base.types import FloatArray
-from .bessel import sums_of_j1_over_x
+from .bessel import FewRadii, sums_of_j1_over_x
 from .effects.blur import Profile
 from .splines import spline_through
 
@@ -35,12 +35,9 @@ class Encircled:
 
     def __init__(self, profile: Profile) -> None:
         self._profile = profile
-        # The triangle of a QR decomposition has the same singular values, and is small.
-        _, sizes, shares = np.linalg.svd(np.linalg.qr(profile.values, mode="r"), full_matrices=False)
-        # The rest of any row is at most the first size that is left out.
-        kept = max(1, int((sizes > _RESIDUAL).sum()))
-        self.shares = np.zeros((-(-kept // _LANES) * _LANES, shares.shape[1]))
-        self.shares[:kept] = shares[:kept]
+        kept = profile.n_functions(_RESIDUAL)
+        self.shares = np.zeros((-(-kept // _LANES) * _LANES, profile.shares.shape[1]))
+        self.shares[:kept] = profile.shares[:kept]
 
     @cached_property
     def coefficients(self) -> FloatArray:
@@ -48,8 +45,8 @@ class Encircled:
         those of the profile. ndarray[n_nodes, n_functions].
         """
         r_um, (nu, spectrum) = self._profile.r_um, self._profile.spectrum
-        radii = np.arange(r_um.size + BEYOND) * r_um[1]
-        return uniform_spline(sums_of_j1_over_x(radii, nu, spectrum @ self.shares.T))
+        few = FewRadii(np.arange(r_um.size + BEYOND) * r_um[1], float(nu[-1]))
+        return uniform_spline(few.to_all(sums_of_j1_over_x(few.nodes, nu, spectrum @ self.shares.T)))
 
 
 def uniform_spline(values: FloatArray) -> FloatArray:

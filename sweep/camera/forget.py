@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .effects import blur, noise, quantization
+from .effects import blur, noise, quantization, sampling
 from .encircled import ENCIRCLED
 from .kernel import KERNELS
 from .noisy import moments, table
@@ -12,7 +12,7 @@ from .seen import MATRICES
 
 def forget_scenes() -> None:
     """Let the next scene compute its kernels, its filters and the table of its noisy pixel anew."""
-    for cache in (blur.PROFILES, ENCIRCLED, KERNELS, MATRICES):
+    for cache in (blur.PROFILES, ENCIRCLED, KERNELS, MATRICES, sampling.MEANS):
         cache.clear()
     for found in (
         blur.interpolation_bound,

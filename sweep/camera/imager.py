@@ -41,8 +41,12 @@ _BLOCK = 2_000_000
 class Imager:
     """A scene with its kernel made, ready for designs. `work` counts what is computed, by effect.
 
-    `electrons`: what the designs give on the units of the kernel; `readout`: how these are read.
+    `electrons`: what the designs give on the units of the kernel; `readout`: how these are read. Of places at which
+    pixels are read one by one, those that see the same as another one are left out.
     """
+
+    all_apart = False
+    """Whether all places are kept."""
 
     def __init__(
         self,
@@ -60,10 +64,13 @@ class Imager:
         self.work: Counter[str] = Counter() if work is None else work
         methods, grid = view.methods, view.grid
         by_pixel, targeted = not methods.straight, view.scenario.target is not None
-        every = blocks(view, phase.cases(view, methods.phase) if cases is None else cases) if targeted else []
-        # Where the kernels of all places would be too large to hold, those of the others are made as they are read.
-        self._others = every[1:] if by_pixel and methods.sampling != "skip" else []
-        cases = every[0] if self._others else cases
+        self._others: list[phase.Cases] = []
+        if by_pixel and targeted and methods.sampling != "skip":
+            if cases is None:
+                every = phase.cases(view, methods.phase)
+                cases = every if self.all_apart else phase.different_places(view, every)[0]
+            # Where the kernels of all places would be too large to hold, those of the others are made as they are read.
+            cases, *self._others = blocks(view, cases)
         if cases is None:
             kernel = kept_kernel(view, by_pixel=by_pixel, work=self.work)
         else:
@@ -85,6 +92,11 @@ class Imager:
             line = self.readout.line(len(by_edges.uniform) * by_edges.fixed.size)
             by_edges = None if line is None else by_edges._replace(line=line)
         return replace(found, fixed=transfer(found.fixed), make=lambda: transfer(electrons.values), by_edges=by_edges)
+
+    @property
+    def with_all_places(self) -> Imager:
+        """The same, with all places that its method looks at."""
+        return Imager(self.view, self.work, cases=phase.cases(self.view, self.view.methods.phase))
 
     @cached_property
     def anywhere(self) -> AnyPlace | None:

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from ..base.types import BoolArray, FloatArray
+from . import chebyshev
 from .compiled_pixels import Rings, kernels_by_ring
 from .effects import crosstalk, sampling
 from .mosaic import Mosaic
@@ -39,14 +40,12 @@ def inner_pixels(half: float, readout_px: float) -> BoolArray:
 
 def _nodes(order: int) -> FloatArray:
     """Those of Chebyshev along a row or column, pixels."""
-    return np.asarray(_FURTHEST_PX / 2 * (1 + np.cos(math.pi * (np.arange(order) + 0.5) / order)))
+    return np.asarray(_FURTHEST_PX / 2 * (1 + chebyshev.roots(order)))
 
 
-def _to_orders(order: int) -> FloatArray:
-    """From values at these nodes to the shares of Chebyshev's polynomials, ndarray[order, order]."""
-    found = np.cos(np.outer(np.arange(order), math.pi * (np.arange(order) + 0.5) / order)) * (2 / order)
-    found[0] /= 2
-    return np.asarray(found)
+def _is_square(mosaic: Mosaic) -> bool:
+    rows, columns = mosaic.indices.shape
+    return bool(rows == columns)
 
 
 class InnerLight:
@@ -64,19 +63,34 @@ class InnerLight:
         finest = 2 * math.pi * finest_per_px * _FURTHEST_PX / 2
         most = math.ceil(finest + 4 * finest ** (1 / 3) + 6)  # J_n(x) falls fast from n = x on
         order = self._needed(most, rings, mosaic)
-        light = self._summed(np.stack([a.ravel() for a in np.meshgrid(*[_nodes(order)] * 2)], axis=1), rings, mosaic)
-        self._sums = np.kron(_to_orders(order), _to_orders(order)) @ light.reshape(order**2, -1)
-        self._orders, self._shape = np.arange(order), light.shape[1:]
+        light = self._at_nodes(order, rings, mosaic)
+        to_orders = chebyshev.to_orders(order)
+        self._sums = np.kron(to_orders, to_orders) @ light.reshape(order**2, -1)
+        self._order, self._shape = order, light.shape[1:]
 
     def _needed(self, most: int, rings: Rings, mosaic: Mosaic) -> int:
         """The order of the polynomial: the images have little of their finest detail, and less of it inside."""
         middle, nodes = np.full(most, _FURTHEST_PX / 2), _nodes(most)
         needed, residual = 0, _RESIDUAL * self._inside.sum() / len(mosaic.channels)
-        for along in ((nodes, middle), (middle, nodes)):
+        for along in ((nodes, middle), (middle, nodes))[: 1 if _is_square(mosaic) else 2]:
             light = self._summed(np.stack(along, axis=1), rings, mosaic)
-            sizes = np.abs(_to_orders(most) @ light.reshape(most, -1)).max(axis=1)
+            sizes = np.abs(chebyshev.to_orders(most) @ light.reshape(most, -1)).max(axis=1)
             needed = max(needed, 1 + int(np.flatnonzero(sizes > residual)[-1]))
         return min(needed + 1, most)
+
+    def _at_nodes(self, order: int, rings: Rings, mosaic: Mosaic) -> FloatArray:
+        """`_summed` at the nodes along both axes, row by row.
+
+        Those on one side of the diagonal of a square tile see what those on the other side see, turned over it.
+        """
+        nodes, (row, column) = _nodes(order), np.indices((order, order)).reshape(2, -1)
+        own = column >= row if _is_square(mosaic) else np.ones(row.size, dtype=bool)
+        light = self._summed(np.stack([nodes[column[own]], nodes[row[own]]], axis=1), rings, mosaic)
+        found = np.empty((order, order, *light.shape[1:]))
+        if _is_square(mosaic):
+            found[column[own], row[own]] = light[:, mosaic.indices.T.ravel()]
+        found[row[own], column[own]] = light
+        return found.reshape(order**2, *light.shape[1:])
 
     @staticmethod
     def pays(half: float, readout_px: float) -> bool:
@@ -88,10 +102,10 @@ class InnerLight:
         seen, n = sampling.window(mosaic, places_px, len(self._inside) // 2), len(mosaic.channels)
         inside = self.among(seen, places_px)
         weights = np.repeat(inside[None].astype(float), len(places_px), axis=0)
-        by_ring = np.zeros((len(places_px), n, n, len(rings.shares)))
+        pairs, by_ring = np.where(np.eye(n) > 0, np.arange(n), -1), np.zeros((len(places_px), n, len(rings.shares)))
         own = seen.columns, seen.rows, weights, seen.channel, np.zeros_like(inside)
-        kernels_by_ring(*own, 0.0, rings, 0, by_ring, np.empty((len(places_px), n)))
-        return np.asarray(by_ring[:, np.arange(n), np.arange(n)] @ rings.shares)
+        kernels_by_ring(*own, 0.0, rings, 0, pairs, by_ring, np.empty((len(places_px), n)))
+        return np.asarray((by_ring.reshape(-1, len(rings.shares)) @ rings.shares).reshape(*by_ring.shape[:2], -1))
 
     def among(self, seen: sampling.Window, places_px: FloatArray) -> BoolArray:
         """Which pixels of a window are inner ones, ndarray[n_rows, n_columns]."""
@@ -107,7 +121,7 @@ class InnerLight:
     def at(self, places_px: FloatArray) -> FloatArray:
         """The light of the inner pixels of each channel, ndarray[n_places, n_channels, n_functions]."""
         angles = np.arccos(np.clip(places_px * (2 / _FURTHEST_PX) - 1, -1, 1))
-        x, y = (np.cos(self._orders * axis[:, None]) for axis in angles.T)
+        x, y = (chebyshev.polynomials(axis, self._order) for axis in angles.T)
         shares = (y[:, :, None] * x[:, None]).reshape(len(places_px), -1)
         return np.asarray((shares @ self._sums).reshape(len(places_px), *self._shape))
 
@@ -118,8 +132,6 @@ def taken_by_channels(mosaic: Mosaic, share: float) -> FloatArray:
     `mosaic`: each pixel of its tile is a channel; `share`: of light that comes through the neighbors' filters.
     """
     n = len(mosaic.channels)
-    whole = (mosaic.indices[..., None] == np.arange(n)).astype(float)
-    of_pixels = crosstalk.mixed(whole[None], share, periodic=True)[0].reshape(-1, n)
     found = np.zeros((n, n))
-    found[:, mosaic.indices.ravel()] = of_pixels.T
+    found[:, mosaic.indices.ravel()] = crosstalk.taken(mosaic, share).reshape(-1, n).T
     return found

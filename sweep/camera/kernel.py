@@ -105,14 +105,16 @@ def make_kernel(
         between = None if same else hats(wavelength_nm, knots)
         if isinstance(made.source, SplitLight):
             factor = np.broadcast_to(factor_of_light(view, methods, wavelength_nm), wavelength_nm.shape)
-            return replace(made, source=replace(made.source, hats=between, factor=factor))
+            shares = made.source.shares
+            shares = shares if shares is None or between is None else shares @ between
+            return replace(made, source=replace(made.source, shares=shares, factor=factor))
         light = made.light if between is None else made.light @ between
     return replace(made, source=light * factor_of_light(view, methods, wavelength_nm))
 
 
 def _one_light(source: FloatArray | SplitLight) -> bool:
     """Whether every wavelength sees the same."""
-    return bool((source.values if isinstance(source, SplitLight) else source).shape[-1] == 1)
+    return source.shares is None if isinstance(source, SplitLight) else bool(source.shape[-1] == 1)
 
 
 KERNELS: Cache[bytes, tuple[Kernel, Counter[str]]] = Cache(8)
@@ -224,7 +226,7 @@ def _pixels(
     # What each channel's readout takes of the pixels of each channel: [cases, rows, columns, channels x channels].
     taken = spread[..., :, None] * own[..., None, :]
     shape = (len(apart), n, n)
-    folded = light.folded(taken.reshape(*taken.shape[:3], n * n)).reshape(*shape, light.values.shape[1])
+    folded = light.folded(taken.reshape(*taken.shape[:3], n * n)).reshape(*shape, -1)
     weights = np.repeat(np.eye(n)[None], len(apart), axis=0)
     return Kernel(folded, taken.sum(axis=(1, 2)), weights, weights, by_channel=True)
 
@@ -264,9 +266,9 @@ def _apart(light: sampling.PixelLight, own: FloatArray, apart: FloatArray, share
     pixels, channel = np.arange(rows.size), own.argmax(axis=2)
     for part, row, column in taken:
         uniform[:, pixels, channel[row, column]] += part
-    shares = np.array([part for part, _, _ in taken])
+    parts = np.array([part for part, _, _ in taken])
     place = np.stack([light.place[:, row, column] for _, row, column in taken])
     through = np.stack([channel[row, column] for _, row, column in taken])
-    split = SplitLight(light.values, None, np.ones(light.values.shape[1]), shares, place, through, n)
+    split = SplitLight(light.values, light.shares, np.ones(1), parts, place, through, n)
     readout = apart[:, used]
     return Kernel(split, uniform, readout, readout**2, by_channel=False)

@@ -30,6 +30,8 @@ _STEPS_DN2 = 1 / 12
 class LinearImager(Imager):
     """An imager whose electrons are taken for digital numbers, linear in a design's QE but for the exposure."""
 
+    all_apart = True
+
     def smooth(self, curves: FloatArray) -> FloatArray:
         """Unquantized, unclipped response, DN, ndarray[n_designs, n_cases, n_signals, n_channels]."""
         return self.readout.folded(unquantized(self._expected(curves), self.readout.pixel))

@@ -30,6 +30,8 @@ from .scenario import Scenario
 from .view import View
 
 _KEPT_BYTES = 200e6
+_ROOM = 4
+"""Memory is reserved for so many times the rows that there are, so that they are seldom copied."""
 _Rows = tuple[NDArray[Any], ...]
 
 
@@ -42,8 +44,8 @@ class _Kept:
 
     @property
     def nbytes(self) -> int:
-        """Memory that they take."""
-        return sum(rows.nbytes for rows in self.rows)
+        """Memory that they take: what is only reserved takes none."""
+        return sum(rows[: len(self._at)].nbytes for rows in self.rows)
 
     def which(self, names: list[Hashable], make: Callable[[IndexArray], _Rows]) -> IndexArray:
         """The rows of some names; `make` makes those of the names, by number, that are not kept."""
@@ -51,7 +53,7 @@ class _Kept:
         if new:
             made, size = make(np.array(list(new.values()))), len(self._at)
             if not self.rows or size + len(new) > len(self.rows[0]):
-                room = 2 * (size + len(new))
+                room = _ROOM * (size + len(new))
                 more = (np.empty((room, *rows.shape[1:]), dtype=rows.dtype) for rows in made)
                 rows = self.rows or made
                 self.rows = tuple(_filled(larger, old[:size]) for larger, old in zip(more, rows, strict=True))
@@ -133,7 +135,7 @@ class ClassCells:
         def made(new: IndexArray) -> _Rows:
             work["places"] += len(new)
             kernels, sums = self._light.at(phase.Cases(images[new], cases.home_px[new]), work)
-            low, high = self.between.ranges(kernels @ self.shares)
+            low, high = self.between.ranges(kernels, self.shares)
             return kernels, sums, low, high
 
         return self._places.which(names_of(self._view, images, cases.home_px), made), which

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.types import FloatArray
+from ..base.types import BoolArray, FloatArray, IndexArray
 from . import compiled_light, legendre
 from .compiled_pixels import kernels_by_ring
 from .effects import crosstalk, demosaic, phase, sampling
@@ -25,7 +25,9 @@ from .view import View
 
 _AT_ONCE = 1_000_000
 """Pixels that are held at once."""
-_FEW_PER_PIXEL = 32
+_BY_RING = 8
+"""Places whose light is held at once by the functions of all rings: it stays in the processor's cache."""
+_FEW_PER_PIXEL = 16
 """Places that are no multiples of so many parts of a pixel are those of small cells, of which there are many."""
 _SHARP: compiled_light.Table = (np.empty((0, 0)), 0.0)
 
@@ -45,6 +47,9 @@ class PlaceKernels:
         self._half = pixel.fill_factor**0.5 / 2
         self._radii = sampling.radii_px(view, target)
         self._share = crosstalk.share(view, methods.crosstalk)
+        # Channels whose pixels take light through the filter of another one, and that one.
+        taken, n = crosstalk.taken(view.mosaic, self._share), len(view.mosaic.channels)
+        self._taken = np.argwhere([(taken[view.mosaic.indices == to] > 0).any(axis=0) for to in range(n)])
         profile = profile_of(view, methods, knots_nm)
         self._table, self._rule, self._rings = _SHARP, legendre.rule(1), None
         self.shares = np.ones((1, knots_nm.size))
@@ -92,7 +97,7 @@ class PlaceKernels:
         else:
             weights = demosaic.center_weights(seen, cases.home_px - cases.places_px, self._methods.demosaic, mosaic)
         n = len(mosaic.channels)
-        found, sums = np.empty((len(x), n, n, len(self.shares))), np.empty((len(x), n))
+        found, sums = np.zeros((len(x), n, n, len(self.shares))), np.empty((len(x), n))
         work["sampling"] += weights.size * len(self.shares)
         if self._rings is None:
             sizes = (self._half, self._radii[0], self._share)
@@ -101,10 +106,34 @@ class PlaceKernels:
         ring, left_out = 0, np.zeros(seen.channel.shape, dtype=bool)
         if inner is not None:
             ring, left_out = min(int(inner.nearest_px), len(self._rings.sizes) - 1), inner.among(seen, cases.places_px)
-        shares = self._rings.shares[self._rings.sizes[ring, 4] :]
-        by_ring = np.zeros((*found.shape[:3], len(shares)))
-        kernels_by_ring(x, y, weights, seen.channel, left_out, self._share, self._rings, ring, by_ring, sums)
-        np.matmul(by_ring, shares, out=found)
+        self._by_ring(x, y, weights, seen.channel, left_out, ring, found, sums)
         if inner is not None:
             found += taken_by_channels(mosaic, self._share)[:, :, None] * inner.at(cases.places_px)[:, None]
-        return found / sums[:, :, None, None], sums
+        found /= sums[:, :, None, None]
+        return found, sums
+
+    def _by_ring(
+        self,
+        x: FloatArray,
+        y: FloatArray,
+        weights: FloatArray,
+        channel: IndexArray,
+        left_out: BoolArray,
+        ring: int,
+        found: FloatArray,
+        sums: FloatArray,
+    ) -> None:
+        """Put what `kernels_by_ring` sums up into `found`, which is nothing before, few places at once."""
+        assert self._rings is not None
+        to, through = self._taken.T
+        pairs = np.full(found.shape[1:3], -1)
+        pairs[to, through] = np.arange(len(to))
+        shares = self._rings.shares[self._rings.sizes[ring, 4] :]
+        room = np.empty((min(_BY_RING, len(x)), len(to), len(shares)))
+        for start in range(0, len(x), _BY_RING):
+            some = slice(start, start + _BY_RING)
+            by_ring = room[: len(x[some])]
+            by_ring[:] = 0.0
+            own = x[some], y[some], weights[some], channel, left_out
+            kernels_by_ring(*own, self._share, self._rings, ring, pairs, by_ring, sums[some])
+            found[some, to, through] = (by_ring.reshape(-1, len(shares)) @ shares).reshape(*by_ring.shape[:2], -1)

@@ -19,16 +19,16 @@ from ..base.types import FloatArray, IndexArray
 class SplitLight:
     """`Kernel.light` of pixels, ndarray[n_cases, n_units, n_channels, n_wavelengths], in factors.
 
-    `values`: light at each different place, ndarray[n_places, n_knots or 1]; `hats`: from these knots to all
-    wavelengths, ndarray[n_knots, n_wavelengths], None where they are the same or see the same; `factor`: of the light's
-    way, ndarray[n_wavelengths]. A pixel is a sum of parts: `shares`: how much of each, ndarray[n_parts]; `place`: where
+    `values`: functions of the light at each different place, ndarray[n_places, n_functions]; `shares`: how much of each
+    is in each wavelength, ndarray[n_functions, n_wavelengths], None where all see the same; `factor`: of the light's
+    way, ndarray[n_wavelengths]. A pixel is a sum of parts: `parts`: how much of each, ndarray[n_parts]; `place`: where
     it is, ndarray[n_parts, n_cases, n_units]; `through`: whose filter it has, ndarray[n_parts, n_units].
     """
 
     values: FloatArray
-    hats: FloatArray | None
+    shares: FloatArray | None
     factor: FloatArray
-    shares: FloatArray
+    parts: FloatArray
     place: IndexArray
     through: IndexArray
     n_channels: int
@@ -40,26 +40,23 @@ class SplitLight:
 
     def whole(self) -> FloatArray:
         """The array itself."""
-        by_place = (self.values if self.hats is None else self.values @ self.hats) * self.factor
+        by_place = (self.values if self.shares is None else self.values @ self.shares) * self.factor
         found = np.zeros(self.shape)
         pixels = np.arange(self.place.shape[2])
-        for share, place, through in zip(self.shares, self.place, self.through, strict=True):
+        for share, place, through in zip(self.parts, self.place, self.through, strict=True):
             found[:, pixels, through] += share * by_place[place]
         return found
 
     def _seen(self, spectra: FloatArray) -> FloatArray:
         """Sums over the wavelengths at each place: ndarray[..., n, n_wavelengths] -> ndarray[..., n_places, n]."""
-        on_knots = spectra * self.factor
-        if self.values.shape[1] == 1:
-            on_knots = on_knots.sum(axis=-1, keepdims=True)
-        elif self.hats is not None:
-            on_knots = on_knots @ self.hats.T
-        return np.asarray(self.values @ np.swapaxes(on_knots, -1, -2), dtype=float)
+        seen = spectra * self.factor
+        by_function = seen.sum(axis=-1, keepdims=True) if self.shares is None else seen @ self.shares.T
+        return np.asarray(self.values @ np.swapaxes(by_function, -1, -2), dtype=float)
 
     def touched(self, channels: Sequence[int]) -> IndexArray:
         """The units that look through the filter of any of these channels."""
         lit = (self.values != 0).any(axis=1)[self.place].any(axis=1)
-        return np.flatnonzero((np.isin(self.through, list(channels)) & (self.shares[:, None] != 0) & lit).any(axis=0))
+        return np.flatnonzero((np.isin(self.through, list(channels)) & (self.parts[:, None] != 0) & lit).any(axis=0))
 
     def sums(self, spectra: FloatArray, channels: Sequence[int], units: IndexArray | None = None) -> FloatArray:
         """Sums over channels and wavelengths, ndarray[n_designs, n_cases, n_signals, n_units] (those of `units`).
@@ -76,7 +73,7 @@ class SplitLight:
         if units is not None:
             place, through = np.ascontiguousarray(place[..., units]), np.ascontiguousarray(through[:, units])
         found = np.zeros((len(spectra), place.shape[1], spectra.shape[2], place.shape[2]))
-        gather(seen, self.shares, place, through, found)
+        gather(seen, self.parts, place, through, found)
         return found
 
     def folded(self, weights: FloatArray, channel: int) -> FloatArray:
@@ -85,12 +82,12 @@ class SplitLight:
         `weights`: ndarray[n_cases, n_units].
         """
         by_place = np.zeros((len(weights), len(self.values)))
-        for share, place, through in zip(self.shares, self.place, self.through, strict=True):
+        for share, place, through in zip(self.parts, self.place, self.through, strict=True):
             own = np.flatnonzero(through == channel)
             for case in range(len(weights)):
                 np.add.at(by_place[case], place[case, own], share * weights[case, own])
         seen = by_place @ self.values
-        return np.asarray((seen if self.hats is None else seen @ self.hats) * self.factor, dtype=float)
+        return np.asarray((seen if self.shares is None else seen @ self.shares) * self.factor, dtype=float)
 
     def work(self, n_channels: int, n_signals: int) -> int:
         """Multiplications of `sums` for one design."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.types import FloatArray, IndexArray
 from ..camera.effects.image_height import HEIGHTS
-from ..camera.effects.phase import Cases
+from ..camera.effects.phase import Cases, different_places
 from ..camera.electrons import Changing
 from ..camera.field import scene_at
 from ..camera.imager import Imager, imager_of
@@ -132,9 +132,10 @@ def _as_read(imager: Imager, curves: FloatArray, found: Mapping[Pair, Extremes |
     at = [case for extremes in kept.values() for case in (extremes.at_smallest, extremes.at_largest)]
     if not at:
         return dict(found)
-    there = Imager(imager.view, imager.work, cases=Cases(*np.moveaxis(np.array(at), 1, 0)), once=True)
+    cases, which = different_places(imager.view, Cases(*np.moveaxis(np.array(at), 1, 0)))
+    there = Imager(imager.view, imager.work, cases=cases, once=True)
     every = separations(there.read(curves)[0][0], imager.view.members)
-    moments = {pair: distances.reshape(len(at), -1) for pair, distances in every.items()}
+    moments = {pair: distances.reshape(len(cases.places_px), -1)[which] for pair, distances in every.items()}
     read = [{pair: distances[place] for pair, distances in moments.items()} for place in range(len(at))]
     for number, (pair, extremes) in enumerate(kept.items()):
         own = read[2 * number : 2 * number + 2] if imager.view.methods.straight else read

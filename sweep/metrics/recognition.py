@@ -44,6 +44,7 @@ def recognize(
     members = [imager.view.members[name] for name in states]
     signals = np.concatenate(members)
     state = np.repeat(np.arange(len(states)), [len(own) for own in members])
+    imager = imager.with_all_places
     electrons = imager.pixel_electrons(curves)[0]
     place = rng.integers(len(electrons), size=(patches, len(signals)))
     truth = np.broadcast_to(state, place.shape)

@@ -109,7 +109,7 @@ def test_sums_over_a_profile_are_those_of_its_values(reach_um: float) -> None:
     )
     weights = rng.uniform(-1, 1, 9)
     np.testing.assert_allclose(
-        profile.sums(r_um, weights), np.einsum("nmk,m->nk", profile.at(r_um), weights), atol=1e-12
+        profile.sums(r_um, weights) @ profile.shares, np.einsum("nmk,m->nk", profile.at(r_um), weights), atol=1e-12
     )
 
 

@@ -218,7 +218,7 @@ def bounded(between: Between, cells: phase.Cells, sums: np.ndarray, values: np.n
     """Of a CFA's own channels. `sums`: of their weights at the nodes, ndarray[n_cells, 9, n_channels]; `values`: of its
     kernel there, ndarray[n_cells, 9, ...].
     """
-    low, high = between.ranges(values.reshape(-1, *values.shape[2:]))
+    low, high = between.ranges(values.reshape(-1, *values.shape[2:]), np.eye(values.shape[-1]))
     low, high = (ends.reshape(*values.shape[:2], *ends.shape[1:]) for ends in (low, high))
     known = between.bounds(cells.centers, cells.half, cells.homes, sums, low.min(axis=1), high.max(axis=1))
     n_cells, every = len(values), np.arange(values.shape[2])
@@ -450,7 +450,7 @@ space = study.spaces[0]
 if sys.argv[2] == "plan":
     print(study.plan("road").promised_dn)
 else:
-    imager = Imager(study.view(space, "road"))
+    imager = Imager(study.view(space, "road")).with_all_places
     print(len(imager.read(space.curves(space.points(0, 1), study.grid.size))[0][0]))
 """
 

@@ -18,7 +18,7 @@ import numpy as np
 from ...base.cache import Cache
 from ...base.types import FloatArray
 from .. import legendre
-from ..bessel import sums_of_j0
+from ..bessel import FewRadii, sums_of_j0
 from ..pixel import Pixel
 from ..scene import Scene
 from ..shot import Shot
@@ -36,6 +36,8 @@ _PANEL_NODES = 32
 _CYCLES_PER_PANEL = 4.0
 _SPLINE_PER_CYCLE = 24
 """Nodes of the table of h(r) per period of the highest frequency."""
+_ROUNDING = 2e-13
+"""No value of the table is further from the sum of its functions, relative to a uniform field."""
 
 
 def defocus_um(scenario: Scene, pitch_um: float) -> float:
@@ -109,16 +111,18 @@ def _frequencies(reach_um: float, wavelength_um: FloatArray, f_number: float) ->
 
 
 class Profile:
-    """h(r) of one disc for some wavelengths, as a table to look up.
+    """h(r) of one disc for some wavelengths, as a table to look up: a sum of fewer functions of the radius.
 
     `spectrum`: frequencies, 1/um, and the factor of J0(2 pi r nu) at each, ndarray[n_frequencies, n_wavelengths];
-    `highest_per_um`: the highest of them.
+    `highest_per_um`: the highest of them. `shares`: how much of each function is in each wavelength,
+    ndarray[n_functions, n_wavelengths], the first ones the most.
     """
 
     def __init__(
         self, radius_um: float, reach_um: float, wavelength_um: FloatArray, f_number: float, w20_um: float
     ) -> None:
         from scipy.interpolate import BSpline  # noqa: PLC0415  (slow to import: kept off the start-up path)
+        from scipy.linalg import qr  # noqa: PLC0415  (slow to import: kept off the start-up path)
         from scipy.special import j1  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
         nu, weight = _frequencies(radius_um + reach_um, wavelength_um, f_number)
@@ -126,12 +130,21 @@ class Profile:
         r = np.linspace(0.0, reach_um + step, max(8, 2 + int(reach_um / step)))
         disc = (2 * math.pi * radius_um * j1(2 * math.pi * radius_um * nu) * weight)[:, None]
         self.spectrum = nu, disc * transfer(nu, wavelength_um, f_number, w20_um)
-        table = sums_of_j0(r, *self.spectrum)
-        self._spline = BSpline(*spline_through(r, table, 3), 3)
-        self.r_um, self.values = r, table
+        few = FewRadii(r, float(nu[-1]))
+        values = sums_of_j0(few.nodes, *self.spectrum)
+        # What the first columns leave of any row is at most the size of the next one's entry on the diagonal.
+        basis, triangle, _ = qr(values.T, mode="economic", pivoting=True)
+        self._left = few.growth * np.abs(np.diag(triangle))
+        self.shares = np.ascontiguousarray(basis[:, : self.n_functions(_ROUNDING)].T)
+        self._table = few.to_all(values @ self.shares.T)
+        self._spline = BSpline(*spline_through(r, self._table, 3), 3)
+        self.r_um = r
         self.highest_per_um = float(nu[-1])
-        self.n_wavelengths = wavelength_um.size
         self.work = r.size * nu.size * wavelength_um.size
+
+    def n_functions(self, residual: float) -> int:
+        """How many of the functions leave no more than this of any value, relative to a uniform field."""
+        return max(1, int((self._left > residual).sum()))
 
     def order(self, width_um: float) -> int:
         """Order of a Gauss-Legendre rule that integrates h over `width_um`."""
@@ -139,23 +152,29 @@ class Profile:
 
     def at(self, r_um: FloatArray) -> FloatArray:
         """h, ndarray[..., n_wavelengths]."""
-        return np.asarray(self._spline(r_um), dtype=float)
+        return np.asarray(self._spline(r_um) @ self.shares, dtype=float)
 
     def sums(self, r_um: FloatArray, weights: FloatArray) -> FloatArray:
-        """Sums of h over the last axis of `r_um`, by their weights: ndarray[n, m], ndarray[m] -> [n, n_wavelengths].
+        """Sums of the functions over the last axis of `r_um`, by their weights: ndarray[n, m], ndarray[m] -> [n,
+        n_functions]; times `shares` those of h.
 
-        The weights go to the spline's coefficients first, so that no more is done at each wavelength than one product.
+        The weights go to the spline's coefficients first, so that no more is done for each function than one product.
         """
         from ..compiled_splines import sums_of_cubic  # noqa: PLC0415  (compiled: kept off the start-up path)
 
-        found = np.empty((len(r_um), self.n_wavelengths))
+        found = np.empty((len(r_um), len(self.shares)))
         sums_of_cubic(r_um, weights, self._spline.t, self._spline.c, found)
         return found
 
     @cached_property
+    def values(self) -> FloatArray:
+        """h at the radii `r_um`, ndarray[n_radii, n_wavelengths]."""
+        return np.asarray(self._table @ self.shares)
+
+    @cached_property
     def slopes(self) -> FloatArray:
         """Derivative of h at the radii `r_um`, 1/um, ndarray[n_radii, n_wavelengths]."""
-        return np.asarray(self._spline.derivative()(self.r_um), dtype=float)
+        return np.asarray(self._spline.derivative()(self.r_um) @ self.shares, dtype=float)
 
 
 _Sizes = tuple[float, float, tuple[float, ...], float, float]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.types import FloatArray
+from ..mosaic import Mosaic
 from ..shot import Shot
 from .base import KernelEffect, Part, Stage
 
@@ -25,6 +26,12 @@ def mixed(light: FloatArray, share: float, *, periodic: bool = False) -> FloatAr
         to[1:] += of[:-1]
         to[:-1] += of[1:]
     return np.asarray(found, dtype=float)
+
+
+def taken(mosaic: Mosaic, share: float) -> FloatArray:
+    """What pixels of a tile take of the light through each channel's filter, ndarray[n_rows, n_columns, n_channels]."""
+    whole = (mosaic.indices[..., None] == np.arange(len(mosaic.channels))).astype(float)
+    return np.asarray(mixed(whole[None], share, periodic=True)[0])
 
 
 def share(shot: Shot, method: str) -> float:

@@ -151,17 +151,47 @@ def cases(shot: Shot, method: str) -> Cases:
     return Cases(places, np.ceil(places - 0.5))
 
 
+def different_places(shot: Shot, every: Cases) -> tuple[Cases, IndexArray]:
+    """Those of some cases that see something else than all before, and which of these each sees, ndarray[n].
+
+    Of a mean over the light, a place sees what its mirror images see.
+    """
+    target, tile = shot.scenario.target, shot.mosaic.indices
+    keys = np.concatenate([every.places_px, every.home_px], axis=1)
+    if target is not None and target.readout == "mean":
+        axes = zip(every.places_px.T, (tile.T, tile), strict=True)
+        keys = np.stack([_folded(along, _mirror(rows), len(rows)) for along, rows in axes], axis=1)
+        if np.array_equal(tile, tile.T):
+            keys = np.sort(keys, axis=1)
+    _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    return every.some(first[order]), np.argsort(order)[which.ravel()]
+
+
+def _folded(along: FloatArray, mirror: float | None, period: int) -> FloatArray:
+    """Places along an axis, each as the one of its images that stands for it."""
+    if mirror is None:
+        return np.asarray(np.mod(along, period))
+    beyond = np.mod(along - mirror, period)
+    return np.asarray(np.minimum(beyond, period - beyond))
+
+
+def _mirror(rows: IndexArray) -> float | None:
+    """Where rows are their own mirror image, pixels; None where they are not."""
+    n = len(rows)
+    mirrors = [m for m in range(n) if np.array_equal(rows[(m - np.arange(n)) % n], rows)]
+    return mirrors[0] / 2 if mirrors else None
+
+
 def domain_px(mosaic: Mosaic) -> FloatArray:
     """A part of the tile that stands for all of it: ndarray[2, 2], (column, row) of its two ends.
 
     Where the tile is its own mirror image, places on both sides of the mirror see the same.
     """
-    tile = mosaic.indices
     ends = []
-    for rows in (tile.T, tile):
-        n = len(rows)
-        mirrors = [m for m in range(n) if np.array_equal(rows[(m - np.arange(n)) % n], rows)]
-        ends.append((mirrors[0] / 2, (mirrors[0] + n) / 2) if mirrors else (0.0, float(n)))
+    for rows in (mosaic.indices.T, mosaic.indices):
+        n, mirror = len(rows), _mirror(rows)
+        ends.append((0.0, float(n)) if mirror is None else (mirror, mirror + n / 2))
     return np.array(ends).T
 
 

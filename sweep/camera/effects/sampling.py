@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...base.cache import Cache
 from ...base.types import BoolArray, FloatArray, IndexArray
 from .. import legendre
 from ..mosaic import Mosaic
@@ -15,7 +16,7 @@ from ..shot import Shot
 from .base import Chosen, KernelEffect, Load, Part, Stage
 from .blur import Profile
 
-PIXEL_S = 7e-10
+PIXEL_S = 5e-10
 """Seconds of a pixel at a place of the light, through a channel's filter, at a wavelength."""
 SEARCHED_S, SEARCHED_PIXEL_S, PLACE_S, PLACE_PIXEL_S = 0.04, 2.4e-6, 6e-5, 4e-9
 """Seconds that a search for the worst of all places takes: to begin with, at all and for each pixel around the light
@@ -23,6 +24,8 @@ and function of its image, and the same for each place; `tests/bench_work.py` me
 AROUND_PX, MOST_FUNCTIONS = 6.0, 32
 """How many more pixels a search looks at than are read, across, and of how many functions an image is a sum, about."""
 _AT_ONCE = 200
+_MOST_KEPT = 2_000_000
+"""Values of pixels that are kept."""
 
 
 def covered(x: FloatArray, y: FloatArray, half: float, radius: float) -> FloatArray:
@@ -77,8 +80,9 @@ def window(mosaic: Mosaic, phases_px: FloatArray, reach_px: float) -> Window:
     columns, rows = (np.arange(a, b + 1) for a, b in zip(low, high, strict=True))
     tile = mosaic.indices
     channel = tile[np.ix_(rows % tile.shape[0], columns % tile.shape[1])]
-    dx = columns[None, None, :] - phases_px[:, :1, None] + np.zeros((1, rows.size, 1))
-    dy = rows[None, :, None] - phases_px[:, 1:, None] + np.zeros((1, 1, columns.size))
+    shape = len(phases_px), rows.size, columns.size
+    dx = np.broadcast_to((columns - phases_px[:, :1])[:, None], shape)
+    dy = np.broadcast_to((rows - phases_px[:, 1:])[:, :, None], shape)
     return Window(channel, dx, dy)
 
 
@@ -97,15 +101,18 @@ def mean_weights(seen: Window, half: float, readout_px: float, n_channels: int) 
 class PixelLight:
     """Light of pixels relative to a uniform field, each different place once.
 
-    `values`: ndarray[n_places, n_wavelengths or 1], the last place is dark; `place`: ndarray[n_cases, rows, columns].
+    `values`: of each function of the light, ndarray[n_places, n_functions], the last place is dark; `place`:
+    ndarray[n_cases, rows, columns]. `shares`: how much of each function is in each wavelength, ndarray[n_functions,
+    n_wavelengths]; None where all wavelengths see the same, and are one function.
     """
 
     values: FloatArray
     place: IndexArray
+    shares: FloatArray | None
 
     def by_pixel(self) -> FloatArray:
         """ndarray[n_cases, rows, columns, n_wavelengths or 1]."""
-        return self.values[self.place]
+        return self._at_wavelengths(self.values)[self.place]
 
     def folded(self, weights: FloatArray) -> FloatArray:
         """Weighted sums over the pixels: ndarray[n_cases, rows, columns, n] -> ndarray[n_cases, n, n_wavelengths]."""
@@ -113,7 +120,10 @@ class PixelLight:
         for case, own in enumerate(weights):
             some = np.flatnonzero(own.any(axis=2))
             found[case] = own.reshape(-1, own.shape[2])[some].T @ self.values[self.place[case].ravel()[some]]
-        return found
+        return self._at_wavelengths(found)
+
+    def _at_wavelengths(self, values: FloatArray) -> FloatArray:
+        return values if self.shares is None else np.asarray(values @ self.shares)
 
 
 def different(seen: Window, wanted: BoolArray) -> tuple[FloatArray, IndexArray, BoolArray]:
@@ -146,18 +156,30 @@ def light_on_pixels(
         values = covered(apart[:, 0], apart[:, 1], half, radius_px)[:, None]
     else:
         values = _means(apart, half, profile, pitch_um)
-    return PixelLight(np.vstack([values, np.zeros((1, values.shape[1]))]), place)
+    shares = None if profile is None else profile.shares
+    return PixelLight(np.vstack([values, np.zeros((1, values.shape[1]))]), place, shares)
+
+
+MEANS: Cache[tuple[Profile, float, bytes], FloatArray] = Cache(4)
+"""The latest pixels: CFAs with tiles of one size look at the same around a light that may fall anywhere."""
 
 
 def _means(apart: FloatArray, half: float, profile: Profile, pitch_um: float) -> FloatArray:
-    """Mean of the profile over pixels at `apart` (ndarray[n, 2]) from its center, ndarray[n, n_wavelengths]."""
+    """Mean of the profile's functions over pixels at `apart` (ndarray[n, 2]) from its center, [n, n_functions]."""
+    if len(apart) * len(profile.shares) > _MOST_KEPT:
+        return _made_means(apart, half, profile, pitch_um)
+    key = (profile, half * pitch_um, apart.tobytes())
+    return MEANS.get(key, lambda: _made_means(apart, half, profile, pitch_um))
+
+
+def _made_means(apart: FloatArray, half: float, profile: Profile, pitch_um: float) -> FloatArray:
     nodes, weights = legendre.rule(profile.order(2 * half * pitch_um))
     u, v = (a.ravel() * half for a in np.meshgrid(nodes, nodes))
     both = np.outer(weights, weights).ravel() / 4
-    values = np.empty((len(apart), profile.n_wavelengths))
+    values = np.empty((len(apart), len(profile.shares)))
     for start in range(0, len(apart), _AT_ONCE):
         x, y = apart[start : start + _AT_ONCE].T
-        r = np.hypot(x[:, None] + u, y[:, None] + v) * pitch_um
+        r = np.sqrt((x[:, None] + u) ** 2 + (y[:, None] + v) ** 2) * pitch_um
         values[start : start + _AT_ONCE] = profile.sums(r, both)
     return values
 

@@ -18,7 +18,7 @@ class MomentTable(NamedTuple):
     """Cubics over twice the standard deviation of the electrons: the root of their number, or with PRNU the inverse
     hyperbolic sine of PRNU times that root, over PRNU.
 
-    `nodes`: ndarray[n + 1], multiples of `moments.STEP`; `coefficients`: ndarray[3, 4, n], for each of
+    `nodes`: ndarray[n + 1], multiples of `moments.STEP`; `coefficients`: ndarray[3, n, 4], for each of
     `moments.moments`; `piece`: which of them each step from 0 up is in.
     """
 
@@ -78,4 +78,4 @@ def tables(pixel: Pixel) -> MomentTable:
         whole = moments.table_without_prnu(pixel)
     steps = np.rint(np.diff(whole.x) / moments.STEP).astype(int)
     piece = np.repeat(np.arange(steps.size), steps)
-    return MomentTable(whole.x, np.ascontiguousarray(np.moveaxis(whole.c, 2, 0)), piece)
+    return MomentTable(whole.x, np.ascontiguousarray(whole.c.T), piece)
