@@ -14,9 +14,6 @@ _TAIL = 9.5
 _NONE = np.empty(0)
 _RARE = 1e-22
 """Numbers of electrons that occur less often than this, relative to the most frequent one, are left out."""
-_KEPT_BITS = 14
-_KEPT, _SHIFT, _MIXED = 2**_KEPT_BITS, np.uint64(64 - _KEPT_BITS), np.uint64(0x9E3779B97F4A7C15)
-"""Values of a table that are kept, and how the bits of a number give one of their places: Fibonacci hashing."""
 
 
 @njit(cache=True, nogil=True)
@@ -182,16 +179,8 @@ def cubic_of_electrons(
     step: float,
     out: FloatArray,
 ) -> None:
-    """Values of a table at expected electrons, ndarray[n]: see `noisy.table.MomentTable`. Beyond `last_e` they stay.
-
-    Places and pixels that mirror each other expect the same: the latest values are kept by the bits of the electrons.
-    """
-    bits, asked, kept = electrons.view(np.uint64), np.full(_KEPT, np.nan), np.empty(_KEPT)
+    """Values of a table at expected electrons, ndarray[n]: see `noisy.table.MomentTable`. Beyond `last_e` they stay."""
     for i in range(electrons.size):
-        slot = (bits[i] * _MIXED) >> _SHIFT
-        if asked[slot] == electrons[i]:
-            out[i] = kept[slot]
-            continue
         held = electrons[i]
         held = last_e if held > last_e else held
         at = np.sqrt(held)
@@ -203,4 +192,3 @@ def cubic_of_electrons(
         k = piece[min(int(at / step), piece.size - 1)]
         s, own = at - nodes[k], coefficients[k]
         out[i] = ((own[0] * s + own[1]) * s + own[2]) * s + own[3]
-        asked[slot], kept[slot] = electrons[i], out[i]
