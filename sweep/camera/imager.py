@@ -93,11 +93,6 @@ class Imager:
             by_edges = None if line is None else by_edges._replace(line=line)
         return replace(found, fixed=transfer(found.fixed), make=lambda: transfer(electrons.values), by_edges=by_edges)
 
-    @property
-    def with_all_places(self) -> Imager:
-        """The same, with all places that its method looks at."""
-        return Imager(self.view, self.work, cases=phase.cases(self.view, self.view.methods.phase))
-
     @cached_property
     def anywhere(self) -> AnyPlace | None:
         """The scene with the light at any place, where that is asked for and more than a lattice of places counts."""
@@ -172,15 +167,21 @@ class Imager:
         return found
 
 
-_imagers: Cache[bytes, Imager] = Cache(16)
-_known: Cache[int, tuple[View, Imager]] = Cache(4)
+class AllApart(Imager):
+    """An imager of all places, for what tells a place from its mirror image: pixels that are drawn one by one."""
+
+    all_apart = True
+
+
+_imagers: Cache[tuple[type[Imager], bytes], Imager] = Cache(16)
+_known: Cache[tuple[type[Imager], int], tuple[View, Imager]] = Cache(4)
 """Those of the views of the last blocks, by the views themselves, which nobody changes."""
 
 
-def imager_of(view: View) -> Imager:
+def imager_of(view: View, kind: type[Imager] = Imager) -> Imager:
     """The imager of a view; the latest ones are kept, so that a kernel is made once in a process."""
 
     def made() -> tuple[View, Imager]:
-        return view, _imagers.get(hashlib.sha256(pickle.dumps(view)).digest(), lambda: Imager(view))
+        return view, _imagers.get((kind, hashlib.sha256(pickle.dumps(view)).digest()), lambda: kind(view))
 
-    return _known.get(id(view), made)[1]
+    return _known.get((kind, id(view)), made)[1]

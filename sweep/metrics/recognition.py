@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base.types import FloatArray, IndexArray
 from ..camera.effects import noise
-from ..camera.imager import Imager
+from ..camera.imager import AllApart
 from .classifiers import CLASSIFIERS
 from .share import share_interval
 
@@ -31,7 +31,7 @@ def _columns_of(rule: str) -> tuple[str, ...]:
 
 
 def recognize(
-    imager: Imager, curves: FloatArray, states: Sequence[str], patches: int, rng: np.random.Generator
+    imager: AllApart, curves: FloatArray, states: Sequence[str], patches: int, rng: np.random.Generator
 ) -> dict[str, float]:
     """Accuracy of every rule for one design, as `columns` names it; `curves`: ndarray[1, n_modified, n_wavelengths].
 
@@ -44,7 +44,6 @@ def recognize(
     members = [imager.view.members[name] for name in states]
     signals = np.concatenate(members)
     state = np.repeat(np.arange(len(states)), [len(own) for own in members])
-    imager = imager.with_all_places
     electrons = imager.pixel_electrons(curves)[0]
     place = rng.integers(len(electrons), size=(patches, len(signals)))
     truth = np.broadcast_to(state, place.shape)
@@ -73,7 +72,7 @@ def recognize(
 class _MostLikely:
     """The most likely of `signals` for drawn patches of one design."""
 
-    def __init__(self, imager: Imager, curves: FloatArray, signals: IndexArray) -> None:
+    def __init__(self, imager: AllApart, curves: FloatArray, signals: IndexArray) -> None:
         read = imager.read_with_noise(curves)
         self._readout = imager.readout
         mean, variance = (np.moveaxis(of[0][:, signals], 2, 1) for of in (read.mean, read.variance))

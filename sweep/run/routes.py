@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.types import FloatArray
-from ..camera.imager import Imager, imager_of
+from ..camera.imager import AllApart, Imager, imager_of
 from ..camera.view import View
 from ..designs.block import Block, CurveBlock, EdgeBlock, edges_of
 from ..designs.space import Space
@@ -21,6 +21,7 @@ from ..metrics.evaluate import evaluate, family_quantities, image_quantities
 from ..metrics.objective import COMBINED, Objective, columns_of
 from ..metrics.own import OwnMetric
 from ..metrics.quantity import OF_A_SHARE, WORST_CASE, YIELD, Asked, Columns, Quantity
+from ..results.tables import FEW
 from ..vision.section import Vision
 
 BY_CURVES = "computed from their curves, since the fast way by their edges failed"
@@ -39,6 +40,12 @@ class Request:
     tolerance: Tolerance
     vision: Vision | None = None
     seed: int = 0
+    drawn: bool = False
+    """Whether raw patches are drawn of plain CFAs and named designs, from the same readout."""
+
+    def imager(self, kind: str, view: View) -> Imager:
+        """The imager of a view for designs of a `kind` of rows."""
+        return imager_of(view, AllApart if self.drawn and kind in FEW else Imager)
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
@@ -87,7 +94,7 @@ def text_of(error: Exception) -> str:
 def _columns(space: Space, view: View, points: FloatArray, request: Request, block: Block | None = None) -> Columns:
     """Every quantity of a block of designs, ndarray[n_designs] each; `block`: these very designs, if a faster one."""
     size = view.grid.size
-    imager = imager_of(view)
+    imager = request.imager(space.kind, view)
     designs = CurveBlock(space.curves(points, size)) if block is None else block
     asked = request.asked
     columns = evaluate(imager, designs, asked.states, probabilities=asked.probabilities, own=asked.own)

@@ -156,7 +156,9 @@ def failed_rows(job: Job, rules: Rules, status: str) -> pa.Table:
 def rules_of(study: Study) -> Rules:
     """The rules of a study."""
     schema = result_schema(study.parameters, list(study.quantities))
-    request = Request(study.asked, study.objective, study.tolerance, study.section.vision, study.section.seed)
+    section = study.section
+    drawn = section.recognition is not None and bool(section.recognition.patches)
+    request = Request(study.asked, study.objective, study.tolerance, section.vision, section.seed, drawn)
     return Rules(schema, request, study.constraints, study.trade_off, study.plans)
 
 

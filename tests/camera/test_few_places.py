@@ -9,7 +9,7 @@ import pytest
 
 from sweep.camera.bessel import FewRadii, sums_of_j0, sums_of_j1_over_x
 from sweep.camera.effects import phase
-from sweep.camera.imager import Imager
+from sweep.camera.imager import AllApart, Imager
 from sweep.camera.methods import REFERENCE
 
 from ..hard.scenes import DARK, F2, FAR, scene
@@ -26,7 +26,7 @@ def test_a_place_reads_what_its_mirror_images_read(name: str, fewest: int, reado
     assert len(few.places_px) == (fewest if readout == "mean" else len(every.places_px))
     imager = Imager(view)
     assert imager.n_places == len(few.places_px)
-    own, whole = (each.read_with_noise(made.curves) for each in (imager, imager.with_all_places))
+    own, whole = (each.read_with_noise(made.curves) for each in (imager, AllApart(view)))
     np.testing.assert_allclose(own.mean[:, which], whole.mean, rtol=0, atol=1e-9)
     np.testing.assert_allclose(own.variance[:, which], whole.variance, rtol=1e-9)
 

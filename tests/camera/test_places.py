@@ -440,7 +440,7 @@ from pathlib import Path
 resource.setrlimit(resource.RLIMIT_AS, ({most}, {most}))
 from sweep.base.errors import SweepError
 from sweep.study import load_study
-from sweep.camera.imager import Imager
+from sweep.camera.imager import AllApart
 from sweep.metrics.evaluate import evaluate
 try:
     study = load_study(Path(sys.argv[1]))
@@ -450,7 +450,7 @@ space = study.spaces[0]
 if sys.argv[2] == "plan":
     print(study.plan("road").promised_dn)
 else:
-    imager = Imager(study.view(space, "road")).with_all_places
+    imager = AllApart(study.view(space, "road"))
     print(len(imager.read(space.curves(space.points(0, 1), study.grid.size))[0][0]))
 """
 
