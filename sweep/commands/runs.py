@@ -8,7 +8,6 @@ import time
 import webbrowser
 from contextlib import ExitStack
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import typer
@@ -88,7 +87,7 @@ def run_one(path: Path, manner: Manner, began_s: float) -> None:
                     scheduler=manner.scheduler,
                     wishes=manner.wishes,
                     stop=stop,
-                    swept=(lambda: None) if crew is None else partial(crew.begin, _DRAWING),
+                    then_load=_DRAWING if pooled else (),
                 )
             if not made:
                 typer.echo(f"Note: {folder} holds this very study, finished; nothing was computed.", err=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from itertools import chain
@@ -77,7 +77,7 @@ def files_of(study: Study) -> set[str]:
 class Making:
     """One run of a study whose scenes are planned, in a folder that it holds.
 
-    `started`: when the run began, by the monotonic clock, seconds; `swept` is called when all rows are computed.
+    `started`: when the run began, by the monotonic clock, seconds; `then_load`: see `run_study`.
     """
 
     study: Study
@@ -87,7 +87,7 @@ class Making:
     progress: Progress
     wishes: Wishes
     started: float
-    swept: Callable[[], None]
+    then_load: Sequence[str]
     made: set[str] = field(default_factory=set)
     _failed: int = 0
     _warnings: list[str] = field(default_factory=list)
@@ -170,7 +170,8 @@ class Making:
         answer, gathered, sweep = self.answer, self._gathering(), self.sweep
         sweep.run(gathered, self.progress, self.wishes)
         answered = [] if answer is None else [answer_row(self.study, answer, self.rules, self.crew)]
-        self.swept()
+        if self.then_load:
+            self.crew.begin(self.then_load)
         for row in answered:
             gathered.add(row)
         gathered.finish()

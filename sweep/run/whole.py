@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -45,15 +45,15 @@ def run_study(
     scheduler: str | None = None,
     wishes: Wishes = NONE,
     stop: Stop | None = None,
-    swept: Callable[[], None] = lambda: None,
+    then_load: Sequence[str] = (),
 ) -> tuple[str, ...]:
     """Run a study into `output`; what an earlier run of the same study finished is kept, if it is not damaged.
 
     Writes `results.parquet`, `search.parquet` and `front.parquet` (when the study searches), `curves.parquet`,
     `points.parquet`, `recognition.parquet` (when the study asks for it), `study.resolved.yaml` and `provenance.json`,
     each atomically, and lists them with their digests in `run.json` and `SHA256SUMS`. Files that the lists do not name
-    are not touched. Returns the names of the files that were made, none when nothing was left to do. `swept` is called
-    as soon as all rows are computed: few calls follow, and workers can be made ready for other work.
+    are not touched. Returns the names of the files that were made, none when nothing was left to do. `then_load`:
+    modules that worker processes load when all rows are computed, for what the caller has them do next.
 
     Raises OutputError when the folder is in use, holds another study, holds something else under the name of a file of
     the run, or cannot be written; InfeasibleError, before anything is left behind, when the search finds no feasible
@@ -82,7 +82,7 @@ def run_study(
                 rules = rules_of(study)
                 if retry or not fits(inventory, study, rules):
                     wrong.add(RESULTS)
-                making = Making(study, rules, inventory, crew, progress, wishes, started, swept)
+                making = Making(study, rules, inventory, crew, progress, wishes, started, then_load)
                 making.make(wrong)
                 wrong |= making.made
             except (StudyError, InfeasibleError):

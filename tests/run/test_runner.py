@@ -28,6 +28,7 @@ from sweep.results.journal import Journal
 from sweep.results.lock import locked
 from sweep.run import run_study
 from sweep.run.rows import Job, jobs_of, rules_of, run_job
+from sweep.run.workers import Workers
 from sweep.study import Study, load_study
 from sweep.study.axes import series_of
 
@@ -46,13 +47,17 @@ def output(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_workers_are_free_before_the_table_is_written(tmp_path: Path) -> None:
-    study, table, before = load_study(study_file(tmp_path, 3)), tmp_path / "out" / "results.parquet", []
-    run_study(study, table.parent, 1, lambda *_: None, swept=lambda: before.append(table.exists()))
-    assert before == [False]
+def test_workers_load_what_comes_next_while_the_table_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, table = load_study(study_file(tmp_path, 3)), tmp_path / "out" / "results.parquet"
+    begun: list[tuple[bool, bool]] = []
+    monkeypatch.setattr(Workers, "begin", lambda _, names: begun.append((names == ("json",), table.exists())))
+    run_study(study, table.parent, 1, lambda *_: None, then_load=("json",))
+    assert [exists for asked, exists in begun if asked] == [False]
     assert table.exists()
-    run_study(study, table.parent, 1, lambda *_: None, swept=lambda: before.append(True))
-    assert before == [False]  # nothing was left to do
+    run_study(study, table.parent, 1, lambda *_: None, then_load=("json",))
+    assert sum(asked for asked, _ in begun) == 1  # nothing was left to do
 
 
 def test_rows_stand_in_order_with_their_columns(output: Path) -> None:
