@@ -426,9 +426,9 @@ sweeps:
     base: G
     to: B
     grid:
-      left_nm: {min: 570, max: 620, count: 300}
+      left_nm: {min: 570, max: 620, count: 200}
       left_width_nm: 8
-      right_nm: {min: 640, max: 680, count: 300}
+      right_nm: {min: 640, max: 680, count: 200}
       right_width_nm: 8
 """
 

@@ -142,7 +142,10 @@ class Planner:
         if straight:
             return True
         saved = self._work(methods) - self._work(after)
-        beside = self._work(self._completed(methods, rest)) - self._work(self._completed(after, rest))
+        # Behind a rounded readout nothing may change anything: all the others stay on.
+        frees = methods.quantization == "round" != after.quantization and not self._noisy
+        others = methods if frees else self._completed(methods, rest)
+        beside = self._work(others) - self._work(self._completed(after, rest))
         return max(saved, beside) > look_s
 
     @cached_property
