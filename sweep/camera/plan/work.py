@@ -18,7 +18,7 @@ from ..view import View
 
 BOX_S, TABLED_S, FOLDED_S = 2.5e-3, 3e-9, 1.4e-8
 """Seconds: of the imager of a CFA, and of a value of its table at a wavelength, on the grid and between fewer nodes."""
-ROW_S, UNROUNDED_S = 1e-6, 1.5e-8
+ROW_S, UNROUNDED_S = 1e-6, 5e-9
 """Seconds: of a design's other columns and its row, and what a light's value in a design by its edges takes more if it
 is not rounded: whole numbers are read and compared in one pass. `tests/bench_work.py` measures them."""
 REACH_S, READOUT_S, QUICK_S, LINEAR_S, COMPARED_S, KERNEL_S = 6.5e-4, 8e-4, 5e-4, 7e-4, 5e-9, 4e-3
