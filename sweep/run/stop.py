@@ -18,7 +18,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 GRACE_S = 2.0
 """What is computed when a stop is asked for may still be finished for so long."""
 _KNOCK_S, _AGAIN_S, _LAST_S = 0.05, 3.0, 4.5
-_POOL = "ExecutorManagerThread"
+POOL_THREAD = "ExecutorManagerThread"
 """Name of the thread in which loky hands out work."""
 _SAID = "interrupted; finished chunks are kept, the same command continues"
 
@@ -162,7 +162,7 @@ def _news_of(stop: Stop) -> Callable[[], None]:
     in_threads, printed, ignored = threading.excepthook, sys.excepthook, sys.unraisablehook
 
     def in_thread(fault: threading.ExceptHookArgs) -> None:
-        if not (stop.requested and fault.thread is not None and fault.thread.name == _POOL):
+        if not (stop.requested and fault.thread is not None and fault.thread.name == POOL_THREAD):
             in_threads(fault)
 
     def print_(kind: type[BaseException], fault: BaseException, trace: TracebackType | None) -> None:

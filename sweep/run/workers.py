@@ -3,32 +3,37 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
+import threading
 import warnings
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib import import_module
 from itertools import islice
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from typing import TYPE_CHECKING, Any
 
 import joblib
 from joblib.externals.loky import ProcessPoolExecutor
+from joblib.externals.loky.backend.process import LokyProcess
 from threadpoolctl import ThreadpoolController
 
 from ..base.errors import SweepError
 from ..base.types import Call
-from .stop import Stop, without_interrupts
+from .stop import POOL_THREAD, Stop, without_interrupts
 from .worker_process import give_back_freed_memory, keep_freed_memory, preparing
 
 if TYPE_CHECKING:
     from ..study import Study
 
 _LEAST_WINDOW, _WINDOW_PER_WORKER = 64, 16
+_LAST_S = 5.0
+"""A pool whose workers are dead has noticed by then."""
 _CALLED, _SEARCHING = ("sweep.run.sweep", "sweep.metrics.nearest"), "sweep.search.solver"
 BACKENDS = ("loky", "threading", "dask")
 _Numbered = tuple[int, Call]
@@ -75,10 +80,28 @@ class Workers:
             self._starting.clear()
 
     def not_awaited(self) -> None:
-        """End what was started and is not awaited, as after a stop."""
+        """End what was started and is not awaited, as after an error or a stop."""
         for started in self._starting:
-            started.close()
+            self._ended(started)
         self._starting.clear()
+
+    def _ended(self, results: Generator[Any]) -> None:
+        """End calls whose results nobody waits for.
+
+        Worker processes are killed first, which their pool takes for a death and tidies up after. The pool's own way to
+        end them loses calls that it has not handed out yet: a KeyError in its thread, and semaphores that nobody frees.
+        """
+        if self.backend == "loky":
+            for process in active_children():
+                if isinstance(process, LokyProcess) and process.pid is not None:
+                    with suppress(ProcessLookupError):
+                        os.kill(process.pid, signal.SIGKILL)
+            with suppress(Exception):
+                deque(results, maxlen=0)
+            for thread in threading.enumerate():
+                if thread.name == POOL_THREAD:
+                    thread.join(_LAST_S)
+        results.close()
 
     @property
     def count(self) -> int:
@@ -129,13 +152,16 @@ class Workers:
             try:
                 parallel = joblib.Parallel(self._n_jobs, return_as="generator_unordered", pre_dispatch="3*n_jobs")
                 with self.stop.held(), without_interrupts():
-                    results = iter(parallel(taken()))
+                    results = parallel(taken())
                 for at, result in self._gracefully(results):
                     del flying[at]
                     yield at, result
             except Exception as error:
                 if not _is_death(error):
                     raise
+            except BaseException:  # whoever took the results left, or was broken off
+                self._ended(results)
+                raise
             suspects = list(flying.items())
             flying.clear()
             for at, call in suspects:
