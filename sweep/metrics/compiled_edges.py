@@ -36,6 +36,15 @@ ReadAs = tuple[float, float, float, float]
 
 
 @njit(cache=True, nogil=True)
+def _number(held_e: float, top_e: float, dn_per_e: float, rest: float, whole: float, full_scale_dn: float) -> float:
+    """Digital number of what a pixel holds; the pedestal is `whole` and `rest`."""
+    held_e = top_e if held_e > top_e else held_e
+    steps = np.floor((held_e * dn_per_e + rest) + 0.5) + whole
+    steps = 0.0 if steps < 0.0 else steps
+    return full_scale_dn if steps > full_scale_dn else steps
+
+
+@njit(cache=True, nogil=True)
 def _read(edges: Edges, exposed: Exposed, line: ReadAs, begin: int, rows: Floats32) -> None:
     """Digital numbers of the designs from `begin` on, ndarray[LANES, n_signals]; behind the last, of the first.
 
@@ -50,11 +59,8 @@ def _read(edges: Edges, exposed: Exposed, line: ReadAs, begin: int, rows: Floats
         d = begin + lane if begin + lane < depth.size else begin
         one, other, deep, more = left[at_left[d]], right[at_right[d]], depth[d], uniform[d]
         for s in range(base.size):
-            held = ((fixed[s] + (base[s] + deep * (one[s] - other[s]))) + more) * time_s
-            held = top_e if held > top_e else held
-            steps = np.floor((held * dn_per_e + rest) + 0.5) + whole
-            steps = 0.0 if steps < 0.0 else steps
-            rows[lane, s] = np.float32(full_scale_dn if steps > full_scale_dn else steps)
+            held_e = ((fixed[s] + (base[s] + deep * (one[s] - other[s]))) + more) * time_s
+            rows[lane, s] = np.float32(_number(held_e, top_e, dn_per_e, rest, whole, full_scale_dn))
 
 
 @njit(cache=True, nogil=True)
@@ -96,13 +102,34 @@ def _read_runs(
             one, own, light = edge[signal], fixed[signal], base[signal]
             fall, out = across[signal, other : other + n], lanes[s, starts[run] : starts[run + 1]]
             for k in range(n):
-                held = ((own + (light + deep[k] * (one - fall[k]))) + more[k]) * time_s
-                held = top_e if held > top_e else held
-                steps = np.floor((held * dn_per_e + rest) + 0.5) + whole
-                steps = 0.0 if steps < 0.0 else steps
-                out[k] = np.float32(full_scale_dn if steps > full_scale_dn else steps)
+                held_e = ((own + (light + deep[k] * (one - fall[k]))) + more[k]) * time_s
+                out[k] = np.float32(_number(held_e, top_e, dn_per_e, rest, whole, full_scale_dn))
     for s in range(order.size):
         lanes[s, starts[-1] :] = lanes[s, 0]
+
+
+@njit(cache=True, nogil=True, fastmath=_NUMBERS)
+def _smallest(of: Floats32, k: int, step: int) -> float:
+    """Smallest of eight numbers, from `k` on."""
+    a, b, c, d = of[k], of[k + step], of[k + 2 * step], of[k + 3 * step]
+    e, f, g, h = of[k + 4 * step], of[k + 5 * step], of[k + 6 * step], of[k + 7 * step]
+    return smaller(smaller(smaller(a, b), smaller(c, d)), smaller(smaller(e, f), smaller(g, h)))
+
+
+@njit(cache=True, nogil=True, fastmath=_NUMBERS)
+def _largest(of: Floats32, k: int, step: int) -> float:
+    """Largest of eight numbers, from `k` on."""
+    a, b, c, d = of[k], of[k + step], of[k + 2 * step], of[k + 3 * step]
+    e, f, g, h = of[k + 4 * step], of[k + 5 * step], of[k + 6 * step], of[k + 7 * step]
+    return larger(larger(larger(a, b), larger(c, d)), larger(larger(e, f), larger(g, h)))
+
+
+@njit(cache=True, nogil=True, fastmath=_NUMBERS)
+def _largest_lane(lanes: Floats32, room: Floats32) -> float:
+    """Largest of one number of each lane; `room`: ndarray[8], to work in."""
+    for k in range(8):
+        room[k] = _largest(lanes, k, 8)
+    return float(_largest(room, 0, 1))
 
 
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
@@ -111,16 +138,8 @@ def _ranges_of_runs(lanes: Floats32, least: Floats32, most: Floats32, low: Float
     for s in range(lanes.shape[0]):
         row = lanes[s]
         for k in range(8):
-            a, b, c, d = row[k], row[k + 8], row[k + 16], row[k + 24]
-            e, f, g, h = row[k + 32], row[k + 40], row[k + 48], row[k + 56]
-            least[k] = smaller(smaller(smaller(a, b), smaller(c, d)), smaller(smaller(e, f), smaller(g, h)))
-            most[k] = larger(larger(larger(a, b), larger(c, d)), larger(larger(e, f), larger(g, h)))
-        a, b, c, d = least[0], least[1], least[2], least[3]
-        e, f, g, h = least[4], least[5], least[6], least[7]
-        low[s] = smaller(smaller(smaller(a, b), smaller(c, d)), smaller(smaller(e, f), smaller(g, h)))
-        a, b, c, d = most[0], most[1], most[2], most[3]
-        e, f, g, h = most[4], most[5], most[6], most[7]
-        high[s] = larger(larger(larger(a, b), larger(c, d)), larger(larger(e, f), larger(g, h)))
+            least[k] = _smallest(row, k, 8)
+        low[s], high[s] = _smallest(least, 0, 1), _largest_lane(row, most)
 
 
 @njit(cache=True, nogil=True)
@@ -164,18 +183,6 @@ def _ranges(rows: Floats32, order: IndexArray, room: Floats32, low: Floats32, hi
         high[s] = room[order[s]]
 
 
-@njit(cache=True, nogil=True, fastmath=_NUMBERS)
-def _largest(best: Floats32, folded: Floats32) -> float:
-    """Largest of all lanes, halved again and again; `folded`: room to work in."""
-    folded[:] = best
-    step = LANES // 2
-    while step:
-        for lane in range(step):
-            folded[lane] = larger(folded[lane], folded[lane + step])
-        step //= 2
-    return float(folded[0])
-
-
 @njit(cache=True, nogil=True)
 def _in_doubles(lanes: Floats32, fixed: FloatArray, first: IndexArray, second: IndexArray, lane: int) -> float:
     """Smallest squared distance of one design, of any size."""
@@ -208,7 +215,7 @@ def nearest_by_edges(
     n_signals = edges[0].size
     rows, lanes = np.empty((LANES, n_signals), np.float32), np.empty((n_signals, LANES), np.float32)
     low, high = np.empty(n_signals, np.float32), np.empty(n_signals, np.float32)
-    room, best, folded = np.empty(n_signals, np.float32), np.empty(LANES, np.float32), np.empty(LANES, np.float32)
+    room, best, folded = np.empty(n_signals, np.float32), np.empty(LANES, np.float32), np.empty((2, 8), np.float32)
     most = 0
     for pair in range(starts.size - 1):
         most = max(most, starts[pair + 1] - starts[pair])
@@ -218,7 +225,7 @@ def nearest_by_edges(
         count = _runs(edges, begin, runs) if finite else _MOST_RUNS + 1
         if count <= _MOST_RUNS:
             _read_runs(edges, exposed, line, begin, runs[: count + 1], order, lanes)
-            _ranges_of_runs(lanes, best[:8], folded[:8], low, high)
+            _ranges_of_runs(lanes, folded[0], folded[1], low, high)
         else:
             _read(edges, exposed, line, begin, rows)
             _mend(rows, room, begin, bad)
@@ -230,7 +237,7 @@ def nearest_by_edges(
             best[:] = np.inf
             some[:4] = lead
             nearest_in_lanes(lanes, halved[own], first[own], second[own], some[:4], best)
-            enough, left = _largest(best, folded), 0
+            enough, left = _largest_lane(best, folded[0]), 0
             exact = enough < _EXACT
             for k in range(count * exact):
                 some[left] = k

@@ -151,10 +151,6 @@ class Journal:
             self.entries.pop(key, None)
         return table
 
-    def answer(self, key: str) -> bytes | None:
-        """The text of the answer kept under `key`, or None."""
-        return self.content(key)
-
     def forget(self, key: str) -> None:
         """Do not use a finished piece again."""
         self.entries.pop(key, None)

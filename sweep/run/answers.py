@@ -61,7 +61,7 @@ class Kept:
 
     def _answer(self, key: str, call: Call) -> Any:
         """The answer of an earlier, interrupted run to this call, or None."""
-        content = self.journal.answer(key)
+        content = self.journal.content(key)
         if content is None:
             return None
         try:

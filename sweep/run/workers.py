@@ -25,6 +25,7 @@ from threadpoolctl import ThreadpoolController
 
 from ..base.errors import SweepError
 from ..base.types import Call
+from .cluster import client_of
 from .stop import POOL_THREAD, Stop, without_interrupts
 from .worker_process import give_back_freed_memory, keep_freed_memory, preparing
 
@@ -226,7 +227,7 @@ def workers(how: Workers) -> Iterator[Workers]:
         # loky starts a worker anew whose caches have grown, and hands it the calls again.
         warnings.filterwarnings("ignore", message="A worker stopped while some jobs", category=UserWarning)
         if how.backend == "dask":
-            stack.enter_context(_dask_client(how.scheduler))
+            stack.enter_context(client_of(how.scheduler))
         elif how.backend == "loky":
             settings = {"inner_max_num_threads": 1, "initializer": preparing(os.getpid())}
         # This process computes, too; and a thread that ends gives back what it found, also to those beside it.
@@ -287,17 +288,3 @@ def _numbered(at: int, call: Call) -> tuple[int, Any]:
 def _is_death(error: Exception) -> bool:
     """Whether a worker died, as the backends say it: loky's broken pool, or Dask's KilledWorker."""
     return isinstance(error, BrokenProcessPool) or type(error).__name__ == "KilledWorker"
-
-
-def _dask_client(scheduler: str | None) -> Any:
-    """A client of the scheduler; raises SweepError when Dask is not installed or the scheduler does not answer."""
-    if scheduler is None:
-        raise SweepError("--backend dask needs --scheduler tcp://HOST:PORT")
-    try:
-        from distributed import Client  # noqa: PLC0415  (an extra)
-    except ImportError:
-        raise SweepError("--backend dask needs Dask: pip install 'cfa-sweep[dask]'") from None
-    try:
-        return Client(scheduler, timeout="10s", set_as_default=True)  # type: ignore[no-untyped-call]
-    except (OSError, ValueError) as error:
-        raise SweepError(f"--scheduler {scheduler}: {str(error).splitlines()[0]}") from None

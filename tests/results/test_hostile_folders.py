@@ -446,7 +446,7 @@ def test_hundreds_of_damaged_journals_and_shards(
         journal = Journal(folder)
         journal.check()
         for key in list(journal.entries):
-            journal.answer(key)
+            journal.content(key)
         if number % 20 == 0:
             if both:  # neither list is whole: nothing of it is this run's
                 with pytest.raises(OutputError):
