@@ -14,7 +14,7 @@ Struct = dict[int, tuple[int, Any]]
 """A structure: the type and the value of each field, by its number.
 
 A list is the type of its items, and these; an integer is as it is written, see `integer`."""
-_TRUE, _FALSE, _BYTE, _I16, _I32, _I64, _DOUBLE, _BINARY, _LIST, _SET, _STRUCT = 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12
+_TRUE, _FALSE, _BYTE, _I16, _I32, _I64, _DOUBLE, _BINARY, LIST, _SET, STRUCT = 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12
 _INTEGERS = (_I16, _I32, _I64)
 _LENGTH = 4
 """Bytes in which the length of the footer stands before the last MAGIC."""
@@ -82,9 +82,9 @@ def _struct(content: bytes, at: int) -> tuple[Struct, int]:
 def _value(content: bytes, at: int, kind: int) -> tuple[Any, int]:
     if kind in _INTEGERS:
         return _varint(content, at)
-    if kind == _STRUCT:
+    if kind == STRUCT:
         return _struct(content, at)
-    if kind in (_LIST, _SET):
+    if kind in (LIST, _SET):
         head, at = content[at], at + 1
         size, items = head >> 4, head & 15
         if size == 15:
@@ -126,9 +126,9 @@ def _write_struct(sink: bytearray, fields: Struct) -> None:
 def _write(sink: bytearray, kind: int, value: Any) -> None:
     if kind in _INTEGERS:
         _write_varint(sink, value)
-    elif kind == _STRUCT and isinstance(value, dict):
+    elif kind == STRUCT and isinstance(value, dict):
         _write_struct(sink, value)
-    elif kind in (_LIST, _SET):
+    elif kind in (LIST, _SET):
         items, values = value
         sink.append(min(len(values), 15) << 4 | items)
         if len(values) >= 15:

@@ -1,23 +1,23 @@
-"""Large result tables: finished parts joined to one Parquet file, most of them as the bytes that they are."""
+"""Large result tables: finished parts joined to one Parquet file as they come, most of them as the bytes they are."""
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from .footer import MAGIC, Struct, footer_bytes, footer_of, integer, integer_of, struct_bytes
-from .tables import ROW_GROUP, Seal, atomic, encoded, release_memory, unsealed
+from ..base.types import BoolArray, IndexArray
+from .footer import LIST, MAGIC, STRUCT, Struct, footer_bytes, footer_of, integer, integer_of, struct_bytes
+from .tables import ROW_GROUP, Seal, encoded, hidden_beside, refused_by_disk, release_memory, unsealed
 
 _AS_THEY_ARE = ROW_GROUP // 4
 """Rows from which on a part becomes a row group of its own; smaller ones are put together, and encoded again."""
-_PARTS_AHEAD = 3
 _ROWS, _GROUPS = 3, 4  # of parquet.thrift's FileMetaData
 _COLUMNS, _GROUP_SIZE, _GROUP_ROWS, _GROUP_START, _GROUP_STORED = 1, 2, 3, 5, 6  # of RowGroup
 _CHUNK_START, _CHUNK = 2, 3  # of ColumnChunk; indices of pages, bloom filters and keys are not written, nor copied
@@ -25,119 +25,150 @@ _PATH, _SIZE, _STORED, _DATA, _DICTIONARY = 3, 6, 7, 9, 11  # of ColumnMetaData
 
 
 @dataclass(frozen=True)
-class EncodedRows:
-    """Consecutive rows of a table, as the bytes of a Parquet file of its schema."""
+class RowsPart:
+    """Consecutive rows of a table, as the bytes of a Parquet file of its schema.
+
+    `few`: those of its rows that a late column may mark; `at`: where among the rows they are, ndarray[n_few].
+    """
 
     content: bytes
     rows: int
+    few: pa.Table
+    at: IndexArray
 
-    def table(self, columns: Sequence[str] | None = None) -> pa.Table:
-        """The rows, or some columns of them."""
-        file = pq.ParquetFile(pa.BufferReader(self.content), page_checksum_verification=True)
-        return file.read(columns)
+    @staticmethod
+    def of(table: pa.Table) -> RowsPart:
+        """A short table, all of whose rows may be marked."""
+        return RowsPart(encoded(table), table.num_rows, table, np.arange(table.num_rows))
 
 
 @dataclass(frozen=True)
 class Late:
-    """A column that is known when all parts are: `of` finds it, in a table of the columns `needs` and itself."""
+    """A column of flags that is known when all parts are: `of` says which of the few rows it marks, by columns `needs`.
+
+    All other rows have False.
+    """
 
     name: str
     needs: Sequence[str]
-    of: Callable[[pa.Table], pa.Table]
+    of: Callable[[pa.Table], BoolArray]
 
 
-def write_joined(
-    parts: Iterable[EncodedRows], late: Late, schema: pa.Schema, path: Path, seal: Seal = unsealed
-) -> None:
-    """Write one Parquet file of parts, of which `late` is another column; atomic, with errors as for `tables.atomic`.
+@contextmanager
+def joining(late: Late, schema: pa.Schema, path: Path, seal: Seal = unsealed) -> Iterator[Joining]:
+    """A Parquet file that takes in parts while the block stands, and `late` at its end; atomic.
 
-    Of a large part, the bytes of all other columns are copied. Small ones are put together to row groups, one of
-    which is in memory. The next part is read while one is written.
+    Raises OutputError when the disk refuses. What the block raises is raised as it is, and no file is left.
     """
-    with atomic(path, seal) as hidden, hidden.open("wb") as sink:
-        joiner = _Joiner(sink, schema)
-        waiting: list[pa.Table] = []
-
-        def write() -> None:
-            if waiting:
-                table = pa.concat_tables(waiting).unify_dictionaries()
-                joiner.add(encoded(late.of(table)))
-            waiting.clear()
-            release_memory()
-
-        for part in _ahead(iter(parts)):
-            if part.rows >= _AS_THEY_ARE:
-                write()
-                joiner.add(part.content, late.name, encoded(late.of(part.table(late.needs)).select([late.name])))
-                continue
-            waiting.append(part.table())
-            if sum(table.num_rows for table in waiting) >= ROW_GROUP:
-                write()
-        write()
-        joiner.finish()
+    with ExitStack() as stack:
+        with refused_by_disk(path):
+            hidden = stack.enter_context(hidden_beside(path, seal))
+            sink = stack.enter_context(hidden.open("wb"))
+            whole = Joining(path, sink, schema, late)
+        yield whole
+        with refused_by_disk(path):
+            whole.finish()
+            stack.close()
 
 
 @dataclass
-class _Joiner:
-    """A Parquet file that grows by the row groups of others of its schema, whose bytes are copied."""
+class _Group:
+    """A row group whose late column is not written yet: bytes of its other columns' `ColumnChunk`s, and None for that.
 
-    sink: BinaryIO
-    schema: pa.Schema
-    _footer: Struct = field(init=False)
-    _groups: list[bytes] = field(default_factory=list)
-    _rows: int = 0
+    `few` and `at`: the rows that the late column may mark; `size`, `stored`: bytes, raw and as they are on the disk.
+    """
+
+    rows: int
+    start: int
+    few: pa.Table
+    at: IndexArray
+    chunks: list[bytes | None] = field(default_factory=list)
+    size: int = 0
+    stored: int = 0
+
+
+@dataclass
+class Joining:
+    """A Parquet file that grows by the row groups of parts, whose bytes are copied.
+
+    Small parts are put together to row groups, one of which is in memory. The late column's chunks stand behind all
+    others, where the footer finds them.
+    """
+
+    path: Path
+    _sink: BinaryIO
+    _schema: pa.Schema
+    _late: Late
+    _groups: list[_Group] = field(default_factory=list)
+    _small: list[RowsPart] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self._footer, _ = footer_of(encoded(self.schema.empty_table()))
-        self.sink.write(MAGIC)
+        self._sink.write(MAGIC)
 
-    def add(self, content: bytes, column: str = "", other: bytes = b"") -> None:
-        """Append the row groups of a file; `column` is taken from an `other` file, of this column alone."""
-        groups = _groups_of(content)
-        others = _groups_of(other) if other else [{}] * len(groups)
-        for group, late in zip(groups, others, strict=True):
-            begun = self.sink.tell()
-            kind, (items, held) = group[_COLUMNS]
-            chunks = [
-                self._copied(late[_COLUMNS][1][1][0], other)
-                if chunk[_CHUNK][1][_PATH][1][1] == [column.encode()]
-                else self._copied(chunk, content)
-                for chunk in held
-            ]
-            made: Struct = {_COLUMNS: (kind, (items, chunks)), _GROUP_ROWS: group[_GROUP_ROWS]}
-            made[_GROUP_SIZE] = integer(sum(integer_of(chunk[_CHUNK][1], _SIZE) for chunk in chunks))
-            made[_GROUP_STORED] = integer(sum(integer_of(chunk[_CHUNK][1], _STORED) for chunk in chunks))
-            made[_GROUP_START] = integer(begun)
-            self._groups.append(struct_bytes(made))
-            self._rows += integer_of(group, _GROUP_ROWS)
+    def add(self, part: RowsPart) -> None:
+        """Append the rows of a part."""
+        with refused_by_disk(self.path):
+            if part.rows >= _AS_THEY_ARE:
+                self._write_small()
+                self._append(part)
+                return
+            self._small.append(part)
+            if sum(each.rows for each in self._small) >= ROW_GROUP:
+                self._write_small()
 
     def finish(self) -> None:
-        """Write where everything is."""
-        kind, (items, _) = self._footer[_GROUPS]
-        whole = self._footer | {_ROWS: integer(self._rows), _GROUPS: (kind, (items, self._groups))}
-        self.sink.write(footer_bytes(whole))
+        """Write the late column, and where everything is; raises OSError."""
+        self._write_small()
+        for group in self._groups:
+            flags = np.zeros(group.rows, dtype=bool)
+            flags[group.at] = self._late.of(group.few)
+            content = encoded(pa.table([pa.array(flags)], schema=pa.schema([self._schema.field(self._late.name)])))
+            (late,) = _only_group_of(content)[_COLUMNS][1][1]
+            group.chunks = [self._copied(group, late, content) if each is None else each for each in group.chunks]
+        footer, _ = footer_of(encoded(self._schema.empty_table()))
+        rows, groups = integer(sum(group.rows for group in self._groups)), list(map(_group_bytes, self._groups))
+        self._sink.write(footer_bytes(footer | {_ROWS: rows, _GROUPS: (footer[_GROUPS][0], (STRUCT, groups))}))
 
-    def _copied(self, chunk: Struct, content: bytes) -> Struct:
+    def _write_small(self) -> None:
+        parts, self._small = self._small, []
+        if not parts:
+            return
+        tables = [pq.read_table(pa.BufferReader(each.content), page_checksum_verification=True) for each in parts]
+        starts = np.cumsum([0, *(each.rows for each in parts)])
+        at = np.concatenate([each.at + start for each, start in zip(parts, starts, strict=False)])
+        few = pa.concat_tables([each.few.select(self._late.needs) for each in parts]).unify_dictionaries()
+        whole = pa.concat_tables(tables).unify_dictionaries()
+        self._append(RowsPart(encoded(whole), whole.num_rows, few, at))
+        release_memory()
+
+    def _append(self, part: RowsPart) -> None:
+        made = _Group(part.rows, self._sink.tell(), part.few.select(self._late.needs), part.at)
+        for chunk in _only_group_of(part.content)[_COLUMNS][1][1]:
+            late = chunk[_CHUNK][1][_PATH][1][1] == [self._late.name.encode()]
+            made.chunks.append(None if late else self._copied(made, chunk, part.content))
+        self._groups.append(made)
+
+    def _copied(self, group: _Group, chunk: Struct, content: bytes) -> bytes:
         """A column of a row group, and where it is now."""
         kind, held = chunk[_CHUNK]
         places = {place: integer_of(held, place) for place in (_DATA, _DICTIONARY) if place in held}
-        start = min(places.values())
-        moved = self.sink.tell() - start
-        self.sink.write(memoryview(content)[start : start + integer_of(held, _STORED)])
+        start, stored = min(places.values()), integer_of(held, _STORED)
+        moved = self._sink.tell() - start
+        self._sink.write(memoryview(content)[start : start + stored])
+        group.size += integer_of(held, _SIZE)
+        group.stored += stored
         moved_places = {place: integer(at + moved) for place, at in places.items()}
-        return {_CHUNK_START: integer(0), _CHUNK: (kind, held | moved_places)}
+        return struct_bytes({_CHUNK_START: integer(0), _CHUNK: (kind, held | moved_places)})
 
 
-def _groups_of(content: bytes) -> list[Struct]:
+def _group_bytes(group: _Group) -> bytes:
+    facts = {_GROUP_SIZE: group.size, _GROUP_ROWS: group.rows, _GROUP_START: group.start, _GROUP_STORED: group.stored}
+    columns: Struct = {_COLUMNS: (LIST, (STRUCT, group.chunks))}
+    return struct_bytes(columns | {number: integer(value) for number, value in facts.items()})
+
+
+def _only_group_of(content: bytes) -> Struct:
     footer, _ = footer_of(content)
-    groups: list[Struct] = footer[_GROUPS][1][1]
-    return groups
-
-
-def _ahead(parts: Iterator[EncodedRows]) -> Iterator[EncodedRows]:
-    """The same parts; a thread makes the next few while one is used."""
-    with ThreadPoolExecutor(1) as thread:
-        coming = deque(thread.submit(next, parts, None) for _ in range(_PARTS_AHEAD))
-        while (part := coming.popleft().result()) is not None:
-            coming.append(thread.submit(next, parts, None))
-            yield part
+    (group,) = footer[_GROUPS][1][1]
+    found: Struct = group
+    return found

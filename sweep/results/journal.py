@@ -11,7 +11,9 @@ import json
 import math
 import os
 import re
+import threading
 import time
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -104,6 +106,7 @@ class Journal:
         self.folder = output / SHARDS
         self.entries: dict[str, Entry] = {}
         self._torn = False
+        self._leaving: threading.Thread | None = None
         if os.path.lexists(self.folder) and not is_real_folder(self.folder):
             raise OutputError(Fault("is no folder of this run; move it away", str(self.folder)))
         self._read()
@@ -159,11 +162,23 @@ class Journal:
         """Forget a finished piece for good: no later run finds it."""
         entry = self.entries.pop(key, None)
         if entry is not None:
+            self._unlink([entry.file])
+
+    def leave(self, keys: Iterable[str]) -> None:
+        """Finished pieces that stand elsewhere now: a thread removes their files, and `remove` waits for it."""
+        gone = [self.entries.pop(key).file for key in keys if key in self.entries]
+        self._leaving = threading.Thread(target=self._unlink, args=(gone,))
+        self._leaving.start()
+
+    def _unlink(self, names: Iterable[str]) -> None:
+        for name in names:
             with suppress(OSError):
-                (self.folder / entry.file).unlink()
+                (self.folder / name).unlink()
 
     def remove(self) -> None:
         """Drop all of it, after the rows stand in the result table; the journal goes last. Files of others stay."""
+        if self._leaving is not None:
+            self._leaving.join()
         if is_real_folder(self.folder):
             own = [path.name for path in self.folder.iterdir() if _NAMES.fullmatch(path.name)]
             for name in (*own, _JOURNAL):

@@ -105,12 +105,20 @@ def unsealed(_: Path) -> None:
 
 
 @contextmanager
-def atomic(path: Path, seal: Seal = unsealed) -> Iterator[Path]:
+def refused_by_disk(path: Path) -> Iterator[None]:
+    """Raises OutputError where the disk refuses (full, read-only, no permission) what is written for `path`."""
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(Fault(f"cannot be written: {error.strerror or error}", str(path))) from None
+
+
+@contextmanager
+def hidden_beside(path: Path, seal: Seal = unsealed) -> Iterator[Path]:
     """Give a hidden name beside `path`; on success it is synced and takes the name of `path`, else it is removed.
 
     `seal` sees the whole hidden file before it takes its name. A symbolic link at `path` is replaced, not followed.
-    Raises OutputError when the disk refuses (full, read-only, no permission). A reader sees the old file or the new
-    one, never a part.
+    A reader sees the old file or the new one, never a part. Raises OSError.
     """
     hidden = path.with_name(f".tmp-{os.getpid()}-{path.name}")
     try:
@@ -122,11 +130,16 @@ def atomic(path: Path, seal: Seal = unsealed) -> Iterator[Path]:
             os.fsync(handle.fileno())
         seal(hidden)
         hidden.replace(path)
-    except OSError as error:
-        raise OutputError(Fault(f"cannot be written: {error.strerror or error}", str(path))) from None
     finally:
         with suppress(OSError):  # where it could not be made, for example below a file
             hidden.unlink()
+
+
+@contextmanager
+def atomic(path: Path, seal: Seal = unsealed) -> Iterator[Path]:
+    """`hidden_beside`, with one error: OutputError when the disk refuses."""
+    with refused_by_disk(path), hidden_beside(path, seal) as hidden:
+        yield hidden
 
 
 def write_table(table: pa.Table, path: Path, seal: Seal = unsealed) -> None:

@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from ..metrics.bound import FEASIBLE
 from ..metrics.pareto import hypervolume
 from ..results.facts import Provenance
 from ..results.inventory import Inventory
-from ..results.joined import EncodedRows, write_joined
+from ..results.joined import RowsPart, joining
 from ..results.journal import Journal
 from ..results.names import TABLES
 from ..results.tables import (
@@ -32,7 +31,6 @@ from ..results.tables import (
     RESULTS,
     SEARCH_LOG,
     VISION_TABLES,
-    encoded,
     holds,
     json_of,
     sliced,
@@ -168,15 +166,16 @@ class Making:
         if intact and not self.inventory.facts.pop("detours", []):
             self.sweep.refill(results)
         answer, gathered, sweep = self.answer, self._gathering(), self.sweep
-        sweep.run(gathered, self.progress, self.wishes)
-        answered = [] if answer is None else [answer_row(self.study, answer, self.rules, self.crew)]
-        if self.then_load:
-            self.crew.begin(self.then_load)
-        for row in answered:
-            gathered.add(row)
-        gathered.finish()
-        parts = chain(sweep.parts(), (EncodedRows(encoded(row), row.num_rows) for row in answered))
-        write_joined(parts, gathered.front.late, self.rules.schema, results, self.inventory.seal(RESULTS))
+        with joining(gathered.front.late, self.rules.schema, results, self.inventory.seal(RESULTS)) as whole:
+            sweep.run(gathered, whole, self.progress, self.wishes)
+            answered = [] if answer is None else [answer_row(self.study, answer, self.rules, self.crew)]
+            if self.then_load:
+                self.crew.begin(self.then_load)
+            for row in answered:
+                gathered.add(row)
+                whole.add(RowsPart.of(row))
+            gathered.finish()
+        self.journal.leave(sweep.keys)
         detours: Detours = sum(map(detours_of, answered), sweep.detours)
         self.inventory.facts["detours"] = [{"how": how, "why": why, "designs": n} for (how, why), n in detours.items()]
         self.gathered, self._failed, self._warnings = gathered, sweep.failed, sweep.warnings

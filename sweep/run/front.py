@@ -22,7 +22,8 @@ BEST_PER_CFA = 12
 """Best feasible designs of each CFA's sweeps that the report lists and draws."""
 FRONT_ROWS = 200
 """Designs of a front, spread evenly over it, whose curves and signals a report can show."""
-_MOST_CANDIDATES = 50_000
+_MOST_CANDIDATES, _AT_ONCE = 50_000, 10_000
+"""Rows from which on fronts are thinned, and from which on rows that came are taken in."""
 
 
 class Front:
@@ -58,15 +59,19 @@ class Front:
     @property
     def late(self) -> Late:
         """The column `pareto` of a whole table."""
-        return Late("pareto", ["pareto", "kind", "cfa", "scenario", *self._axes], self.marked)
+        return Late("pareto", ["pareto", "kind", "cfa", "scenario", *self._axes], self.holds)
+
+    def holds(self, table: pa.Table) -> BoolArray:
+        """Which rows of a table are on the whole front, which is finished, ndarray[n_rows]."""
+        local, values, groups = self._candidates(table)
+        front: BoolArray = np.zeros(table.num_rows, dtype=bool)
+        front[local] = [tuple(v) in self._on_it.get(g, ()) for v, g in zip(values.tolist(), groups, strict=True)]
+        return front
 
     def marked(self, table: pa.Table) -> pa.Table:
         """The table with `pareto` only where a row is on the whole front, which is finished."""
-        local, values, groups = self._candidates(table)
-        kept = [tuple(v) in self._on_it.get(g, ()) for v, g in zip(values.tolist(), groups, strict=True)]
-        front: BoolArray = np.zeros(table.num_rows, dtype=bool)
-        front[local] = kept
-        return table.set_column(table.schema.get_field_index("pareto"), table.schema.field("pareto"), pa.array(front))
+        at, field = table.schema.get_field_index("pareto"), table.schema.field("pareto")
+        return table.set_column(at, field, pa.array(self.holds(table)))
 
     def _candidates(self, table: pa.Table) -> tuple[IndexArray, FloatArray, list[tuple[str, str]]]:
         wanted = table["pareto"].to_numpy()
@@ -98,13 +103,23 @@ class Gathered:
         """`scenario`: the first one, in which swept designs are drawn."""
         self.rules, self.scenario = rules, scenario
         self.front, self.swept = Front(rules.front), Front(rules.front, "sweep")
+        self._waiting: list[pa.Table] = []
         self._always: list[pa.Table] = []
         self._best: dict[str, pa.Table] = {}
         self._feasible: dict[str, pa.Table] = {}
         self._leading: dict[str, pa.Table] = {}
 
     def add(self, few: pa.Table) -> None:
-        """Take in what `few_of` a table gives."""
+        """Take in what `few_of` a table gives; several at once, since they are few rows."""
+        self._waiting.append(few)
+        if sum(each.num_rows for each in self._waiting) >= _AT_ONCE:
+            self._take_in()
+
+    def _take_in(self) -> None:
+        if not self._waiting:
+            return
+        few = pa.concat_tables(self._waiting).unify_dictionaries().combine_chunks()
+        self._waiting.clear()
         self.front.add(few)
         self.swept.add(few)
         always = holds(few, "kind", *FEW)
@@ -135,6 +150,7 @@ class Gathered:
 
     def finish(self) -> None:
         """Nothing more comes."""
+        self._take_in()
         self.front.finish()
         self.swept.finish()
 

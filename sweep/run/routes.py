@@ -21,12 +21,15 @@ from ..metrics.evaluate import evaluate, family_quantities, image_quantities
 from ..metrics.objective import COMBINED, Objective, columns_of
 from ..metrics.own import OwnMetric
 from ..metrics.quantity import OF_A_SHARE, WORST_CASE, YIELD, Asked, Columns, Quantity
+from ..results.identity import CHUNK
 from ..results.tables import FEW
 from ..vision.section import Vision
 
 BY_CURVES = "computed from their curves, since the fast way by their edges failed"
 ALONE = "computed one by one, since their block failed"
 _MOST_LETTERS = 200
+_CHUNKS_BY_EDGES = 4
+"""In a block of designs that are seen by their edges alone: these take little memory."""
 Detours = Counter[tuple[str, str]]
 """How many designs took another route than their block's own: (BY_CURVES or ALONE, the fault of the own route)."""
 
@@ -48,6 +51,13 @@ class Request:
         return imager_of(view, AllApart if self.drawn and kind in FEW else Imager)
 
     @property
+    def needs_curves(self) -> bool:
+        """Whether something is asked for that designs need their curves for, or what each signal reads."""
+        asked = self.asked
+        worst = any(quantity.extreme == WORST_CASE for quantity in self.quantities.values())
+        return bool(self.vision is not None or asked.states or asked.own or asked.wanted_yield or worst)
+
+    @property
     def quantities(self) -> Mapping[str, Quantity]:
         """Every column by its name."""
         return columns_of(self.asked, self.objective)
@@ -62,12 +72,33 @@ class Found:
     detours: Detours
 
 
+def found_of(space: Space, start: int, stop: int, view: View, request: Request) -> Found:
+    """Designs `start`..`stop`-1 of a space, a block at a time, which stays in the cache; see `block_of`.
+
+    More than a chunk of them are seen by their edges.
+    """
+    return _in_blocks(CHUNK * (1 if request.needs_curves else _CHUNKS_BY_EDGES), space, start, stop, view, request)
+
+
+def _in_blocks(size: int, space: Space, start: int, stop: int, view: View, request: Request) -> Found:
+    parts: list[Found] = []
+    faults: dict[int, str] = {}
+    for begin in range(start, stop, size):
+        part = block_of(space, begin, min(begin + size, stop), view, request)
+        parts.append(part)
+        faults |= {begin - start + index: text for index, text in part.faults.items()}
+    names = request.quantities.keys() & parts[0].columns.keys()
+    columns = {name: np.concatenate([part.columns[name] for part in parts]) for name in names}
+    return Found(columns, faults, sum((part.detours for part in parts), Counter()))
+
+
 def block_of(space: Space, start: int, stop: int, view: View, request: Request) -> Found:
     """Designs `start`..`stop`-1 of a space.
 
-    By their edges where the family is separable, else from their curves. Where the fast way fails, all of them from
-    their curves, whose numbers are the same up to rounding; where that fails, too, one by one, which gives the very
-    numbers of a whole block, and what is wrong with a design is its fault. A number that is not finite is a fault.
+    By their edges where the family is separable, else from their curves. Where the fast way fails, in chunks; in that
+    where it fails again all from their curves, whose numbers are the same up to rounding; where that fails, too, one by
+    one, which gives the very numbers of a whole block, and what is wrong with a design is its fault. A number that is
+    not finite is a fault.
     """
     points = space.points(start, stop)
     detours: Detours = Counter()
@@ -77,6 +108,8 @@ def block_of(space: Space, start: int, stop: int, view: View, request: Request) 
         fast = edges_of(space, start, stop)
         columns = _columns(space, view, points, request, fast)
     except Exception as error:  # one design must not take the others with it
+        if len(points) > CHUNK:
+            return _in_blocks(CHUNK, space, start, stop, view, request)
         own = text_of(error)
         try:
             columns = _columns(space, view, points, request)

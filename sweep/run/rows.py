@@ -23,7 +23,7 @@ from ..results.arrays import flags, numbers, places, words
 from ..results.identity import CHUNK
 from ..results.tables import holds, result_schema
 from ..study import Study
-from .routes import Detours, Found, Request, block_of
+from .routes import Detours, Request, found_of
 
 _WORDS = pa.dictionary(pa.int32(), pa.string())
 _ARRAYS: dict[pa.DataType, Callable[[Any], pa.Array]] = {pa.float64(): numbers, pa.bool_(): flags, pa.int64(): places}
@@ -94,7 +94,7 @@ def run_job(job: Job, view: View, rules: Rules) -> pa.Table:
     another route than their block's own.
     """
     points = job.space.points(job.start, job.stop)
-    found = _quantities(job, view, rules)
+    found = found_of(job.space, job.start, job.stop, view, rules.request)
     columns, faults = found.columns, found.faults
     ok = np.ones(len(points), dtype=bool)
     ok[list(faults)] = False
@@ -160,18 +160,6 @@ def rules_of(study: Study) -> Rules:
     drawn = section.recognition is not None and bool(section.recognition.patches)
     request = Request(study.asked, study.objective, study.tolerance, section.vision, section.seed, drawn)
     return Rules(schema, request, study.constraints, study.trade_off, study.plans)
-
-
-def _quantities(job: Job, view: View, rules: Rules) -> Found:
-    """Every quantity, what went wrong with which design, and detours; a chunk at a time, which stays in the cache."""
-    parts: list[Found] = []
-    faults: dict[int, str] = {}
-    for start in range(job.start, job.stop, CHUNK):
-        part = block_of(job.space, start, min(start + CHUNK, job.stop), view, rules.request)
-        parts.append(part)
-        faults |= {start - job.start + index: text for index, text in part.faults.items()}
-    columns = {name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns}
-    return Found(columns, faults, sum((part.detours for part in parts), Counter()))
 
 
 def joined(tables: Sequence[pa.Table]) -> pa.Table:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from itertools import groupby
@@ -16,7 +16,7 @@ from ..base.errors import FailedDesignError, Fault, OutputError
 from ..base.types import Call, Progress, delayed
 from ..camera.view import View
 from ..results.identity import fingerprint
-from ..results.joined import EncodedRows
+from ..results.joined import Joining, RowsPart
 from ..results.journal import Journal, Shard
 from ..results.tables import sliced
 from ..study import Study
@@ -104,18 +104,21 @@ class Sweep:
                     with self.crew.stop.held():
                         self.journal.save(key, index, shard)
 
-    def run(self, gathered: Gathered, progress: Progress, wishes: Wishes) -> None:
-        """Compute what is not kept yet; `gathered` takes in all rows.
+    def run(self, gathered: Gathered, whole: Joining, progress: Progress, wishes: Wishes) -> None:
+        """Compute what is not kept yet; `gathered` and `whole` take in all rows, the latter in their order.
 
         Raises FailedDesignError, after its chunk is kept, if that is wished. Counts failures and detours.
         """
         self.failed, self.detours = 0, Counter()
         entries = self.journal.entries
+        joined = _InOrder(self, whole)
         for index, key in enumerate(self.keys):
             if key in entries and wishes.retry_failed and entries[key].failed:
                 self.journal.forget(key)
             elif key in entries and (table := self._kept(index)) is not None:
-                self._take_in(few_of(table, self.rules), entries[key].failed, gathered)
+                few = few_of(table, self.rules)
+                self._take_in(few, entries[key].failed, gathered)
+                joined.found(index, few)
         todo = [index for index, key in enumerate(self.keys) if key not in entries]
         done = sum(entries[key].rows for key in self.keys if key in entries)
         progress("designs", done, self.study.n_designs)
@@ -129,14 +132,16 @@ class Sweep:
             for index, (shard, *_) in zip(batches[at], found, strict=True):
                 self.journal.save(self.keys[index], index, shard)
 
-        for found in self.crew(calls, _quarantined, keep):
-            for shard, few, looks in found:
+        for batch, found in zip(batches, self.crew(calls, _quarantined, keep), strict=True):
+            for index, (shard, few, looks) in zip(batch, found, strict=True):
                 self._take_in(few, shard.failed, gathered)
                 self.looks |= looks
                 done += shard.rows
                 if shard.failed and wishes.fail_fast:
                     raise _first_failure(shard.table())
+                joined.found(index, few, shard.content)
             progress("designs", done, self.study.n_designs)
+        joined.rest()
 
     def _batches(self, todo: list[int]) -> list[list[int]]:
         """Jobs by the calls that they are computed in.
@@ -159,16 +164,16 @@ class Sweep:
         plan = self.study.plans.get(scenario)
         return 0.0 if plan is None else plan.work
 
-    def parts(self) -> Iterator[EncodedRows]:
-        """All finished chunks in order, as files; one whose file was damaged since is computed again."""
-        for index, (job, key) in enumerate(zip(self.jobs, self.keys, strict=True)):
-            content = self.journal.content(key)
-            if content is None:
-                self._tell_damaged(index)
-                ((shard, *_),) = _shards([(job, self._view(job))], self.rules)
-                self.journal.save(key, index, shard)
-                content = shard.content
-            yield EncodedRows(content, job.stop - job.start)
+    def content(self, index: int) -> bytes:
+        """A finished chunk as a file; one whose file was damaged since is computed again."""
+        job, key = self.jobs[index], self.keys[index]
+        content = self.journal.content(key)
+        if content is None:
+            self._tell_damaged(index)
+            ((shard, *_),) = _shards([(job, self._view(job))], self.rules)
+            self.journal.save(key, index, shard)
+            content = shard.content
+        return content
 
     def _kept(self, index: int) -> pa.Table | None:
         """A finished chunk; None, and it counts as not finished, if its file is damaged."""
@@ -186,6 +191,37 @@ class Sweep:
         self.failed += failed
         self.detours += detours_of(few)
         gathered.add(few)
+
+
+@dataclass
+class _InOrder:
+    """The finished chunks of a sweep, in the order of their rows, on their way to the whole table.
+
+    One whose turn is not yet is read from the journal later; its few rows are kept.
+    """
+
+    sweep: Sweep
+    whole: Joining
+    early: dict[int, pa.Table] = field(default_factory=dict)
+    turn: int = 0
+
+    def found(self, index: int, few: pa.Table, content: bytes | None = None) -> None:
+        """A chunk is finished, of which `few_of` gives these rows; where its file's content is at hand, it goes on."""
+        self.early[index] = few
+        if index == self.turn and content is not None:
+            self._join(content)
+            if self.turn in self.early:  # one of those that came before their turn; a stop waits for no more of them
+                self._join(self.sweep.content(self.turn))
+
+    def rest(self) -> None:
+        """All are finished."""
+        while self.turn in self.early:
+            self._join(self.sweep.content(self.turn))
+
+    def _join(self, content: bytes) -> None:
+        few, job = self.early.pop(self.turn), self.sweep.jobs[self.turn]
+        self.whole.add(RowsPart(content, job.stop - job.start, few, few["design_id"].to_numpy() - job.first_id))
+        self.turn += 1
 
 
 def _shards(batch: Sequence[tuple[Job, View]], rules: Rules, looking: Looking | None = None) -> list[_Finished]:

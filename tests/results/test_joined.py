@@ -11,9 +11,10 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from sweep.base.errors import OutputError
 from sweep.results import joined
 from sweep.results.footer import footer_bytes, footer_of
-from sweep.results.joined import EncodedRows, Late, write_joined
+from sweep.results.joined import Late, RowsPart, joining
 from sweep.results.tables import batches, encoded, result_schema
 
 SCHEMA = result_schema(["left_nm"], ["csd_yellow_red", "sensitivity"])
@@ -38,11 +39,17 @@ def table(rows: int, first: int = 0) -> pa.Table:
 def late_of(ids: set[int]) -> Late:
     """A front of these rows."""
 
-    def of(some: pa.Table) -> pa.Table:
-        found = pa.array([number in ids for number in some["design_id"].to_pylist()], pa.bool_())
-        return some.set_column(some.schema.get_field_index("pareto"), some.schema.field("pareto"), found)
+    def of(some: pa.Table) -> np.ndarray:
+        assert some.schema.names == ["design_id", "pareto"]
+        return np.array([number in ids for number in some["design_id"].to_pylist()], bool)
 
     return Late("pareto", ["design_id", "pareto"], of)
+
+
+def part_of(rows: pa.Table) -> RowsPart:
+    """A part, whose few rows are those that its own `pareto` marks, the last one first."""
+    at = np.flatnonzero(rows["pareto"].to_numpy())[::-1]
+    return RowsPart(encoded(rows), rows.num_rows, rows.take(pa.array(at)), at)
 
 
 @pytest.mark.parametrize("sizes", [[40], [3, 40, 41, 2, 2, 40], [5, 1], []])
@@ -54,30 +61,55 @@ def test_parts_are_joined_row_by_row(tmp_path: Path, monkeypatch: pytest.MonkeyP
         made.append(some.schema.names)
         return encoded(some)
 
-    monkeypatch.setattr(joined, "encoded", counted)
     starts = np.cumsum([0, *sizes]).tolist()
     tables = [table(size, start) for size, start in zip(sizes, starts, strict=False)]
-    on_front = {1, 39, 45}
-    parts = [EncodedRows(encoded(each), each.num_rows) for each in tables]
+    parts = list(map(part_of, tables))
+    monkeypatch.setattr(joined, "encoded", counted)
+    local = pa.concat_tables([SCHEMA.empty_table(), *tables]).filter(pa.compute.field("pareto"))
+    on_front = {*local["design_id"].to_pylist()[1::2], -1, 1}
     path = tmp_path / "whole.parquet"
-    write_joined(parts, late_of(on_front), SCHEMA, path)
-    wanted = late_of(on_front).of(pa.concat_tables([SCHEMA.empty_table(), *tables]))
+    with joining(late_of(on_front), SCHEMA, path) as whole:
+        for part in parts:
+            whole.add(part)
+            assert not path.exists()
+    wanted = [
+        row | {"pareto": row["pareto"] and row["design_id"] in on_front} for each in tables for row in each.to_pylist()
+    ]
     found = pq.read_table(path, page_checksum_verification=True)
     assert found.schema.equals(SCHEMA, check_metadata=True)
-    assert found.to_pylist() == wanted.to_pylist()
+    assert found.to_pylist() == wanted
+    assert found["pareto"].to_pylist().count(True) == local.num_rows // 2 + (1 in local["design_id"].to_pylist())
     assert sum(each.num_rows for each in batches(path)) == sum(sizes)
     # A large part is a row group of its own, of which the late column alone is encoded.
     large = sum(size >= 40 for size in sizes)
-    assert sum(names == ["pareto"] for names in made) == large
     small = 0 if not sizes else sum(1 for a, b in zip([40, *sizes], sizes, strict=False) if b < 40 <= a)
     assert pq.read_metadata(path).num_row_groups == large + small
-    assert len(made) == large + small + 1  # and the schema, once
+    assert sum(names == ["pareto"] for names in made) == large + small
+    assert len(made) == large + 2 * small + 1  # and the schema, once
     # Statistics, by which readers leave out row groups, are those of the rows.
     metadata = pq.read_metadata(path)
     column = SCHEMA.get_field_index("design_id")
     groups = [metadata.row_group(g) for g in range(metadata.num_row_groups)]
     firsts = [group.column(column).statistics.min for group in groups]
     assert firsts == np.cumsum([0, *(group.num_rows for group in groups)])[: len(groups)].tolist()
+    assert all(
+        group.total_byte_size == sum(group.column(c).total_uncompressed_size for c in range(group.num_columns))
+        for group in groups
+    )
+
+
+def test_any_column_alone_is_read_from_a_file_whose_late_column_stands_at_its_end(tmp_path: Path) -> None:
+    tables = [table(40_000), table(33_000, 40_000)]
+    path = tmp_path / "whole.parquet"
+    with joining(late_of({0, 40_003}), SCHEMA, path) as whole:
+        for each in tables:
+            whole.add(part_of(each))
+    for name in SCHEMA.names:
+        wanted = pa.concat_tables(tables)[name].to_pylist()
+        if name == "pareto":
+            wanted = [number in (0, 40_003) for number in range(73_000)]
+        assert pq.read_table(path, columns=[name])[name].to_pylist() == wanted
+    assert pq.read_table(path, filters=[("pareto", "==", True)])["design_id"].to_pylist() == [0, 40_003]
 
 
 def test_parts_of_another_schema_or_none_at_all_are_refused(tmp_path: Path) -> None:
@@ -85,9 +117,40 @@ def test_parts_of_another_schema_or_none_at_all_are_refused(tmp_path: Path) -> N
     for content in (b"", b"PAR1", b"PAR1" + bytes(20) + b"PAR1", encoded(table(3))[:-9] + b"\xff\xff\xff\x7fPAR1"):
         with pytest.raises(ValueError, match=r"Parquet|footer"):
             footer_of(content)
+
+    def join(part: RowsPart) -> None:
+        with joining(late_of(set()), SCHEMA, path) as whole:
+            whole.add(part)
+
+    few = table(1)
     with pytest.raises((ValueError, KeyError, pa.ArrowException)):
-        write_joined([EncodedRows(b"no table", 40_000)], late_of(set()), SCHEMA, path)
+        join(RowsPart(b"no table", 40_000, few, np.array([0])))
     assert list(tmp_path.iterdir()) == []  # nothing half written
+
+
+def test_what_is_wrong_beside_the_file_is_told_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A disk that refuses the file is one thing, and an OSError of what goes on meanwhile another."""
+    path = tmp_path / "whole.parquet"
+
+    def fails_with(error: OSError) -> None:
+        with joining(late_of(set()), SCHEMA, path):
+            raise error
+
+    with pytest.raises(BrokenPipeError, match="gone"):
+        fails_with(BrokenPipeError("gone"))
+    assert list(tmp_path.iterdir()) == []
+
+    def full(_: object) -> bytes:
+        raise OSError(28, "No space left on device")
+
+    def join() -> None:
+        with joining(late_of(set()), SCHEMA, path) as whole:
+            whole.add(part_of(table(3)))
+            monkeypatch.setattr(joined, "encoded", full)
+
+    with pytest.raises(OutputError, match="No space left"):
+        join()
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

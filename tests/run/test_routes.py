@@ -16,7 +16,7 @@ from sweep.designs.families.stopband import MultiStopband, Stopband
 from sweep.designs.space import Filter
 from sweep.report import read_output, summary_lines
 from sweep.results.identity import CHUNK
-from sweep.run import Wishes, run_study
+from sweep.run import Wishes, routes, run_study
 from sweep.run.routes import ALONE, BY_CURVES
 from sweep.run.rows import Job, detours_of, rules_of, run_job
 from sweep.study import Study
@@ -105,10 +105,13 @@ def fragile_job(study: Study, kind: type[MultiStopband]) -> tuple[Job, Any, Any]
     return Job(space, "chart", 0, space.size, 0), study.view(space, "chart"), rules_of(study)
 
 
+@pytest.mark.parametrize("chunk", [CHUNK, 7])
 @pytest.mark.parametrize("separable", [True, False])
 def test_designs_beside_a_bad_one_are_those_of_a_whole_block(
-    plain: Study, monkeypatch: pytest.MonkeyPatch, separable: bool
+    plain: Study, monkeypatch: pytest.MonkeyPatch, separable: bool, chunk: int
 ) -> None:
+    """A block of several chunks is taken apart: only designs of a bad one's own chunk take another route."""
+    monkeypatch.setattr(routes, "CHUNK", chunk)
     job, view, rules = fragile_job(plain, FragileEdges if separable else Fragile)
     whole = Stopband if separable else MultiStopband
     fine = run_job(*fragile_job(plain, whole)).to_pandas()
@@ -126,8 +129,10 @@ def test_designs_beside_a_bad_one_are_those_of_a_whole_block(
     found = table.to_pandas()
     bad = found["left_nm"] == 600
     assert set(found.loc[bad, "status"]) == {"error: ValueError: no such filter at all"}
+    chunks = found["design_id"] // chunk
+    beside = ~bad & chunks.isin(set(chunks[bad]))
     assert detours_of(table) == {
-        (ALONE, f"ValueError: {'no such edge' if separable else 'no such filter at all'}"): int((~bad).sum())
+        (ALONE, f"ValueError: {'no such edge' if separable else 'no such filter at all'}"): int(beside.sum())
     }
     same = [name for name in found.columns if name != "pareto"]
     words = {"status": str}

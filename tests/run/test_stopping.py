@@ -35,7 +35,7 @@ PHASES = {
     "search": ("sweep.search.solver:search_from", 3),
     "sweep": ("sweep.metrics.evaluate:evaluate", 6),
     "recognition": ("sweep.metrics.recognition:recognize", 2),
-    "tables": ("sweep.results.joined:write_joined", 1),
+    "tables": ("sweep.results.joined:Joining.finish", 1),
     "points": ("sweep.results.tables:write_table", 2),
     "report": ("sweep.report.page:make_report", 1),
 }
