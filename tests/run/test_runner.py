@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -28,6 +29,7 @@ from sweep.results.journal import Journal
 from sweep.results.lock import locked
 from sweep.run import run_study
 from sweep.run.rows import Job, jobs_of, rules_of, run_job
+from sweep.run.sweep import Sweep, _InOrder
 from sweep.run.workers import Workers
 from sweep.study import Study, load_study
 from sweep.study.axes import series_of
@@ -120,6 +122,31 @@ def test_two_workers_give_the_same_rows(study: Study, output: Path, tmp_path: Pa
     for name in ("results.parquet", "search.parquet", "curves.parquet"):
         assert pq.read_table(tmp_path / name).equals(pq.read_table(output / name)), name
     assert not (tmp_path / "shards").exists()
+
+
+def test_rows_stand_in_order_whenever_their_scene_is_computed(
+    study: Study, output: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The last scene first, and each chunk as a row group of its own."""
+    heavier = {name: float(at) for at, name in enumerate(study.scenarios)}
+    assert len(heavier) > 1
+    order: list[int] = []
+    join = _InOrder.found
+
+    def found(self: _InOrder, index: int, few: pa.Table, content: bytes | None = None) -> None:
+        order.append(index)
+        join(self, index, few, content)
+
+    monkeypatch.setattr(Sweep, "_work", lambda _, scenario: heavier[scenario])
+    monkeypatch.setattr(_InOrder, "found", found)
+    monkeypatch.setattr("sweep.results.joined._AS_THEY_ARE", 1)
+    ran(study, tmp_path, 1)
+    assert order != sorted(order)
+    assert sorted(order) == list(range(len(order)))
+    pd.testing.assert_frame_equal(
+        pd.read_parquet(tmp_path / "results.parquet"), pd.read_parquet(output / "results.parquet")
+    )
+    assert pq.read_metadata(tmp_path / "results.parquet").num_row_groups == len(order) + 1  # and the answer
 
 
 def test_finished_chunks_are_not_computed_again(study: Study, output: Path, tmp_path: Path) -> None:
