@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
@@ -63,12 +63,20 @@ def joining(late: Late, schema: pa.Schema, path: Path, seal: Seal = unsealed) ->
     with ExitStack() as stack:
         with refused_by_disk(path):
             hidden = stack.enter_context(hidden_beside(path, seal))
-            sink = stack.enter_context(hidden.open("wb"))
+            sink = hidden.open("wb")
+            stack.callback(_given_up, sink)
             whole = Joining(path, sink, schema, late)
         yield whole
         with refused_by_disk(path):
             whole.finish()
+            sink.close()
             stack.close()
+
+
+def _given_up(sink: BinaryIO) -> None:
+    """What is not written yet of a file that is removed is of no use."""
+    with suppress(OSError):
+        sink.close()
 
 
 @dataclass
@@ -104,6 +112,11 @@ class Joining:
 
     def __post_init__(self) -> None:
         self._sink.write(MAGIC)
+
+    @property
+    def needs(self) -> Sequence[str]:
+        """What must be known of the few rows of a part."""
+        return self._late.needs
 
     def add(self, part: RowsPart) -> None:
         """Append the rows of a part."""

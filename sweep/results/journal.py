@@ -11,9 +11,9 @@ import json
 import math
 import os
 import re
-import threading
 import time
 from collections.abc import Iterable
+from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -106,7 +106,6 @@ class Journal:
         self.folder = output / SHARDS
         self.entries: dict[str, Entry] = {}
         self._torn = False
-        self._leaving: threading.Thread | None = None
         if os.path.lexists(self.folder) and not is_real_folder(self.folder):
             raise OutputError(Fault("is no folder of this run; move it away", str(self.folder)))
         self._read()
@@ -133,8 +132,11 @@ class Journal:
 
     def check(self) -> None:
         """Forget what is missing or has another size; a file of the right size is checked when it is used."""
-        here = list(os.scandir(self.folder)) if is_real_folder(self.folder) else []
-        sizes = {item.name: item.stat().st_size for item in here if item.is_file(follow_symlinks=False)}
+        sizes: dict[str, int] = {}
+        for item in list(os.scandir(self.folder)) if is_real_folder(self.folder) else []:
+            with suppress(FileNotFoundError):  # a run that is under way has just removed it
+                if item.is_file(follow_symlinks=False):
+                    sizes[item.name] = item.stat().st_size
         self.entries = {key: entry for key, entry in self.entries.items() if sizes.get(entry.file) == entry.size}
 
     def save(self, key: str, index: int, shard: Shard) -> None:
@@ -164,11 +166,9 @@ class Journal:
         if entry is not None:
             self._unlink([entry.file])
 
-    def leave(self, keys: Iterable[str]) -> None:
-        """Finished pieces that stand elsewhere now: a thread removes their files, and `remove` waits for it."""
-        gone = [self.entries.pop(key).file for key in keys if key in self.entries]
-        self._leaving = threading.Thread(target=self._unlink, args=(gone,))
-        self._leaving.start()
+    def leave(self, keys: Iterable[str], aside: Executor) -> None:
+        """Finished pieces that stand elsewhere now: their files are removed `aside`, for which this does not wait."""
+        aside.submit(self._unlink, [self.entries.pop(key).file for key in keys if key in self.entries])
 
     def _unlink(self, names: Iterable[str]) -> None:
         for name in names:
@@ -177,8 +177,6 @@ class Journal:
 
     def remove(self) -> None:
         """Drop all of it, after the rows stand in the result table; the journal goes last. Files of others stay."""
-        if self._leaving is not None:
-            self._leaving.join()
         if is_real_folder(self.folder):
             own = [path.name for path in self.folder.iterdir() if _NAMES.fullmatch(path.name)]
             for name in (*own, _JOURNAL):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
@@ -88,6 +89,7 @@ class Making:
     then_load: Sequence[str]
     made: set[str] = field(default_factory=set)
     _failed: int = 0
+    _aside: Executor = field(init=False)
     _warnings: list[str] = field(default_factory=list)
 
     def make(self, names: set[str]) -> None:
@@ -95,6 +97,10 @@ class Making:
 
         Provenance comes last: what a folder without it holds is not a finished run.
         """
+        with ThreadPoolExecutor(1) as self._aside:
+            self._make(names)
+
+    def _make(self, names: set[str]) -> None:
         before = dict(self.inventory.files)
         todo = names
         while todo:
@@ -175,7 +181,7 @@ class Making:
                 gathered.add(row)
                 whole.add(RowsPart.of(row))
             gathered.finish()
-        self.journal.leave(sweep.keys)
+        self.journal.leave(sweep.keys, self._aside)
         detours: Detours = sum(map(detours_of, answered), sweep.detours)
         self.inventory.facts["detours"] = [{"how": how, "why": why, "designs": n} for (how, why), n in detours.items()]
         self.gathered, self._failed, self._warnings = gathered, sweep.failed, sweep.warnings

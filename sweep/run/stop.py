@@ -156,13 +156,15 @@ def stop_on_signals(outer: Stop | None = None, *, ends_process: bool = False) ->
 def _news_of(stop: Stop) -> Callable[[], None]:
     """Nobody is told of what a stop has caused; what gives the usual hooks back.
 
-    In a pool's thread: that the workers are gone. In compiled code that can't hand an exception on, which Cython and
-    Python print and forget: that it was broken off; the main thread is broken off once more then.
+    In a pool's thread: that the workers are gone, or that calls are lost to it, as they may be where an error ends it.
+    In compiled code that can't hand an exception on, which Cython and Python print and forget: that it was broken off;
+    the main thread is broken off once more then.
     """
     in_threads, printed, ignored = threading.excepthook, sys.excepthook, sys.unraisablehook
 
     def in_thread(fault: threading.ExceptHookArgs) -> None:
-        if not (stop.requested and fault.thread is not None and fault.thread.name == POOL_THREAD):
+        of_pool = fault.thread is not None and fault.thread.name == POOL_THREAD
+        if not (of_pool and (stop.requested or issubclass(fault.exc_type, KeyError))):
             in_threads(fault)
 
     def print_(kind: type[BaseException], fault: BaseException, trace: TracebackType | None) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 import pyarrow as pa
 
 from ..base.errors import FailedDesignError, Fault, OutputError
-from ..base.types import Call, Progress, delayed
+from ..base.types import Call, IndexArray, Progress, delayed
 from ..camera.view import View
 from ..results.identity import fingerprint
 from ..results.joined import Joining, RowsPart
@@ -197,20 +197,26 @@ class Sweep:
 class _InOrder:
     """The finished chunks of a sweep, in the order of their rows, on their way to the whole table.
 
-    One whose turn is not yet is read from the journal later; its few rows are kept.
+    One whose turn is not yet is read from the journal later; of its rows, those are kept that may be on the front.
     """
 
     sweep: Sweep
     whole: Joining
-    early: dict[int, pa.Table] = field(default_factory=dict)
+    early: dict[int, tuple[pa.Table, IndexArray]] = field(default_factory=dict)
     turn: int = 0
 
     def found(self, index: int, few: pa.Table, content: bytes | None = None) -> None:
-        """A chunk is finished, of which `few_of` gives these rows; where its file's content is at hand, it goes on."""
-        self.early[index] = few
-        if index == self.turn and content is not None:
-            self._join(content)
-            if self.turn in self.early:  # one of those that came before their turn; a stop waits for no more of them
+        """A chunk is finished, of which `few_of` gives these rows; where its file's content is at hand, it may go on.
+
+        So may one more that came before its turn. A stop waits for no more of them.
+        """
+        marked = few.filter(few["pareto"])
+        at = marked["design_id"].to_numpy() - self.sweep.jobs[index].first_id
+        self.early[index] = marked.select(self.whole.needs), at
+        if content is not None:
+            if index == self.turn:
+                self._join(content)
+            if self.turn in self.early:
                 self._join(self.sweep.content(self.turn))
 
     def rest(self) -> None:
@@ -219,8 +225,8 @@ class _InOrder:
             self._join(self.sweep.content(self.turn))
 
     def _join(self, content: bytes) -> None:
-        few, job = self.early.pop(self.turn), self.sweep.jobs[self.turn]
-        self.whole.add(RowsPart(content, job.stop - job.start, few, few["design_id"].to_numpy() - job.first_id))
+        job = self.sweep.jobs[self.turn]
+        self.whole.add(RowsPart(content, job.stop - job.start, *self.early.pop(self.turn)))
         self.turn += 1
 
 

@@ -3,38 +3,36 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
-import threading
+import time
 import warnings
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib import import_module
 from itertools import islice
-from multiprocessing import active_children, get_context
+from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any
 
 import joblib
 from joblib.externals.loky import ProcessPoolExecutor
-from joblib.externals.loky.backend.process import LokyProcess
 from threadpoolctl import ThreadpoolController
 
 from ..base.errors import SweepError
 from ..base.types import Call
 from .cluster import client_of
-from .stop import POOL_THREAD, Stop, without_interrupts
+from .stop import Stop, without_interrupts
 from .worker_process import give_back_freed_memory, keep_freed_memory, preparing
 
 if TYPE_CHECKING:
     from ..study import Study
 
 _LEAST_WINDOW, _WINDOW_PER_WORKER = 64, 16
-_LAST_S = 5.0
-"""A pool whose workers are dead has noticed by then."""
+_HANDED_OUT_S = 0.1
+"""What was given to a pool has gone to its workers by then."""
 _CALLED, _SEARCHING = ("sweep.run.sweep", "sweep.metrics.nearest"), "sweep.search.solver"
 BACKENDS = ("loky", "threading", "dask")
 _Numbered = tuple[int, Call]
@@ -83,26 +81,8 @@ class Workers:
     def not_awaited(self) -> None:
         """End what was started and is not awaited, as after an error or a stop."""
         for started in self._starting:
-            self._ended(started)
+            _left(started)
         self._starting.clear()
-
-    def _ended(self, results: Generator[Any]) -> None:
-        """End calls whose results nobody waits for.
-
-        Worker processes are killed first, which their pool takes for a death and tidies up after. The pool's own way to
-        end them loses calls that it has not handed out yet: a KeyError in its thread, and semaphores that nobody frees.
-        """
-        if self.backend == "loky":
-            for process in active_children():
-                if isinstance(process, LokyProcess) and process.pid is not None:
-                    with suppress(ProcessLookupError):
-                        os.kill(process.pid, signal.SIGKILL)
-            with suppress(Exception):
-                deque(results, maxlen=0)
-            for thread in threading.enumerate():
-                if thread.name == POOL_THREAD:
-                    thread.join(_LAST_S)
-        results.close()
 
     @property
     def count(self) -> int:
@@ -150,6 +130,7 @@ class Workers:
                 yield (_numbered, (at, call), {})
 
         while waiting and not self.stop.requested:
+            results: Generator[Any] | None = None
             try:
                 parallel = joblib.Parallel(self._n_jobs, return_as="generator_unordered", pre_dispatch="3*n_jobs")
                 with self.stop.held(), without_interrupts():
@@ -161,7 +142,9 @@ class Workers:
                 if not _is_death(error):
                     raise
             except BaseException:  # whoever took the results left, or was broken off
-                self._ended(results)
+                waiting.clear()
+                if flying and results is not None:
+                    _left(results)
                 raise
             suspects = list(flying.items())
             flying.clear()
@@ -283,6 +266,16 @@ def _loaded(modules: tuple[str, ...]) -> bool:
 def _numbered(at: int, call: Call) -> tuple[int, Any]:
     """The result of a call, and its number."""
     return at, _one_threaded(*call)
+
+
+def _left(results: Generator[Any]) -> None:
+    """End calls whose results nobody waits for, and whose workers get no more.
+
+    The pool's thread hands calls out within moments. A call that it has not handed out yet when its workers are ended
+    is lost to it: a KeyError in that thread, and semaphores that nobody frees.
+    """
+    time.sleep(_HANDED_OUT_S)
+    results.close()
 
 
 def _is_death(error: Exception) -> bool:

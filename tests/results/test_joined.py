@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import resource
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -138,6 +140,20 @@ def test_what_is_wrong_beside_the_file_is_told_as_it_is(tmp_path: Path, monkeypa
 
     with pytest.raises(BrokenPipeError, match="gone"):
         fails_with(BrokenPipeError("gone"))
+    assert list(tmp_path.iterdir()) == []
+
+    def fails_behind_what_waits() -> None:
+        with joining(late_of(set()), SCHEMA, path) as whole:
+            whole._sink.write(bytes(131))  # still in memory
+            _, most = resource.getrlimit(resource.RLIMIT_FSIZE)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (100, most))
+            try:
+                raise OutputError("the journal")
+            finally:
+                limits.callback(resource.setrlimit, resource.RLIMIT_FSIZE, (most, most))
+
+    with ExitStack() as limits, pytest.raises(OutputError, match="the journal"):
+        fails_behind_what_waits()
     assert list(tmp_path.iterdir()) == []
 
     def full(_: object) -> bytes:
