@@ -109,6 +109,7 @@ class Joining:
     _late: Late
     _groups: list[_Group] = field(default_factory=list)
     _small: list[RowsPart] = field(default_factory=list)
+    _small_rows: int = 0
 
     def __post_init__(self) -> None:
         self._sink.write(MAGIC)
@@ -126,7 +127,8 @@ class Joining:
                 self._append(part)
                 return
             self._small.append(part)
-            if sum(each.rows for each in self._small) >= ROW_GROUP:
+            self._small_rows += part.rows
+            if self._small_rows >= ROW_GROUP:
                 self._write_small()
 
     def finish(self) -> None:
@@ -143,7 +145,7 @@ class Joining:
         self._sink.write(footer_bytes(footer | {_ROWS: rows, _GROUPS: (footer[_GROUPS][0], (STRUCT, groups))}))
 
     def _write_small(self) -> None:
-        parts, self._small = self._small, []
+        parts, self._small, self._small_rows = self._small, [], 0
         if not parts:
             return
         tables = [pq.read_table(pa.BufferReader(each.content), page_checksum_verification=True) for each in parts]

@@ -104,6 +104,7 @@ class Gathered:
         self.rules, self.scenario = rules, scenario
         self.front, self.swept = Front(rules.front), Front(rules.front, "sweep")
         self._waiting: list[pa.Table] = []
+        self._waiting_rows = 0
         self._always: list[pa.Table] = []
         self._best: dict[str, pa.Table] = {}
         self._feasible: dict[str, pa.Table] = {}
@@ -112,7 +113,8 @@ class Gathered:
     def add(self, few: pa.Table) -> None:
         """Take in what `few_of` a table gives; several at once, since they are few rows."""
         self._waiting.append(few)
-        if sum(each.num_rows for each in self._waiting) >= _AT_ONCE:
+        self._waiting_rows += few.num_rows
+        if self._waiting_rows >= _AT_ONCE:
             self._take_in()
 
     def _take_in(self) -> None:
@@ -120,6 +122,7 @@ class Gathered:
             return
         few = pa.concat_tables(self._waiting).unify_dictionaries().combine_chunks()
         self._waiting.clear()
+        self._waiting_rows = 0
         self.front.add(few)
         self.swept.add(few)
         always = holds(few, "kind", *FEW)

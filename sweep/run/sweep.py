@@ -111,14 +111,14 @@ class Sweep:
         """
         self.failed, self.detours = 0, Counter()
         entries = self.journal.entries
-        joined = _InOrder(self, whole)
+        in_order = _InOrder(self, whole)
         for index, key in enumerate(self.keys):
             if key in entries and wishes.retry_failed and entries[key].failed:
                 self.journal.forget(key)
             elif key in entries and (table := self._kept(index)) is not None:
                 few = few_of(table, self.rules)
                 self._take_in(few, entries[key].failed, gathered)
-                joined.found(index, few)
+                in_order.found(index, few)
         todo = [index for index, key in enumerate(self.keys) if key not in entries]
         done = sum(entries[key].rows for key in self.keys if key in entries)
         progress("designs", done, self.study.n_designs)
@@ -139,9 +139,9 @@ class Sweep:
                 done += shard.rows
                 if shard.failed and wishes.fail_fast:
                     raise _first_failure(shard.table())
-                joined.found(index, few, shard.content)
+                in_order.found(index, few, shard.content)
             progress("designs", done, self.study.n_designs)
-        joined.rest()
+        in_order.rest()
 
     def _batches(self, todo: list[int]) -> list[list[int]]:
         """Jobs by the calls that they are computed in.

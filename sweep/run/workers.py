@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 _LEAST_WINDOW, _WINDOW_PER_WORKER = 64, 16
 _HANDED_OUT_S = 0.1
-"""What was given to a pool has gone to its workers by then."""
+"""Seconds for a pool's thread to hand on what it was given; it needs far less, unless the machine stands still."""
 _CALLED, _SEARCHING = ("sweep.run.sweep", "sweep.metrics.nearest"), "sweep.search.solver"
 BACKENDS = ("loky", "threading", "dask")
 _Numbered = tuple[int, Call]
