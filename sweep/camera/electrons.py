@@ -18,14 +18,12 @@ from numpy.typing import DTypeLike
 from ..base.types import BoolArray, FloatArray, IndexArray
 from ..designs.block import Block, EdgeBlock, EdgeSums
 from ..designs.products import row_products
-from .effects import flicker, quadrature
-from .exposure import exposure_times, fixed_white, white_irradiance
-from .field import over_field
+from .exposure import exposure_times
 from .kernel import Kernel
 from .registry import factor_of_light
-from .seen import SeenFilters
+from .scene_light import SceneLight
 from .split_light import SplitLight
-from .view import View, background_irradiance, per_photon, signal_irradiance
+from .view import View, background_irradiance, per_photon
 
 KEPT = 15_000_000
 """Largest table of signals times kernel that is kept."""
@@ -95,84 +93,78 @@ def _background(view: View) -> FloatArray:
 class Electrons:
     """What a kernel gives of designs. `work` counts the values that are computed, by effect.
 
-    `kernel`: the scene's. `seen`: the filters as the rays see them, at each place of the field; `place`: that of each
-    case, ndarray[n_cases]. `signals`, `white`: electrons/s for each QE of light and the white patch at every
-    wavelength, ndarray[n_signals, n_wavelengths] and ndarray[n_wavelengths]; `background`: for each QE of the modified
-    channels, ndarray[n_places, n_modified, n_wavelengths]. `fixed`: electrons/s of what no design changes,
-    ndarray[n_cases, n_signals, n_units].
+    `light`, `kernel`: the scene's; `place`: of the field, of each case, ndarray[n_cases]. `background`: electrons/s for
+    each QE of the modified channels, ndarray[n_places, n_modified, n_wavelengths]. `fixed`: electrons/s of what no
+    design changes, ndarray[n_cases, n_signals, n_units].
     """
 
     def __init__(
-        self, view: View, kernel: Kernel, work: Counter[str], dtype: DTypeLike = np.float64, *, once: bool = False
+        self,
+        light: SceneLight,
+        kernel: Kernel,
+        work: Counter[str],
+        dtype: DTypeLike = np.float64,
+        *,
+        once: bool = False,
     ) -> None:
         """`dtype`: of the product of curves and scene, where the scene's table is small enough to be kept. `once`: for
         a single use, so that no table is made.
         """
-        self.view = view
+        self.view = view = light.view
         self._work = work
-        self.kernel = kernel
-        self._nodes = quadrature.nodes(view.grid.size, view.methods.quadrature)
-        at_all = self._nodes.size == view.grid.size
-        self._hats = None if at_all else quadrature.between_nodes(view.grid.size, self._nodes)
-        self.signals = signal_irradiance(view) * per_photon(view)
-        self.white = white_irradiance(view) * per_photon(view)
-        self._fixed_white = fixed_white(view)
+        self.light, self.kernel = light, kernel
         fixed, modified = list(view.fixed), list(view.modified)
-        places = over_field(view)
-        self.seen = [SeenFilters(place, view.methods.angle) for place in places]
+        places, seen = light.places, light.seen
         self.place = np.repeat(np.arange(len(places)), kernel.shape[0] // len(places))
         self._split = kernel.source if isinstance(kernel.source, SplitLight) and len(places) == 1 else None
         background = [_background(place) for place in places]
-        each = [np.repeat(light[None], len(modified), axis=0) for light in background]
-        self.background = np.stack([seen.light(light, modified) for seen, light in zip(self.seen, each, strict=True)])
+        each = [np.repeat(dimmed[None], len(modified), axis=0) for dimmed in background]
+        self.background = np.stack([own.light(dimmed, modified) for own, dimmed in zip(seen, each, strict=True)])
         if self._split is None:
             self.fixed = self._products(kernel.light[:, :, fixed], view.qe[None, fixed], fixed)[0]
         else:
             self.fixed = self._of_pixels(self._split, view.qe[None, fixed], fixed)[0]
-        rates = [s.curves(view.qe[fixed], fixed) @ light for s, light in zip(self.seen, background, strict=True)]
+        rates = [own.curves(view.qe[fixed], fixed) @ dimmed for own, dimmed in zip(seen, background, strict=True)]
         self._fixed_uniform = np.einsum("xuc,xc->xu", kernel.uniform[:, :, fixed], np.stack(rates)[self.place])
         self._modified_uniform = kernel.uniform[:, :, modified]
         # Units that look through a filter that changes; electrons/s per QE of it, kept where the table is small.
         if self._split is None:
             self._touched = np.flatnonzero((kernel.light[:, :, modified] != 0).any(axis=(0, 2, 3)))
             self._modified = kernel.light[:, self._touched][:, :, modified]
-            size = self._modified[..., 0].size * len(self.signals) * self._nodes.size
+            size = self._modified[..., 0].size * len(self.light.signals) * self.light.nodes.size
             self._kept = self._table().astype(dtype, copy=False) if 0 < size <= KEPT and not once else None
         else:
             self._touched, self._kept = self._split.touched(modified), None
 
-    def _looked_at(self, qe: FloatArray, channels: Sequence[int], place: int = 0) -> FloatArray:
-        """QE of some channels as the quadrature sees it (itself, or linear between its nodes), and then the rays."""
-        nodal = qe if self._hats is None else qe[..., self._nodes] @ self._hats
-        return self.seen[place].curves(nodal, channels)
-
     def at_each_place(self, light: FloatArray, channels: Sequence[int]) -> FloatArray:
         """Light on some channels, ndarray[n_cases, ..., n, n_wavelengths], as their filters see it at its place."""
-        return np.concatenate([seen.light(light[self.place == at], channels) for at, seen in enumerate(self.seen)])
+        return np.concatenate(
+            [seen.light(light[self.place == at], channels) for at, seen in enumerate(self.light.seen)]
+        )
 
     def _products(self, light: FloatArray, qe: FloatArray, of: Sequence[int]) -> FloatArray:
         """Sum over channels and wavelengths of kernel, QE and signals, [n_designs, n_cases, n_signals, n_units].
 
         `light`, `qe`: of the channels `of`.
         """
-        parts = [self._products_at(at, light[self.place == at], qe, of) for at in range(len(self.seen))]
+        parts = [self._products_at(at, light[self.place == at], qe, of) for at in range(len(self.light.seen))]
         return np.concatenate(parts, axis=1)
 
     def _of_pixels(
         self, split: SplitLight, qe: FloatArray, of: Sequence[int], units: IndexArray | None = None
     ) -> FloatArray:
         """`_products` of a light in factors."""
-        spectra = self._looked_at(qe, of)[:, :, None] * self.signals
-        self._work["response"] += len(qe) * split.work(len(of), len(self.signals))
+        spectra = self.light.looked_at(qe, of)[:, :, None] * self.light.signals
+        self._work["response"] += len(qe) * split.work(len(of), len(self.light.signals))
         return split.sums(spectra, of, units)
 
     def _products_at(self, place: int, light: FloatArray, qe: FloatArray, of: Sequence[int]) -> FloatArray:
         """Of the cases of one place of the field."""
         cases, units, channels, _ = light.shape
-        size, n, n_signals = self.view.grid.size, len(qe), len(self.signals)
+        size, n, n_signals = self.view.grid.size, len(qe), len(self.light.signals)
         weights = np.broadcast_to(light, (cases, units, channels, size)).reshape(cases * units, channels * size)
         # [n_designs, channels, n_signals, n_wavelengths]
-        seen = self._looked_at(qe, of, place)[:, :, None] * self.signals
+        seen = self.light.looked_at(qe, of, place)[:, :, None] * self.light.signals
         moved = np.moveaxis(seen, 2, 1).reshape(n, n_signals, channels * size)
         self._work["response"] += weights.shape[0] * moved.size
         # A product for each design, so that its bits do not depend on how many there are.
@@ -182,14 +174,14 @@ class Electrons:
     def _table(self) -> FloatArray:
         """Signals times kernel on the quadrature's nodes, [channels x nodes, n_cases x n_signals x n_units]."""
         cases, units, channels, size = self._modified.shape
-        if self._hats is None and not any(seen.matrices for seen in self.seen):
-            found = np.empty((channels, size, cases, len(self.signals), units))
+        if self.light.between_nodes is None and not any(seen.matrices for seen in self.light.seen):
+            found = np.empty((channels, size, cases, len(self.light.signals), units))
             kernel = np.ascontiguousarray(np.transpose(self._modified, (2, 3, 0, 1)))
-            np.multiply(kernel[:, :, :, None], self.signals.T[:, None, :, None], out=found)
+            np.multiply(kernel[:, :, :, None], self.light.signals.T[:, None, :, None], out=found)
             return found.reshape(channels * size, -1)
-        product = self._modified[:, None] * self.signals[:, None, None, :]
+        product = self._modified[:, None] * self.light.signals[:, None, None, :]
         product = self.at_each_place(product, self.view.modified)
-        on_nodes = product if self._hats is None else product @ self._hats.T
+        on_nodes = product if self.light.between_nodes is None else product @ self.light.between_nodes.T
         return np.ascontiguousarray(on_nodes.reshape(-1, channels * on_nodes.shape[-1]).T)
 
     def rates(self, curves: FloatArray) -> FloatArray:
@@ -205,21 +197,10 @@ class Electrons:
         elif self._kept is None:
             part = self._products(self._modified, curves, self.view.modified)
         else:
-            qe = curves[:, :, self._nodes].reshape(len(curves), -1).astype(self._kept.dtype)
+            qe = curves[:, :, self.light.nodes].reshape(len(curves), -1).astype(self._kept.dtype)
             self._work["response"] += len(curves) * self._kept.size
             part = row_products(qe, self._kept).reshape(len(curves), *self.fixed.shape[:2], self._touched.size)
         found[..., self._touched] += part
-        return found
-
-    def exposure_s(self, curves: FloatArray) -> FloatArray:
-        """Exposure of each design, s, ndarray[n_designs]."""
-        return exposure_times(self.view, curves @ self.white, self._fixed_white)
-
-    def scales(self, exposure_s: FloatArray) -> FloatArray:
-        """Light relative to its mean in the cases of a pulsed light, ndarray[n_designs, n_scales]."""
-        found = flicker.scales(self.view, self.view.methods.flicker, exposure_s)
-        if found.shape[1] > 1:
-            self._work["flicker"] += found.size
         return found
 
     def expected(self, curves: FloatArray, scales: FloatArray, exposure_s: FloatArray) -> FloatArray:
@@ -260,13 +241,13 @@ class Electrons:
         if not np.array_equal(touched, self._touched):
             return None
         everywhere = np.arange(view.grid.size)
-        time_s = exposure_times(view, np.zeros((1, 1)), self._fixed_white)
-        white = block.product(self.white[:, None], everywhere)
-        if white.max(initial=0.0) <= self._fixed_white:
+        time_s = exposure_times(view, np.zeros((1, 1)), self.light.fixed_white)
+        white = block.product(self.light.white[:, None], everywhere)
+        if white.max(initial=0.0) <= self.light.fixed_white:
             which = np.ones(len(block), dtype=bool)
         else:
-            which = exposure_times(view, white, self._fixed_white) == time_s
-        if not which.any() or not np.isfinite(time_s[0]) or self.scales(time_s).shape[1] > 1:
+            which = exposure_times(view, white, self.light.fixed_white) == time_s
+        if not which.any() or not np.isfinite(time_s[0]) or self.light.scales(time_s).shape[1] > 1:
             return None
         some = block if which.all() else block.some(np.flatnonzero(which))
         unit = int(self._touched[0])
@@ -277,7 +258,7 @@ class Electrons:
             uniform *= self._modified_uniform[:, unit, 0]
         uniform = self._fixed_uniform[:, unit] + uniform + view.pixel.dark_e_per_s
         rest = self.fixed + (self._fixed_uniform + view.pixel.dark_e_per_s)[:, None]
-        fixed, kept, nodes = np.ascontiguousarray(self.fixed[:, :, unit]), self._kept, self._nodes
+        fixed, kept, nodes = np.ascontiguousarray(self.fixed[:, :, unit]), self._kept, self.light.nodes
 
         def make() -> FloatArray:
             values = some.product(kept, nodes).reshape(len(some), len(fixed), -1).astype(float, copy=False)
@@ -288,13 +269,3 @@ class Electrons:
         if isinstance(some, EdgeBlock) and len(fixed) == 1 and kept.dtype == float and len(some) * kept.size > _MANY:
             by_edges = ByEdges(some.tables.product(kept, nodes), some, fixed[0], uniform[:, 0])
         return Changing(rest * time_s[0], unit, make, float(time_s[0]), which, by_edges)
-
-    def light_dn(self, curves: FloatArray, exposure_s: float) -> FloatArray:
-        """What each signal gives through each channel's filter where its image is whole, in a pulse's darkest moment.
-
-        `curves`: of one design, ndarray[n_modified, n_wavelengths]. DN, ndarray[n_signals, n_channels, n_wavelengths].
-        """
-        qe = self.view.qe.copy()
-        qe[list(self.view.modified)] = curves
-        scale = self.scales(np.array([exposure_s]))[0].min() * exposure_s * self.view.pixel.dn_per_e
-        return np.asarray(self.signals[:, None] * self._looked_at(qe, range(len(qe))) * scale, dtype=float)

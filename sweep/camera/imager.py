@@ -24,10 +24,11 @@ from ..designs.block import Block
 from .effects import phase
 from .electrons import Changing, Electrons
 from .field import over_field
-from .kernel import kept_kernel, make_kernel
+from .kernel import Kernel, kept_kernel, make_kernel
 from .kernel_size import blocks
 from .noisy_readout import NoisyReadout
 from .readout import Readout
+from .scene_light import SceneLight
 from .view import View
 
 if TYPE_CHECKING:
@@ -39,10 +40,10 @@ _BLOCK = 2_000_000
 
 
 class Imager:
-    """A scene with its kernel made, ready for designs. `work` counts what is computed, by effect.
+    """A scene, ready for designs. `work` counts what is computed, by effect; the kernel is made once it is asked for.
 
-    `electrons`: what the designs give on the units of the kernel; `readout`: how these are read. Of places at which
-    pixels are read one by one, those that see the same as another one are left out.
+    `light`: the scene's; `electrons`: what the designs give on the units of the kernel; `readout`: how these are read.
+    Of places at which pixels are read one by one, those that see the same as another one are left out.
     """
 
     all_apart = False
@@ -62,25 +63,50 @@ class Imager:
         """
         self.view = view
         self.work: Counter[str] = Counter() if work is None else work
-        methods, grid = view.methods, view.grid
-        by_pixel, targeted = not methods.straight, view.scenario.target is not None
+        self._dtype, self._once = dtype, once
+        by_pixel, targeted = not view.methods.straight, view.scenario.target is not None
         self._others: list[phase.Cases] = []
-        if by_pixel and targeted and methods.sampling != "skip":
+        if by_pixel and targeted and view.methods.sampling != "skip":
             if cases is None:
-                every = phase.cases(view, methods.phase)
+                every = phase.cases(view, view.methods.phase)
                 cases = every if self.all_apart else phase.different_places(view, every)[0]
             # Where the kernels of all places would be too large to hold, those of the others are made as they are read.
             cases, *self._others = blocks(view, cases)
-        if cases is None:
-            kernel = kept_kernel(view, by_pixel=by_pixel, work=self.work)
-        else:
-            kernel = make_kernel(view, methods, grid.nodes_nm, by_pixel=by_pixel, work=self.work, cases=cases)
-        self.n_cases, self.n_units = kernel.shape
-        each = len(over_field(view))
-        self.n_places = self.n_cases + each * sum(len(block.places_px) for block in self._others)
-        self.electrons = Electrons(view, kernel, self.work, dtype, once=once)
-        self.readout = Readout(view, kernel, self.work)
+        self._cases = cases
         self._latest: dict[str, tuple[bytes, Any]] = {}
+
+    @cached_property
+    def light(self) -> SceneLight:
+        """What there is without a kernel."""
+        return SceneLight(self.view, self.work)
+
+    @cached_property
+    def _kernel(self) -> Kernel:
+        view, by_pixel = self.view, not self.view.methods.straight
+        if self._cases is None:
+            return kept_kernel(view, by_pixel=by_pixel, work=self.work)
+        wave = view.grid.nodes_nm
+        return make_kernel(view, view.methods, wave, by_pixel=by_pixel, work=self.work, cases=self._cases)
+
+    @cached_property
+    def electrons(self) -> Electrons:
+        """What designs give."""
+        return Electrons(self.light, self._kernel, self.work, self._dtype, once=self._once)
+
+    @cached_property
+    def readout(self) -> Readout:
+        """How it is read."""
+        return Readout(self.view, self._kernel, self.work)
+
+    @property
+    def n_cases(self) -> int:
+        """Places whose kernels are held."""
+        return self._kernel.shape[0]
+
+    @property
+    def n_places(self) -> int:
+        """All places, those of the sensor's field times those of the light."""
+        return self.n_cases + len(over_field(self.view)) * sum(len(block.places_px) for block in self._others)
 
     def read_changing(self, block: Block) -> Changing | None:
         """`Electrons.changing` as read, DN; None, too, where a channel is read from several units."""
@@ -107,7 +133,7 @@ class Imager:
         return self._read_once("read", curves, self._read)
 
     def _read(self, curves: FloatArray) -> tuple[FloatArray, FloatArray]:
-        exposure_s = self.electrons.exposure_s(curves)
+        exposure_s = self.light.exposure_s(curves)
         own = np.concatenate([self.readout.folded(self.readout.transfer(e)) for e in self._blocks(curves, exposure_s)])
         return np.concatenate([own, *(other.read(curves)[0] for other in self._rest())], axis=1), exposure_s
 
@@ -134,7 +160,7 @@ class Imager:
         return self._read_once("noise", curves, self._read_with_noise)
 
     def _read_with_noise(self, curves: FloatArray) -> NoisyReadout:
-        exposure_s = self.electrons.exposure_s(curves)
+        exposure_s = self.light.exposure_s(curves)
         parts = [self.readout.with_noise(electrons) for electrons in self._blocks(curves, exposure_s)]
         found = [tuple(np.concatenate(values) for values in zip(*parts, strict=True))]
         for other in self._rest():
@@ -145,8 +171,8 @@ class Imager:
 
     def _blocks(self, curves: FloatArray, exposure_s: FloatArray) -> Iterator[FloatArray]:
         """`Electrons.expected` of blocks of designs."""
-        scales = self.electrons.scales(exposure_s)
-        step = max(1, _BLOCK // (self.n_cases * scales.shape[1] * len(self.electrons.signals) * self.n_units))
+        scales = self.light.scales(exposure_s)
+        step = max(1, _BLOCK // (self.n_cases * scales.shape[1] * len(self.light.signals) * self._kernel.shape[1]))
         for start in range(0, len(curves), step):
             block = slice(start, start + step)
             yield self.electrons.expected(curves[block], scales[block], exposure_s[block])
@@ -160,8 +186,8 @@ class Imager:
         if self._others:
             most = f"at most those of {self.n_cases} places: a smaller light, or a named place"
             raise SweepError(Fault("too many pixels to draw", value=f"{self.n_places} places", allowed=most))
-        exposure_s = self.electrons.exposure_s(curves)
-        found = self.electrons.expected(curves, self.electrons.scales(exposure_s), exposure_s)
+        exposure_s = self.light.exposure_s(curves)
+        found = self.electrons.expected(curves, self.light.scales(exposure_s), exposure_s)
         if self.readout.by_channel and self.view.scenario.target is None:
             return found[..., self.view.mosaic.indices.ravel()]
         return found

@@ -94,20 +94,20 @@ class LinearImager(Imager):
 
     def _expected(self, curves: FloatArray) -> FloatArray:
         """Expected electrons of the units, ndarray[n_designs, n_cases, n_signals, n_units]."""
-        exposure_s = self.electrons.exposure_s(curves)
-        return self.electrons.expected(curves, self.electrons.scales(exposure_s), exposure_s)
+        exposure_s = self.light.exposure_s(curves)
+        return self.electrons.expected(curves, self.light.scales(exposure_s), exposure_s)
 
     def _with_slope(self, curves: FloatArray, curves_gradient: FloatArray) -> tuple[FloatArray, FloatArray]:
         """`_expected` of one design, and its exact derivative, electrons per unit of parameter; see `gradient`."""
         own, n = self.electrons, len(curves_gradient)
         one = curves[None]
-        exposure_s = own.exposure_s(one)
-        scales = own.scales(exposure_s)
+        exposure_s = self.light.exposure_s(one)
+        scales = self.light.scales(exposure_s)
         whole = own.expected(one, scales, exposure_s)[0]
         light = (own.rates(curves_gradient) - own.fixed)[:, :, None] * scales[0][None, None, :, None, None]
         uniform = own.through_filters(own.of_background(curves_gradient))
         slope = (light + uniform[:, :, None, None, :]).reshape(n, *whole.shape) * exposure_s
-        relative = relative_slope(self.view, own.white, curves, curves_gradient)
+        relative = relative_slope(self.view, self.light.white, curves, curves_gradient)
         return whole, np.asarray(slope + relative[:, None, None, None] * whole, dtype=float)
 
     def per_qe(self, modified: int, curves: FloatArray) -> FloatArray:
@@ -142,9 +142,9 @@ class LinearImager(Imager):
         `light`, `uniform`: what units get through it, see `Kernel`, without the axis of the channels.
         """
         own, channel = self.electrons, self.view.modified[modified]
-        exposure_s = own.exposure_s(curves[None])
-        scales = own.scales(exposure_s)[0]
-        seen = light[:, None, None] * own.signals[:, None, :]
+        exposure_s = self.light.exposure_s(curves[None])
+        scales = self.light.scales(exposure_s)[0]
+        seen = light[:, None, None] * self.light.signals[:, None, :]
         seen = own.at_each_place(seen[..., None, :], [channel])[..., 0, :]
         background = own.background[own.place, modified][:, None, None, None]
         both = seen * scales[None, :, None, None, None] + uniform[:, None, None, :, None] * background

@@ -53,6 +53,7 @@ class PlaceKernels:
         profile = profile_of(view, methods, knots_nm)
         self._table, self._rule, self._rings = _SHARP, legendre.rule(1), None
         self.shares = np.ones((1, knots_nm.size))
+        self._not_counted = 0 if profile is None else profile.work
         if profile is not None:
             light = encircled(profile)
             self._table = light.coefficients, pixel.pitch_um / float(profile.r_um[1])
@@ -67,6 +68,8 @@ class PlaceKernels:
         n_channels, n_channels, n_functions]; times `shares`, ndarray[n_functions, n_knots], at each wavelength. And
         the sum of weights of each channel's pixels, ndarray[n_cases, n_channels].
         """
+        work["blur"] += self._not_counted
+        self._not_counted = 0
         n, step = len(self._view.mosaic.channels), max(1, _AT_ONCE // pixels_per_place(self._view))
         found, sums = np.empty((len(cases.places_px), n, n, len(self.shares))), np.empty((len(cases.places_px), n))
         # The same way for a place in whatever company it is asked for.

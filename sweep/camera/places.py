@@ -22,7 +22,7 @@ from .place_cells import CellKernels, kept_cells
 from .registry import factor_of_light
 from .view import View
 
-_OWN_DN = 1e-5
+OWN_DN = 1e-5
 """What a search leaves of its tolerance for its own kernels; they were seen 2e-6 DN from those of a readout."""
 _MOST_CELLS = 400_000
 """Cells of one design, after which the search gives up."""
@@ -53,7 +53,7 @@ class AnyPlace:
         within_dn, wave = phase.within_dn(view.methods.phase), view.grid.nodes_nm
         if within_dn is None:
             raise ValueError(f"{view.methods.phase!r} looks at a lattice of places")
-        self.within_dn, self.members = within_dn - _OWN_DN, view.members
+        self.within_dn, self.members = within_dn - OWN_DN, view.members
         self._mosaic, self._work, self._cells = view.mosaic, work, kept_cells(view)
         self._dimmed = factor_of_light(view, view.methods, wave)
 

@@ -59,7 +59,7 @@ class _Geometry:
         n = len(view.mosaic.channels)
         self.moving = [c for c in range(n) if math.isfinite(view.effective_index(c))]
         self.known = {c: known_at(view.carrier(c)) for c in self.moving}
-        kernel, self._signals = self.imager.electrons.kernel.light[0], self.imager.electrons.signals
+        kernel, self._signals = self.imager.electrons.kernel.light[0], self.imager.light.signals
         used = [(unit, c) for unit in range(len(kernel)) for c in range(n) if kernel[unit, c].any()]
         self.weights = [(unit, c, self._signals * kernel[unit, c]) for unit, c in used]
         """Units, the channels that they look through, and electrons/s for each QE there, [n_signals, n_wavelengths]."""
@@ -147,9 +147,9 @@ class _Design:
         self._geometry, self._work, view = geometry, work, geometry.view
         self._qe = view.qe.copy()
         self._qe[list(view.modified)] = curves
-        exposure_s = geometry.imager.electrons.exposure_s(curves[None])
+        exposure_s = geometry.imager.light.exposure_s(curves[None])
         # Two signals are nearest in the darkest moment of a pulse.
-        scale = geometry.imager.electrons.scales(exposure_s).min() * exposure_s[0] * view.pixel.dn_per_e
+        scale = geometry.imager.light.scales(exposure_s).min() * exposure_s[0] * view.pixel.dn_per_e
         self._weights = [(unit, channel, weights * scale) for unit, channel, weights in geometry.weights]
         self._wave = view.grid.nodes_nm
         self._bases = {channel: view.carrier(channel) for channel in geometry.moving}

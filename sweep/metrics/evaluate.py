@@ -17,7 +17,7 @@ from ..camera.imager import Imager, imager_of
 from ..camera.registry import EFFECTS
 from ..camera.sensor_places import SensorPlaces
 from ..camera.view import View
-from ..curves.lights import Pair
+from ..curves.lights import Pair, class_pairs
 from ..designs.block import Block, CurveBlock
 from ..designs.family import Family
 from ..vision.section import Vision
@@ -89,7 +89,7 @@ def _over_all_places(
     """Put the extremes over all places into the columns, which hold those over the lattice."""
     assert imager.anywhere is not None
     for design in np.flatnonzero(np.isfinite(exposure_s)):
-        light = imager.electrons.light_dn(curves[design], exposure_s[design])
+        light = imager.light.light_dn(curves[design], exposure_s[design])
         if not np.isfinite(light).all():
             continue
         found = imager.anywhere.extremes(light)
@@ -100,6 +100,26 @@ def _over_all_places(
             best = columns[BEST_PLACE + name]
             columns[name][design] = np.minimum(columns[name][design], smallest)
             best[design] = np.maximum(best[design], largest)
+
+
+def _by_search(imager: Imager, curves: FloatArray) -> Columns | None:
+    """CSDs and exposure where a straight response is read out: the search for the worst place tells them all.
+
+    The lattice's places are nodes of its first cells. None where light or exposure are not finite.
+    """
+    assert imager.anywhere is not None
+    exposure_s = imager.light.exposure_s(curves)
+    every = [imager.light.light_dn(*design) for design in zip(curves, exposure_s.tolist(), strict=True)]
+    if not all(np.isfinite(light).all() for light in every):
+        return None
+    pairs = class_pairs(imager.view.lights.classes)
+    columns = {start + csd_name(pair): np.full(len(curves), np.nan) for pair in pairs for start in ("", BEST_PLACE)}
+    for design, light in enumerate(every):
+        for pair, extremes in imager.anywhere.extremes(light).items():
+            if extremes is not None:
+                columns[csd_name(pair)][design] = extremes.smallest
+                columns[BEST_PLACE + csd_name(pair)][design] = extremes.largest
+    return columns | {EXPOSURE: exposure_s}
 
 
 def _over_all_heights(imager: Imager, curves: FloatArray, exposure_s: FloatArray, columns: Columns) -> None:
@@ -162,6 +182,10 @@ def evaluate(
     cells than `places` allows, or `sensor_places`.
     """
     block = _block(designs)
+    if imager.anywhere is not None and imager.view.methods.straight and not (states or own or _OTHERS):
+        found = _by_search(imager, block.curves())
+        if found is not None:
+            return found | designed_quantities(imager.view, block)
     changing = None if states or _OTHERS else imager.read_changing(block)
     if changing is None:
         columns = _read(imager, block, states, probabilities=probabilities, own=own)

@@ -101,7 +101,7 @@ class Model:
         self._run = run
         self._budget = budget
         self.stop: Callable[[], object] | None = None
-        self.spent = False
+        self.spent = self.lost = False
         self._latest: deque[FloatArray] = deque(maxlen=_SETTLED_EVALUATIONS)
         self._span = (problem.high - problem.low)[problem.free]
         self._free = problem.free
@@ -119,10 +119,17 @@ class Model:
         self._seen: dict[bytes, Point] = {}
 
     def at(self, u: FloatArray) -> Point:
-        """The simulation at `u`, made and logged once; past the budget it stops the search that uses this model."""
+        """The simulation at `u`, made and logged once; past the budget it stops the search that uses this model.
+
+        And where `u` is no number: an algorithm's own arithmetic fails on some machines, and nothing comes after it.
+        """
         # A copy, since `u` is nlopt's own buffer.
         u = np.clip(np.array(u, dtype=float), 0.0, 1.0)
         key = u.tobytes()
+        if self._seen and self.stop is not None and not np.isfinite(u).all():
+            self.stop()
+            self.lost = True
+            return next(iter(self._seen.values()))
         if key not in self._seen and len(self._run.log) >= self._budget and self.stop is not None:
             self.stop()
             self.spent = True

@@ -73,7 +73,7 @@ def search_from(
     except nlopt.RoundoffLimited:
         run.status = "roundoff_limited"
     except nlopt.ForcedStop:
-        run.status = "maxeval_reached" if model.spent else "settled"
+        run.status = "maxeval_reached" if model.spent else "roundoff_limited" if model.lost else "settled"
     except (RuntimeError, nlopt.runtime_error):  # its own class; what it carries cannot leave this process
         run.status = "failed"
     return run
@@ -200,8 +200,9 @@ def _extremes(problem: Problem, quantity: str, sign: float, u0: FloatArray, max_
     opt.set_upper_bounds([1.0] * u0.size + [1e6])
     opt.set_max_objective(objective)
     opt.add_inequality_mconstraint(conditions, np.zeros(n_rows + n_own))
+    model.stop = opt.force_stop
     opt.set_maxeval(max_evaluations)
     opt.set_xtol_rel(_X_TOLERANCE)
-    with contextlib.suppress(nlopt.RoundoffLimited, nlopt.runtime_error, RuntimeError):
+    with contextlib.suppress(nlopt.RoundoffLimited, nlopt.ForcedStop, nlopt.runtime_error, RuntimeError):
         opt.optimize([*u0, float((sign * first.values).min()) / scale])
     return seen

@@ -167,6 +167,18 @@ def test_combined_objectives_improve_on_their_starts(algorithm: str, objective: 
     assert best.objective > random.objective
 
 
+def test_a_search_ends_where_its_algorithm_asks_for_no_number() -> None:
+    """As SLSQP does where its own arithmetic fails, which depends on the machine: nothing is simulated there."""
+    run = SearchRun(0)
+    model, stopped = Model(STOPBAND, run, 10), list[bool]()
+    model.stop = lambda: stopped.append(True)
+    first = model.at(np.full(STOPBAND.free.size, 0.5))
+    assert model.at(np.array([0.5, np.nan, 0.5, 0.5])) is first
+    assert model.lost
+    assert stopped == [True]
+    assert len(run.log) == 1
+
+
 def test_dimensions_are_kept() -> None:
     limits = {"edge_width_nm": Bound(min=25.0), "band_width_nm": Bound(min=40.0)}
     problem = replace(STOPBAND, constraints={"sensitivity": Bound(min=0.8), **limits})

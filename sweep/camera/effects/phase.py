@@ -236,5 +236,7 @@ class Phase(KernelEffect):
             return load._replace(cases=cases)  # of a light that may be dark all distances are 0, and none is looked for
         deep = decades(methods.phase)
         return load._replace(
-            cases=cases, searched=cases * PER_DECADE * deep**2, search_s=SEARCH_S + SEARCH_DECADE_S * deep
+            cases=0.0 if methods.straight else cases,  # of a straight readout, the search has the lattice's places, too
+            searched=cases * PER_DECADE * deep**2,
+            search_s=SEARCH_S + SEARCH_DECADE_S * deep,
         )
