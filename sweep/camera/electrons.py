@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike
 
-from ..base.types import BoolArray, FloatArray, IndexArray
+from ..base.types import BoolArray, FloatArray
 from ..designs.block import Block, EdgeBlock, EdgeSums
 from ..designs.products import row_products
 from .exposure import exposure_times
@@ -123,7 +123,8 @@ class Electrons:
         if self._split is None:
             self.fixed = self._products(kernel.light[:, :, fixed], view.qe[None, fixed], fixed)[0]
         else:
-            self.fixed = self._of_pixels(self._split, view.qe[None, fixed], fixed)[0]
+            self.fixed = np.zeros((kernel.shape[0], len(light.signals), kernel.shape[1]))
+            self._add_pixels(self._split, view.qe[None, fixed], fixed, self.fixed[None])
         rates = [own.curves(view.qe[fixed], fixed) @ dimmed for own, dimmed in zip(seen, background, strict=True)]
         self._fixed_uniform = np.einsum("xuc,xc->xu", kernel.uniform[:, :, fixed], np.stack(rates)[self.place])
         self._modified_uniform = kernel.uniform[:, :, modified]
@@ -134,7 +135,7 @@ class Electrons:
             size = self._modified[..., 0].size * len(self.light.signals) * self.light.nodes.size
             self._kept = self._table().astype(dtype, copy=False) if 0 < size <= KEPT and not once else None
         else:
-            self._touched, self._kept = self._split.touched(modified), None
+            self._touched, self._kept = np.empty(0, dtype=np.intp), None
 
     def at_each_place(self, light: FloatArray, channels: Sequence[int]) -> FloatArray:
         """Light on some channels, ndarray[n_cases, ..., n, n_wavelengths], as their filters see it at its place."""
@@ -150,13 +151,11 @@ class Electrons:
         parts = [self._products_at(at, light[self.place == at], qe, of) for at in range(len(self.light.seen))]
         return np.concatenate(parts, axis=1)
 
-    def _of_pixels(
-        self, split: SplitLight, qe: FloatArray, of: Sequence[int], units: IndexArray | None = None
-    ) -> FloatArray:
-        """`_products` of a light in factors."""
+    def _add_pixels(self, split: SplitLight, qe: FloatArray, of: Sequence[int], found: FloatArray) -> None:
+        """Add `_products` of a light in factors to `found`."""
         spectra = self.light.looked_at(qe, of)[:, :, None] * self.light.signals
         self._work["response"] += len(qe) * split.work(len(of), len(self.light.signals))
-        return split.sums(spectra, of, units)
+        split.add_sums(spectra, of, found)
 
     def _products_at(self, place: int, light: FloatArray, qe: FloatArray, of: Sequence[int]) -> FloatArray:
         """Of the cases of one place of the field."""
@@ -190,11 +189,11 @@ class Electrons:
         `curves`: QE of the modified channels, ndarray[n_designs, n_modified, n_wavelengths].
         """
         found = np.repeat(self.fixed[None], len(curves), axis=0)
+        if self._split is not None and self.view.modified:
+            self._add_pixels(self._split, curves, self.view.modified, found)
         if not self._touched.size:
             return found
-        if self._split is not None:
-            part = self._of_pixels(self._split, curves, self.view.modified, self._touched)
-        elif self._kept is None:
+        if self._kept is None:
             part = self._products(self._modified, curves, self.view.modified)
         else:
             qe = curves[:, :, self.light.nodes].reshape(len(curves), -1).astype(self._kept.dtype)
@@ -207,9 +206,15 @@ class Electrons:
         """Expected electrons before the full well, ndarray[n_designs, n_cases x n_scales, n_signals, n_units]."""
         uniform = self._fixed_uniform + self.through_filters(self.of_background(curves))
         uniform = uniform + self.view.pixel.dark_e_per_s
-        both = self.rates(curves)[:, :, None] * scales[:, None, :, None, None] + uniform[:, :, None, None, :]
-        flat = both.reshape(len(curves), -1, *both.shape[3:])
-        return np.asarray(flat * exposure_s[:, None, None, None], dtype=float)
+        rates = self.rates(curves)
+        if scales.shape[1] > 1:
+            rates = np.repeat(rates, scales.shape[1], axis=1)
+            uniform = np.repeat(uniform, scales.shape[1], axis=1)
+        # In place: to give memory to an array of all pixels takes as long as a product.
+        rates *= np.tile(scales, (1, rates.shape[1] // scales.shape[1]))[:, :, None, None]
+        rates += uniform[:, :, None, :]
+        rates *= exposure_s[:, None, None, None]
+        return rates
 
     def of_background(self, curves: FloatArray) -> FloatArray:
         """Electrons/s of the background in the modified channels, ndarray[n, n_places, n_modified].

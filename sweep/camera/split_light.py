@@ -53,28 +53,17 @@ class SplitLight:
         by_function = seen.sum(axis=-1, keepdims=True) if self.shares is None else seen @ self.shares.T
         return np.asarray(self.values @ np.swapaxes(by_function, -1, -2), dtype=float)
 
-    def touched(self, channels: Sequence[int]) -> IndexArray:
-        """The units that look through the filter of any of these channels."""
-        lit = (self.values != 0).any(axis=1)[self.place].any(axis=1)
-        return np.flatnonzero((np.isin(self.through, list(channels)) & (self.parts[:, None] != 0) & lit).any(axis=0))
-
-    def sums(self, spectra: FloatArray, channels: Sequence[int], units: IndexArray | None = None) -> FloatArray:
-        """Sums over channels and wavelengths, ndarray[n_designs, n_cases, n_signals, n_units] (those of `units`).
+    def add_sums(self, spectra: FloatArray, channels: Sequence[int], found: FloatArray) -> None:
+        """Add sums over channels and wavelengths to `found`, ndarray[n_designs, n_cases, n_signals, n_units].
 
         `spectra`: QE times signals, ndarray[n_designs, n_channels, n_signals, n_wavelengths], of the `channels`. One
         design is computed as if there was no other.
         """
         from .compiled_split import gather  # noqa: PLC0415  (compiled: kept off the start-up path)
 
-        seen = np.ascontiguousarray(self._seen(spectra))
         row = np.full(self.n_channels, -1)
         row[list(channels)] = np.arange(len(channels))
-        place, through = self.place, row[self.through]
-        if units is not None:
-            place, through = np.ascontiguousarray(place[..., units]), np.ascontiguousarray(through[:, units])
-        found = np.zeros((len(spectra), place.shape[1], spectra.shape[2], place.shape[2]))
-        gather(seen, self.parts, place, through, found)
-        return found
+        gather(np.ascontiguousarray(self._seen(spectra)), self.parts, self.place, row[self.through], found)
 
     def folded(self, weights: FloatArray, channel: int) -> FloatArray:
         """Weighted sums over the units of what they get through one channel's filter, ndarray[n_cases, n_wavelengths].

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.types import FloatArray, IndexArray
+from ..camera.effects import phase
 from ..camera.effects.image_height import HEIGHTS
-from ..camera.effects.phase import Cases, different_places
 from ..camera.electrons import Changing
 from ..camera.field import scene_at
 from ..camera.imager import Imager, imager_of
@@ -86,12 +86,15 @@ def _over_all_places(
     exposure_s: FloatArray,
     columns: Columns,
 ) -> None:
-    """Put the extremes over all places into the columns, which hold those over the lattice."""
-    assert imager.anywhere is not None
+    """Put the extremes over all places into the columns, which hold those over the lattice.
+
+    In the darkest moment of a light that goes dark all distances are 0, there and everywhere.
+    """
     for design in np.flatnonzero(np.isfinite(exposure_s)):
         light = imager.light.light_dn(curves[design], exposure_s[design])
-        if not np.isfinite(light).all():
+        if not np.isfinite(light).all() or not light.any():
             continue
+        assert imager.anywhere is not None
         found = imager.anywhere.extremes(light)
         found = _as_read(imager, curves[design : design + 1], found)
         for pair, extremes in found.items():
@@ -105,9 +108,9 @@ def _over_all_places(
 def _by_search(imager: Imager, curves: FloatArray) -> Columns | None:
     """CSDs and exposure where a straight response is read out: the search for the worst place tells them all.
 
-    The lattice's places are nodes of its first cells. None where light or exposure are not finite.
+    The lattice's places are nodes of its first cells. In the darkest moment of a light that goes dark all distances are
+    0. None where light or exposure are not finite.
     """
-    assert imager.anywhere is not None
     exposure_s = imager.light.exposure_s(curves)
     every = [imager.light.light_dn(*design) for design in zip(curves, exposure_s.tolist(), strict=True)]
     if not all(np.isfinite(light).all() for light in every):
@@ -115,6 +118,11 @@ def _by_search(imager: Imager, curves: FloatArray) -> Columns | None:
     pairs = class_pairs(imager.view.lights.classes)
     columns = {start + csd_name(pair): np.full(len(curves), np.nan) for pair in pairs for start in ("", BEST_PLACE)}
     for design, light in enumerate(every):
+        if not light.any():
+            for values in columns.values():
+                values[design] = 0.0
+            continue
+        assert imager.anywhere is not None
         for pair, extremes in imager.anywhere.extremes(light).items():
             if extremes is not None:
                 columns[csd_name(pair)][design] = extremes.smallest
@@ -152,7 +160,7 @@ def _as_read(imager: Imager, curves: FloatArray, found: Mapping[Pair, Extremes |
     at = [case for extremes in kept.values() for case in (extremes.at_smallest, extremes.at_largest)]
     if not at:
         return dict(found)
-    cases, which = different_places(imager.view, Cases(*np.moveaxis(np.array(at), 1, 0)))
+    cases, which = phase.different_places(imager.view, phase.Cases(*np.moveaxis(np.array(at), 1, 0)))
     there = Imager(imager.view, imager.work, cases=cases, once=True)
     every = separations(there.read(curves)[0][0], imager.view.members)
     moments = {pair: distances.reshape(len(cases.places_px), -1)[which] for pair, distances in every.items()}
@@ -182,7 +190,8 @@ def evaluate(
     cells than `places` allows, or `sensor_places`.
     """
     block = _block(designs)
-    if imager.anywhere is not None and imager.view.methods.straight and not (states or own or _OTHERS):
+    anywhere = phase.all_count(imager.view, imager.view.methods)
+    if anywhere and imager.view.methods.straight and not (states or own or _OTHERS):
         found = _by_search(imager, block.curves())
         if found is not None:
             return found | designed_quantities(imager.view, block)
@@ -197,7 +206,7 @@ def evaluate(
         columns = {name: np.empty(len(block)) for name in along}
         for name, values in columns.items():
             values[changing.which], values[~changing.which] = along[name], rest[name]
-    if imager.anywhere is not None:
+    if anywhere:
         _over_all_places(imager, block.curves(), columns[EXPOSURE], columns)
     if EFFECTS[HEIGHTS].all_count(imager.view, imager.view.methods):
         _over_all_heights(imager, block.curves(), columns[EXPOSURE], columns)
