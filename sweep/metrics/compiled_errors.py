@@ -12,6 +12,8 @@ from .compiled import RARE
 
 _MOST_NATS = 100.0
 """Logarithms of a likelihood ratio beyond this are taken to say nothing, which bounds the error from above."""
+_COARSE = 4
+"""Steps of these logarithms that are taken together, to find out whether two signals need a closer look."""
 
 
 @njit(cache=True, nogil=True)
@@ -48,7 +50,7 @@ def _common(firsts: IndexArray, starts: IndexArray, one: int, other: int) -> tup
 
 @njit(cache=True, nogil=True)
 def _ratios(
-    firsts: IndexArray, starts: IndexArray, roots: FloatArray, one: int, other: int, step: float
+    firsts: IndexArray, starts: IndexArray, roots: FloatArray, logs: FloatArray, one: int, other: int, step: float
 ) -> tuple[int, FloatArray]:
     """Overlap of one channel by the logarithm of the likelihood ratio, in steps: the first step, shares from it on."""
     i, j, n = _common(firsts, starts, one, other)
@@ -58,7 +60,7 @@ def _ratios(
     for k in range(n):
         p, q = roots[i + k], roots[j + k]
         if p > 0 and q > 0:
-            at = round(min(max(2 * math.log(p / q) / step, -most), most)) + most
+            at = round(min(max(2 * (logs[i + k] - logs[j + k]) / step, -most), most)) + most
             found[at] += p * q
             begin, end = min(begin, at), max(end, at)
     if end < begin:
@@ -79,17 +81,25 @@ def _sum_of_few(one: FloatArray, other: FloatArray) -> FloatArray:
 
 @njit(cache=True, nogil=True)
 def _least_error(
-    firsts: IndexArray, starts: IndexArray, roots: FloatArray, rows: IndexArray, a: int, b: int, step: float
+    firsts: IndexArray,
+    starts: IndexArray,
+    roots: FloatArray,
+    logs: FloatArray,
+    rows: IndexArray,
+    a: int,
+    b: int,
+    step: float,
 ) -> float:
     """Error of the most likely of two equally frequent signals.
 
     Half the sum of min(p, q), that is of sqrt(p q) exp(-|ln(p / q)| / 2); the logarithms of independent channels add.
+    Each is off by half a step at most, so that the error is exact within exp(n_channels step / 4).
     """
     # Two halves of the channels, so that their sum over both need not be written out.
     first, one, other = 0, np.ones(1), np.ones(1)
     for c in range(rows.shape[0]):
         if rows[c, a] != rows[c, b]:
-            own_first, own = _ratios(firsts, starts, roots, rows[c, a], rows[c, b], step)
+            own_first, own = _ratios(firsts, starts, roots, logs, rows[c, a], rows[c, b], step)
             first += own_first
             if one.size <= other.size:
                 one = _sum_of_few(one, own)
@@ -122,18 +132,21 @@ def largest_error(
     firsts: IndexArray,
     starts: IndexArray,
     roots: FloatArray,
+    logs: FloatArray,
     rows: IndexArray,
     step: float,
 ) -> float:
     """Largest error of two signals over the pairs of two types: those whose overlap leaves room for it, largest first.
 
-    `overlap`, `firsts`, `starts`, `roots`, `rows`: as in `overlaps`; `first`, `second`: signals of each type.
+    And whose error by larger steps leaves room, too, by as much as either may be off. `overlap`, `firsts`, `starts`,
+    `roots`, `rows`: as in `overlaps`; `logs`: of the roots; `first`, `second`: signals of each type.
     """
     bound = np.empty(first.size * second.size)
     for a in range(first.size):
         for b in range(second.size):
             bound[a * second.size + b] = overlap[first[a], second[b]]
-    found = 0.0
+    found, looked_at = 0.0, np.zeros(bound.size, dtype=np.bool_)
+    off = math.exp((_COARSE + 1) * len(rows) * step / 4)
     while bound.size:  # few are looked at, so that sorting them all is not worth it
         at = 0
         for k in range(bound.size):
@@ -142,7 +155,11 @@ def largest_error(
         if not 0.5 * bound[at] > found:
             break
         a, b = first[at // second.size], second[at % second.size]
-        found = max(found, _least_error(firsts, starts, roots, rows, a, b, step))
+        if not looked_at[at]:
+            about = _least_error(firsts, starts, roots, logs, rows, a, b, _COARSE * step)
+            bound[at], looked_at[at] = min(bound[at], 2 * off * about), True
+            continue
+        found = max(found, _least_error(firsts, starts, roots, logs, rows, a, b, step))
         bound[at] = 0.0
     return found
 

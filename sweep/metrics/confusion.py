@@ -138,6 +138,8 @@ def errors(
         block = electrons[start : start + max(1, _AT_ONCE // n_signals)]
         numbers = _Numbers.joined([_numbers(block[..., own], pixel) for own in channels])
         parts = numbers.firsts, numbers.starts, numbers.roots
+        with np.errstate(divide="ignore"):
+            logs = np.log(numbers.roots)
         for d in range(len(block)):
             rows = np.ascontiguousarray(numbers.rows[:, d])
             overlap = kernels.overlaps(*parts, rows)
@@ -149,7 +151,7 @@ def errors(
                     sums[signals] += both.sum(axis=axis)
                 worst = max(both.sum(axis=1).max(), both.sum(axis=0).max())
                 bounds[pair][start + d] = min(worst + FLOOR, 1.0)
-                error = kernels.largest_error(overlap, one, other, *parts, rows, step)
+                error = kernels.largest_error(overlap, one, other, *parts, logs, rows, step)
                 found[pair][start + d] = min(error + FLOOR, 0.5)
             state[start + d] = min(sums.max() + FLOOR, 1.0)
     for values in (*found.values(), *bounds.values(), state):
