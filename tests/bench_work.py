@@ -162,8 +162,8 @@ def of_lattices() -> Iterator[tuple[str, float, float]]:
         one, every = (replace(made, methods=replace(REFERENCE, phase=name)) for name in ("one", "quarter pixel"))
         across = 2 * sampling.radii_px(made, made.scenario.target)[1] + 1  # type: ignore[arg-type]
         values = (phase.n_places(every, "quarter pixel") - 1) * across**2 * len(made.mosaic.channels) * GRID.size
-        more_s = shortest_s(partial(Imager, every), cold=True) - shortest_s(partial(Imager, one), cold=True)
-        yield f"a pixel of a place, through a filter, {distance_m:g} m", sampling.PIXEL_S, more_s / values
+        every_s, one_s = (shortest_s(lambda made=own: Imager(made).electrons, cold=True) for own in (every, one))
+        yield f"a pixel of a place, through a filter, {distance_m:g} m", sampling.PIXEL_S, (every_s - one_s) / values
 
 
 def of_searches() -> Iterator[tuple[str, float, float]]:
@@ -187,7 +187,7 @@ def of_searches() -> Iterator[tuple[str, float, float]]:
             new.append(counted["places"])
             at = f"{method}, {distance_m:g} m"
             ratio = new[-1] / len(phase.places_px(made, method))
-            yield f"places per place of the lattice, {at}", phase.PER_DECADE * deep**2, ratio
+            yield f"places per place of the lattice, {at}", phase.AT_ALL + phase.PER_DECADE * deep**2, ratio
             yield f"a design, {at}", phase.SEARCH_S + phase.SEARCH_DECADE_S * deep, again_s
         place_s = (new_s[-1] - new_s[0]) / (new[-1] - new[0])
         yield f"a place, {distance_m:g} m", sampling.PLACE_S + sampling.PLACE_PIXEL_S * around, place_s

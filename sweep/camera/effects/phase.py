@@ -30,10 +30,10 @@ MOST = 1024
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
 NODES = np.array([[x, y] for y in (-1.0, 0.0, 1.0) for x in (-1.0, 0.0, 1.0)])
 """A cell's corners and its nodes from its center (column, row), in units of its half width."""
-PER_DECADE = 0.3
-"""Places of a search, in those of the lattice, for the square of its limit's decades below 100 DN, about."""
-SEARCH_S, SEARCH_DECADE_S = 0.007, 0.002
-"""Seconds that a search takes for each design, at all and for each decade; `tests/bench_work.py` measures all three."""
+AT_ALL, PER_DECADE = 0.8, 0.3
+"""Places of a search, in those of the lattice: at all, and for the square of its limit's decades below 100 DN, about."""
+SEARCH_S, SEARCH_DECADE_S = 0.009, 0.0025
+"""Seconds that a search takes for each design, at all and for each decade; `tests/bench_work.py` measures all four."""
 PER_PIXEL = 4
 """Places per pixel, along a row and a column, of the finest lattice."""
 _PER_PIXEL = {"one": 0, "pixel": 1, "half pixel": 2, "quarter pixel": PER_PIXEL} | dict.fromkeys(_WITHIN_DN, PER_PIXEL)
@@ -237,6 +237,6 @@ class Phase(KernelEffect):
         deep = decades(methods.phase)
         return load._replace(
             cases=0.0 if methods.straight else cases,  # of a straight readout, the search has the lattice's places, too
-            searched=cases * PER_DECADE * deep**2,
+            searched=cases * (AT_ALL + PER_DECADE * deep**2),
             search_s=SEARCH_S + SEARCH_DECADE_S * deep,
         )

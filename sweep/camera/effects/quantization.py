@@ -13,7 +13,7 @@ from ..pixel import Pixel
 from ..shot import Shot
 from .base import NEXT_TO_NOTHING_DN, Chosen, Load, ReadoutEffect
 
-ROUNDED_S = 2.2e-9
+ROUNDED_S = 1.2e-9
 """Seconds of rounding a value; `tests/bench_work.py` measures them."""
 _CURVATURE = 4 * math.e
 """Second derivative of a Poisson mean in the root of the electrons, at most, for values between -1 and 1.

@@ -16,9 +16,9 @@ from ..shot import Shot
 from .base import Chosen, KernelEffect, Load, Part, Stage
 from .blur import Profile
 
-PIXEL_S = 5e-10
+PIXEL_S = 3.5e-10
 """Seconds of a pixel at a place of the light, through a channel's filter, at a wavelength."""
-SEARCHED_S, SEARCHED_PIXEL_S, PLACE_S, PLACE_PIXEL_S = 0.04, 2.4e-6, 6e-5, 4e-9
+SEARCHED_S, SEARCHED_PIXEL_S, PLACE_S, PLACE_PIXEL_S = 0.02, 2.4e-6, 4e-5, 4e-9
 """Seconds that a search for the worst of all places takes: to begin with, at all and for each pixel around the light
 and function of its image, and the same for each place; `tests/bench_work.py` measures all of these."""
 AROUND_PX, MOST_FUNCTIONS = 6.0, 32

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from ..effects.base import MULTIPLICATION_S, Effect, Load
 from ..effects.noise import in_closed_form
+from ..effects.sampling import MOST_FUNCTIONS
 from ..electrons import KEPT
 from ..methods import Methods
 from ..registry import EFFECTS
@@ -18,14 +19,14 @@ from ..view import View
 
 BOX_S, TABLED_S, FOLDED_S = 2.5e-3, 3e-9, 1.4e-8
 """Seconds: of the imager of a CFA, and of a value of its table at a wavelength, on the grid and between fewer nodes."""
-ROW_S, UNROUNDED_S = 1e-6, 5e-9
+ROW_S, UNROUNDED_S = 1e-6, 3.5e-9
 """Seconds: of a design's other columns and its row, and what a light's value in a design by its edges takes more if it
 is not rounded: whole numbers are read and compared in one pass. `tests/bench_work.py` measures them."""
-REACH_S, READOUT_S, QUICK_S, LINEAR_S, COMPARED_S, KERNEL_S = 6.5e-4, 8e-4, 5e-4, 7e-4, 5e-9, 4e-3
+REACH_S, READOUT_S, QUICK_S, LINEAR_S, COMPARED_S, KERNEL_S = 4e-4, 8e-4, 5e-4, 7e-4, 5e-9, 4e-3
 """Seconds of a planner: for the reach of a box, a bound of the readout, one of the optics without kernels and with
 them, each value that it compares, and a kernel of a light at a distance; `tests/bench_work.py` measures what they come
 to."""
-NOISE_S, UNEVEN_NOISE_S = 0.03, 0.06
+NOISE_S, UNEVEN_NOISE_S = 0.045, 0.06
 """Seconds of the first bounds of a noisy readout, without PRNU and with it; `tests/bench_work.py` measures them."""
 LEAST_LOOK_S = 2 * REACH_S
 """Seconds for each CFA, with which hardly anything can be found."""
@@ -83,9 +84,11 @@ def estimated_work(view: View, methods: Methods) -> Work:
         load = effect.work(view, methods, load)
     changed = load.units * len(view.modified) / channels
     lights = load.cases * signals
-    products = lights * load.units * channels * view.grid.size * MULTIPLICATION_S
-    table, tabled_s = lights * changed * load.nodes, 0.0
-    if 0 < table <= KEPT:
+    # Pixels see the light in few functions, and the fixed ones are counted with what reads them (`sampling`).
+    apart = load.units > channels
+    products = 0.0 if apart else lights * load.units * channels * view.grid.size * MULTIPLICATION_S
+    table, tabled_s = lights * changed * (min(load.knots, MOST_FUNCTIONS) if apart else load.nodes), 0.0
+    if 0 < table <= KEPT and not apart:
         tabled_s = lights * changed * view.grid.size * (TABLED_S if load.nodes == view.grid.size else FOLDED_S)
     values = load.scales * lights
     always_s = values * (channels * signals / 2 * MULTIPLICATION_S) + load.search_s + ROW_S
