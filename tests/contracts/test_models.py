@@ -96,6 +96,30 @@ def test_non_dominated_is_the_definition(seed: int, n: int) -> None:
     assert list(non_dominated(values)) == brute
 
 
+@pytest.mark.parametrize("scale", [1.0, 1e-310, 5e306])
+@pytest.mark.parametrize("kind", ["continuous", "ties", "one value", "line"])
+def test_non_dominated_of_many_rows_is_what_a_sweep_over_them_finds(kind: str, scale: float) -> None:
+    """From the largest first objective on, a row is on the front where it has the most of the second so far."""
+    rng = np.random.default_rng(4)
+    values = rng.normal(size=(20_000, 2))
+    if kind == "ties":
+        values = np.rint(8 * values)
+    elif kind == "one value":
+        values[:, 0] = 3.0
+    elif kind == "line":
+        values[:, 1] = -values[:, 0]
+    values *= scale
+    most: dict[float, float] = {}
+    for first, second in values.tolist():
+        most[first] = max(second, most.get(first, -math.inf))
+    front, best = set(), -math.inf
+    for first in sorted(most, reverse=True):
+        if most[first] > best:
+            best = most[first]
+            front.add((first, best))
+    assert non_dominated(values).tolist() == [tuple(row) in front for row in values.tolist()]
+
+
 def test_irradiance_is_the_camera_equation() -> None:
     assert irradiance_factor(Optics(f_number=4)) == pytest.approx(math.pi / 65, rel=1e-15)
     assert irradiance_factor(Optics(f_number=4), magnification=-1) == pytest.approx(math.pi / 257, rel=1e-15)
