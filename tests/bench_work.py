@@ -187,7 +187,11 @@ def of_searches() -> Iterator[tuple[str, float, float]]:
             new.append(counted["places"])
             at = f"{method}, {distance_m:g} m"
             ratio = new[-1] / len(phase.places_px(made, method))
-            yield f"places per place of the lattice, {at}", phase.AT_ALL + phase.PER_DECADE * deep**2, ratio
+            yield (
+                f"places per place of the lattice, {at}",
+                sampling.searched_places(phase.AT_ALL + phase.PER_DECADE * deep**2, across),
+                ratio,
+            )
             yield f"a design, {at}", phase.SEARCH_S + phase.SEARCH_DECADE_S * deep, again_s
         place_s = (new_s[-1] - new_s[0]) / (new[-1] - new[0])
         yield f"a place, {distance_m:g} m", sampling.PLACE_S + sampling.PLACE_PIXEL_S * around, place_s

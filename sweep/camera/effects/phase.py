@@ -30,8 +30,9 @@ MOST = 1024
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
 NODES = np.array([[x, y] for y in (-1.0, 0.0, 1.0) for x in (-1.0, 0.0, 1.0)])
 """A cell's corners and its nodes from its center (column, row), in units of its half width."""
-AT_ALL, PER_DECADE = 0.8, 0.3
-"""Places of a search, in those of the lattice, about: at all, and for its limit's decades below 100 DN, squared."""
+AT_ALL, PER_DECADE = 0.2, 0.3
+"""Places of a search, in those of the lattice, about: at all, and for its limit's decades below 100 DN, squared; see
+`sampling.searched_places`."""
 SEARCH_S, SEARCH_DECADE_S = 0.009, 0.0025
 """Seconds that a search takes for each design, at all and for each decade; `tests/bench_work.py` measures all four."""
 PER_PIXEL = 4

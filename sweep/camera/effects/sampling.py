@@ -21,6 +21,8 @@ PIXEL_S = 3.5e-10
 SEARCHED_S, SEARCHED_PIXEL_S, PLACE_S, PLACE_PIXEL_S = 0.02, 2.4e-6, 4e-5, 4e-9
 """Seconds that a search for the worst of all places takes: to begin with, at all and for each pixel around the light
 and function of its image, and the same for each place; `tests/bench_work.py` measures all of these."""
+_LARGE_LIGHT, _SMALL_LIGHT = 0.8, 3.0
+"""Of the places of a search, how many a large light needs, and how many more one that is a pixel wide."""
 AROUND_PX, MOST_FUNCTIONS = 6.0, 32
 """How many more pixels a search looks at than are read, across, and of how many functions an image is a sum, about."""
 _AT_ONCE = 200
@@ -184,6 +186,11 @@ def _made_means(apart: FloatArray, half: float, profile: Profile, pitch_um: floa
     return values
 
 
+def searched_places(of_any: float, across_px: float) -> float:
+    """About how many places a search looks at, of a light of a size; `of_any`: whatever its size (`phase.AT_ALL`)."""
+    return of_any * (_LARGE_LIGHT + _SMALL_LIGHT / across_px)
+
+
 class Sampling(KernelEffect):
     """Pixels, one by one, in place of the mean over the whole readout."""
 
@@ -213,7 +220,7 @@ class Sampling(KernelEffect):
         shared_s, own_s = load.shared_s, PIXEL_S * load.cases * pixels * len(shot.mosaic.channels) * apart
         if load.searched:
             around = (across + AROUND_PX) ** 2 * min(load.knots, MOST_FUNCTIONS)
-            places_s = load.searched * (PLACE_S + PLACE_PIXEL_S * around)
+            places_s = searched_places(load.searched, across) * (PLACE_S + PLACE_PIXEL_S * around)
             own_s += SEARCHED_S + SEARCHED_PIXEL_S * around + places_s / 2
             shared_s += places_s / 2  # CFAs whose tiles are alike look at about half of their places together
         units = load.units if methods.straight else pixels
