@@ -112,12 +112,14 @@ def _by_search(imager: Imager, curves: FloatArray) -> Columns | None:
     0. None where light or exposure are not finite.
     """
     exposure_s = imager.light.exposure_s(curves)
-    every = [imager.light.light_dn(*design) for design in zip(curves, exposure_s.tolist(), strict=True)]
-    if not all(np.isfinite(light).all() for light in every):
+    if not np.isfinite(exposure_s).all():
         return None
     pairs = class_pairs(imager.view.lights.classes)
     columns = {start + csd_name(pair): np.full(len(curves), np.nan) for pair in pairs for start in ("", BEST_PLACE)}
-    for design, light in enumerate(every):
+    for design, time_s in enumerate(exposure_s.tolist()):
+        light = imager.light.light_dn(curves[design], time_s)
+        if not np.isfinite(light).all():
+            return None
         if not light.any():
             for values in columns.values():
                 values[design] = 0.0
