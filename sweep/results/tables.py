@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -115,6 +116,11 @@ def refused_by_disk(path: Path) -> Iterator[None]:
         raise OutputError(Fault(f"cannot be written: {error.strerror or error}", str(path))) from None
 
 
+def _sync(path: Path) -> None:
+    with path.open("rb") as handle:
+        os.fsync(handle.fileno())
+
+
 @contextmanager
 def hidden_beside(path: Path, seal: Seal = unsealed) -> Iterator[Path]:
     """Give a hidden name beside `path`; on success it is synced and takes the name of `path`, else it is removed.
@@ -128,9 +134,13 @@ def hidden_beside(path: Path, seal: Seal = unsealed) -> Iterator[Path]:
         hidden.unlink(missing_ok=True)
         hidden.touch(exist_ok=False)  # a new file, not what a link of this name leads to
         yield hidden
-        with hidden.open("rb") as handle:
-            os.fsync(handle.fileno())
-        seal(hidden)
+        if seal is unsealed:
+            _sync(hidden)
+        else:
+            with ThreadPoolExecutor(1) as aside:  # to read a large file takes about as long as to sync it
+                synced = aside.submit(_sync, hidden)
+                seal(hidden)
+                synced.result()
         hidden.replace(path)
     finally:
         with suppress(OSError):  # where it could not be made, for example below a file

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property, partial
@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ..base.errors import BrokenProofError
-from ..base.types import Progress
+from ..base.types import IndexArray, Progress
 from ..metrics.bound import FEASIBLE
 from ..metrics.pareto import hypervolume
 from ..results.facts import Provenance
@@ -26,6 +26,7 @@ from ..results.names import TABLES
 from ..results.tables import (
     FRONT,
     LEFT_OUT,
+    LIMITED_BY,
     PRICE,
     PROVENANCE,
     RESOLVED,
@@ -203,7 +204,9 @@ class Making:
         rows, on_front = self.gathered.frame(), self.gathered.front_frame()
         looking, known = Looking.of(self.study, names), self.sweep.looks
         looks = looks_of(self.study, looking, rows, on_front, known, self.crew, self.progress)
-        points = partial(swept_points, self.inventory.path(RESULTS))
+        points: Callable[[], IndexArray] = partial(swept_points, self.inventory.path(RESULTS))
+        if LIMITED_BY in names:
+            points = self._aside.submit(points).result  # read while others are looked at
         shown = Shown(self.study, rows, on_front, looks, points, self._limit, self.crew, self._kept, self.progress)
         for name, table in ROW_TABLES.items():
             if name in names:
