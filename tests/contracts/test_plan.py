@@ -14,6 +14,7 @@ import pytest
 
 from sweep.base.errors import SweepError
 from sweep.camera.effects.base import Stage
+from sweep.camera.forget import forget_scenes
 from sweep.camera.imager import Imager
 from sweep.camera.methods import REFERENCE, Methods
 from sweep.camera.plan.plan import Plan
@@ -263,6 +264,7 @@ def test_a_tighter_tolerance_costs_more_and_is_kept() -> None:
 
     def run(plans: dict[str, Plan]) -> tuple[np.ndarray, int]:
         planned, found, work = replace(study, plans=plans), [], 0
+        forget_scenes()
         for name in names:
             for space in spaces:
                 imager = Imager(planned.view(space, name))
