@@ -36,8 +36,9 @@ def _counts(electrons: float, prnu: float, most: int) -> tuple[int, FloatArray]:
         z = _TAIL * i / half
         begin, end = poisson_shares(max(electrons * (1 + prnu * z), 0.0), start, RARE, own)
         weight = math.exp(-z * z / 2) / own[begin:end].sum()
-        for k in range(begin, end):
-            shares[k] += weight * own[k]
+        some, here = shares[begin:end], own[begin:end]
+        for k in range(here.size):
+            some[k] += weight * here[k]
     return start, shares / shares.sum()
 
 
@@ -112,8 +113,9 @@ def pixel_numbers(
         left = weight - right
         begin = cell - reach - low
         if begin >= 0 and begin + 2 * reach + low <= high:  # no end of the range is near
+            some, before, behind = found[begin:], table[p], table[p + 1]
             for i in range(2 * reach + 1):
-                found[begin + i] += left * table[p, i] + right * table[p + 1, i]
+                some[i] += left * before[i] + right * behind[i]
             continue
         for i in range(2 * reach + 1):
             b = min(max(begin + i, 0), high - low)
@@ -127,8 +129,9 @@ def _sum_of(one: FloatArray, other: FloatArray) -> FloatArray:
     found = np.zeros(one.size + other.size - 1)
     for i in range(one.size):
         if one[i] > RARE:
+            share, some = one[i], found[i:]
             for j in range(other.size):
-                found[i + j] += one[i] * other[j]
+                some[j] += share * other[j]
     return found
 
 
