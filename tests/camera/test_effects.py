@@ -199,6 +199,16 @@ def test_demosaicking_a_bayer_tile_is_bilinear() -> None:
     assert weights.sum() == pytest.approx(3.0)
 
 
+def test_the_nearest_pixels_of_four_channels_weigh_to_the_last_bit_as_a_tent_does() -> None:
+    """So that plans see two equal kernels, and promise that nothing changes."""
+    places = np.random.default_rng(4).uniform(0, 1, (200, 2))
+    seen = sampling.window(TILES["RYNCy"], places, 3.0)
+    tent, nearest = (
+        demosaic.center_weights(seen, np.rint(places) - places, method, TILES["RYNCy"]) for method in ("tent", "skip")
+    )
+    assert (tent == nearest).all()
+
+
 def test_crosstalk_by_hand() -> None:
     rng = np.random.default_rng(2)
     light = rng.uniform(size=(1, 4, 5))

@@ -19,7 +19,8 @@ def center_weights(seen: Window, home: FloatArray, method: str, mosaic: Mosaic) 
     (1 - |dx| / columns)(1 - |dy| / rows), which for a Bayer tile is bilinear interpolation. `skip`: the nearest pixel
     of each channel, the mean where several are equally near.
     """
-    dx, dy = (a - home[:, axis, None, None] for axis, a in enumerate((seen.dx, seen.dy)))
+    # From pixel to pixel: whole numbers, so that methods which weigh alike do so to the last bit.
+    dx, dy = (np.rint(a - home[:, axis, None, None]) for axis, a in enumerate((seen.dx, seen.dy)))
     rows, columns = mosaic.indices.shape
     weights = np.maximum(0.0, 1 - np.abs(dx) / columns) * np.maximum(0.0, 1 - np.abs(dy) / rows)
     if method == "skip":
