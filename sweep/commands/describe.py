@@ -22,7 +22,7 @@ from ..curves.light_unit import LightUnit
 from ..curves.mending import mended
 from ..curves.signal_color import LightColor
 from ..report.figures import rendered
-from ..results.tables import write_bytes, write_text
+from ..results.atomic import write_bytes, write_text
 from .describe_picture import draw
 
 _MOST_NAMES = 12

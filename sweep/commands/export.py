@@ -14,9 +14,9 @@ from ..base.types import FloatArray
 from ..camera.mosaic import Mosaic
 from ..curves.isetcam import color_hints, csv_text, filter_names, isetcam_mat, unique_names
 from ..report import Output, check_kept, read_output, study_of
+from ..results.atomic import write_bytes
 from ..results.chosen import find_row
 from ..results.designs import row_curves
-from ..results.tables import write_bytes
 from ..study import Study, folder_name
 from .export_also import other_files
 from .options import Also

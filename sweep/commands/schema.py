@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 from ..base.errors import Fault, OutputError
-from ..results.tables import write_text
+from ..results.atomic import write_text
 from ..study.editors import TITLE, schema_text
 from ..study.schema import StudySection
 

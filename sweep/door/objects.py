@@ -133,7 +133,7 @@ class LoadedStudy:
         rows = []
         for name in scenarios:
             for space in spaces:
-                found = block_of(space, 0, space.size, study.view(space, name), request)
+                found = block_of(space, 0, space.points(0, space.size), study.view(space, name), request)
                 for text in found.faults.values():
                     raise SweepError(Fault(f"{space.name} in {name}: {text}"))
                 own = space.violation(space.points(0, space.size))

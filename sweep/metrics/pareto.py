@@ -43,7 +43,7 @@ def non_dominated(values: FloatArray, eligible: BoolArray | None = None) -> Bool
     """
     import moocore  # noqa: PLC0415  (pulls in pandas: kept off the start-up path)
 
-    keep = np.isfinite(values).all(axis=1)
+    keep = np.logical_and.reduce([np.isfinite(column) for column in values.T])
     if eligible is not None:
         keep &= eligible
     front = np.zeros(len(values), dtype=bool)

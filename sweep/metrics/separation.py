@@ -248,5 +248,6 @@ def cfa_sensitivity(total_qe: FloatArray, counts: IndexArray, clear_qe: FloatArr
     `total_qe`: ndarray[..., n_channels], QE summed over the wavelengths; `counts`: pixels per tile of each channel. 1
     means a sensor without color filters. Returns ndarray[...].
     """
-    mean = (total_qe * counts).sum(axis=-1) / counts.sum()
+    weighted = np.moveaxis(total_qe * counts, -1, 0)
+    mean = sum(weighted[1:], start=weighted[0]) / counts.sum()  # few channels of many designs
     return np.asarray(mean / clear_qe.sum(dtype=float), dtype=float)

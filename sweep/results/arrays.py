@@ -5,6 +5,7 @@ PyArrow's own conversions load pandas, for which workers have no other use.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -55,9 +56,23 @@ def values_of(column: pa.Array | pa.ChunkedArray) -> NDArray[Any]:
     return np.concatenate([np.zeros(0, column.type.to_pandas_dtype()), *(_values(chunk) for chunk in chunks)])
 
 
-def which(column: pa.DictionaryArray) -> IndexArray:
-    """The place of each word in the column's dictionary, ndarray[n]; -1 for null."""
-    return np.where(_there(column.indices), _raw(column.indices), -1)
+def texts_of(column: pa.ChunkedArray) -> list[str]:
+    """The words of a dictionary-encoded column, none of which is null."""
+    found: list[str] = []
+    for chunk in column.chunks:
+        words = chunk.dictionary.to_pylist()
+        found += [words[at] for at in _raw(chunk.indices).tolist()]
+    return found
+
+
+def holds_one_of(column: pa.DictionaryArray, words: Collection[str]) -> BoolArray:
+    """Where a column holds one of some words, ndarray[n]."""
+    at = [index for index, word in enumerate(column.dictionary.to_pylist()) if word in words]
+    if len(at) == len(column.dictionary):
+        return _there(column.indices)
+    if not at:
+        return np.zeros(len(column), dtype=bool)
+    return np.isin(np.where(_there(column.indices), _raw(column.indices), -1), at)
 
 
 def _values(chunk: pa.Array) -> NDArray[Any]:

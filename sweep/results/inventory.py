@@ -20,8 +20,9 @@ import pyarrow as pa
 
 from ..base.disk import MOST_FACTS, Digest, digest_of, is_link, is_real_folder, parsed_facts, read_plain
 from ..base.errors import Fault, OutputError
+from .atomic import Seal, write_bytes
 from .names import FIGURES, RUN, SUMS, is_drawn, is_own
-from .tables import AUDIT, Seal, json_of, write_bytes, write_table
+from .tables import AUDIT, json_of, write_table
 
 _SUM = re.compile(r"([0-9a-f]{64})  (\S+)")
 _FINGERPRINT = re.compile(r"# run ([0-9a-f]{64})\b")
@@ -133,9 +134,9 @@ class Inventory:
     def seal(self, name: str) -> Seal:
         """What lists a file that is written to its end, before it takes its name; errors as for `write`."""
 
-        def list_it(hidden: Path) -> None:
+        def list_it(hidden: Path, digest: Digest | None = None) -> None:
             self._free(name)
-            self.files[name] = digest_of(hidden)
+            self.files[name] = digest_of(hidden) if digest is None else digest
             self.save()
 
         return list_it

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
@@ -12,9 +13,11 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from ..base.disk import Digest
 from ..base.types import BoolArray, IndexArray
+from .atomic import Seal, hidden_beside, refused_by_disk, unsealed
 from .footer import LIST, MAGIC, STRUCT, Struct, footer_bytes, footer_of, integer, integer_of, struct_bytes
-from .tables import ROW_GROUP, Seal, encoded, hidden_beside, refused_by_disk, release_memory, unsealed
+from .tables import ROW_GROUP, encoded, release_memory
 
 _AS_THEY_ARE = ROW_GROUP // 4
 """Rows from which on a part becomes a row group of its own; smaller ones are put together, and encoded again."""
@@ -60,12 +63,17 @@ def joining(late: Late, schema: pa.Schema, path: Path, seal: Seal = unsealed) ->
 
     Raises OutputError when the disk refuses. What the block raises is raised as it is, and no file is left.
     """
+    written = _Written()
+
+    def sealed(hidden: Path, _: Digest | None = None) -> None:
+        seal(hidden, written.digest())
+
     with ExitStack() as stack:
         with refused_by_disk(path):
-            hidden = stack.enter_context(hidden_beside(path, seal))
+            hidden = stack.enter_context(hidden_beside(path, sealed))
             sink = hidden.open("wb")
             stack.callback(_given_up, sink)
-            whole = Joining(path, sink, schema, late)
+            whole = Joining(path, sink, written, schema, late)
         yield whole
         with refused_by_disk(path):
             whole.finish()
@@ -77,6 +85,20 @@ def _given_up(sink: BinaryIO) -> None:
     """What is not written yet of a file that is removed is of no use."""
     with suppress(OSError):
         sink.close()
+
+
+class _Written:
+    """Bytes that were written one after the other: how many, and their digest, for which they need not be read."""
+
+    def __init__(self) -> None:
+        self.size, self._sha256 = 0, hashlib.sha256()
+
+    def add(self, content: bytes | memoryview) -> None:
+        self.size += len(content)
+        self._sha256.update(content)
+
+    def digest(self) -> Digest:
+        return Digest(self._sha256.hexdigest(), self.size)
 
 
 @dataclass
@@ -105,6 +127,7 @@ class Joining:
 
     path: Path
     _sink: BinaryIO
+    _written: _Written
     _schema: pa.Schema
     _late: Late
     _groups: list[_Group] = field(default_factory=list)
@@ -112,7 +135,7 @@ class Joining:
     _small_rows: int = 0
 
     def __post_init__(self) -> None:
-        self._sink.write(MAGIC)
+        self._write(MAGIC)
 
     @property
     def needs(self) -> Sequence[str]:
@@ -134,15 +157,27 @@ class Joining:
     def finish(self) -> None:
         """Write the late column, and where everything is; raises OSError."""
         self._write_small()
-        for group in self._groups:
-            flags = np.zeros(group.rows, dtype=bool)
-            flags[group.at] = self._late.of(group.few)
-            content = encoded(pa.table([pa.array(flags)], schema=pa.schema([self._schema.field(self._late.name)])))
-            (late,) = _only_group_of(content)[_COLUMNS][1][1]
-            group.chunks = [self._copied(group, late, content) if each is None else each for each in group.chunks]
+        self._write_late()
         footer, _ = footer_of(encoded(self._schema.empty_table()))
         rows, groups = integer(sum(group.rows for group in self._groups)), list(map(_group_bytes, self._groups))
-        self._sink.write(footer_bytes(footer | {_ROWS: rows, _GROUPS: (footer[_GROUPS][0], (STRUCT, groups))}))
+        self._write(footer_bytes(footer | {_ROWS: rows, _GROUPS: (footer[_GROUPS][0], (STRUCT, groups))}))
+
+    def _write(self, content: bytes | memoryview) -> None:
+        self._sink.write(content)
+        self._written.add(content)
+
+    def _write_late(self) -> None:
+        if not self._groups:
+            return
+        schema, flags = pa.schema([self._schema.field(self._late.name)]), []
+        for group in self._groups:
+            own = np.zeros(group.rows, dtype=bool)
+            own[group.at] = self._late.of(group.few)
+            flags.append(pa.table([pa.array(own)], schema=schema))
+        content = encoded(*flags)
+        for group, late in zip(self._groups, _groups_of(content), strict=True):
+            (chunk,) = late[_COLUMNS][1][1]
+            group.chunks = [self._copied(group, chunk, content) if each is None else each for each in group.chunks]
 
     def _write_small(self) -> None:
         parts, self._small, self._small_rows = self._small, [], 0
@@ -157,8 +192,9 @@ class Joining:
         release_memory()
 
     def _append(self, part: RowsPart) -> None:
-        made = _Group(part.rows, self._sink.tell(), part.few.select(self._late.needs), part.at)
-        for chunk in _only_group_of(part.content)[_COLUMNS][1][1]:
+        made = _Group(part.rows, self._written.size, part.few.select(self._late.needs), part.at)
+        (whole,) = _groups_of(part.content)
+        for chunk in whole[_COLUMNS][1][1]:
             late = chunk[_CHUNK][1][_PATH][1][1] == [self._late.name.encode()]
             made.chunks.append(None if late else self._copied(made, chunk, part.content))
         self._groups.append(made)
@@ -168,8 +204,8 @@ class Joining:
         kind, held = chunk[_CHUNK]
         places = {place: integer_of(held, place) for place in (_DATA, _DICTIONARY) if place in held}
         start, stored = min(places.values()), integer_of(held, _STORED)
-        moved = self._sink.tell() - start
-        self._sink.write(memoryview(content)[start : start + stored])
+        moved = self._written.size - start
+        self._write(memoryview(content)[start : start + stored])
         group.size += integer_of(held, _SIZE)
         group.stored += stored
         moved_places = {place: integer(at + moved) for place, at in places.items()}
@@ -182,8 +218,7 @@ def _group_bytes(group: _Group) -> bytes:
     return struct_bytes(columns | {number: integer(value) for number, value in facts.items()})
 
 
-def _only_group_of(content: bytes) -> Struct:
+def _groups_of(content: bytes) -> list[Struct]:
     footer, _ = footer_of(content)
-    (group,) = footer[_GROUPS][1][1]
-    found: Struct = group
+    found: list[Struct] = footer[_GROUPS][1][1]
     return found

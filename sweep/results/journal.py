@@ -1,7 +1,8 @@
 """Finished work of a run that is not whole yet: shards of rows and kept answers, listed in a journal.
 
-A shard is written to a hidden file, synced and renamed; then a line of the journal names it with the SHA-256 of its
-bytes, and is synced. What the journal does not list, or what no longer has its digest, is computed again.
+A shard is written to a hidden file and synced, by the worker that computed it where that is on this machine. Then it is
+renamed, and a line of the journal names it with the SHA-256 of its bytes, and is synced. What the journal does not
+list, or what no longer has its digest, is computed again.
 """
 
 from __future__ import annotations
@@ -20,11 +21,11 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
-from ..base.disk import is_link, is_real_folder, opened, read_plain
+from ..base.disk import Digest, is_link, is_real_folder, opened, read_plain
 from ..base.errors import Fault, OutputError
-from .tables import decoded, encoded, holds, write_bytes
+from .atomic import refused_by_disk, write_bytes, write_hidden
+from .tables import decoded, encoded, holds
 
 SHARDS = "shards"
 _JOURNAL = "_journal.jsonl"
@@ -80,23 +81,35 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class Shard:
-    """Finished rows as a Parquet file's bytes: how many, how many of them failed, and the seconds that they took."""
+class Hidden:
+    """A synced file that has no name of the journal's yet, and what it holds."""
 
-    content: bytes
+    path: Path
+    digest: Digest
+
+
+@dataclass(frozen=True)
+class Shard:
+    """Finished rows as a Parquet file: how many, how many of them failed, and the seconds that they took.
+
+    `file`: its bytes, or where they stand.
+    """
+
+    file: bytes | Hidden
     rows: int
     failed: int
     seconds: float
 
     @staticmethod
-    def of(table: pa.Table, seconds: float) -> Shard:
-        """A table, encoded."""
-        failed = int(np.count_nonzero(~holds(table, "status", "ok")))
-        return Shard(encoded(table), table.num_rows, failed, seconds)
+    def of(table: pa.Table, seconds: float, path: Path | None = None) -> Shard:
+        """A table, encoded; where a path is given, hidden beside it. Raises OutputError when the disk refuses."""
+        content, failed = encoded(table), int(np.count_nonzero(~holds(table, "status", "ok")))
+        file = content if path is None else Hidden(write_hidden(content, path), _digest(content))
+        return Shard(file, table.num_rows, failed, seconds)
 
-    def table(self) -> pa.Table:
-        """The rows."""
-        return pq.read_table(pa.BufferReader(self.content))
+
+def _digest(content: bytes) -> Digest:
+    return Digest(hashlib.sha256(content).hexdigest(), len(content))
 
 
 class Journal:
@@ -139,10 +152,19 @@ class Journal:
                     sizes[item.name] = item.stat().st_size
         self.entries = {key: entry for key, entry in self.entries.items() if sizes.get(entry.file) == entry.size}
 
+    def path(self, key: str, index: int) -> Path:
+        """Where finished rows stand that are kept under `key`."""
+        return self.folder / _SHARD.format(index=index, key=key[:16])
+
     def save(self, key: str, index: int, shard: Shard) -> None:
         """Keep finished rows under `key`; raises OutputError when the disk refuses."""
-        name = _SHARD.format(index=index, key=key[:16])
-        self._keep(key, name, shard.content, shard.rows, shard.failed, shard.seconds)
+        path, counts = self.path(key, index), (shard.rows, shard.failed, shard.seconds)
+        if isinstance(shard.file, Hidden):
+            with refused_by_disk(path):
+                shard.file.path.replace(path)
+            self._list(key, path.name, shard.file.digest, *counts)
+        else:
+            self._keep(key, path.name, shard.file, *counts)
 
     def keep(self, key: str, answer: bytes, seconds: float) -> None:
         """Keep the text of any finished answer under `key`; errors as for `save`."""
@@ -186,8 +208,11 @@ class Journal:
                 self.folder.rmdir()
         self.entries.clear()
 
-    def content(self, key: str) -> bytes | None:
-        """The bytes kept under `key`, or None when their file is missing or does not hold what was written."""
+    def content(self, key: str, *, just_kept: bool = False) -> bytes | None:
+        """The bytes kept under `key`, or None when their file is missing or does not hold what was written.
+
+        What was kept a moment ago has its size, and its digest is not looked at.
+        """
         entry = self.entries.get(key)
         if entry is None:
             return None
@@ -195,12 +220,18 @@ class Journal:
             content = read_plain(self.folder / entry.file, entry.size)
         except OSError:
             return None
-        return content if hashlib.sha256(content).hexdigest() == entry.sha256 else None
+        if just_kept:
+            return content if len(content) == entry.size else None
+        return content if _digest(content).sha256 == entry.sha256 else None
 
     def _keep(self, key: str, file: str, content: bytes, rows: int, failed: int, seconds: float) -> None:
         write_bytes(content, self.folder / file)
-        digest = hashlib.sha256(content).hexdigest()
-        entry = Entry(key, file, digest, len(content), rows, failed, round(seconds, 4), round(time.time(), 3))
+        self._list(key, file, _digest(content), rows, failed, seconds)
+
+    def _list(self, key: str, file: str, digest: Digest, rows: int, failed: int, seconds: float) -> None:
+        """Name a finished file in the journal."""
+        assert digest.size is not None
+        entry = Entry(key, file, digest.sha256, digest.size, rows, failed, round(seconds, 4), round(time.time(), 3))
         line = ("\n" if self._torn else "") + json.dumps(asdict(entry)) + "\n"
         self._torn = True  # until the whole line is on the disk
         journal = self.folder / _JOURNAL

@@ -23,8 +23,8 @@ from ..base.disk import read_plain
 from ..base.errors import OutputError
 from ..camera.plan.plan import Choice, Plan
 from ..study import Study
+from .atomic import write_bytes
 from .identity import MODEL_VERSION, fingerprint
-from .tables import write_bytes
 
 CACHE = "SWEEP_CACHE"
 """Variable of the environment: the folder to keep plans in, instead of the user's cache folder."""

@@ -8,7 +8,7 @@ import re
 import socket
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
@@ -22,16 +22,15 @@ _ATTEMPTS, _PAUSE_S = 5, 0.02
 _SAYS = re.compile(rb"(process \d+ on [^\n]*)?")
 _MOST_SAID = 400
 _LEFT_OVER = re.compile(r"\.tmp-\d+-(SHA256SUMS|[\w.-]+\.(parquet|json|yaml|html|csv|png|svg))")
-"""Hidden names that `tables.atomic` gives to files of a run."""
+"""Hidden names that `atomic.atomic` gives to files of a run."""
 
 
 @contextmanager
 def locked(output: Path) -> Iterator[None]:
     """Hold the output folder for one command; raises OutputError, naming the holder, when it is in use.
 
-    The kernel drops the lock with its process, so a lock cannot go stale. Hidden files that a killed command left
-    behind are removed. A `.lock` that is a link, or
-    that holds something else, is not touched.
+    The kernel drops the lock with its process, so a lock cannot go stale. Hidden files that a killed command, or a
+    worker of this one, left behind are removed. A `.lock` that is a link, or that holds something else, is not touched.
     """
     lock = output / LOCK
     try:
@@ -52,7 +51,11 @@ def locked(output: Path) -> Iterator[None]:
                 time.sleep(_PAUSE_S)  # someone may just be looking who holds it
         _say(handle, output)
         _clear(output)
-        yield
+        try:
+            yield
+        finally:
+            with suppress(OSError):
+                _clear(output)
 
 
 def holder(output: Path) -> str | None:
@@ -94,7 +97,7 @@ def _said(handle: IO[bytes]) -> str:
 
 
 def _clear(output: Path) -> None:
-    """Remove what killed commands left half written, but not through links."""
+    """Remove what killed commands and workers left half written, but not through links."""
     own = (output / SHARDS, output / FIGURES)
     for folder in (output, *(inner for inner in own if is_real_folder(inner))):
         for path in folder.iterdir():

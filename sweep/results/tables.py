@@ -1,12 +1,9 @@
-"""Parquet and JSON on disk: explicit schema, atomic writes, shards that a kill cannot harm."""
+"""Parquet and JSON on disk: explicit schemas, and how columns are stored."""
 
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +13,8 @@ import pyarrow.parquet as pq
 
 from ..base.errors import Fault, OutputError
 from ..base.types import BoolArray
-from .arrays import which
+from .arrays import holds_one_of
+from .atomic import Seal, atomic, unsealed, write_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -68,8 +66,6 @@ FEW = (PLAIN, NAMED, FOUND)
 """Kinds of which there are few rows."""
 ROW_GROUP = 131_072
 """Rows that are read and written at once."""
-Seal = Callable[[Path], None]
-"""Sees a file that is written to its end, before it takes its name."""
 
 
 def result_schema(parameters: Sequence[str], quantities: Sequence[str]) -> pa.Schema:
@@ -103,72 +99,10 @@ def front_schema(parameters: Sequence[str]) -> pa.Schema:
     return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION})
 
 
-def unsealed(_: Path) -> None:
-    """Nothing is noted of a file before it takes its name."""
-
-
-@contextmanager
-def refused_by_disk(path: Path) -> Iterator[None]:
-    """Raises OutputError where the disk refuses (full, read-only, no permission) what is written for `path`."""
-    try:
-        yield
-    except OSError as error:
-        raise OutputError(Fault(f"cannot be written: {error.strerror or error}", str(path))) from None
-
-
-def _sync(path: Path) -> None:
-    with path.open("rb") as handle:
-        os.fsync(handle.fileno())
-
-
-@contextmanager
-def hidden_beside(path: Path, seal: Seal = unsealed) -> Iterator[Path]:
-    """Give a hidden name beside `path`; on success it is synced and takes the name of `path`, else it is removed.
-
-    `seal` sees the whole hidden file before it takes its name. A symbolic link at `path` is replaced, not followed.
-    A reader sees the old file or the new one, never a part. Raises OSError.
-    """
-    hidden = path.with_name(f".tmp-{os.getpid()}-{path.name}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        hidden.unlink(missing_ok=True)
-        hidden.touch(exist_ok=False)  # a new file, not what a link of this name leads to
-        yield hidden
-        if seal is unsealed:
-            _sync(hidden)
-        else:
-            with ThreadPoolExecutor(1) as aside:  # to read a large file takes about as long as to sync it
-                synced = aside.submit(_sync, hidden)
-                seal(hidden)
-                synced.result()
-        hidden.replace(path)
-    finally:
-        with suppress(OSError):  # where it could not be made, for example below a file
-            hidden.unlink()
-
-
-@contextmanager
-def atomic(path: Path, seal: Seal = unsealed) -> Iterator[Path]:
-    """`hidden_beside`, with one error: OutputError when the disk refuses."""
-    with refused_by_disk(path), hidden_beside(path, seal) as hidden:
-        yield hidden
-
-
 def write_table(table: pa.Table, path: Path, seal: Seal = unsealed) -> None:
     """Write one Parquet file atomically, with a checksum of each page; `seal` and errors as for `atomic`."""
     with atomic(path, seal) as hidden:
-        _write_table(table, hidden, row_group_size=ROW_GROUP)
-
-
-def write_bytes(content: bytes, path: Path, seal: Seal = unsealed) -> None:
-    """Write one file atomically; `seal` and errors as for `atomic`."""
-    with atomic(path, seal) as hidden:
-        hidden.write_bytes(content)
-
-
-def write_text(text: str, path: Path) -> None:
-    """Write one UTF-8 text file atomically; errors as for `atomic`."""
-    write_bytes(text.encode("utf-8"), path)
+        _write_tables([table], hidden, ROW_GROUP)
 
 
 def write_csv(table: pd.DataFrame, path: Path) -> None:
@@ -198,16 +132,22 @@ def write_json(data: Mapping[str, Any], path: Path) -> None:
     write_text(json_of(data), path)
 
 
-def _write_table(table: pa.Table, where: Any, **options: Any) -> None:
-    """Write a Parquet file whose pages carry checksums (CRC-32), which readers can verify."""
-    how = {"write_page_checksum": True, "write_batch_size": _ROWS_AT_ONCE, **_encodings(table.schema), **options}
-    pq.write_table(table, where, **how)
+def _write_tables(tables: Sequence[pa.Table], where: Any, most: int | None = None) -> None:
+    """Write a Parquet file whose pages carry checksums (CRC-32), which readers can verify.
+
+    `tables`: of one schema, a row group each, or several of `most` rows.
+    """
+    schema = tables[0].schema
+    how = {"write_page_checksum": True, "write_batch_size": _ROWS_AT_ONCE, **_encodings(schema)}
+    with pq.ParquetWriter(where, schema, **how) as writer:
+        for table in tables:
+            writer.write_table(table, most)
 
 
-def encoded(table: pa.Table) -> bytes:
-    """A table as the bytes of a Parquet file."""
+def encoded(*tables: pa.Table) -> bytes:
+    """Tables of one schema as the bytes of a Parquet file, a row group each."""
     sink = pa.BufferOutputStream()
-    _write_table(table, sink)
+    _write_tables(tables, sink)
     return bytes(sink.getvalue().to_pybytes())
 
 
@@ -265,11 +205,7 @@ def sliced(path: Path, sizes: Iterable[int]) -> Iterator[pa.Table]:
 
 def holds(table: pa.Table, column: str, *words: str) -> BoolArray:
     """Where a column of words (dictionary-encoded) holds one of `words`, ndarray[n_rows]."""
-    found = [np.zeros(0, dtype=bool)]
-    for chunk in table[column].chunks:
-        at = [index for index, word in enumerate(chunk.dictionary.to_pylist()) if word in words]
-        found.append(np.isin(which(chunk), at))
-    return np.concatenate(found)
+    return np.concatenate([np.zeros(0, dtype=bool), *(holds_one_of(chunk, words) for chunk in table[column].chunks)])
 
 
 def release_memory() -> None:

@@ -63,8 +63,10 @@ def swept_points(path: Path) -> IndexArray:
     for table in batches(path, ["kind", "feasible", "pareto", "status"]):
         swept = holds(table, "kind", SWEPT) & holds(table, "status", "ok")
         feasible, pareto = table["feasible"].to_numpy(), table["pareto"].to_numpy()
-        found = np.select([~swept, feasible & pareto, feasible], [_NOT_SWEPT, _ON_FRONT, _FEASIBLE], _INFEASIBLE)
-        groups.append(found.astype(np.uint8))
+        found = np.where(feasible, _FEASIBLE, _INFEASIBLE).astype(np.uint8)
+        found[feasible & pareto] = _ON_FRONT
+        found[~swept] = _NOT_SWEPT
+        groups.append(found)
     every = np.concatenate(groups)
     others = (np.flatnonzero(every == group) for group in (_FEASIBLE, _INFEASIBLE))
     shares = [some[even(some.size, MOST_POINTS)] for some in others]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from collections.abc import Sequence
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
@@ -15,7 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from ..base.errors import BrokenProofError
-from ..base.types import IndexArray, Progress
+from ..base.types import Progress
 from ..metrics.bound import FEASIBLE
 from ..metrics.pareto import hypervolume
 from ..results.facts import Provenance
@@ -26,7 +27,6 @@ from ..results.names import TABLES
 from ..results.tables import (
     FRONT,
     LEFT_OUT,
-    LIMITED_BY,
     PRICE,
     PROVENANCE,
     RESOLVED,
@@ -91,6 +91,7 @@ class Making:
     made: set[str] = field(default_factory=set)
     _failed: int = 0
     _aside: Executor = field(init=False)
+    _table: Future[None] | None = None
     _warnings: list[str] = field(default_factory=list)
 
     def make(self, names: set[str]) -> None:
@@ -108,9 +109,11 @@ class Making:
             if RESULTS in todo:
                 self._sweep()
             if todo & {SEARCH_LOG, FRONT, PRICE, LEFT_OUT}:
+                self._wait_for_table()
                 self._write_search(todo)
             if todo & ROW_TABLES.keys():
                 self._write_of_rows(todo)
+            self._wait_for_table()
             if todo & {*VISION_TABLES}:
                 self._write_vision(todo)
             if RESOLVED in todo:
@@ -173,7 +176,9 @@ class Making:
         if intact and not self.inventory.facts.pop("detours", []):
             self.sweep.refill(results)
         answer, gathered, sweep = self.answer, self._gathering(), self.sweep
-        with joining(gathered.front.late, self.rules.schema, results, self.inventory.seal(RESULTS)) as whole:
+        with ExitStack() as stack:
+            late, seal = gathered.front.late, self.inventory.seal(RESULTS)
+            whole = stack.enter_context(joining(late, self.rules.schema, results, seal))
             sweep.run(gathered, whole, self.progress, self.wishes)
             answered = [] if answer is None else [answer_row(self.study, answer, self.rules, self.crew)]
             if self.then_load:
@@ -182,10 +187,17 @@ class Making:
                 gathered.add(row)
                 whole.add(RowsPart.of(row))
             gathered.finish()
-        self.journal.leave(sweep.keys, self._aside)
-        detours: Detours = sum(map(detours_of, answered), sweep.detours)
-        self.inventory.facts["detours"] = [{"how": how, "why": why, "designs": n} for (how, why), n in detours.items()]
-        self.gathered, self._failed, self._warnings = gathered, sweep.failed, sweep.warnings
+            detours: Detours = sum(map(detours_of, answered), sweep.detours)
+            self.inventory.facts["detours"] = [{"how": h, "why": why, "designs": n} for (h, why), n in detours.items()]
+            self.gathered, self._failed, self._warnings = gathered, sweep.failed, sweep.warnings
+            self._table = self._aside.submit(stack.pop_all().close)
+
+    def _wait_for_table(self) -> None:
+        """Until the result table has its name, nothing else is written, and no chunk leaves the journal."""
+        if self._table is not None:
+            table, self._table = self._table, None
+            table.result()
+            self.journal.leave(self.sweep.keys, self._aside)
 
     def _write_search(self, names: set[str]) -> None:
         assert self.answer is not None
@@ -201,16 +213,16 @@ class Making:
             self.inventory.write_table(LEFT_OUT, left_out_table(*given))
 
     def _write_of_rows(self, names: set[str]) -> None:
+        points = partial(swept_points, self.inventory.path(RESULTS))
         rows, on_front = self.gathered.frame(), self.gathered.front_frame()
         looking, known = Looking.of(self.study, names), self.sweep.looks
         looks = looks_of(self.study, looking, rows, on_front, known, self.crew, self.progress)
-        points: Callable[[], IndexArray] = partial(swept_points, self.inventory.path(RESULTS))
-        if LIMITED_BY in names:
-            points = self._aside.submit(points).result  # read while others are looked at
         shown = Shown(self.study, rows, on_front, looks, points, self._limit, self.crew, self._kept, self.progress)
         for name, table in ROW_TABLES.items():
             if name in names:
-                self.inventory.write_table(name, table.made(shown))
+                made = table.made(shown)
+                self._wait_for_table()
+                self.inventory.write_table(name, made)
 
     def _kept(self, what: str) -> Kept:
         """Calls whose results the journal keeps."""

@@ -9,7 +9,7 @@ import pyarrow as pa
 
 from ..base.types import BoolArray, FloatArray, IndexArray
 from ..metrics.pareto import non_dominated
-from ..results.arrays import places, values_of
+from ..results.arrays import places, texts_of, values_of
 from ..results.joined import Late
 from ..results.tables import FEW, SWEPT, holds
 from ..results.thinning import best_at, best_rows, leading, leading_at
@@ -80,7 +80,7 @@ class Front:
         local = np.flatnonzero(wanted)
         few = table.select([*self._axes, "cfa", "scenario"]).take(pa.array(local))
         values = np.stack([few[name].to_numpy() for name in self._axes], axis=1)
-        return local, values, list(zip(few["cfa"].to_pylist(), few["scenario"].to_pylist(), strict=True))
+        return local, values, list(zip(texts_of(few["cfa"]), texts_of(few["scenario"]), strict=True))
 
     def _by_group(self, table: pa.Table) -> dict[tuple[str, str], FloatArray]:
         _, values, groups = self._candidates(table)

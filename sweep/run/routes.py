@@ -72,44 +72,43 @@ class Found:
     detours: Detours
 
 
-def found_of(space: Space, start: int, stop: int, view: View, request: Request) -> Found:
-    """Designs `start`..`stop`-1 of a space, a block at a time, which stays in the cache; see `block_of`.
+def found_of(space: Space, start: int, points: FloatArray, view: View, request: Request) -> Found:
+    """Designs of a space from `start` on, a block at a time, which stays in the cache; see `block_of`.
 
     More than a chunk of them are seen by their edges.
     """
-    return _in_blocks(CHUNK * (1 if request.needs_curves else _CHUNKS_BY_EDGES), space, start, stop, view, request)
+    return _in_blocks(CHUNK * (1 if request.needs_curves else _CHUNKS_BY_EDGES), space, start, points, view, request)
 
 
-def _in_blocks(size: int, space: Space, start: int, stop: int, view: View, request: Request) -> Found:
+def _in_blocks(size: int, space: Space, start: int, points: FloatArray, view: View, request: Request) -> Found:
     parts: list[Found] = []
     faults: dict[int, str] = {}
-    for begin in range(start, stop, size):
-        part = block_of(space, begin, min(begin + size, stop), view, request)
+    for begin in range(0, len(points), size):
+        part = block_of(space, start + begin, points[begin : begin + size], view, request)
         parts.append(part)
-        faults |= {begin - start + index: text for index, text in part.faults.items()}
+        faults |= {begin + index: text for index, text in part.faults.items()}
     names = request.quantities.keys() & parts[0].columns.keys()
     columns = {name: np.concatenate([part.columns[name] for part in parts]) for name in names}
     return Found(columns, faults, sum((part.detours for part in parts), Counter()))
 
 
-def block_of(space: Space, start: int, stop: int, view: View, request: Request) -> Found:
-    """Designs `start`..`stop`-1 of a space.
+def block_of(space: Space, start: int, points: FloatArray, view: View, request: Request) -> Found:
+    """Designs of a space from `start` on, of which these are the `points`.
 
     By their edges where the family is separable, else from their curves. Where the fast way fails, in chunks; in that
     where it fails again all from their curves, whose numbers are the same up to rounding; where that fails, too, one by
     one, which gives the very numbers of a whole block, and what is wrong with a design is its fault. A number that is
     not finite is a fault.
     """
-    points = space.points(start, stop)
     detours: Detours = Counter()
     faults: dict[int, str] = {}
     fast: EdgeBlock | None = None
     try:
-        fast = edges_of(space, start, stop)
+        fast = edges_of(space, start, start + len(points))
         columns = _columns(space, view, points, request, fast)
     except Exception as error:  # one design must not take the others with it
         if len(points) > CHUNK:
-            return _in_blocks(CHUNK, space, start, stop, view, request)
+            return _in_blocks(CHUNK, space, start, points, view, request)
         own = text_of(error)
         try:
             columns = _columns(space, view, points, request)

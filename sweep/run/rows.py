@@ -90,11 +90,11 @@ def run_job(job: Job, view: View, rules: Rules) -> pa.Table:
     """Evaluate a job; a design that fails is a row with its status, and the others are kept.
 
     `pareto` marks the non-dominated designs of this job alone, among those that meet every constraint but those on the
-    front's axes; `compaction.Front` finds those of the whole table. `detours_of` the table says which designs took
+    front's axes; `front.Front` finds those of the whole table. `detours_of` the table says which designs took
     another route than their block's own.
     """
     points = job.space.points(job.start, job.stop)
-    found = found_of(job.space, job.start, job.stop, view, rules.request)
+    found = found_of(job.space, job.start, points, view, rules.request)
     columns, faults = found.columns, found.faults
     ok = np.ones(len(points), dtype=bool)
     ok[list(faults)] = False

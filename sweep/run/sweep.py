@@ -5,12 +5,14 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from itertools import groupby
 from pathlib import Path
 
 import pyarrow as pa
+import pyarrow.parquet as pq
 
 from ..base.errors import FailedDesignError, Fault, OutputError
 from ..base.types import Call, IndexArray, Progress, delayed
@@ -31,7 +33,9 @@ _SCENES_PER_WORKER, _FEW = 2, 64
 """From how many scenes for each worker on, and up to how many designs, one worker computes all jobs of a scene."""
 KILLED = "error: its worker died twice"
 _Finished = tuple[Shard, pa.Table, dict[int, Look]]
-"""A job's rows as a file's content, the few that `Gathered` takes in, and looks at its designs by their ids."""
+"""A job's rows as a file, the few that `Gathered` takes in, and looks at its designs by their ids."""
+_Asked = tuple[Job, View, Path | None]
+"""A job, its view, and beside which path its rows are to be hidden; None: they come back as bytes."""
 
 
 @dataclass
@@ -118,29 +122,28 @@ class Sweep:
             elif key in entries and (table := self._kept(index)) is not None:
                 few = few_of(table, self.rules)
                 self._take_in(few, entries[key].failed, gathered)
-                in_order.found(index, few)
+                in_order.found(index, few, waits=True)
         todo = [index for index, key in enumerate(self.keys) if key not in entries]
         done = sum(entries[key].rows for key in self.keys if key in entries)
         progress("designs", done, self.study.n_designs)
         batches = self._batches(todo)
-        calls = (
-            delayed(_shards, [(self.jobs[i], self._view(self.jobs[i])) for i in batch], self.rules, self.looking)
-            for batch in batches
-        )
+        asked = ([(self.jobs[i], self._view(self.jobs[i]), self._path(i)) for i in batch] for batch in batches)
+        calls = (delayed(_shards, batch, self.rules, self.looking) for batch in asked)
 
         def keep(at: int, found: list[_Finished]) -> None:
             for index, (shard, *_) in zip(batches[at], found, strict=True):
                 self.journal.save(self.keys[index], index, shard)
 
-        for batch, found in zip(batches, self.crew(calls, _quarantined, keep), strict=True):
-            for index, (shard, few, looks) in zip(batch, found, strict=True):
-                self._take_in(few, shard.failed, gathered)
-                self.looks |= looks
-                done += shard.rows
-                if shard.failed and wishes.fail_fast:
-                    raise _first_failure(shard.table())
-                in_order.found(index, few, shard.content)
-            progress("designs", done, self.study.n_designs)
+        with closing(self.crew(calls, _quarantined, keep)) as finished:
+            for batch, found in zip(batches, finished, strict=True):
+                for index, (shard, few, looks) in zip(batch, found, strict=True):
+                    self._take_in(few, shard.failed, gathered)
+                    self.looks |= looks
+                    done += shard.rows
+                    if shard.failed and wishes.fail_fast:
+                        raise _first_failure(pq.read_table(pa.BufferReader(self.content(index, just_kept=True))))
+                    in_order.found(index, few)
+                progress("designs", done, self.study.n_designs)
         in_order.rest()
 
     def _batches(self, todo: list[int]) -> list[list[int]]:
@@ -164,15 +167,20 @@ class Sweep:
         plan = self.study.plans.get(scenario)
         return 0.0 if plan is None else plan.work
 
-    def content(self, index: int) -> bytes:
+    def _path(self, index: int) -> Path | None:
+        """Beside which path a worker writes the rows of a job; None on a cluster, where disks are not shared."""
+        return None if self.crew.backend == "dask" else self.journal.path(self.keys[index], index)
+
+    def content(self, index: int, *, just_kept: bool = False) -> bytes:
         """A finished chunk as a file; one whose file was damaged since is computed again."""
         job, key = self.jobs[index], self.keys[index]
-        content = self.journal.content(key)
+        content = self.journal.content(key, just_kept=just_kept)
         if content is None:
             self._tell_damaged(index)
-            ((shard, *_),) = _shards([(job, self._view(job))], self.rules)
+            shard, *_ = _finished((job, self._view(job), None), self.rules, partial(self.compute, job))
             self.journal.save(key, index, shard)
-            content = shard.content
+            assert isinstance(shard.file, bytes)
+            content = shard.file
         return content
 
     def _kept(self, index: int) -> pa.Table | None:
@@ -205,43 +213,44 @@ class _InOrder:
     early: dict[int, tuple[pa.Table, IndexArray]] = field(default_factory=dict)
     turn: int = 0
 
-    def found(self, index: int, few: pa.Table, content: bytes | None = None) -> None:
-        """A chunk is finished, of which `few_of` gives these rows; where its file's content is at hand, it may go on.
+    def found(self, index: int, few: pa.Table, *, waits: bool = False) -> None:
+        """A chunk is finished, of which `few_of` gives these rows; unless it `waits`, it may go on if it is its turn.
 
         So may one more that came before its turn. A stop waits for no more of them.
         """
         marked = few.filter(few["pareto"])
         at = marked["design_id"].to_numpy() - self.sweep.jobs[index].first_id
         self.early[index] = marked.select(self.whole.needs), at
-        if content is not None:
+        if not waits:
             if index == self.turn:
-                self._join(content)
+                self._join(just_kept=True)
             if self.turn in self.early:
-                self._join(self.sweep.content(self.turn))
+                self._join()
 
     def rest(self) -> None:
         """All are finished."""
         while self.turn in self.early:
-            self._join(self.sweep.content(self.turn))
+            self._join()
 
-    def _join(self, content: bytes) -> None:
-        job = self.sweep.jobs[self.turn]
+    def _join(self, *, just_kept: bool = False) -> None:
+        job, content = self.sweep.jobs[self.turn], self.sweep.content(self.turn, just_kept=just_kept)
         self.whole.add(RowsPart(content, job.stop - job.start, *self.early.pop(self.turn)))
         self.turn += 1
 
 
-def _shards(batch: Sequence[tuple[Job, View]], rules: Rules, looking: Looking | None = None) -> list[_Finished]:
+def _shards(batch: Sequence[_Asked], rules: Rules, looking: Looking | None) -> list[_Finished]:
     """What is found of each job."""
-    return [_finished(job, view, rules, partial(run_job, job, view, rules), looking) for job, view in batch]
+    return [_finished(asked, rules, partial(run_job, *asked[:2], rules), looking) for asked in batch]
 
 
 def _finished(
-    job: Job, view: View, rules: Rules, computed: Callable[[], pa.Table], looking: Looking | None = None
+    asked: _Asked, rules: Rules, computed: Callable[[], pa.Table], looking: Looking | None = None
 ) -> _Finished:
     """A job's rows, once they are computed."""
+    job, view, path = asked
     started = time.monotonic()
     table = computed()
-    shard = Shard.of(table, time.monotonic() - started)
+    shard = Shard.of(table, time.monotonic() - started, path)
     return shard, few_of(table, rules), {} if looking is None else looking.beside_rows(job, view, table)
 
 
@@ -251,13 +260,14 @@ def _quarantined(call: Call) -> list[_Finished]:
     """
     batch, rules, _ = call[1]
     again = _halved if len(batch) == 1 else _table_alone
-    return [_finished(job, view, rules, partial(again, job, view, rules)) for job, view in batch]
+    return [_finished((job, view, None), rules, partial(again, job, view, rules)) for job, view, _ in batch]
 
 
 def _table_alone(job: Job, view: View, rules: Rules) -> pa.Table:
     """Rows of a job, in a process of its own; by halves if that dies."""
     try:
-        return alone((_shards, ([(job, view)], rules), {}))[0][0].table()
+        table: pa.Table = alone((run_job, (job, view, rules), {}))
+        return table
     except WorkerKilledError:
         return _halved(job, view, rules)
 

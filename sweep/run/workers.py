@@ -94,7 +94,7 @@ class Workers:
         calls: Iterable[Call],
         killed: Callable[[Call], Any] | None = None,
         finished: Callable[[int, Any], None] | None = None,
-    ) -> Iterator[Any]:
+    ) -> Generator[Any]:
         """Results of delayed calls in their order; `finished` gets each with its number as soon as it is there.
 
         When a worker dies, the calls under way run again, each in a process of its own. One that dies again goes to

@@ -21,7 +21,8 @@ study = load_study(Path(sys.argv[1]))
 rules, looking = rules_of(study), Looking.of(study, [LIMITED_BY, POINTS])
 kinds = set()
 for job in jobs_of(study):
-    _shards([(job, study.view(job.space, job.scenario))], rules, looking)
+    path = Path(sys.argv[2]) / f"{job.first_id}.parquet"
+    _shards([(job, study.view(job.space, job.scenario), path)], rules, looking)
     kinds.add(job.space.kind)
 print(*sorted(kinds), *({"pandas", "matplotlib", "scipy.stats", "sklearn"} & sys.modules.keys()))
 """
@@ -30,6 +31,6 @@ print(*sorted(kinds), *({"pandas", "matplotlib", "scipy.stats", "sklearn"} & sys
 def test_a_sweep_loads_no_pandas(tmp_path: Path) -> None:
     """PyArrow loads it on the first conversion that is its own."""
     ran = subprocess.run(
-        [sys.executable, "-c", CODE, study_file(tmp_path, 3)], capture_output=True, text=True, check=True
+        [sys.executable, "-c", CODE, study_file(tmp_path, 3), tmp_path], capture_output=True, text=True, check=True
     )
     assert ran.stdout.split() == ["design", "reference", "sweep"]

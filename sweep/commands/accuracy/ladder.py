@@ -23,7 +23,8 @@ from ...metrics.evaluate import evaluate
 from ...metrics.separation import csd_name
 from ...report.figures import rendered
 from ...report.series import draw_knobs, draw_work_precision
-from ...results.tables import write_bytes, write_table
+from ...results.atomic import write_bytes
+from ...results.tables import write_table
 from ...study import Study
 from .knobs import Regridded, Setting, knob_measurements
 from .payments import PAID_AT_DN, Payment, cpu_s, one_design, payments

@@ -11,7 +11,7 @@ import pandas as pd
 
 from ...base.errors import Fault, OutputError
 from ...report.pages import inlined, page, rows
-from ...results.tables import write_text
+from ...results.atomic import write_text
 
 HARD_CASES = "hard_cases.json"
 REPORT = "accuracy.html"
@@ -45,7 +45,7 @@ def read_hard_cases(folder: Path) -> pd.DataFrame | None:
 
 
 def make_accuracy_report(folder: Path, report: AccuracyReport) -> None:
-    """Write `accuracy.html` into the folder; errors as for `tables.atomic`."""
+    """Write `accuracy.html` into the folder; errors as for `atomic.atomic`."""
     ladder = report.ladder.assign(
         run_s=report.ladder["seconds"],
         faster=(report.ladder["reference_s"] / (report.ladder["plan_s"] + report.ladder["seconds"])).map(

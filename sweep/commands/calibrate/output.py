@@ -11,7 +11,8 @@ import numpy as np
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
-from ...results.tables import write_json, write_text
+from ...results.atomic import write_text
+from ...results.tables import write_json
 from .fit import Fit, printed_order
 from .model import DISTANCES, Figures
 from .run import Calibration

@@ -13,7 +13,7 @@ from ...base.disk import read_input
 from ...base.errors import DataError, Fault, OutputError, StudyError, SweepError
 from ...base.own_code import is_code
 from ...curves.scan import MOST_BYTES
-from ...results.tables import atomic, write_bytes, write_text
+from ...results.atomic import atomic, write_bytes, write_text
 from ...study import load_study
 from ...study.editors import SCHEMA_FILE, schema_text
 from .make import checked_name

@@ -15,7 +15,7 @@ from ...curves.light_files import lights_file
 from ...curves.light_unit import LightUnit
 from ...door.channels import Layout, layout_of
 from ...door.files import sensor_file
-from ...results.tables import atomic, write_text
+from ...results.atomic import atomic, write_text
 from ...study import Study, folder_name, load_study
 from ...study.editors import SCHEMA_FILE, schema_text
 from .template import TYPICAL_NM, LightsText, PixelText, SensorText, one_line, study_text

@@ -12,7 +12,8 @@ from pathlib import Path
 import pandas as pd
 
 from ...base.errors import Fault, OutputError, SweepError
-from ...results.tables import write_bytes, write_csv, write_text
+from ...results.atomic import write_bytes, write_text
+from ...results.tables import write_csv
 from ...study import folder_name
 from .. import Output, read_output
 from ..answer import who_else
@@ -65,7 +66,7 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> list[str]:
     """Compare finished runs, write `compare.html`, `compare.csv`, `fronts.png`, `fronts.svg`, and say what was found.
 
     `to`: default outputs/compare-<a>-<b>. Raises SweepError unless there are 2 to 26; OutputError for a folder without
-    a finished run, where a file would be replaced that no comparison wrote, and as `tables.atomic` does.
+    a finished run, where a file would be replaced that no comparison wrote, and as `atomic.atomic` does.
     """
     if not 2 <= len(folders) <= len(_LETTERS):
         allowed = f"2 to {len(_LETTERS)} folders"
