@@ -4,7 +4,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from sweep.results.arrays import flags, numbers, places, values_of, which, words
+from sweep.results.arrays import flags, holds_one_of, numbers, places, texts_of, values_of, words
 
 NAN = float("nan")
 FLOATS = [1.5, NAN, -0.0, np.inf, NAN, 5e-324, 7.0, NAN, 1.0]
@@ -65,11 +65,19 @@ def test_null_is_nan_and_nothing_where_there_is_no_such_value(start: int) -> Non
             values_of(pa.array([1, None], pa.int64()).cast(kind))
 
 
-def test_which_word_stands_in_each_row() -> None:
-    column = pa.array(["b", None, "a", "b", None], pa.string()).dictionary_encode()
-    assert which(column).tolist() == [0, -1, 1, 0, -1]
-    assert which(column.slice(2)).tolist() == [1, 0, -1]
+WORDS = ["b", None, "a", "b", None, "c"]
+
+
+@pytest.mark.parametrize("wanted", [(), ("a",), ("b", "c"), ("a", "b", "c"), ("d",)], ids="".join)
+def test_where_a_column_holds_one_of_some_words(wanted: tuple[str, ...]) -> None:
+    column = pa.array(WORDS, pa.string()).dictionary_encode()
     few = pa.DictionaryArray.from_arrays(pa.array([1, 0, 1, None], pa.int8()), pa.array(["a", "b"]))
-    assert which(few).tolist() == [1, 0, 1, -1]
-    assert which(few[:0]).tolist() == []
-    assert which(pa.nulls(3, pa.dictionary(pa.int32(), pa.string()))).tolist() == [-1, -1, -1]
+    for made in (column, column.slice(2), few, few[:0], pa.nulls(3, pa.dictionary(pa.int32(), pa.string()))):
+        assert holds_one_of(made, wanted).tolist() == [word in wanted for word in made.to_pylist()]
+
+
+def test_words_of_several_chunks() -> None:
+    chunks = [pa.array(some).dictionary_encode() for some in (["b", "a", "b"], ["c", "b"], [])]
+    column = pa.chunked_array([chunk.cast(pa.dictionary(pa.int32(), pa.string())) for chunk in chunks])
+    assert texts_of(column) == column.to_pylist() == ["b", "a", "b", "c", "b"]
+    assert texts_of(column.slice(1, 3)) == ["a", "b", "c"]

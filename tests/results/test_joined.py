@@ -59,9 +59,9 @@ def test_parts_are_joined_row_by_row(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(joined, "_AS_THEY_ARE", 40)
     made: list[list[str]] = []
 
-    def counted(some: pa.Table) -> bytes:
-        made.append(some.schema.names)
-        return encoded(some)
+    def counted(*some: pa.Table) -> bytes:
+        made.extend(each.schema.names for each in some)
+        return encoded(*some)
 
     starts = np.cumsum([0, *sizes]).tolist()
     tables = [table(size, start) for size, start in zip(sizes, starts, strict=False)]

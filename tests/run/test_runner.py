@@ -133,9 +133,9 @@ def test_rows_stand_in_order_whenever_their_scene_is_computed(
     order: list[int] = []
     join = _InOrder.found
 
-    def found(self: _InOrder, index: int, few: pa.Table, content: bytes | None = None) -> None:
+    def found(self: _InOrder, index: int, few: pa.Table, *, waits: bool = False) -> None:
         order.append(index)
-        join(self, index, few, content)
+        join(self, index, few, waits=waits)
 
     monkeypatch.setattr(Sweep, "_work", lambda _, scenario: heavier[scenario])
     monkeypatch.setattr(_InOrder, "found", found)
@@ -251,13 +251,14 @@ def test_a_killed_run_is_continued(tmp_path: Path, number: signal.Signals) -> No
 
 
 @pytest.mark.slow
-def test_a_full_disk_is_one_line_and_loses_nothing(study: Study, output: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_full_disk_is_one_line_and_loses_nothing(study: Study, output: Path, tmp_path: Path, jobs: int) -> None:
     def small_files_only() -> None:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (150_000, 150_000))
 
     folder = tmp_path / "out" / "tiny"
-    run = started(tmp_path, tmp_path / "out", "--jobs", "1", count=26, preexec_fn=small_files_only)
+    run = started(tmp_path, tmp_path / "out", "--jobs", str(jobs), count=26, preexec_fn=small_files_only)
     assert run.wait(timeout=120) == 2
     said = (tmp_path / "said").read_text()
     assert said.count("\n") == 1, said
