@@ -12,13 +12,13 @@ import numpy as np
 
 from ..base.errors import Fault, OutputError, SweepError, nearest
 from ..designs.space import Space
-from ..metrics.bound import FEASIBLE, total_violation
+from ..metrics.bound import total_violation
 from ..metrics.quantity import Column, Quantity
 from ..search.limit import Limit
 from ..study import Study, folder_name
 from .given import CurveLike, on_grid, over_nm
 from .limits import any_filter, at_least, limit_or_reason
-from .own_filters import bases_of, cfa_with, judged, table_of, verdict, view_with, with_units
+from .own_filters import bases_of, cfa_with, judged, table_of, view_with, with_units
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -98,8 +98,8 @@ class LoadedStudy:
         Without a channel: of the plain CFAs and named designs. The values are QE, or, with `relative_to`, transmissions
         times that curve of the sensor. `base`: the curve that the filter replaces, where the study does not say it. Its
         technology is that of the study's own filters. A row per scene and filter; units and meanings are in `attrs`.
-        All effects are computed. What only a family's parameters say is NaN, and a constraint on it leaves `feasible`
-        unknown (NA). Raises SweepError for curves that are not clean, names that are unknown, and a QE above 1.
+        All effects are computed. What only a family's parameters say is NaN, and where it is constrained, no filter is
+        feasible. Raises SweepError for curves that are not clean, names that are unknown, and a QE above 1.
         """
         study = self.study
         scenarios = [self._scenario(scenario)] if scenario is not None else list(study.scenarios)
@@ -114,12 +114,10 @@ class LoadedStudy:
         curves = np.stack([*rows.values()], axis=1)
         views = {name: view_with(study, chosen, name, bases) for name in scenarios}
         found = {name: judged(study, view, curves) for name, view in views.items()}
-        return table_of(study, [("own", chosen, n, columns, verdict(study, columns)) for n, columns in found.items()])
+        return table_of(study, [("own", chosen, n, columns) for n, columns in found.items()])
 
     def _own(self, cfa: str | None, scenarios: list[str]) -> pd.DataFrame:
         """The study's plain CFAs and named designs."""
-        from pandas.arrays import BooleanArray
-
         from ..results.tables import NAMED, PLAIN
         from ..run.routes import block_of
         from ..run.rows import rules_of
@@ -139,8 +137,7 @@ class LoadedStudy:
                 own = space.violation(space.points(0, space.size))
                 worst = total_violation(found.columns, study.constraints, own)
                 columns = {quantity: found.columns[quantity] for quantity in study.quantities}
-                feasible = BooleanArray(worst <= FEASIBLE, np.zeros(space.size, dtype=bool))
-                rows.append((space.name, space.cfa, name, columns | {"violation": worst}, feasible))
+                rows.append((space.name, space.cfa, name, columns | {"violation": worst}))
         return table_of(study, rows)
 
     def limit(
@@ -247,7 +244,7 @@ class FinishedRun:
         self.output: Output = read_output(self.folder)
 
     def __repr__(self) -> str:
-        return f"<run {self.output.study.study}: {self.output.counts.rows:,} designs in {self.folder}>"
+        return f"<run {self.output.study.study}: {self.output.provenance.filters:,} filters in {self.folder}>"
 
     @cached_property
     def table(self) -> pd.DataFrame:

@@ -20,7 +20,6 @@ from ..study import Study
 
 if TYPE_CHECKING:
     import pandas as pd
-    from pandas.arrays import BooleanArray
 
 _MOST_QE = 1 + 1e-9
 
@@ -121,23 +120,15 @@ def judged(study: Study, view: View, curves: FloatArray) -> Columns:
     return columns | {"violation": total_violation(columns, study.constraints, own)}
 
 
-def verdict(study: Study, columns: Columns) -> BooleanArray:
-    """Whether filters of one's own are feasible: unknown where a constraint is on what only a family's have."""
-    from pandas.arrays import BooleanArray  # noqa: PLC0415  (slow to import: kept off the start-up path)
+def table_of(study: Study, rows: Sequence[tuple[str, str, str, Columns]]) -> pd.DataFrame:
+    """Return a table with a row per design: (name, CFA, scenario, columns) of each block of designs.
 
-    met = columns["violation"] <= FEASIBLE
-    unknown = np.zeros_like(met)
-    for name in study.constraints:
-        unknown |= np.isnan(columns[name])
-    return BooleanArray(met, met & unknown)
-
-
-def table_of(study: Study, rows: Sequence[tuple[str, str, str, Columns, BooleanArray]]) -> pd.DataFrame:
-    """A table with a row per design: (name, CFA, scenario, columns, feasible) of each block of designs."""
+    A design with an unknown constrained quantity, such as a width of edges, is not feasible.
+    """
     import pandas as pd  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
     parts = []
-    for name, cfa, scenario, columns, feasible in rows:
+    for name, cfa, scenario, columns in rows:
         labels: dict[str, Any] = {"name": name, "cfa": cfa, "scenario": scenario}
-        parts.append(pd.DataFrame(labels | columns | {"feasible": feasible}))
+        parts.append(pd.DataFrame(labels | columns | {"feasible": columns["violation"] <= FEASIBLE}))
     return with_units(pd.concat(parts, ignore_index=True), study.quantities)

@@ -19,10 +19,11 @@ from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.quantity import Column, Columns
 from ..metrics.separation import csd_name
 from ..metrics.smooth import smooth_csd
+from ..search.limit import gap_between
 from ..study import Study
 from .limits import any_filter, as_exposed, at_least, limit_or_reason
 from .opening import Given, made_study
-from .own_filters import judged, table_of, verdict
+from .own_filters import judged, table_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -86,14 +87,14 @@ class Verdict:
     def table(self) -> pd.DataFrame:
         """A row per scene and CFA, the filter's own last; units and meanings of its quantities are in `attrs`."""
         study = self.study
-        return table_of(study, [(cfa, cfa, scene, c, verdict(study, c)) for scene, cfa, c in self.rows])
+        return table_of(study, [(cfa, cfa, scene, c) for scene, cfa, c in self.rows])
 
     @property
     def gap(self) -> float | None:
         """How far the filter is below the limit, relative."""
         if self.limit is None or self.smooth is None or not self.limit > 0:
             return None
-        return max(0.0, 1 - self.smooth / self.limit)
+        return gap_between(self.smooth, self.limit)
 
     def __str__(self) -> str:
         """What a person reads of it."""

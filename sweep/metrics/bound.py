@@ -41,11 +41,10 @@ class Bound(Section):
         return max(end, _LEAST_SCALE) if end > 0 else 1.0
 
     def violation(self, values: FloatArray) -> FloatArray:
-        """How far `values` are outside, relative to `scale`, >= 0; 0 where the quantity does not exist (NaN)."""
+        """How far `values` are outside, relative to `scale`, >= 0; NaN where the value is unknown (NaN)."""
         below = 0.0 if self.min is None else self.min - values
         above = 0.0 if self.max is None else values - self.max
-        outside = np.maximum(below, above)
-        return np.where(outside > 0, outside, 0.0) / self.scale
+        return np.maximum(np.maximum(below, above), 0.0) / self.scale
 
     def __str__(self) -> str:
         ends = [f">= {self.min:g}"] if self.min is not None else []
@@ -60,7 +59,8 @@ def total_violation(
 ) -> FloatArray:
     """Largest violation of each design, relative to the bound for a study's constraints: ndarray[n_designs].
 
-    `own`: violation of the family's conditions. `leave_out`: quantities that are not looked at. 0 is feasible.
+    `own`: violation of the family's conditions. `leave_out`: quantities that are not looked at. 0 is feasible; NaN,
+    where a quantity is unknown, is not.
     """
     worst = own
     for quantity, bound in constraints.items():

@@ -13,6 +13,7 @@ from ..metrics.quantity import DECADES, OF_A_SHARE, WORST_CASE
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
 from ..results.thinning import per_exposure
+from ..study.axes import series_of
 from .allowed_lamps import lamp_lines
 from .assumed import assumed, moves_with_light, technology_of
 from .leaders import Leaders, Row, leaders_of
@@ -20,10 +21,13 @@ from .names import OF_CLEAR, capital, full_name, label, rate_told
 from .noise import usable_lines
 from .robustness import over_population, robustness_lines, worst_over
 from .series import lead_sentence, leads_of
-from .terms import constraints_told, missed_told
+from .terms import constraints_told, missed_told, unknown_lines
 from .unseen import unseen_lines, unseen_told
+from .upper_bound import upper_bound_beside
 from .values import series_figures
 
+_MOST_SCENARIOS = 6
+"""Scenarios beside the leading one whose best design the answer names."""
 _BY_NOISE = (D_PRIME, CNR)
 """Metrics of separations in units of the noise."""
 
@@ -49,7 +53,11 @@ def _of_designs(output: Output) -> list[str]:
         if len(failed) == len(searched):
             return [f"Every design failed: {failed['status'].iloc[0]}."]
         under = constraints_told(output)
-        return [f"No design meets every constraint{f': {under}' if under else ''}.", *who_else(output)]
+        return [
+            f"No design meets every constraint{f': {under}' if under else ''}.",
+            *unknown_lines(output),
+            *who_else(output),
+        ]
     usable = list(usable_lines(output))
     # Where the question is of noise, separations matter where another CFA begins to lead.
     series = usable + [lead_sentence(s) for s in series_figures(output) if not usable or len(leads_of(s)) > 1]
@@ -57,7 +65,8 @@ def _of_designs(output: Output) -> list[str]:
         return series
     leaders = leaders_of(output)
     lamps = robustness_lines(output, leaders.chosen)
-    return [*_best(output, leaders), *lamps, *lamp_lines(output), *who_else(output), *series]
+    others = _best_of_other_scenarios(output)
+    return [*_best(output, leaders), *others, *lamps, *lamp_lines(output), *who_else(output), *series]
 
 
 def said_separation(output: Output, row: Row) -> str:
@@ -94,19 +103,38 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     yield from _of_least(output, best, plain)
     if filter_told := assumed(output, best):
         yield filter_told
-    search = output.provenance.search
-    proven = None if search is None or not _made(best) else search.limit_proven
     parts = _band(best)
-    if proven is not None and output.goal.name == separation.name:
-        most = separation.told_bound(proven)
-        alike = " and moves like it" if moves_with_light(output, best) else ""
-        parts.append(f"No filter in its place that meets the same{alike} exceeds {most} (proven, before quantization).")
     if lights := _limited(output, best):
         parts.append(f"The two lights that limit it are {lights}.")
+    bound = upper_bound_beside(output, best)
+    if bound is not None:
+        where = f" in {bound.scenario}" if len(output.scenarios) > 1 else ""
+        alike = " that moves like it" if moves_with_light(output, best) else ""
+        same = "the same constraints" if output.constraints else "no constraint"
+        parts.append(
+            f"Upper bound for any filter{alike} in {bound.channel} of {bound.cfa} under {same}{where}: "
+            f"{separation.told_bound(bound.value)} (proven, before quantization)."
+        )
     if parts:
         yield " ".join(parts)
     yield from unseen_lines(output)
     yield from (_best_of_other(output, row) for row in leaders.others)
+
+
+def _best_of_other_scenarios(output: Output) -> Iterator[str]:
+    """Best design of each scenario but the leading one, up to a few; those of a series by its two ends."""
+    inner = {name for members in series_of(output.scenarios).values() for name in list(members)[1:-1]}
+    others = [name for name in output.scenarios if name not in inner and name != output.scenario]
+    for scenario in others[:_MOST_SCENARIOS]:
+        leaders = leaders_of(output, scenario)
+        if leaders.chosen is None:
+            yield f"In {scenario}, no design meets every constraint."
+            continue
+        best = f"{full_name(leaders.chosen)} {said_separation(output, leaders.chosen)}"
+        against = "" if leaders.plain is None else _times(output, leaders.chosen, leaders.plain)
+        yield f"In {scenario}, {best}{against}."
+    if left := len(output.scenarios) - 1 - len(others[:_MOST_SCENARIOS]):
+        yield f"The best of {left} more scenario{'s' if left > 1 else ''}: in the report's table of best designs."
 
 
 def _limited(output: Output, row: Row) -> str:

@@ -37,8 +37,8 @@ CURVE_COLORS = {
     "C": "#555555",
     "W": "#999999",
 }
-TRACED_NAME, LIMIT_NAME = "found by the search", "limit of any filter, unquantized"
-"""What a search found at levels of sensitivity, and what is proven there."""
+TRACED_NAME, BOUND_FILTER_NAME = "found by the search", "filter at the upper bound"
+"""Legend entries: optima of the search at levels of sensitivity; the curve of the filter that attains its bound."""
 TYPE_COLORS = {"green": "#009e73", "yellow": "#c9a800", "orange": "#e66100", "red": "#b2182b"}
 CURVE_CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 _LABEL_BOX = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0}
@@ -64,7 +64,8 @@ class ParetoFigure:
     """CSD against the sensitivity of the modified channel.
 
     `levels`: CFAs without a modified channel, name -> CSD. `traced`: what the search found at each level of
-    sensitivity; `limit`: what no filter exceeds there.
+    sensitivity; `limit`: the upper bound there, `limit_name`: which filters it bounds. `counts`: of the groups, in the
+    whole table.
     """
 
     title: str
@@ -76,6 +77,8 @@ class ParetoFigure:
     levels: Mapping[str, float]
     bound: float | None
     bound_text: str = ""
+    limit_name: str = ""
+    counts: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -120,7 +123,7 @@ def draw_pareto(figure: ParetoFigure) -> Figure:
                 shown.x,
                 shown.y,
                 color=COLORS[group],
-                label=_group_label(group, points),
+                label=_group_label(figure, group),
                 rasterized=True,
                 **styles[group],
             )
@@ -132,7 +135,7 @@ def draw_pareto(figure: ParetoFigure) -> Figure:
         )
     if figure.limit is not None:
         style: dict[str, Any] = {"color": COLORS["limit"], "linestyle": "--", "linewidth": 1.5, "zorder": 4}
-        axes.plot(figure.limit.x, figure.limit.y, label=LIMIT_NAME, drawstyle="steps-post", **style)
+        axes.plot(figure.limit.x, figure.limit.y, label=figure.limit_name, drawstyle="steps-post", **style)
     low, high = axes.get_xlim()
     heights = sorted(figure.levels.items(), key=lambda item: item[1])
     for _, level in heights:
@@ -150,7 +153,7 @@ def draw_pareto(figure: ParetoFigure) -> Figure:
     return figure_
 
 
-def _group_label(group: str, points: Points) -> str:
+def _group_label(figure: ParetoFigure, group: str) -> str:
     text = {
         "infeasible": "does not meet the constraints",
         "feasible": "feasible",
@@ -158,7 +161,7 @@ def _group_label(group: str, points: Points) -> str:
         "best": "best of the search",
         "named": "named designs",
     }[group]
-    return f"{text} ({points.x.size:,})" if group in ("infeasible", "feasible", "front") else text
+    return f"{text} ({figure.counts[group]:,})" if group in figure.counts else text
 
 
 def _level_labels(heights: Sequence[tuple[str, float]], limits: tuple[float, float]) -> list[tuple[str, float]]:

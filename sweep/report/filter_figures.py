@@ -9,7 +9,7 @@ import numpy as np
 from ..base.types import FloatArray
 from ..designs.glass import IN_FRONT
 from ..results.output import Output
-from .figures import LIMIT_NAME, CurvesFigure
+from .figures import BOUND_FILTER_NAME, CurvesFigure
 from .names import label
 from .values import drawn, light_shades, modifications
 
@@ -29,8 +29,8 @@ def filters_figure(output: Output, cfa: str) -> CurvesFigure:
         else:
             curves |= {label(row) + (f", {channel}" if len(made) > 1 else ""): qe for channel, qe in made.items()}
     if cfa in output.curves.limits:
-        curves[LIMIT_NAME] = output.curves.limits[cfa]
-    dashed = (*ends, LIMIT_NAME)
+        curves[BOUND_FILTER_NAME] = output.curves.limits[cfa]
+    dashed = (*ends, BOUND_FILTER_NAME)
     in_front = any(str(family).endswith(IN_FRONT) for family in rows["family"])
     return CurvesFigure(
         f"{cfa}: filters in front of the lens" if in_front else f"{cfa}: modified channel",
@@ -38,7 +38,7 @@ def filters_figure(output: Output, cfa: str) -> CurvesFigure:
         output.curves.wavelength_nm,
         curves,
         dashed,
-        {LIMIT_NAME: "#000000"},
+        {BOUND_FILTER_NAME: "#000000"},
         light_shades(output),
     )
 

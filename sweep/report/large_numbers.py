@@ -17,6 +17,7 @@ from .leaders import Row, leaders_of
 from .names import OF_CLEAR, rate_told
 from .noise import UsableEnds, usable_ends
 from .series import SeriesFigure, leads_of
+from .upper_bound import upper_bound_beside
 from .values import series_figures
 
 
@@ -30,7 +31,7 @@ class LargeNumber:
 
 
 def large_numbers(output: Output) -> list[LargeNumber]:
-    """Separation, light and distance to the limit of the best one; without a limit what it separates for its exposure.
+    """Separation, light and distance to the upper bound of the best one; else what it separates for its exposure.
 
     Over scenarios that differ in one number: who leads first, its light, and up to where. Where the question is of
     noise: how much the one bears that bears most, and its light.
@@ -57,11 +58,11 @@ def large_numbers(output: Output) -> list[LargeNumber]:
             _beside(plain, CFA_SENSITIVITY, float(best[CFA_SENSITIVITY]), "{:.3f}".format),
         ),
     ]
-    search = output.provenance.search
-    if search is not None and search.limit_proven is not None and output.goal.name == separation.name:
-        left = separation.told(max(0.0, search.limit_proven - value))
-        limit = f"{separation.told_bound(search.limit_proven)}: no filter exceeds it before quantization"
-        numbers.append(LargeNumber(left, "below the limit of any filter", limit))
+    bound = upper_bound_beside(output, best)
+    if bound is not None:
+        shown = f"{separation.told_bound(bound.value)}: proven under the same constraints, before quantization"
+        name = f"below the upper bound for any filter in {bound.channel} of {bound.cfa}"
+        numbers.append(LargeNumber(separation.told(bound.value - value), name, shown))
     elif best[measure] == best[measure] and separation.unit != DECADES and separation.metric not in (D_PRIME, CNR):
         rate = float(best[measure])
         beside = _beside(plain, measure, rate, rate_told)

@@ -37,9 +37,8 @@ class Leaders:
 
 
 def leaders_of(output: Output, scenario: str | None = None) -> Leaders:
-    """Who leads in a scenario, by default in that of the best design, or in the first one."""
-    if scenario is None:
-        scenario = str(output.best.iloc[0]["scenario"]) if len(output.best) else output.scenarios[0]
+    """Who leads in a scenario, by default in that of the search, or in the first one."""
+    scenario = output.scenario if scenario is None else scenario
     return output.once(("leaders", scenario), partial(_leaders, output, scenario))
 
 

@@ -13,7 +13,7 @@ OF_CLEAR = "of a clear sensor's light"
 
 def label(row: Mapping[Any, Any]) -> str:
     """A design's name, or its number."""
-    return str(row["name"]) if isinstance(row["name"], str) else f"design {row['design_id']}"
+    return str(row["name"]) if isinstance(row["name"], str) else f"filter {row['filter_id']}"
 
 
 def capital(text: str) -> str:

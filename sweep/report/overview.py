@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
-from .figures import COLORS, LIMIT_NAME, TRACED_NAME, Points, canvas
+from .figures import COLORS, TRACED_NAME, Points, canvas
 from .names import label
+from .upper_bound import limit_name
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,7 +39,7 @@ class OverviewFigure:
 
     `groups`: plain CFAs, named designs, the search's best and the swept front, whose designs meet every constraint
     but, in `outside`, those on its two axes. `traced`: what the search found at each level of sensitivity; `limit`:
-    what no filter exceeds there. The last two are of the CFA that was searched.
+    what no filter exceeds there, named `limit_name`. The last two are of the CFA that was searched.
     """
 
     title: str
@@ -47,6 +48,7 @@ class OverviewFigure:
     groups: dict[str, Points]
     traced: Points | None
     limit: Points | None
+    limit_name: str
 
 
 def overview_figure(output: Output, scenario: str) -> OverviewFigure:
@@ -71,6 +73,7 @@ def around_designs(output: Output, scenario: str) -> OverviewFigure:
         groups={},
         traced=traced,
         limit=limit,
+        limit_name=limit_name(output),
     )
 
 
@@ -109,7 +112,7 @@ def draw_overview(figure: OverviewFigure) -> Figure:
         )
     if figure.limit is not None:
         style: dict[str, Any] = {"color": COLORS["limit"], "linestyle": "--", "linewidth": 1.5, "zorder": 4}
-        axes.plot(figure.limit.x, figure.limit.y, label=LIMIT_NAME, drawstyle="steps-post", **style)
+        axes.plot(figure.limit.x, figure.limit.y, label=figure.limit_name, drawstyle="steps-post", **style)
     low, high = axes.get_xlim()
     axes.set_xlim(min(low, 0.25), max(high, 1.0))
     axes.set_ylim(bottom=0)

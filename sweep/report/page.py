@@ -32,7 +32,6 @@ from .noise import all_series, told_apart_table
 from .overview import draw_overview, overview_figure
 from .page_data import payload
 from .pages import inlined, library, page, rows, script
-from .price import price_drawings
 from .published import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
 from .scenes import effect_table, scene_groups, scene_table
 from .scorecard import draw_scorecard, score_cells, scorecard
@@ -53,7 +52,7 @@ _PICTURES = ("tiles", "sensor", "signals", "chart")
 """Figures that the page shows as pictures; it draws all others itself, but for those of tasks."""
 _MAPS = "places-"
 _OF_TASKS = ("scorecard", "color-noise", "rendered")
-_OF_REGIONS, _OF_PRICE = "regions", "price"
+_OF_REGIONS = "regions"
 
 
 def make_report(output: Output, *, mend: bool = False, parallel: Parallel = in_turn) -> None:
@@ -87,7 +86,7 @@ def _contents(output: Output, some: Iterable[str] | None, parallel: Parallel) ->
     parts = _parts(output, published) if some is None else {}
     for (name, caption, where, _), made in zip(wanted, chain(begun, pictures), strict=True):
         contents |= {f"{where}.{kind}": content for kind, content in made.items()}
-        if some is None and name.startswith((*_PICTURES, *_OF_TASKS, _OF_REGIONS, _OF_PRICE, _MAPS, VISION_FIGURES)):
+        if some is None and name.startswith((*_PICTURES, *_OF_TASKS, _OF_REGIONS, _MAPS, VISION_FIGURES)):
             images.append((name, caption, inlined(made["png"])))
     if len(published):
         contents[PUBLISHED_CSV] = csv_of(published).encode("utf-8")
@@ -101,7 +100,6 @@ def _images(images: Sequence[tuple[str, str, str]]) -> dict[str, list[tuple[str,
     """Pictures by where the page has them: caption and address; `images`: their files' names, too."""
     wheres: dict[str, str | tuple[str, ...]] = {
         "images": _PICTURES,
-        "price_images": _OF_PRICE,
         "lamp_images": _OF_REGIONS,
     }
     wheres |= {"vision_images": VISION_FIGURES, "score_images": _OF_TASKS, "map_images": _MAPS}
@@ -205,7 +203,6 @@ def _drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
         yield "scorecard", f"Every figure relative to {card.names[card.reference]}", partial(draw_scorecard, card)
     yield from map_drawings(output)
     yield from color_drawings(output)
-    yield from price_drawings(output)
     yield from lamp_drawings(output)
     yield "tiles", "Tiles of the CFAs; a hatched pixel is modified", partial(draw_tiles, tiles_figure(output))
     yield "sensor", "Quantum efficiency of the sensor", partial(draw_curves, content.sensor_figure(output))

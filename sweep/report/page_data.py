@@ -42,6 +42,7 @@ def payload(output: Output) -> dict[str, Any]:
         "groups": list(GROUPS),
         "group": _packed(_groups(rows), "u1"),
         "design_id": _packed(rows["design_id"], "f8"),
+        "filter_id": _packed(rows["filter_id"], "f8"),
         "scenario": _words(rows["scenario"]),
         "cfa": _words(rows["cfa"]),
         "names": {str(at): _names(output, row) for at, row in _records(rows, rows["name"].map(_is_word))},
@@ -134,6 +135,7 @@ def _views(output: Output, rows: pd.DataFrame) -> Iterator[dict[str, Any]]:
                 "y_label": figure.y_label,
                 **_lines(figure),
                 "levels": {name: float(level) for name, level in figure.levels.items() if np.isfinite(level)},
+                "counts": dict(figure.counts),
                 "bound": figure.bound,
                 "bound_text": figure.bound_text,
                 "knee": _knee(figure, output, rows[(rows["scenario"] == scenario) & (rows["cfa"] == cfa)]),
@@ -143,7 +145,8 @@ def _views(output: Output, rows: pd.DataFrame) -> Iterator[dict[str, Any]]:
 def _lines(figure: ParetoFigure | OverviewFigure) -> dict[str, Any]:
     """What the search found and the limit, as lists of x and y."""
     both = {"traced": figure.traced, "limit": figure.limit}
-    return {name: None if p is None else [p.x.tolist(), p.y.tolist()] for name, p in both.items()}
+    lines = {name: None if p is None else [p.x.tolist(), p.y.tolist()] for name, p in both.items()}
+    return {**lines, "limit_name": figure.limit_name}
 
 
 def _overview(output: Output, scenario: str) -> dict[str, Any]:
@@ -267,7 +270,7 @@ def _series(series: SeriesFigure) -> dict[str, Any]:
 def _front(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
     """The feasible front, every digit of it, for its file."""
     own = rows[rows["feasible"] & rows["pareto"] & (rows["kind"] == SWEPT)]
-    names = ["design_id", "scenario", "cfa", *_used(own, output.parameters), *output.distances]
+    names = ["filter_id", "scenario", "cfa", *_used(own, output.parameters), *output.distances]
     names += [name for name in dict.fromkeys((*output.light, *output.further)) if name not in names]
     return {"columns": names, "rows": [[_plain(value) for value in row] for row in own[names].itertuples(index=False)]}
 

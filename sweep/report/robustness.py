@@ -12,7 +12,6 @@ from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN
 from .leaders import Row
 from .names import capital, full_name
-from .price import price_lines
 
 
 def over_population(output: Output) -> bool:
@@ -28,7 +27,7 @@ def worst_over(output: Output) -> str:
 
 
 def robustness_lines(output: Output, best: Row | None) -> Iterator[str]:
-    """The price of the worst case, what breaks designs, and yields; nothing without a population of lights.
+    """Cost of the worst case, what breaks designs, and yields; nothing without a population of lights.
 
     In the scenario of the best design, else in the first one.
     """
@@ -38,7 +37,6 @@ def robustness_lines(output: Output, best: Row | None) -> Iterator[str]:
     few: list[Row] = list(output.few[output.few["scenario"] == scenario].to_dict("records"))
     if best is not None and over_population(output):
         yield from _price(output, best, [row for row in few if row["kind"] == NAMED])
-    yield from price_lines(output)
     for row in few:
         if row["kind"] in (NAMED, FOUND) and np.isfinite(row.get("breaks_at", np.nan)):
             yield _breaks(output, row, few)

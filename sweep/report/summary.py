@@ -5,6 +5,7 @@ from __future__ import annotations
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..results.facts import SearchFacts
 from ..results.output import Output
+from ..results.tables import PLAIN
 from ..study.axes import series_of
 from .answer import answer_sentences
 from .assumed import assumed_line
@@ -113,11 +114,15 @@ def _plan_line(output: Output) -> str:
 def counts_line(output: Output) -> str:
     """How many designs there are, and what the report leaves out."""
     counts = output.counts
-    text = f"{_count(counts.rows, 'design')}"
-    if counts.feasible < counts.rows - counts.failed:
-        text += f", {counts.feasible:,} of them feasible (every constraint is met)"
-    if counts.front:
-        text += f", {counts.front:,} of these on the Pareto front of separation and sensitivity"
+    text = _count(output.provenance.filters, "filter")
+    plain = len({*output.kind(PLAIN)["filter_id"]})
+    text += f" ({plain} of them plain CFAs)" if plain else ""
+    if len(output.scenarios) > 1:
+        text += f" in {len(output.scenarios)} scenarios ({_count(counts.rows, 'row')})"
+    if counts.feasible(met=False):
+        text += f", {counts.feasible():,} feasible (every constraint is met)"
+    if counts.front():
+        text += f", {counts.front():,} on the Pareto front of separation and sensitivity"
     if counts.failed:
         text += f", {counts.failed:,} failed"
     drawn = len(drawn_rows(output))
@@ -133,24 +138,28 @@ def _count(number: int, what: str) -> str:
 def _limit_line(output: Output, search: SearchFacts) -> str:
     """The bracket of the limit: what is proven, for which filters and which response."""
     if search.no_limit is not None or search.limit_proven is None:
-        return f"Limit: none computed ({search.no_limit})."
+        return f"Upper bound: none computed ({search.no_limit})."
     proven = output.goal.told_bound(search.limit_proven)
-    gap = "nothing is left to gain" if search.gap is None else f"the search's answer is {100 * search.gap:.1f} % below"
+    gap = (
+        "nothing is left to gain" if search.gap is None else f"the search's answer is {100 * search.gap:.1f} % below it"
+    )
     without = f" but {', '.join(search.limit_left_out)}" if search.limit_left_out else ""
-    proof = f"no filter exceeds {proven} (proven)"
+    proof = f"{proven} (proven)"
     if search.limit_attained is not None:
-        left = f"{max(0.0, search.limit_proven - search.limit_attained):.2g} {output.goal.unit}".rstrip()
-        proof += f" and one comes within {left} of that limit"
+        left = f"{search.limit_proven - search.limit_attained:.2g} {output.goal.unit}".rstrip()
+        proof += f", and one filter comes within {left} of it"
     if search.limit_open_parts:
         programs, parts = search.limit_programs, search.limit_open_parts
-        proof += f", but the limit itself is not proven: {parts} parts are open after {programs} linear programs"
+        proof += f", but it may not be the least one: {parts} parts are open after {programs} linear programs"
     levels = search.front_limits_open
     technology = (output.study.sweeps | output.study.boxes)[search.space].technology
     moved = "" if technology is None else f", as {technology.told}"
     if output.goal.extreme and output.study.production.tolerance and "edge shifts" not in search.limit_left_out:
         moved += ", whose whole shape production moves"
+    where = f"{search.channel} of {search.cfa}{f' in {search.scenario}' if len(output.scenarios) > 1 else ''}"
     return (
-        f"Limit of any filter: {proof}; {gap}. This is for filters between the least transmission and the curve that "
-        f"they replace{moved}, under the same constraints{without}, before clipping and quantization."
-        + (f" At {levels} levels of the front the line is an upper bound, not yet the limit." if levels else "")
+        f"Upper bound of {output.goal.words} for any filter in {where}: {proof}; {gap}. This is for filters between "
+        f"the least transmission and the curve that they replace{moved}, under the same constraints{without}, before "
+        "clipping and quantization."
+        + (f" At {levels} levels of the front it may not be the least one." if levels else "")
     )

@@ -22,10 +22,12 @@ def comparison_table(output: Output) -> pd.DataFrame:
 
 
 def best_table(output: Output, most: int = 12) -> pd.DataFrame:
-    """The best feasible designs with their parameters, the first ones of very many, and what the study asks for."""
+    """Best feasible designs with their parameters: the first ones, or over several scenarios the best of each CFA."""
     ranked = output.best.head(most)
+    if len(output.scenarios) > 1:
+        ranked = output.best.groupby(["scenario", "cfa"], sort=False, observed=True).head(1)
     used = [name for name in output.parameters if ranked[name].nunique() > 1 or len(ranked) == 1]
-    keys = ["design_id", "kind", "cfa", "scenario"]
+    keys = ["filter_id", "kind", "cfa", "scenario"]
     asked = [name for name in (*output.light, *output.further) if name not in _first(output)]
     columns = [
         *keys,

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.quantity import DN, Column
 from ..results.output import Output
+from ..results.tables import FOUND, NAMED, SWEPT
 from .leaders import Row
 from .names import capital
 from .values import modifications
@@ -33,11 +35,24 @@ def missed_told(output: Output, row: Row) -> str:
     parts = list[str]()
     for name, bound in output.constraints.items():
         value = float(row[name])
+        if math.isnan(value):
+            parts.append(f"its {output.words(name)} {'' if parts else 'is '}unknown")
         for side, end, past in (("below", bound.min, -1), ("above", bound.max, 1)):
             if end is not None and past * (value - end) / bound.scale > FEASIBLE:
                 verb = "" if parts else "is "
                 parts.append(f"its {output.words(name)} {verb}{side} {_amount(output.columns.get(name), end)}")
     return " and ".join(parts)
+
+
+def unknown_lines(output: Output) -> Iterator[str]:
+    """Say which constrained quantities designs lack; unknown is not feasible."""
+    rows = output.kind(NAMED, SWEPT, FOUND)
+    rows = rows[rows["status"] == "ok"]
+    for name in output.constraints:
+        unknown = rows[rows[name].isna()]
+        if len(unknown):
+            families = ", ".join(dict.fromkeys(map(str, unknown["family"])))
+            yield f"Designs of {families} have no {output.words(name)}: unknown is not feasible."
 
 
 def _amount(column: Column | None, value: float | None) -> str:

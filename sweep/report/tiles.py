@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from ..camera.mosaic import Mosaic
 from ..results.output import Output
 from .figures import CURVE_COLORS, empty_figure
-from .values import mosaic_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,7 +33,7 @@ def tiles_figure(output: Output) -> TilesFigure:
     for entry in (*study.designs.values(), *study.sweeps.values(), *study.boxes.values()):
         if entry.base is not None:
             modified.setdefault(entry.cfa, {}).update(dict.fromkeys(entry.channel, entry.base))
-    return TilesFigure({name: mosaic_of(output, name) for name in names}, modified)
+    return TilesFigure({name: output.mosaic(name) for name in names}, modified)
 
 
 def draw_tiles(tiles: TilesFigure) -> Figure:

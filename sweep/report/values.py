@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..camera.mosaic import Mosaic
 from ..curves.color import display_colors
 from ..metrics.limiting import BETWEEN, limited_by_name
 from ..metrics.quantity import Column
@@ -21,6 +20,7 @@ from .figures import TYPE_COLORS, CurvesFigure, ParetoFigure, Points
 from .names import label
 from .series import Line, SeriesFigure
 from .signal_figures import ChartFigure, Cloud
+from .upper_bound import bounds_figure, limit_name
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,6 +59,12 @@ def pareto_figure(output: Output, scenario: str, cfa: str) -> ParetoFigure:
         levels=dict(zip(references["cfa"], references[separation.name], strict=True)),
         bound=least,
         bound_text="" if least is None else f"{sensitivity.words} at least {least:g}",
+        limit_name=limit_name(output),
+        counts={
+            "infeasible": output.counts.feasible(scenario, cfa, met=False),
+            "feasible": output.counts.feasible(scenario, cfa),
+            "front": output.counts.front(scenario, cfa),
+        },
     )
 
 
@@ -71,12 +77,10 @@ def _whole_words(output: Output, column: Column) -> str:
 def _trade_offs(output: Output, scenario: str, cfa: str) -> tuple[Points | None, Points | None]:
     """What the search traced, and the limit, where the search is of this CFA and scenario."""
     search = output.provenance.search
-    if output.front is None or search is None or search.scenario != scenario:
-        return None, None
-    if cfa not in set(output.kind(FOUND)["cfa"]):
+    if output.front is None or search is None or (search.scenario, search.cfa) != (scenario, cfa):
         return None, None
     traced = output.front.dropna(subset=["objective"])
-    bounded = output.front.dropna(subset=["limit"])
+    bounded = output.front.dropna(subset=["limit"]) if bounds_figure(output, scenario, cfa) else output.front[:0]
     limit = Points(bounded["sensitivity_min"].to_numpy(), bounded["limit"].to_numpy()) if len(bounded) else None
     return Points(traced["sensitivity"].to_numpy(), traced["objective"].to_numpy()), limit
 
@@ -210,16 +214,10 @@ def _cloud(points: pd.DataFrame, title: str, first: str, other: str, near: Neare
     return Cloud(title, f"{first} / DN", f"{other} / DN", types, nearest)
 
 
-def mosaic_of(output: Output, cfa: str) -> Mosaic:
-    """The tile of a CFA of the study."""
-    tile = output.study.cfas[cfa].tile
-    return Mosaic.from_name(cfa) if tile is None else Mosaic.from_rows(cfa, tile)
-
-
 def channel_curves(output: Output, cfa: str) -> list[str]:
     """Names of the sensor's curves that a CFA's channels have; a modified channel has none."""
     renamed = output.study.cfas[cfa].curves
-    names = (renamed.get(channel, channel) for channel in mosaic_of(output, cfa).channels)
+    names = (renamed.get(channel, channel) for channel in output.mosaic(cfa).channels)
     return [name for name in dict.fromkeys(names) if name in output.curves.sensor]
 
 

@@ -18,7 +18,7 @@ _MOST_SHOWN = 10
 
 
 def find_row(output: Output, key: str) -> Mapping[Any, Any]:
-    """The row of a name, of a design_id or of `best`; of a name that occurs in several scenarios the first.
+    """Return the row of a name, of a filter_id or of `best`; of one that occurs in several scenarios the first.
 
     Raises SweepError, with the nearest name, when there is none or when its design failed.
     """
@@ -30,12 +30,12 @@ def find_row(output: Output, key: str) -> Mapping[Any, Any]:
         row: dict[Any, Any] = output.best.iloc[0].to_dict()
     elif len(named):
         row = named.iloc[0].to_dict()
-    elif key.isascii() and key.isdecimal() and int(key) < output.counts.rows:
+    elif key.isascii() and key.isdecimal() and int(key) < output.provenance.filters:
         row = _streamed(output.folder / RESULTS, int(key))
     else:
         names = list(dict.fromkeys(map(str, table["name"].dropna())))
         shown = [*names[:_MOST_SHOWN], *(["..."] if len(names) > _MOST_SHOWN else [])]
-        allowed = f"{BEST}, a name ({', '.join(shown)}), or a design_id from 0 to {output.counts.rows - 1:,}"
+        allowed = f"{BEST}, a name ({', '.join(shown)}), or a filter_id from 0 to {output.provenance.filters - 1:,}"
         near = nearest(key, [*names, BEST])
         raise SweepError(Fault("no such design", str(output.folder), None, "--design", key, allowed, near))
     if row["status"] != "ok":
@@ -43,10 +43,10 @@ def find_row(output: Output, key: str) -> Mapping[Any, Any]:
     return row
 
 
-def _streamed(path: Path, design_id: int) -> dict[str, Any]:
-    """A row by its id, a row group in memory."""
+def _streamed(path: Path, filter_id: int) -> dict[str, Any]:
+    """Return the first row of a filter, a row group in memory."""
     for table in batches(path):
-        found = table.filter(pc.equal(table["design_id"], pa.scalar(design_id)))
+        found = table.filter(pc.equal(table["filter_id"], pa.scalar(filter_id)))
         if found.num_rows:
             return dict(found.to_pylist()[0])
-    raise OutputError(Fault("has too few rows", str(path), None, "design_id", design_id))
+    raise OutputError(Fault("has too few rows", str(path), None, "filter_id", filter_id))

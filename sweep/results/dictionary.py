@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from typing import get_args
 
+import pyarrow as pa
+
 from ..curves.tasks import Measure, TaskName
-from ..metrics.quantity import DN, Asked
+from ..metrics.quantity import DN, Asked, Column
 from ..metrics.registry import listed
 from .curves import SCHEMA
 from .names import FIGURES, REPORT, RUN, SUMS
-from .price import price_schema
 from .tables import (
     AUDIT,
     CROSSINGS,
@@ -18,7 +21,6 @@ from .tables import (
     LEFT_OUT,
     LIMITED_BY,
     POINTS,
-    PRICE,
     PROVENANCE,
     RECOGNITION,
     REGIONS_MAP,
@@ -39,19 +41,21 @@ from .tables import (
 from .thinning import MOST_POINTS
 
 _KEYS = {
+    ("design_id",): "number of the row: a filter in a scenario",
+    ("filter_id",): "number of the filter, the same in every scenario and table of the study",
     (
-        "design_id",
         "kind",
-        "name",
-        "cfa",
-        "family",
-        "scenario",
-    ): "which design in which scene: a plain CFA "
-    "(`reference`), a named design, one that was swept, or the search's answer",
+    ): "a plain CFA (`reference`), a named design (`design`), a swept one (`sweep`), the search's answer (`search`)",
+    ("name",): "name of a plain CFA, a named design or the search's answer",
+    ("space",): "name of the sweep, box, design or CFA of the study that the filter belongs to",
+    ("cfa", "family", "scenario"): "CFA, filter family and scenario",
     ("left_nm, ...",): "parameters of the families, unit in the name",
 }
 _VERDICTS = {
-    ("feasible", "violation"): "whether all constraints are met, and the largest relative violation",
+    ("feasible",): "whether all constraints are met; a design with an unknown constrained quantity is not feasible",
+    (
+        "violation",
+    ): "largest violation of a constraint, relative to its bound; null where a constrained quantity is unknown",
     ("objective",): "the study's objective, where it is of several quantities",
     ("limit", "gap"): "of the search's answer: what no filter exceeds (between the least transmission and the replaced "
     "curve, same constraints, before clipping and quantization; a design may read a little more after rounding), and "
@@ -83,6 +87,27 @@ _OWN = (
 )
 KEYS = tuple(name for names in (*_KEYS, *_VERDICTS) for name in names)
 """Columns that are no quantities of a metric."""
+
+
+def described(schema: pa.Schema, columns: Mapping[str, Column]) -> pa.Schema:
+    """Return a schema whose fields carry `unit` and `meaning`, which pandas reads as `DataFrame.attrs`.
+
+    `columns`: the quantities of a study by name.
+    """
+    meanings = {name: text for names, text in (_KEYS | _VERDICTS).items() for name in names}
+    meanings |= {name: column.meaning for name, column in columns.items()}
+    units = {name: column.unit for name, column in columns.items()}
+    known = [name for name in schema.names if name in meanings]
+    attrs = {
+        kind: {n: words[n] for n in known if n in words} for kind, words in (("units", units), ("meanings", meanings))
+    }
+    fields = [
+        field.with_metadata({"unit": units.get(field.name, ""), "meaning": meanings[field.name]})
+        if field.name in meanings
+        else field
+        for field in schema
+    ]
+    return pa.schema(fields, {**(schema.metadata or {}), b"PANDAS_ATTRS": json.dumps(attrs).encode()})
 
 
 def columns_table() -> list[str]:
@@ -123,11 +148,6 @@ FILES = {
     SEARCH_LOG: "every evaluation of the search and of its front: " + ", ".join(search_schema(["<parameters>"]).names),
     FRONT: "what the search found at each level of sensitivity, and the limit there; between two levels rows with the "
     "limit alone: " + ", ".join(front_schema(["<parameters>"]).names),
-    PRICE: "where a search asks for `nominal_levels` of an objective that is a worst case: the search's answer, the "
-    "filter with the largest worst case that the search finds at each nominal level, and the one with the most "
-    "nominally that it finds; then, with a `front`, at each of its levels (`sensitivity_min`) what it finds with the "
-    "largest worst case and with the most nominally; all before clipping and rounding: "
-    + ", ".join(price_schema(["<parameters>"]).names),
     CURVES: "a row per curve and wavelength: " + ", ".join(SCHEMA.names),
     POINTS: "what the clouds draw: design_id, signal_type, signal, channel, dn",
     RECOGNITION: "raw patches told apart by classifiers, where a study asks for them, with 95 % intervals",

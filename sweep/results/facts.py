@@ -56,11 +56,18 @@ class PlanFacts(_Facts):
 
 
 class SearchFacts(_Facts):
-    """A search in figures; see `search.limit.Limit` for those of the limit."""
+    """A search in figures; see `search.limit.Limit` for those of the limit.
+
+    `cfa`, `channel`: what was searched in. `bounded`: kind and name of the spaces whose feasible filters the limit
+    holds for, in the search's scenario.
+    """
 
     algorithm: str
     scenario: str
     space: str
+    cfa: str
+    channel: str
+    bounded: tuple[str, ...]
     starts: int
     evaluations: int
     endings: tuple[str, ...]
@@ -97,6 +104,7 @@ class Provenance(_Facts):
     scheduler: str | None
     workers: int
     threads_per_worker: int
+    filters: int
     designs: int
     failed: int
     plans: dict[str, PlanFacts]

@@ -12,7 +12,6 @@ from .tables import (
     LEFT_OUT,
     LIMITED_BY,
     POINTS,
-    PRICE,
     PROVENANCE,
     RECOGNITION,
     REGIONS_MAP,
@@ -33,7 +32,6 @@ TABLES = (
     RESULTS,
     SEARCH_LOG,
     FRONT,
-    PRICE,
     CURVES,
     POINTS,
     LIMITED_BY,
@@ -53,7 +51,7 @@ MADE_BY_RUN = frozenset((*TABLES, RESOLVED, PROVENANCE))
 _DRAWN = re.compile(
     r"report\.html|cfas\.(png|svg)|pareto(-\d+)?\.(png|svg)|paper_comparison\.(csv|parquet)"
     r"|figures/((filters|series|places)-\d+|tiles|sensor|signals|chart|scorecard|(color-noise|rendered)-\d+"
-    r"|price(-light)?|regions-\d+|clouds-(cfas|designs)|vision-(errors|ranks|misread))\.(png|svg)"
+    r"|regions-\d+|clouds-(cfas|designs)|vision-(errors|ranks|misread))\.(png|svg)"
 )
 
 

@@ -13,6 +13,7 @@ from ruamel.yaml import YAML
 
 from ..base.errors import Fault, OutputError
 from ..base.types import IndexArray
+from ..camera.mosaic import Mosaic
 from ..metrics.bound import Bound
 from ..metrics.objective import Objective
 from ..metrics.quantity import Column
@@ -35,7 +36,6 @@ from .tables import (
     NAMED,
     PLAIN,
     POINTS,
-    PRICE,
     PROVENANCE,
     RECOGNITION,
     REGIONS_MAP,
@@ -61,7 +61,6 @@ if TYPE_CHECKING:
 _Made = TypeVar("_Made")
 _OPTIONAL = (
     FRONT,
-    PRICE,
     CROSSINGS,
     RECOGNITION,
     SEARCH_LOG,
@@ -86,10 +85,9 @@ class Output:
 
     `study`: the study that was run, and `resolved` its file. `profiles`: over the whole table, per CFA; none where a
     sweep is no grid. `swept_points`: ids of the swept designs that figures show as points. `searched`: the search's
-    evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per
-    light that was left out of a search; `price`: the largest worst case at each nominal level; `regions`: cells of the
-    maps of color regions. `traded`: color error against noise, `rendered`: areas of pictures; `places`: separations
-    over the sensor; `vision`: tables of the benchmark of vision by their files' names.
+    evaluations. `audited`: rows of `sweep audit`; `left_out`: a row per light that was left out of a search; `regions`:
+    cells of the maps of color regions. `traded`: color error against noise, `rendered`: areas of pictures; `places`:
+    separations over the sensor; `vision`: tables of the benchmark of vision by their files' names.
     """
 
     folder: Path
@@ -107,7 +105,6 @@ class Output:
     searched: pd.DataFrame | None
     audited: pd.DataFrame | None
     left_out: pd.DataFrame | None
-    price: pd.DataFrame | None
     regions: pd.DataFrame | None
     traded: pd.DataFrame | None
     rendered: pd.DataFrame | None
@@ -187,11 +184,26 @@ class Output:
         """Columns that say which design is best, the first one first, all maximized."""
         return (self.objective.column, *self.provenance.trade_off)
 
+    @property
+    def scenario(self) -> str:
+        """Scenario that answers lead with: the search's, else the first one."""
+        search = self.provenance.search
+        return self.scenarios[0] if search is None else search.scenario
+
     @cached_property
     def best(self) -> pd.DataFrame:
-        """Feasible swept and searched designs, best first."""
+        """Feasible swept and searched designs, best first; those of the leading scenario before all others."""
         candidates = self.table[self.table["feasible"] & self.table["kind"].isin([SWEPT, FOUND])]
-        return candidates.sort_values([*self.order, "design_id"], ascending=[False] * 3 + [True])
+        leading = (candidates["scenario"] == self.scenario).rename("leading")
+        keys = ["leading", *self.order, "design_id"]
+        return (
+            candidates.assign(leading=leading).sort_values(keys, ascending=[False] * 4 + [True]).drop(columns="leading")
+        )
+
+    def mosaic(self, cfa: str) -> Mosaic:
+        """Return the mosaic of a CFA of the study."""
+        tile = self.study.cfas[cfa].tile
+        return Mosaic.from_name(cfa) if tile is None else Mosaic.from_rows(cfa, tile)
 
     def kind(self, *kinds: str) -> pd.DataFrame:
         """Rows of some kinds: see `tables.PLAIN` and what stands beside it."""
@@ -259,7 +271,6 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
         searched=more.get(SEARCH_LOG),
         audited=more.get(AUDIT),
         left_out=more.get(LEFT_OUT),
-        price=more.get(PRICE),
         regions=more.get(REGIONS_MAP),
         traded=more.get(TRADED),
         rendered=more.get(RENDERED),
@@ -272,7 +283,8 @@ def read_output(folder: Path, *, audited: bool = True) -> Output:
 def _joined(table: pd.DataFrame, *others: pd.DataFrame | None) -> pd.DataFrame:
     """The table with what other tables say of its designs."""
     for other in others:
-        table = table if other is None else table.merge(other, on="design_id", how="left")
+        if other is not None:
+            table = table.merge(other.drop(columns="filter_id", errors="ignore"), on="design_id", how="left")
     return table
 
 

@@ -29,7 +29,6 @@ RECOGNITION = "recognition.parquet"
 CROSSINGS = "crossings.parquet"
 LIMITED_BY = "limited_by.parquet"
 ROBUSTNESS = "robustness.parquet"
-PRICE = "price.parquet"
 REGIONS_MAP = "regions.parquet"
 SENSOR_MAP = "sensor_map.parquet"
 TRADED, RENDERED = "color_noise.parquet", "rendered.parquet"
@@ -49,7 +48,8 @@ _ROWS_AT_ONCE = 65_536
 _TEXT = pa.dictionary(pa.int32(), pa.string())
 _KEYS = (
     pa.field("design_id", pa.int64(), nullable=False),
-    *(pa.field(name, _TEXT) for name in ("kind", "name", "cfa", "family", "scenario")),
+    pa.field("filter_id", pa.int64(), nullable=False),
+    *(pa.field(name, _TEXT) for name in ("kind", "name", "space", "cfa", "family", "scenario")),
 )
 _VERDICTS = (
     *(pa.field(name, pa.float64()) for name in ("violation", "limit", "gap")),
@@ -175,7 +175,10 @@ def _encodings(schema: pa.Schema) -> dict[str, Any]:
     if _PARAMETERS.encode() not in (schema.metadata or {}):
         return {}
     words = [field.name for field in schema if pa.types.is_dictionary(field.type)]
-    return {"use_dictionary": words, "column_encoding": {"design_id": "DELTA_BINARY_PACKED"}}
+    return {
+        "use_dictionary": words,
+        "column_encoding": dict.fromkeys(("design_id", "filter_id"), "DELTA_BINARY_PACKED"),
+    }
 
 
 def batches(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:

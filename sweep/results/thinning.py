@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +17,7 @@ from ..base.errors import Fault, OutputError
 from ..base.types import BoolArray, IndexArray
 from ..metrics.columns.exposure import EXPOSURE
 from .arrays import places, values_of
-from .tables import SWEPT, batches, holds, release_memory
+from .tables import PLAIN, SWEPT, batches, holds, release_memory
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,12 +33,48 @@ _NOT_SWEPT, _INFEASIBLE, _FEASIBLE, _ON_FRONT = range(4)
 
 @dataclass(frozen=True)
 class Counts:
-    """Rows of the whole table: all, feasible, feasible and on the Pareto front, failed."""
+    """Rows of the whole table, counted by (kind, scenario, CFA, ok, feasible, pareto).
 
-    rows: int
-    feasible: int
-    front: int
-    failed: int
+    Plain CFAs are no designs: they count among the rows alone.
+    """
+
+    groups: Mapping[tuple[str, str, str, bool, bool, bool], int]
+
+    @property
+    def rows(self) -> int:
+        """All rows."""
+        return sum(self.groups.values())
+
+    @property
+    def failed(self) -> int:
+        """Rows that could not be computed."""
+        return sum(n for (_, _, _, ok, _, _), n in self.groups.items() if not ok)
+
+    def feasible(self, scenario: str | None = None, cfa: str | None = None, *, met: bool = True) -> int:
+        """Return the number of designs that meet all constraints, or do not, in a scenario and a CFA, or in all."""
+        return sum(n for _, n in self._designs(scenario, cfa, met))
+
+    def front(self, scenario: str | None = None, cfa: str | None = None) -> int:
+        """Return the number of feasible designs on the Pareto front."""
+        return sum(n for pareto, n in self._designs(scenario, cfa, met=True) if pareto)
+
+    def _designs(self, scenario: str | None, cfa: str | None, met: bool) -> Iterator[tuple[bool, int]]:
+        for (kind, own_scenario, own_cfa, ok, feasible, pareto), n in self.groups.items():
+            if kind != PLAIN and ok and feasible == met and scenario in (None, own_scenario) and cfa in (None, own_cfa):
+                yield pareto, n
+
+
+def _counted(table: pa.Table) -> Counter[tuple[str, str, str, bool, bool, bool]]:
+    """Count the rows of a row group."""
+    named = {name: table[name].cast(pa.string()) for name in ("kind", "scenario", "cfa")}
+    flags = {
+        "ok": pc.equal(table["status"].cast(pa.string()), "ok"),
+        "feasible": table["feasible"],
+        "pareto": table["pareto"],
+    }
+    columns = named | flags
+    grouped = pa.table(columns).group_by(list(columns)).aggregate([([], "count_all")])
+    return Counter({tuple(row[name] for name in columns): row["count_all"] for row in grouped.to_pylist()})
 
 
 def per_exposure(separation: str) -> str:
@@ -94,13 +131,11 @@ def thinned(
     every = max(1, -(-total // MOST_ROWS))
     kept: list[pa.Table] = []
     best: pa.Table | None = None
-    feasible = front = failed = 0
+    counted: Counter[tuple[str, str, str, bool, bool, bool]] = Counter()
     for table in batches(path):
         see(table)
         ok, on_front = table["feasible"].to_numpy(), table["pareto"].to_numpy()
-        feasible += int(ok.sum())
-        front += int((ok & on_front).sum())
-        failed += int((~holds(table, "status", "ok")).sum())
+        counted += _counted(table)
         always = ~holds(table, "kind", SWEPT) | on_front
         ids = table["design_id"].to_numpy()
         kept.append(table.filter(pa.array(always | (ids % every == 0) | np.isin(ids, keep))))
@@ -114,7 +149,7 @@ def thinned(
     frame: pd.DataFrame = pa.concat_tables(kept).unify_dictionaries().to_pandas()
     frame = frame.drop_duplicates("design_id").sort_values("design_id", ignore_index=True)
     frame[per_exposure(separation)] = frame[separation] / (frame[EXPOSURE] * _MS)
-    return frame, Counts(total, feasible, front, failed)
+    return frame, Counts(counted)
 
 
 def best_at(table: pa.Table, order: Sequence[str], most: int, among: BoolArray | None = None) -> IndexArray:

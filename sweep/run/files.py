@@ -19,6 +19,7 @@ from ..base.errors import BrokenProofError
 from ..base.types import Progress
 from ..metrics.bound import FEASIBLE
 from ..metrics.pareto import hypervolume
+from ..results.dictionary import described
 from ..results.facts import Provenance
 from ..results.inventory import Inventory
 from ..results.joined import RowsPart, joining
@@ -27,7 +28,6 @@ from ..results.names import TABLES
 from ..results.tables import (
     FRONT,
     LEFT_OUT,
-    PRICE,
     PROVENANCE,
     RESOLVED,
     RESULTS,
@@ -53,7 +53,6 @@ from .search import (
     answer_row,
     front_table,
     limit_alone,
-    price_table,
     run_search,
     search_facts,
     search_log,
@@ -68,7 +67,6 @@ def files_of(study: Study) -> set[str]:
     names = {RESULTS, RESOLVED, PROVENANCE, *(name for name, table in ROW_TABLES.items() if table.asked(study))}
     if study.search is not None:
         names |= {SEARCH_LOG, FRONT} if study.search.levels else {SEARCH_LOG}
-        names |= {PRICE} if study.search.nominal_levels else set()
     names |= {LEFT_OUT} if study.leaves_one_out else set()
     return names | ({*VISION_TABLES} if study.section.vision is not None else set())
 
@@ -108,7 +106,7 @@ class Making:
         while todo:
             if RESULTS in todo:
                 self._sweep()
-            if todo & {SEARCH_LOG, FRONT, PRICE, LEFT_OUT}:
+            if todo & {SEARCH_LOG, FRONT, LEFT_OUT}:
                 self._wait_for_table()
                 self._write_search(todo)
             if todo & ROW_TABLES.keys():
@@ -202,15 +200,13 @@ class Making:
     def _write_search(self, names: set[str]) -> None:
         assert self.answer is not None
         if SEARCH_LOG in names:
-            self.inventory.write_table(SEARCH_LOG, search_log(self.answer))
+            self._write(SEARCH_LOG, search_log(self.answer))
         if FRONT in names:
-            self.inventory.write_table(FRONT, front_table(self.study, self.answer))
-        if PRICE in names:
-            self.inventory.write_table(PRICE, price_table(self.answer))
+            self._write(FRONT, front_table(self.study, self.answer))
         if LEFT_OUT in names:
             kept = self._kept("left out")
             given = self.study, self.answer.search, self.answer.best, kept, self.progress
-            self.inventory.write_table(LEFT_OUT, left_out_table(*given))
+            self._write(LEFT_OUT, left_out_table(*given))
 
     def _write_of_rows(self, names: set[str]) -> None:
         points = partial(swept_points, self.inventory.path(RESULTS))
@@ -222,7 +218,16 @@ class Making:
             if name in names:
                 made = table.made(shown)
                 self._wait_for_table()
-                self.inventory.write_table(name, made)
+                self._write(name, made)
+
+    def _write(self, name: str, table: pa.Table) -> None:
+        """Write a table with the filter's number beside each design's, and with units and meanings."""
+        if "design_id" in table.column_names and "filter_id" not in table.column_names:
+            ids = table["design_id"].to_numpy(zero_copy_only=False)
+            filters = np.where(ids == self.study.n_designs, self.study.n_filters, ids % self.study.n_filters)
+            at = table.column_names.index("design_id") + 1
+            table = table.add_column(at, "filter_id", pa.array(filters, pa.int64(), from_pandas=True))
+        self.inventory.write_table(name, table.cast(described(table.schema, self.study.quantities)))
 
     def _kept(self, what: str) -> Kept:
         """Calls whose results the journal keeps."""
@@ -234,7 +239,7 @@ class Making:
         parallel = self._kept("vision")
         tables = vision_tables(self.study, self.gathered.frame(), parallel, self.progress)
         for name in names & tables.keys():
-            self.inventory.write_table(name, tables[name])
+            self._write(name, tables[name])
 
     def _limit(self) -> Limit | None:
         """The search's limit, found alone where the search itself need not be repeated."""
@@ -245,6 +250,7 @@ class Making:
     def _provenance(self) -> Provenance:
         study, gathered, answer = self.study, self.gathered, self.answer
         found: dict[str, Any] = {
+            "filters": study.n_filters + (answer is not None),
             "designs": study.n_designs + (answer is not None),
             "failed": self._failed,
             "plans": plan_facts(study),

@@ -14,10 +14,10 @@ from ..camera.imager import imager_of
 from ..camera.view import View
 from ..curves.lights import Lights, class_pairs
 from ..metrics.evaluate import evaluate
-from ..metrics.quantity import HELD_OUT
+from ..metrics.objective import Objective
+from ..metrics.quantity import HELD_OUT, WORST_CASE
 from ..metrics.separation import csd_name
 from ..results.designs import row_curves
-from ..search.price import best_nominal, has_nominal, nominal_problem
 from ..search.problem import Evaluation, Problem, best_feasible, starting_points
 from ..search.solver import search_from, smooth_objective
 from ..search.trade_off import Effort
@@ -77,8 +77,13 @@ def left_out_table(study: Study, search: Search, best: Evaluation, parallel: Par
     effort = Effort(search.algorithm, points, max(1, search.max_evaluations // LEFT_OUT_STARTS), seed)
     optima: list[tuple[Problem, Evaluation]] = [(problem, best)]
     if has_nominal(problem):
-        nominal = best_nominal(problem, best, effort, parallel)
-        optima += [] if nominal is None else [(nominal_problem(problem), nominal)]
+        nominal = _nominal_problem(problem)
+        calls = [
+            delayed(search_from, nominal, i, u, effort.algorithm, effort.evaluations, seed)
+            for i, u in enumerate([problem.to_unit(best.x), *points])
+        ]
+        optimum = best_feasible([e for run in parallel(calls) for e in run.log])
+        optima += [] if optimum is None else [(nominal, optimum)]
     tasks = []
     rows: list[dict[str, Any]] = []
     for asked, optimum in optima:
@@ -92,6 +97,18 @@ def left_out_table(study: Study, search: Search, best: Evaluation, parallel: Par
         progress("lights left out", done, len(rows))
     fields = [(name, pa.string()) for name in ("objective", "signal_type", "signal")]
     return pa.Table.from_pylist(rows, schema=pa.schema([*fields, *((name, pa.float64()) for name in _FIGURES)]))
+
+
+def has_nominal(problem: Problem) -> bool:
+    """Return whether the objective is a single worst case."""
+    quantity = problem.quantities.get(problem.objective.column)
+    return quantity is not None and quantity.extreme == WORST_CASE
+
+
+def _nominal_problem(problem: Problem) -> Problem:
+    """Problem whose objective is the quantity without production tolerances, in place of its worst case."""
+    of = problem.quantities[problem.objective.column].of
+    return replace(problem, objective=Objective(minimum={of: 1.0}))
 
 
 def left_out_signals(problem: Problem) -> list[int]:

@@ -20,6 +20,7 @@ from ..designs.space import Space
 from ..metrics.bound import FEASIBLE, Bound, total_violation
 from ..metrics.pareto import non_dominated
 from ..results.arrays import flags, numbers, places, words
+from ..results.dictionary import described
 from ..results.identity import CHUNK
 from ..results.tables import holds, result_schema
 from ..study import Study
@@ -35,13 +36,17 @@ _DETOURS = b"cfa_sweep_detours"
 
 @dataclass(frozen=True)
 class Job:
-    """A run of consecutive designs of one space in one scenario; `first_id` is the row id of its first design."""
+    """A run of consecutive designs of one space in one scenario.
+
+    `first_id`: the row id of its first design; `first_filter`: the number of its filter, the same in every scenario.
+    """
 
     space: Space
     scenario: str
     start: int
     stop: int
     first_id: int
+    first_filter: int = 0
 
 
 @dataclass(frozen=True)
@@ -67,11 +72,14 @@ def jobs_of(study: Study) -> Iterator[Job]:
     """All jobs in the order of their rows."""
     first_id = 0
     for scenario in study.scenarios:
+        first_filter = 0
         for space in study.spaces:
             size = _job_size(study, space)
             for start in range(0, space.size, size):
-                yield Job(space, scenario, start, min(start + size, space.size), first_id + start)
+                stop = min(start + size, space.size)
+                yield Job(space, scenario, start, stop, first_id + start, first_filter + start)
             first_id += space.size
+            first_filter += space.size
 
 
 def _job_size(study: Study, space: Space) -> int:
@@ -155,7 +163,7 @@ def failed_rows(job: Job, rules: Rules, status: str) -> pa.Table:
 
 def rules_of(study: Study) -> Rules:
     """The rules of a study."""
-    schema = result_schema(study.parameters, list(study.quantities))
+    schema = described(result_schema(study.parameters, list(study.quantities)), study.quantities)
     section = study.section
     drawn = section.recognition is not None and bool(section.recognition.patches)
     request = Request(study.asked, study.objective, study.tolerance, section.vision, section.seed, drawn)
@@ -200,8 +208,10 @@ def _labels(job: Job) -> dict[str, Any]:
     n, space = job.stop - job.start, job.space
     return {
         "design_id": np.arange(job.first_id, job.first_id + n),
+        "filter_id": np.arange(job.first_filter, job.first_filter + n),
         "kind": _word(space.kind, n),
         "name": _word(None if space.kind == "sweep" else space.name, n),
+        "space": _word(space.name, n),
         "cfa": _word(space.cfa, n),
         "family": _word("none" if space.filter is None else space.filter.family.kind, n),
         "scenario": _word(job.scenario, n),

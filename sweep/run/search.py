@@ -15,10 +15,9 @@ from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..designs.space import Space
 from ..metrics.bound import FEASIBLE
 from ..metrics.columns.sensitivity import cfa_sensitivity_at
-from ..results.price import price_schema
 from ..results.tables import front_schema, search_schema
+from ..search.certificate import ROUNDING
 from ..search.limit import Limit, limit_of, why_not
-from ..search.price import PricePoint, price_of_light, worst_case_price
 from ..search.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
 from ..search.solver import best_reachable, search_from
 from ..search.trade_off import Effort, FrontPoint, calls_at_levels, check_proof, gap_of, trade_off
@@ -38,7 +37,6 @@ class SearchAnswer:
     limit: Limit | None
     no_limit: str | None
     front: tuple[FrontPoint, ...]
-    price: tuple[PricePoint, ...] = ()
 
     @property
     def gap(self) -> float | None:
@@ -73,11 +71,7 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     limit = next(answers) if limited else None
     check_proof(best, limit)
     front = trade_off(problem, search.levels, effort, answers, parallel, progress, limited=limited)
-    price: tuple[PricePoint, ...] = ()
-    if search.nominal_levels:
-        price = worst_case_price(problem, best, limit, search.nominal_levels, effort, parallel, progress)
-        price += price_of_light(problem, front, effort, parallel, progress)
-    return SearchAnswer(search, tuple(runs), best, limit, no_limit, front, price)
+    return SearchAnswer(search, tuple(runs), best, limit, no_limit, front)
 
 
 def limit_alone(study: Study, search: Search) -> Limit | None:
@@ -103,13 +97,15 @@ def answer_row(study: Study, answer: SearchAnswer, rules: Rules, parallel: Paral
     assert space.filter is not None
     name = f"best {kind_in_words(space.filter.family.kind)}"
     found = Space("search", name, space.cfa, space.filter, axes)
-    job = Job(found, answer.search.scenario, 0, 1, study.n_designs)
+    job = Job(found, answer.search.scenario, 0, 1, study.n_designs, study.n_filters)
     # Workers have loaded what this takes, and this process has not.
     (row,) = parallel([delayed(run_job, job, study.view(found, job.scenario), rules)])
+    values: dict[str, Any] = {"space": space.name}
     if answer.limit is not None:
-        for name, value in (("limit", answer.limit.proven), ("gap", answer.gap)):
-            index = row.schema.get_field_index(name)
-            row = row.set_column(index, row.schema.field(name), pa.array([value], type=pa.float64()))
+        values |= {"limit": answer.limit.proven, "gap": answer.gap}
+    for name, value in values.items():
+        index, kind = row.schema.get_field_index(name), row.schema.field(name)
+        row = row.set_column(index, kind, pa.array([value]).cast(kind.type))
     return row
 
 
@@ -119,6 +115,9 @@ def search_facts(study: Study, answer: SearchAnswer) -> dict[str, Any]:
         "algorithm": answer.search.algorithm,
         "scenario": answer.search.scenario,
         "space": answer.search.space.name,
+        "cfa": answer.search.space.cfa,
+        "channel": " and ".join(answer.search.space.filter.channels) if answer.search.space.filter else "",
+        "bounded": [] if answer.limit is None else bounded_spaces(study, answer.search),
         "starts": len(answer.runs),
         "evaluations": sum(len(run.log) for run in answer.runs),
         "endings": [run.status for run in answer.runs],
@@ -135,6 +134,30 @@ def search_facts(study: Study, answer: SearchAnswer) -> dict[str, Any]:
         "no_limit": answer.no_limit,
         "front_evaluations": sum(len(run.log) for point in answer.front for run in point.runs),
     }
+
+
+def bounded_spaces(study: Study, search: Search) -> list[str]:
+    """Kinds and names of the spaces whose feasible filters the search's upper bound holds for, in its scenario.
+
+    They are in the same channel of the same CFA, replace the same curve, which they nowhere exceed, and are of the same
+    technology.
+    """
+    searched = search.space.filter
+    assert searched is not None
+    names = [f"search {search.space.name}"]
+    for space in study.spaces:
+        made = space.filter
+        if made is None or (space.cfa, made.bases, made.technology) != (
+            search.space.cfa,
+            searched.bases,
+            searched.technology,
+        ):
+            continue
+        low, high = (np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max))
+        (base,) = (study.sensor.curve(name) for name in made.bases.values())
+        if (made.family.upper(low, high)[0] <= base * (1 + ROUNDING)).all():
+            names.append(f"{space.kind} {space.name}")
+    return names
 
 
 def search_log(answer: SearchAnswer) -> pa.Table:
@@ -180,24 +203,3 @@ def front_table(study: Study, answer: SearchAnswer) -> pa.Table:
                 whole = cfa_sensitivity_at(view, sensitivity)
                 rows.append({"sensitivity_min": sensitivity, "cfa_sensitivity_min": whole, "limit": proven})
     return pa.Table.from_pylist(rows, schema=front_schema(names))
-
-
-def price_table(answer: SearchAnswer) -> pa.Table:
-    """A row per filter of the price of the worst case, from the search's answer to the best nominal filter.
-
-    Then two rows for each level of the front: the largest worst case there, and the most nominally.
-    """
-    names = answer.search.space.parameters
-    rows = [
-        {
-            "nominal_min": point.level,
-            "sensitivity_min": point.least_sensitivity,
-            "nominal": point.nominal,
-            "worst": point.worst,
-            "sensitivity": point.best.sensitivity,
-            "cfa_sensitivity": point.best.cfa_sensitivity,
-            **dict(zip(names, map(float, point.best.x), strict=True)),
-        }
-        for point in answer.price
-    ]
-    return pa.Table.from_pylist(rows, schema=price_schema(names))

@@ -11,11 +11,10 @@ from collections.abc import Callable
 
 from ..base.types import FloatArray
 from ..search.limit import limit_of, why_not
-from ..search.price import has_nominal, nominal_problem, searches_of_price
 from ..search.problem import Problem, starting_points
 from ..search.solver import GRADIENT, search_from
 from ..study import Search, Study
-from .held_out import LEFT_OUT_STARTS, left_out_signals
+from .held_out import LEFT_OUT_STARTS, has_nominal, left_out_signals
 
 PER_START, PER_LEVEL = 35, 120
 """Evaluations of a start with derivatives, and of all starts at a level of the front."""
@@ -37,13 +36,7 @@ def search_seconds(study: Study, search: Search) -> tuple[float, int]:
         optima = 2 if has_nominal(problem) else 1
         searches = optima * len(left_out_signals(problem)) + optima - 1
         evaluations += searches * LEFT_OUT_STARTS * min(search.max_evaluations // LEFT_OUT_STARTS, usual)
-    worst, nominal = searches_of_price(search.nominal_levels, len(search.levels), len(starts))
-    evaluations += worst * usual
     seconds = evaluations * per_evaluation
-    if nominal:
-        per_nominal = _per_evaluation(nominal_problem(problem), starts[0], search, study.section.seed)
-        seconds += nominal * usual * per_nominal
-        evaluations += nominal * usual
     if why_not(problem) is None:
         seconds += (1 + len(search.levels)) * _took(lambda: limit_of(problem, most_programs=_PROGRAMS))
     return seconds, evaluations

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.errors import Fault, SweepError
+from ..base.errors import BrokenProofError, Fault, SweepError
 from ..base.types import FloatArray
 from ..camera.effects.image_height import all_heights_count
 from ..camera.effects.saturation import top_e
@@ -44,6 +44,8 @@ _SENSITIVITY_TOLERANCE = 1e-6
 _MOST_PROGRAMS = 5000
 _ATTEMPTS, _ATTEMPT_PROGRAMS = 5, 100
 """How often bounds on worst cases are raised until a filter keeps them, with so many linear programs each."""
+_PROOF_TOLERANCE = 1e-9
+"""A design may exceed a proven limit by this share, which is rounding, and no more."""
 _NOT_LINEAR = "is not linear in the filter"
 _SHARES = (0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5)
 """How far a solver's filter is moved toward one that is inside, to make up for the solver's tolerance."""
@@ -105,6 +107,23 @@ def limit_of(
     from_here = -np.inf if not program.noisy or least is None or least.min is None else least.min
     elsewhere = tuple(proof.proven_at(program, s) if s >= from_here else np.inf for s in sensitivities)
     return Limit(attained, proof.proven, curve, left_out, solved, proof.open_parts, elsewhere)
+
+
+def check_bound(value: float, proven: float, where: str = "") -> None:
+    """Raise BrokenProofError where a filter's value before quantization is above its proven upper bound."""
+    if not value <= proven + _PROOF_TOLERANCE * max(1.0, proven):
+        raise BrokenProofError(
+            Fault(
+                f"broken proof{where}: a filter has {value:.9g}, but the upper bound is {proven:.9g}; what is finished "
+                "is kept; this is a fault of the program, not of the study"
+            )
+        )
+
+
+def gap_between(value: float, proven: float) -> float:
+    """Relative gap of a value to its upper bound; raises BrokenProofError, see `check_bound`."""
+    check_bound(value, proven)
+    return 1 - min(value, proven) / proven
 
 
 def _members_of(problem: Problem, over: Sequence[str]) -> MemberPairs:

@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import BrokenProofError, Fault
 from ..base.types import Call, FloatArray, Parallel, Progress, delayed
 from ..metrics.bound import Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
-from .limit import Limit, limit_of
+from .limit import Limit, check_bound, gap_between, limit_of
 from .problem import Evaluation, Problem, SearchRun, best_feasible
 from .solver import search_from
 
@@ -23,8 +22,6 @@ _FRONT_PROGRAMS = 1000
 """Linear programs for the limit at each level; a level of the built-in studies takes about ten."""
 _BETWEEN = 5
 """Sensitivities between two levels at which the limit is told."""
-_PROOF_TOLERANCE = 1e-9
-"""A design may exceed a proven limit by this share, which is rounding, and no more."""
 _NO_LIMIT = 0.05
 """A limit of no more than this is no more than its own accuracy."""
 
@@ -57,19 +54,13 @@ class Effort:
 
 def check_proof(best: Evaluation | None, limit: Limit | None, where: str = "") -> None:
     """Raise BrokenProofError where a design that the search found is better than what is proven to be out of reach."""
-    if best is None or limit is None or best.objective <= limit.proven + _PROOF_TOLERANCE * max(1.0, limit.proven):
-        return
-    raise BrokenProofError(
-        Fault(
-            f"broken proof{where}: the search found {best.objective:.9g}, but the limit says that no filter has more "
-            f"than {limit.proven:.9g}; what is finished is kept; this is a fault of the program, not of the study"
-        )
-    )
+    if best is not None and limit is not None:
+        check_bound(best.objective, limit.proven, where)
 
 
 def gap_of(best: Evaluation, limit: Limit) -> float | None:
-    """How far an answer is below the limit, relative; none where the limit itself is no more than its own accuracy."""
-    return None if limit.proven <= _NO_LIMIT else max(0.0, 1 - best.objective / limit.proven)
+    """Relative gap of an answer to the upper bound; None where the bound itself is within its own accuracy."""
+    return None if limit.proven <= _NO_LIMIT else gap_between(best.objective, limit.proven)
 
 
 def calls_at_levels(problem: Problem, levels: Sequence[float], effort: Effort, *, limited: bool) -> list[Call]:

@@ -49,7 +49,6 @@ class Search:
     starts: int
     max_evaluations: int
     levels: tuple[float, ...] = ()
-    nominal_levels: int = 0
 
 
 @dataclass(frozen=True)
@@ -153,9 +152,14 @@ class Study:
         return tuple(dict.fromkeys(name for space in self.spaces for name in space.parameters))
 
     @property
+    def n_filters(self) -> int:
+        """Filters of all spaces, plain CFAs included, each counted once over all scenarios."""
+        return sum(space.size for space in self.spaces)
+
+    @property
     def n_designs(self) -> int:
         """Designs of all spaces, over all scenarios."""
-        return sum(space.size for space in self.spaces) * len(self.scenarios)
+        return self.n_filters * len(self.scenarios)
 
     def view(self, space: Space, scenario: str) -> View:
         """What the designs of `space` share in a scenario."""

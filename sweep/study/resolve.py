@@ -16,7 +16,7 @@ from ..curves.spectrum import Curves
 from ..curves.tasks import StudyTasks
 from ..designs.space import Space
 from ..metrics.own import OwnMetric
-from ..metrics.quantity import WORST_CASE, Asked, Quantity
+from ..metrics.quantity import Asked, Quantity
 from ..metrics.registry import listed, quantities_of
 from ..search.solver import ALGORITHMS
 from .allowed_lamps import check_regions
@@ -252,7 +252,7 @@ class _Resolver:
         if seen.drive is not None and isinstance(seen.exposure, WhitePatchExposure):
             self.add(("search", "scenario"), "a search under a pulsed light needs a fixed exposure", scenario)
         effort = section.algorithm, section.starts, section.max_evaluations
-        return Search(boxes[chosen], scenario, *effort, levels, section.nominal_levels)
+        return Search(boxes[chosen], scenario, *effort, levels)
 
     def check_searched(self, space: Space, lights: Lights) -> None:
         """What the searched family must have for the study's constraints, and the front for its objective."""
@@ -268,13 +268,6 @@ class _Resolver:
         if self.section.search.front is not None and light:
             problem = "the front is searched at levels of sensitivity, which is in the objective"
             self.add(("search", "front"), problem, None, "an objective of CSDs")
-        column = self.section.objective.column
-        if self.section.search.nominal_levels and (column not in known or known[column].extreme != WORST_CASE):
-            problem = "levels of what is nominal go with an objective that is a single worst case"
-            worst = ", ".join(
-                name for name, quantity in known.items() if quantity.extreme == WORST_CASE and quantity.goal
-            )
-            self.add(("search", "nominal_levels"), problem, column, worst or "`production` or `population`")
 
 
 def resolve(

@@ -187,14 +187,12 @@ class Levels(Section):
 class SearchSection(Documented):
     """A search in a box, or in that of a sweep (from the smallest to the largest value of each parameter).
 
-    `front`: repeat the search over these levels of the least sensitivity. `nominal_levels`: of an objective that is a
-    worst case, repeat it at so many levels of the same quantity where nothing is off: what does the worst case cost?
+    `front`: repeat the search over these levels of the least sensitivity.
     """
 
     space: Name | None = None
     """The sweep or box to search; may be left out where there is one."""
     front: Levels | None = None
-    nominal_levels: int = Field(default=0, ge=0, le=1000)
     scenario: Name | None = None
     algorithm: Name = "SLSQP"
     """SLSQP, MMA, CCSAQ; without gradients COBYLA, ISRES, ORIG_DIRECT_L, AGS."""

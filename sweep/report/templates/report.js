@@ -25,7 +25,7 @@ function plain(text) {
 
 const columns = {};
 for (const [name, column] of Object.entries(data.columns)) columns[name] = unpack(column.values);
-const group = unpack(data.group), ids = unpack(data.design_id);
+const group = unpack(data.group), ids = unpack(data.design_id), filters = unpack(data.filter_id);
 const scenario = unpack(data.scenario.codes), cfa = unpack(data.cfa.codes);
 const wavelength = Array.from(unpack(data.curves.wavelength_nm));
 const G = Object.fromEntries(data.groups.map((name, i) => [name, i]));
@@ -35,7 +35,7 @@ const x = columns[data.axes.x], y = columns[data.axes.y], light = columns.cfa_se
 let overview = data.overviews[0], view = data.views[0] || null;
 
 const shown = (name, value) => Number.isFinite(value) ? value.toFixed(data.columns[name].digits) : "-";
-const title = (row) => data.names[row] ? data.names[row].long : `design ${ids[row]}`;
+const title = (row) => data.names[row] ? data.names[row].long : `filter ${filters[row]}`;
 
 const cfaOf = (row) => data.cfa.words[cfa[row]];
 
@@ -100,7 +100,7 @@ function levelTraces(drawn) {
   const found = [];
   if (drawn.traced) found.push({type: drawnBy, mode: "markers", name: "found by the search", x: drawn.traced[0],
     y: drawn.traced[1], hoverinfo: "skip", marker: {symbol: "cross-thin-open", size: 9, color: data.colors.groups.best, line: {width: 2}}});
-  if (drawn.limit) found.push({type: drawnBy, mode: "lines", name: "limit of any filter, unquantized", x: drawn.limit[0],
+  if (drawn.limit) found.push({type: drawnBy, mode: "lines", name: drawn.limit_name, x: drawn.limit[0],
     y: drawn.limit[1], hoverinfo: "skip", line: {shape: "hv", color: data.colors.groups.limit, dash: "dash", width: 2}});
   return found;
 }
@@ -156,12 +156,12 @@ function drawOverview() {
 
 function traces() {
   const color = data.colors.groups, found = [];
-  const count = (rows) => rows.length.toLocaleString("en");
+  const count = (n) => n.toLocaleString("en");
   const bad = byId("infeasible").checked ? rowsOf("infeasible") : [];
   if (bad.length) {
     const violation = bad.map((i) => columns.violation[i]);
     const top = violation.filter(Number.isFinite).sort((a, b) => a - b)[Math.floor(0.95 * (violation.length - 1))];
-    found.push(points(bad, `not feasible (${count(bad)} drawn)`, {
+    found.push(points(bad, `not feasible (${count(view.counts.infeasible)})`, {
       symbol: "x", size: 4, opacity: 0.6, color: violation, cmin: 0, cmax: top || 1,
       colorscale: [[0, "#8c8c8c"], [1, "#e6c9a8"]], showscale: !narrow(),
       colorbar: {title: {text: "violation", side: "right"}, thickness: 8, len: 0.45, y: 0.2, x: 1.0},
@@ -169,8 +169,8 @@ function traces() {
   }
   const good = rowsOf("feasible"), front = rowsOf("front");
   if (good.length)
-    found.push(points(good, `feasible (${count(good)} drawn)`, {size: 4, opacity: 0.6, color: color.feasible}));
-  if (front.length) found.push(points(front, `Pareto front (${count(front)})`, {size: 7, color: color.front}));
+    found.push(points(good, `feasible (${count(view.counts.feasible)})`, {size: 4, opacity: 0.6, color: color.feasible}));
+  if (front.length) found.push(points(front, `Pareto front (${count(view.counts.front)})`, {size: 7, color: color.front}));
   found.push(...levelTraces(view));
   if (view.knee !== null)
     found.push(points([view.knee], "knee of the front",
@@ -241,7 +241,7 @@ function drawCurves(row) {
     line: {width: 0}, fillcolor: `${data.colors.types[type] || "#777777"}22`, hoverinfo: "skip"});
   for (const name of names)
     line(name, data.curves.sensor[name], data.colors.curves[name] || "#777777", whole ? "solid" : "dot", whole ? 2.5 : 1.5);
-  if (!whole && data.curves.limits[cfaOf(row)]) line("limit of any filter, unquantized", data.curves.limits[cfaOf(row)], "#000000", "dash", 1.2);
+  if (!whole && data.curves.limits[cfaOf(row)]) line("filter at the upper bound", data.curves.limits[cfaOf(row)], "#000000", "dash", 1.2);
   own.forEach(([channel, packed], i) => line(own.length > 1 ? `${title(row)}, ${channel}` : title(row), packed, cycle[i], "solid", 2.5));
   Plotly.react("curves", found, {
     title: {text: `QE of ${plain(title(row))}`, font: {size: 14}}, height: 380, margin: {l: 50, r: 10, t: 36, b: 85},
@@ -312,7 +312,7 @@ function choose(row) {
   head.textContent = title(row);
   const note = document.createElement("p"), kept = group[row] === G.plain || ids[row] in data.curves.designs;
   note.textContent = (kept ? "" : "This page holds no curve of this design. ") +
-    `To export it as CSV and for ISETCam: sweep export ${data.folder} --design ${ids[row]}` +
+    `To export it as CSV and for ISETCam: sweep export ${data.folder} --design ${filters[row]}` +
     (kept && !(ids[row] in data.clouds.designs) ? `. Its signals are kept in ${data.cloud_scenario} alone.` : "");
   box.replaceChildren(head, list, note);
   box.dataset.design = ids[row];
