@@ -270,7 +270,7 @@ def _series(series: SeriesFigure) -> dict[str, Any]:
 def _front(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
     """The feasible front, every digit of it, for its file."""
     own = rows[rows["feasible"] & rows["pareto"] & (rows["kind"] == SWEPT)]
-    names = ["filter_id", "scenario", "cfa", *_used(own, output.parameters), *output.distances]
+    names = ["design_id", "filter_id", "scenario", "cfa", *_used(own, output.parameters), *output.distances]
     names += [name for name in dict.fromkeys((*output.light, *output.further)) if name not in names]
     return {"columns": names, "rows": [[_plain(value) for value in row] for row in own[names].itertuples(index=False)]}
 

@@ -224,7 +224,7 @@ class Making:
         """Write a table with the filter's number beside each design's, and with units and meanings."""
         if "design_id" in table.column_names and "filter_id" not in table.column_names:
             ids = table["design_id"].to_numpy(zero_copy_only=False)
-            filters = np.where(ids == self.study.n_designs, self.study.n_filters, ids % self.study.n_filters)
+            filters = np.where(ids == self.study.n_designs, self.study.n_filters, ids % max(1, self.study.n_filters))
             at = table.column_names.index("design_id") + 1
             table = table.add_column(at, "filter_id", pa.array(filters, pa.int64(), from_pandas=True))
         self.inventory.write_table(name, table.cast(described(table.schema, self.study.quantities)))

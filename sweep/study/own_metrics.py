@@ -24,8 +24,8 @@ from .sources import Sources
 from .yaml_tree import Key
 
 _GROUP: Offered = "sweep.metrics"
-_OTHERS = ("design_id", "kind", "name", "cfa", "family", "scenario", "objective", "limit", "gap", "feasible")
-_VERDICTS = ("violation", "pareto", "plan", "promised_dn", "status")
+_OTHERS = ("design_id", "filter_id", "kind", "name", "space", "cfa", "family", "scenario", "objective")
+_VERDICTS = ("limit", "gap", "feasible", "violation", "pareto", "plan", "promised_dn", "status")
 RESERVED = (*_OTHERS, *_VERDICTS)
 """Columns that are no quantities."""
 _SAME = 1e-9

@@ -224,10 +224,10 @@ def test_a_row_that_was_tampered_with_is_refused(tiny: Path, tmp_path: Path) -> 
 
 
 def test_unknown_keys_are_one_line(tiny: Path, tmp_path: Path) -> None:
-    rows = len(pd.read_parquet(tiny / "results.parquet"))
+    filters = pd.read_parquet(tiny / "results.parquet")["filter_id"].max() + 1
     for key, words in (
         ("mime", "did you mean 'mine'?"),
-        (str(rows), f"0 to {rows - 1:,}"),
+        (str(filters), f"0 to {filters - 1:,}"),
         ("-1", "RGGB"),
         ("", "best"),
     ):

@@ -187,7 +187,14 @@ def test_a_job_of_several_chunks_has_their_rows(tmp_path: Path) -> None:
     assert whole.stop - whole.start > CHUNK
     view, rules = study.view(whole.space, whole.scenario), rules_of(study)
     parts = [
-        Job(whole.space, whole.scenario, start, min(start + CHUNK, whole.stop), whole.first_id + start)
+        Job(
+            whole.space,
+            whole.scenario,
+            start,
+            min(start + CHUNK, whole.stop),
+            whole.first_id + start,
+            whole.first_filter + start,
+        )
         for start in range(0, whole.stop, CHUNK)
     ]
     together = run_job(whole, view, rules).to_pandas()

@@ -22,31 +22,8 @@ from sweep.results.names import REPORT
 from sweep.study import load_study
 
 from ..build import ran
-from ..conftest import STUDIES, Finished, needs_measured
-
-FAST = ("stopband",)
-LONG = ("robust", "noise", "angle")
-SLOW = (
-    "fog",
-    "dual",
-    "paper",
-    "freeform",
-    "producible",
-    "rccb",
-    "exposure",
-    "night",
-    "distance",
-    "accuracy",
-    "glass",
-    "scorecard",
-    "balanced",
-)
-EVERY = [
-    *FAST,
-    *(pytest.param(name, marks=[pytest.mark.slow, pytest.mark.long]) for name in LONG),
-    *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW),
-    pytest.param("measured", marks=[pytest.mark.slow, needs_measured]),
-]
+from ..conftest import STUDIES, Finished
+from .shipped import EVERY
 
 
 def whole(folder: Path) -> pd.DataFrame:
@@ -87,7 +64,7 @@ def test_nobody_beats_the_best_without_being_named(finished: Finished, name: str
     rows = table[(table["scenario"] == leaders.scenario) & (table[separation] > leaders.chosen[separation])]
     if len(rows):
         best = rows[rows[separation] == rows[separation].max()]
-        names = best["name"].astype(object).where(best["name"].notna(), "esign " + best["design_id"].astype(str))
+        names = best["name"].astype(object).where(best["name"].notna(), "ilter " + best["filter_id"].astype(str))
         assert any(name in text for name in names)
 
 
@@ -166,7 +143,7 @@ def test_who_separates_most_names_its_lights_whatever_the_constraints(finished: 
     assert not most["feasible"]
     said = " ".join(answer_sentences(read_output(folder)))
     lights = limited.loc[most["design_id"], "limited_by_yellow_red"]
-    assert f"Design {most['design_id']} of RYNCy separates most of all: {most['csd_yellow_red']:.0f} DN" in said
+    assert f"Filter {most['filter_id']} of RYNCy separates most of all: {most['csd_yellow_red']:.0f} DN" in said
     assert f"(limited by {lights}), but its sensitivity is below 0.9 and its slope above 0.06 per nm." in said
     rate = table.loc[(table["csd_yellow_red"] / table["exposure_s"]).idxmax()]
     assert rate["design_id"] in limited.index
@@ -276,6 +253,6 @@ def test_the_best_of_each_other_cfa_is_named(tmp_path: Path) -> None:
     assert len(most) == 2
     other, best = most.iloc[0], most.iloc[1]
     said = answer_sentences(read_output(tmp_path / "out"))
-    assert f"design {best['design_id']} of {best['cfa']} separates yellow from red by" in said[0]
-    told = f"The best of {other['cfa']} that meets the same, design {other['design_id']}, separates yellow from red by "
+    assert f"filter {best['filter_id']} of {best['cfa']} separates yellow from red by" in said[0]
+    told = f"The best of {other['cfa']} that meets the same, filter {other['filter_id']}, separates yellow from red by "
     assert [line for line in said if line.startswith(f"{told}{other['csd_yellow_red']:.0f} DN at ")]

@@ -28,6 +28,7 @@ def table(rows: int, first: int = 0) -> pa.Table:
     words = pa.array([["sweep", "reference"][i % 2] for i in range(rows)], pa.string())
     made: dict[str, pa.Array] = {
         "design_id": pa.array(range(first, first + rows), pa.int64()),
+        "filter_id": pa.array(range(first, first + rows), pa.int64()),
         "left_nm": pa.array([600.0 + i % 7 for i in range(rows)]),
         "csd_yellow_red": pa.array(rng.random(rows)),
         "sensitivity": pa.array([None if i % 5 == 0 else 0.5 for i in range(rows)], pa.float64()),

@@ -67,7 +67,7 @@ def test_rows_stand_in_order_with_their_columns(output: Path) -> None:
     assert len(frame) == 2 * (2 + 1 + 26 * 2 * 51 * 2) + 1
     assert list(frame["design_id"]) == list(range(len(frame)))
     assert list(frame.columns) == [
-        *("design_id", "kind", "name", "cfa", "family", "scenario"),
+        *("design_id", "filter_id", "kind", "name", "space", "cfa", "family", "scenario"),
         *("left_nm", "left_width_nm", "right_nm", "right_width_nm", "depth"),
         *("csd_green_yellow", "csd_green_orange", "csd_green_red"),
         *("csd_yellow_orange", "csd_yellow_red", "csd_orange_red"),

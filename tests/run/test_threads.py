@@ -84,7 +84,7 @@ def test_parts_of_a_job_are_the_job(plain: Study, separable: bool, monkeypatch: 
         view = plain.view(space, scenario)
         whole = run_job(Job(space, scenario, 0, size, 0), view, rules)
         ends = [0, 1, 2, 17, 33, 1024, 2049, CHUNK, CHUNK + 1, size]
-        parts = [run_job(Job(space, scenario, a, b, a), view, rules) for a, b in pairwise(ends)]
+        parts = [run_job(Job(space, scenario, a, b, a, a), view, rules) for a, b in pairwise(ends)]
         columns = [name for name in rules.schema.names if name != "pareto"]  # that of each part alone
         both = [table.select(columns).to_pydict() for table in (joined(parts), whole)]
         assert repr(both[0]) == repr(both[1])

@@ -202,11 +202,16 @@ def _with_base(curve: np.ndarray) -> View:
 
 def test_words_say_what_is_proven() -> None:
     """A finished proof, one that was cut short, and levels that were."""
-    output: Any = SimpleNamespace(goal=PROBLEM.quantities["csd_yellow_red"], study=STUDY.section)
+    output: Any = SimpleNamespace(
+        goal=PROBLEM.quantities["csd_yellow_red"], study=STUDY.section, scenarios=list(STUDY.scenarios)
+    )
     done = SearchFacts(
         algorithm="SLSQP",
         scenario="chart",
         space="edges",
+        cfa="RYNCy",
+        channel="N",
+        bounded=("search edges",),
         starts=1,
         evaluations=1,
         endings=("success",),
@@ -224,18 +229,18 @@ def test_words_say_what_is_proven() -> None:
         front_evaluations=0,
     )
     words = _limit_line(output, done)
-    bracket = "no filter exceeds 100.0 DN (proven) and one comes within 10 DN of that limit"
-    assert f"{bracket}; the search's answer is 10.0 % below" in words
+    bracket = "for any filter in N of RYNCy: 100.0 DN (proven), and one filter comes within 10 DN of it"
+    assert f"{bracket}; the search's answer is 10.0 % below it" in words
     assert "under the same constraints but edge_width_nm, before clipping and quantization" in words
     assert "open" not in words
     cut = _limit_line(output, done.model_copy(update={"limit_open_parts": 3}))
-    assert "the limit itself is not proven: 3 parts are open after 9 linear programs" in cut
+    assert "it may not be the least one: 3 parts are open after 9 linear programs" in cut
     unknown = _limit_line(output, done.model_copy(update={"limit_attained": None}))
-    assert "no filter exceeds 100.0 DN (proven); the search's answer is 10.0 % below" in unknown
+    assert "N of RYNCy: 100.0 DN (proven); the search's answer is 10.0 % below it" in unknown
     levels = done.model_copy(update={"front_limits_open": 2})
-    assert "At 2 levels of the front the line is an upper bound" in _limit_line(output, levels)
+    assert "At 2 levels of the front it may not be the least one" in _limit_line(output, levels)
     none = done.model_copy(update={"no_limit": "the objective is a sum", "limit_proven": None})
-    assert _limit_line(output, none) == "Limit: none computed (the objective is a sum)."
+    assert _limit_line(output, none) == "Upper bound: none computed (the objective is a sum)."
 
 
 @pytest.mark.parametrize("level", [0.8, 0.9, 0.97, 1.0])

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from sweep.report.page import _vision_drawings
 from sweep.report.vision import NETWORK, OBSERVER, benchmark_of
 from sweep.report.vision_ranks import ranks_of
 from sweep.report.vision_tables import vision_sentences
@@ -19,6 +20,7 @@ from sweep.vision.scenes import ORDERS, UNSEEN
 from sweep.vision.scores import mean_of
 
 from ..commanded import sweep
+from ..plain_values import MOST_BYTES, pickled_size
 from ..warm import Warm
 
 pytestmark = [pytest.mark.slow, pytest.mark.long]
@@ -113,6 +115,13 @@ def test_the_report_has_its_figures(folder: Path) -> None:
     assert "Images of traffic lights" in page
     assert "Rank correlation" in page
     assert {f"figures/vision-{name}.png" for name in ("errors", "ranks", "misread")} <= Inventory(folder).files.keys()
+
+
+def test_its_drawings_are_plain_values(output: Output) -> None:
+    drawings = list(_vision_drawings(output))
+    assert len(drawings) == 3
+    for name, _, draw in drawings:
+        assert pickled_size(draw) < MOST_BYTES, name
 
 
 def test_a_lost_table_comes_back_the_same(folder: Path) -> None:

@@ -1,0 +1,31 @@
+"""Studies of the project whose finished runs tests look at."""
+
+from __future__ import annotations
+
+import pytest
+
+from ..conftest import needs_measured
+
+FAST = ("stopband",)
+LONG = ("robust", "noise", "angle")
+SLOW = (
+    "fog",
+    "dual",
+    "paper",
+    "freeform",
+    "producible",
+    "rccb",
+    "exposure",
+    "night",
+    "distance",
+    "accuracy",
+    "glass",
+    "scorecard",
+    "balanced",
+)
+EVERY = [
+    *FAST,
+    *(pytest.param(name, marks=[pytest.mark.slow, pytest.mark.long]) for name in LONG),
+    *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW),
+    pytest.param("measured", marks=[pytest.mark.slow, needs_measured]),
+]

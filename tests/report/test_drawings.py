@@ -1,0 +1,27 @@
+"""Drawings that go to workers are plain values: no run, no cache, nothing that another thread fills."""
+
+from __future__ import annotations
+
+import pytest
+
+from sweep.report import read_output
+from sweep.report.page import _drawings, _vision_drawings
+
+from ..conftest import Finished
+from ..plain_values import MOST_BYTES, pickled_size
+from .shipped import EVERY
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_every_drawing_of_a_report_is_a_plain_value(finished: Finished, name: str) -> None:
+    output = read_output(finished(name))
+    drawings = [*_drawings(output), *_vision_drawings(output)]
+    assert len(drawings) > 4
+    for file, _, draw in drawings:
+        assert pickled_size(draw) < MOST_BYTES, file
+
+
+def test_a_drawing_that_holds_a_run_is_refused(finished: Finished) -> None:
+    output = read_output(finished("stopband"))
+    with pytest.raises(AssertionError, match="whole run"):
+        pickled_size({"figure": output})

@@ -1,0 +1,162 @@
+"""An upper bound stands beside the designs that it bounds, and beside no others."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sweep.base.errors import BrokenProofError
+from sweep.report import read_output, summary_lines
+from sweep.report.answer import answer_sentences
+from sweep.report.large_numbers import large_numbers
+from sweep.report.leaders import leaders_of
+from sweep.report.page_data import payload
+from sweep.report.upper_bound import upper_bound_beside
+from sweep.results.output import Output
+from sweep.study import load_study
+
+from ..build import ran
+
+SHOWN = re.compile(
+    r"Upper bound for any filter in (?P<channel>\w+) of (?P<cfa>\w+) under (?:the same constraints|no constraint)"
+    r"(?: in (?P<scenario>\w+))?: (?P<value>[\d.]+) DN \(proven, before quantization\)"
+)
+LARGE = re.compile(r"below the upper bound for any filter in (?P<channel>\w+) of (?P<cfa>\w+)")
+CFAS = {
+    "RYNCy": ("RYNCy: {}", "Y"),
+    "RCCN": ("RCCN: {tile: [[R, C], [C, N]]}", "C"),
+    "RGBN": ("RGBN: {tile: [[R, G], [B, N]]}", "Y"),
+}
+
+
+def study_text(
+    exposures: dict[str, float], cfas: list[str], grids: dict[str, str], searched: str, scenario: str, least: float
+) -> str:
+    """Return a study of fixed exposures (s), with a sweep in each CFA and a search in one of them and one scenario."""
+    scenes = "\n".join(f"  {name}: {{exposure: {{kind: fixed, exposure_s: {s:g}}}}}" for name, s in exposures.items())
+    sweeps = "\n".join(
+        f"  in_{cfa}: {{cfa: {cfa}, channel: N, base: {CFAS[cfa][1]}, to: G, grid: {grids[cfa]}}}" for cfa in cfas
+    )
+    tiles = ", ".join(["RGGB: {}", *(CFAS[cfa][0] for cfa in cfas)])
+    return f"""\
+study: bounded
+sensor: ar0820
+lights: tl16
+scenarios:
+{scenes}
+cfas: {{{tiles}}}
+sweeps:
+{sweeps}
+constraints: {{sensitivity: {{min: {least:g}}}}}
+search: {{space: in_{searched}, scenario: {scenario}, starts: 2, max_evaluations: 60}}
+"""
+
+
+def finished_output(folder: Path, text: str) -> Output:
+    """Run a study and read what it left."""
+    (folder / "bounded.yaml").write_text(text)
+    ran(load_study(folder / "bounded.yaml"), folder / "out", 1)
+    return read_output(folder / "out")
+
+
+def check_shown_bounds(output: Output) -> int:
+    """Check every upper bound that answer, large numbers, summary and page show; return how many the answer shows."""
+    search = output.provenance.search
+    assert search is not None
+    leaders, goal = leaders_of(output), output.goal.name
+    table, shown = output.table, 0
+    for text in answer_sentences(output):
+        for match in SHOWN.finditer(text):
+            assert leaders.chosen is not None
+            own = match["scenario"] or output.scenarios[0]
+            assert (match["channel"], match["cfa"], own) == (search.channel, search.cfa, search.scenario)
+            assert (leaders.chosen["cfa"], leaders.chosen["scenario"]) == (match["cfa"], own)
+            assert leaders.chosen[goal] <= float(match["value"])
+            shown += 1
+    for number in large_numbers(output):
+        if (match := LARGE.search(number.name)) is not None:
+            assert leaders.chosen is not None
+            assert (leaders.chosen["cfa"], leaders.chosen["scenario"]) == (match["cfa"], search.scenario)
+            assert match["cfa"] == search.cfa
+            bound = float(number.comparison.split()[0])
+            assert leaders.chosen[goal] <= bound
+            assert float(number.value.split()[0]) == pytest.approx(bound - leaders.chosen[goal], abs=1)
+    (line,) = [text for text in summary_lines(output) if text.startswith("Upper bound of")]
+    where = f"{search.channel} of {search.cfa}" + (f" in {search.scenario}" if len(output.scenarios) > 1 else "")
+    assert search.limit_proven is None or f"for any filter in {where}: " in line
+    for view in payload(output)["views"]:
+        if view["limit"] is None:
+            continue
+        assert (view["scenario"], view["cfa"]) == (search.scenario, search.cfa)
+        rounding = math.sqrt(len(output.mosaic(search.cfa).channels))
+        rows = table[(table["scenario"] == search.scenario) & (table["cfa"] == search.cfa) & table["feasible"]]
+        levels, bounds = map(np.array, view["limit"])
+        for sensitivity, value in zip(rows["sensitivity"], rows[goal], strict=True):
+            reached = bounds[levels <= sensitivity]
+            assert not reached.size or value <= reached[-1] + rounding
+    return shown
+
+
+GRID = "{left_nm: [600, 606, 612], left_width_nm: [6, 30], right_nm: [646, 652], right_width_nm: 7}"
+
+
+def test_the_bound_of_one_scenario_is_not_shown_beside_the_design_of_another(tmp_path: Path) -> None:
+    text = study_text({"day": 2e-4, "night": 5e-3}, ["RYNCy"], {"RYNCy": GRID}, "RYNCy", "day", 0.9)
+    output = finished_output(tmp_path, text)
+    assert check_shown_bounds(output) == 1
+    answer = " ".join(answer_sentences(output))
+    assert leaders_of(output).scenario == "day"  # the search's
+    bright = leaders_of(output, "night").chosen
+    assert bright is not None
+    assert bright[output.goal.name] > 2 * output.provenance.search.limit_proven  # type: ignore[union-attr, operator]
+    assert (
+        f"In night, filter {bright['filter_id']} of RYNCy separates yellow from red by {bright[output.goal.name]:.0f} DN"
+        in answer
+    )
+    assert upper_bound_beside(output, bright) is None
+
+
+def test_the_bound_of_one_cfa_is_not_shown_beside_the_design_of_another(tmp_path: Path) -> None:
+    text = study_text({"chart": 2e-3}, ["RGBN", "RYNCy"], {"RYNCy": GRID, "RGBN": GRID}, "RGBN", "chart", 0.9)
+    output = finished_output(tmp_path, text)
+    check_shown_bounds(output)
+    rows = output.best[output.best["cfa"] == "RYNCy"]
+    assert len(rows)
+    assert all(upper_bound_beside(output, row) is None for row in rows.to_dict("records"))
+
+
+def test_a_value_above_its_own_bound_is_an_error(tmp_path: Path) -> None:
+    text = study_text({"chart": 2e-3}, ["RYNCy"], {"RYNCy": GRID}, "RYNCy", "chart", 0.9)
+    output = finished_output(tmp_path, text)
+    row = output.best.iloc[0].to_dict()
+    assert output.provenance.search is not None
+    proven = output.provenance.search.limit_proven
+    assert proven is not None
+    assert upper_bound_beside(output, row) is not None
+    assert upper_bound_beside(output, row | {output.goal.name: proven + 0.5}) is None  # its rounding
+    with pytest.raises(BrokenProofError, match="upper bound is"):
+        upper_bound_beside(output, row | {output.goal.name: proven + 3})
+
+
+@pytest.mark.parametrize("seed", [*range(2), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 60))])
+def test_random_studies_show_each_bound_beside_its_own_design(tmp_path: Path, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    names = ["day", "dusk", "night"][: random.integers(1, 4)]
+    exposures = {name: float(10 ** random.uniform(-4, -2)) for name in names}
+    cfas = [str(name) for name in random.permutation(list(CFAS))[: random.integers(1, 4)]]
+    grids = {}
+    for cfa in cfas:
+        left, right = random.uniform(585, 625, 3), random.uniform(635, 690, 2)
+        edges = {"left_nm": left, "left_width_nm": random.uniform(5, 50, 2), "right_nm": right, "right_width_nm": [7.0]}
+        grids[cfa] = (
+            "{"
+            + ", ".join(f"{n}: [{', '.join(f'{v:.2f}' for v in sorted(values))}]" for n, values in edges.items())
+            + "}"
+        )
+    searched, scenario = str(random.choice(cfas)), str(random.choice(names))
+    text = study_text(exposures, cfas, grids, searched, scenario, float(random.choice([0.0, 0.6, 0.75])))
+    check_shown_bounds(finished_output(tmp_path, text))
