@@ -18,7 +18,7 @@ ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 # Tests start hundreds of processes, which would each compile the package's source anew.
 unexport PYTHONDONTWRITEBYTECODE
 TESTS := $(ONE_THREAD) $(BIN)/python -m pytest -n logical --dist worksteal
-KERNELS := $(shell grep -rl --include=*.py "machine_code import" sweep)
+KERNELS := sweep/base/machine_code.py $(shell grep -rl --include=*.py "machine_code import" sweep)
 
 .PHONY: study report test slow accuracy check documents bench clean
 .DELETE_ON_ERROR:

@@ -3,7 +3,6 @@
     python -m tests.bench_estimate [STUDY ...]
 
 The numbers of evaluations in `run/search_estimate.py` are from here.
-Plans are found before, as by a dry run.
 """
 
 from __future__ import annotations

@@ -6,7 +6,6 @@ that calls it.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -50,7 +49,6 @@ def designs_and_metrics() -> None:
     )
     noisy = text.replace(dim, f"{dim}, noise: true") + "pixel: {read_noise_e: 2, prnu: 0.01, offset_dn: 64}\n"
     with TemporaryDirectory() as folder:
-        os.environ["SWEEP_CACHE"] = folder  # plans are kept there, not in the user's
         for name, made in (("noisy", noisy), ("population", text + "population: {temperature_c: [-40, 85]}\n")):
             path = Path(folder) / f"{name}.yaml"
             path.write_text(made)

@@ -84,12 +84,6 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
         write_table(Path(path), rows)
 
 
-@pytest.fixture(scope="session", autouse=True)
-def kept_plans(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Plans are kept in a folder of this session, not in the user's."""
-    os.environ["SWEEP_CACHE"] = str(tmp_path_factory.getbasetemp() / "kept")
-
-
 @pytest.fixture
 def hard_case_rows(request: pytest.FixtureRequest) -> list[dict[str, Any]]:
     """Rows of the table of hard cases, one for each that ran in this session."""

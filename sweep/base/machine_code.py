@@ -1,13 +1,18 @@
 """Numba's compiler, whose machine code is kept until the source of any kernel changes.
 
-Numba itself looks at the file of a kernel alone, and keeps what the kernel took from other files as it was.
+Numba itself looks at the file of a kernel alone, and keeps what the kernel took from other files as it was; and a file
+of machine code that is damaged ends the process, or is run. Here each one has a digest before what it holds, a damaged
+one is as one that is missing, and none lies in a folder that others may write: they could have their own code run.
 """
 
+# mypy: disable-error-code="no-untyped-call"
 from __future__ import annotations
 
 import hashlib
 import os
+import pickle
 import shutil
+import stat
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -16,13 +21,19 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+from numba.core import caching
 from platformdirs import user_cache_path
+
+from .errors import Fault, SweepError
 
 _ROOT = Path(__file__).parent.parent
 _NAMES = ("compiled", "nearest", "vectorized")
 """What the names of files with kernels begin with."""
 _FORGOTTEN_S = 7 * 24 * 3600.0
 """Seconds after which code of other sources is removed."""
+_FORM = "each file after its SHA-256"
+"""Name of the form of the files, another one for another form: neither is to read what the other wrote."""
+_DIGEST_BYTES = hashlib.sha256().digest_size
 
 _SETTINGS: Any = numba.config
 _F = TypeVar("_F", bound=Callable[..., Any])
@@ -38,24 +49,104 @@ def sources() -> list[Path]:
 
 
 def njit(**options: Any) -> Callable[[_F], _F]:
-    """`numba.njit`, kept by what all kernels are made of."""
+    """`numba.njit`, kept by what all kernels are made of where `cache` is true and a folder can be written.
+
+    Raises SweepError where others may write that folder.
+    """
+    kept = options.pop("cache", False)
 
     def decorated(function: _F) -> _F:
-        before = _SETTINGS.CACHE_DIR
-        _SETTINGS.CACHE_DIR = str(_kept_in(before))
-        try:
-            made: _F = numba.njit(**options)(function)
-        finally:
-            _SETTINGS.CACHE_DIR = before
-        return made
+        made: Any = numba.njit(**options)(function)
+        if kept:
+            with suppress(RuntimeError):  # numba's, where the folder cannot be written
+                made._cache = _Cache(function)
+        kernel: _F = made
+        return kernel
 
     return decorated
+
+
+class _Files(caching.IndexDataCacheFile):
+    """The machine code of a kernel for each key: a file that lists them, and a file for each."""
+
+    def load(self, key: Any) -> Any:
+        """The code; None where there is none, or that of another key: two processes may have chosen one name."""
+        found = super().load(key)
+        return found[1] if found is not None and found[0] == key else None
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep the code."""
+        super().save(key, (key, data))
+
+    def _load_index(self) -> Any:
+        try:
+            stamp, names = self._load_data(self._index_name)
+        except Exception:  # whatever unpickling raises
+            return {}
+        return names if stamp == self._source_stamp else {}
+
+    def _save_index(self, overloads: Any) -> None:
+        self._save_data(self._index_name, (self._source_stamp, overloads))
+
+    def _load_data(self, name: str) -> Any:
+        """Load what a file holds; raises OSError where it is damaged."""
+        content = Path(self._data_path(name)).read_bytes()
+        digest, held = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
+        if hashlib.sha256(held).digest() != digest:
+            raise OSError(f"{name} is damaged")
+        return pickle.loads(held)
+
+    def _dump(self, obj: Any) -> bytes:
+        held: bytes = super()._dump(obj)
+        return hashlib.sha256(held).digest() + held
+
+
+class _Folder(caching.InTreeCacheLocator):
+    """The place of the machine code of a file's kernels, in a folder of the user's own."""
+
+    def __init__(self, py_func: Any, py_file: str) -> None:
+        super().__init__(py_func, py_file)
+        self._own = _kept_in(_SETTINGS.CACHE_DIR)
+        self._cache_path = str(self._own / self.get_suitable_cache_subpath(py_file))
+
+    def ensure_cache_path(self) -> None:
+        """Make the folders; raises OSError where that fails, and SweepError where others may write one."""
+        for folder in (self._own, Path(self._cache_path)):
+            _make_own(folder)
+        super().ensure_cache_path()
+
+
+class _Code(caching.CompileResultCacheImpl):
+    _locator_classes = [_Folder]
+
+
+class _Cache(caching.FunctionCache):
+    """The machine code of a kernel on the disk. What cannot be loaded is compiled and kept anew."""
+
+    _impl_class = _Code
+
+    def __init__(self, function: Any) -> None:
+        super().__init__(function)
+        stamp = self._impl.locator.get_source_stamp()
+        self._cache_file = _Files(self._cache_path, self._impl.filename_base, stamp)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The code of a signature; None where there is none that can be used."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # of pickle, of numba or of LLVM
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep the code of a signature, if it can be written."""
+        with suppress(OSError):
+            super().save_overload(sig, data)
 
 
 @cache
 def _kept_in(asked: str) -> Path:
     """The folder of the machine code: in the one that is asked for, beside the package, or the user's."""
-    digest = hashlib.sha256()
+    digest = hashlib.sha256(f"{_FORM}\0{numba.__version__}\0".encode())
     for path in sources():
         digest.update(path.relative_to(_ROOT).as_posix().encode() + b"\0" + path.read_bytes())
     beside = _ROOT / "__pycache__"
@@ -67,3 +158,15 @@ def _kept_in(asked: str) -> Path:
                 if time.time() - other.stat().st_mtime > _FORGOTTEN_S:
                     shutil.rmtree(other, ignore_errors=True)
     return found
+
+
+def _make_own(folder: Path) -> None:
+    """Make a folder that the user alone may write; raises SweepError where it is there, and others may."""
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    if not hasattr(os, "geteuid"):
+        return
+    found = folder.lstat()
+    others = found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or others:
+        allowed = "one that is yours, and that no one else may write: remove it, or set NUMBA_CACHE_DIR to another one"
+        raise SweepError(Fault("a folder of machine code that others may change", str(folder), allowed=allowed))

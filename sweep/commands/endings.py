@@ -86,6 +86,8 @@ def _said(error: Exception) -> int:
     if isinstance(error, BrokenPipeError):
         return _BROKEN_PIPE
     if isinstance(error, typer.Abort):
+        if isinstance(error.__cause__, EOFError):  # typer takes any for the end of what a user types
+            raise error.__cause__
         say_lines(["interrupted"])
         return _INTERRUPTED
     text = _text(error)

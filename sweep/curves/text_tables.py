@@ -28,6 +28,20 @@ _END = re.compile(r">{3,}end.*<{3,}|\[endoffile\]|\[end.*\]", re.IGNORECASE)
 _MARKS = {"\t": "tabs", ";": "semicolons", ",": "", " ": "blanks"}
 _RELEVANT = 50
 """Lines that say how a table is laid out."""
+_UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+_BEGINNINGS = {
+    b"PK\x03\x04": "a ZIP archive or a spreadsheet (.xlsx)",
+    b"\xd0\xcf\x11\xe0": "an old spreadsheet (.xls)",
+    b"\x1f\x8b": "a gzip archive",
+    b"\x89PNG": "a PNG picture",
+    b"\xff\xd8\xff": "a JPEG picture",
+    b"%PDF-": "a PDF document",
+    b"\x7fELF": "a program",
+}
+"""Files that are no text, by their first bytes."""
+_CONTROLS = re.compile(rb"[\x01-\x08\x0e-\x19\x1c-\x1f]")
+"""What no text has; in one of UTF-16 or with a few NULs there are none either."""
+_BEGINNING_BYTES = 4096
 
 
 def scan_text(path: Path) -> Scan:
@@ -50,11 +64,14 @@ def text_table(path: Path, first: str = WAVELENGTH) -> TextTable:
 
 
 def _decoded(path: Path) -> tuple[str, list[str], list[Fault]]:
-    """A file's text; how it was decoded, and the fault of one that is no text."""
+    """A file's text; how it was decoded, and the fault of one with NULs. Raises DataError where it is no text."""
     content = read_input(path, MOST_BYTES, DataError)
+    kind = _kind_of(content[:_BEGINNING_BYTES])
+    if kind is not None:
+        raise DataError(Fault(f"not a text table: {kind}", str(path), allowed="text; save it as CSV"))
     notes: list[str] = []
     try:
-        if content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) and content[:4] != codecs.BOM_UTF32_LE:
+        if content[:2] in _UTF_16 and content[:4] != codecs.BOM_UTF32_LE:
             text = content.decode("utf-16")
             notes.append("the text is UTF-16")
         else:
@@ -66,6 +83,13 @@ def _decoded(path: Path) -> tuple[str, list[str], list[Fault]]:
         fault = Fault("NUL characters in the text", str(path), allowed="UTF-8; UTF-16? save as UTF-8")
         return text.replace("\0", ""), notes, [fault]
     return text, notes, []
+
+
+def _kind_of(beginning: bytes) -> str | None:
+    """Name what a file is that is no text; it would take long to find a fault in each of its lines."""
+    known = next((kind for first, kind in _BEGINNINGS.items() if beginning.startswith(first)), None)
+    binary = beginning[:2] not in _UTF_16 and b"\0" in beginning and _CONTROLS.search(beginning)
+    return known or ("binary data" if binary else None)
 
 
 def _laid_out(file: str, text: str, first: str) -> TextTable:

@@ -127,6 +127,23 @@ def test_a_fault_of_the_program_keeps_its_traceback() -> None:
         ends_in_lines(lambda: 1 / 0)
 
 
+def test_the_end_of_a_file_is_no_interrupt(tmp_path: Path) -> None:
+    """Whatever raises EOFError, such as unpickling: typer takes it for the end of what a user types."""
+    program = """
+import sweep.study
+from sweep.commands.app import main
+def ended(*_, **__):
+    raise EOFError("Ran out of input")
+sweep.study.load_study = ended
+main()
+"""
+    command = [sys.executable, "-c", program, "run", str(tmp_path / "x.yaml")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "interrupted" not in done.stderr
+    assert "EOFError: Ran out of input" in done.stderr
+
+
 def test_a_reader_that_leaves_is_no_fault() -> None:
     with subprocess.Popen([*COMMAND, "schema"], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as run:
         assert run.stdout is not None

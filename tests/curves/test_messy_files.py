@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import gzip
+import io
 import json
 import shlex
+import zipfile
 from collections.abc import Callable
+from itertools import chain
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
 
 from sweep.base.errors import SweepError
+from sweep.curves import text_tables
 from sweep.curves.files import read_curves, scan_curves
 from sweep.curves.instrument_files import read_xml
+from sweep.curves.lens_files import read_chief_rays
 from sweep.study import load_study
 
 from ..build import one_line
@@ -170,6 +177,55 @@ def test_what_two_readers_could_read_in_two_ways_is_refused(tmp_path: Path, file
     path.write_text(content)
     with one_line(said):
         read_curves(path)
+
+
+def zipped() -> bytes:
+    held = io.BytesIO()
+    with zipfile.ZipFile(held, "w") as archive:
+        archive.writestr("curves", np.random.default_rng(1).bytes(20_000_000))
+    return held.getvalue()
+
+
+NO_TEXTS: dict[str, tuple[Callable[[], bytes], str]] = {
+    "zip": (zipped, "a ZIP archive or a spreadsheet (.xlsx)"),
+    "xls": (lambda: b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600), "an old spreadsheet (.xls)"),
+    "gzip": (lambda: gzip.compress(text().encode()), "a gzip archive"),
+    "png": (lambda: b"\x89PNG\r\n\x1a\n" + bytes(50), "a PNG picture"),
+    "pdf": (lambda: b"%PDF-1.7\n" + text().encode(), "a PDF document"),
+    "program": (lambda: b"\x7fELF\x02\x01\x01" + bytes(50), "a program"),
+    "random": (lambda: b"x" + np.random.default_rng(1).bytes(5000), "binary data"),
+}
+
+
+@pytest.mark.parametrize("kind", NO_TEXTS)
+def test_what_is_no_text_is_refused_before_its_lines_are_looked_at(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    made, said = NO_TEXTS[kind]
+    path, study = tmp_path / "a.csv", tmp_path / "x.yaml"
+    path.write_bytes(made())
+    sections = [
+        "sensor: {files: [{file: a.csv, columns: {R: R, C: C}}]}",
+        "lights: {files: [{file: a.csv, quantity: energy, signals: {red: [r], green: [g]}}]}",
+    ]
+    study.write_text("\n".join(["study: x", *sections, "cfas: [RCCC]", ""]))
+    monkeypatch.setattr(text_tables, "_laid_out", mock.Mock(side_effect=AssertionError))
+    line = f"not a text table: {said}; allowed: text; save it as CSV"
+    assert commanded("describe", path) == (2, "", f"sweep: {path}: {line}\n")
+    assert line in commanded("check", study)[2]
+    study.write_text("\n".join(["study: x", "sensor: ar0820", *sections[1:], "cfas: [RGGB]", ""]))
+    assert line in commanded("check", study)[2]
+    with one_line("not a text table"):
+        read_chief_rays(path)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
+def test_a_text_in_utf_16_is_text(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(text(), encoding)
+    scan = scan_curves(path)
+    np.testing.assert_allclose(scan.values, QE, rtol=1e-5)
+    assert ["NUL characters" in str(fault) for fault in chain(*scan.faults)] == ([] if encoding == "utf-16" else [True])
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])

@@ -81,10 +81,7 @@ def test_a_design_that_kills_its_worker_is_a_row(plain: Study, tmp_path: Path, s
 
 
 @pytest.mark.slow
-def test_a_worker_that_is_killed_while_scenes_are_planned_costs_nothing(
-    plain: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("SWEEP_CACHE", str(tmp_path / "kept"))
+def test_a_worker_that_is_killed_while_scenes_are_planned_costs_nothing(plain: Study, tmp_path: Path) -> None:
     wish = tmp_path / "wish"
     wish.write_text("kill 1 ")
     study = mischievous(plain, wish)
@@ -93,7 +90,6 @@ def test_a_worker_that_is_killed_while_scenes_are_planned_costs_nothing(
     plans = with_plans(study, 2, lambda *_: None).plans
     assert wish.read_text().count("done") >= 2
     wish.unlink()
-    monkeypatch.setenv("SWEEP_CACHE", str(tmp_path / "new"))
     assert plans == with_plans(study, 1, lambda *_: None).plans
 
 

@@ -62,7 +62,6 @@ def command(folder: Path, *extra: str) -> list[str]:
 def started(folder: Path, jobs: int, place: str, call: int) -> subprocess.Popen[bytes]:
     """A run that is for a minute in one call."""
     slow = {"SWEEP_SLOW_AT": place, "SWEEP_SLOW_CALL": str(call), "SWEEP_SLOW_FILE": str(folder / "slow.calls")}
-    slow["SWEEP_CACHE"] = str(folder / "kept")  # so that the plans are looked for
     with (folder / "said").open("w") as said:
         return subprocess.Popen(
             command(folder, "--jobs", str(jobs)),
