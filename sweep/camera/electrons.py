@@ -50,13 +50,14 @@ class Changing:
     """Those designs of a block that differ in one channel alone: electrons, or the digital numbers read from them.
 
     `fixed`: ndarray[n_cases, n_signals, n_channels], what they share (that channel's values mean nothing); `make`
-    gives those of `channel`, ndarray[n, n_cases, n_signals]; `exposure_s`: that of each. `which`: ndarray[n_designs],
-    the n designs. `by_edges`: what the channel's values are sums of, where designs are told by their edges.
+    gives those of `channel` for a part of them, ndarray[n, n_cases, n_signals]; `exposure_s`: that of each. `which`:
+    ndarray[n_designs], the n designs. `by_edges`: what the channel's values are sums of, where designs are told by
+    their edges.
     """
 
     fixed: FloatArray
     channel: int
-    make: Callable[[], FloatArray]
+    make: Callable[[slice], FloatArray]
     exposure_s: float
     which: BoolArray
     by_edges: ByEdges | None = None
@@ -64,13 +65,18 @@ class Changing:
     @cached_property
     def values(self) -> FloatArray:
         """That channel of each, made when it is asked for."""
-        return self.make()
+        return self.make(slice(None))
 
     @property
     def whole(self) -> FloatArray:
         """All channels of each, ndarray[n, n_cases, n_signals, n_channels]."""
-        found = np.repeat(self.fixed[None], len(self.values), axis=0)
-        found[..., self.channel] = self.values
+        return self.whole_of(slice(None))
+
+    def whole_of(self, part: slice) -> FloatArray:
+        """The same of a part of the designs."""
+        values = self.values[part] if "values" in self.__dict__ else self.make(part)
+        found = np.repeat(self.fixed[None], len(values), axis=0)
+        found[..., self.channel] = values
         return found
 
 
@@ -265,9 +271,10 @@ class Electrons:
         rest = self.fixed + (self._fixed_uniform + view.pixel.dark_e_per_s)[:, None]
         fixed, kept, nodes = np.ascontiguousarray(self.fixed[:, :, unit]), self._kept, self.light.nodes
 
-        def make() -> FloatArray:
-            values = some.product(kept, nodes).reshape(len(some), len(fixed), -1).astype(float, copy=False)
-            _expose(values, fixed, uniform, float(time_s[0]))
+        def make(part: slice) -> FloatArray:
+            few = some.some(part)
+            values = few.product(kept, nodes).reshape(len(few), len(fixed), -1).astype(float, copy=False)
+            _expose(values, fixed, uniform[part], float(time_s[0]))
             return values
 
         by_edges = None

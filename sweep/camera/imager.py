@@ -117,7 +117,11 @@ class Imager:
         if by_edges is not None:
             line = self.readout.line(len(by_edges.uniform) * by_edges.fixed.size)
             by_edges = None if line is None else by_edges._replace(line=line)
-        return replace(found, fixed=transfer(found.fixed), make=lambda: transfer(electrons.values), by_edges=by_edges)
+
+        def make(part: slice) -> FloatArray:
+            return transfer(electrons.make(part))
+
+        return replace(found, fixed=transfer(found.fixed), make=make, by_edges=by_edges)
 
     @cached_property
     def anywhere(self) -> AnyPlace | None:

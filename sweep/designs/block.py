@@ -48,7 +48,7 @@ class Block(Protocol):
         Over all modified channels; `base_qe`: ndarray[n_modified, n_wavelengths]. Where it is 0 the ratio is 1.
         """
 
-    def some(self, which: IndexArray) -> Block:
+    def some(self, which: IndexArray | slice) -> Block:
         """Those of its designs."""
 
 
@@ -71,7 +71,7 @@ class CurveBlock:
         flat = seen.reshape(len(self.qe), -1)
         return row_products(flat.astype(weights.dtype, copy=False), weights)
 
-    def some(self, which: IndexArray) -> CurveBlock:
+    def some(self, which: IndexArray | slice) -> CurveBlock:
         """See `Block.some`."""
         return CurveBlock(self.qe[which])
 
@@ -180,7 +180,7 @@ class EdgeBlock:
         """See `Block.curves`."""
         return self.space.curves(self.space.points_of(self.numbers), self.tables.base.size)
 
-    def some(self, which: IndexArray) -> EdgeBlock:
+    def some(self, which: IndexArray | slice) -> EdgeBlock:
         """See `Block.some`."""
         ends = (self.at_left[which], self.at_right[which], self.depth[which])
         return EdgeBlock(self.space, self.numbers[which], self.tables, *ends)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.types import FloatArray, IndexArray
+from ..base.types import FloatArray
 from ..camera.effects import phase
 from ..camera.effects.image_height import HEIGHTS
 from ..camera.electrons import Changing
@@ -23,28 +23,23 @@ from ..designs.family import Family
 from ..vision.section import Vision
 from .columns.color_separation import ColorSeparation
 from .columns.exposure import EXPOSURE
-from .own import OwnMetric, own_quantities
+from .own import OwnMetric
 from .quantity import (
     BEST_PLACE,
-    Asked,
     Columns,
     DesignMetric,
     FamilyMetric,
     NoiseMetric,
-    ReadoutMetric,
     VisionMetric,
 )
-from .registry import METRICS, quantities_of
+from .registry import METRICS
 from .separation import csd_name, separations, separations_along, separations_by_edges
+from .whole_readout import Spent, WholeReadout, by_case, over_cases
 
 if TYPE_CHECKING:
     from ..camera.places import Extremes
 
-_READOUT = [metric for metric in METRICS if isinstance(metric, ReadoutMetric)]
-_OTHERS = [metric for metric in _READOUT if not isinstance(metric, ColorSeparation)]
-"""Metrics that need the whole readout of every design."""
-_AT_ONCE = 1024
-"""Readouts of a design in a case that are compared at once."""
+_CSD = [metric for metric in METRICS if isinstance(metric, ColorSeparation)]
 
 
 def designed_quantities(view: View, designs: FloatArray | Block) -> Columns:
@@ -181,30 +176,33 @@ def evaluate(
     *,
     probabilities: bool = False,
     own: Sequence[OwnMetric] = (),
+    spent: Spent | None = None,
 ) -> Columns:
     """Evaluate a block of designs as the camera reads them out, as far as the scene's methods go.
 
     `designs`: see `designed_quantities`. Returns the columns of all metrics but those of a family, each
     ndarray[n_designs]; `states`: signal types that noise may confuse, `probabilities`: with their CDP and CSP; `own`:
-    metrics of a user's own. CSDs are the smallest over the places of the light and the moments of its pulses;
-    `best_place_csd_<a>_<b>` is the largest over the places of the smallest over the moments. Noise metrics and own
-    ones are the worst over the places of the lattice. Distances are NaN where the extremes over all places take more
-    cells than `places` allows, or `sensor_places`.
+    metrics of a user's own; `spent` is added to. CSDs are the smallest over the places of the light and the moments of
+    its pulses; `best_place_csd_<a>_<b>` is the largest over the places of the smallest over the moments. All metrics
+    but CSDs are the worst over the places of the lattice. Distances are NaN where the extremes over all places take
+    more cells than `places` allows, or `sensor_places`.
     """
-    block = _block(designs)
+    block, extra = _block(designs), WholeReadout(imager, own, spent or Spent())
     anywhere = phase.all_count(imager.view, imager.view.methods)
-    if anywhere and imager.view.methods.straight and not (states or own or _OTHERS):
-        found = _by_search(imager, block.curves())
+    if anywhere and imager.view.methods.straight and not states:
+        curves = block.curves()
+        found = _by_search(imager, curves)
         if found is not None:
-            return found | designed_quantities(imager.view, block)
-    changing = None if states or _OTHERS else imager.read_changing(block)
+            more = extra.of(len(curves), lambda part: imager.read(curves[part])[0])
+            return found | more | designed_quantities(imager.view, block)
+    changing = None if states else imager.read_changing(block)
     if changing is None:
-        columns = _read(imager, block, states, probabilities=probabilities, own=own)
+        columns = _read(imager, block, extra, states, probabilities=probabilities)
     elif changing.which.all():
-        columns = _distances_along(imager, changing, own)
+        columns = _distances_along(imager, changing, extra)
     else:
-        along = _distances_along(imager, changing, own)
-        rest = _read(imager, block.some(np.flatnonzero(~changing.which)), own=own)
+        along = _distances_along(imager, changing, extra)
+        rest = _read(imager, block.some(np.flatnonzero(~changing.which)), extra)
         columns = {name: np.empty(len(block)) for name in along}
         for name, values in columns.items():
             values[changing.which], values[~changing.which] = along[name], rest[name]
@@ -215,8 +213,8 @@ def evaluate(
     return columns | designed_quantities(imager.view, block)
 
 
-def _distances_along(imager: Imager, changing: Changing, own: Sequence[OwnMetric]) -> Columns:
-    """CSDs and exposure of designs that differ in one channel alone, and own metrics."""
+def _distances_along(imager: Imager, changing: Changing, extra: WholeReadout) -> Columns:
+    """CSDs and exposure of designs that differ in one channel alone, and what needs their whole readout."""
     by_edges = separations_by_edges(changing, imager.view.members)
     cases = (
         [by_edges]
@@ -227,17 +225,12 @@ def _distances_along(imager: Imager, changing: Changing, own: Sequence[OwnMetric
         ]
     )
     each = {csd_name(pair): np.stack([case[pair] for case in cases]) for pair in cases[0]}
-    found = _over(imager, each) | {EXPOSURE: np.full(int(changing.which.sum()), changing.exposure_s)}
-    return found | own_quantities(own, imager.view, changing.whole) if own else found
+    n = int(changing.which.sum())
+    return over_cases(imager, each) | {EXPOSURE: np.full(n, changing.exposure_s)} | extra.of(n, changing.whole_of)
 
 
 def _read(
-    imager: Imager,
-    block: Block,
-    states: Sequence[str] = (),
-    *,
-    probabilities: bool = False,
-    own: Sequence[OwnMetric] = (),
+    imager: Imager, block: Block, extra: WholeReadout, states: Sequence[str] = (), *, probabilities: bool = False
 ) -> Columns:
     """What the readout of any designs gives; with `states`, what noise does to them, too."""
     curves, members, apart = block.curves(), imager.view.members, Columns()
@@ -249,37 +242,5 @@ def _read(
         apart = _joined([metric.of_noise(imager, curves, read, confused) for metric in noisy])
     else:
         response, exposure_s = imager.read(curves)
-    apart |= own_quantities(own, imager.view, response)
-    return _over(imager, _by_case(response, members)) | apart | {EXPOSURE: exposure_s}
-
-
-def _by_case(response: FloatArray, members: Mapping[str, IndexArray]) -> Columns:
-    """What the readout gives in each case, ndarray[n_cases, n_designs]; so many cases at once that a cache holds them.
-
-    `response`: ndarray[n_designs, n_cases, n_signals, n_channels].
-    """
-    n_designs, n_cases = response.shape[:2]
-    step, parts = max(1, _AT_ONCE // max(1, n_designs)), []
-    for start in range(0, n_cases, step):
-        some = np.swapaxes(response[:, start : start + step], 0, 1)
-        parts.append(_joined([metric.of_readout(some.reshape(-1, *some.shape[2:]), members) for metric in _READOUT]))
-    return {name: np.concatenate([part[name] for part in parts]).reshape(n_cases, n_designs) for name in parts[0]}
-
-
-def _over(imager: Imager, cases: Columns) -> Columns:
-    """The worst of all cases, and of CSDs the largest over the places of the smallest over the moments.
-
-    `cases`: ndarray[n_cases, n_designs] each.
-    """
-    quantities = quantities_of(Asked(imager.view.lights.classes, any_place=True))
-    best = {quantity.of: name for name, quantity in quantities.items() if quantity.extreme == "best place"}
-    found: Columns = {}
-    for name, each in cases.items():
-        if len(each) == 1:
-            found |= {own: each[0].copy() for own in (name, best.get(name)) if own is not None}
-            continue
-        moments = np.stack([quantities[name].worse(place) for place in np.split(each, imager.n_places)])
-        found[name] = quantities[name].worse(moments)
-        if name in best:
-            found[best[name]] = moments.max(axis=0)
-    return found
+    apart |= extra.of(len(curves), response.__getitem__)
+    return over_cases(imager, by_case(response, members, _CSD)) | apart | {EXPOSURE: exposure_s}

@@ -86,7 +86,10 @@ class SearchFacts(_Facts):
 
 
 class Provenance(_Facts):
-    """Everything needed to run a study again, what the machine was, and what its columns mean."""
+    """Everything needed to run a study again, what the machine was, and what its columns mean.
+
+    `spent_s`: what metrics of the whole readout took, and what all rows took, seconds of all workers.
+    """
 
     command: tuple[str, ...]
     duration_s: float
@@ -112,6 +115,7 @@ class Provenance(_Facts):
     parameters: tuple[str, ...]
     quantities: tuple[Column, ...]
     detours: tuple[dict[str, Any], ...]
+    spent_s: tuple[float, float] = (0.0, 0.0)
     warnings: tuple[str, ...]
     search: SearchFacts | None = None
     hypervolume: dict[str, float] | None = None

@@ -19,6 +19,7 @@ from ..base.errors import BrokenProofError
 from ..base.types import Progress
 from ..metrics.bound import FEASIBLE
 from ..metrics.pareto import hypervolume
+from ..metrics.whole_readout import whole_readout_metrics
 from ..results.dictionary import described
 from ..results.facts import Provenance
 from ..results.inventory import Inventory
@@ -46,7 +47,7 @@ from .held_out import left_out_table
 from .looks import Looking, looks_of
 from .of_rows import ROW_TABLES, Shown
 from .provenance import plan_facts, provenance, resolved_yaml
-from .routes import Detours, detours_in_words
+from .routes import Detours, detours_in_words, spent_in_words
 from .rows import Rules, detours_of, with_local_front
 from .search import (
     SearchAnswer,
@@ -187,6 +188,8 @@ class Making:
             gathered.finish()
             detours: Detours = sum(map(detours_of, answered), sweep.detours)
             self.inventory.facts["detours"] = [{"how": h, "why": why, "designs": n} for (h, why), n in detours.items()]
+            if sweep.spent_s:  # else all rows were there
+                self.inventory.facts["spent_s"] = [sweep.spent_s, sweep.seconds]
             self.gathered, self._failed, self._warnings = gathered, sweep.failed, sweep.warnings
             self._table = self._aside.submit(stack.pop_all().close)
 
@@ -258,9 +261,11 @@ class Making:
             "parameters": study.parameters,
             "quantities": [quantity.column for quantity in study.quantities.values()],
             "detours": self.inventory.facts.setdefault("detours", []),
+            "spent_s": self.inventory.facts.setdefault("spent_s", [0.0, 0.0]),
         }
         counted: Detours = Counter({(each["how"], each["why"]): each["designs"] for each in found["detours"]})
         warnings = [*study.warnings, *self._warnings, *detours_in_words(counted)]
+        warnings += spent_in_words(whole_readout_metrics(study.asked), *found["spent_s"])
         if answer is not None:
             found["search"] = search_facts(study, answer)
             if study.plans[answer.search.scenario].methods.saturation == "clip":

@@ -21,6 +21,7 @@ from ..metrics.evaluate import evaluate, family_quantities, image_quantities
 from ..metrics.objective import COMBINED, Objective, columns_of
 from ..metrics.own import OwnMetric
 from ..metrics.quantity import OF_A_SHARE, WORST_CASE, YIELD, Asked, Columns, Quantity
+from ..metrics.whole_readout import Spent
 from ..results.identity import CHUNK
 from ..results.tables import FEW
 from ..vision.section import Vision
@@ -52,10 +53,10 @@ class Request:
 
     @property
     def needs_curves(self) -> bool:
-        """Whether something is asked for that designs need their curves for, or what each signal reads."""
+        """Whether something is asked for that designs need their curves for, or all that each signal reads at once."""
         asked = self.asked
         worst = any(quantity.extreme == WORST_CASE for quantity in self.quantities.values())
-        return bool(self.vision is not None or asked.states or asked.own or asked.wanted_yield or worst)
+        return bool(self.vision is not None or asked.states or asked.wanted_yield or worst)
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
@@ -65,11 +66,15 @@ class Request:
 
 @dataclass(frozen=True)
 class Found:
-    """Quantities of a block, ndarray[n_designs] each; what is wrong with which design; detours that were taken."""
+    """Quantities of a block, ndarray[n_designs] each; what is wrong with which design; detours that were taken.
+
+    `spent_s`: see `whole_readout.Spent`.
+    """
 
     columns: Columns
     faults: dict[int, str]
     detours: Detours
+    spent_s: float = 0.0
 
 
 def found_of(space: Space, start: int, points: FloatArray, view: View, request: Request) -> Found:
@@ -89,7 +94,8 @@ def _in_blocks(size: int, space: Space, start: int, points: FloatArray, view: Vi
         faults |= {begin + index: text for index, text in part.faults.items()}
     names = request.quantities.keys() & parts[0].columns.keys()
     columns = {name: np.concatenate([part.columns[name] for part in parts]) for name in names}
-    return Found(columns, faults, sum((part.detours for part in parts), Counter()))
+    spent_s = sum(part.spent_s for part in parts)
+    return Found(columns, faults, sum((part.detours for part in parts), Counter()), spent_s)
 
 
 def block_of(space: Space, start: int, points: FloatArray, view: View, request: Request) -> Found:
@@ -103,19 +109,20 @@ def block_of(space: Space, start: int, points: FloatArray, view: View, request: 
     detours: Detours = Counter()
     faults: dict[int, str] = {}
     fast: EdgeBlock | None = None
+    spent = Spent()
     try:
         fast = edges_of(space, start, start + len(points))
-        columns = _columns(space, view, points, request, fast)
+        columns = _columns(space, view, points, request, spent, fast)
     except Exception as error:  # one design must not take the others with it
         if len(points) > CHUNK:
             return _in_blocks(CHUNK, space, start, points, view, request)
         own = text_of(error)
         try:
-            columns = _columns(space, view, points, request)
+            columns = _columns(space, view, points, request, spent)
             detours[BY_CURVES, own] = len(points)
         except Exception:
-            columns, faults, detours = _one_by_one(space, start, view, points, request, own)
-    return Found(columns, _not_finite(columns, view, request) | faults, detours)
+            columns, faults, detours = _one_by_one(space, start, view, points, request, spent, own)
+    return Found(columns, _not_finite(columns, view, request) | faults, detours, spent.seconds)
 
 
 def text_of(error: Exception) -> str:
@@ -123,19 +130,21 @@ def text_of(error: Exception) -> str:
     return " ".join(f"{type(error).__name__}: {error}".split())[:_MOST_LETTERS]
 
 
-def _columns(space: Space, view: View, points: FloatArray, request: Request, block: Block | None = None) -> Columns:
+def _columns(
+    space: Space, view: View, points: FloatArray, request: Request, spent: Spent, block: Block | None = None
+) -> Columns:
     """Every quantity of a block of designs, ndarray[n_designs] each; `block`: these very designs, if a faster one."""
     size = view.grid.size
     imager = request.imager(space.kind, view)
     designs = CurveBlock(space.curves(points, size)) if block is None else block
     asked = request.asked
-    columns = evaluate(imager, designs, asked.states, probabilities=asked.probabilities, own=asked.own)
+    columns = evaluate(imager, designs, asked.states, probabilities=asked.probabilities, own=asked.own, spent=spent)
     columns |= family_quantities(None if space.filter is None else space.filter.family, points)
     if request.vision is not None:
         columns |= image_quantities(view, space.curves(points, size), request.vision, request.seed)
     worst = [quantity for quantity in request.quantities.values() if quantity.extreme == WORST_CASE]
     if worst:
-        columns |= worst_cases(space, imager, points, columns, worst, request.tolerance, asked.own)
+        columns |= worst_cases(space, imager, points, columns, worst, request.tolerance, asked.own, spent)
     if request.asked.wanted_yield:
         columns |= of_a_share(space, view, points, request)
     if request.objective.column == COMBINED:
@@ -151,15 +160,17 @@ def worst_cases(
     worst: Sequence[Quantity],
     tolerance: Tolerance,
     own: Sequence[OwnMetric] = (),
+    spent: Spent | None = None,
 ) -> Columns:
     """Worst cases of designs over how far off they may come out, and of CSDs over the population of the lights.
 
-    `nominal`: what `evaluate` gives of them; `worst`: the quantities that are asked for; `own`: metrics of a user's.
+    `nominal`: what `evaluate` gives of them; `worst`: the quantities that are asked for; `own`, `spent`:
+    see `evaluate`.
     """
     view = imager.view
     places = [off for off in tolerance.places if any(off)] if space.filter is not None else []
     curves = [space.curves(points, view.grid.size, off) for off in (AS_DESIGNED, *places)]
-    cases = [nominal, *(evaluate(imager, shifted, own=own) for shifted in curves[1:])]
+    cases = [nominal, *(evaluate(imager, shifted, own=own, spent=spent) for shifted in curves[1:])]
     if view.lights.population is not None:
         from ..metrics.members import population_imager  # noqa: PLC0415  (only where lights have a population)
 
@@ -181,7 +192,7 @@ def of_a_share(space: Space, view: View, points: FloatArray, request: Request) -
 
 
 def _one_by_one(
-    space: Space, start: int, view: View, points: FloatArray, request: Request, own: str
+    space: Space, start: int, view: View, points: FloatArray, request: Request, spent: Spent, own: str
 ) -> tuple[Columns, dict[int, str], Detours]:
     """Each design by its own route, else from its curves; `own`: the fault of the whole block."""
     found: list[Columns | None] = []
@@ -190,11 +201,11 @@ def _one_by_one(
     for index, point in enumerate(points):
         at = start + index
         try:
-            found.append(_columns(space, view, point[None], request, edges_of(space, at, at + 1)))
+            found.append(_columns(space, view, point[None], request, spent, edges_of(space, at, at + 1)))
             detours[ALONE, own] += 1
         except Exception as error:
             try:
-                found.append(_columns(space, view, point[None], request))
+                found.append(_columns(space, view, point[None], request, spent))
                 detours[BY_CURVES, text_of(error)] += 1
             except Exception as last:  # the row says what happened
                 found.append(None)
@@ -238,3 +249,11 @@ def detours_in_words(detours: Detours) -> list[str]:
                 f"{n:,} {'design was' if n == 1 else 'designs were'} {kind} ({why.most_common(1)[0][0]}{more})"
             )
     return lines
+
+
+def spent_in_words(names: Sequence[str], spent_s: float, rows_s: float) -> list[str]:
+    """A line on what metrics of the whole readout take; none where there are none."""
+    if not names:
+        return []
+    what = f"metric {names[0]} needs" if len(names) == 1 else f"metrics {', '.join(names)} need"
+    return [f"{what} the whole readout of a design: {spent_s:,.2f} s of the workers' {rows_s:,.2f} s for all rows"]

@@ -31,7 +31,7 @@ _ARRAYS: dict[pa.DataType, Callable[[Any], pa.Array]] = {pa.float64(): numbers, 
 _MOST_CHUNKS, _LEAST_JOBS = 16, 64
 _DRAWN_DESIGNS = 32
 """Of a job where each design is seen by many random lamps and cameras."""
-_DETOURS = b"cfa_sweep_detours"
+_DETOURS, _SPENT = b"cfa_sweep_detours", b"cfa_sweep_spent_s"
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def run_job(job: Job, view: View, rules: Rules) -> pa.Table:
 
     `pareto` marks the non-dominated designs of this job alone, among those that meet every constraint but those on the
     front's axes; `front.Front` finds those of the whole table. `detours_of` the table says which designs took
-    another route than their block's own.
+    another route than their block's own, `spent_on` it what metrics of the whole readout took.
     """
     points = job.space.points(job.start, job.stop)
     found = found_of(job.space, job.start, points, view, rules.request)
@@ -120,7 +120,7 @@ def run_job(job: Job, view: View, rules: Rules) -> pa.Table:
         "pareto": _local_front(columns, ok, own, rules),
         "status": _status(faults, len(points)),
     }
-    return _with_detours(_table(values, len(points), rules.schema), found.detours)
+    return _annotated(_table(values, len(points), rules.schema), found.detours, found.spent_s)
 
 
 def _local_front(columns: Mapping[str, FloatArray], ok: BoolArray, own: FloatArray, rules: Rules) -> BoolArray:
@@ -171,9 +171,9 @@ def rules_of(study: Study) -> Rules:
 
 
 def joined(tables: Sequence[pa.Table]) -> pa.Table:
-    """The rows of several tables of jobs, with the detours of all."""
+    """The rows of several tables of jobs, with the detours and seconds of all."""
     detours = sum((detours_of(table) for table in tables), Counter())
-    return _with_detours(pa.concat_tables(tables).unify_dictionaries(), detours)
+    return _annotated(pa.concat_tables(tables).unify_dictionaries(), detours, sum(map(spent_on, tables)))
 
 
 def detours_of(table: pa.Table) -> Detours:
@@ -182,12 +182,19 @@ def detours_of(table: pa.Table) -> Detours:
     return Counter({(kind, fault): n for kind, fault, n in json.loads(kept)} if kept else {})
 
 
-def _with_detours(table: pa.Table, detours: Detours) -> pa.Table:
-    """The table with its detours in its metadata, which go where its rows go."""
-    if not detours:
-        return table
-    kept = json.dumps([(kind, fault, n) for (kind, fault), n in detours.items()]).encode()
-    return table.replace_schema_metadata({**(table.schema.metadata or {}), _DETOURS: kept})
+def spent_on(table: pa.Table) -> float:
+    """Seconds that metrics of the whole readout took for a job, see `whole_readout.Spent`."""
+    return float((table.schema.metadata or {}).get(_SPENT, 0.0))
+
+
+def _annotated(table: pa.Table, detours: Detours, spent_s: float) -> pa.Table:
+    """The table with its detours and seconds in its metadata, which go where its rows go, but into no whole table."""
+    metadata = dict(table.schema.metadata or {})
+    if detours:
+        metadata[_DETOURS] = json.dumps([(kind, fault, n) for (kind, fault), n in detours.items()]).encode()
+    if spent_s:
+        metadata[_SPENT] = str(spent_s).encode()
+    return table.replace_schema_metadata(metadata)
 
 
 def _word(text: str | None, n: int) -> pa.Array:

@@ -19,13 +19,13 @@ from ..base.types import Call, IndexArray, Progress, delayed
 from ..camera.view import View
 from ..results.identity import fingerprint
 from ..results.joined import Joining, RowsPart
-from ..results.journal import Journal, Shard
+from ..results.journal import Entry, Journal, Shard
 from ..results.tables import sliced
 from ..study import Study
 from .front import Gathered, few_of
 from .looks import Look, Looking
 from .routes import Detours
-from .rows import Job, Rules, detours_of, failed_rows, job_key, jobs_of, joined, run_job, with_local_front
+from .rows import Job, Rules, detours_of, failed_rows, job_key, jobs_of, joined, run_job, spent_on, with_local_front
 from .wishes import Wishes
 from .workers import WorkerKilledError, Workers, alone
 
@@ -43,6 +43,7 @@ class Sweep:
     """All chunks of a study, those that the journal holds and those that are still to compute.
 
     `looking`: how plain CFAs and named designs are looked at while they are computed; `looks`: what was seen.
+    `spent_s`: of `seconds` that all rows took, those of metrics of the whole readout.
     """
 
     study: Study
@@ -53,6 +54,8 @@ class Sweep:
     warnings: list[str] = field(default_factory=list)
     failed: int = 0
     detours: Detours = field(default_factory=Counter)
+    seconds: float = 0.0
+    spent_s: float = 0.0
     looks: dict[int, Look] = field(default_factory=dict)
 
     @cached_property
@@ -113,7 +116,7 @@ class Sweep:
 
         Raises FailedDesignError, after its chunk is kept, if that is wished. Counts failures and detours.
         """
-        self.failed, self.detours = 0, Counter()
+        self.failed, self.detours, self.seconds, self.spent_s = 0, Counter(), 0.0, 0.0
         entries = self.journal.entries
         in_order = _InOrder(self, whole)
         for index, key in enumerate(self.keys):
@@ -121,7 +124,7 @@ class Sweep:
                 self.journal.forget(key)
             elif key in entries and (table := self._kept(index)) is not None:
                 few = few_of(table, self.rules)
-                self._take_in(few, entries[key].failed, gathered)
+                self._take_in(few, entries[key], gathered)
                 in_order.found(index, few, waits=True)
         todo = [index for index, key in enumerate(self.keys) if key not in entries]
         done = sum(entries[key].rows for key in self.keys if key in entries)
@@ -137,7 +140,7 @@ class Sweep:
         with closing(self.crew(calls, _quarantined, keep)) as finished:
             for batch, found in zip(batches, finished, strict=True):
                 for index, (shard, few, looks) in zip(batch, found, strict=True):
-                    self._take_in(few, shard.failed, gathered)
+                    self._take_in(few, shard, gathered)
                     self.looks |= looks
                     done += shard.rows
                     if shard.failed and wishes.fail_fast:
@@ -194,10 +197,12 @@ class Sweep:
     def _tell_damaged(self, index: int) -> None:
         self.warnings.append(f"chunk {index} was damaged on the disk and is computed again")
 
-    def _take_in(self, few: pa.Table, failed: int, gathered: Gathered) -> None:
+    def _take_in(self, few: pa.Table, finished: Entry | Shard, gathered: Gathered) -> None:
         """A finished chunk, of which `few_of` gives these rows."""
-        self.failed += failed
+        self.failed += finished.failed
         self.detours += detours_of(few)
+        self.seconds += finished.seconds
+        self.spent_s += spent_on(few)
         gathered.add(few)
 
 

@@ -30,8 +30,9 @@ from .workers import Workers, called_by, workers
 
 _HOW = ("command", "backend", "scheduler", "workers", "duration_s")
 """What provenance and `run.json` both say of how a run went, so that either makes the other again."""
-_DETOURS = "detours"
-"""Of both as well: which designs took another route than their block's own."""
+_OF_ROWS = ("detours", "spent_s")
+"""Of both as well: which designs took another route than their block's own, and what metrics of the whole readout
+took."""
 
 
 def run_study(
@@ -71,7 +72,7 @@ def run_study(
         retry = wishes.retry_failed and bool(read_facts(output / PROVENANCE).get("failed", 0))
         if retry or how is None:
             how = {"command": list(command), "workers": crew.count, "backend": crew.backend, "scheduler": scheduler}
-            how[_DETOURS] = inventory.facts.get(_DETOURS, [])
+            how |= {key: inventory.facts[key] for key in _OF_ROWS if key in inventory.facts}
         inventory = begin(output, study, how | {"designs": study.n_designs})
         if wrong == {RESOLVED}:
             inventory.write({RESOLVED: resolved_yaml(study).encode("utf-8")})
@@ -106,7 +107,7 @@ def _how(inventory: Inventory) -> dict[str, Any] | None:
     intact = inventory.guarded or not inventory.wrong([PROVENANCE])
     facts = inventory.facts if inventory.guarded else read_facts(inventory.path(PROVENANCE))
     known = intact and facts.keys() >= {*_HOW}
-    return {key: facts[key] for key in (*_HOW, _DETOURS) if key in facts} if known else None
+    return {key: facts[key] for key in (*_HOW, *_OF_ROWS) if key in facts} if known else None
 
 
 def _discard(inventory: Inventory) -> None:

@@ -30,12 +30,12 @@ def changing(
     block = EdgeBlock(None, np.arange(n), None, at_left, at_right, depth)  # type: ignore[arg-type]
     by_edges = ByEdges(EdgeSums(base, left, right), block, own, uniform, line)
 
-    def make() -> np.ndarray:
+    def make(part: slice) -> np.ndarray:
         electrons = ((own + (base + depth[:, None] * (left[at_left] - right[at_right]))) + uniform[:, None]) * 3.0
         top_e, gain, offset, full = line
         whole = np.floor(offset)
         dn = np.floor((np.where(electrons > top_e, top_e, electrons) * gain + (offset - whole)) + 0.5) + whole
-        return np.clip(dn, 0, full)[:, None]
+        return np.clip(dn, 0, full)[part, None]
 
     return Changing(fixed, 2, make, 3.0, np.ones(n, dtype=bool), by_edges)
 

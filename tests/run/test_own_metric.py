@@ -17,7 +17,7 @@ from sweep.base.own_code import OwnCode
 from sweep.camera.linear import smooth_imager
 from sweep.metrics.own import OwnMetric
 from sweep.metrics.smooth import SmoothDesign
-from sweep.report import make_report, read_output
+from sweep.report import make_report, read_output, summary_lines
 from sweep.results.dictionary import KEYS
 from sweep.run import run_study
 from sweep.study import Study, load_study
@@ -60,6 +60,23 @@ def test_a_csd_written_again_has_the_same_numbers_and_the_same_optimum(tmp_path:
     assert kept["apart"]["unit"] == "DN"
     assert kept["red_spread"]["wanted"] == "less"
     assert pq.read_schema(tmp_path / "own" / "results.parquet").field("apart").type == "double"
+
+
+def test_the_run_says_what_its_metrics_take_and_no_row_does(tmp_path: Path) -> None:
+    made = study(tmp_path, OWN_METRIC.partition("search:")[0])
+    for jobs in (1, 2):
+        ran(made, tmp_path / str(jobs), jobs)
+    tables = [(tmp_path / str(jobs) / "results.parquet").read_bytes() for jobs in (1, 2)]
+    assert tables[0] == tables[1]
+    output = read_output(tmp_path / "1")
+    spent_s, rows_s = output.provenance.spent_s
+    assert 0 < spent_s < rows_s
+    told = "metrics apart, red_spread need the whole readout of a design: "
+    told += f"{spent_s:,.2f} s of the workers' {rows_s:,.2f} s for all rows"
+    assert f"Note: {told}." in summary_lines(output)
+    (tmp_path / "1" / "provenance.json").unlink()
+    ran(made, tmp_path / "1", 1)
+    assert told in read_output(tmp_path / "1").provenance.warnings
 
 
 @pytest.mark.slow

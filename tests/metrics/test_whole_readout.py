@@ -1,0 +1,132 @@
+"""Metrics of the whole readout beside CSDs, which keep their fast routes; what they take is told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sweep.base.own_code import OwnCode
+from sweep.camera.imager import Imager
+from sweep.designs.block import CurveBlock, EdgeBlock, edges_of
+from sweep.metrics import evaluate as route
+from sweep.metrics import registry, whole_readout
+from sweep.metrics.evaluate import evaluate
+from sweep.metrics.own import OwnMetric
+from sweep.metrics.quantity import Asked, Columns, Quantity, ReadoutMetric
+from sweep.metrics.whole_readout import Spent, whole_readout_metrics
+
+from ..blocks import SPACE, VIEWS
+
+VIEW = VIEWS["any place"]
+SCENES = VIEWS | {"anywhere": replace(VIEW, methods=replace(VIEW.methods, phase="within 10 DN"))}
+CODE = """\
+import numpy as np
+
+
+def brightest(readings):
+    return readings.dn.max(axis=2)
+
+
+def absent(readings):
+    CALLS.append(len(readings.dn))
+
+
+brightest.wanted, CALLS = "less", []
+"""
+BRIGHTEST, ABSENT = (OwnMetric(OwnCode(f"mine.py:{name}", CODE)) for name in ("brightest", "absent"))
+
+
+class Darkest(ReadoutMetric):
+    """A metric that another file of `metrics/columns` would add."""
+
+    order = 10
+
+    def quantities(self, asked: Asked) -> tuple[Quantity, ...]:  # noqa: ARG002
+        """Its column."""
+        return (Quantity("darkest_dn", "darkest_dn", "the weakest signal", "DN", wanted="more", ends=("min",)),)
+
+    def of_readout(self, response: np.ndarray, members: Any) -> Columns:  # noqa: ARG002
+        """The weakest signal in its best channel."""
+        return {"darkest_dn": response.max(axis=2).min(axis=1)}
+
+
+@pytest.fixture
+def darkest(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """One more registered metric."""
+    monkeypatch.setattr(registry, "METRICS", (*registry.METRICS, Darkest()))
+    monkeypatch.setattr(whole_readout, "OTHERS", [Darkest()])
+    registry.quantities_of.cache_clear()
+    yield
+    registry.quantities_of.cache_clear()
+
+
+def counted(monkeypatch: pytest.MonkeyPatch, name: str) -> list[int]:
+    """How often a route is taken from now on, a number for each time."""
+    calls: list[int] = []
+    way: Callable[..., Any] = getattr(route, name)
+
+    def taken(*arguments: Any, **named: Any) -> Any:
+        calls.append(1)
+        return way(*arguments, **named)
+
+    monkeypatch.setattr(route, name, taken)
+    return calls
+
+
+def by_hand(name: str, block: EdgeBlock) -> dict[str, np.ndarray]:
+    """Both metrics from the readout of the designs' curves."""
+    response, _ = Imager(SCENES[name]).read(block.curves())
+    best = response.max(axis=3)
+    return {"darkest_dn": best.min(axis=(1, 2)), "brightest": best.max(axis=(1, 2))}
+
+
+@pytest.mark.usefixtures("darkest")
+@pytest.mark.parametrize("at_once", [2**19, 1000])
+@pytest.mark.parametrize("name", list(SCENES))
+def test_csds_are_those_without_other_metrics_and_these_are_of_the_whole_readout(
+    name: str, at_once: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(whole_readout, "_READ_AT_ONCE", at_once)
+    block, spent = edges_of(SPACE, 3, 9 if name == "anywhere" else 69), Spent()
+    assert block is not None
+    columns = evaluate(Imager(SCENES[name]), block, own=[BRIGHTEST], spent=spent)
+    monkeypatch.setattr(whole_readout, "OTHERS", [])
+    alone = evaluate(Imager(SCENES[name]), block)
+    assert {*columns} == {*alone, "darkest_dn", "brightest"}
+    for column, values in alone.items():
+        np.testing.assert_array_equal(columns[column], values, err_msg=column)
+    for column, values in by_hand(name, block).items():
+        np.testing.assert_allclose(columns[column], values, atol=1e-9, err_msg=column)
+    assert spent.seconds > 0
+
+
+@pytest.mark.usefixtures("darkest")
+@pytest.mark.parametrize(
+    ("name", "way", "n"), [("rounded", "separations_by_edges", SPACE.size), ("anywhere", "_by_search", 3)]
+)
+def test_other_metrics_switch_no_fast_route_off(name: str, way: str, n: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    fast, slow = counted(monkeypatch, way), counted(monkeypatch, "_read")
+    block = edges_of(SPACE, 0, n)
+    assert block is not None
+    evaluate(Imager(SCENES[name]), block, own=[BRIGHTEST])
+    assert (len(fast), len(slow)) == (1, 0)
+
+
+def test_a_cfa_that_lacks_an_own_metric_says_so_of_one_design() -> None:
+    calls = ABSENT.code.loaded.__globals__["CALLS"]
+    calls.clear()
+    for block in (edges_of(SPACE, 0, SPACE.size), CurveBlock(SPACE.curves(SPACE.points(0, 9), 301))):
+        assert block is not None
+        columns = evaluate(Imager(VIEWS["rounded"]), block, own=[ABSENT, BRIGHTEST])
+        assert np.isnan(columns["absent"]).all()
+        assert np.isfinite(columns["brightest"]).all()
+    assert calls == [1, 1]
+
+
+@pytest.mark.usefixtures("darkest")
+def test_a_study_knows_which_of_its_columns_these_are() -> None:
+    assert whole_readout_metrics(Asked(("yellow", "red"), own=(BRIGHTEST,))) == ["darkest_dn", "brightest"]
