@@ -22,7 +22,7 @@ from sweep.results.names import REPORT
 from sweep.study import load_study
 
 from ..build import ran
-from ..conftest import STUDIES, Finished, needs_measured
+from ..conftest import STUDIES, Finished
 
 FAST = ("stopband",)
 LONG = ("robust", "noise", "angle")
@@ -45,7 +45,7 @@ EVERY = [
     *FAST,
     *(pytest.param(name, marks=[pytest.mark.slow, pytest.mark.long]) for name in LONG),
     *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW),
-    pytest.param("measured", marks=[pytest.mark.slow, needs_measured]),
+    pytest.param("measured", marks=pytest.mark.slow),
 ]
 
 
