@@ -111,7 +111,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Finish
                     text = text.replace(every, fewer)
                 study = outputs / f"{name}.yaml"
                 study.write_text(text)
-                data = ["--data", SHARED / "data"] if name == "measured" else []
+                data = ["--data", STUDIES] if name == "measured" else []
                 with pytest.MonkeyPatch.context() as patch:
                     if name not in LOOKED_AT:
                         patch.setattr("sweep.report.figures.rendered", lambda _, kind: kind.encode())

@@ -4,8 +4,7 @@
     python tests/same_results.py compare BEFORE AFTER   # two such folders, cell by cell; exit code 1 where they differ
 
 Plans with their promises and the audit are compared word by word. Numbers count as equal within 1e-12 of the largest
-finite one of their column; the summary says where they are equal bit for bit. `measured.yaml` needs its curve files: `save --data FOLDER`, else it is
-left out.
+finite one of their column; the summary says where they are equal bit for bit.
 """
 
 from __future__ import annotations
@@ -21,7 +20,6 @@ import pyarrow.parquet as pq
 STUDIES = Path(__file__).parent.parent / "studies"
 RELATIVE = 1e-12
 TABLES = ("results", "search", "front", "recognition", "curves", "points")
-NEEDS_DATA = ("measured",)
 
 
 def sweep(*arguments: str, said: Path) -> None:
@@ -32,16 +30,12 @@ def sweep(*arguments: str, said: Path) -> None:
         sys.exit(f"{' '.join(arguments)}: {done.stderr}")
 
 
-def save(folder: Path, data: Path | None) -> None:
+def save(folder: Path) -> None:
     """Results, search logs, fronts, plans with their promises, and an audit."""
     folder.mkdir(parents=True)
     for study in sorted(STUDIES.glob("*.yaml")):
-        if study.stem in NEEDS_DATA and data is None:
-            print(f"{study.stem}: left out, it needs --data")
-            continue
-        more = ["--data", str(data)] if study.stem in NEEDS_DATA else []
-        sweep("plan", str(study), "--explain", *more, said=folder / f"{study.stem}.plan.txt")
-        sweep("run", str(study), "--output", str(folder / "runs"), *more, said=folder / f"{study.stem}.said.txt")
+        sweep("plan", str(study), "--explain", said=folder / f"{study.stem}.plan.txt")
+        sweep("run", str(study), "--output", str(folder / "runs"), said=folder / f"{study.stem}.said.txt")
         print(f"{study.stem}: saved")
     sweep("audit", str(folder / "runs" / "distance"), said=folder / "distance.audit.txt")
 
@@ -99,13 +93,12 @@ def main() -> None:
     verbs = parser.add_subparsers(dest="verb", required=True)
     saving = verbs.add_parser("save")
     saving.add_argument("folder", type=Path)
-    saving.add_argument("--data", type=Path)
     comparing = verbs.add_parser("compare")
     comparing.add_argument("before", type=Path)
     comparing.add_argument("after", type=Path)
     given = parser.parse_args()
     if given.verb == "save":
-        save(given.folder, given.data)
+        save(given.folder)
     elif compare(given.before, given.after):
         sys.exit(1)
 

@@ -17,13 +17,16 @@ from .mosaic import Mosaic
 
 _LEAST_QE = 1e-9
 """A pixel that sees less would be exposed for hours on the sun."""
+_CLEAR_NAMES = ("c", "w", "clear", "white", "mono", "panchromatic")
+"""Names of a pixel without filter, in any case."""
 
 
 @dataclass(frozen=True)
 class SensorCurves:
     """QE by curve name, each ndarray[n_wavelengths], electrons per photon (or on one common relative scale).
 
-    `clear` names the reference of the CFA's sensitivity. `variants` maps a CFA's name to channels of it that use a
+    `clear` names the reference of the CFA's sensitivity: a pixel without filter where `has_clear`, else the brightest
+    curve. `variants` maps a CFA's name to channels of it that use a
     curve of another name. `technologies`: by what the filters of curves work, where that is stated.
     """
 
@@ -34,6 +37,12 @@ class SensorCurves:
     surrogate: bool = False
     variants: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     technologies: Mapping[str, Technology | None] = field(default_factory=dict)
+    has_clear: bool = True
+
+    @property
+    def brightest(self) -> str:
+        """The reference where that is only the brightest curve; empty where it is a pixel without filter."""
+        return "" if self.has_clear else self.clear
 
     def curve_name(self, cfa: str, channel: str) -> str:
         """The curve that `channel` of `cfa` uses."""
@@ -69,6 +78,7 @@ class SensorCurves:
 def make_sensor(name: str, qe: Mapping[str, FloatArray], source: str, clear: str | None = None) -> SensorCurves:
     """A sensor from curves on the grid; `clear` defaults to the curve with the largest total.
 
+    That one counts as a pixel without filter only where its name says so.
     Raises DataError when a QE is above 1 or below 1e-9 everywhere, or `clear` is not a curve.
     """
     faults = []
@@ -83,7 +93,8 @@ def make_sensor(name: str, qe: Mapping[str, FloatArray], source: str, clear: str
     if faults:
         raise DataError(faults)
     chosen = clear or max(qe, key=lambda curve: float(qe[curve].sum()))
-    sensor = SensorCurves(name, dict(qe), chosen, source)
+    has_clear = clear is not None or chosen.casefold() in _CLEAR_NAMES
+    sensor = SensorCurves(name, dict(qe), chosen, source, has_clear=has_clear)
     sensor.curve(chosen)
     return sensor
 

@@ -21,6 +21,12 @@ _COARSE_NM = 10.0
 _FEWEST_IN_PEAK = 4
 _PERCENT = 100.0
 _MOST_LETTERS = 100
+_NEARLY = 1e-6
+NORMALIZED = (
+    "the curves have a maximum of 1: they look normalized, and are taken as QE; electrons, noise, SNR and what a "
+    "stated exposure gives are then those of a pixel with that QE; `scale` brings them to the pixel's own"
+)
+"""A note of curves that `looks_normalized`."""
 
 
 @dataclass(frozen=True)
@@ -139,11 +145,18 @@ def notes(facts: Facts, *, as_qe: bool) -> list[str]:
         found.append(f"no value is above 0: {', '.join(dark)}")
     if as_qe:
         top = max(curve.peak for curve in facts.curves)
-        if top > 1:
+        if top > 1 + _NEARLY:
             scale = qe_scale(top)
             reason = "percent" if scale == 1 / _PERCENT else "a relative scale"
             found.append(f"values up to {top:.6g} are above 1, so no QE: {reason}? Then set `scale: {scale:.4g}`")
+        elif looks_normalized(top):
+            found.append(NORMALIZED)
     return found
+
+
+def looks_normalized(top: float) -> bool:
+    """Whether QE curves whose largest value is `top` are rather relative responses: no pixel has a QE of just 1."""
+    return abs(top - 1) <= _NEARLY
 
 
 def qe_scale(top: float) -> float:

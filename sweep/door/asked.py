@@ -124,7 +124,8 @@ def filter_of_run(folder: Path, design: str | None, wishes: AskedFor) -> Judged:
     nodes_nm = study.grid.nodes_nm
     own = {OWN + channel: curve for channel, curve in zip(space.filter.channels, curves[0], strict=True)}
     curves_nm = {name: (nodes_nm, curve) for name, curve in {**study.sensor.qe, **own}.items()}
-    given = sensor_given(None, curves_nm, name=study.sensor.name, clear=study.sensor.clear)
+    clear = study.sensor.clear if study.sensor.has_clear else None
+    given = sensor_given(None, curves_nm, name=study.sensor.name, clear=clear)
     sensor = Given({**given.keys, "technology": study.sensor.technologies}, given.curves)
     mosaic = study.mosaics[space.cfa]
     named = _other_names(study.sensor, space.cfa, mosaic) | dict(study.section.cfas[space.cfa].curves)

@@ -15,7 +15,7 @@ from ..camera.exposure import may_set_exposure
 from ..camera.mosaic import Mosaic
 from ..curves.lights import Pair, class_pairs
 from ..designs.technology import Technology
-from ..metrics.columns.sensitivity import CFA_SENSITIVITY
+from ..metrics.columns.sensitivity import CFA_SENSITIVITY, reference_of
 from ..metrics.quantity import Column, Columns
 from ..metrics.separation import csd_name
 from ..metrics.smooth import smooth_csd
@@ -105,6 +105,8 @@ class Verdict:
         for scene in scenes:
             rows = {cfa: columns for own, cfa, columns in self.rows if own == scene}
             yield from _aligned(rows, (self.goal, *self.others), scene if len(scenes) > 1 else "CFA")
+        if brightest := self.study.sensor.brightest:
+            yield f"Light: 1 = {reference_of(brightest)}."
         if self.limit is None or self.smooth is None:
             yield f"No limit is computed: {self.no_limit}."
             return
@@ -118,7 +120,7 @@ class Verdict:
 
 
 def _aligned(rows: Mapping[str, Columns], columns: Sequence[Column], corner: str) -> Iterator[str]:
-    """A line per CFA of one scene: its separations, and the light of the whole tile (1: a sensor without filters)."""
+    """A line per CFA of one scene: its separations, and the light of the whole tile (see `reference_of`)."""
     head = [corner, *("/".join(column.pair or ()) for column in columns), "light"]
     cells = [
         [cfa, *(column.amount(float(own[column.name][0]), 1) for column in columns), f"{own[CFA_SENSITIVITY][0]:.3f}"]

@@ -187,7 +187,7 @@ class Quantity(Column):
 class Asked:
     """What a study asks for: signal types, states that noise may confuse, any place of the light, shifts of edges, a
     population of its lights and a share of random ones (0: none), probabilities of detection and separation, tasks, a
-    benchmark of vision, and own metrics.
+    benchmark of vision, and own metrics. `brightest`: the curve whose light is 1, where that is no clear pixel.
     """
 
     classes: tuple[str, ...]
@@ -200,6 +200,7 @@ class Asked:
     probabilities: bool = False
     vision: bool = False
     own: tuple[OwnMetric, ...] = ()
+    brightest: str = ""
 
 
 class Metric(ABC):

@@ -17,7 +17,7 @@ from ..study.axes import series_of
 from .allowed_lamps import lamp_lines
 from .assumed import assumed, moves_with_light, technology_of
 from .leaders import Leaders, Row, leaders_of
-from .names import OF_CLEAR, capital, full_name, label, rate_told
+from .names import capital, full_name, label, of_reference, rate_told
 from .noise import usable_lines
 from .robustness import over_population, robustness_lines, worst_over
 from .series import lead_sentence, leads_of
@@ -73,7 +73,7 @@ def said_separation(output: Output, row: Row) -> str:
     """How far a row separates the pair of signal types of the trade-off, and at which light."""
     separation = output.trade_off[0]
     told = separation.told(row[separation.name])
-    light = f"at {row[CFA_SENSITIVITY]:.3f} {OF_CLEAR}"
+    light = f"at {row[CFA_SENSITIVITY]:.3f} {of_reference(output)}"
     if separation.pair is None or separation.metric in _BY_NOISE:
         return f"reaches {separation.words} {told} {light}"
     worst = f" in the worst case of {worst_over(output)}" if separation.extreme == WORST_CASE else ""
@@ -231,7 +231,7 @@ def _others(output: Output, leaders: Leaders) -> Iterator[str]:
 
 def _figures(output: Output, row: Row) -> str:
     separation = output.trade_off[0]
-    light = f"{row[CFA_SENSITIVITY]:.3f} {OF_CLEAR}"
+    light = f"{row[CFA_SENSITIVITY]:.3f} {of_reference(output)}"
     return f"{separation.told(row[separation.name])} at {light}{_limited_told(output, row)}"
 
 

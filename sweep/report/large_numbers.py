@@ -14,7 +14,7 @@ from ..results.output import Output
 from ..results.tables import PLAIN
 from ..results.thinning import per_exposure
 from .leaders import Row, leaders_of
-from .names import OF_CLEAR, rate_told
+from .names import of_reference, rate_told
 from .noise import UsableEnds, usable_ends
 from .series import SeriesFigure, leads_of
 from .upper_bound import upper_bound_beside
@@ -54,7 +54,7 @@ def large_numbers(output: Output) -> list[LargeNumber]:
         LargeNumber(separation.told(value), separation.words, against),
         LargeNumber(
             f"{best[CFA_SENSITIVITY]:.3f}",
-            OF_CLEAR,
+            of_reference(output),
             _beside(plain, CFA_SENSITIVITY, float(best[CFA_SENSITIVITY]), "{:.3f}".format),
         ),
     ]
@@ -90,7 +90,7 @@ def _numbers_under_noise(output: Output, ends: Sequence[UsableEnds]) -> Iterator
     light = float(rows[name][CFA_SENSITIVITY])
     beside = _beside(None if plain is None else rows[plain], CFA_SENSITIVITY, light, "{:.3f}".format)
     yield numbers[0]
-    yield LargeNumber(f"{light:.3f}", OF_CLEAR, beside)
+    yield LargeNumber(f"{light:.3f}", of_reference(output), beside)
     yield from numbers[1:2]
 
 
@@ -119,7 +119,7 @@ def _numbers_over(output: Output, series: SeriesFigure) -> Iterator[LargeNumber]
     plain = [other for other in others if rows[other]["kind"] == PLAIN]
     most = max(plain, key=lambda other: np.nan_to_num(others[other][start], nan=-np.inf), default="")
     beside = _beside(rows.get(most), CFA_SENSITIVITY, light, "{:.3f}".format)
-    yield LargeNumber(f"{light:.3f}", OF_CLEAR, beside)
+    yield LargeNumber(f"{light:.3f}", of_reference(output), beside)
     figures = ", ".join(part for part in (f"{separation.told(own[stop])}", rival(stop)) if part)
     yield LargeNumber(at(stop), f"{name} leads up to here" if leads[-1][2] != stop else "and still leads here", figures)
 

@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN
 
-OF_CLEAR = "of a clear sensor's light"
-"""What the light of a whole CFA is told in."""
+
+def of_reference(output: Output) -> str:
+    """The light that a whole CFA's is told in: a clear sensor's, or that of the brightest curve in every pixel."""
+    sensor = output.provenance.sensor
+    return "of a clear sensor's light" if sensor.has_clear else f"of the light of {sensor.reference} pixels alone"
 
 
 def label(row: Mapping[Any, Any]) -> str:

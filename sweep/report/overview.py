@@ -35,7 +35,7 @@ _NAMES = {
 
 @dataclass(frozen=True)
 class OverviewFigure:
-    """Separation over the light of the whole CFA (a clear sensor is 1), in one scenario.
+    """Separation over the light of the whole CFA (1: a clear sensor, or brightest pixels alone), in one scenario.
 
     `groups`: plain CFAs, named designs, the search's best and the swept front, whose designs meet every constraint
     but, in `outside`, those on its two axes. `traced`: what the search found at each level of sensitivity; `limit`:
@@ -66,9 +66,11 @@ def around_designs(output: Output, scenario: str) -> OverviewFigure:
     """The same without the designs: what stands around them."""
     separation = output.trade_off[0]
     traced, limit = _trade_off(output, scenario)
+    sensor = output.provenance.sensor
+    reference = "clear sensor" if sensor.has_clear else f"{sensor.reference} pixels alone"
     return OverviewFigure(
         title=f"{output.study.study}: {separation.words} against light",
-        x_label=f"{output.columns[CFA_SENSITIVITY].words}: light of the whole CFA (clear sensor = 1)",
+        x_label=f"{output.columns[CFA_SENSITIVITY].words}: light of the whole CFA ({reference} = 1)",
         y_label=separation.axis,
         groups={},
         traced=traced,

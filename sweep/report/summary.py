@@ -9,7 +9,7 @@ from ..results.tables import PLAIN
 from ..study.axes import series_of
 from .answer import answer_sentences
 from .assumed import assumed_line
-from .names import OF_CLEAR
+from .names import of_reference
 from .published import comparison_lines, comparison_with_published
 from .scorecard import score_lines, scorecard
 from .tables import geometry_table
@@ -23,7 +23,7 @@ def _scene_lines(output: Output) -> list[str]:
     """CFAs and named designs in each scenario; of those that differ in one number the two ends, of many others few."""
     shown = output.trade_off[0]
     title = f"{shown.words[:1].upper()}{shown.words[1:]} of the named CFAs and designs"
-    title += f", and their share {OF_CLEAR}:" if len(output.scenarios) == 1 else ":"
+    title += f", and their share {of_reference(output)}:" if len(output.scenarios) == 1 else ":"
     rows, scenarios = output.named, output.scenarios
     inner = {name for own in series_of(scenarios).values() for name in list(own)[1:-1]}
     shown_ones = [name for name in scenarios if name not in inner]

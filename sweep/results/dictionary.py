@@ -9,6 +9,7 @@ from typing import get_args
 import pyarrow as pa
 
 from ..curves.tasks import Measure, TaskName
+from ..metrics.columns.sensitivity import CFA_SENSITIVITY, reference_of
 from ..metrics.quantity import DN, Asked, Column
 from ..metrics.registry import listed
 from .curves import SCHEMA
@@ -85,6 +86,7 @@ _OWN = (
     "a metric of the study's `metrics`, the worst over moments and places of the lattice; nothing is promised of it: "
     "the tolerance in DN is of CSDs"
 )
+_WITHOUT_CLEAR = f"; without a clear pixel 1 = {reference_of('<name>')}"
 KEYS = tuple(name for names in (*_KEYS, *_VERDICTS) for name in names)
 """Columns that are no quantities of a metric."""
 
@@ -117,7 +119,8 @@ def columns_table() -> list[str]:
     tasks = tuple(TaskName("<task>", metric, ("<light>",)) for metric in get_args(Measure))
     asked = Asked(types, types, any_place=True, probabilities=True, tasks=tasks, vision=True)
     for quantity in listed(asked):
-        rows.append(_row((quantity.name,), quantity.unit, quantity.meaning))
+        more = _WITHOUT_CLEAR if quantity.name == CFA_SENSITIVITY else ""
+        rows.append(_row((quantity.name,), quantity.unit, quantity.meaning + more))
     rows.append(_row(("<own metric>",), "its own", _OWN))
     rows.append(_row(("worst_<quantity>",), "", _WORST))
     rows.append(_row(("yield_csd_<a>_<b>",), DN, _OF_A_SHARE))

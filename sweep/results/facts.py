@@ -25,6 +25,13 @@ class Origin(_Facts):
     surrogate: bool
 
 
+class SensorOrigin(Origin):
+    """The same of a sensor, with the curve whose light is 1: that of a pixel without filter, or the brightest one."""
+
+    reference: str = ""
+    has_clear: bool = True
+
+
 class EffectFacts(_Facts):
     """How an effect was computed, what that changes in a CSD at most (DN), and why."""
 
@@ -97,7 +104,7 @@ class Provenance(_Facts):
     fingerprint: str
     model_version: str
     data_sha256: dict[str, str]
-    sensor: Origin
+    sensor: SensorOrigin
     lights: Origin
     versions: dict[str, str]
     platform: str

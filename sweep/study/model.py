@@ -116,6 +116,7 @@ class Study:
             tasks=() if self.tasks is None else self.tasks.keys,
             vision=self.section.vision is not None,
             own=self.own,
+            brightest=self.sensor.brightest,
         )
 
     @property

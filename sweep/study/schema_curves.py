@@ -81,7 +81,10 @@ class SensorSection(Documented):
     name: Name | None = None
     files: list[CurveFile] = []
     clear: Name | None = None
-    """The reference of the CFA's sensitivity. Left out, it is the built-in sensor's own, or the largest curve."""
+    """The pixel without filter: the reference of the CFA's sensitivity.
+
+    Left out, it is the built-in sensor's own, or the largest curve, which counts as clear only if it is called C, W,
+    clear, white, mono or panchromatic."""
     technology: dict[Name, Stated] = {}
     """Curve -> `pigment`, or `interference: {effective_index: 1.8}`, whose transmission over the clear curve moves with
     the angle of the light; a curve that is left out, as on axis."""

@@ -8,6 +8,7 @@ from dataclasses import replace
 from ..base.errors import DataError
 from ..base.types import FloatArray
 from ..camera.sensor import BUILT_IN_SENSORS, SensorCurves, make_sensor
+from ..curves.facts import NORMALIZED, looks_normalized
 from .schema_curves import CurveFile, SensorSection
 from .sources import Sources
 from .yaml_tree import Key
@@ -78,6 +79,10 @@ def _columns(
 ) -> dict[str, FloatArray]:
     """The curves of one file on the grid, times a factor; those that a finished run kept have it already."""
     curves = sources.curves(path, entry)
+    if curves is not None and entry.relative_to is None:
+        top = max((float(curves.values[c].max()) for c in entry.columns.values() if c in curves.values), default=0.0)
+        if looks_normalized(entry.scale * top):
+            sources.warnings.append(f"{entry.file}: {NORMALIZED}")
     found = {}
     for name, column in entry.columns.items():
         place = (*path, "columns", name)

@@ -26,13 +26,14 @@ def _moves(sensor: SensorCurves, curve: str) -> bool:
 def with_technologies(sensor: SensorCurves, section: StudySection, sources: Sources) -> SensorCurves:
     """The sensor with what is stated of its curves; what does not fit adds a fault."""
     clear = sensor.curve(sensor.clear)
+    kind = "clear" if sensor.has_clear else "brightest"
     stated = replace(sensor, technologies=section.sensor.technology)
     for curve in section.sensor.technology:
         path: tuple[Key, ...] = ("sensor", "technology", curve)
         if curve not in sensor.qe:
             sources.unknown(path, "curve", curve, list(sensor.qe))
         elif _moves(stated, curve) and (sensor.qe[curve] > clear * (1 + _ROUNDING)).any():
-            problem = f"an interference filter lets through a share of the clear curve, {sensor.clear}"
+            problem = f"an interference filter lets through a share of the {kind} curve, {sensor.clear}"
             sources.add(path, problem, f"{curve} is above it", "pigment")
     return stated
 

@@ -13,7 +13,7 @@ from sweep.curves.files import read_curves
 
 from ..build import SCENES, study_file
 from ..commanded import commanded, sweep
-from ..conftest import SHARED, STUDIES, Finished, needs_measured
+from ..conftest import STUDIES, Finished
 
 
 @pytest.fixture(scope="module")
@@ -154,17 +154,15 @@ def test_an_infeasible_study_names_the_constraint_and_writes_nothing(tmp_path: P
 
 
 @pytest.mark.slow
-@needs_measured
 def test_measured_curves_run_to_a_report(tmp_path: Path) -> None:
-    arguments = ("--data", str(SHARED / "data"), "--output", str(tmp_path), "--jobs", "2")
-    done = sweep("run", str(STUDIES / "measured.yaml"), *arguments)
+    done = sweep("run", str(STUDIES / "measured.yaml"), "--output", str(tmp_path), "--jobs", "2")
     assert done.returncode == 0, done.stderr
     frame = pd.read_parquet(tmp_path / "measured" / "results.parquet")
     best = frame[frame["feasible"] & (frame["cfa"] == "RGBN")]
     plain = frame[frame["cfa"] == "RGBW"]["csd_yellow_red"].iloc[0]
     assert best["csd_yellow_red"].max() > plain
     curves = pd.read_parquet(tmp_path / "measured" / "curves.parquet")
-    raw = read_curves(SHARED / "data" / "qe_ar0132at_rgbw.csv")
+    raw = read_curves(STUDIES / "data" / "qe_ar0132at_rgbw.csv")
     at_630 = raw.values["W"][list(raw.wavelength_nm).index(630)]
     assert curves[(curves["curve"] == "W") & (curves["wavelength_nm"] == 630)]["value"].item() == pytest.approx(
         at_630, rel=1e-12

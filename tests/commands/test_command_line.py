@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 import webbrowser
 from pathlib import Path
 
@@ -44,6 +45,23 @@ def test_a_name_is_a_study_of_this_folder_or_of_the_project(tmp_path: Path, monk
     assert "did you mean 'stopband'?" in err
     code, _, err = commanded("check", "stopbnd.yaml")
     assert (code, "cannot be read" in err) == (2, True)
+
+
+def test_the_measured_study_finds_its_curves_from_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, said, err = commanded("check", "measured")
+    assert (code, "232,564 designs" in said) == (0, True), err
+
+
+def test_an_installed_copy_has_every_file_of_the_studies() -> None:
+    project = tomllib.loads((STUDIES.parent / "pyproject.toml").read_text())
+    shared = Path("share/cfa-sweep")
+    for folder, patterns in project["tool"]["setuptools"]["data-files"].items():
+        inside = STUDIES.parent / Path(folder).relative_to(shared)
+        files = {path for pattern in patterns for path in STUDIES.parent.glob(pattern)}
+        assert {path.parent for path in files} == {inside}
+        assert files >= {*inside.glob("*.yaml"), *inside.glob("*.csv")}
+    assert str(shared / "studies" / "data") in project["tool"]["setuptools"]["data-files"]
 
 
 def test_a_changed_key_is_checked_like_the_file_and_kept(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from sweep.study.editors import schema_text
 
 from ..cases import thinned
 from ..commanded import commanded
-from ..conftest import SHARED, needs_measured
+from ..conftest import SHARED, STUDIES, needs_measured
 from ..curve_texts import WAVE, bell, csv
 
 
@@ -199,17 +199,19 @@ def test_the_command_ends_with_the_picture_or_exit_2(tmp_path: Path) -> None:
     assert "negative value, and " in said
 
 
-@needs_measured
-def test_measured_files_are_taken_for_what_they_are(tmp_path: Path) -> None:
-    for name, guess in (
-        ("qe_ar0132at_rgbw", "QE"),
-        ("qe_mt9v024_rccc", "QE"),
-        ("led_luxeon", "light"),
-        ("traffic_lica", "light"),
-    ):
-        found = described(SHARED / "data" / f"{name}.csv", tmp_path)
-        assert any(f"A guess: {guess}" in line for line in found.lines)
-        assert not found.faults
+@pytest.mark.parametrize(
+    ("file", "guess"),
+    [
+        (STUDIES / "data" / "qe_ar0132at_rgbw.csv", "QE"),
+        (STUDIES / "data" / "led_luxeon.csv", "light"),
+        pytest.param(SHARED / "data" / "qe_mt9v024_rccc.csv", "QE", marks=needs_measured),
+        pytest.param(SHARED / "data" / "traffic_lica.csv", "light", marks=needs_measured),
+    ],
+)
+def test_measured_files_are_taken_for_what_they_are(tmp_path: Path, file: Path, guess: str) -> None:
+    found = described(file, tmp_path)
+    assert any(f"A guess: {guess}" in line for line in found.lines)
+    assert not found.faults
 
 
 def test_names_that_look_the_same_keep_their_colors(tmp_path: Path) -> None:

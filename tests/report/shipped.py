@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from ..conftest import needs_measured
-
 FAST = ("stopband",)
 LONG = ("robust", "noise", "angle")
 SLOW = (
@@ -27,5 +25,5 @@ EVERY = [
     *FAST,
     *(pytest.param(name, marks=[pytest.mark.slow, pytest.mark.long]) for name in LONG),
     *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW),
-    pytest.param("measured", marks=[pytest.mark.slow, needs_measured]),
+    pytest.param("measured", marks=pytest.mark.slow),
 ]

@@ -11,7 +11,7 @@ from sweep.run.provenance import resolved_yaml
 from sweep.study import folder_name, load_study
 
 from ..build import BASE, faults, load, one_line
-from ..conftest import SHARED, STUDIES, needs_measured
+from ..conftest import STUDIES
 
 SENSOR_FILE = "sensor:\n  files:\n    - {file: qe.csv, columns: {R: R, C: C}}\n"
 LIGHT_FILE = "lights:\n  files:\n    - {file: led.csv, quantity: energy, signals: {red: [r], green: [g]}}\n"
@@ -47,15 +47,13 @@ def test_shipped_studies_load(name: str) -> None:
         assert study.n_designs > 100_000
 
 
-@needs_measured
 def test_the_measured_study_loads() -> None:
-    study = load_study(STUDIES / "measured.yaml", SHARED / "data")
+    study = load_study(STUDIES / "measured.yaml")
     assert not study.sensor.surrogate
     assert set(study.digests) == {
-        "qe_ar0132at_rgbw.csv",
-        "qe_ar0132at_rccc.csv",
-        "led_luxeon.csv",
-        "traffic_lica.csv",
+        "data/qe_ar0132at_rgbw.csv",
+        "data/qe_ar0132at_rccc.csv",
+        "data/led_luxeon.csv",
     }
     assert study.lights.classes == ("green", "yellow", "red")
     # one common scale: both files give the same clear pixel at 630 nm

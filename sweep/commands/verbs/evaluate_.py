@@ -36,7 +36,10 @@ def evaluate_(
     ] = None,
     quantity: Annotated[LightUnit, typer.Option(help="What the numbers of the lights are.")] = "energy",
     transmission: Annotated[
-        bool, typer.Option("--transmission", help="The values are a transmission in front of the clear pixel.")
+        bool,
+        typer.Option(
+            "--transmission", help="The values are a transmission in front of the clear pixel, or else the brightest."
+        ),
     ] = False,
     relative_to: Annotated[
         str | None, typer.Option(help="The values are a transmission times this curve.", show_default=False)

@@ -16,6 +16,12 @@ from ..smooth import Rows, SmoothDesign
 SENSITIVITY, CFA_SENSITIVITY = "sensitivity", "cfa_sensitivity"
 
 
+def reference_of(brightest: str) -> str:
+    """The sensor whose light is 1; `brightest`: its curve, where the study has no clear pixel."""
+    alone = f"a sensor of {brightest} pixels alone, its brightest curve"
+    return alone if brightest else "a sensor without color filters"
+
+
 class Sensitivity(DesignMetric):
     """Total QE of the modified channels over that of the curves that they replace; that of the CFA over a clear one."""
 
@@ -23,7 +29,6 @@ class Sensitivity(DesignMetric):
 
     def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
         """`sensitivity` and `cfa_sensitivity`."""
-        del asked
         own = Quantity(
             name=SENSITIVITY,
             metric=SENSITIVITY,
@@ -40,7 +45,7 @@ class Sensitivity(DesignMetric):
         whole = Quantity(
             name=CFA_SENSITIVITY,
             metric=CFA_SENSITIVITY,
-            meaning="sensitivity of the CFA: the light of the whole tile (1 = a sensor without color filters)",
+            meaning=f"sensitivity of the CFA: the light of the whole tile (1 = {reference_of(asked.brightest)})",
             label="CFA sensitivity",
             wanted="more",
             role="light",

@@ -12,6 +12,7 @@ import pandas as pd
 from ...results.curves import KeptCurves
 from ...results.facts import Provenance
 from .. import Output
+from ..names import of_reference
 
 _SHOWN = 48
 _MOST_KEYS = 3
@@ -111,6 +112,9 @@ def curve_notes(runs: Mapping[str, Output]) -> list[str]:
         what = _other_curves(reference.curves, output.curves)
         if what:
             notes.append(f"{first} and {label} used other curves ({what}): their results do not compare one to one.")
+        if of_reference(output) != of_reference(reference):
+            shares = f"{of_reference(reference)} in {first}, {of_reference(output)} in {label}"
+            notes.append(f"The CFA sensitivities do not compare: they are shares {shares}.")
     return notes
 
 
