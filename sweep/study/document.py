@@ -19,6 +19,8 @@ _MOST = (500_000, 50_000)
 _RESOLVED = ".resolved.yaml"
 _MOST_RESOLVED = (8_000_000, 400_000)
 """Of a file of that name, as a run writes it: with every default, and each of up to 2000 scenarios."""
+_MEANT = {"yes": "true", "on": "true", "y": "true", "no": "false", "off": "false", "n": "false"}
+"""Booleans of YAML 1.1, which are texts in YAML 1.2."""
 _MOST_LOOKED_AT = 2 * MOST_FAULTS
 """Of the faults that the schema finds; of a value that may have several types there is one for each."""
 
@@ -139,7 +141,9 @@ class Document:
             got = value.get(tag) if isinstance(value, dict) else value
             return self.fault((*path, tag), "unknown kind", got, expected)
         shown = value if not isinstance(value, dict | list) else type(value).__name__
-        return self.fault(path, "not allowed", shown, _readable(item["msg"]))
+        meant = _MEANT.get(str(value).casefold()) if kind == "bool_type" else None
+        problem = "not allowed" if meant is None else f"true or false expected: write {meant}"
+        return self.fault(path, problem, shown, _readable(item["msg"]) if meant is None else None)
 
 
 def field_names(model: type[BaseModel], path: Sequence[Key], data: Any) -> list[str]:
@@ -224,7 +228,7 @@ def dotted(path: Sequence[Key]) -> str:
 
 def _readable(message: str) -> str:
     plain = message.removeprefix("Input should be ").removeprefix("a valid ")
-    return "mapping" if plain.startswith("dictionary") else plain
+    return "mapping" if plain.startswith("dictionary") else "true or false" if plain == "boolean" else plain
 
 
 def _text(path: Path, most_bytes: int) -> str:

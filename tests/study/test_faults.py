@@ -28,3 +28,12 @@ def test_the_name_of_a_pair_in_the_other_order_is_proposed(tmp_path: Path, text:
     if name:
         text = BASE.replace("sensitivity:", f"{name}:") + text.partition("objective:")[0]
         assert faults(tmp_path, text)[0].endswith(f"did you mean {meant!r}?")
+
+
+@pytest.mark.parametrize(("said", "meant"), [("yes", "true"), ("On", "true"), ("no", "false"), ("off", "false")])
+def test_a_boolean_of_another_yaml_is_told_as_it_is_written(tmp_path: Path, said: str, meant: str) -> None:
+    expected = f"true or false expected: write {meant} (got {said!r})"
+    for section in ("scenarios: {chart: {noise: BOOLEAN}}\n", "validate: {leave_one_out: BOOLEAN}\n"):
+        assert faults(tmp_path, BASE + section.replace("BOOLEAN", said))[0].endswith(expected)
+    other = faults(tmp_path, BASE + "scenarios: {chart: {noise: loud}}\n")[0]
+    assert other.endswith("not allowed (got 'loud'); allowed: true, false or a mapping")
