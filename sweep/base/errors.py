@@ -17,13 +17,22 @@ _MOST_OF_A_PART = 2000
 def nearest(name: object, known: Iterable[str]) -> str | None:
     """Return the known name that is most like `name`, or None when none is alike.
 
+    A name of the same words in another order, or with a letter wrong, is more like it than one of other words.
     Looks at the first 1000 names, and nowhere for the like of a name beyond 100 letters, so that it never takes long.
     """
     if len(str(name)) > _MOST_LETTERS:
         return None
     folded = {str(c).casefold(): str(c) for c in islice(known, _MOST_KNOWN) if len(str(c)) <= _MOST_LETTERS}
-    found = difflib.get_close_matches(str(name).casefold(), list(folded), n=1, cutoff=0.5)
+    sought, ordered = str(name).casefold(), {_in_order(c): c for c in reversed(folded)}
+    found = difflib.get_close_matches(sought, list(folded), n=1, cutoff=0.5)
+    if sought not in folded and (alike := difflib.get_close_matches(_in_order(sought), list(ordered), n=1, cutoff=0.9)):
+        found = [ordered[alike[0]]]
     return folded[found[0]] if found else None
+
+
+def _in_order(name: str) -> str:
+    """The words of a name in the order of the alphabet."""
+    return "_".join(sorted(name.split("_")))
 
 
 @dataclass(frozen=True)

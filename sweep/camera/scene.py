@@ -6,6 +6,7 @@ import math
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
 
 from ..base.types import Meters, Ratio, Seconds, Section, Share
 from .pixel import DarkCurrent, Optics, Pixel, Prnu, ReadNoise
@@ -112,7 +113,9 @@ def _noise(value: Any) -> Any:
     """`true` is the pixel's own noise, `false` none."""
     if isinstance(value, bool):
         return {} if value else None
-    return value
+    if value is None or isinstance(value, dict | Noise):
+        return value
+    raise PydanticCustomError("bool_type", "true, false or a mapping")
 
 
 class Scene(Section):

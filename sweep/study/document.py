@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from types import UnionType
@@ -12,13 +13,15 @@ from pydantic import BaseModel, ValidationError
 
 from ..base.disk import NO_UTF_16, not_utf8, read_input
 from ..base.errors import MOST_FAULTS, Fault, StudyError, nearest
-from .yaml_tree import Key, Tree, yaml_text
+from .yaml_tree import Key, Place, Tree, yaml_text
 
 _MOST = (500_000, 50_000)
 """Bytes of a study file, and keys and values in it."""
 _RESOLVED = ".resolved.yaml"
 _MOST_RESOLVED = (8_000_000, 400_000)
 """Of a file of that name, as a run writes it: with every default, and each of up to 2000 scenarios."""
+_MEANT = {"yes": "true", "on": "true", "y": "true", "no": "false", "off": "false", "n": "false"}
+"""Booleans of YAML 1.1, which are texts in YAML 1.2."""
 _MOST_LOOKED_AT = 2 * MOST_FAULTS
 """Of the faults that the schema finds; of a value that may have several types there is one for each."""
 
@@ -48,35 +51,57 @@ class Document:
 
     def change(self, key: str, text: str) -> None:
         """Set a dotted key to a value written as in a study file. Raises StudyError where it cannot stand there."""
-        said = f"--set {key}"
-        value = Tree(f"value: {text}", said, _MOST[1]).root["value"]
+        said = f"--set {key}={text}"
+        try:
+            value = Tree(f"value: {text}", None, _MOST[1]).root["value"]
+        except StudyError as error:
+            raise StudyError([replace(fault, file=said, line=None, key=None) for fault in error.faults]) from None
         *path, last = key.split(".")
         node: Any = self.data
         for at, part in enumerate(path):
             if isinstance(node, list) and part.isdecimal() and int(part) < len(node):
                 node = node[int(part)]
+            elif isinstance(node, dict):
+                if part not in node:
+                    self._tree.put(node, part, {}, said)
+                node = node[part]
             else:
-                node = node.setdefault(part, {}) if isinstance(node, dict) else None
+                node = None
             if not isinstance(node, dict | list):
                 where = ".".join(path[: at + 1])
                 raise StudyError(Fault(f"`{where}` is no mapping in {self.file}", said, allowed="the whole of it"))
         if isinstance(node, list):
             if not last.isdecimal() or int(last) >= len(node):
                 raise StudyError(Fault("no such entry of the list", said, value=last, allowed=f"0 to {len(node) - 1}"))
-            node[int(last)] = value
+            self._tree.put(node, int(last), value, said)
         else:
-            node[last] = value
+            self._tree.put(node, last, value, said)
 
-    def line(self, path: Sequence[Key]) -> int:
-        """Line of the deepest key of `path` that the file has, from 1."""
+    def rename(self, path: Sequence[Key], name: str | None) -> None:
+        """Give a key the name that was meant; without one, or where that is taken, drop the key."""
+        *parents, key = path
         node: Any = self.data
-        line = 1
-        for key in path:
+        for part in parents:
+            node = _child(node, part)
+        if _has(node, key):
+            value = node.pop(key)
+            if name is not None and name not in node:
+                self._tree.put(node, name, value, self._tree.place(node, key))
+
+    def place(self, path: Sequence[Key]) -> Place:
+        """Place of the deepest key of `path` that there is; of a section, an option that changed a key of it."""
+        node: Any = self.data
+        place: Place = 1
+        for part in path:
+            key = _written(node, part)
+            if isinstance(node, list) and isinstance(part, str) and part in node:
+                key = node.index(part)  # a list of names, which is read as a mapping
             if not _has(node, key):
-                break
-            line = self._tree.line(node, key) or line
+                return place
+            place = self._tree.place(node, key) or place
             node = _child(node, key)
-        return line
+        keys = node if isinstance(node, dict) else range(len(node)) if isinstance(node, list) else ()
+        return next((inner for key in keys if isinstance(inner := self._tree.place(node, key), str)), place)
 
     def fault(
         self,
@@ -87,11 +112,12 @@ class Document:
         near: str | None = None,
     ) -> Fault:
         """A fault at `path` of this file."""
-        line = None if self.file is None else self.line(path)
-        return Fault(problem, self.file, line, dotted(path), value, allowed, near)
+        place = None if self.file is None else self.place(path)
+        file, line = (place, None) if isinstance(place, str) else (self.file, place)
+        return Fault(problem, file, line, dotted(path), value, allowed, near)
 
-    def faults(self, error: ValidationError, model: type[BaseModel]) -> list[Fault]:
-        """Pydantic's errors as faults of this file."""
+    def faults(self, error: ValidationError, model: type[BaseModel]) -> list[tuple[tuple[Key, ...], Fault]]:
+        """Pydantic's errors as faults of this file, with their paths."""
         found: dict[tuple[tuple[Key, ...], str], Fault] = {}
         meant = set()
         items = error.errors(include_url=False)
@@ -102,9 +128,9 @@ class Document:
             if item["type"] == "extra_forbidden":
                 meant.add((*path[:-1], fault.nearest))
         # A misspelled key is one fault, not a second one because the right key is missing.
-        told = [fault for (path, problem), fault in found.items() if not (problem == "missing" and path in meant)]
+        told = [(path, fault) for (path, problem), fault in found.items() if problem != "missing" or path not in meant]
         more = len(items) - _MOST_LOOKED_AT
-        return [*told, Fault(f"and about {more:,} more faults", self.file)] if more > 0 else told
+        return [*told, ((), Fault(f"and about {more:,} more faults", self.file))] if more > 0 else told
 
     def _known_path(self, loc: Sequence[Key]) -> tuple[Key, ...]:
         """`loc` without the tags that pydantic adds for unions, and with a missing last key kept."""
@@ -139,7 +165,9 @@ class Document:
             got = value.get(tag) if isinstance(value, dict) else value
             return self.fault((*path, tag), "unknown kind", got, expected)
         shown = value if not isinstance(value, dict | list) else type(value).__name__
-        return self.fault(path, "not allowed", shown, _readable(item["msg"]))
+        meant = _MEANT.get(str(value).casefold()) if kind == "bool_type" else None
+        problem = "not allowed" if meant is None else f"true or false expected: write {meant}"
+        return self.fault(path, problem, shown, _readable(item["msg"]) if meant is None else None)
 
 
 def field_names(model: type[BaseModel], path: Sequence[Key], data: Any) -> list[str]:
@@ -224,7 +252,7 @@ def dotted(path: Sequence[Key]) -> str:
 
 def _readable(message: str) -> str:
     plain = message.removeprefix("Input should be ").removeprefix("a valid ")
-    return "mapping" if plain.startswith("dictionary") else plain
+    return "mapping" if plain.startswith("dictionary") else "true or false" if plain == "boolean" else plain
 
 
 def _text(path: Path, most_bytes: int) -> str:

@@ -26,8 +26,7 @@ def check_goals(section: StudySection, sources: Sources, asked: Asked) -> None:
     _check_objective(section, sources, asked, known)
     for name, bound in section.constraints.items():
         path: tuple[Key, ...] = ("constraints", name)
-        ended = [each for each, quantity in known.items() if quantity.ends]
-        if not _is_known(path, "quantity", name, ended, section, sources, asked):
+        if not _is_known(path, "quantity", name, section, sources, asked):
             continue
         if known[name].smooth is None and section.search is not None:
             sources.add(path, f"the search does not know {name}", None, "a study without `search`")
@@ -36,12 +35,11 @@ def check_goals(section: StudySection, sources: Sources, asked: Asked) -> None:
 
 
 def _check_objective(section: StudySection, sources: Sources, asked: Asked, known: Mapping[str, Quantity]) -> None:
-    goals = [name for name, quantity in known.items() if quantity.goal]
     given = sources.document.data.get("objective")
     rule = section.objective.rule
     for name in section.objective.weights:
         path: tuple[Key, ...] = ("objective", rule.name, name) if isinstance(given, dict) else ("objective",)
-        if not _is_known(path, "objective", name, goals, section, sources, asked):
+        if not _is_known(path, "objective", name, section, sources, asked):
             continue
         _check_slopes(path, known[name], section, sources)
         if known[name].wanted != rule.wanted:
@@ -70,12 +68,12 @@ def _is_known(
     path: tuple[Key, ...],
     what: str,
     name: str,
-    known: list[str],
     section: StudySection,
     sources: Sources,
     asked: Asked,
 ) -> bool:
-    """Whether the name is `known`; else adds a fault, with what the study would need for it."""
+    """Whether there is such a quantity; else adds a fault, with what the study would need for it."""
+    known = _names(what, asked)
     if name in known:
         return True
     shifted = quantities_of(replace(asked, edge_shift=True)).get(name)
@@ -87,5 +85,11 @@ def _is_known(
     elif not asked.states and name in {*quantities_of(replace(asked, states=asked.classes))} - {*quantities_of(asked)}:
         sources.add(path, f"{name} needs `recognition`", None, "`recognition: {}`, and noise in every scenario")
     else:
-        sources.unknown(path, what, name, known)
+        more = replace(asked, states=asked.classes, edge_shift=True, wanted_yield=1.0)
+        sources.unknown(path, what, name, known, _names(what, more))
     return False
+
+
+def _names(what: str, asked: Asked) -> list[str]:
+    """Quantities that an objective or a constraint can be of."""
+    return [name for name, q in quantities_of(asked).items() if (q.goal if what == "objective" else q.ends)]

@@ -14,12 +14,13 @@ from .yaml_tree import Key
 
 def with_light_files(section: StudySection, sources: Sources) -> StudySection:
     """The study with what is in the files in the place of their names. Raises StudyError for files that do not do."""
+    before = len(sources.faults)
     changed: dict[str, object] = {"lights": _read(section.lights, ("lights",), section, sources)}
     asked = section.validation
     if asked is not None and asked.lights is not None:
         own = _read(asked.lights, ("validate", "lights"), section, sources)
         changed["validation"] = asked.model_copy(update={"lights": own})
-    if sources.faults:
+    if len(sources.faults) > before:
         raise StudyError(sources.faults)
     return section.model_copy(update=changed)
 

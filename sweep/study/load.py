@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
-
-from pydantic import ValidationError
 
 from ..base.disk import is_folder
 from ..base.errors import Fault, StudyError
 from ..curves.spectrum import Curves, WavelengthGrid
+from .checked import schema_of
 from .document import Document
 from .model import Study
 from .resolve import resolve
-from .schema import StudySection
 from .sources import KeptSources
 
 _ALLOWED = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.")
@@ -40,15 +39,14 @@ def load_study(
     document = Document(path)
     for key, text in changes.items():
         document.change(key, text)
-    section = _section(document)
+    known = schema_of(document)
     if step_nm is not None:
-        grid = section.wavelengths
-        section = section.model_copy(
-            update={"wavelengths": WavelengthGrid(start_nm=grid.start_nm, stop_nm=grid.stop_nm, step_nm=step_nm)}
-        )
+        grid = known.section.wavelengths
+        finer = WavelengthGrid(start_nm=grid.start_nm, stop_nm=grid.stop_nm, step_nm=step_nm)
+        known = replace(known, section=known.section.model_copy(update={"wavelengths": finer}))
     if data is not None and not is_folder(data):
         raise StudyError(Fault("no such folder", None, None, "--data", str(data)))
-    return resolve(document, section, [*([data] if data is not None else []), path.parent], kept, allow_code=allow_code)
+    return resolve(document, known, [*([data] if data is not None else []), path.parent], kept, allow_code=allow_code)
 
 
 def study_of_keys(
@@ -60,15 +58,7 @@ def study_of_keys(
     names that the study gives these. Raises StudyError as `load_study` does, without file and line.
     """
     document = Document(keys)
-    return resolve(document, _section(document), [folder], None, given, allow_code=allow_code)
-
-
-def _section(document: Document) -> StudySection:
-    """The schema of a document; raises StudyError with every fault."""
-    try:
-        return StudySection.model_validate(document.data)
-    except ValidationError as error:
-        raise StudyError(document.faults(error, StudySection)) from None
+    return resolve(document, schema_of(document), [folder], None, given, allow_code=allow_code)
 
 
 def folder_name(study_name: str) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TypeVar
 
 from ..base.errors import StudyError, SweepError
 from ..camera.effects import blur
 from ..camera.mosaic import Mosaic
-from ..camera.scene import OBJECT_RESOLUTION, WhitePatchExposure
+from ..camera.scene import OBJECT_RESOLUTION
 from ..camera.sensor import BUILT_IN_SENSORS, SensorCurves
 from ..curves.builtin.registry import BUILT_IN_LIGHTS
 from ..curves.lights import Lights
@@ -18,9 +19,8 @@ from ..designs.space import Space
 from ..metrics.own import OwnMetric
 from ..metrics.quantity import Asked, Quantity
 from ..metrics.registry import listed, quantities_of
-from ..search.solver import ALGORITHMS
 from .allowed_lamps import check_regions
-from .axes import Axis
+from .checked import Checked
 from .document import Document
 from .goals import check_goals
 from .light_files import with_light_files
@@ -31,13 +31,16 @@ from .own_metrics import check_names, own_metrics, try_metrics
 from .populations import check_range, with_population
 from .schema import CfaSection, StudySection
 from .schema_curves import LightsSection
+from .searches import check_searched, search_of
 from .seen_images import check_vision
 from .sensor_fields import check_fields, with_chief_rays
 from .sensors import sensor_of
 from .sizes import check_count, check_memory
 from .sources import KeptSources, Sources
-from .spaces import SpaceBuilder
+from .spaces import SpaceBuilder, check_cfas
 from .technologies import check_lenses, with_technologies
+
+_Made = TypeVar("_Made")
 
 
 class _Resolver:
@@ -52,44 +55,39 @@ class _Resolver:
         given: Mapping[str, Curves],
         allow_code: bool | Mapping[str, str],
     ) -> None:
-        self.document = document
         self.sources = Sources(document, section.wavelengths, folders, kept, given, allow_code)
-        self.section = with_chief_rays(with_light_files(section, self.sources), self.sources)
+        self.section = section
         self.faults = self.sources.faults
         self.add = self.sources.add
         self.unknown = self.sources.unknown
         self.tasks: StudyTasks | None = None
         self.own: tuple[OwnMetric, ...] = ()
 
-    def resolve(self) -> Study:
-        section = self.section
-        sensor, lights = self.sensor(), self.sources.lights(self.offered(section.lights))
+    def resolve(self, known: Checked) -> Study:
+        """The study. Raises StudyError once all is checked that can be without what is wrong. `known`: its schema."""
+        lit = self.had(lambda: with_light_files(self.section, self.sources))
+        section = self.section = with_chief_rays(lit or self.section, self.sources)
+        sensor = self.had(self.sensor)
+        lights = self.had(lambda: self.sources.lights(self.offered(section.lights))) if lit else None
         mosaics = {name: mosaic for name, cfa in section.cfas.items() if (mosaic := self.mosaic(name, cfa)) is not None}
-        if sensor is None or lights is None:
-            raise StudyError(self.faults)
-        sensor = with_technologies(sensor, section, self.sources)
-        held_out = self.held_out(lights)
-        lights = with_population(lights, section, self.sources)
+        if sensor is not None:
+            sensor = with_technologies(sensor, section, self.sources)
+        held_out = self.had(lambda: self.held_out(lights))
+        if lights is not None:
+            lights = with_population(lights, section, self.sources)
         self.read_tasks()
-        self.own = own_metrics(section, self.sources)
-        spaces = SpaceBuilder(section, self.sources, sensor, mosaics).spaces()
-        check_names(self.own, self.asked(lights), spaces, self.sources)
-        self.check_columns(lights)
-        check_luminances(section, lights, self.sources)
+        metrics = self.had(lambda: own_metrics(section, self.sources))
+        self.own = metrics or ()
+        spaces = self.spaces(sensor, mosaics)
         check_regions(section, self.sources)
         self.check_images()
-        check_lenses(section, sensor, spaces, self.sources)
-        if self.tasks is not None:
-            from .tasks import check_seen  # noqa: PLC0415  (few studies have tasks)
-
-            check_seen(self.tasks, section, sensor, spaces, self.sources)
-        self.check_recognition(lights)
-        check_vision(section, lights, mosaics, self.sources)
-        check_goals(section, self.sources, self.asked(lights))
-        self.check_published(lights, mosaics)
-        search = self.search(spaces, lights)
-        if self.faults:
-            raise StudyError(self.faults)
+        search = search_of(section, spaces, self.sources)
+        if lights is not None:
+            self.check_lights(lights, mosaics)
+            if metrics is not None and (self.tasks is not None or section.tasks is None):
+                self.had(lambda: self.check_quantities(lights, spaces, search))
+        if self.faults or known.faults or sensor is None or lights is None:
+            raise StudyError(known.faults_with(self.faults))
         study = Study(
             name=section.study,
             section=section,
@@ -119,6 +117,43 @@ class _Resolver:
         check_count(study, self.sources)
         return study
 
+    def had(self, make: Callable[[], _Made]) -> _Made | None:
+        """The result, or None where that is refused, after its faults were added."""
+        before = len(self.faults)
+        try:
+            return make()
+        except StudyError as error:
+            self.faults.extend(error.faults if len(self.faults) == before else ())
+            return None
+
+    def spaces(self, sensor: SensorCurves | None, mosaics: Mapping[str, Mosaic]) -> list[Space]:
+        """The spaces of the study; none without a sensor."""
+        if sensor is None:
+            check_cfas(self.section, self.sources)
+            return []
+        spaces = SpaceBuilder(self.section, self.sources, sensor, mosaics).spaces()
+        check_lenses(self.section, sensor, spaces, self.sources)
+        if self.tasks is not None:
+            from .tasks import check_seen  # noqa: PLC0415  (few studies have tasks)
+
+            check_seen(self.tasks, self.section, sensor, spaces, self.sources)
+        return spaces
+
+    def check_lights(self, lights: Lights, mosaics: Mapping[str, Mosaic]) -> None:
+        """Check all that names signal types or needs their spectra."""
+        self.check_columns(lights)
+        check_luminances(self.section, lights, self.sources)
+        self.check_recognition(lights)
+        check_vision(self.section, lights, mosaics, self.sources)
+        self.check_published(lights, mosaics)
+
+    def check_quantities(self, lights: Lights, spaces: list[Space], search: Search | None) -> None:
+        """Check all that names quantities. Raises StudyError where a name has two meanings."""
+        check_names(self.own, self.asked(lights), spaces, self.sources)
+        check_goals(self.section, self.sources, self.asked(lights))
+        if search is not None:
+            check_searched(self.section, search.space, quantities_of(self.asked(lights)), self.sources)
+
     def sensor(self) -> SensorCurves | None:
         """Its curves, of an installed package where that offers it."""
         section, known = self.section.sensor, BUILT_IN_SENSORS
@@ -128,12 +163,12 @@ class _Resolver:
         """Lights, of an installed package where that offers them."""
         return offered_curves(self.sources, at, lights, "sweep.lights", BUILT_IN_LIGHTS)
 
-    def held_out(self, lights: Lights) -> Lights | None:
+    def held_out(self, lights: Lights | None) -> Lights | None:
         """Lights to validate on; leaving one out needs a search."""
         asked = self.section.validation
         if asked is not None and asked.leave_one_out and self.section.search is None:
             self.add(("validate", "leave_one_out"), "nothing is searched", None, "a study with `search`")
-        if asked is None or asked.lights is None:
+        if asked is None or asked.lights is None or lights is None:
             return None
         return self.sources.held_out(self.offered(asked.lights, ("validate", "lights")), lights)
 
@@ -219,60 +254,10 @@ class _Resolver:
                     if row in known and quantity not in names:
                         self.unknown((*path, quantity), "quantity", quantity, names)
 
-    def search(self, spaces: list[Space], lights: Lights) -> Search | None:
-        section = self.section.search
-        if section is None:
-            return None
-        boxes = {space.name: space for space in spaces if space.kind in ("sweep", "search")}
-        names = [*self.section.sweeps, *self.section.boxes]
-        scenarios = list(self.section.scenarios)
-        chosen = section.space or (names[0] if len(names) == 1 else None)
-        if chosen is None:
-            self.add(
-                ("search", "space"), "missing: the search needs one sweep or box", None, ", ".join(names) or "a sweep"
-            )
-        elif chosen not in names:
-            self.unknown(("search", "space"), "sweep or box", chosen, names)
-        elif chosen in boxes and all(min(axis) == max(axis) for axis in boxes[chosen].axes):
-            self.add(("search", "space"), "every parameter is fixed", chosen, "one free parameter or more")
-        if section.scenario is not None and section.scenario not in scenarios:
-            self.unknown(("search", "scenario"), "scenario", section.scenario, scenarios)
-        if section.algorithm not in ALGORITHMS:
-            what = "algorithm (it must take inequality constraints)"
-            self.unknown(("search", "algorithm"), what, section.algorithm, list(ALGORITHMS))
-        if chosen not in boxes or section.algorithm not in ALGORITHMS or self.faults:
-            return None
-        self.check_searched(boxes[chosen], lights)
-        levels: tuple[float, ...] = ()
-        if section.front is not None:
-            axis = Axis(min=section.front.min, max=section.front.max, count=section.front.count)
-            levels = axis.points()
-        scenario = section.scenario or scenarios[0]
-        seen = self.section.scenarios[scenario]
-        if seen.drive is not None and isinstance(seen.exposure, WhitePatchExposure):
-            self.add(("search", "scenario"), "a search under a pulsed light needs a fixed exposure", scenario)
-        effort = section.algorithm, section.starts, section.max_evaluations
-        return Search(boxes[chosen], scenario, *effort, levels)
-
-    def check_searched(self, space: Space, lights: Lights) -> None:
-        """What the searched family must have for the study's constraints, and the front for its objective."""
-        assert space.filter is not None
-        own, known = space.filter.family.dimensions, quantities_of(self.asked(lights))
-        for name in self.section.constraints:
-            if name in known and known[name].needs == "family" and name not in own:
-                self.add(
-                    ("constraints", name), f"{space.filter.family.kind} has no {name}", None, ", ".join(own) or "none"
-                )
-        assert self.section.search is not None
-        light = any(known[name].role == "light" for name in self.section.objective.weights if name in known)
-        if self.section.search.front is not None and light:
-            problem = "the front is searched at levels of sensitivity, which is in the objective"
-            self.add(("search", "front"), problem, None, "an objective of CSDs")
-
 
 def resolve(
     document: Document,
-    section: StudySection,
+    known: Checked,
     folders: list[Path],
     kept: KeptSources | None = None,
     given: Mapping[str, Curves] = {},
@@ -281,7 +266,7 @@ def resolve(
 ) -> Study:
     """Make the study; `folders` are searched in order for its files. Raises StudyError with every fault found.
 
-    `kept`: curves to take instead of those in files, `given`: files that are not on a disk; `allow_code`: code that
-    it names may run. See `Sources`.
+    `known`: what its schema says; `kept`: curves to take instead of those in files, `given`: files that are not on a
+    disk; `allow_code`: code that it names may run. See `Sources`.
     """
-    return _Resolver(document, section, folders, kept, given, allow_code).resolve()
+    return _Resolver(document, known.section, folders, kept, given, allow_code).resolve(known)

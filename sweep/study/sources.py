@@ -66,10 +66,14 @@ class Sources:
     digests: dict[str, str] = field(default_factory=dict)
     _read: dict[str, Curves | None] = field(default_factory=dict)
 
-    def unknown(self, path: tuple[Key, ...], what: str, value: str, known: list[str]) -> None:
-        """Add the fault of a name that is not among the known ones, with the nearest of them."""
+    def unknown(
+        self, path: tuple[Key, ...], what: str, value: str, known: list[str], others: Iterable[str] = ()
+    ) -> None:
+        """Add the fault of a name that is not among the known ones, with the nearest of them and of `others`."""
         told = len(self.faults) < MOST_FAULTS
-        self.add(path, f"unknown {what}", value, ", ".join(known) if told else None, self._near(value, known))
+        self.add(
+            path, f"unknown {what}", value, ", ".join(known) if told else None, self._near(value, [*known, *others])
+        )
 
     def _near(self, value: str, known: Iterable[str]) -> str | None:
         """The nearest known name, as long as somebody is told of it."""

@@ -33,6 +33,19 @@ _MOST_DRAWN = 10_000_000
 _FAMILIES: Offered = "sweep.families"
 
 
+def check_cfas(section: StudySection, sources: Sources) -> None:
+    """Check that filters are put into CFAs of the study, which is all that can be told without a sensor."""
+    for kind, entries in (("designs", section.designs), ("sweeps", section.sweeps), ("boxes", section.boxes)):
+        for name, entry in entries.items():
+            check_cfa(section, sources, (kind, name), entry)
+
+
+def check_cfa(section: StudySection, sources: Sources, path: tuple[Key, ...], entry: Modification) -> None:
+    """Add a fault where a filter is put into a CFA that the study does not have."""
+    if entry.cfa not in section.cfas:
+        sources.unknown((*path, "cfa"), "CFA", entry.cfa, list(section.cfas))
+
+
 @dataclass(frozen=True)
 class SpaceBuilder:
     """Makes the spaces of a study; what is wrong goes to the faults of `sources`."""
@@ -151,8 +164,7 @@ class SpaceBuilder:
         path = axes_path[:-1]
         curves = list(self.sensor.qe)
         mosaic = self.mosaics.get(entry.cfa)
-        if entry.cfa not in self.section.cfas:
-            self.sources.unknown((*path, "cfa"), "CFA", entry.cfa, list(self.section.cfas))
+        check_cfa(self.section, self.sources, path, entry)
         if entry.base is not None and entry.base not in curves:
             self.sources.unknown((*path, "base"), "curve", entry.base, curves)
         if isinstance(entry.to, str) and entry.to not in curves:

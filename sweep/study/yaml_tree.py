@@ -42,7 +42,9 @@ _HALF = re.compile("[\ud800-\udfff]")
 """Half of a character: `\\ud800`. No file takes it."""
 
 Key = str | int
-Lines = dict[Key, int]
+Place = int | str
+"""A line from 1, or the option that a value came from."""
+Lines = dict[Key, Place]
 
 
 @dataclass
@@ -69,7 +71,7 @@ class Tree:
         self._file = file
         self._most = most_values
         self._count = 0
-        self._lines: dict[int, Lines] = {}
+        self._lines: dict[int, tuple[Any, Lines]] = {}  # with what the id is of, so that no other value has it
         self._open: list[_Open] = []
         self._anchors: dict[str, tuple[Any, int] | None] = {}
         self.root: Any = None
@@ -85,9 +87,15 @@ class Tree:
         except (YAMLError, RecursionError, ValueError) as error:
             raise self._refused(f"not valid YAML: {type(error).__name__} {error}", None) from None
 
-    def line(self, node: Any, key: Key) -> int | None:
-        """The line of a key of a mapping or of an entry of a list, from 1; None where the file has none."""
-        return self._lines.get(id(node), {}).get(key)
+    def place(self, node: Any, key: Key) -> Place | None:
+        """The place of a key of a mapping or of an entry of a list; None where the file has none."""
+        return self._lines[id(node)][1].get(key) if id(node) in self._lines else None
+
+    def put(self, node: Any, key: Key, value: Any, place: Place | None) -> None:
+        """Set a key of a mapping or an entry of a list to a value that stands at another place."""
+        node[key] = value
+        if place is not None:
+            self._lines.setdefault(id(node), (node, {}))[1][key] = place
 
     def _take(self, event: Event) -> None:
         line = event.start_mark.line + 1
@@ -164,7 +172,7 @@ class Tree:
         for source in done.merged:
             for key, value in source.items():
                 done.value.setdefault(key, value)
-        self._lines[id(done.value)] = done.lines
+        self._lines[id(done.value)] = done.value, done.lines
         if done.anchor is not None:
             self._anchors[done.anchor] = (done.value, self._count - done.first)
         self._put(done.value, 0, done.line)

@@ -84,7 +84,7 @@ def test_report_command_makes_it_again(stopband: tuple[Path, list[str]]) -> None
 
 def test_wrong_input_is_one_line_and_exit_2(tmp_path: Path) -> None:
     wrong = tmp_path / "wrong.yaml"
-    wrong.write_text(study_file(tmp_path).read_text().replace("cfas: [RGGB", "cfas: [RGXB").replace("starts", "start"))
+    wrong.write_text(study_file(tmp_path).read_text().replace("starts", "start"))
     done = sweep("run", str(wrong), "--output", str(tmp_path / "out"))
     for code, out, said in (
         (done.returncode, done.stdout, done.stderr),

@@ -73,12 +73,15 @@ def test_a_changed_key_is_checked_like_the_file_and_kept(tmp_path: Path) -> None
     assert changed.constraints["sensitivity"].min == 0.92
     assert changed.n_designs == load_study(path).n_designs + 12
     for text, said in (
-        ("constraints.sensitivity.min=x", "a.yaml:19: constraints.sensitivity.min: not allowed (got 'x')"),
+        (
+            "constraints.sensitivity.min=x",
+            "sweep: --set constraints.sensitivity.min=x: constraints.sensitivity.min: not allowed (got 'x')",
+        ),
         ("constraints.sensitivty.min=0.9", "did you mean 'sensitivity'?"),
-        ("study.name=x", "--set study.name: `study` is no mapping"),
+        ("study.name=x", "--set study.name=x: `study` is no mapping"),
         ("cfas.7=RGGB", "no such entry of the list (got '7')"),
         ("seed", "not KEY=VALUE (got 'seed')"),
-        ("seed=[", "--set seed"),
+        ("seed=[", "--set seed=[: not valid YAML"),
     ):
         code, out, err = commanded("check", path, "--set", text)
         assert (code, out, len(err.splitlines())) == (2, "", 1)

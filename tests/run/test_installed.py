@@ -170,7 +170,10 @@ def test_curves_of_a_package_are_those_of_its_files(package: Path, tmp_path: Pat
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("SENSOR = 3\nleds = {}", "mine says nothing of curves (got 3); allowed: a mapping with `files`"),
+        (
+            CURVES.replace("SENSOR =", "SENSOR = 3 or"),
+            "mine says nothing of curves (got 3); allowed: a mapping with `files`",
+        ),
         (CURVES.replace("columns", "column"), "no such section: files.0.columns: Field required (got 'mine')"),
         (CURVES.replace("    return", "    return 1 / 0 or"), "leds: ZeroDivisionError: division by zero"),
         (CURVES.replace("leds.csv", "led.csv"), "no such file (got 'led.csv')"),

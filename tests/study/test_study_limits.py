@@ -183,7 +183,7 @@ def test_lines_are_those_of_keys_and_entries(tmp_path: Path) -> None:
         ("g", "absent"): 11,
         ("absent",): 1,
     }
-    assert {key: document.line(key) for key in lines} == lines
+    assert {key: document.place(key) for key in lines} == lines
 
 
 words = st.text(st.characters(exclude_categories=("Cc", "Cs")), max_size=8)
