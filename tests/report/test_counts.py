@@ -1,0 +1,158 @@
+"""Filters are counted once, named alike in every table, and unknown figures are not feasible."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+
+from sweep.metrics.bound import Bound
+from sweep.report import make_report, read_output
+from sweep.report.answer import answer_sentences
+from sweep.report.page_data import payload
+from sweep.report.summary import counts_line
+from sweep.report.values import pareto_figure, traded_cfas
+from sweep.results.chosen import find_row
+from sweep.results.output import Output
+from sweep.study import load_study
+
+from ..build import ran
+from ..conftest import STUDIES, Finished
+
+UNKNOWN = """\
+study: unknown
+sensor: ar0820
+lights: tl16
+cfas: [RGGB, RYNCy]
+sweeps:
+  nodes:
+    cfa: RYNCy
+    channel: N
+    base: Y
+    family: free_form
+    options: {nodes: {start_nm: 600, stop_nm: 660, step_nm: 60}}
+    grid: {transmission_600_nm: [0.5, 1], transmission_660_nm: [0.5, 1]}
+constraints: {band_width_nm: {min: 10}}
+"""
+SCENES = """\
+study: scenes
+sensor: ar0820
+lights: tl16
+scenarios: {dim: {exposure: {kind: fixed, exposure_s: 1.0e-3}}, bright: {exposure: {kind: fixed, exposure_s: 4.0e-3}}}
+cfas: [RGGB, RYNCy]
+sweeps:
+  edges:
+    cfa: RYNCy
+    channel: N
+    base: Y
+    to: G
+    grid: {left_nm: [580, 600, 610], left_width_nm: [6, 30], right_nm: [640, 680], right_width_nm: 7}
+constraints: {sensitivity: {min: 0.9}}
+search: {starts: 4, max_evaluations: 400, scenario: bright}
+"""
+
+
+@pytest.fixture(scope="module")
+def scenes(tmp_path_factory: pytest.TempPathFactory) -> Output:
+    folder = tmp_path_factory.mktemp("scenes")
+    (folder / "scenes.yaml").write_text(SCENES)
+    ran(load_study(folder / "scenes.yaml"), folder / "out", 1)
+    return read_output(folder / "out")
+
+
+def test_an_unknown_value_violates_by_an_unknown_amount() -> None:
+    violation = Bound(min=2.0).violation(np.array([np.nan, 1.0, 3.0]))
+    np.testing.assert_array_equal(violation, [np.nan, 0.5, 0.0])
+
+
+def test_a_design_without_a_constrained_figure_is_not_feasible_and_the_figure_is_named(tmp_path: Path) -> None:
+    (tmp_path / "unknown.yaml").write_text(UNKNOWN)
+    ran(load_study(tmp_path / "unknown.yaml"), tmp_path / "out", 1)
+    output = read_output(tmp_path / "out")
+    assert not output.table["feasible"].any()
+    assert output.table["violation"].isna().all()
+    said = answer_sentences(output)
+    assert said[0] == "No design meets every constraint: band_width_nm at least 10 nm."
+    assert said[1] == "Designs of free_form have no band_width_nm: unknown is not feasible."
+    assert ", 0 feasible (every constraint is met)" in counts_line(output)
+
+
+def test_one_number_of_filters_in_terminal_picture_and_page(scenes: Output) -> None:
+    designs = scenes.table[scenes.table["kind"] != "reference"]
+    assert f"{12 + 1 + 1} filters (1 of them plain CFAs) in 2 scenarios (27 rows)" in counts_line(scenes)
+    assert f", {designs['feasible'].sum()} feasible" in counts_line(scenes)
+    assert f", {(designs['feasible'] & designs['pareto']).sum()} on the Pareto front" in counts_line(scenes)
+    assert not scenes.table.loc[scenes.table["kind"] == "reference", "feasible"].any()
+    views = {(view["scenario"], view["cfa"]): view["counts"] for view in payload(scenes)["views"]}
+    for scenario in scenes.scenarios:
+        for cfa in traded_cfas(scenes):
+            rows = designs[(designs["scenario"] == scenario) & (designs["cfa"] == cfa)]
+            counts = pareto_figure(scenes, scenario, cfa).counts
+            assert counts == views[scenario, cfa]
+            assert counts["feasible"] == rows["feasible"].sum()
+            assert counts["infeasible"] == (~rows["feasible"]).sum()
+            assert counts["front"] == (rows["feasible"] & rows["pareto"]).sum()
+
+
+def test_the_terminal_and_the_picture_of_stopband_count_alike(finished: Finished) -> None:
+    output = read_output(finished("stopband"))
+    counts = pareto_figure(output, "chart", "RYNCy").counts
+    feasible, front = map(int, re.findall(r"([\d,]+) (?:feasible|on the Pareto)", counts_line(output).replace(",", "")))
+    assert (counts["feasible"], counts["front"]) == (feasible, front)
+
+
+def test_a_filter_has_one_number_in_every_scenario_and_table(scenes: Output) -> None:
+    table = pd.read_parquet(scenes.folder / "results.parquet")
+    for _, rows in table.groupby("filter_id"):
+        assert (
+            rows[["kind", "name", "space", "cfa", "left_nm", "left_width_nm", "right_nm"]]
+            .nunique(dropna=False)
+            .eq(1)
+            .all()
+        )
+    assert table["filter_id"].nunique() == 14
+    assert table.loc[table["kind"] == "sweep", "space"].eq("edges").all()
+    assert table.loc[table["kind"] == "search", ["filter_id", "space"]].to_numpy().tolist() == [[13, "edges"]]
+    known = table.set_index("design_id")["filter_id"]
+    for path in scenes.folder.glob("*.parquet"):
+        rows = pd.read_parquet(path)
+        if "design_id" in rows:
+            rows = rows.dropna(subset=["design_id"])
+            assert (rows["filter_id"].to_numpy() == known.loc[rows["design_id"]].to_numpy()).all(), path.name
+    assert find_row(scenes, "5")["filter_id"] == 5
+
+
+def test_pandas_alone_reads_units_and_meanings(scenes: Output) -> None:
+    table = pd.read_parquet(scenes.folder / "results.parquet")
+    assert table.attrs["units"]["csd_yellow_red"] == "DN"
+    assert table.attrs["meanings"]["csd_yellow_red"] == scenes.columns["csd_yellow_red"].meaning
+    field = pq.read_schema(scenes.folder / "results.parquet").field("exposure_s")
+    assert field.metadata[b"unit"] == b"s"
+    assert field.metadata[b"meaning"]
+    assert {*table.columns} - {*table.attrs["meanings"]} == {*scenes.parameters}
+
+
+def test_the_answer_names_the_best_of_every_scenario(scenes: Output) -> None:
+    said = " ".join(answer_sentences(scenes))
+    for scenario in scenes.scenarios:
+        best = scenes.best[scenes.best["scenario"] == scenario].iloc[0]
+        assert f"by {best['csd_yellow_red']:.0f} DN" in said
+        assert f"in {scenario}" in said.lower()
+    leading = scenes.best.iloc[0]
+    assert leading["scenario"] == "bright"  # the search's, though not the first one
+    assert f"by {leading['csd_yellow_red']:.0f} DN" in answer_sentences(scenes)[0]
+    make_report(scenes)
+    assert "27 rows" in (scenes.folder / "report.html").read_text()
+
+
+@pytest.mark.parametrize("name", ["robust", "angle", "balanced"])
+def test_filters_named_for_an_optimum_meet_its_constraints(name: str) -> None:
+    study = load_study(STUDIES / f"{name}.yaml")
+    from sweep.door.objects import LoadedStudy
+
+    rows = LoadedStudy(study).evaluate(scenario=next(iter(study.scenarios)))
+    assert rows.loc[rows["sensitivity"].notna(), "feasible"].all()
