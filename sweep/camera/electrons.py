@@ -172,7 +172,7 @@ class Electrons:
         seen = self.light.looked_at(qe, of, place)[:, :, None] * self.light.signals
         moved = np.moveaxis(seen, 2, 1).reshape(n, n_signals, channels * size)
         self._work["response"] += weights.shape[0] * moved.size
-        # A product for each design, so that its bits do not depend on how many there are.
+        # A product for each design, so that how many there are changes it by no more than rounding.
         found = (moved @ weights.T).reshape(n, n_signals, cases, units)
         return np.asarray(np.moveaxis(found, 1, 2), dtype=float)
 

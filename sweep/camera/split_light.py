@@ -56,8 +56,8 @@ class SplitLight:
     def add_sums(self, spectra: FloatArray, channels: Sequence[int], found: FloatArray) -> None:
         """Add sums over channels and wavelengths to `found`, ndarray[n_designs, n_cases, n_signals, n_units].
 
-        `spectra`: QE times signals, ndarray[n_designs, n_channels, n_signals, n_wavelengths], of the `channels`. One
-        design is computed as if there was no other.
+        `spectra`: QE times signals, ndarray[n_designs, n_channels, n_signals, n_wavelengths], of the `channels`. Other
+        designs change one by no more than rounding.
         """
         from .compiled_split import gather  # noqa: PLC0415  (compiled: kept off the start-up path)
 

@@ -11,10 +11,11 @@ _FEW_TERMS = 8
 
 
 def row_products(rows: FloatArray, matrix: FloatArray) -> FloatArray:
-    """`rows @ matrix`, in which the same row gives the same bits alone and in any block.
+    """`rows @ matrix`, each row by the same call: on one machine its sums are the same alone and in any block.
 
     `rows`: ndarray[n, k]; `matrix`: ndarray[k, m]. BLAS sums in an order that depends on shapes, strides and, on some
-    processors, a row's place among others. So every row is multiplied by itself, by the same call.
+    processors, a row's place among others. So every row is multiplied by itself. On another machine, or by another
+    route, sums are equal to rounding.
     """
     if 0 < len(matrix) <= _FEW_TERMS:
         columns = np.ascontiguousarray(rows.T)

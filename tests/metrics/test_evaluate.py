@@ -22,6 +22,8 @@ from sweep.metrics.columns.sensitivity import sensitivities_gradient
 from sweep.metrics.evaluate import designed_quantities, evaluate
 from sweep.metrics.smooth import smooth_response
 
+from ..rounding import gamma
+
 GRID = WavelengthGrid()
 SENSOR = BUILT_IN_SENSORS["ar0820"](GRID)
 LIGHTS = BUILT_IN_LIGHTS["tl16"](GRID)
@@ -94,13 +96,14 @@ def test_csd_is_of_the_quantized_readout() -> None:
 def test_sensitivities_of_a_design() -> None:
     found = evaluate(imager_of(view()), FAMILY.curves(X))
     n = FAMILY.curves(X)[:, 0].sum(axis=1)
-    np.testing.assert_allclose(found["sensitivity"], n / SENSOR.qe["Y"].sum(), rtol=1e-14)
+    # A quotient of two sums over wavelengths; the second one's are of four channels.
+    np.testing.assert_allclose(found["sensitivity"], n / SENSOR.qe["Y"].sum(), rtol=2 * gamma(301 + 1))
     total = sum(SENSOR.qe[c].sum() for c in ("R", "Y", "Cy")) + n
-    np.testing.assert_allclose(found["cfa_sensitivity"], total / 4 / SENSOR.qe["C"].sum(), rtol=1e-13)
+    np.testing.assert_allclose(found["cfa_sensitivity"], total / 4 / SENSOR.qe["C"].sum(), rtol=2 * gamma(301 + 4))
     plain = evaluate(imager_of(view("RGGB")), np.empty((1, 0, 301)))
     assert np.isnan(plain["sensitivity"][0])
     rggb = (SENSOR.qe["R"] + 2 * SENSOR.qe["G"] + SENSOR.qe["B"]).sum() / 4 / SENSOR.qe["C"].sum()
-    assert plain["cfa_sensitivity"][0] == pytest.approx(rggb, rel=1e-13)
+    assert plain["cfa_sensitivity"][0] == pytest.approx(rggb, rel=2 * gamma(301 + 4), abs=0)
 
 
 @pytest.mark.parametrize("kind", ["white_patch", "white_patch_set_by_n", "fixed"])
