@@ -106,7 +106,7 @@ def test_a_family_and_a_metric_of_a_package_are_like_those_of_files(package: Pat
 def test_nothing_of_a_package_runs_unasked(tmp_path: Path) -> None:
     with pytest.raises(StudyError, match="what an installed package offers, whose code would run") as caught:
         study(tmp_path, allow=False)
-    assert len(caught.value.faults) == 1
+    assert len(caught.value.faults) == 2  # the family and the metric
     assert commanded("run", tmp_path / "named.yaml")[0] == 2
     assert not (tmp_path / "ran").exists()
     with pytest.raises(StudyError, match=r"unknown family \(got 'bands'\).*stopband, band; did you mean 'band'"):
