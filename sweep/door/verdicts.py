@@ -113,8 +113,9 @@ class Verdict:
         gap = "" if self.gap is None else f", {100 * self.gap:.1f} % below"
         bound, has = self.goal.told_bound(self.limit), self.goal.amount(self.smooth, 1)
         alike = "" if self.technology is None else f" that works by {self.technology.told}"
+        where = f" in {scenes[0]}" if len(scenes) > 1 else ""
         yield (
-            f"{self.goal.words[:1].upper()}{self.goal.words[1:]} before quantization: no filter between 0 and "
+            f"{self.goal.words[:1].upper()}{self.goal.words[1:]} before quantization{where}: no filter between 0 and "
             f"{self.below} with as much light{alike} exceeds {bound} (proven); this one has {has}{gap}."
         )
 
