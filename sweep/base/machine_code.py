@@ -55,7 +55,7 @@ def njit(**options: Any) -> Callable[[_F], _F]:
 @cache
 def _kept_in(asked: str) -> Path:
     """The folder of the machine code: in the one that is asked for, beside the package, or the user's."""
-    digest = hashlib.sha256()
+    digest = hashlib.sha256(numba.__version__.encode())
     for path in sources():
         digest.update(path.relative_to(_ROOT).as_posix().encode() + b"\0" + path.read_bytes())
     beside = _ROOT / "__pycache__"
