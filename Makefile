@@ -2,6 +2,7 @@
 # make report NAME=stopband  draw the report of outputs/stopband again
 # make test                  install and run the tests, which take about two minutes on two cores
 # make slow                  run the tests that take longer, and the other cases of these
+# make oldest                run the tests with the oldest versions that pyproject.toml allows, in .venv-oldest
 # make check                 ruff, mypy --strict
 # make accuracy              run the hard cases, measure what accuracy costs in time, outputs/accuracy/accuracy.html
 # make documents           print the tables of studies/README.md and outputs/README.md anew
@@ -10,6 +11,7 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
   $$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 VENV := .venv
 BIN := $(VENV)/bin
+OLDEST := .venv-oldest
 NAME ?= stopband
 ARGS ?=
 # A study of vision needs the extra of that name, and no other study does.
@@ -20,7 +22,7 @@ unexport PYTHONDONTWRITEBYTECODE
 TESTS := $(ONE_THREAD) $(BIN)/python -m pytest -n logical --dist worksteal
 KERNELS := sweep/base/machine_code.py $(shell grep -rl --include=*.py "machine_code import" sweep)
 
-.PHONY: study report test slow accuracy check documents bench clean
+.PHONY: study report test slow oldest accuracy check documents bench clean
 .DELETE_ON_ERROR:
 
 study: $(VENV)/.ready$(EXTRA)
@@ -34,6 +36,9 @@ test: $(VENV)/.compiled
 
 slow: $(VENV)/.compiled
 	$(TESTS) -m slow $(ARGS)
+
+oldest: $(OLDEST)/.oldest
+	@$(MAKE) --no-print-directory test VENV=$(OLDEST)
 
 accuracy: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest tests/hard/test_hard_cases.py -m "slow or not slow" --hard-cases outputs/accuracy/hard_cases.json
@@ -53,7 +58,7 @@ bench: $(VENV)/.ready-bench
 	$(ONE_THREAD) $(BIN)/python tests/bench_work.py
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(OLDEST) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 $(VENV)/bin/python:
 	@test -n "$(PYTHON)" || { echo "make: Python 3.11 or newer with venv was not found; set PYTHON=/path/to/python3" >&2; exit 2; }
@@ -76,6 +81,14 @@ $(VENV)/.ready-dev: pyproject.toml | $(VENV)/bin/python
 	$(INSTALLING)
 	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
 	@touch $@ $(VENV)/.ready $(VENV)/.ready-vision
+
+# Made anew each time, as what is installed would not go down. uv alone picks the oldest versions, and serves nothing else.
+$(OLDEST)/.oldest: pyproject.toml
+	@echo "Installing into $(OLDEST): once, which takes a minute or two."
+	$(PYTHON) -m venv --clear $(OLDEST)
+	$(OLDEST)/bin/python -m pip install --quiet --disable-pip-version-check uv
+	$(OLDEST)/bin/uv pip install --quiet --python $(OLDEST)/bin/python --resolution lowest-direct -e '.[dev]'
+	@touch $(OLDEST)/.ready $(OLDEST)/.ready-vision $(OLDEST)/.ready-dev $@
 
 $(VENV)/.compiled: $(VENV)/.ready-dev tests/compile.py $(KERNELS)
 	@echo "Compiling what the tests share: once, which takes half a minute."

@@ -45,7 +45,7 @@ def payload(output: Output) -> dict[str, Any]:
         "filter_id": _packed(rows["filter_id"], "f8"),
         "scenario": _words(rows["scenario"]),
         "cfa": _words(rows["cfa"]),
-        "names": {str(at): _names(output, row) for at, row in _records(rows, rows["name"].map(_is_word))},
+        "names": {str(at): _names(output, row) for at, row in _records(rows, rows["name"].notna())},
         "overviews": [_overview(output, scenario) for scenario in output.scenarios],
         "views": list(_views(output, rows)),
         "curves": _curves(output),
@@ -79,10 +79,6 @@ def _groups(rows: pd.DataFrame) -> np.ndarray:
     front = rows["feasible"] & rows["pareto"]
     kinds = [rows["kind"] == kind for kind in (PLAIN, FOUND, NAMED)]
     return np.select([*kinds, front, rows["feasible"]], [5, 4, 3, 2, 1], default=0)
-
-
-def _is_word(value: Any) -> bool:
-    return isinstance(value, str)
 
 
 def _records(rows: pd.DataFrame, wanted: pd.Series) -> Iterator[tuple[int, dict[Any, Any]]]:

@@ -53,7 +53,7 @@ def values_of(column: pa.Array | pa.ChunkedArray) -> NDArray[Any]:
     Raises ValueError for whole numbers and truth values of which some are null.
     """
     chunks = column.chunks if isinstance(column, pa.ChunkedArray) else [column]
-    return np.concatenate([np.zeros(0, column.type.to_pandas_dtype()), *(_values(chunk) for chunk in chunks)])
+    return np.concatenate([np.zeros(0, _kind(column.type)), *(_values(chunk) for chunk in chunks)])
 
 
 def texts_of(column: pa.ChunkedArray) -> list[str]:
@@ -87,8 +87,16 @@ def _values(chunk: pa.Array) -> NDArray[Any]:
 
 def _raw(chunk: pa.Array) -> NDArray[Any]:
     """The numbers of a column, ndarray[n]; anything where it is null."""
-    kind = np.dtype(chunk.type.to_pandas_dtype())
+    kind = _kind(chunk.type)
     return np.frombuffer(chunk.buffers()[1] or b"", kind, len(chunk), chunk.offset * kind.itemsize)
+
+
+def _kind(kind: pa.DataType) -> np.dtype[Any]:
+    """NumPy's kind of numbers or truth values; to say that of truth values, some PyArrow load pandas."""
+    if pa.types.is_boolean(kind):
+        return np.dtype(bool)
+    letter = "f" if pa.types.is_floating(kind) else "u" if pa.types.is_unsigned_integer(kind) else "i"
+    return np.dtype(f"{letter}{kind.bit_width // 8}")
 
 
 def _there(chunk: pa.Array) -> BoolArray:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..designs.space import Space
 from ..study import Study
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def row_space(study: Study, row: Mapping[Any, Any]) -> Space:
@@ -19,6 +22,15 @@ def row_space(study: Study, row: Mapping[Any, Any]) -> Space:
     within = row["design_id"] % sum(space.size for space in study.spaces)  # ids run through the spaces of each scenario
     ends = np.cumsum([space.size for space in study.spaces])
     return study.spaces[int(np.searchsorted(ends, within, side="right"))]
+
+
+def computed_rows(*tables: pd.DataFrame) -> list[dict[Any, Any]]:
+    """The rows of tables, each design once; not those that failed."""
+    found: dict[Any, dict[Any, Any]] = {}
+    for table in tables:
+        for row in table[table["status"] == "ok"].to_dict("records"):
+            found.setdefault(row["design_id"], row)
+    return [*found.values()]
 
 
 def row_curves(study: Study, row: Mapping[Any, Any]) -> tuple[Space, Any]:

@@ -79,6 +79,8 @@ def _of_plain(kind: Any, data: Any) -> Any:
 
 def _of_generic(kind: Any, origin: Any, data: Any) -> Any:
     kinds = get_args(kind)
+    if hasattr(origin, "__value__"):  # NumPy's NDArray is a type alias with some versions of Python and NumPy
+        return _made(origin.__value__[kinds], data)
     if origin in (Union, types.UnionType):
         return _one_of(kinds, data)
     if origin is np.ndarray:

@@ -17,7 +17,7 @@ from ..metrics.evaluate import evaluate
 from ..metrics.objective import Objective
 from ..metrics.quantity import HELD_OUT, WORST_CASE
 from ..metrics.separation import csd_name
-from ..results.designs import row_curves
+from ..results.designs import computed_rows, row_curves
 from ..search.problem import Evaluation, Problem, best_feasible, starting_points
 from ..search.solver import search_from, smooth_objective
 from ..search.trade_off import Effort
@@ -38,12 +38,9 @@ def held_out_table(
 
     The scenes are those of the study, by the methods of their plans, with the other lights in place of its own.
     """
-    import pandas as pd  # noqa: PLC0415  (slow to import: workers do without)
-
     assert study.held_out is not None
     lights = study.held_out
-    every = pd.concat([rows, on_front]).drop_duplicates("design_id")
-    shown: list[dict[Any, Any]] = every[every["status"] == "ok"].to_dict("records")
+    shown = computed_rows(rows, on_front)
     calls = []
     for row in shown:
         space, curves = row_curves(study, row)

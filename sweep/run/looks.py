@@ -19,7 +19,7 @@ from ..camera.view import View
 from ..curves.lights import Pair
 from ..metrics.limiting import limiting_lights
 from ..metrics.recognition import recognize
-from ..results.designs import row_curves
+from ..results.designs import computed_rows, row_curves
 from ..results.tables import FEW, FOUND, LIMITED_BY, POINTS, RECOGNITION, holds
 from ..study import Study
 from .rows import Job
@@ -147,11 +147,8 @@ def looks_of(
 
 def _shown(looking: Looking, rows: pd.DataFrame, on_front: pd.DataFrame) -> Iterator[tuple[_Row, frozenset[str]]]:
     """Rows that are shown, each once, and for which tables they are looked at; not those that failed."""
-    import pandas as pd  # noqa: PLC0415  (slow to import: workers do without)
-
     front = {*on_front["design_id"]}
-    every = pd.concat([rows, on_front]).drop_duplicates("design_id")
-    for row in every[every["status"] == "ok"].to_dict("records"):
+    for row in computed_rows(rows, on_front):
         kind, scenario = str(row["kind"]), str(row["scenario"])
         yield row, looking.wanted(kind, scenario, on_front=row["design_id"] in front)
 

@@ -33,7 +33,7 @@ SWEPT = BASE.split("constraints:", maxsplit=1)[0]
         (["run"], "Missing argument"),
         (["run", "x.yaml", "--jobs", "0"], "--jobs"),
         (["run", "x.yaml", "--jobs", "many"], "--jobs"),
-        (["run", "x.yaml", "--job", "2"], "No such option: --job"),
+        (["run", "x.yaml", "--job", "2"], "No such option"),
         (["chek", "x.yaml"], "No such command 'chek'"),
         (["check", "a.yaml", "b"], "unexpected extra argument"),
         (["check", "nowhere.yaml"], "nowhere.yaml: cannot be read: No such file or directory"),

@@ -141,7 +141,9 @@ def test_speos_and_rgb_weights_come_back_as_they_left(tiny: Path, tmp_path: Path
     np.testing.assert_allclose(weights.loc["R", ["red", "green", "blue"]].astype(float), [1, 0, 0], atol=1e-12)
     assert weights.loc["R", "residual"] < 1e-12
     spectra = pd.read_parquet(tiny / "curves.parquet")
-    lights = np.stack([light["value"] for _, light in spectra[spectra["kind"] == "light"].groupby("curve")])
+    lights = np.stack(
+        [light["value"] for _, light in spectra[spectra["kind"] == "light"].groupby("curve", observed=True)]
+    )
     for name, row in weights.iterrows():
         exact, fit = table.values[str(name)], row[["red", "green", "blue"]].to_numpy(float) @ primaries
         left = exact - fit
