@@ -60,7 +60,7 @@ def upper_bound_beside(output: Output, row: Row) -> UpperBound | None:
 def limit_name(output: Output) -> str:
     """Name the filters that the search's upper bound is of, for a legend; empty without a search."""
     search = output.provenance.search
-    return "" if search is None else f"upper bound, any filter in {search.channel} of {search.cfa}, before quantization"
+    return "" if search is None else f"upper bound for {search.channel} of {search.cfa}, unquantized"
 
 
 def bounds_figure(output: Output, scenario: str, cfa: str) -> bool:
