@@ -13,6 +13,7 @@ import os
 import pickle
 import shutil
 import stat
+import tempfile
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -101,19 +102,45 @@ class _Files(caching.IndexDataCacheFile):
         return hashlib.sha256(held).digest() + held
 
 
-class _Folder(caching.InTreeCacheLocator):
-    """The place of the machine code of a file's kernels, in a folder of the user's own."""
+class _Folder:
+    """Locator of the machine code of a file's kernels, in a folder of the user's own; see Numba's `_CacheLocator`.
 
-    def __init__(self, py_func: Any, py_file: str) -> None:
-        super().__init__(py_func, py_file)
+    It has no base class, since Numba's have other names in other versions.
+    """
+
+    def __init__(self, function: Any, file: str) -> None:
+        self._file, self._line = Path(file), function.__code__.co_firstlineno
         self._own = _kept_in(_SETTINGS.CACHE_DIR)
-        self._cache_path = str(self._own / self.get_suitable_cache_subpath(py_file))
+        named = hashlib.sha256(str(self._file.parent.resolve()).encode()).hexdigest()[:16]
+        self._path = self._own / f"{self._file.parent.name}_{named}"
+
+    @classmethod
+    def from_function(cls, function: Any, file: str) -> _Folder | None:
+        """Return the locator; None where its folder cannot be written."""
+        locator = cls(function, file)
+        try:
+            locator.ensure_cache_path()
+        except OSError:
+            return None
+        return locator
+
+    def get_cache_path(self) -> str:
+        """Return the folder of the files."""
+        return str(self._path)
+
+    def get_source_stamp(self) -> str:
+        """Return the digest of the kernel's source file."""
+        return hashlib.sha256(self._file.read_bytes()).hexdigest()
+
+    def get_disambiguator(self) -> str:
+        """Return what tells kernels of one name in a file apart."""
+        return str(self._line)
 
     def ensure_cache_path(self) -> None:
         """Make the folders; raises OSError where that fails, and SweepError where others may write one."""
-        for folder in (self._own, Path(self._cache_path)):
+        for folder in (self._own, self._path):
             _make_own(folder)
-        super().ensure_cache_path()
+        tempfile.TemporaryFile(dir=self._path).close()
 
 
 class _Code(caching.CompileResultCacheImpl):
