@@ -27,7 +27,7 @@ from ..run.routes import worst_cases
 from ..study import Study
 
 SHARE = 0.01
-_COLUMNS = ("design_id", "scenario", "plan", "promised_dn", "realized_dn", "quantity")
+_COLUMNS = ("design_id", "filter_id", "scenario", "plan", "promised_dn", "realized_dn", "quantity")
 _AT_ONCE = 64
 """Designs that are recomputed in one block, between two reports of progress."""
 
@@ -146,7 +146,7 @@ def _compared(
     each = np.nan_to_num(np.stack([off[name] for name in names]), nan=np.inf)
     worst = each.argmax(axis=0)
     return [
-        {key: row[key] for key in ("design_id", "scenario", "plan", "promised_dn")}
+        {key: row[key] for key in ("design_id", "filter_id", "scenario", "plan", "promised_dn")}
         | {"realized_dn": float(each[at, index]), "quantity": names[at]}
         for index, (row, at) in enumerate(zip(rows, worst, strict=True))
     ]

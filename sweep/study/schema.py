@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -61,9 +61,6 @@ class Modification(Documented):
             "an installed package offers it.",
         ),
     ] = "stopband"
-    where: Literal["pixel", "lens"] = "pixel"
-    """`pixel`: the filter replaces a channel. `lens`: it is a glass in front of the lens, whose transmission every
-    channel sees, the same at every place of the image; it starts from 1, and has neither `channel` nor `base`."""
     channel: Annotated[list[Name], BeforeValidator(_listed, json_schema_input_type=list[Name] | Name)] = []
     """The channel of the CFA that the filter replaces; `dual` takes a list of two."""
     base: Name | None = None

@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
 
-import numpy as np
-
 from ..base.errors import SweepError, nearest
 from ..base.own_code import Offered, is_in_file, offers
 from ..base.types import FloatArray
@@ -15,7 +13,6 @@ from ..camera.mosaic import Mosaic
 from ..camera.sensor import SensorCurves
 from ..curves.builtin.surrogate import surrogate_parameters
 from ..designs.family import Family, Parameter
-from ..designs.glass import Glass
 from ..designs.plugin import PluginFamily
 from ..designs.registry import FAMILIES, build_family
 from ..designs.space import Filter, Kind, Space
@@ -111,7 +108,9 @@ class SpaceBuilder:
 
     def _check_channels(self, path: tuple[Key, ...], entry: Modification, mosaic: Mosaic | None) -> None:
         """The channels that a family replaces: of the CFA, as many as the family wants, each once."""
-        self._check_where(path, entry)
+        for key, value in (("channel", entry.channel), ("base", entry.base)):
+            if not value:
+                self.sources.add((*path, key), "missing")
         stated = entry.technology
         if self.section.production.thickness and stated is not None and stated.interference is None:
             problem = "a pigment has no films that come out too thick (`production.thickness`)"
@@ -126,8 +125,6 @@ class SpaceBuilder:
             self.sources.add((*path, "family"), "a family of one's own has no edges that production could shift")
         elif not own and entry.family not in FAMILIES:
             self.sources.unknown((*path, "family"), "family", entry.family, [*FAMILIES, *offers(_FAMILIES)])
-        elif entry.where == "lens" and not own and FAMILIES[entry.family].n_modified > 1:
-            self.sources.add((*path, "family"), f"{entry.family} replaces several channels; a glass is one filter")
         elif entry.channel and len(entry.channel) != (n_modified := 1 if own else FAMILIES[entry.family].n_modified):
             self.sources.add((*path, "channel"), f"{entry.family} replaces {n_modified} channel(s)", entry.channel)
         elif len(set(entry.channel)) < len(entry.channel):
@@ -137,19 +134,6 @@ class SpaceBuilder:
     def _is_own(entry: Modification) -> bool:
         """Whether a family is not the package's."""
         return is_from_outside(entry.family, _FAMILIES, FAMILIES)
-
-    def _check_where(self, path: tuple[Key, ...], entry: Modification) -> None:
-        """What a filter in a pixel must say, and one in front of the lens must not."""
-        if entry.where == "lens":
-            for key, given in (("channel", entry.channel), ("base", entry.base), ("technology", entry.technology)):
-                if given:
-                    self.sources.add((*path, key), "every channel sees a filter in front of the lens: leave it out")
-            if isinstance(entry.to, str):
-                self.sources.add((*path, "to"), "a glass goes to a share of its light", entry.to, "0 to 1")
-        else:
-            for key, given in (("channel", entry.channel), ("base", entry.base)):
-                if not given:
-                    self.sources.add((*path, key), "missing")
 
     def _filtered(
         self,
@@ -172,7 +156,8 @@ class SpaceBuilder:
         self._check_channels(path, entry, mosaic)
         if len(self.sources.faults) > before or mosaic is None:  # a CFA without a mosaic has a fault of its own
             return []
-        base = np.ones_like(self.sensor.qe[curves[0]]) if entry.base is None else self.sensor.curve(entry.base)
+        assert entry.base is not None  # else there is a fault
+        base = self.sensor.curve(entry.base)
         target = (
             self.sensor.curve(entry.to) if isinstance(entry.to, str) else None if entry.to is None else base * entry.to
         )
@@ -188,23 +173,10 @@ class SpaceBuilder:
         if len(self.sources.faults) > before:
             return []
         target_name = "" if entry.to is None else str(entry.to)
-        bases = self._bases(entry, mosaic)
-        if unknown := [name for name in bases.values() if name not in curves]:
-            self.sources.unknown((*path, "cfa"), "curve of a channel behind the glass", unknown[0], curves)
-            return []
-        if entry.where == "lens":
-            family = cast(Family, Glass(family, np.stack([self.sensor.curve(name) for name in bases.values()])))
-        made = Filter(family, bases, target_name, entry.technology)
+        made = Filter(family, dict.fromkeys(entry.channel, entry.base), target_name, entry.technology)
         space = Space(kind, name, entry.cfa, made, tuple(ordered), kind != "search" and rows is None, rows)
         check_filter(space, path, self.sensor, self.sources)
         return [space]
-
-    def _bases(self, entry: Modification, mosaic: Mosaic) -> dict[str, str]:
-        """Channel -> the curve that the filter replaces there, or stands before."""
-        if entry.base is not None:
-            return dict.fromkeys(entry.channel, entry.base)
-        named = self.section.cfas[entry.cfa].curves
-        return {c: named.get(c, self.sensor.curve_name(entry.cfa, c)) for c in mosaic.channels}
 
     def _family(self, entry: Modification, base: FloatArray, target: FloatArray | None) -> Family:
         """The family over its curves; raises SweepError."""

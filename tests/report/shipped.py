@@ -17,7 +17,6 @@ SLOW = (
     "night",
     "distance",
     "accuracy",
-    "glass",
     "scorecard",
     "balanced",
 )

@@ -132,9 +132,7 @@ def test_the_first_plot_has_every_cfa_at_its_light(finished: Finished, standing:
     swept = table[(table["kind"] == "sweep") & table["pareto"] & table["feasible"]]
     assert len(shown["swept front"][0]) == len(swept)
     bounded = front.dropna(subset=["limit"])
-    np.testing.assert_allclose(
-        shown["upper bound for N of RYNCy, unquantized"][0], bounded["cfa_sensitivity_min"]
-    )
+    np.testing.assert_allclose(shown["upper bound for N of RYNCy, unquantized"][0], bounded["cfa_sensitivity_min"])
     np.testing.assert_allclose(shown["upper bound for N of RYNCy, unquantized"][1], bounded["limit"])
     modes = seen.page.evaluate("document.getElementById('cfas').data.filter((t) => t.name === 'found by the search')")
     assert [mode["mode"] for mode in modes] == ["markers"]  # between its levels nothing is found
