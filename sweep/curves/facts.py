@@ -155,7 +155,7 @@ def notes(facts: Facts, *, as_qe: bool) -> list[str]:
 
 
 def looks_normalized(top: float) -> bool:
-    """Whether QE curves whose largest value is `top` are rather relative responses: no pixel has a QE of just 1."""
+    """Return whether QE curves with the largest value `top` are relative responses: no pixel has a QE of just 1."""
     return abs(top - 1) <= _NEARLY
 
 

@@ -40,7 +40,7 @@ _BEGINNINGS = {
 }
 """Files that are no text, by their first bytes."""
 _CONTROLS = re.compile(rb"[\x01-\x08\x0e-\x19\x1c-\x1f]")
-"""What no text has; in one of UTF-16 or with a few NULs there are none either."""
+"""Control bytes that no text has, UTF-16 and stray NULs included."""
 _BEGINNING_BYTES = 4096
 
 

@@ -41,7 +41,7 @@ class Bound(Section):
         return max(end, _LEAST_SCALE) if end > 0 else 1.0
 
     def violation(self, values: FloatArray) -> FloatArray:
-        """How far `values` are outside, relative to `scale`, >= 0; NaN where the value is unknown (NaN)."""
+        """Return how far `values` are outside, relative to `scale`, >= 0; NaN where the value is unknown (NaN)."""
         below = 0.0 if self.min is None else self.min - values
         above = 0.0 if self.max is None else values - self.max
         return np.maximum(np.maximum(below, above), 0.0) / self.scale

@@ -37,7 +37,7 @@ class Leaders:
 
 
 def leaders_of(output: Output, scenario: str | None = None) -> Leaders:
-    """Who leads in a scenario, by default in that of the search, or in the first one."""
+    """Return who leads in a scenario, by default in that of the search, or in the first one."""
     scenario = output.scenario if scenario is None else scenario
     return output.once(("leaders", scenario), partial(_leaders, output, scenario))
 

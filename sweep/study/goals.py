@@ -72,7 +72,7 @@ def _is_known(
     sources: Sources,
     asked: Asked,
 ) -> bool:
-    """Whether there is such a quantity; else adds a fault, with what the study would need for it."""
+    """Return whether there is such a quantity; else add a fault, with what the study would need for it."""
     known = _names(what, asked)
     if name in known:
         return True
