@@ -46,7 +46,7 @@ class Job:
     start: int
     stop: int
     first_id: int
-    first_filter: int = 0
+    first_filter: int
 
 
 @dataclass(frozen=True)

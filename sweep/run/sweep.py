@@ -282,7 +282,9 @@ def _halved(job: Job, view: View, rules: Rules) -> pa.Table:
     if job.stop - job.start == 1:
         return failed_rows(job, rules, KILLED)
     middle = (job.start + job.stop) // 2
-    halves = replace(job, stop=middle), replace(job, start=middle, first_id=job.first_id + middle - job.start)
+    first = middle - job.start
+    second = replace(job, start=middle, first_id=job.first_id + first, first_filter=job.first_filter + first)
+    halves = replace(job, stop=middle), second
     return joined([_table_alone(half, view, rules) for half in halves])
 
 

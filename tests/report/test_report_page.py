@@ -112,8 +112,9 @@ def test_pointing_at_any_design_tells_its_limiting_lights(finished: Finished, op
     seen.page.mouse.move(*seen.point_at(trace)[:2])
     seen.page.wait_for_selector("#hover", state="visible")
     title, *pointed = seen.page.inner_text("#hover").splitlines()
-    names = pd.read_parquet(folder / "results.parquet").set_index("design_id")["name"]
-    (design,) = names.index[names == title] if not title.startswith("design ") else [int(title.split()[1])]
+    table = pd.read_parquet(folder / "results.parquet").set_index("design_id")
+    column, sought = ("filter_id", int(title.split()[1])) if title.startswith("filter ") else ("name", title)
+    (design,) = table.index[table[column] == sought]
     for pair in ("green_yellow", "green_red", "yellow_red"):
         at = [line.startswith(f"{pair.replace('_', '/')} CSD: ") for line in pointed].index(True)
         lights = limited.loc[design, f"limited_by_{pair}"]

@@ -16,6 +16,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from sweep.base.errors import FailedDesignError, OutputError, SweepError
+from sweep.camera.scene import Target
 from sweep.commands.status import status_lines
 from sweep.report import make_report, read_output
 from sweep.results.identity import CHUNK
@@ -84,9 +85,9 @@ def test_a_design_that_kills_its_worker_is_a_row(plain: Study, tmp_path: Path, s
 def test_a_worker_that_is_killed_while_scenes_are_planned_costs_nothing(plain: Study, tmp_path: Path) -> None:
     wish = tmp_path / "wish"
     wish.write_text("kill 1 ")
-    study = mischievous(plain, wish)
-    single = replace(study.spaces[-1], axes=((590.0,), (5.0,), (660.0,), (5.0,), (1.0,)))
-    study = replace(study, spaces=(*study.spaces[:-1], single))
+    target = Target(distance_m=100, fov_deg=60, phase_px="any")  # what a plan looks at designs for
+    scenes = {name: scene.model_copy(update={"target": target}) for name, scene in plain.scenarios.items()}
+    study = mischievous(replace(plain, scenarios=scenes), wish)
     plans = with_plans(study, 2, lambda *_: None).plans
     assert wish.read_text().count("done") >= 2
     wish.unlink()

@@ -103,7 +103,7 @@ def fragile_job(study: Study, kind: type[MultiStopband]) -> tuple[Job, Any, Any]
     family = kind(study.grid.nodes_nm, study.sensor.qe["Y"], study.sensor.qe["G"], *bands)
     axes = ((590.0, 600.0, 610.0, 655.5), (5.0, 20.0), (640.0, 650.0, 660.0), (5.0,), (0.3, 1.0))
     space = replace(study.spaces[-1], filter=Filter(family, {"N": "Y"}, "G"), axes=axes)
-    return Job(space, "chart", 0, space.size, 0), study.view(space, "chart"), rules_of(study)
+    return Job(space, "chart", 0, space.size, 0, 0), study.view(space, "chart"), rules_of(study)
 
 
 @pytest.mark.parametrize("chunk", [CHUNK, 7])

@@ -185,7 +185,7 @@ def test_a_failing_design_is_a_row(study: Study) -> None:
     axes = ((2.0, 3.0, 4.0, 5.0), (10.0,), (650.0,), (10.0,), (1.0,))
     space = Space("sweep", "fragile", "RYNCy", Filter(family, {"N": "Y"}, "G"), axes)
     rules = replace(rules_of(study), constraints={})
-    rows = run_job(Job(space, "chart", 0, 4, 0), study.view(space, "chart"), rules).to_pandas()
+    rows = run_job(Job(space, "chart", 0, 4, 0, 0), study.view(space, "chart"), rules).to_pandas()
     assert list(rows["status"]) == ["ok", "error: ValueError: no such filter", "ok", "not finite"]
     assert list(rows["feasible"]) == [True, False, True, False]
     assert list(rows["csd_yellow_red"].isna()) == [False, True, False, True]

@@ -86,7 +86,7 @@ def test_parts_of_a_job_are_the_job_within_rounding(
     for scenario in plain.scenarios:
         view = plain.view(space, scenario)
         magnitude_dn = brightest_dn(view, space.curves(space.points(0, 100), plain.grid.size))
-        whole = run_job(Job(space, scenario, 0, size, 0), view, rules)
+        whole = run_job(Job(space, scenario, 0, size, 0, 0), view, rules)
         ends = [0, 1, 2, 17, 33, 1024, 2049, CHUNK, CHUNK + 1, size]
         parts = [run_job(Job(space, scenario, a, b, a, a), view, rules) for a, b in pairwise(ends)]
         columns = [name for name in rules.schema.names if name != "pareto"]  # that of each part alone
