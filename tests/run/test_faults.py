@@ -88,6 +88,8 @@ def test_a_worker_that_is_killed_while_scenes_are_planned_costs_nothing(plain: S
     target = Target(distance_m=100, fov_deg=60, phase_px="any")  # what a plan looks at designs for
     scenes = {name: scene.model_copy(update={"target": target}) for name, scene in plain.scenarios.items()}
     study = mischievous(replace(plain, scenarios=scenes), wish)
+    single = replace(study.spaces[-1], axes=((590.0,), (5.0,), (660.0,), (5.0,), (1.0,)))
+    study = replace(study, spaces=(*study.spaces[:-1], single))
     plans = with_plans(study, 2, lambda *_: None).plans
     assert wish.read_text().count("done") >= 2
     wish.unlink()
