@@ -1,10 +1,9 @@
-"""Run one study as the command asks, or say what it would take."""
+"""Run one study as the command asks, or say what that would do."""
 
 from __future__ import annotations
 
 import os
 import sys
-import time
 import webbrowser
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -64,7 +63,7 @@ def run_one(path: Path, manner: Manner, began_s: float) -> None:
     if note is not None:
         typer.echo(f"Note: {note}.", err=True)
     if manner.dry_run:
-        _tell(loaded, folder, manner, time.monotonic() - began_s)
+        _tell(loaded, folder, manner)
         return
     kind = runner.usable_backend(manner.backend)
     if kind != manner.backend:
@@ -104,13 +103,9 @@ def run_one(path: Path, manner: Manner, began_s: float) -> None:
         typer.echo(f"Note: no browser was found for {folder / REPORT}.", err=True)
 
 
-def _tell(study: Study, folder: Path, manner: Manner, loading_s: float) -> None:
-    """Say what a run would take; `loading_s`: what it took up to here."""
+def _tell(study: Study, folder: Path, manner: Manner) -> None:
+    """Say what a run would do."""
     with ProgressDisplay() as display:
-        found = runner.estimate(study, folder, manner.workers, display.update)
-    begun = time.monotonic()
-    from ..report.estimate import report_seconds  # noqa: PLC0415  (what a report imports is timed, too)
-
-    more_s = loading_s + (time.monotonic() - begun) + report_seconds(study)
-    for line in runner.estimate_lines(found, folder, more_s):
+        found = runner.to_do(study, folder, manner.workers, display.update)
+    for line in runner.to_do_lines(found, folder):
         typer.echo(line)

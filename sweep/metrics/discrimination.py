@@ -63,14 +63,7 @@ def detectability(mean: FloatArray, variance: FloatArray, first: IndexArray, sec
 def pairwise_error(
     mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray, shape: NoiseShape | None = None
 ) -> FloatArray:
-    """The largest of `errors_of_pairs`."""
-    return np.asarray(errors_of_pairs(mean, variance, first, second, shape).max(axis=1), dtype=float)
-
-
-def errors_of_pairs(
-    mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray, shape: NoiseShape | None = None
-) -> FloatArray:
-    """Probability that noise moves one point of a pair over to the other, ndarray[n_designs, n_pairs].
+    """Largest probability that noise moves one point of a pair over to the other, ndarray[n_designs].
 
     The pair is divided by a plane with normal S^-1 D, S the mean covariance, placed so that both points err equally
     often: Q(D' S^-1 D / (s_a + s_b)), with the standard deviation s of each along the normal (Fukunaga,
@@ -91,7 +84,7 @@ def errors_of_pairs(
             error = np.maximum(error, _LEFT_OUT)
             error = np.minimum(error, shape.bound(block, difference, ours, theirs, first, second))
         found[block] = error
-    return found
+    return np.asarray(found.max(axis=1), dtype=float)
 
 
 @dataclass(frozen=True)

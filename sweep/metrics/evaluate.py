@@ -181,7 +181,7 @@ def evaluate(
     """Evaluate a block of designs as the camera reads them out, as far as the scene's methods go.
 
     `designs`: see `designed_quantities`. Returns the columns of all metrics but those of a family, each
-    ndarray[n_designs]; `states`: signal types that noise may confuse, `probabilities`: with their CDP and CSP; `own`:
+    ndarray[n_designs]; `states`: signal types that noise may confuse, `probabilities`: with their CDP; `own`:
     metrics of a user's own; `spent` is added to. CSDs are the smallest over the places of the light and the moments of
     its pulses; `best_place_csd_<a>_<b>` is the largest over the places of the smallest over the moments. All metrics
     but CSDs are the worst over the places of the lattice. Distances are NaN where the extremes over all places take

@@ -9,7 +9,7 @@ from ..base.later import loaded_later
 
 if TYPE_CHECKING:
     from ..results.folder import output_folder
-    from .estimate import estimate, estimate_lines
+    from .dry_run import to_do, to_do_lines
     from .plans import with_plans
     from .stop import stop_on_signals
     from .whole import run_study
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 __all__ = [
     "BACKENDS",
     "Wishes",
-    "estimate",
-    "estimate_lines",
     "output_folder",
     "run_study",
     "stop_on_signals",
+    "to_do",
+    "to_do_lines",
     "usable_backend",
     "with_plans",
 ]
@@ -32,11 +32,11 @@ __getattr__ = loaded_later(
     {
         "BACKENDS": ".workers",
         "Wishes": ".wishes",
-        "estimate": ".estimate",
-        "estimate_lines": ".estimate",
         "output_folder": "..results.folder",
         "run_study": ".whole",
         "stop_on_signals": ".stop",
+        "to_do": ".dry_run",
+        "to_do_lines": ".dry_run",
         "usable_backend": ".workers",
         "with_plans": ".plans",
     },

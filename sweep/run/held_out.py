@@ -26,7 +26,7 @@ from ..study import Search, Study
 if TYPE_CHECKING:
     import pandas as pd
 
-LEFT_OUT_STARTS = 4
+_LEFT_OUT_STARTS = 4
 """Of each search without a light."""
 _FIGURES = ("seen", "with_it", "fall")
 
@@ -70,10 +70,10 @@ def left_out_table(study: Study, search: Search, best: Evaluation, parallel: Par
     """
     problem, seed = study.problem(search), study.section.seed
     lights = study.lights
-    points = starting_points(problem, LEFT_OUT_STARTS - 1, seed)
-    effort = Effort(search.algorithm, points, max(1, search.max_evaluations // LEFT_OUT_STARTS), seed)
+    points = starting_points(problem, _LEFT_OUT_STARTS - 1, seed)
+    effort = Effort(search.algorithm, points, _evaluations_of_start(search), seed)
     optima: list[tuple[Problem, Evaluation]] = [(problem, best)]
-    if has_nominal(problem):
+    if _has_nominal(problem):
         nominal = _nominal_problem(problem)
         calls = [
             delayed(search_from, nominal, i, u, effort.algorithm, effort.evaluations, seed)
@@ -85,7 +85,7 @@ def left_out_table(study: Study, search: Search, best: Evaluation, parallel: Par
     rows: list[dict[str, Any]] = []
     for asked, optimum in optima:
         starts = [asked.to_unit(optimum.x), *points]
-        for at in left_out_signals(asked):
+        for at in _left_out_signals(asked):
             tasks.append(delayed(_without, asked, at, starts, effort.algorithm, effort.evaluations, seed))
             names = {"signal_type": lights.types[at], "signal": lights.names[at]}
             rows.append({"objective": asked.objective.column, **names})
@@ -96,7 +96,19 @@ def left_out_table(study: Study, search: Search, best: Evaluation, parallel: Par
     return pa.Table.from_pylist(rows, schema=pa.schema([*fields, *((name, pa.float64()) for name in _FIGURES)]))
 
 
-def has_nominal(problem: Problem) -> bool:
+def most_evaluations_left_out(study: Study, search: Search) -> int:
+    """Evaluations of `left_out_table` at most."""
+    problem = study.problem(search)
+    optima = 2 if _has_nominal(problem) else 1
+    searches = optima * len(_left_out_signals(problem)) + optima - 1
+    return searches * _LEFT_OUT_STARTS * _evaluations_of_start(search)
+
+
+def _evaluations_of_start(search: Search) -> int:
+    return max(1, search.max_evaluations // _LEFT_OUT_STARTS)
+
+
+def _has_nominal(problem: Problem) -> bool:
     """Return whether the objective is a single worst case."""
     quantity = problem.quantities.get(problem.objective.column)
     return quantity is not None and quantity.extreme == WORST_CASE
@@ -108,7 +120,7 @@ def _nominal_problem(problem: Problem) -> Problem:
     return replace(problem, objective=Objective(minimum={of: 1.0}))
 
 
-def left_out_signals(problem: Problem) -> list[int]:
+def _left_out_signals(problem: Problem) -> list[int]:
     """Lights of the objective's types that are not alone in theirs."""
     asked = {name for column in problem.objective.weights for name in _types(problem, column)}
     lights = problem.view.lights

@@ -57,11 +57,10 @@ class Shown:
 
 @dataclass(frozen=True)
 class RowTable:
-    """A table: whether a study asks for it, and what it holds; `long`: what takes so long that an estimate names it."""
+    """A table: whether a study asks for it, and what it holds."""
 
     asked: Callable[[Study], bool]
     made: Callable[[Shown], pa.Table]
-    long: str = ""
 
 
 def _always(_: Study) -> bool:
@@ -110,17 +109,14 @@ ROW_TABLES = {
         lambda study: study.held_out is not None,
         lambda s: held_out_table(s.study, s.rows, s.on_front, s.parallel, s.progress),
     ),
-    ROBUSTNESS: RowTable(lambda study: study.pair_over_population is not None, _robustness, "yields"),
-    REGIONS_MAP: RowTable(lambda study: study.section.regions is not None, _regions, "maps of color regions"),
-    SENSOR_MAP: RowTable(
-        lambda study: any(s.field is not None for s in study.scenarios.values()), _sensor_map, "a map over the sensor"
-    ),
+    ROBUSTNESS: RowTable(lambda study: study.pair_over_population is not None, _robustness),
+    REGIONS_MAP: RowTable(lambda study: study.section.regions is not None, _regions),
+    SENSOR_MAP: RowTable(lambda study: any(s.field is not None for s in study.scenarios.values()), _sensor_map),
     CROSSINGS: RowTable(
         _has_crossings,
         lambda s: crossings_table(s.study, s.rows, s.parallel, s.progress),
-        "where an allowed error ends",
     ),
-    RECOGNITION: RowTable(_has_patches, lambda s: recognition_table(s.study, s.rows, s.looks), "raw patches"),
+    RECOGNITION: RowTable(_has_patches, lambda s: recognition_table(s.study, s.rows, s.looks)),
     TRADED: RowTable(_has_colors, lambda s: traded_table(s.study, s.rows)),
     RENDERED: RowTable(_has_colors, lambda s: rendered_table(s.study, s.rows)),
 }

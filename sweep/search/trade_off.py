@@ -78,6 +78,11 @@ def calls_at_levels(problem: Problem, levels: Sequence[float], effort: Effort, *
     return [*limits, *(call for own in at_level for call in _searches(own, effort, 0, effort.starts[:_FRONT_STARTS]))]
 
 
+def most_searches(n_levels: int, n_starts: int) -> int:
+    """Searches of `trade_off` at most: those from a few points, and those from what each level's neighbors found."""
+    return n_levels * min(n_starts, _FRONT_STARTS) + 2 * max(0, n_levels - 1)
+
+
 def trade_off(
     problem: Problem,
     levels: Sequence[float],

@@ -150,7 +150,7 @@ class Recognition(Section):
     `states`: the signal types to tell apart; all of them where it is left out. `patches`: raw patches that are drawn
     of every signal for each plain CFA, named design and answer of the search, half of them to train the classifiers;
     0 draws none. `error_max`: a CFA is usable while no two states are confused more often. `probabilities`: columns of
-    CDP and CSP, too, which are discussed for IEEE P2020.
+    CDP, too, which is discussed for IEEE P2020.
     """
 
     states: Annotated[list[Name], Field(min_length=2, max_length=MOST_TYPES)] | None = None

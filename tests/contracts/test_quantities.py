@@ -172,19 +172,6 @@ def contrast_detected(made: Made, quantity: Quantity) -> list[float]:
     return found
 
 
-def separated(made: Made, quantity: Quantity) -> list[float]:
-    """1 less the mean error over all pairs of lights, each on its side of the plane of the two."""
-    found = []
-    for m, v, n, w in made.pairs(*(quantity.pair or ("", ""))):
-        errors = []
-        for a, s in zip(m, v, strict=True):
-            for b, t in zip(n, w, strict=True):
-                normal = (a - b) / (s + t)
-                errors.append(norm.sf(normal @ (a - b) / (np.sqrt(normal**2 @ s) + np.sqrt(normal**2 @ t))))
-        found.append(1 - float(np.mean(errors)))
-    return found
-
-
 DEFINITIONS: dict[str, tuple[Callable[[Made, Quantity], list[float]], float]] = {
     "csd": (csd, 1e-12),
     "best_place_csd": (best_place, 1e-12),
@@ -202,7 +189,6 @@ DEFINITIONS: dict[str, tuple[Callable[[Made, Quantity], list[float]], float]] = 
     "state_error": (largest_error, 1e-12),
     "state_error_bound": (at_least_its_error, 1e-12),
     "cdp": (contrast_detected, 1e-4),
-    "csp": (separated, 0.02),  # Gaussian tails are told down to 1e-12, bounds where noise is not Gaussian
 }
 """Metric -> what it is, written from its definition; and the relative difference that is allowed."""
 ONLY = {"cdp": ("dithered",)}

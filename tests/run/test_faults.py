@@ -22,7 +22,7 @@ from sweep.report import make_report, read_output
 from sweep.results.identity import CHUNK
 from sweep.results.journal import SHARDS, Journal
 from sweep.results.lock import locked
-from sweep.run import Wishes, estimate, estimate_lines, output_folder, run_study, with_plans
+from sweep.run import Wishes, output_folder, run_study, to_do, to_do_lines, with_plans
 from sweep.run.stop import Stop
 from sweep.run.sweep import KILLED
 from sweep.run.worker_process import growth_bytes
@@ -162,37 +162,34 @@ def test_status_of_a_run(plain: Study, tmp_path: Path) -> None:
 
 
 def test_dry_run_counts_what_is_finished(plain: Study, tmp_path: Path) -> None:
-    found = estimate(plain, tmp_path / "out", 1, lambda *_: None)
-    assert (found.designs, found.kept) == (plain.n_designs, 0)
+    found = to_do(plain, tmp_path / "out", 1, lambda *_: None)
+    assert found.finished == 0
     assert not (tmp_path / "out").exists()
     half_done(plain, tmp_path / "out")
     kept = sum(entry.rows for entry in Journal(tmp_path / "out").entries.values())
-    found = estimate(plain, tmp_path / "out", 2, lambda *_: None)
-    assert found.kept == kept
-    assert found.seconds > 0
-    assert found.memory_bytes > 50e6
-    # What the sample says of the disk is what the rest takes.
+    found = to_do(plain, tmp_path / "out", 2, lambda *_: None)
+    assert found.finished == kept
+    assert f": {kept:,} finished, {plain.n_designs - kept:,} in " in next(to_do_lines(found, tmp_path))
     ran(plain, tmp_path / "out", 1)
-    bytes_per_row = (tmp_path / "out" / "results.parquet").stat().st_size / plain.n_designs
-    assert found.disk_bytes / 2 / (plain.n_designs - kept) == pytest.approx(bytes_per_row, rel=1.0)
-    found = estimate(plain, tmp_path / "out", 1, lambda *_: None)
-    assert (
-        estimate_lines(found, tmp_path)[0]
-        == f"{found.designs:,} designs: {found.designs:,} finished, 0 in 0 chunks to compute."
-    )
+    first, *_, last = to_do_lines(to_do(plain, tmp_path / "out", 1, lambda *_: None), tmp_path)
+    assert first.endswith(f"{plain.n_designs:,} rows: {plain.n_designs:,} finished, 0 in 0 chunks to compute.")
+    assert last.endswith("nothing was computed or written.")
 
 
-def test_a_dry_run_counts_evaluations_of_search_front_and_lights_left_out(tmp_path: Path) -> None:
+def test_a_dry_run_says_what_is_searched_and_computed_and_computes_no_design(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = study_file(tmp_path, 2)
-    text = path.read_text()
-    counts = []
-    for asked in (
-        "starts: 4, max_evaluations: 40",
-        "starts: 4, max_evaluations: 40, front: {min: 0.8, max: 0.9, count: 3}",
-    ):
-        path.write_text(text.replace("starts: 4, max_evaluations: 200", asked))
-        counts.append(estimate(load_study(path), tmp_path / "out", 1, lambda *_: None).evaluations)
-    assert counts == [40, 40 + 3 * 40]  # a level has four starts with as many evaluations each
+    asked = "starts: 4, max_evaluations: 40, front: {min: 0.8, max: 0.9, count: 3}"
+    path.write_text(path.read_text().replace("starts: 4, max_evaluations: 200", asked))
+    monkeypatch.setattr("sweep.run.sweep.run_job", None)
+    study = load_study(path)
+    found = to_do(study, tmp_path / "out", 1, lambda *_: None)
+    _, search, front, *effects, _ = to_do_lines(found, tmp_path / "out")
+    assert search == "Search: 4 starts, 40 evaluations at most."
+    assert front == "Its front: 3 levels, 100 evaluations at most."  # two starts each, and one from each neighbor
+    told = {line.partition(": ")[2] for line in effects}
+    assert told == {f"{', '.join(plan.computed) or 'none'}." for plan in found.study.plans.values()}
     assert not (tmp_path / "out").exists()
 
 

@@ -241,10 +241,10 @@ def test_the_filter_of_the_noise_study_is_what_a_search_finds() -> None:
 def test_a_search_refuses_what_has_no_smooth_rows(tmp_path: Path) -> None:
     every = quantities_of(Asked(STATES, STATES, probabilities=True, vision=True))
     without = [q.name for q in every.values() if q.ends and q.smooth is None]
-    assert {q.metric for q in map(every.get, without) if q is not None} == {"cdp", "csp"}
+    assert {q.metric for q in map(every.get, without) if q is not None} == {"cdp"}
     text = (STUDIES / "stopband.yaml").read_text().replace("search:", "recognition: {probabilities: true}\nsearch:", 1)
     path = tmp_path / "asked.yaml"
-    for name in ("cdp_yellow_red", "csp_green_red"):
+    for name in ("cdp_yellow_red", "cdp_green_red"):
         constrained = re.sub(r"^constraints:\n", f"constraints:\n  {name}: {{min: 0.9}}\n", text, flags=re.MULTILINE)
         path.write_text(constrained.replace("level: 0.95}", "level: 0.95}\n    noise: true", 1))
         with pytest.raises(StudyError) as caught:

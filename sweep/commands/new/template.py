@@ -68,7 +68,7 @@ def study_text(name: str, sensor: SensorText, lights: LightsText, pixel: PixelTe
     stop = sensor.range_nm[1]
     return f"""\
 # yaml-language-server: $schema=study.schema.json
-# Check it with `sweep check`, see what it takes with `sweep run ... --dry-run`.
+# Check it with `sweep check`, see what is to do with `sweep run ... --dry-run`.
 study: {scalar(name)}
 question: >-
   One {layout.base} pixel of {layout.plain[-1]} gets a stopband. Where should its edges lie, so that {pair[0]} and

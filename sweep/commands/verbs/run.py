@@ -24,7 +24,7 @@ def run(
     jobs: Annotated[int | None, typer.Option(min=1, help="Workers.", show_default="all cores")] = None,
     backend: Annotated[str, typer.Option(help="loky (processes), threading, or dask (a cluster).")] = "loky",
     scheduler: Annotated[str | None, typer.Option(help="Of Dask: tcp://HOST:PORT.", show_default=False)] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what is to do and what it takes.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what is to do, and do nothing.")] = False,
     fail_fast: Annotated[bool, typer.Option("--fail-fast", help="Stop at the first design that fails.")] = False,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Compute failed designs again.")] = False,
     changes: Changes = None,

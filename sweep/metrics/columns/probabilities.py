@@ -1,15 +1,10 @@
-"""Probabilities that are discussed for IEEE P2020: of detecting a contrast (CDP), and of separating colors (CSP).
+"""The contrast detection probability (CDP), which is discussed for IEEE P2020.
 
-CDP: the probability that the Weber contrast K of two noisy readouts, bright over dark less 1, is within a share of the
+It is the probability that the Weber contrast K of two noisy readouts, bright over dark less 1, is within a share of the
 contrast of their means: P(K (1 - e) <= K measured <= K (1 + e)); Geese, Seger, Paolillo, "Detection probabilities:
 performance prediction for sensors of autonomous vehicles" (Electronic Imaging 2018); Artmann, Geese, Gaede, "Contrast
 detection probability: implementation and use cases" (2019). Here the pedestal is taken away, noise is Gaussian, e is
 1/2, and of two signals the channel with the largest CDP counts.
-
-CSP: the working group names photon noise and metameric spectra as its parts (Geese, "Automotive image quality concepts
-for the next SAE levels: color separation probability and contrast detection probability", AutoSens); a formula is not
-published there. Here it is the probability that a light of either type, each pair of lights as likely, falls on its own
-side of the plane between the two: 1 less the mean pairwise error.
 """
 
 from __future__ import annotations
@@ -23,20 +18,18 @@ from ...camera.imager import Imager
 from ...camera.noisy.gaussian import share_below
 from ...camera.noisy_readout import NoisyReadout
 from ...curves.lights import class_pairs, pair_name
-from ..discrimination import NoiseShape, errors_of_pairs
+from ..discrimination import NoiseShape
 from ..quantity import Asked, Columns, NoiseMetric, Quantity
 
-CDP, CSP = "cdp", "csp"
+CDP = "cdp"
 _MOST = 1e12
 """Contrast to a dark readout of 0."""
 _SHARE = 0.5
 """How far a measured contrast may be from that of the means, of it."""
-_MEANINGS = {
-    CDP: "contrast detection probability: that the Weber contrast of two readouts is within half of that of their "
-    "means, in the best channel, for the worst two signals of two types",
-    CSP: "color separation probability: that noise leaves a light on its own side of the plane between two, the mean "
-    "over all pairs of lights of two types",
-}
+_MEANING = (
+    "contrast detection probability: that the Weber contrast of two readouts is within half of that of their means, in "
+    "the best channel, for the worst two signals of two types"
+)
 
 
 class Probabilities(NoiseMetric):
@@ -46,21 +39,20 @@ class Probabilities(NoiseMetric):
     extra = True
 
     def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
-        """Two columns for each pair of states, where a study asks for them."""
+        """A column for each pair of states, where a study asks for them."""
         if not asked.probabilities:
             return ()
         return tuple(
             Quantity(
-                name=pair_name(metric, pair),
-                metric=metric,
-                meaning=_MEANINGS[metric],
+                name=pair_name(CDP, pair),
+                metric=CDP,
+                meaning=_MEANING,
                 pair=pair,
                 wanted="more",
                 ends=("min",),
                 most=1.0,
             )
             for pair in class_pairs(asked.states)
-            for metric in (CDP, CSP)
         )
 
     def of_noise(
@@ -69,13 +61,11 @@ class Probabilities(NoiseMetric):
         """From mean and variance of the digital numbers."""
         del curves
         found: Columns = {}
-        mean, variance, shape = NoiseShape.of_cases(read)
+        mean, variance, _ = NoiseShape.of_cases(read)
         for pair in class_pairs(list(members)):
             both = members[pair[0]], members[pair[1]]
             detected = detection(mean - imager.readout.pixel.offset_dn, variance, *both)
-            separated = 1 - errors_of_pairs(mean, variance, *both, shape).mean(axis=1)
-            for metric, each in ((CDP, detected), (CSP, separated)):
-                found[pair_name(metric, pair)] = each.reshape(read.mean.shape[:2]).min(axis=1)
+            found[pair_name(CDP, pair)] = detected.reshape(read.mean.shape[:2]).min(axis=1)
         return found
 
 
