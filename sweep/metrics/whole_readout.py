@@ -69,15 +69,15 @@ class WholeReadout:
 
 
 def by_case(response: FloatArray, members: Mapping[str, IndexArray], metrics: Sequence[ReadoutMetric]) -> Columns:
-    """What the readout gives in each case, ndarray[n_cases, n_designs]; so many cases at once that a cache holds them.
+    """Evaluate metrics of the readout in each case, ndarray[n_cases, n_designs]; as many at once as a cache holds.
 
     `response`: ndarray[n_designs, n_cases, n_signals, n_channels].
     """
     n_designs, n_cases = response.shape[:2]
     step, parts = max(1, _AT_ONCE // max(1, n_designs)), []
     for start in range(0, n_cases, step):
-        some = np.swapaxes(response[:, start : start + step], 0, 1)
-        readouts, columns = some.reshape(-1, *some.shape[2:]), Columns()
+        cases = np.swapaxes(response[:, start : start + step], 0, 1)
+        readouts, columns = cases.reshape(-1, *cases.shape[2:]), Columns()
         for metric in metrics:
             columns |= metric.of_readout(readouts, members)
         parts.append(columns)

@@ -86,6 +86,8 @@ def _best(output: Output, leaders: Leaders) -> Iterator[str]:
     """Who is best under the constraints, beside the plain CFA that separates most; then what limits it, and others."""
     best, plain, separation = leaders.chosen, leaders.plain, output.trade_off[0]
     if best is None:
+        if len(output.scenarios) > 1:
+            yield f"In {leaders.scenario}, no design meets every constraint."
         return
     under = constraints_told(output)
     who = full_name(best) + technology_of(output, best)
@@ -134,7 +136,7 @@ def _best_of_other_scenarios(output: Output) -> Iterator[str]:
         against = "" if leaders.plain is None else _times(output, leaders.chosen, leaders.plain)
         yield f"In {scenario}, {best}{against}."
     if left := len(output.scenarios) - 1 - len(others[:_MOST_SCENARIOS]):
-        yield f"The best of {left} more scenario{'s' if left > 1 else ''}: in the report's table of best designs."
+        yield f"Of {left} more scenario{'s' if left > 1 else ''}, the report's tables have the best designs."
 
 
 def _limited(output: Output, row: Row) -> str:
@@ -208,12 +210,13 @@ def _others(output: Output, leaders: Leaders) -> Iterator[str]:
     best, most, rate = leaders.chosen, leaders.separates, leaders.per_exposure
     separation = output.trade_off[0]
     per_time = separation.unit != DECADES and separation.metric not in _BY_NOISE
+    where = f" in {leaders.scenario}" if len(output.scenarios) > 1 else ""
     if most is not None and best is not None and most["design_id"] == best["design_id"] and _made(best):
-        yield f"Nothing else in this run {'separates' if per_time else 'has'} more."
+        yield f"Nothing else in this run {'separates' if per_time else 'has'} more{where}."
     more = most is not None and (best is None or most[separation.name] > best[separation.name])
     if most is not None and more:
         verb = "separates most" if per_time else "has the most"
-        yield f"{capital(full_name(most))} {verb} of all: {_figures(output, most)}{_missed(output, most)}."
+        yield f"{capital(full_name(most))} {verb} of all{where}: {_figures(output, most)}{_missed(output, most)}."
     if rate is None or not per_time:
         return
     measure = per_exposure(separation.name)
@@ -223,7 +226,7 @@ def _others(output: Output, leaders: Leaders) -> Iterator[str]:
     others = {full_name(r): rate_told(r[measure]) for r in rivals}
     tied = [name for name, value in others.items() if value == told]
     who = " and ".join(["it" if same else full_name(rate), *tied])
-    text = f"{capital(who)} separate{' most for their' if tied else 's most for its'} exposure"
+    text = f"{capital(who)} separate{' most for their' if tied else 's most for its'} exposure{where}"
     text += f"{', too' if same else ''}: {told} {separation.unit} per ms of exposure"
     against = ", ".join(f"{name} {value}" for name, value in others.items() if name not in tied)
     yield text + (f" ({against})" if against else "") + ("" if same else _missed(output, rate)) + "."

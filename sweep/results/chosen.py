@@ -46,7 +46,7 @@ def find_row(output: Output, key: str) -> Mapping[Any, Any]:
 def _streamed(path: Path, filter_id: int) -> dict[str, Any]:
     """Return the first row of a filter, a row group in memory."""
     for table in batches(path):
-        found = table.filter(pc.equal(table["filter_id"], pa.scalar(filter_id)))
-        if found.num_rows:
-            return dict(found.to_pylist()[0])
+        rows = table.filter(pc.equal(table["filter_id"], pa.scalar(filter_id)))
+        if rows.num_rows:
+            return dict(rows.to_pylist()[0])
     raise OutputError(Fault("has too few rows", str(path), None, "filter_id", filter_id))

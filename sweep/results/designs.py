@@ -26,11 +26,11 @@ def row_space(study: Study, row: Mapping[Any, Any]) -> Space:
 
 def computed_rows(*tables: pd.DataFrame) -> list[dict[Any, Any]]:
     """The rows of tables, each design once; not those that failed."""
-    found: dict[Any, dict[Any, Any]] = {}
+    rows: dict[Any, dict[Any, Any]] = {}
     for table in tables:
         for row in table[table["status"] == "ok"].to_dict("records"):
-            found.setdefault(row["design_id"], row)
-    return [*found.values()]
+            rows.setdefault(row["design_id"], row)
+    return [*rows.values()]
 
 
 def row_curves(study: Study, row: Mapping[Any, Any]) -> tuple[Space, Any]:

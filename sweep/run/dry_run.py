@@ -1,4 +1,4 @@
-"""What a run would do: what it is asked for, what of it is finished already, and which effects it computes."""
+"""Dry run: filters, scenarios, rows finished and to compute, evaluations at most, and the effects that are computed."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def to_do(study: Study, output: Path, n_jobs: int, progress: Progress) -> ToDo:
 
 
 def to_do_lines(found: ToDo, output: Path) -> Iterator[str]:
-    """What is left to do, in words."""
+    """Describe the work that is left, a line each."""
     study = found.study
     plain = sum(space.size for space in study.spaces if space.kind == PLAIN)
     left = study.n_designs - found.finished
@@ -74,10 +74,10 @@ def to_do_lines(found: ToDo, output: Path) -> Iterator[str]:
 def _search_lines(study: Study, search: Search) -> Iterator[str]:
     """The most evaluations of a search that finds a feasible design, and of all that is searched with it."""
     starts = min(search.starts, search.max_evaluations)
-    each = search.max_evaluations // starts
-    yield f"Search: {_count(starts, 'start')}, {_count(starts * each, 'evaluation')} at most."
+    per_start = search.max_evaluations // starts
+    yield f"Search: {_count(starts, 'start')}, {_count(starts * per_start, 'evaluation')} at most."
     if search.levels:
-        most = most_searches(len(search.levels), starts) * each
+        most = most_searches(len(search.levels), starts) * per_start
         yield f"Its front: {_count(len(search.levels), 'level')}, {_count(most, 'evaluation')} at most."
     if study.leaves_one_out:
         most = most_evaluations_left_out(study, search)

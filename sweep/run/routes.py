@@ -53,7 +53,7 @@ class Request:
 
     @property
     def needs_curves(self) -> bool:
-        """Whether something is asked for that designs need their curves for, or all that each signal reads at once."""
+        """Return whether designs need their curves, or the whole readout at once."""
         asked = self.asked
         worst = any(quantity.extreme == WORST_CASE for quantity in self.quantities.values())
         return bool(self.vision is not None or asked.states or asked.wanted_yield or worst)

@@ -31,7 +31,7 @@ from .workers import Workers, called_by, workers
 _HOW = ("command", "backend", "scheduler", "workers", "duration_s")
 """What provenance and `run.json` both say of how a run went, so that either makes the other again."""
 _OF_ROWS = ("detours", "spent_s")
-"""Of both as well: which designs took another route than their block's own, and what metrics of the whole readout
+"""Kept in both as well: which designs took another route than their block's own, and what metrics of the whole readout
 took."""
 
 

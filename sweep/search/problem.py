@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -88,7 +87,7 @@ class Problem:
         own = [q for q in self.quantities.values() if q.apart and not q.extreme]
         return {q.name: q.pair for q in own if q.pair is not None}
 
-    @cached_property
+    @property
     def free(self) -> IndexArray:
         """Indices of the parameters that are not fixed."""
         return np.flatnonzero(self.high > self.low)

@@ -149,6 +149,16 @@ def test_the_answer_names_the_best_of_every_scenario(scenes: Output) -> None:
     assert "27 rows" in (scenes.folder / "report.html").read_text()
 
 
+def test_a_leading_scenario_without_a_feasible_design_is_said(tmp_path: Path) -> None:
+    text = SCENES.replace("{sensitivity: {min: 0.9}}", "{csd_yellow_red: {min: 100}}").split("search:")[0]
+    (tmp_path / "scenes.yaml").write_text(text)
+    ran(load_study(tmp_path / "scenes.yaml"), tmp_path / "out", 1)
+    said = answer_sentences(read_output(tmp_path / "out"))
+    assert said[0] == "In dim, no design meets every constraint."
+    assert said[1].startswith("In bright, filter ")
+    assert " separates most of all in dim: " in said[2]
+
+
 @pytest.mark.parametrize("name", ["robust", "angle", "balanced"])
 def test_filters_named_for_an_optimum_meet_its_constraints(name: str) -> None:
     study = load_study(STUDIES / f"{name}.yaml")
