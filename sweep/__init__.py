@@ -24,7 +24,7 @@ _HOMES = {
     "FinishedRun": "door.objects:FinishedRun",
     "Pixel": "camera.pixel:Pixel",
     "Optics": "camera.pixel:Optics",
-    "Scenario": "camera.scenario:Scenario",
+    "Scene": "camera.scene:Scene",
     "Target": "camera.scene:Target",
     "WavelengthGrid": "curves.spectrum:WavelengthGrid",
     "Stopband": "designs.families.stopband:Stopband",

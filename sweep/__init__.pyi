@@ -1,7 +1,5 @@
 from .base.errors import SweepError
 from .camera.pixel import Optics, Pixel
-from .camera.scenario import Scenario
-from .camera.scene import Target
 from .curves.spectrum import WavelengthGrid
 from .designs.families.dual import Dual
 from .designs.families.free_form import FreeForm
@@ -27,7 +25,7 @@ __all__ = [
     "Optics",
     "Pixel",
     "Quantity",
-    "Scenario",
+    "Scene",
     "Stopband",
     "SweepError",
     "Target",

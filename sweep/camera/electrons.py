@@ -1,29 +1,27 @@
 """Expected electrons of a scene on a sensor, for a block of designs: what light, filters, drive and exposure give.
 
-In the physical order: light through optics and filters onto the units of the kernel, a uniform background, dark
+In the physical order: light through optics and filters onto the elements of the pixel response, a uniform background, dark
 current, a pulse's moment, the exposure. Nothing is clipped, rounded or noisy yet.
 """
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import DTypeLike
 
 from ..base.types import BoolArray, FloatArray
 from ..designs.block import Block, EdgeBlock, EdgeSums
 from ..designs.products import row_products
 from .exposure import exposure_times
-from .kernel import Kernel
-from .registry import factor_of_light
+from .irradiance import background_irradiance, way_of_light
+from .pixel_response import PixelResponse
 from .scene_light import SceneLight
 from .split_light import SplitLight
-from .view import View, background_irradiance, per_photon
+from .view import View, per_photon
 
 KEPT = 15_000_000
 """Largest table of signals times kernel that is kept."""
@@ -92,61 +90,54 @@ def _expose(rates: FloatArray, fixed: FloatArray, uniform: FloatArray, time_s: f
 
 def _background(view: View) -> FloatArray:
     """Electrons/s of the background for each QE, behind all that dims it, ndarray[n_wavelengths]."""
-    dimmed = factor_of_light(view, view.methods, view.grid.nodes_nm, background=True)
+    dimmed = way_of_light(view, view.grid.nodes_nm, background=True)
     return np.asarray(background_irradiance(view) * per_photon(view) * dimmed, dtype=float)
 
 
 class Electrons:
-    """What a kernel gives of designs. `work` counts the values that are computed, by effect.
+    """Expected electrons of designs on the elements of a pixel response.
 
-    `light`, `kernel`: the scene's; `place`: of the field, of each case, ndarray[n_cases]. `background`: electrons/s for
-    each QE of the modified channels, ndarray[n_places, n_modified, n_wavelengths]. `fixed`: electrons/s of what no
-    design changes, ndarray[n_cases, n_signals, n_units].
+    `light`, `response`: the scene's; `position`: of the field, of each case, ndarray[n_cases]. `background`:
+    electrons/s for each QE of the modified channels, ndarray[n_positions, n_modified, n_wavelengths]. `fixed`:
+    electrons/s of what no design changes, ndarray[n_cases, n_signals, n_elements].
     """
 
-    def __init__(
-        self,
-        light: SceneLight,
-        kernel: Kernel,
-        work: Counter[str],
-        dtype: DTypeLike = np.float64,
-        *,
-        once: bool = False,
-    ) -> None:
-        """`dtype`: of the product of curves and scene, where the scene's table is small enough to be kept. `once`: for
-        a single use, so that no table is made.
-        """
+    def __init__(self, light: SceneLight, response: PixelResponse, *, once: bool = False) -> None:
+        """`once`: for a single use, so that no table is made."""
         self.view = view = light.view
-        self._work = work
-        self.light, self.kernel = light, kernel
+        self.light, self.response = light, response
         fixed, modified = list(view.fixed), list(view.modified)
-        places, seen = light.places, light.seen
-        self.place = np.repeat(np.arange(len(places)), kernel.shape[0] // len(places))
-        self._split = kernel.source if isinstance(kernel.source, SplitLight) and len(places) == 1 else None
-        background = [_background(place) for place in places]
+        positions, angular = light.positions, light.angular
+        self.position = np.repeat(np.arange(len(positions)), response.shape[0] // len(positions))
+        self._split = response.source if isinstance(response.source, SplitLight) and len(positions) == 1 else None
+        background = [_background(position) for position in positions]
         each = [np.repeat(dimmed[None], len(modified), axis=0) for dimmed in background]
-        self.background = np.stack([own.light(dimmed, modified) for own, dimmed in zip(seen, each, strict=True)])
+        self.background = np.stack([own.light(dimmed, modified) for own, dimmed in zip(angular, each, strict=True)])
         if self._split is None:
-            self.fixed = self._products(kernel.light[:, :, fixed], view.qe[None, fixed], fixed)[0]
+            self.fixed = self._products(response.light[:, :, fixed], view.qe[None, fixed], fixed)[0]
         else:
-            self.fixed = np.zeros((kernel.shape[0], len(light.signals), kernel.shape[1]))
+            self.fixed = np.zeros((response.shape[0], len(light.signals), response.shape[1]))
             self._add_pixels(self._split, view.qe[None, fixed], fixed, self.fixed[None])
-        rates = [own.curves(view.qe[fixed], fixed) @ dimmed for own, dimmed in zip(seen, background, strict=True)]
-        self._fixed_uniform = np.einsum("xuc,xc->xu", kernel.uniform[:, :, fixed], np.stack(rates)[self.place])
-        self._modified_uniform = kernel.uniform[:, :, modified]
-        # Units that look through a filter that changes; electrons/s per QE of it, kept where the table is small.
+        rates = [own.curves(view.qe[fixed], fixed) @ dimmed for own, dimmed in zip(angular, background, strict=True)]
+        self._fixed_uniform = np.einsum("xuc,xc->xu", response.uniform[:, :, fixed], np.stack(rates)[self.position])
+        self._modified_uniform = response.uniform[:, :, modified]
+        # Elements that look through a filter that changes; electrons/s per QE of it, kept where the table is small.
         if self._split is None:
-            self._touched = np.flatnonzero((kernel.light[:, :, modified] != 0).any(axis=(0, 2, 3)))
-            self._modified = kernel.light[:, self._touched][:, :, modified]
-            size = self._modified[..., 0].size * len(self.light.signals) * self.light.nodes.size
-            self._kept = self._table().astype(dtype, copy=False) if 0 < size <= KEPT and not once else None
+            self._touched = np.flatnonzero((response.light[:, :, modified] != 0).any(axis=(0, 2, 3)))
+            self._modified = response.light[:, self._touched][:, :, modified]
+            size = self._modified.size * len(self.light.signals)
+            self._kept: FloatArray | None = None
+            if 0 < size <= KEPT and not once:
+                self._kept = self._table()
+                if view.accuracy.single_precision:
+                    self._kept = np.asarray(self._kept, dtype=np.float32)
         else:
             self._touched, self._kept = np.empty(0, dtype=np.intp), None
 
-    def at_each_place(self, light: FloatArray, channels: Sequence[int]) -> FloatArray:
+    def at_each_position(self, light: FloatArray, channels: Sequence[int]) -> FloatArray:
         """Light on some channels, ndarray[n_cases, ..., n, n_wavelengths], as their filters see it at its place."""
         return np.concatenate(
-            [seen.light(light[self.place == at], channels) for at, seen in enumerate(self.light.seen)]
+            [seen.light(light[self.position == at], channels) for at, seen in enumerate(self.light.angular)]
         )
 
     def _products(self, light: FloatArray, qe: FloatArray, of: Sequence[int]) -> FloatArray:
@@ -154,13 +145,12 @@ class Electrons:
 
         `light`, `qe`: of the channels `of`.
         """
-        parts = [self._products_at(at, light[self.place == at], qe, of) for at in range(len(self.light.seen))]
+        parts = [self._products_at(at, light[self.position == at], qe, of) for at in range(len(self.light.angular))]
         return np.concatenate(parts, axis=1)
 
     def _add_pixels(self, split: SplitLight, qe: FloatArray, of: Sequence[int], found: FloatArray) -> None:
         """Add `_products` of a light in factors to `found`."""
-        spectra = self.light.looked_at(qe, of)[:, :, None] * self.light.signals
-        self._work["response"] += len(qe) * split.work(len(of), len(self.light.signals))
+        spectra = self.light.angular[0].curves(qe, of)[:, :, None] * self.light.signals
         split.add_sums(spectra, of, found)
 
     def _products_at(self, place: int, light: FloatArray, qe: FloatArray, of: Sequence[int]) -> FloatArray:
@@ -169,25 +159,23 @@ class Electrons:
         size, n, n_signals = self.view.grid.size, len(qe), len(self.light.signals)
         weights = np.broadcast_to(light, (cases, units, channels, size)).reshape(cases * units, channels * size)
         # [n_designs, channels, n_signals, n_wavelengths]
-        seen = self.light.looked_at(qe, of, place)[:, :, None] * self.light.signals
+        seen = self.light.angular[place].curves(qe, of)[:, :, None] * self.light.signals
         moved = np.moveaxis(seen, 2, 1).reshape(n, n_signals, channels * size)
-        self._work["response"] += weights.shape[0] * moved.size
         # A product for each design, so that how many there are changes it by no more than rounding.
         found = (moved @ weights.T).reshape(n, n_signals, cases, units)
         return np.asarray(np.moveaxis(found, 1, 2), dtype=float)
 
     def _table(self) -> FloatArray:
-        """Signals times kernel on the quadrature's nodes, [channels x nodes, n_cases x n_signals x n_units]."""
+        """Signals times response, [channels x wavelengths, n_cases x n_signals x n_elements]."""
         cases, units, channels, size = self._modified.shape
-        if self.light.between_nodes is None and not any(seen.matrices for seen in self.light.seen):
+        if not any(seen.matrices for seen in self.light.angular):
             found = np.empty((channels, size, cases, len(self.light.signals), units))
-            kernel = np.ascontiguousarray(np.transpose(self._modified, (2, 3, 0, 1)))
-            np.multiply(kernel[:, :, :, None], self.light.signals.T[:, None, :, None], out=found)
+            response = np.ascontiguousarray(np.transpose(self._modified, (2, 3, 0, 1)))
+            np.multiply(response[:, :, :, None], self.light.signals.T[:, None, :, None], out=found)
             return found.reshape(channels * size, -1)
         product = self._modified[:, None] * self.light.signals[:, None, None, :]
-        product = self.at_each_place(product, self.view.modified)
-        on_nodes = product if self.light.between_nodes is None else product @ self.light.between_nodes.T
-        return np.ascontiguousarray(on_nodes.reshape(-1, channels * on_nodes.shape[-1]).T)
+        product = self.at_each_position(product, self.view.modified)
+        return np.ascontiguousarray(product.reshape(-1, channels * size).T)
 
     def rates(self, curves: FloatArray) -> FloatArray:
         """Electrons/s of each signal, ndarray[n_designs, n_cases, n_signals, n_units].
@@ -202,8 +190,7 @@ class Electrons:
         if self._kept is None:
             part = self._products(self._modified, curves, self.view.modified)
         else:
-            qe = curves[:, :, self.light.nodes].reshape(len(curves), -1).astype(self._kept.dtype)
-            self._work["response"] += len(curves) * self._kept.size
+            qe = curves.reshape(len(curves), -1).astype(self._kept.dtype)
             part = row_products(qe, self._kept).reshape(len(curves), *self.fixed.shape[:2], self._touched.size)
         found[..., self._touched] += part
         return found
@@ -236,7 +223,7 @@ class Electrons:
         """
         found = np.zeros((len(rates), *self._modified_uniform.shape[:2]))
         for index in range(rates.shape[2]):
-            found += self._modified_uniform[:, :, index] * rates[:, self.place, index, None]
+            found += self._modified_uniform[:, :, index] * rates[:, self.position, index, None]
         return found
 
     def changing(self, block: Block) -> Changing | None:
@@ -262,22 +249,21 @@ class Electrons:
             return None
         some = block if which.all() else block.some(np.flatnonzero(which))
         unit = int(self._touched[0])
-        self._work["response"] += len(some) * self._kept.size
-        uniform = np.zeros((len(some), len(self.place)))
+        uniform = np.zeros((len(some), len(self.position)))
         if self.background.any():
-            uniform = some.product(np.ascontiguousarray(self.background[:, 0].T), everywhere)[:, self.place]
+            uniform = some.product(np.ascontiguousarray(self.background[:, 0].T), everywhere)[:, self.position]
             uniform *= self._modified_uniform[:, unit, 0]
         uniform = self._fixed_uniform[:, unit] + uniform + view.pixel.dark_e_per_s
         rest = self.fixed + (self._fixed_uniform + view.pixel.dark_e_per_s)[:, None]
-        fixed, kept, nodes = np.ascontiguousarray(self.fixed[:, :, unit]), self._kept, self.light.nodes
+        fixed, kept = np.ascontiguousarray(self.fixed[:, :, unit]), self._kept
 
         def make(part: slice) -> FloatArray:
             few = some.some(part)
-            values = few.product(kept, nodes).reshape(len(few), len(fixed), -1).astype(float, copy=False)
+            values = few.product(kept, everywhere).reshape(len(few), len(fixed), -1).astype(float, copy=False)
             _expose(values, fixed, uniform[part], float(time_s[0]))
             return values
 
         by_edges = None
         if isinstance(some, EdgeBlock) and len(fixed) == 1 and kept.dtype == float and len(some) * kept.size > _MANY:
-            by_edges = ByEdges(some.tables.product(kept, nodes), some, fixed[0], uniform[:, 0])
+            by_edges = ByEdges(some.tables.product(kept, everywhere), some, fixed[0], uniform[:, 0])
         return Changing(rest * time_s[0], unit, make, float(time_s[0]), which, by_edges)

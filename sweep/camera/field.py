@@ -1,35 +1,83 @@
-"""The places of the sensor that a scene asks for: each has a chief ray angle and a field angle of its own.
+"""Field positions: each has a chief ray angle and a field angle of its own.
 
-A place is said by its image height h, 0 in the middle of the sensor and 1 in its corner. The lens has no distortion:
-the tangent of the field angle grows like h. Each place is a scene of its own, with the same exposure for all of them.
+A field position is said by its image height h, 0 in the middle of the sensor and 1 in its corner. The lens has no
+distortion: the tangent of the field angle grows like h. Each is a scene of its own, with the same exposure for all.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
-from .effects.illumination import Options
+import numpy as np
+
+from ..base.types import FloatArray
 from .scene import Scene
-from .seen import SKIP, moves
 from .view import View
+
+_STARTS = 2
+"""Image heights from which the smallest value is refined."""
+_HALVINGS = 4
 
 
 def scene_at(scene: Scene, height: float) -> Scene:
-    """What a scene's field sees at an image height, 0 to 1."""
+    """The scene as seen at an image height, 0 to 1."""
     assert scene.field is not None
-    corner = math.tan(math.radians(Options.of(scene).off_axis_deg))
+    corner = math.tan(math.radians(scene.off_axis_deg))
     optics = scene.optics.model_copy(update={"cra_deg": scene.field.cra_at(height)})
     off_axis = {"off_axis_deg": math.degrees(math.atan(height * corner))}
     return scene.model_copy(update={"field": None, "optics": optics, **off_axis})
 
 
-def over_field(view: View) -> tuple[View, ...]:
-    """A view of each place of the field that is looked at; one where no field is asked for, or all see the same."""
+def view_at(view: View, height: float) -> View:
+    """The view at an image height, 0 to 1."""
+    return replace(view, scenario=scene_at(view.scenario, height))
+
+
+def field_heights(view: View) -> tuple[float, ...]:
+    """Image heights at which a scene is computed; 0 where all of them see the same."""
     scene = view.scenario
     if scene.field is None:
+        return (0.0,)
+    still = not view.computes("angle") or not view.moving
+    bright = not view.computes("illumination") or scene.off_axis_deg == 0
+    if still and bright:
+        return (0.0,)
+    if not scene.field.everywhere:
+        return scene.field.seen_heights
+    count = view.accuracy.field_positions
+    return tuple(sorted({*(at / (count - 1) for at in range(count)), *scene.field.knots[0]}))
+
+
+def over_field(view: View) -> tuple[View, ...]:
+    """A view of each field position that is computed; the view itself where the scene has no field."""
+    if view.scenario.field is None:
         return (view,)
-    still = view.methods.angle == SKIP or not moves(view)
-    bright = view.methods.illumination == "skip" or Options.of(scene).off_axis_deg == 0
-    heights = (0.0,) if still and bright else scene.field.seen_heights
-    return tuple(replace(view, scenario=scene_at(scene, height)) for height in heights)
+    return tuple(view_at(view, height) for height in field_heights(view))
+
+
+def refined_heights(
+    heights: tuple[float, ...], values: FloatArray, evaluate: Callable[[float], FloatArray]
+) -> tuple[FloatArray, FloatArray]:
+    """Smallest values over all image heights and where, ndarray[n_values] each, by refinement of the smallest known.
+
+    `values`: ndarray[n_values, n_heights], known at ascending `heights`; `evaluate`: from a height to ndarray[n_values].
+    The steps around a start are halved; that no lower value lies elsewhere is not proven.
+    """
+    known = dict(zip(heights, values.T, strict=True))
+    at, lowest = np.zeros(len(values)), values.min(axis=1)
+    for value, own in enumerate(values):
+        for start in np.argsort(own, kind="stable")[:_STARTS]:
+            best = heights[start]
+            step = max(np.diff(heights)[max(start - 1, 0) : start + 1]) / 2
+            for _ in range(_HALVINGS):
+                for height in (best - step, best + step):
+                    if 0 <= height <= 1 and height not in known:
+                        known[height] = evaluate(height)
+                near = [height for height in (best - step, best, best + step) if 0 <= height <= 1]
+                best = min(near, key=lambda height: known[height][value])
+                step /= 2
+            if start == np.argsort(own, kind="stable")[0] or known[best][value] < lowest[value]:
+                lowest[value], at[value] = known[best][value], best
+    return lowest, at

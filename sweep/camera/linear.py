@@ -17,20 +17,19 @@ from ..base.cache import Cache
 from ..base.errors import Fault, SweepError
 from ..base.types import FloatArray, IndexArray
 from .exposure import relative_slope
-from .imager import Imager
-from .methods import REFERENCE
+from .forward import ForwardModel
 from .pixel import unquantized
 from .split_light import SplitLight
-from .view import View
+from .view import READOUT, View
 
 _STEPS_DN2 = 1 / 12
 """Variance of rounding to whole digital numbers, DN^2."""
+_FIELD_POSITIONS = 9
+"""Field positions at which a search looks where all places of the sensor count; its best design is read out at more."""
 
 
-class LinearImager(Imager):
-    """An imager whose electrons are taken for digital numbers, linear in a design's QE but for the exposure."""
-
-    all_apart = True
+class LinearModel(ForwardModel):
+    """The forward model of an unclipped, unrounded readout: linear in a design's QE but for the exposure."""
 
     def smooth(self, curves: FloatArray) -> FloatArray:
         """Unquantized, unclipped response, DN, ndarray[n_designs, n_cases, n_signals, n_channels]."""
@@ -69,9 +68,9 @@ class LinearImager(Imager):
 
     def spread_shares(self) -> FloatArray:
         """Sum of the shares that the pixels have in a channel's variance, ndarray[n_cases, n_channels]."""
-        kernel = self.by_pixel.electrons.kernel
-        repeats = self.by_pixel._expected(self.view.base_qe[None]).shape[1] // len(kernel.spread)
-        return np.repeat(kernel.spread.sum(axis=1), repeats, axis=0)
+        response = self.by_pixel.electrons.response
+        repeats = self.by_pixel._expected(self.view.base_qe[None]).shape[1] // len(response.spread)
+        return np.repeat(response.spread.sum(axis=1), repeats, axis=0)
 
     @cached_property
     def members(self) -> dict[str, IndexArray]:
@@ -79,18 +78,18 @@ class LinearImager(Imager):
         return self.view.members
 
     @cached_property
-    def by_pixel(self) -> LinearImager:
+    def by_pixel(self) -> LinearModel:
         """The same scene with its pixels kept apart, whose variances are not those of their mean.
 
         Raises SweepError where the pixels of all places of the light do not fit into memory.
         """
-        apart = {name: getattr(REFERENCE, name) for name in ("saturation", "quantization")}
-        found = LinearImager(replace(self.view, methods=replace(self.view.methods, **apart)))
-        if found._others:
-            most = f"at most those of {found.n_cases} places: a smaller light, or a named place"
+        view = replace(self.view, left_out=self.view.left_out - {"saturation", "quantization"})
+        result = _ByPixel(view)
+        if result._phase_blocks:
+            most = f"at most those of {len(result._phase_blocks[0])} places: a smaller light, or a named place"
             problem = "too many pixels for a search under noise"
-            raise SweepError(Fault(problem, value=f"{found.n_places} places", allowed=most))
-        return found
+            raise SweepError(Fault(problem, value=f"{result.n_cases} places", allowed=most))
+        return result
 
     def _expected(self, curves: FloatArray) -> FloatArray:
         """Expected electrons of the units, ndarray[n_designs, n_cases, n_signals, n_units]."""
@@ -116,8 +115,8 @@ class LinearImager(Imager):
         ndarray[n_cases, n_signals, n_units, n_wavelengths]; the smooth response is linear in it where N does not set
         the exposure.
         """
-        kernel, channel = self.electrons.kernel, self.view.modified[modified]
-        rates = self._per_qe(modified, curves, kernel.light[:, :, channel], kernel.uniform[:, :, channel])
+        response, channel = self.electrons.response, self.view.modified[modified]
+        rates = self._per_qe(modified, curves, response.light[:, :, channel], response.uniform[:, :, channel])
         return rates * self.view.pixel.dn_per_e
 
     def spread_per_qe(self, modified: int, curves: FloatArray) -> FloatArray:
@@ -126,41 +125,50 @@ class LinearImager(Imager):
         ndarray[n_cases, n_signals, n_wavelengths]; see `per_qe`.
         """
         own, channel = self.by_pixel, self.view.modified[modified]
-        kernel = own.electrons.kernel
-        share = kernel.spread[:, :, channel]
-        split = kernel.source
+        response = own.electrons.response
+        share = response.spread[:, :, channel]
+        split = response.source
         if isinstance(split, SplitLight):
             light = split.folded(share, channel)
         else:
             light = np.einsum("xu,xuw->xw", share, split[:, :, channel])
-        uniform = (share * kernel.uniform[:, :, channel]).sum(axis=1)
+        uniform = (share * response.uniform[:, :, channel]).sum(axis=1)
         return own._per_qe(modified, curves, light[:, None], uniform[:, None])[:, :, 0]
 
     def _per_qe(self, modified: int, curves: FloatArray, light: FloatArray, uniform: FloatArray) -> FloatArray:
         """Electrons per QE of one modified channel, ndarray[n_cases, n_signals, n_units, n_wavelengths].
 
-        `light`, `uniform`: what units get through it, see `Kernel`, without the axis of the channels.
+        `light`, `uniform`: what units get through it, see `PixelResponse`, without the axis of the channels.
         """
         own, channel = self.electrons, self.view.modified[modified]
         exposure_s = self.light.exposure_s(curves[None])
         scales = self.light.scales(exposure_s)[0]
         seen = light[:, None, None] * self.light.signals[:, None, :]
-        seen = own.at_each_place(seen[..., None, :], [channel])[..., 0, :]
-        background = own.background[own.place, modified][:, None, None, None]
+        seen = own.at_each_position(seen[..., None, :], [channel])[..., 0, :]
+        background = own.background[own.position, modified][:, None, None, None]
         both = seen * scales[None, :, None, None, None] + uniform[:, None, None, :, None] * background
         return np.asarray(both.reshape(-1, *both.shape[2:]) * exposure_s[0], dtype=float)
 
 
-_imagers: Cache[bytes, LinearImager] = Cache(16)
+class _ByPixel(LinearModel):
+    """A linear model whose pixels are kept apart, those of all field positions together."""
+
+    def __init__(self, view: View) -> None:
+        super().__init__(view)
+        self._positions = []
 
 
-def smooth_imager(view: View) -> LinearImager:
-    """The imager of a view without clipping and rounding, on every wavelength: what a search sees.
+_models: Cache[bytes, LinearModel] = Cache(16)
 
-    The latest ones are kept, so that a kernel is made once in a process.
+
+def linear_model(view: View) -> LinearModel:
+    """The linear model of a view: what a search sees.
+
+    The latest ones are kept, so that a response is made once in a process. All places of the sensor are seen at few
+    field positions.
     """
-    straight = {"saturation": "skip", "quantization": "skip", "noise": "skip", "quadrature": "grid"}
-    if view.methods.flicker == "fine":  # of a straight response the ends are the extremes
-        straight["flicker"] = "ends"
-    seen = replace(view, methods=replace(view.methods, **straight))
-    return _imagers.get(hashlib.sha256(pickle.dumps(seen)).digest(), lambda: LinearImager(seen))
+    few = view.accuracy.model_copy(
+        update={"field_positions": min(view.accuracy.field_positions, _FIELD_POSITIONS), "pwm_moments": 2}
+    )
+    seen = replace(view, left_out=view.left_out | READOUT, accuracy=few)
+    return _models.get(hashlib.sha256(pickle.dumps(seen)).digest(), lambda: LinearModel(seen))

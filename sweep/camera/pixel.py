@@ -78,6 +78,11 @@ class Pixel(Section):
         """System gain, DN per electron."""
         return self.full_scale_dn / self.well_e if self.gain_dn_per_e is None else self.gain_dn_per_e
 
+    @property
+    def saturation_e(self) -> float:
+        """Electrons from which the readout does not rise: the full well, or the end of the ADC's range."""
+        return min(self.well_e, (self.full_scale_dn - self.offset_dn) / self.dn_per_e)
+
 
 def irradiance_factor(optics: Optics, magnification: float = 0.0, field_angle_rad: float = 0.0) -> float:
     """Irradiance at the sensor over radiance of the scene, sr: pi T cos^4 / (1 + 4 N^2 (1 + |m|)^2).

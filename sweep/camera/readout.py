@@ -1,68 +1,89 @@
 """The readout of a scene: from expected electrons through full well, noise and ADC to the channels' digital numbers.
 
-Only what `View.methods` names is computed. A channel is the mean over the disc, or the demosaicked center.
+A channel is the mean over the disc, or the demosaicked center.
 """
 
 from __future__ import annotations
 
 import math
-from collections import Counter
 
 import numpy as np
 
 from ..base.types import BoolArray, FloatArray, IndexArray
-from .effects import quantization, saturation
-from .kernel import Kernel
-from .noisy import table
-from .noisy_readout import is_cut, is_gaussian, reach_dn
+from .noise import table
+from .noise_readout import is_cut, is_gaussian, reach_dn
 from .pixel import Pixel, unquantized
+from .pixel_response import PixelResponse
 from .view import View
 
 _CERTAIN_DN2 = 1e-9
 _FEW = 16
 _MANY = 50_000
 """Values from which on a compiled pass saves more time than it takes to load."""
+_MOST_POISSON_E = 1e18
+"""NumPy's Poisson generator takes no larger mean."""
+
+
+def rounded(dn: FloatArray, pixel: Pixel) -> FloatArray:
+    """The pedestal added to `dn`, rounded half up, inside the ADC's range.
+
+    The whole part of the pedestal is added after rounding, so that no digit of a float is lost to it: values with and
+    without a whole pedestal differ by exactly that.
+    """
+    whole = math.floor(pixel.offset_dn)
+    steps = np.asarray(dn + (pixel.offset_dn - whole), dtype=float)
+    steps += 0.5
+    np.floor(steps, out=steps)
+    steps += whole
+    return np.clip(steps, 0.0, pixel.full_scale_dn, out=steps)
+
+
+def draws_dn(electrons: FloatArray, pixel: Pixel, rng: np.random.Generator) -> FloatArray:
+    """Monte Carlo: a readout of each pixel, which expects `electrons` and has its own gain error; rounded."""
+    # In place: to give memory to an array of millions of pixels takes as long as a sum over them.
+    expected = rng.standard_normal(electrons.shape)
+    expected *= pixel.prnu
+    expected += 1
+    expected *= electrons
+    held = rng.poisson(np.clip(expected, 0.0, _MOST_POISSON_E, out=expected))
+    dn = rng.standard_normal(out=expected)
+    dn *= pixel.read_noise_e
+    dn += np.minimum(held, pixel.well_e)
+    dn *= pixel.dn_per_e
+    dn += pixel.offset_dn
+    dn += 0.5
+    return np.clip(np.floor(dn, out=dn), 0, pixel.full_scale_dn, out=dn)
 
 
 class Readout:
-    """How a camera reads a kernel's units. `work` counts the values that are computed, by effect.
+    """How a camera reads the elements of a pixel response. `by_channel`: whether each element is a channel already."""
 
-    `pixel`: without a pedestal where that is skipped. `by_channel`: whether each unit is a channel already.
-    """
-
-    def __init__(self, view: View, kernel: Kernel, work: Counter[str]) -> None:
+    def __init__(self, view: View, response: PixelResponse) -> None:
         self.view = view
-        self.n_cases = kernel.shape[0]
-        self._weights, self._spread = kernel.readout, kernel.spread
-        self._work = work
-        pixel = view.pixel
-        without = view.methods.pedestal == "skip"
-        self.pixel: Pixel = pixel.model_copy(update={"offset_dn": 0.0}) if without else pixel
-        self.by_channel = kernel.by_channel
+        self.n_cases = response.shape[0]
+        self._weights, self._spread = response.readout, response.spread
+        self.pixel = view.pixel
+        self.by_channel = response.by_channel
 
     def transfer(self, electrons: FloatArray) -> FloatArray:
-        """Digital numbers of the units from their expected electrons, as far as the methods go."""
-        methods, noisy, pixel = self.view.methods, self.view.scenario.noise is not None, self.pixel
-        soft = noisy and methods.noise == "expected"
-        rounds, clips = methods.quantization != "skip", methods.saturation != "skip"
-        if clips:
-            self._work["noise" if soft else "saturation"] += electrons.size
-        if rounds:
-            self._work["quantization"] += electrons.size
-        if soft and clips:
+        """Digital numbers of the elements from their expected electrons; the mean of those that noise gives."""
+        view, pixel = self.view, self.pixel
+        clips, rounds = view.computes("saturation"), view.computes("quantization")
+        noisy = view.scenario.noise is not None
+        if noisy and view.computes("noise"):
             return (table.mean_rounded if rounds else table.mean_unrounded)(electrons, pixel)
         if rounds and not noisy and electrons.size > _MANY:
             return self._whole_numbers(electrons, clips)
-        held = saturation.clipped(electrons, pixel) if clips else electrons
+        held = np.minimum(electrons, pixel.saturation_e) if clips else electrons
         if not rounds:
             return unquantized(held, pixel)
         if noisy:
             dn = unquantized(held, pixel)
             return dn + table.mean_rounded(electrons, pixel) - table.mean_unrounded(electrons, pixel)
-        return quantization.rounded(held * pixel.dn_per_e, pixel)
+        return rounded(held * pixel.dn_per_e, pixel)
 
     def _whole_numbers(self, electrons: FloatArray, clips: bool) -> FloatArray:
-        """The same in one pass, without noise."""
+        """`transfer` in one pass, without noise."""
         from .compiled_readout import whole_numbers  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         many = np.ascontiguousarray(electrons)
@@ -72,22 +93,17 @@ class Readout:
 
     def _line(self, clips: bool) -> tuple[float, float, float, float]:
         """Electrons from which nothing more is read, DN per electron, pedestal and full scale, DN."""
-        top_e = saturation.top_e(self.pixel) if clips else math.inf
+        top_e = self.pixel.saturation_e if clips else math.inf
         return top_e, self.pixel.dn_per_e, self.pixel.offset_dn, float(self.pixel.full_scale_dn)
 
-    def line(self, n_values: int) -> tuple[float, float, float, float] | None:
-        """`_line` for whoever reads `n_values` of it by himself; None where a readout is more than whole numbers."""
-        methods = self.view.methods
-        if methods.quantization == "skip" or self.view.scenario.noise is not None:
+    def line(self) -> tuple[float, float, float, float] | None:
+        """`_line` for whoever reads values by himself; None where a readout is more than whole numbers."""
+        if not self.view.computes("quantization") or self.view.scenario.noise is not None:
             return None
-        clips = methods.saturation != "skip"
-        self._work["saturation"] += n_values * clips
-        self._work["quantization"] += n_values
-        return self._line(clips)
+        return self._line(self.view.computes("saturation"))
 
     def variance_dn(self, electrons: FloatArray) -> FloatArray:
         """Variance of the units' digital numbers, DN^2, with their rounding."""
-        self._work["variance"] += electrons.size
         return table.variance(electrons, self.pixel)
 
     def folded(self, dn: FloatArray) -> FloatArray:
@@ -101,7 +117,7 @@ class Readout:
     def with_noise(self, electrons: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray, FloatArray]:
         """`NoisyReadout.mean`, `variance`, `gaussian` and `reach_dn` of a block.
 
-        Pixels are read one by one, so saturation and quantization must be among the view's methods.
+        Pixels are read one by one, so neither saturation nor quantization may be left out.
         """
         dn, variance_dn = self.transfer(electrons), self.variance_dn(electrons)
         # A digital number that is the same in all but one of a billion readouts: what is left of its noise is
@@ -112,7 +128,7 @@ class Readout:
         return (mean, variance, *self._shape_of_noise(electrons, variance))
 
     def channels_of(self, pixels: FloatArray, place: int) -> FloatArray:
-        """Readout of each channel from its pixels (those of `Imager.pixel_electrons`) at a place of the light.
+        """Readout of each channel from its pixels (those of `ForwardModel.pixel_electrons`) at a place of the light.
 
         ndarray[n, n_pixels] -> ndarray[n, n_channels].
         """
@@ -124,7 +140,7 @@ class Readout:
 
     @property
     def few_pixels(self) -> tuple[IndexArray, ...] | None:
-        """For each channel the pixels of `Imager.pixel_electrons` of which it is the mean; None where they are many."""
+        """For each channel the pixels of `ForwardModel.pixel_electrons` of which it is the mean; None where they are many."""
         view = self.view
         if view.scenario.target is not None or view.mosaic.counts.max() > _FEW:
             return None
@@ -133,7 +149,6 @@ class Readout:
 
     def _weighed(self, values: FloatArray, weights: FloatArray) -> FloatArray:
         """Sums over the units by their `weights`, ndarray[n_cases, n_units, n_channels]."""
-        self._work["readout"] += values.size
         repeats = values.shape[1] // self.n_cases
         return np.asarray(values @ np.repeat(weights, repeats, axis=0))
 

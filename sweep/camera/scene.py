@@ -119,13 +119,15 @@ def _noise(value: Any) -> Any:
 
 
 class Scene(Section):
-    """What the camera sees, and how it is exposed; `Scenario` adds what single effects ask for.
+    """What the camera sees, and how it is exposed: a scenario of a study.
 
     Without a `target` every signal is a self-emissive patch that fills the field. Signals have the same photon count,
     `photon_radiance` (photons/s/sr/m^2, summed over the wavelength grid), or, with `intensity_cd`, the luminance of a
     light of that luminous intensity and the target's diameter (0.2 m without a target). `background_cd_m2`: light that
     is added over the whole field, also in front of the target, flat in photons. `drive`: of a pulsed LED. `field`: the
-    worst place of the sensor. `noise`: photon, read and dark noise and PRNU act before the mean is taken;
+    worst place of the sensor. `off_axis_deg`: the field angle, off which a lens without vignetting gives cos^4 of the
+    light. `visibility_m`: the distance at which haze or fog leaves 2 % of a target's light (Koschmieder's
+    meteorological range). `noise`: photon, read and dark noise and PRNU act before the mean is taken;
     true, or figures of its own. Limits: 1 to 1e40 photons (the sun's disc: 1e25), 1e-12 to 1e15 cd, a background up to
     1e15 cd/m^2 (the sun: 2e9).
     """
@@ -138,6 +140,8 @@ class Scene(Section):
     background_cd_m2: float = Field(default=0.0, ge=0, le=1e15)
     drive: Drive | None = None
     field: SensorField | None = None
+    off_axis_deg: float = Field(default=0.0, ge=0, lt=90)
+    visibility_m: Meters | None = None
     noise: Annotated[Noise | None, BeforeValidator(_noise, json_schema_input_type=bool | Noise | None)] = None
 
     @model_validator(mode="after")
@@ -148,7 +152,14 @@ class Scene(Section):
             raise ValueError("`field` says the chief ray angle of each place: leave out optics.cra_deg")
         if self.field is not None and self.target is not None and self.target.phase_px == "any":
             raise ValueError("`field` needs a light at a named place of the mosaic, not `phase_px: any`")
+        if self.visibility_m is not None and self.target is None:
+            raise ValueError("visibility_m needs a target with a distance")
         return self
+
+    @property
+    def any_phase(self) -> bool:
+        """Whether the light may fall anywhere on the mosaic."""
+        return self.target is not None and self.target.phase_px == "any"
 
     @property
     def luminance_cd_m2(self) -> float | None:

@@ -17,7 +17,7 @@ from ..base.types import FloatArray, IndexArray
 
 @dataclass(frozen=True)
 class SplitLight:
-    """`Kernel.light` of pixels, ndarray[n_cases, n_units, n_channels, n_wavelengths], in factors.
+    """`PixelResponse.light` of pixels, ndarray[n_cases, n_units, n_channels, n_wavelengths], in factors.
 
     `values`: functions of the light at each different place, ndarray[n_places, n_functions]; `shares`: how much of each
     is in each wavelength, ndarray[n_functions, n_wavelengths], None where all see the same; `factor`: of the light's
@@ -77,7 +77,3 @@ class SplitLight:
                 np.add.at(by_place[case], place[case, own], share * weights[case, own])
         seen = by_place @ self.values
         return np.asarray((seen if self.shares is None else seen @ self.shares) * self.factor, dtype=float)
-
-    def work(self, n_channels: int, n_signals: int) -> int:
-        """Multiplications of `sums` for one design."""
-        return int(n_channels * n_signals * self.values.size + n_signals * self.place.size)

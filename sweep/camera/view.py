@@ -1,47 +1,108 @@
-"""What a block of designs shares: sensor, CFA, lights and scene, and how the scene is simulated."""
+"""What a block of designs shares: sensor, CFA, lights and scene, and how accurately the scene is simulated."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..base.types import FloatArray
-from ..curves.color import luminance_per_photon_radiance
-from .methods import REFERENCE, Methods
-from .pixel import irradiance_factor
-from .shot import Shot
+from ..base.types import FloatArray, IndexArray
+from ..curves.lights import Lights
+from ..curves.spectrum import WavelengthGrid
+from ..curves.tasks import StudyTasks
+from ..designs.technology import Technology, index_of
+from .accuracy import STANDARD, Accuracy
+from .mosaic import Mosaic
+from .pixel import Pixel
+from .scene import Scene
+
+READOUT = frozenset({"noise", "quantization", "saturation"})
+"""Effects without which digital numbers are linear in electrons."""
 
 
 @dataclass(frozen=True)
-class View(Shot):
-    """A shot, and the methods by which it is simulated."""
+class View:
+    """What a block of designs shares.
 
-    methods: Methods = field(default=REFERENCE)
-
-
-def signal_irradiance(view: View) -> FloatArray:
-    """Photon irradiance of each signal where its image is whole, on axis, in clear air, photons/s/m^2/nm.
-
-    ndarray[n_signals, n_wavelengths].
+    `qe`: ndarray[n_channels, n_wavelengths] of the mosaic's channels, electrons per photon; the rows of `modified`
+    (channel indices, one per curve that a family makes) hold the base curve. `clear_qe`: the reference of the CFA's
+    sensitivity, ndarray[n_wavelengths]. `technologies`: by what each channel's filter works, None where that is not
+    stated; empty where it is of none. `tasks`: what else the study asks of its designs. `accuracy`: numerical settings;
+    `left_out`: effects that are not computed (see `effects`).
     """
-    scenario = view.scenario
-    factor = irradiance_factor(scenario.optics)
-    luminance = scenario.luminance_cd_m2
-    if luminance is None:
-        return view.lights.photons * (scenario.photon_radiance * factor)
-    per_photon = luminance_per_photon_radiance(view.grid, view.lights.photons)
-    return view.lights.photons * (luminance / per_photon * factor)[:, None]
 
+    grid: WavelengthGrid
+    mosaic: Mosaic
+    qe: FloatArray
+    modified: tuple[int, ...]
+    clear_qe: FloatArray
+    lights: Lights
+    pixel: Pixel
+    scenario: Scene
+    technologies: tuple[Technology | None, ...] = field(default=(), kw_only=True)
+    tasks: StudyTasks | None = field(default=None, kw_only=True)
+    accuracy: Accuracy = field(default=STANDARD, kw_only=True)
+    left_out: frozenset[str] = field(default=frozenset(), kw_only=True)
 
-def background_irradiance(view: View) -> FloatArray:
-    """Photon irradiance of the uniform background, flat in photons, ndarray[n_wavelengths]."""
-    grid, luminance = view.grid, view.scenario.background_cd_m2
-    if not luminance:
-        return np.zeros(grid.size)
-    flat = np.full((1, grid.size), 1 / (grid.size * grid.step_nm))
-    radiance = luminance / luminance_per_photon_radiance(grid, flat)[0]
-    return np.asarray(flat[0] * radiance * irradiance_factor(view.scenario.optics), dtype=float)
+    @property
+    def base_qe(self) -> FloatArray:
+        """Curves that the modified channels replace, ndarray[n_modified, n_wavelengths]."""
+        return self.qe[list(self.modified)]
+
+    @property
+    def fixed(self) -> tuple[int, ...]:
+        """Channels that no design modifies."""
+        return tuple(i for i in range(len(self.mosaic.channels)) if i not in self.modified)
+
+    def effective_index(self, channel: int) -> float:
+        """That of a channel's filter; infinite for one that does not move with the angle of the light."""
+        return index_of(self.technologies[channel]) if self.technologies else math.inf
+
+    @property
+    def moving(self) -> tuple[int, ...]:
+        """Channels whose filter moves with the angle of the light."""
+        return tuple(c for c in range(len(self.mosaic.channels)) if math.isfinite(self.effective_index(c)))
+
+    def carrier(self, channel: int) -> FloatArray:
+        """What a channel is under its filter and stays at every angle: its base, or of a plain one the clear pixel."""
+        return self.qe[channel] if channel in self.modified else self.clear_qe
+
+    @property
+    def longest_distance_dn(self) -> float:
+        """No two points of the unclipped response that fit into the range are further apart; DN."""
+        return float(2 * self.pixel.full_scale_dn * np.sqrt(len(self.mosaic.channels)))
+
+    @property
+    def members(self) -> dict[str, IndexArray]:
+        """Signal type -> indices of its signals."""
+        return self.lights.members
+
+    def computes(self, effect: str) -> bool:
+        """Whether an effect is not left out."""
+        return effect not in self.left_out
+
+    @property
+    def with_all_effects(self) -> View:
+        """The view with no effect left out."""
+        return replace(self, left_out=frozenset())
+
+    @property
+    def linear(self) -> bool:
+        """Whether digital numbers are linear in electrons: neither clipped nor rounded."""
+        return READOUT <= self.left_out
+
+    @property
+    def all_phases(self) -> bool:
+        """Whether the worst of all sampling phases is asked for."""
+        return self.scenario.any_phase
+
+    @property
+    def all_heights(self) -> bool:
+        """Whether the worst of all places of the sensor is asked for, and they differ."""
+        scene = self.scenario
+        differ = bool(self.moving) or scene.off_axis_deg != 0
+        return scene.field is not None and scene.field.everywhere and differ
 
 
 def per_photon(view: View) -> float:

@@ -18,6 +18,7 @@ def finish(folder: Path, began_s: float, *, mend: bool = False, parallel: Parall
     `began_s`: when the command began, by the monotonic clock: a user waits for the report, too. `parallel` makes the
     pictures, without it they are made one after the other.
     """
+    from ..base.errors import BrokenPromiseError, Fault
     from ..base.types import in_turn
     from ..report import make_report, read_output, summary_lines
 
@@ -25,3 +26,6 @@ def finish(folder: Path, began_s: float, *, mend: bool = False, parallel: Parall
     make_report(found, mend=mend, parallel=parallel or in_turn)
     for line in summary_lines(found, time.monotonic() - began_s):
         typer.echo(line)
+    check = found.provenance.check
+    if check is not None and not check.passed:
+        raise BrokenPromiseError([Fault(check.sentence.removesuffix("."), key=check.scenario)])

@@ -105,7 +105,6 @@ def run_one(path: Path, manner: Manner, began_s: float) -> None:
 
 def _tell(study: Study, folder: Path, manner: Manner) -> None:
     """Say what a run would do."""
-    with ProgressDisplay() as display:
-        found = runner.to_do(study, folder, manner.workers, display.update)
+    found = runner.to_do(study, folder, manner.workers)
     for line in runner.to_do_lines(found, folder):
         typer.echo(line)

@@ -183,9 +183,7 @@ class LoadedStudy:
 
         Then `evaluate` computes by it, and `study.plans` says what it left out and why.
         """
-        from ..run import with_plans
-
-        return LoadedStudy(with_plans(self.study, 1, _silent, tolerance_dn))
+        return LoadedStudy(self.study.with_plans(tolerance_dn))
 
     def run(self, output: Path | str = "outputs", jobs: int | None = None) -> FinishedRun:
         """Run the study into `output`/<name>, draw its report, and give the finished run; what is finished stays.

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.errors import DataError, Fault, nearest
 from ..base.types import FloatArray
-from ..camera.imager import imager_of
+from ..camera.forward import forward_model
 from ..camera.view import View
 from ..curves.lights import class_pairs
 from ..metrics.bound import FEASIBLE, total_violation
@@ -99,7 +99,7 @@ def judged(study: Study, view: View, curves: FloatArray) -> Columns:
         allowed = "0 to 1; a transmission is relative to a curve (`relative_to`), percent are divided by 100"
         raise DataError(Fault("a QE above 1", value=round(float(curves.max()), 6), allowed=allowed))
     asked = study.asked
-    found = evaluate(imager_of(view), curves, asked.states, probabilities=asked.probabilities, own=asked.own)
+    found = evaluate(forward_model(view), curves, asked.states, probabilities=asked.probabilities, own=asked.own)
     if view.lights.population is not None and not study.tolerance:
         from ..metrics.members import population_imager  # noqa: PLC0415  (only where lights have a population)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base.machine_code import njit
 from ..base.types import FloatArray, IndexArray
-from ..camera.compiled import poisson_shares
+from ..camera.noise.compiled import poisson_shares
 
 RARE = 1e-40
 """What occurs less often than this, relative to the most frequent, is left out."""

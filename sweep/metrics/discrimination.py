@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.types import BoolArray, FloatArray, IndexArray
-from ..camera.noisy.gaussian import share_below
-from ..camera.noisy_readout import NoisyReadout
+from ..camera.noise.gaussian import share_below
+from ..camera.noise_readout import NoisyReadout
 from ..curves.lights import Pair, class_pairs
 from .separation import pair_blocks
 

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
-from ..base.types import FloatArray
-from ..camera.effects import phase
-from ..camera.effects.image_height import HEIGHTS
+from ..base.types import BoolArray, FloatArray
 from ..camera.electrons import Changing
-from ..camera.field import scene_at
-from ..camera.imager import Imager, imager_of
-from ..camera.registry import EFFECTS
-from ..camera.sensor_places import SensorPlaces
+from ..camera.field import field_heights, refined_heights, view_at
+from ..camera.forward import ForwardModel, forward_model
+from ..camera.phases import Phases, refined_minima
 from ..camera.view import View
-from ..curves.lights import Pair, class_pairs
+from ..curves.lights import class_pairs
 from ..designs.block import Block, CurveBlock
 from ..designs.family import Family
 from ..vision.section import Vision
@@ -35,9 +30,6 @@ from .quantity import (
 from .registry import METRICS
 from .separation import csd_name, separations, separations_along, separations_by_edges
 from .whole_readout import Spent, WholeReadout, by_case, over_cases
-
-if TYPE_CHECKING:
-    from ..camera.places import Extremes
 
 _CSD = [metric for metric in METRICS if isinstance(metric, ColorSeparation)]
 
@@ -75,102 +67,62 @@ def _joined(parts: Sequence[Columns]) -> Columns:
     return {name: values for part in parts for name, values in part.items()}
 
 
-def _over_all_places(
-    imager: Imager,
-    curves: FloatArray,
-    exposure_s: FloatArray,
-    columns: Columns,
-) -> None:
-    """Put the extremes over all places into the columns, which hold those over the lattice.
+def _by_phase(model: ForwardModel, cases: Columns, n_places: int) -> FloatArray:
+    """CSDs at each phase or field position, the smallest over the moments, ndarray[n_designs, n_pairs, n_places].
 
-    In the darkest moment of a light that goes dark all distances are 0, there and everywhere.
+    `cases`: ndarray[n_cases x n_moments, n_designs] by column.
     """
-    for design in np.flatnonzero(np.isfinite(exposure_s)):
-        light = imager.light.light_dn(curves[design], exposure_s[design])
-        if not np.isfinite(light).all() or not light.any():
-            continue
-        assert imager.anywhere is not None
-        found = imager.anywhere.extremes(light)
-        found = _as_read(imager, curves[design : design + 1], found)
-        for pair, extremes in found.items():
-            name = csd_name(pair)
-            smallest, largest = (np.nan, np.nan) if extremes is None else (extremes.smallest, extremes.largest)
-            best = columns[BEST_PLACE + name]
-            columns[name][design] = np.minimum(columns[name][design], smallest)
-            best[design] = np.maximum(best[design], largest)
+    names = [csd_name(pair) for pair in class_pairs(model.view.lights.classes)]
+    each = np.stack([cases[name] for name in names])  # [n_pairs, n_cases x n_moments, n_designs]
+    return np.moveaxis(each.reshape(len(names), n_places, -1, each.shape[-1]).min(axis=2), -1, 0)
 
 
-def _by_search(imager: Imager, curves: FloatArray) -> Columns | None:
-    """CSDs and exposure where a straight response is read out: the search for the worst place tells them all.
-
-    The lattice's places are nodes of its first cells. In the darkest moment of a light that goes dark all distances are
-    0. None where light or exposure are not finite.
-    """
-    exposure_s = imager.light.exposure_s(curves)
-    if not np.isfinite(exposure_s).all():
-        return None
-    pairs = class_pairs(imager.view.lights.classes)
-    columns = {start + csd_name(pair): np.full(len(curves), np.nan) for pair in pairs for start in ("", BEST_PLACE)}
-    for design, time_s in enumerate(exposure_s.tolist()):
-        light = imager.light.light_dn(curves[design], time_s)
-        if not np.isfinite(light).all():
-            return None
-        if not light.any():
-            for values in columns.values():
-                values[design] = 0.0
-            continue
-        assert imager.anywhere is not None
-        for pair, extremes in imager.anywhere.extremes(light).items():
-            if extremes is not None:
-                columns[csd_name(pair)][design] = extremes.smallest
-                columns[BEST_PLACE + csd_name(pair)][design] = extremes.largest
-    return columns | {EXPOSURE: exposure_s}
+def _csds(model: ForwardModel, curves: FloatArray) -> FloatArray:
+    """CSDs of one design at each phase, the smallest over the moments, ndarray[n_pairs, n_phases]."""
+    distances = separations(model.read(curves)[0][0], model.view.members)
+    return np.stack([each.reshape(model.n_cases, -1).min(axis=1) for each in distances.values()])
 
 
-def _over_all_heights(imager: Imager, curves: FloatArray, exposure_s: FloatArray, columns: Columns) -> None:
-    """Put the smallest distances over all places of the sensor into the columns, which hold those of a few.
+def _refine_phases(model: ForwardModel, block: Block, cases: Columns, columns: Columns) -> None:
+    """Put the extremes over all sampling phases into the columns, which hold those over the lattice."""
+    view, phases = model.view, model.phases
+    assert phases is not None
+    names = [csd_name(pair) for pair in class_pairs(view.lights.classes)]
+    on_lattice = _by_phase(model, cases, len(phases))
+    for design in np.flatnonzero(np.isfinite(on_lattice).all(axis=(1, 2))):
+        curves = block.some(slice(design, design + 1)).curves()
 
-    They are looked for in the straight response, and read out where they are.
-    """
-    view = imager.view
-    asked = EFFECTS[HEIGHTS].limit_dn(view.methods.field)
-    assert asked is not None
-    places = SensorPlaces(view, asked, imager.work)
-    for design in np.flatnonzero(np.isfinite(exposure_s)):
-        found = places.worst(curves[design])
-        for pair in (pair for pair, worst in found.items() if worst is None):
-            columns[csd_name(pair)][design] = np.nan
-        for height in {worst.height for worst in found.values() if worst is not None}:
-            there = imager_of(replace(view, scenario=scene_at(view.scenario, height)))
-            for moment in np.moveaxis(there.read(curves[design : design + 1])[0], 1, 0):
-                for pair, distance in separations(moment, view.members).items():
-                    own = columns[csd_name(pair)]
-                    own[design] = np.minimum(own[design], distance[0])
+        def both_ends(at: Phases, curves: FloatArray = curves) -> FloatArray:
+            apart = _csds(model.at(at), curves)
+            return np.concatenate([apart, -apart])
+
+        known = np.concatenate([on_lattice[design], -on_lattice[design]])
+        smallest, largest = np.split(refined_minima(view, phases, known, both_ends), 2)
+        for name, least, most in zip(names, smallest, -largest, strict=True):
+            columns[name][design] = least
+            columns[BEST_PLACE + name][design] = most
 
 
-def _as_read(imager: Imager, curves: FloatArray, found: Mapping[Pair, Extremes | None]) -> dict[Pair, Extremes | None]:
-    """Extremes of one design at the places where those of the straight response are, as the camera reads them out.
+def _refine_heights(model: ForwardModel, block: Block, cases: Columns, columns: Columns) -> None:
+    """Put the smallest distances over all places of the sensor into the columns, which hold those of some heights."""
+    view = model.view
+    names, heights = [csd_name(pair) for pair in class_pairs(view.lights.classes)], field_heights(view)
+    if not view.accuracy.finest_phase_px:
+        return
+    at_heights = _by_phase(model, cases, len(heights))
+    for design in np.flatnonzero(np.isfinite(at_heights).all(axis=(1, 2))):
+        curves = block.some(slice(design, design + 1)).curves()
 
-    Where the readout is not straight, another pair's place may be the better one.
-    """
-    kept = {pair: extremes for pair, extremes in found.items() if extremes is not None}
-    at = [case for extremes in kept.values() for case in (extremes.at_smallest, extremes.at_largest)]
-    if not at:
-        return dict(found)
-    cases, which = phase.different_places(imager.view, phase.Cases(*np.moveaxis(np.array(at), 1, 0)))
-    there = Imager(imager.view, imager.work, cases=cases, once=True)
-    every = separations(there.read(curves)[0][0], imager.view.members)
-    moments = {pair: distances.reshape(len(cases.places_px), -1)[which] for pair, distances in every.items()}
-    read = [{pair: distances[place] for pair, distances in moments.items()} for place in range(len(at))]
-    for number, (pair, extremes) in enumerate(kept.items()):
-        own = read[2 * number : 2 * number + 2] if imager.view.methods.straight else read
-        distances = [float(each[pair].min()) for each in own]
-        kept[pair] = replace(extremes, smallest=min(distances), largest=max(distances))
-    return {pair: kept.get(pair) for pair in found}
+        def at_height(height: float, curves: FloatArray = curves) -> FloatArray:
+            return np.asarray(_csds(forward_model(view_at(view, height)), curves).min(axis=1))
+
+        smallest, _ = refined_heights(heights, at_heights[design], at_height)
+        for name, least in zip(names, smallest, strict=True):
+            columns[name][design] = least
 
 
 def evaluate(
-    imager: Imager,
+    model: ForwardModel,
     designs: FloatArray | Block,
     states: Sequence[str] = (),
     *,
@@ -178,69 +130,74 @@ def evaluate(
     own: Sequence[OwnMetric] = (),
     spent: Spent | None = None,
 ) -> Columns:
-    """Evaluate a block of designs as the camera reads them out, as far as the scene's methods go.
+    """Evaluate a block of designs as the camera reads them out.
 
     `designs`: see `designed_quantities`. Returns the columns of all metrics but those of a family, each
     ndarray[n_designs]; `states`: signal types that noise may confuse, `probabilities`: with their CDP; `own`:
-    metrics of a user's own; `spent` is added to. CSDs are the smallest over the places of the light and the moments of
-    its pulses; `best_place_csd_<a>_<b>` is the largest over the places of the smallest over the moments. All metrics
-    but CSDs are the worst over the places of the lattice. Distances are NaN where the extremes over all places take
-    more cells than `places` allows, or `sensor_places`.
+    metrics of a user's own; `spent` is added to. CSDs are the smallest over the phases of the light, the field
+    positions and the moments of its pulses; `best_place_csd_<a>_<b>` is the largest over the phases of the smallest
+    over the moments. Where all phases or all places of the sensor count, the CSDs are refined between those of the
+    lattice; other metrics are the worst over the lattice.
     """
-    block, extra = _block(designs), WholeReadout(imager, own, spent or Spent())
-    anywhere = phase.all_count(imager.view, imager.view.methods)
-    if anywhere and imager.view.methods.straight and not states:
-        curves = block.curves()
-        found = _by_search(imager, curves)
-        if found is not None:
-            more = extra.of(len(curves), lambda part: imager.read(curves[part])[0])
-            return found | more | designed_quantities(imager.view, block)
-    changing = None if states else imager.read_changing(block)
+    block, extra, view = _block(designs), WholeReadout(model, own, spent or Spent()), model.view
+    changing = None if states else model.read_changing(block)
     if changing is None:
-        columns = _read(imager, block, extra, states, probabilities=probabilities)
+        cases, columns = _read(model, block, extra, states, probabilities=probabilities)
     elif changing.which.all():
-        columns = _distances_along(imager, changing, extra)
+        cases, columns = _distances_along(model, changing, extra)
     else:
-        along = _distances_along(imager, changing, extra)
-        rest = _read(imager, block.some(np.flatnonzero(~changing.which)), extra)
-        columns = {name: np.empty(len(block)) for name in along}
-        for name, values in columns.items():
-            values[changing.which], values[~changing.which] = along[name], rest[name]
-    if anywhere:
-        _over_all_places(imager, block.curves(), columns[EXPOSURE], columns)
-    if EFFECTS[HEIGHTS].all_count(imager.view, imager.view.methods):
-        _over_all_heights(imager, block.curves(), columns[EXPOSURE], columns)
-    return columns | designed_quantities(imager.view, block)
+        parts = (
+            _distances_along(model, changing, extra),
+            _read(model, block.some(np.flatnonzero(~changing.which)), extra),
+        )
+        cases, columns = (
+            {name: _merged(changing.which, along[name], rest[name]) for name in along}
+            for along, rest in zip(*parts, strict=True)
+        )
+    if view.all_phases:
+        _refine_phases(model, block, cases, columns)
+    if view.all_heights:
+        _refine_heights(model, block, cases, columns)
+    return columns | designed_quantities(view, block)
 
 
-def _distances_along(imager: Imager, changing: Changing, extra: WholeReadout) -> Columns:
-    """CSDs and exposure of designs that differ in one channel alone, and what needs their whole readout."""
-    by_edges = separations_by_edges(changing, imager.view.members)
-    cases = (
+def _merged(which: BoolArray, some: FloatArray, others: FloatArray) -> FloatArray:
+    """Values of designs, the last axis, from those that are `which` and those that are not."""
+    merged = np.empty((*some.shape[:-1], which.size))
+    merged[..., which], merged[..., ~which] = some, others
+    return merged
+
+
+def _distances_along(model: ForwardModel, changing: Changing, extra: WholeReadout) -> tuple[Columns, Columns]:
+    """CSDs in each case, and the columns, of designs that differ in one channel alone."""
+    by_edges = separations_by_edges(changing, model.view.members)
+    each = (
         [by_edges]
         if by_edges is not None
         else [
-            separations_along(fixed, changing.channel, changing.values[:, case], imager.view.members)
+            separations_along(fixed, changing.channel, changing.values[:, case], model.view.members)
             for case, fixed in enumerate(changing.fixed)
         ]
     )
-    each = {csd_name(pair): np.stack([case[pair] for case in cases]) for pair in cases[0]}
+    cases = {csd_name(pair): np.stack([case[pair] for case in each]) for pair in each[0]}
     n = int(changing.which.sum())
-    return over_cases(imager, each) | {EXPOSURE: np.full(n, changing.exposure_s)} | extra.of(n, changing.whole_of)
+    columns = over_cases(model, cases) | {EXPOSURE: np.full(n, changing.exposure_s)}
+    return cases, columns | extra.of(n, changing.whole_of)
 
 
 def _read(
-    imager: Imager, block: Block, extra: WholeReadout, states: Sequence[str] = (), *, probabilities: bool = False
-) -> Columns:
-    """What the readout of any designs gives; with `states`, what noise does to them, too."""
-    curves, members, apart = block.curves(), imager.view.members, Columns()
+    model: ForwardModel, block: Block, extra: WholeReadout, states: Sequence[str] = (), *, probabilities: bool = False
+) -> tuple[Columns, Columns]:
+    """CSDs in each case, and the columns, of any designs; with `states`, what noise does to them, too."""
+    curves, members, apart = block.curves(), model.view.members, Columns()
     if states:
-        read = imager.read_with_noise(curves)
+        read = model.read_with_noise(curves)
         response, exposure_s = read.mean, read.exposure_s
         confused = {name: members[name] for name in states}
         noisy = [m for m in METRICS if isinstance(m, NoiseMetric) and (probabilities or not m.extra)]
-        apart = _joined([metric.of_noise(imager, curves, read, confused) for metric in noisy])
+        apart = _joined([metric.of_noise(model, curves, read, confused) for metric in noisy])
     else:
-        response, exposure_s = imager.read(curves)
+        response, exposure_s = model.read(curves)
     apart |= extra.of(len(curves), response.__getitem__)
-    return over_cases(imager, by_case(response, members, _CSD)) | apart | {EXPOSURE: exposure_s}
+    cases = by_case(response, members, _CSD)
+    return cases, over_cases(model, cases) | apart | {EXPOSURE: exposure_s}

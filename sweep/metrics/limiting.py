@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.types import FloatArray, IndexArray
-from ..camera.imager import Imager
+from ..camera.forward import ForwardModel
 from ..camera.view import View
 from ..curves.lights import Pair, class_pairs, pair_name
 from ..designs.block import Block
@@ -47,7 +47,7 @@ def _named(view: View, lights: IndexArray) -> NDArray[np.object_]:
     return np.array(names, dtype=object)[which.reshape(-1)]
 
 
-def limiting_lights_of(imager: Imager, block: Block) -> LimitingLights:
+def limiting_lights_of(imager: ForwardModel, block: Block) -> LimitingLights:
     """`limiting_lights` of a block of designs, read out by the same route as `evaluate` reads them."""
     changing = imager.read_changing(block)
     if changing is None:

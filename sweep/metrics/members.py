@@ -16,8 +16,7 @@ import numpy as np
 
 from ..base.cache import Cache
 from ..base.types import FloatArray, IndexArray
-from ..camera.linear import LinearImager, smooth_imager
-from ..camera.methods import REFERENCE
+from ..camera.linear import LinearModel, linear_model
 from ..camera.view import View
 from ..curves.lights import Pair, class_pairs
 from ..curves.members import Members
@@ -72,13 +71,13 @@ class PopulationImager:
     def __init__(self, view: View) -> None:
         """Everything is on, whatever the plan of `view` leaves out: plans promise nothing of other members."""
         self.members = Members(view.lights, view.grid)
-        self.view = replace(view, lights=self.members.lights, methods=REFERENCE)
+        self.view = replace(view.with_all_effects, lights=self.members.lights)
         self._tables: dict[Pair, _Table] = {}
 
     @cached_property
-    def imager(self) -> LinearImager:
+    def imager(self) -> LinearModel:
         """The smooth response to every spectrum of the members."""
-        return smooth_imager(self.view)
+        return linear_model(self.view)
 
     def worst(self, curves: FloatArray, pairs: Sequence[Pair] = ()) -> dict[str, FloatArray]:
         """The smallest CSD of each pair over all members and places, DN, by the name of the CSD, ndarray[n_designs].

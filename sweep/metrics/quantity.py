@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 
 from ..base.types import FloatArray, IndexArray
-from ..camera.imager import Imager
-from ..camera.noisy_readout import NoisyReadout
+from ..camera.forward import ForwardModel
+from ..camera.noise_readout import NoisyReadout
 from ..camera.view import View
 from ..curves.lights import Pair
 from ..curves.tasks import TaskName
@@ -242,7 +242,7 @@ class NoiseMetric(Metric):
 
     @abstractmethod
     def of_noise(
-        self, imager: Imager, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
+        self, imager: ForwardModel, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
     ) -> Columns:
         """Each column, the worst over all places and moments, ndarray[n_designs].
 

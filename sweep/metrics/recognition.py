@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ..base.types import FloatArray, IndexArray
-from ..camera.effects import noise
-from ..camera.imager import AllApart
+from ..camera.forward import AllPhases
+from ..camera.readout import draws_dn
 from .classifiers import CLASSIFIERS
 from .share import share_interval
 
@@ -31,7 +31,7 @@ def _columns_of(rule: str) -> tuple[str, ...]:
 
 
 def recognize(
-    imager: AllApart, curves: FloatArray, states: Sequence[str], patches: int, rng: np.random.Generator
+    imager: AllPhases, curves: FloatArray, states: Sequence[str], patches: int, rng: np.random.Generator
 ) -> dict[str, float]:
     """Accuracy of every rule for one design, as `columns` names it; `curves`: ndarray[1, n_modified, n_wavelengths].
 
@@ -54,7 +54,7 @@ def recognize(
     rule = _MostLikely(imager, curves, signals)
     step = max(1, _AT_ONCE // (len(signals) * n_pixels))
     for block in (slice(start, start + step) for start in range(0, patches, step)):
-        whole = noise.draws_dn(electrons[place[block], signals], imager.readout.pixel, rng)
+        whole = draws_dn(electrons[place[block], signals], imager.readout.pixel, rng)
         drawn[block] = whole[..., seen]
         said[block] = state[rule.of(whole, place[block])]
     found = dict(_accuracy(MOST_LIKELY, truth, said))
@@ -72,9 +72,9 @@ def recognize(
 class _MostLikely:
     """The most likely of `signals` for drawn patches of one design."""
 
-    def __init__(self, imager: AllApart, curves: FloatArray, signals: IndexArray) -> None:
+    def __init__(self, imager: AllPhases, curves: FloatArray, signals: IndexArray) -> None:
         read = imager.read_with_noise(curves)
-        self._readout = imager.readout
+        self._model = imager
         mean, variance = (np.moveaxis(of[0][:, signals], 2, 1) for of in (read.mean, read.variance))
         self._mean = np.ascontiguousarray(mean)  # [n_places, n_channels, n_signals]
         self._variance = np.ascontiguousarray(np.maximum(variance, _LEAST_VARIANCE))
@@ -86,8 +86,8 @@ class _MostLikely:
         best = np.empty(place.shape, dtype=np.intp)
         for at in np.unique(place):
             here = place == at
-            kernel = int(at) * self._readout.n_cases // len(self._mean)
-            values = self._readout.channels_of(drawn[here], kernel)  # [n, n_channels]
+            kernel = int(at) * self._model.n_cases // len(self._mean)
+            values = self._model.channels_of(drawn[here], kernel)  # [n, n_channels]
             found = np.empty(len(values), dtype=np.intp)
             likeliest(values, self._mean[at], self._variance[at], found)
             best[here] = found

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from ..base.types import FloatArray, IndexArray
-from ..camera.linear import LinearImager, smooth_imager
+from ..camera.linear import LinearModel, linear_model
 from ..camera.view import View
 from ..curves.lights import Pair
 from ..designs.family import Family
@@ -77,7 +77,7 @@ class SmoothDesign:
 
     def __init__(
         self,
-        imager: LinearImager,
+        imager: LinearModel,
         family: Family,
         x: FloatArray,
         free: IndexArray,
@@ -193,7 +193,7 @@ def smooth_response(view: View, curves: FloatArray) -> FloatArray:
 
     `curves`: ndarray[n_designs, n_modified, n_wavelengths].
     """
-    return smooth_imager(view).smooth(curves)
+    return linear_model(view).smooth(curves)
 
 
 def smooth_csd(view: View, curves: FloatArray, pair: Pair) -> FloatArray:

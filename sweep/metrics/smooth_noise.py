@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.types import FloatArray
-from ..camera.linear import smooth_imager
+from ..camera.linear import linear_model
 from ..camera.view import View
 from ..curves.lights import Pair, class_pairs
 from .discrimination import detectability
@@ -154,7 +154,7 @@ def _of_signals(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:
 
 def smooth_detectability(view: View, curves: FloatArray, pair: Pair) -> FloatArray:
     """d' of the smooth response, the smallest over the cases, ndarray[n_designs]; see `smooth.smooth_csd`."""
-    imager = smooth_imager(view)
+    imager = linear_model(view)
     mean, variance = imager.smooth(curves), imager.variance(curves)
     both = view.members[pair[0]], view.members[pair[1]]
     over = [detectability(mean[:, case], variance[:, case], *both) for case in range(mean.shape[1])]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.types import FloatArray, IndexArray
-from ..camera.imager import Imager
+from ..camera.forward import ForwardModel
 from .columns.color_separation import ColorSeparation
 from .own import OwnMetric, own_quantities
 from .quantity import Asked, Columns, ReadoutMetric
@@ -40,12 +40,12 @@ def whole_readout_metrics(asked: Asked) -> list[str]:
 class WholeReadout:
     """Metrics that need the whole readout: a user's own, and those of `OTHERS`."""
 
-    imager: Imager
+    imager: ForwardModel
     own: Sequence[OwnMetric]
     spent: Spent
 
     def of(self, n: int, whole: Callable[[slice], FloatArray]) -> Columns:
-        """The columns of n designs; `whole`: the readout of a part of them, see `Imager.read`.
+        """The columns of n designs; `whole`: the readout of a part of them, see `ForwardModel.read`.
 
         A CFA of which an own metric says nothing says so of one design, and no more are read for it.
         """
@@ -56,7 +56,7 @@ class WholeReadout:
         columns = {name: np.full(n, values[0]) for name, values in first.items()}
         present = [metric for metric in self.own if np.isfinite(first[metric.name][0])]
         if present or OTHERS:
-            values_per_design = self.imager.n_places * len(view.lights.names) * len(view.mosaic.channels)
+            values_per_design = self.imager.n_cases * len(view.lights.names) * len(view.mosaic.channels)
             step = max(1, _READ_AT_ONCE // values_per_design)
             parts = [self._of(whole(slice(start, start + step)), present) for start in range(0, n, step)]
             columns |= {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
@@ -84,7 +84,7 @@ def by_case(response: FloatArray, members: Mapping[str, IndexArray], metrics: Se
     return {name: np.concatenate([part[name] for part in parts]).reshape(n_cases, n_designs) for name in parts[0]}
 
 
-def over_cases(imager: Imager, cases: Columns) -> Columns:
+def over_cases(imager: ForwardModel, cases: Columns) -> Columns:
     """The worst of all cases, and of CSDs the largest over the places of the smallest over the moments.
 
     `cases`: ndarray[n_cases, n_designs] each.
@@ -96,7 +96,7 @@ def over_cases(imager: Imager, cases: Columns) -> Columns:
         if len(each) == 1:
             found |= {own: each[0].copy() for own in (name, best.get(name)) if own is not None}
             continue
-        moments = np.stack([quantities[name].worse(place) for place in np.split(each, imager.n_places)])
+        moments = np.stack([quantities[name].worse(place) for place in np.split(each, imager.n_cases)])
         found[name] = quantities[name].worse(moments)
         if name in best:
             found[best[name]] = moments.max(axis=0)

@@ -132,6 +132,7 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
         "scenes": rows(scene_table(groups)),
         "group_rows": [rows(effect_table(group)) for group in groups],
         "audited": output.audited is not None,
+        "checked": "" if output.provenance.check is None else output.provenance.check.sentence,
         "lamps": rows(lamp_table(output)),
         "vision": _vision(output),
         "comparison": rows(tables.comparison_table(output)),

@@ -1,4 +1,4 @@
-"""How each scene was simulated, what that may change and did change, and what it saved."""
+"""How each scene was simulated: effects computed and left out, the bound on what that changes, and measured errors."""
 
 from __future__ import annotations
 
@@ -10,24 +10,19 @@ import pandas as pd
 from ..results.facts import EffectFacts
 from ..results.output import Output
 
-_LEAST_S = 1e-6
-
 
 @dataclass(frozen=True)
 class SceneGroup:
-    """Scenes that were simulated by the same methods. `effects`: rows of effect, method, promised error, reason.
+    """Scenes of which the same effects were computed.
 
-    `realized_dn`: the largest error that an audit found, None without one; `work`: estimated seconds, `whole_work`:
-    those with every effect on.
+    `realized_dn`: the largest error that an audit found, None without one.
     """
 
     scenarios: tuple[str, ...]
     effects: tuple[EffectFacts, ...]
-    promised_dn: float
+    error_bound_dn: float
     realized_dn: float | None
     tolerance_dn: float
-    work: float
-    whole_work: float
 
     @property
     def title(self) -> str:
@@ -38,33 +33,25 @@ class SceneGroup:
     @property
     def computed(self) -> str:
         """Effects that were computed."""
-        return ", ".join(each.effect for each in self.effects if each.is_computed)
+        return ", ".join(each.effect for each in self.effects if each.computed)
 
 
 def scene_groups(output: Output) -> list[SceneGroup]:
-    """All scenes, those with the same methods together, each effect with its largest promise among them."""
+    """All scenes, those with the same effects together, each effect with its largest bound among them."""
     plans = output.provenance.plans
-    groups: dict[tuple[tuple[str, str], ...], list[str]] = {}
+    groups: dict[tuple[str, ...], list[str]] = {}
     for name, plan in plans.items():
-        groups.setdefault(tuple((each.effect, each.method) for each in plan.effects), []).append(name)
+        groups.setdefault(tuple(plan.computed), []).append(name)
     found = []
     for names in groups.values():
         own = [plans[name] for name in names]
         effects = (
-            max(choices, key=lambda each: each.promised_dn)
+            max(choices, key=lambda each: each.bound_dn or 0.0)
             for choices in zip(*(plan.effects for plan in own), strict=True)
         )
-        found.append(
-            SceneGroup(
-                tuple(names),
-                tuple(effects),
-                max(plan.promised_dn for plan in own),
-                _realized(output, names),
-                own[0].tolerance_dn,
-                sum(plan.work for plan in own),
-                sum(plan.reference_work for plan in own),
-            )
-        )
+        bound_dn = max(plan.error_bound_dn for plan in own)
+        realized_dn, tolerance_dn = _realized(output, names), own[0].tolerance_dn
+        found.append(SceneGroup(tuple(names), tuple(effects), bound_dn, realized_dn, tolerance_dn))
     return found
 
 
@@ -76,18 +63,15 @@ def _realized(output: Output, names: list[str]) -> float | None:
 
 
 def scene_table(groups: Sequence[SceneGroup]) -> pd.DataFrame:
-    """What each group of scenes promises, what an audit found, and what the methods save."""
+    """Effects of each group of scenes, the bound on the others, and the error that an audit found."""
     return pd.DataFrame(
         [
             {
                 "scenes": group.title,
                 "computed": group.computed,
-                "promised / DN": f"{group.promised_dn:.2g}",
-                "realized / DN": "not audited" if group.realized_dn is None else f"{group.realized_dn:.2g}",
+                "bound on what is left out / DN": f"{group.error_bound_dn:.2g}",
+                "error / DN": "not audited" if group.realized_dn is None else f"{group.realized_dn:.2g}",
                 "tolerance / DN": f"{group.tolerance_dn:g}",
-                "estimated / s": f"{group.work:.2g}",
-                "with everything on / s": f"{group.whole_work:.2g}",
-                "times less": f"{group.whole_work / max(group.work, _LEAST_S):.3g}",
             }
             for group in groups
         ]
@@ -95,13 +79,13 @@ def scene_table(groups: Sequence[SceneGroup]) -> pd.DataFrame:
 
 
 def effect_table(group: SceneGroup) -> pd.DataFrame:
-    """Every effect's method, promise and reason."""
+    """Every effect, whether it is computed, its bound and reason."""
     return pd.DataFrame(
         [
             {
                 "effect": each.effect,
-                "method": each.method,
-                "promised / DN": f"{each.promised_dn:.2g}",
+                "computed": "computed" if each.computed else "left out",
+                "bound / DN": "none" if each.bound_dn is None else f"{each.bound_dn:.2g}",
                 "reason": each.reason,
             }
             for each in group.effects

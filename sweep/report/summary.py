@@ -90,25 +90,16 @@ def summary_lines(output: Output, took_s: float | None = None) -> list[str]:
 
 
 def _plan_line(output: Output) -> str:
-    """What was simulated, over all scenarios, and what the rest changes; where that cannot be promised, for what."""
+    """Effects that were computed, over all scenarios, a bound on what the others change, and the check of the run."""
     plans = output.provenance.plans
     computed = dict.fromkeys(effect for plan in plans.values() for effect in plan.computed)
-    kept = [plan.promised_dn for plan in plans.values() if plan.promised_dn <= plan.tolerance_dn]
-    short = {name: plan for name, plan in plans.items() if plan.promised_dn > plan.tolerance_dn}
-    tolerance = max(plan.tolerance_dn for plan in plans.values())
-    line = f"Simulated: {', '.join(computed)}"
-    if kept:
-        most = f"all else changes a CSD by at most {max(kept):.2g} DN" if max(kept) else "nothing else changes a CSD"
-        line += f"; {most} (tolerance {tolerance:g} DN)"
-        line += f" in {len(kept)} of {len(plans)} scenarios" if short else ""
-    if not short:
-        return f"{line}."
-    where = f" in the other {len(short)}" if kept else f" in any of {len(plans)} scenarios" if len(plans) > 1 else ""
-    causes = dict.fromkeys(max(p.effects, key=lambda effect: effect.promised_dn).effect for p in short.values())
-    worst = max(short, key=lambda name: short[name].promised_dn)
-    proven = f"no more than {short[worst].promised_dn:,.0f} DN is proven{f' in {worst}' if len(plans) > 1 else ''}"
-    line += f". The tolerance of {tolerance:g} DN cannot be promised{where} ({', '.join(causes)}: {proven})"
-    return f"{line}; `sweep audit` measures what is really changed."
+    bound_dn = max(plan.error_bound_dn for plan in plans.values())
+    most = (
+        f"the other effects change a CSD by at most {bound_dn:.2g} DN" if bound_dn else "no other effect changes a CSD"
+    )
+    line = f"Simulated: {', '.join(computed)}; {most}."
+    check = output.provenance.check
+    return line if check is None else f"{line} {check.sentence}"
 
 
 def counts_line(output: Output) -> str:

@@ -66,8 +66,8 @@ _VERDICTS = {
     (
         "plan",
         "promised_dn",
-    ): "how the scene was simulated (`provenance.json` says it in full), and what that changes "
-    "at most in any CSD, also at the best place and with shifted edges",
+    ): "how the scene was simulated (`provenance.json` says it in full), and a bound on what the effects that were "
+    "left out change in any CSD, also at the best place and with shifted edges",
     ("status",): "`ok`, or what failed",
 }
 _WORST = (
@@ -83,7 +83,7 @@ _OF_A_SHARE = (
     "rounding, with everything on; no limit is computed of it, and a limit of others leaves a constraint on it out"
 )
 _OWN = (
-    "a metric of the study's `metrics`, the worst over moments and places of the lattice; nothing is promised of it: "
+    "a metric of the study's `metrics`, the worst over moments and phases of the lattice; its error is not checked: "
     "the tolerance in DN is of CSDs"
 )
 _WITHOUT_CLEAR = f"; without a clear pixel 1 = {reference_of('<name>')}"
@@ -166,7 +166,7 @@ FILES = {
     VISION_CONDITIONS: "of each design at each distance and level of light: csd (DN), dprime and pair_error, the "
     "smallest or the largest over the pairs of lenses",
     VISION_MISREAD: "images that were read wrongly, in false colors: bytes of rows x columns x 3 in `pixels`",
-    AUDIT: "rows of `sweep audit`: promised and realized errors",
+    AUDIT: "rows of `sweep audit`: errors against the reference settings, and those that are allowed",
     RESOLVED: "the study with every default written out; a study file itself",
     PROVENANCE: "versions, seed, command, machine, plans of the scenes, what the columns mean",
     REPORT: "the report: one file that you can send, without the network",

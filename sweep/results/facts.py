@@ -7,7 +7,6 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from ..camera.registry import EFFECTS
 from ..metrics.quantity import Column
 
 
@@ -33,33 +32,53 @@ class SensorOrigin(Origin):
 
 
 class EffectFacts(_Facts):
-    """How an effect was computed, what that changes in a CSD at most (DN), and why."""
+    """Whether an effect was computed, a bound on what it changes in a CSD (DN, None where no bound is known), and why."""
 
     effect: str
-    method: str
-    promised_dn: float
+    computed: bool
+    bound_dn: float | None
     reason: str
-
-    @property
-    def is_computed(self) -> bool:
-        """Whether it was more than left out."""
-        return self.effect not in EFFECTS or self.method != EFFECTS[self.effect].off
 
 
 class PlanFacts(_Facts):
-    """How a scene was simulated; `work`: estimated seconds, `reference_work`: with every effect on."""
+    """How a scene was simulated; `error_bound_dn`: by how much all that was left out changes a CSD at most."""
 
     key: str
     tolerance_dn: float
-    promised_dn: float
-    work: float
-    reference_work: float
+    error_bound_dn: float
+    accuracy: dict[str, Any]
     effects: tuple[EffectFacts, ...]
 
     @property
     def computed(self) -> list[str]:
         """Effects that were computed."""
-        return [each.effect for each in self.effects if each.is_computed]
+        return [each.effect for each in self.effects if each.computed]
+
+
+class CheckFacts(_Facts):
+    """Rows of a run that were compared with the reference settings; the largest difference of a CSD, and where."""
+
+    rows: int
+    design_id: int
+    scenario: str
+    quantity: str
+    largest_dn: float
+    allowed_dn: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether no difference is larger than allowed; rounding of the arithmetic is not counted."""
+        return self.largest_dn <= self.allowed_dn * (1 + 1e-9) + 1e-9
+
+    @property
+    def sentence(self) -> str:
+        """The result in words."""
+        rows = "1 row differs" if self.rows == 1 else f"{self.rows:,} rows differ"
+        where = f"{self.quantity} of design {self.design_id} in {self.scenario}"
+        return (
+            f"Checked: {rows} from the reference settings by at most {self.largest_dn:.2g} DN ({where}; "
+            f"allowed {self.allowed_dn:.3g} DN)."
+        )
 
 
 class SearchFacts(_Facts):
@@ -118,6 +137,7 @@ class Provenance(_Facts):
     designs: int
     failed: int
     plans: dict[str, PlanFacts]
+    check: CheckFacts | None = None
     trade_off: tuple[str, str]
     parameters: tuple[str, ...]
     quantities: tuple[Column, ...]

@@ -10,7 +10,6 @@ from ..base.later import loaded_later
 if TYPE_CHECKING:
     from ..results.folder import output_folder
     from .dry_run import to_do, to_do_lines
-    from .plans import with_plans
     from .stop import stop_on_signals
     from .whole import run_study
     from .wishes import Wishes
@@ -25,7 +24,6 @@ __all__ = [
     "to_do",
     "to_do_lines",
     "usable_backend",
-    "with_plans",
 ]
 __getattr__ = loaded_later(
     globals(),
@@ -38,6 +36,5 @@ __getattr__ = loaded_later(
         "to_do": ".dry_run",
         "to_do_lines": ".dry_run",
         "usable_backend": ".workers",
-        "with_plans": ".plans",
     },
 )

@@ -10,8 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from ..base.types import FloatArray, Parallel, Progress, delayed
-from ..camera.imager import Imager
-from ..camera.methods import REFERENCE
+from ..camera.forward import ForwardModel
 from ..camera.view import View
 from ..curves.lights import Lights
 from ..curves.single_leds import Norm, SingleLeds, every_led
@@ -49,7 +48,7 @@ def regions_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
     calls = []
     for row in shown:
         space, curves = row_curves(study, row)
-        view = replace(study.view(space, row["scenario"]), methods=REFERENCE)
+        view = study.view(space, row["scenario"]).with_all_effects
         calls.append(delayed(_cells, view, curves, allowed, asked.wanted_dn))
     found: list[dict[str, Any]] = []
     for done, (row, cells) in enumerate(zip(shown, parallel(calls), strict=True), 1):
@@ -94,7 +93,7 @@ def _read(view: View, curves: FloatArray, leds: SingleLeds) -> FloatArray:
         some = photons[start : start + _TOGETHER]
         names = tuple(str(number) for number in range(len(some)))
         lights = Lights("leds", names, names, some, view.lights.photon_ratio, "modeled", surrogate=True)
-        parts.append(Imager(replace(view, lights=lights), once=True).read(curves)[0][0])
+        parts.append(ForwardModel(replace(view, lights=lights), once=True).read(curves)[0][0])
     return np.concatenate(parts, axis=1)
 
 

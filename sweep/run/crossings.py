@@ -13,9 +13,8 @@ import pyarrow as pa
 from pydantic import ValidationError
 
 from ..base.types import FloatArray, Parallel, Progress, delayed
-from ..camera.imager import Imager
-from ..camera.methods import REFERENCE
-from ..camera.scenario import Scenario
+from ..camera.forward import ForwardModel
+from ..camera.scene import Scene
 from ..camera.view import View
 from ..metrics.columns.confusion import STATE_ERROR, state_errors
 from ..results.designs import row_curves
@@ -51,8 +50,8 @@ class ScenesBetween:
     def at(self, number: float) -> View:
         """The scene with another number, everything on. Raises ValidationError where a study may not have it."""
         said = _with(self.said, self.path, number)
-        scene = Scenario.model_validate(said)
-        return replace(self.view, scenario=scene, pixel=self.study.pixel_in(scene), methods=REFERENCE)
+        scene = Scene.model_validate(said)
+        return replace(self.view, scenario=scene, pixel=self.study.pixel_in(scene), left_out=frozenset())
 
 
 def crossings_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
@@ -130,7 +129,7 @@ def _with(said: Mapping[str, Any], path: tuple[str, ...], number: float) -> dict
 
 def state_error_of(view: View, curves: FloatArray, states: tuple[str, ...]) -> float:
     """How often noise confuses the worst two states of a filter; `curves`: ndarray[1, n_modified, n_wavelengths]."""
-    return float(state_errors(Imager(view, once=True), curves, states)[0])
+    return float(state_errors(ForwardModel(view, once=True), curves, states)[0])
 
 
 def _crossing(

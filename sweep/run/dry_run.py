@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..base.types import Progress
 from ..results.folder import held_by
 from ..results.inventory import Inventory
 from ..results.journal import Journal
@@ -14,7 +13,6 @@ from ..results.tables import PLAIN, RESULTS
 from ..search.trade_off import most_searches
 from ..study import Search, Study
 from .held_out import most_evaluations_left_out
-from .plans import with_plans
 from .rows import rules_of
 from .stop import Stop
 from .sweep import Sweep
@@ -34,12 +32,12 @@ class ToDo:
     searches: bool
 
 
-def to_do(study: Study, output: Path, n_jobs: int, progress: Progress) -> ToDo:
+def to_do(study: Study, output: Path, n_jobs: int) -> ToDo:
     """Plan, and look at what is kept; neither compute designs nor write anything."""
     held = held_by(output)
     whole = held is not None and held.is_of(study) and not Inventory(output).wrong([RESULTS], quick=True)
     crew = Workers(n_jobs, Stop())
-    study = with_plans(study, crew.count, progress)
+    study = study.with_plans()
     if whole:
         return ToDo(study, study.n_designs, 0, searches=False)
     journal = Journal(output)

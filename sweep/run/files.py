@@ -42,6 +42,7 @@ from ..results.thinning import swept_points
 from ..search.limit import Limit
 from ..study import Study
 from .answers import Kept
+from .check import check_run
 from .front import Front, Gathered, few_of
 from .held_out import left_out_table
 from .looks import Looking, looks_of
@@ -61,6 +62,9 @@ from .search import (
 from .sweep import Sweep
 from .wishes import Wishes
 from .workers import Workers
+
+_CHECK_S, _CHECK_SHARE = 1.0, 0.1
+"""Time of the check at the end of a run: seconds, or a share of the run, whichever is longer."""
 
 
 def files_of(study: Study) -> set[str]:
@@ -268,12 +272,14 @@ class Making:
         warnings += spent_in_words(whole_readout_metrics(study.asked), *found["spent_s"])
         if answer is not None:
             found["search"] = search_facts(study, answer)
-            if study.plans[answer.search.scenario].methods.saturation == "clip":
+            if "saturation" in study.plans[answer.search.scenario].computed:
                 warnings.append("pixels may saturate: the search sees them before clipping, its row after")
             if answer.front:
                 found["hypervolume"] = _hypervolumes(answer, gathered.swept)
                 found["hypervolume_least_sensitivity"] = answer.search.levels[0]
         self.inventory.facts.setdefault("duration_s", round(time.monotonic() - self.started, 3))
+        seconds = max(_CHECK_S, _CHECK_SHARE * float(self.inventory.facts["duration_s"]))
+        found["check"] = check_run(study, self.inventory.path(RESULTS), seconds)
         return Provenance(**provenance(study, self.inventory.facts), **found, warnings=tuple(warnings))
 
 

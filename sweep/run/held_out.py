@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from ..base.types import FloatArray, Parallel, Progress, delayed
-from ..camera.imager import imager_of
+from ..camera.forward import forward_model
 from ..camera.view import View
 from ..curves.lights import Lights, class_pairs
 from ..metrics.evaluate import evaluate
@@ -55,7 +55,7 @@ def held_out_table(
 
 
 def _on_lights(view: View, curves: FloatArray) -> dict[str, float]:
-    columns = evaluate(imager_of(view), np.asarray(curves, dtype=float))
+    columns = evaluate(forward_model(view), np.asarray(curves, dtype=float))
     names = [csd_name(pair) for pair in class_pairs(view.lights.classes)]
     return {HELD_OUT + name: float(columns[name][0]) for name in names}
 

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 
 from ..base.types import IndexArray, Parallel, Progress, delayed
-from ..camera.imager import Imager, imager_of
+from ..camera.forward import ForwardModel, forward_model
 from ..camera.view import View
 from ..curves.lights import class_pairs
 from ..designs.block import CurveBlock, edges_of_some
@@ -65,13 +65,13 @@ def _limits_of_swept(study: Study, ids: IndexArray, parallel: Parallel, progress
 
 def _limits(view: View, space: Space, numbers: IndexArray) -> list[LimitingLights]:
     """The lights that limit some designs of a space, by their numbers in it; a block of them after the other."""
-    imager = imager_of(view)
-    values = imager.n_places * len(view.lights.names) * len(view.mosaic.channels)
+    imager = forward_model(view)
+    values = imager.n_cases * len(view.lights.names) * len(view.mosaic.channels)
     step = max(1, _MOST_VALUES // values)
     return [_of_block(imager, space, numbers[start : start + step]) for start in range(0, numbers.size, step)]
 
 
-def _of_block(imager: Imager, space: Space, numbers: IndexArray) -> LimitingLights:
+def _of_block(imager: ForwardModel, space: Space, numbers: IndexArray) -> LimitingLights:
     """The same of a block, by the routes that `routes.block_of` tries; no lights where a design takes none of them."""
     grid, pairs = imager.view.grid, class_pairs(imager.view.lights.classes)
     with suppress(Exception):

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.types import FloatArray, Parallel, Progress, delayed
-from ..camera.imager import AllApart, Imager, imager_of
+from ..camera.forward import AllPhases, ForwardModel, forward_model
 from ..camera.view import View
 from ..curves.lights import Pair
 from ..metrics.limiting import limiting_lights
@@ -81,7 +81,7 @@ class Looking:
     def at(self, view: View, seen: _Seen) -> Look:
         """Look at a design. The random numbers of its patches follow from the study's seed and its id."""
         design_id, curves, wanted = seen
-        imager = imager_of(view, AllApart if RECOGNITION in wanted else Imager)
+        imager = forward_model(view, AllPhases if RECOGNITION in wanted else ForwardModel)
         limited_by = dn = recognized = None
         if wanted & {LIMITED_BY, POINTS}:
             response = imager.read(curves)[0]
@@ -89,7 +89,7 @@ class Looking:
             dn = response[0, 0].copy()
         if RECOGNITION in wanted:
             rng = np.random.default_rng((self.seed, design_id))
-            assert isinstance(imager, AllApart)
+            assert isinstance(imager, AllPhases)
             recognized = recognize(imager, curves, self.states, self.patches, rng)
         return Look(limited_by, dn, recognized)
 

@@ -40,9 +40,8 @@ def plan_facts(study: Study) -> dict[str, Any]:
         name: {
             "key": plan.key,
             "tolerance_dn": plan.tolerance_dn,
-            "promised_dn": plan.promised_dn,
-            "work": plan.work,
-            "reference_work": plan.reference_work,
+            "error_bound_dn": plan.error_bound_dn,
+            "accuracy": plan.accuracy.model_dump(),
             "effects": [asdict(choice) for choice in plan.choices],
         }
         for name, plan in study.plans.items()

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.types import FloatArray
-from ..camera.imager import AllApart, Imager, imager_of
+from ..camera.forward import AllPhases, ForwardModel, forward_model
 from ..camera.view import View
 from ..designs.block import Block, CurveBlock, EdgeBlock, edges_of
 from ..designs.space import Space
@@ -47,9 +47,9 @@ class Request:
     drawn: bool = False
     """Whether raw patches are drawn of plain CFAs and named designs, from the same readout."""
 
-    def imager(self, kind: str, view: View) -> Imager:
+    def imager(self, kind: str, view: View) -> ForwardModel:
         """The imager of a view for designs of a `kind` of rows."""
-        return imager_of(view, AllApart if self.drawn and kind in FEW else Imager)
+        return forward_model(view, AllPhases if self.drawn and kind in FEW else ForwardModel)
 
     @property
     def needs_curves(self) -> bool:
@@ -154,7 +154,7 @@ def _columns(
 
 def worst_cases(
     space: Space,
-    imager: Imager,
+    imager: ForwardModel,
     points: FloatArray,
     nominal: Columns,
     worst: Sequence[Quantity],

@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 
 from ..base.types import BoolArray, FloatArray
-from ..camera.plan.plan import Plan
+from ..camera.plan import Plan
 from ..camera.view import View
 from ..designs.block import by_edges
 from ..designs.space import Space
@@ -227,7 +227,7 @@ def _labels(job: Job) -> dict[str, Any]:
 
 def _how(plan: Plan | None, n: int) -> dict[str, Any]:
     """How the scene was simulated: the plan's key and its promise."""
-    return {} if plan is None else {"plan": _word(plan.key, n), "promised_dn": np.full(n, plan.promised_dn)}
+    return {} if plan is None else {"plan": _word(plan.key, n), "promised_dn": np.full(n, plan.error_bound_dn)}
 
 
 def _table(values: Mapping[str, pa.Array | FloatArray | BoolArray], n: int, schema: pa.Schema) -> pa.Table:

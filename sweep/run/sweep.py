@@ -153,10 +153,10 @@ class Sweep:
         """Jobs by the calls that they are computed in.
 
         Jobs of few designs of one scene go to one worker, since they share its kernels, where there are so many scenes
-        that no worker waits long for the last one. Scenes that take longest, by their plans, come first.
+        that no worker waits long for the last one. Scenes with the largest lights, which take longest, come first.
         """
         scenes = [list(own) for _, own in groupby(todo, lambda index: self.jobs[index].scenario)]
-        scenes.sort(key=lambda own: -self._work(self.jobs[own[0]].scenario))
+        scenes.sort(key=lambda own: -self._light_px(self.jobs[own[0]].scenario))
         if len(scenes) < _SCENES_PER_WORKER * self.crew.count:
             return [[index] for own in scenes for index in own]
         found: list[list[int]] = []
@@ -165,10 +165,10 @@ class Sweep:
             found += [own] if few else [[index] for index in own]
         return found
 
-    def _work(self, scenario: str) -> float:
-        """Estimated seconds of a scene; 0 where none are known."""
-        plan = self.study.plans.get(scenario)
-        return 0.0 if plan is None else plan.work
+    def _light_px(self, scenario: str) -> float:
+        """Size of a scene's light on the mosaic, pixels; 0 where it fills the field."""
+        target = self.study.scenarios[scenario].target
+        return 0.0 if target is None else target.object_resolution_px
 
     def _path(self, index: int) -> Path | None:
         """Beside which path a worker writes the rows of a job; None on a cluster, where disks are not shared."""

@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from ..base.types import FloatArray, Parallel, Progress, delayed
-from ..camera.imager import Imager
+from ..camera.forward import ForwardModel
 from ..camera.view import View
 from ..curves.lights import class_pairs, pair_name
 from ..metrics.columns.confusion import D_PRIME, STATE_ERROR
@@ -146,7 +146,7 @@ def predictors(view: View, curves: FloatArray, vision: Vision) -> Predictors:
         for j, level in enumerate(vision.levels.values()):
             there = view_at(view, vision, distance_m, level)
             there = replace(there, scenario=there.scenario.model_copy(update={"intensity_cd": middle_cd}))
-            columns = evaluate(Imager(there, once=True), curves[None], vision.lenses)
+            columns = evaluate(ForwardModel(there, once=True), curves[None], vision.lenses)
             found.csd[i, j] = min(columns[csd_name(pair)][0] for pair in pairs)
             found.dprime[i, j] = min(_of_pair(columns, pair) for pair in pairs)
             found.pair_error[i, j] = columns[STATE_ERROR][0]

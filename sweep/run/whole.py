@@ -21,7 +21,6 @@ from ..study import Study
 from ..study.reach import out_of_reach
 from ..vision.installed import require_network
 from .files import Making, files_of, fits
-from .plans import with_plans
 from .provenance import resolved_yaml
 from .rows import rules_of
 from .stop import Stop, stop_on_signals
@@ -79,7 +78,7 @@ def run_study(
         elif wrong or retry:
             try:
                 crew.begin(called_by(study))
-                study = with_plans(study, crew.count, progress, stop=own)
+                study = study.with_plans()
                 rules = rules_of(study)
                 if retry or not fits(inventory, study, rules):
                     wrong.add(RESULTS)

@@ -19,7 +19,7 @@ from scipy.optimize import linprog
 from scipy.sparse import csr_matrix, hstack, vstack
 
 from ..base.types import FloatArray, IndexArray
-from ..camera.linear import LinearImager, smooth_imager
+from ..camera.linear import LinearModel, linear_model
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import SENSITIVITY
 from .certificate import ROUNDING, Certificate, Sides, Solved
@@ -119,7 +119,7 @@ class FilterProgram:
     def _distances(self) -> Iterator[tuple[str, Distances]]:
         """Each distance's name, and its pairs."""
         view = self.problem.view
-        imager, channel = smooth_imager(view), view.modified[0]
+        imager, channel = linear_model(view), view.modified[0]
         # Exposure does not depend on N, so the response to a filter is linear, plus what does not depend on it.
         gain = imager.per_qe(0, self.base[None])[:, :, channel]
         fixed = np.delete(imager.smooth(self.base[None, None])[0], channel, axis=2)
@@ -159,7 +159,7 @@ class FilterProgram:
         reach = np.divide(most, self._rate[:, None], out=np.full(most.shape, np.inf), where=self._rate[:, None] > 0)
         self.reach = np.where(most < (self._least - self._slack)[:, None], -np.inf, reach)
 
-    def _noise(self, imager: LinearImager) -> tuple[FloatArray, FloatArray]:
+    def _noise(self, imager: LinearModel) -> tuple[FloatArray, FloatArray]:
         """The least variance in the modified channel, ndarray[n_cases, n_signals], and those of the others, DN^2."""
         row, least = np.zeros_like(self.base), 0.0
         bound = self.problem.constraints.get(SENSITIVITY)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.types import FloatArray, IndexArray
-from ..camera.linear import smooth_imager
+from ..camera.linear import linear_model
 from ..camera.view import View
 from ..designs.tolerance import AS_DESIGNED, Off
 from ..metrics.bound import FEASIBLE, Bound
@@ -97,7 +97,7 @@ class Model:
     def __init__(self, problem: Problem, run: SearchRun, budget: int) -> None:
         self._problem = problem
         self._quantities = problem.quantities
-        self._imager = smooth_imager(problem.view)
+        self._imager = linear_model(problem.view)
         self._run = run
         self._budget = budget
         self.stop: Callable[[], object] | None = None

@@ -15,14 +15,14 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.types import FloatArray
-from ..camera.linear import LinearImager
+from ..camera.linear import LinearModel
 
 _ROUNDING = 1e-12
 """Of the sums over wavelengths, relative."""
 
 
 def least_variance(
-    imager: LinearImager, base: FloatArray, box: tuple[FloatArray, FloatArray], row: FloatArray, least: float
+    imager: LinearModel, base: FloatArray, box: tuple[FloatArray, FloatArray], row: FloatArray, least: float
 ) -> FloatArray:
     """Variance in the only modified channel that none of the filters goes below, DN^2, ndarray[n_cases, n_signals].
 

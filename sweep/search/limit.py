@@ -19,8 +19,6 @@ import numpy as np
 
 from ..base.errors import BrokenProofError, Fault, SweepError
 from ..base.types import FloatArray
-from ..camera.effects.image_height import all_heights_count
-from ..camera.effects.saturation import top_e
 from ..camera.exposure import may_set_exposure
 from ..camera.pixel import unquantized
 from ..metrics.bound import FEASIBLE, Bound
@@ -87,7 +85,7 @@ def limit_of(
     if refused is not None:
         raise SweepError(Fault(f"no limit: {refused}"))
     relaxed, left_out = _relaxed(problem)
-    heights = _any_height_of(relaxed) if all_heights_count(relaxed.view) else None
+    heights = _any_height_of(relaxed) if relaxed.view.all_heights else None
     distances = any(relaxed.quantities[name].apart for name in relaxed.objective.weights)
     tolerance = tolerance_dn if distances else _SENSITIVITY_TOLERANCE
     over = [n for n in dict.fromkeys((*relaxed.objective.weights, *relaxed.constraints)) if relaxed.worst_distance(n)]
@@ -281,7 +279,7 @@ def _clips(problem: Problem) -> bool:
     """Whether the base curve's response, the largest that any of the filters has, is cut off when it is read out."""
     view = problem.view
     smooth = smooth_response(view, view.base_qe[None])
-    top_dn = unquantized(np.array(top_e(view.pixel)), view.pixel)
+    top_dn = unquantized(np.array(view.pixel.saturation_e), view.pixel)
     return bool((smooth > top_dn).any())
 
 

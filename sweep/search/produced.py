@@ -16,7 +16,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.types import BoolArray, FloatArray, IndexArray
-from ..camera.effects.image_height import all_heights_count
 from ..designs.family import Family, MovedFamily
 from ..designs.tolerance import AS_DESIGNED
 from .problem import Problem
@@ -83,8 +82,7 @@ def ways_of(problem: Problem) -> tuple[Produced, ...]:
 
     Where all places of the light or the sensor count, only as designed.
     """
-    target = problem.view.scenario.target
-    anywhere = all_heights_count(problem.view) or (target is not None and target.phase_px == "any")
+    anywhere = problem.view.all_heights or problem.view.all_phases
     return (_as_designed(problem.view.base_qe[0]), *(() if anywhere else _moves(problem)))
 
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from ..base.types import Number, Section
-from ..camera.scenario import Scenario
+from ..camera.scene import Scene
 from .schema_curves import Name
 
 
@@ -73,7 +73,7 @@ _MOST_KEYS = 500_000
 """Of all scenarios that `each` makes."""
 
 
-class ScenarioTemplate(Scenario):
+class ScenarioTemplate(Scene):
     """What the file says of a scenario; with `each`, of one for every combination of its values.
 
     `each`: dotted keys of the scenario (target.distance_m) -> values.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -10,22 +9,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..base.errors import Fault, StudyError
-from ..camera.methods import REFERENCE
+from ..camera.effects import Box
 from ..camera.mosaic import Mosaic
 from ..camera.pixel import Pixel
-from ..camera.plan.at_once import counted_s, everything_on, looking_s
-from ..camera.plan.bounds import Box
-from ..camera.plan.plan import Plan
-from ..camera.plan.planner import Planner
-from ..camera.plan.work import DesignCount
-from ..camera.scenario import Scenario
-from ..camera.scene import Geometry
+from ..camera.plan import Plan, plan_scene
+from ..camera.scene import Geometry, Scene
 from ..camera.sensor import SensorCurves
 from ..camera.view import View
 from ..curves.lights import Lights, Pair, class_pairs
 from ..curves.spectrum import WavelengthGrid
 from ..curves.tasks import StudyTasks
-from ..designs.block import by_edges
 from ..designs.space import Space
 from ..designs.technology import Technology
 from ..designs.tolerance import Tolerance
@@ -61,7 +54,7 @@ class Study:
     sensor: SensorCurves
     lights: Lights
     pixel: Pixel
-    scenarios: Mapping[str, Scenario]
+    scenarios: Mapping[str, Scene]
     geometry: Mapping[str, Geometry]
     mosaics: Mapping[str, Mosaic]
     spaces: tuple[Space, ...]
@@ -190,16 +183,17 @@ class Study:
             scenario=scene,
             technologies=tuple(technologies) if any(technologies) else (),
             tasks=self.tasks,
-            methods=self.plans[scenario].methods if scenario in self.plans else REFERENCE,
+            accuracy=self.section.accuracy,
+            left_out=self.plans[scenario].left_out if scenario in self.plans else frozenset(),
         )
 
-    def pixel_in(self, scene: Scenario) -> Pixel:
+    def pixel_in(self, scene: Scene) -> Pixel:
         """The study's pixel, with a scene's noise where it states one."""
         return self.pixel if scene.noise is None else scene.noise.of(self.pixel)
 
     def box(self, space: Space, scenario: str) -> Box:
-        """What the designs of `space` can be, for a plan of the scenario."""
-        view = self._everything_on(space, scenario)
+        """The range of the designs of `space`, for a plan of the scenario."""
+        view = self.view(space, scenario).with_all_effects
         low, high = view.qe.copy(), view.qe.copy()
         if space.filter is not None:
             ends = [np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max)]
@@ -207,54 +201,26 @@ class Study:
             lows, highs = zip(*(family.hull(*ends) for family in families), strict=True)
             low[list(view.modified)] = np.min(lows, axis=0)
             high[list(view.modified)] = np.max(highs, axis=0)
-        return Box(view, low, high, self._evaluated(space, scenario))
+        return Box(view, low, high)
 
-    def _everything_on(self, space: Space, scenario: str) -> View:
-        """`view` by the methods of the reference, whatever plans there are."""
-        return replace(self.view(space, scenario), methods=REFERENCE)
-
-    def _evaluated(self, space: Space, scenario: str) -> DesignCount:
-        """The designs of a space that are looked at in a scenario, at most: its own, and those of a search."""
-        searched = self.search is not None and self.search.space is space and self.search.scenario == scenario
-        more = self.search.max_evaluations if searched and self.search is not None else 0
-        return DesignCount(space.size + more, by_edges(space))
-
-    def _asked(self, scenario: str) -> list[tuple[Space, DesignCount]]:
-        """The spaces that count in a scenario, each with `_evaluated`: all of them where none has a design."""
-        spaces = [(space, self._evaluated(space, scenario)) for space in self.spaces]
-        return [(space, designs) for space, designs in spaces if designs.n] or spaces
-
-    def boxes(self, scenario: str) -> list[Box]:
-        """What the designs of all spaces can be; spaces without a design count where there are no others.
+    def plan(self, scenario: str, tolerance_dn: float | None = None) -> Plan:
+        """The plan of a scene, for all designs of the study; `tolerance_dn` instead of the study's own.
 
         Raises StudyError for numbers that are allowed one by one, but that no float can hold together.
         """
+        tolerance_dn = self.section.tolerance_dn if tolerance_dn is None else tolerance_dn
+        searched = None if self.search is None or self.search.scenario != scenario else self.search.space
+        spaces = [space for space in self.spaces if space.size or space is searched] or list(self.spaces)
         with _holding(scenario):
-            return [self.box(space, scenario) for space, _ in self._asked(scenario)]
+            boxes = [self.box(space, scenario) for space in spaces]
+            return plan_scene(scenario, boxes, tolerance_dn, self.section.accuracy, for_noise=bool(self.states))
 
-    def tolerance_dn(self, wanted_dn: float | None = None) -> float:
-        """How far a plan may be from everything on, DN: as wanted, or else as the study says."""
-        return self.section.tolerance_dn if wanted_dn is None else wanted_dn
+    def with_plans(self, tolerance_dn: float | None = None) -> Study:
+        """The study with a plan for each of its scenarios; `tolerance_dn` instead of the study's own.
 
-    def plan(self, scenario: str, tolerance_dn: float | None = None, *, always: bool = False) -> Plan:
-        """A plan of a scenario that holds for all designs of the study.
-
-        It is looked for in about a twentieth of the time that everything on takes, as counted. Where everything on
-        takes less than to look for one, that is the plan. The cheapest plan of all, however long it takes to find, if
-        it is looked for `always`.
-
-        Raises StudyError as `boxes` does.
+        Raises StudyError as `plan` does.
         """
-        tolerance = self.tolerance_dn(tolerance_dn)
-        with _holding(scenario):
-            views = [(self._everything_on(space, scenario), designs) for space, designs in self._asked(scenario)]
-            everything_s = counted_s(views)
-            budget_s = math.inf if always else looking_s(views, everything_s)
-            if budget_s:
-                planner = Planner(self.boxes(scenario), for_noise=bool(self.states), budget_s=budget_s)
-                if planner.has_time:
-                    return planner.plan(scenario, tolerance)
-            return everything_on(views, everything_s, scenario, tolerance)
+        return replace(self, plans={name: self.plan(name, tolerance_dn) for name in self.scenarios})
 
     def problem(self, search: Search) -> Problem:
         """The search as a mathematical problem."""

@@ -9,8 +9,7 @@ import numpy as np
 
 from ..base.errors import Fault, StudyError, SweepError
 from ..base.own_code import Offered, is_in_file, offers
-from ..camera.methods import REFERENCE
-from ..camera.scenario import Scenario
+from ..camera.scene import Scene
 from ..camera.view import View
 from ..designs.space import Space
 from ..metrics.own import OwnMetric, Readings
@@ -104,7 +103,7 @@ def _tried(metric: OwnMetric, view: View) -> bool:
 
     Its filters are the curves that they replace, and darker ones.
     """
-    plain = replace(view, scenario=Scenario(), methods=REFERENCE, technologies=())
+    plain = replace(view, scenario=Scene(), left_out=frozenset(), technologies=())
     base = plain.base_qe[None]
     response = smooth_response(plain, np.concatenate([base, 0.9 * base, 0.8 * base]))[:, 0]
     every = metric.parts(Readings.of_view(view, response))

@@ -7,10 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.errors import StudyError
-from ..camera.effects.saturation import top_e
-from ..camera.field import over_field
 from ..camera.pixel import unquantized
-from ..camera.plan.bounds import Reach
 from ..curves.lights import Lights
 from ..curves.population import DRIFT_NM_PER_K, Population
 from .model import Study
@@ -76,9 +73,8 @@ def check_range(study: Study, sources: Sources) -> None:
     for name in study.scenarios:
         for space in study.spaces:
             box = study.box(space, name)
-            places = [replace(box, view=replace(place, lights=lights)) for place in over_field(box.view)]
-            brightest_dn = max(float(Reach(place).brightest_pixels_dn.max()) for place in places)
-            top_dn = float(unquantized(np.array(top_e(box.view.pixel)), box.view.pixel))
+            brightest_dn = replace(box, view=replace(box.view, lights=lights)).brightest_pixel_dn
+            top_dn = float(unquantized(np.array(box.view.pixel.saturation_e), box.view.pixel))
             if brightest_dn > top_dn:
                 problem = f"lights of the population exceed the full well or the range of the ADC (CFA {space.cfa})"
                 sources.add(("scenarios", name), problem, f"{brightest_dn:,.0f} DN", f"up to {top_dn:,.0f} DN")

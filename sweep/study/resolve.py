@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from ..base.errors import StudyError, SweepError
-from ..camera.effects import blur
+from ..camera import psf
 from ..camera.mosaic import Mosaic
 from ..camera.scene import OBJECT_RESOLUTION
 from ..camera.sensor import BUILT_IN_SENSORS, SensorCurves
@@ -33,7 +33,7 @@ from .schema import CfaSection, StudySection
 from .schema_curves import LightsSection
 from .searches import check_searched, search_of
 from .seen_images import check_vision
-from .sensor_fields import check_fields, with_chief_rays
+from .sensor_fields import with_chief_rays
 from .sensors import sensor_of
 from .sizes import check_count, check_memory
 from .sources import KeptSources, Sources
@@ -111,7 +111,6 @@ class _Resolver:
         check_memory(study, self.sources)
         try_metrics(study, self.sources)
         check_range(study, self.sources)
-        check_fields(study, self.sources)
         if self.faults:
             raise StudyError(self.faults)
         check_count(study, self.sources)
@@ -209,7 +208,7 @@ class _Resolver:
     def check_images(self) -> None:
         """Every target makes an image that can be computed."""
         for name, scenario in self.section.scenarios.items():
-            refused = blur.too_much(scenario, self.section.pixel)
+            refused = psf.too_much(scenario, self.section.pixel)
             if refused is not None:
                 key, problem, value, allowed = refused
                 self.add(("scenarios", name, *key), problem, value, allowed)

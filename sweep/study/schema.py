@@ -7,9 +7,9 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, model_validator
 
 from ..base.types import Number, Section
+from ..camera.accuracy import STANDARD, AccuracySection
 from ..camera.pixel import Pixel
-from ..camera.scenario import Scenario
-from ..camera.scene import Geometry
+from ..camera.scene import Geometry, Scene
 from ..camera.sensor import BUILT_IN_SENSORS
 from ..curves.population import Population
 from ..curves.single_leds import RegionMap
@@ -236,13 +236,15 @@ class StudySection(Documented):
     ]
     """Traffic lights: `tl16`, a built-in surrogate, a file, what a package offers, or a mapping with `files`."""
     scenarios: Annotated[
-        dict[Name, Scenario],
+        dict[Name, Scene],
         BeforeValidator(expanded, json_schema_input_type=dict[Name, ScenarioTemplate]),
         Field(min_length=1),
-    ] = {"chart": Scenario()}
+    ] = {"chart": Scene()}
     """Scenes, by name: exposure, target, optics, weather, noise."""
     tolerance_dn: Annotated[float, Field(ge=1e-12, le=1e12)] = 0.1
     """By how much the simulation may change any CSD, DN."""
+    accuracy: AccuracySection = STANDARD
+    """How finely the camera is sampled: `fast`, `standard`, `reference`, or a mapping of settings."""
     geometry: Annotated[dict[Name, Geometry], Field(max_length=1000)] = {}
     """Distances at which the size of a light on the sensor is told, by name."""
     cfas: Annotated[

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from ..camera.effects import blur
-from ..camera.kernel_size import MOST_KERNEL_BYTES
+from ..camera import psf
+from ..camera.memory import MOST_BYTES
 from ..camera.mosaic import Mosaic
-from ..camera.scenario import Scenario
-from ..camera.scene import FixedExposure
+from ..camera.scene import FixedExposure, Scene
 from ..curves.color import luminance_per_photon_radiance
 from ..curves.lights import Lights
 from ..vision.section import FEWEST_LAMPS, MOST_BITS, MOST_READ_NOISE_DN, MOST_WELL_E, Vision
@@ -53,8 +52,8 @@ def _check_images(section: StudySection, vision: Vision, sources: Sources) -> No
     """Every distance makes an image that can be computed."""
     for distance_m in vision.distances_m:
         exposure = FixedExposure(exposure_s=1.0)
-        scenario = Scenario(target=vision.target(distance_m), optics=vision.optics, exposure=exposure)
-        refused = blur.too_much(scenario, section.pixel)
+        scenario = Scene(target=vision.target(distance_m), optics=vision.optics, exposure=exposure)
+        refused = psf.too_much(scenario, section.pixel)
         if refused is not None:
             _, problem, value, allowed = refused
             sources.add(("vision", "distances_m"), f"{problem} at {distance_m:g} m", value, allowed)
@@ -85,14 +84,14 @@ def _check_memory(vision: Vision, lights: Lights, mosaics: Mapping[str, Mosaic],
         places = mosaic.indices.size * vision.places_per_pixel**2
         lamps = 8 * places * n_lenses * len(lights.names) * pixels * len(vision.distances_m)
         cases = 8 * places * 2 * math.factorial(n_lenses) * (1 + test_lamps * len(vision.intensities_cd)) * pixels
-        if (every := max(lamps, cases)) > MOST_KERNEL_BYTES:
+        if (every := max(lamps, cases)) > MOST_BYTES:
             problem = f"{places} places of the head take too much memory (CFA {name})"
-            allowed = f"at most {MOST_KERNEL_BYTES / 2**30:g} GiB: smaller images, fewer places, lamps or distances"
+            allowed = f"at most {MOST_BYTES / 2**30:g} GiB: smaller images, fewer places, lamps or distances"
             sources.add(("vision",), problem, f"{every / 2**30:.1f} GiB", allowed)
             return
         planes = len(mosaic.channels) if vision.input == "demosaicked" else 1
         trained = 8 * _HELD_TIMES * planes * pixels * max(vision.train_images, vision.check_images, vision.test_images)
-        if vision.network and trained > MOST_KERNEL_BYTES:
-            allowed = f"at most {MOST_KERNEL_BYTES / 2**30:g} GiB: smaller images, or fewer of them"
+        if vision.network and trained > MOST_BYTES:
+            allowed = f"at most {MOST_BYTES / 2**30:g} GiB: smaller images, or fewer of them"
             sources.add(("vision",), f"images take too much memory (CFA {name})", f"{trained / 2**30:.1f} GiB", allowed)
             return

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..camera.effects.image_height import slowest_lens
 from ..camera.sensor_field import PLACES, SensorField
 from ..curves.lens_files import ChiefRays
-from .model import Study
 from .schema import StudySection
 from .sources import Sources
 
@@ -40,17 +38,3 @@ def _with_fields(section: StudySection, fields: Mapping[str, SensorField]) -> di
         name: scenario.model_copy(update={"field": fields[name]}) if name in fields else scenario
         for name, scenario in section.scenarios.items()
     }
-
-
-def check_fields(study: Study, sources: Sources) -> None:
-    """All places of the sensor are looked at where the lens's cone is wide enough for a proof."""
-    for name in study.scenarios:
-        for space in study.spaces:
-            view = study.view(space, name)
-            if (allowed := slowest_lens(view)) is not None:
-                problem = (
-                    "all places of the sensor are too many behind so slow a lens, where filters move with the angle"
-                )
-                f_number = view.scenario.optics.f_number
-                sources.add(("scenarios", name, "optics", "f_number"), problem, f_number, allowed)
-                break

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..base.errors import StudyError
-from ..camera.kernel_size import too_large
+from ..camera.memory import too_large
 from .model import Study
 from .sources import Sources
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..camera.effects.angle import too_steep
+from ..camera.angular import too_steep
 from ..camera.sensor import SensorCurves
 from ..designs.space import Space
 from .schema import StudySection

@@ -13,9 +13,10 @@ import numpy as np
 
 from ..base.cache import Cache
 from ..base.types import FloatArray
-from ..camera.effects import blur
-from ..camera.effects.sampling import Window, light_on_pixels
+from ..camera import psf
+from ..camera.disc_image import light_on_pixels
 from ..camera.mosaic import Mosaic
+from ..camera.sampling import Window
 from ..camera.scene import Target
 from ..camera.view import View
 from .section import Vision
@@ -24,7 +25,7 @@ SPACING = 1.5
 """From lens to lens, in diameters."""
 _HOUSING, _BACKPLATE = (1.6, 1.6), (3.0, 3.0)
 """Width and height around one lens, in diameters."""
-_KNOTS = "every 10 nm"
+_PSF_STEP_NM = 10.0
 MARGIN = 1
 """Pixels around the image whose light crosstalk brings into it."""
 _PERIOD_PX = 160
@@ -74,7 +75,7 @@ def head_maps(view: View, vision: Vision) -> HeadMaps:
 
 
 def _made(view: View, vision: Vision, target: Target) -> HeadMaps:
-    knots = blur.knots(view.grid.nodes_nm, _KNOTS)
+    knots = psf.psf_knots_nm(view.grid.nodes_nm, _PSF_STEP_NM)
     places, across = head_places_px(vision, view.mosaic), target.object_resolution_px
     lenses = [_disc(view, vision, places + np.array([0, across * height]), knots) for height in heights(vision)]
     more = SPACING * (len(vision.lenses) - 1)
@@ -102,9 +103,9 @@ def _disc(view: View, vision: Vision, centers: FloatArray, knots_nm: FloatArray)
     )
     radius = target.object_resolution_px / 2
     furthest = (float(np.hypot(np.abs(dx).max(), np.abs(dy).max())) + 2) * pixel.pitch_um
-    defocus = blur.defocus_um(view.scenario, pixel.pitch_um)
+    defocus = psf.defocus_um(view.scenario, pixel.pitch_um)
     wave = tuple(knots_nm * 1e-3)
-    profile = blur.profile(radius * pixel.pitch_um, furthest, wave, vision.optics.f_number, defocus)
+    profile = psf.profile(radius * pixel.pitch_um, furthest, wave, vision.optics.f_number, defocus)
     every = np.ones(shape, dtype=bool)
     return light_on_pixels(seen, every, pixel.fill_factor**0.5 / 2, radius, profile, pixel.pitch_um).by_pixel()
 
@@ -118,7 +119,7 @@ def _rectangle(
     series of a period that leaves its neighbors far away.
     """
     pixel, pitch = view.pixel, view.pixel.pitch_um
-    defocus = blur.defocus_um(view.scenario, pitch)
+    defocus = psf.defocus_um(view.scenario, pitch)
     highest = 1 / (knots_nm[0] * 1e-3 * vision.optics.f_number) * pitch  # per pixel
     orders = np.arange(math.ceil(highest * _PERIOD_PX) + 1)
     nu = orders / _PERIOD_PX
@@ -127,7 +128,7 @@ def _rectangle(
     series = [twice * width / _PERIOD_PX * np.sinc(nu * width) * np.sinc(nu * side) for width in size_px]
     radial = np.hypot(nu[:, None], nu[None, :]) / pitch
     distinct, which = np.unique(np.round(radial, 12), return_inverse=True)
-    transfer = blur.transfer(distinct, knots_nm * 1e-3, vision.optics.f_number, defocus)
+    transfer = psf.otf(distinct, knots_nm * 1e-3, vision.optics.f_number, defocus)
     waves = [np.cos(2 * math.pi * nu * x[..., None]) * s for x, s in zip(_apart(vision, centers), series, strict=True)]
     columns, of_column = np.unique(waves[0].reshape(-1, nu.size), axis=0, return_inverse=True)
     rows, of_row = np.unique(waves[1].reshape(-1, nu.size), axis=0, return_inverse=True)

@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.types import FloatArray, IndexArray
-from ..camera.effects import crosstalk
-from ..camera.methods import REFERENCE
+from ..camera import crosstalk
+from ..camera.angular import AngularResponse
+from ..camera.irradiance import signal_irradiance
 from ..camera.pixel import Pixel, irradiance_factor
-from ..camera.scenario import Scenario
-from ..camera.scene import FixedExposure, Noise
-from ..camera.seen import SeenFilters
-from ..camera.view import View, per_photon, signal_irradiance
+from ..camera.scene import FixedExposure, Noise, Scene
+from ..camera.view import View, per_photon
 from ..curves.color import luminance_per_photon_radiance
 from ..curves.hats import hats
 from .compiled_images import draw_numbers
@@ -31,14 +30,14 @@ Numbers = NDArray[np.int16]
 
 def view_at(view: View, vision: Vision, distance_m: float, level: LightLevel) -> View:
     """The view's camera before a head at a distance: lamps of 1 cd, exposed as the level says."""
-    scenario = Scenario(
+    scenario = Scene(
         target=vision.target(distance_m),
         optics=vision.optics,
         intensity_cd=1.0,
         exposure=FixedExposure(exposure_s=level.exposure_s),
         noise=Noise(),
     )
-    return replace(view, scenario=scenario, methods=REFERENCE)
+    return replace(view, scenario=scenario, left_out=frozenset())
 
 
 @dataclass(frozen=True)
@@ -90,7 +89,7 @@ class HeadCamera:
         self.levels = list(vision.levels.values())
         self._views = [[view_at(view, vision, d, level) for level in self.levels] for d in vision.distances_m]
         channels = list(range(len(qe)))
-        self.qe = SeenFilters(self._views[0][0], REFERENCE.angle).curves(qe, channels)
+        self.qe = AngularResponse(self._views[0][0]).curves(qe, channels)
         self.pixel: Pixel = self._views[0][0].pixel
         self.table: PixelTable = pixel_table(self.pixel)
         size = vision.crop_px + 2 * MARGIN
@@ -163,7 +162,7 @@ class HeadCamera:
         for channel in range(len(self.qe)):
             own = self._channel == channel
             found[:, :, own] = np.moveaxis(light[:, own] @ weight[channel], 2, 1)
-        share = crosstalk.share(view, REFERENCE.crosstalk)
+        share = crosstalk.share(view)
         if share:
             flat = found.reshape(-1, *self._channel.shape)
             found = crosstalk.mixed(flat, share).reshape(found.shape)

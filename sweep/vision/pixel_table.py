@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaln, ndtr
 
 from ..base.types import FloatArray
-from ..camera.noisy import gaussian, moments
+from ..camera.noise import gaussian, moments
 from ..camera.pixel import Pixel
 
 ROOT_STEP = 1 / 16

@@ -14,8 +14,8 @@ import numpy as np
 from ...base.errors import SweepError
 from ...base.types import FloatArray, IndexArray
 from ...camera.effects import blur, noise, phase
-from ...camera.imager import Imager
-from ...camera.linear import LinearImager
+from ...camera.forward import ForwardModel
+from ...camera.linear import LinearModel
 from ...camera.methods import REFERENCE, Methods
 from ...camera.registry import EFFECTS
 from ...camera.view import View
@@ -88,7 +88,7 @@ def _csds(study: Study, scenario: str, methods: Methods, most_designs: int, **ho
     for space in spaces:
         view = replace(study.view(space, scenario), methods=methods)
         curves = space.curves(space.points(0, min(space.size, most_designs)), study.grid.size)
-        found.append(_distances(LinearImager(view, Counter(), **how).smooth(curves), view.members))
+        found.append(_distances(LinearModel(view, Counter(), **how).smooth(curves), view.members))
     return np.concatenate(found, axis=1), time.perf_counter() - started
 
 
@@ -126,11 +126,11 @@ def _places(study: Study, scenario: str) -> Iterator[Setting]:
         for x in range(columns * _PLACES_PER_PIXEL):
             at = target.model_copy(update={"phase_px": (x / _PLACES_PER_PIXEL, y / _PLACES_PER_PIXEL)})
             there = replace(view, scenario=view.scenario.model_copy(update={"target": at}))
-            exact = np.minimum(exact, _distances(LinearImager(there).smooth(curves), members))
+            exact = np.minimum(exact, _distances(LinearModel(there).smooth(curves), members))
     for method in phase.LATTICES:
         blur.PROFILES.clear()
         started = time.perf_counter()
-        imager = LinearImager(replace(view, methods=replace(_SMOOTH, phase=method)))
+        imager = LinearModel(replace(view, methods=replace(_SMOOTH, phase=method)))
         found = _distances(imager.smooth(curves), members)
         seconds = time.perf_counter() - started
         oracle = f"every 1/{_PLACES_PER_PIXEL} pixel"
@@ -140,7 +140,7 @@ def _places(study: Study, scenario: str) -> Iterator[Setting]:
 def _draws(study: Study, scenario: str) -> Iterator[Setting]:
     """The mean of Monte Carlo readouts of every pixel against the closed form, for one design and place."""
     view, curves = _one(study, scenario)
-    imager = Imager(replace(view, methods=REFERENCE))
+    imager = ForwardModel(replace(view, methods=REFERENCE))
     started = time.perf_counter()
     exact = _distances(imager.read_with_noise(curves).mean[:, :1], view.members)
     closed_s = time.perf_counter() - started

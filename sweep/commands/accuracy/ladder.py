@@ -14,7 +14,7 @@ import pandas as pd
 import pyarrow as pa
 
 from ...base.types import FloatArray, Progress
-from ...camera.imager import Imager
+from ...camera.forward import ForwardModel
 from ...camera.methods import REFERENCE
 from ...camera.plan.plan import Plan
 from ...camera.view import View
@@ -140,7 +140,7 @@ def _timed(study: Study, scenario: str, most_designs: int) -> tuple[FloatArray, 
 
 def _csds(view: View, curves: FloatArray, work: Counter[str]) -> FloatArray:
     """All CSDs, ndarray[n_pairs, n_designs]."""
-    columns = evaluate(Imager(view, work), curves)
+    columns = evaluate(ForwardModel(view, work), curves)
     return np.stack([columns[csd_name(pair)] for pair in class_pairs(view.lights.classes)])
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from ...camera.forget import forget_scenes
-from ...camera.imager import Imager
+from ...camera.forward import ForwardModel
 from ...camera.methods import REFERENCE
 from ...camera.plan.plan import Plan
 from ...designs.block import CurveBlock, edges_of
@@ -121,7 +121,7 @@ def compute(study: Study, scenario: str) -> None:
         if not space.size:
             continue
         view = study.view(space, scenario)
-        imager = Imager(view if scenario in study.plans else replace(view, methods=REFERENCE))
+        imager = ForwardModel(view if scenario in study.plans else replace(view, methods=REFERENCE))
         for start in range(0, space.size, CHUNK):
             stop = min(start + CHUNK, space.size)
             block = edges_of(space, start, stop)

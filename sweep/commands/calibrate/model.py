@@ -9,7 +9,7 @@ import numpy as np
 from ...base.types import FloatArray
 from ...camera.mosaic import Mosaic
 from ...camera.pixel import Pixel
-from ...camera.scenario import Scenario
+from ...camera.scene import Scene
 from ...camera.sensor import SensorCurves, ar0820_sensor
 from ...camera.view import View
 from ...curves.builtin.surrogate import StopbandParameters, SurrogateParameters
@@ -45,7 +45,7 @@ def figures(parameters: SurrogateParameters, rows: Sequence[str]) -> Figures:
 def _view(mosaic: Mosaic, sensor: SensorCurves, lights: Lights, base: Mapping[str, str]) -> View:
     modified = tuple(mosaic.channels.index(channel) for channel in base)
     qe = sensor.mosaic_qe(mosaic, base)
-    return View(GRID, mosaic, qe, modified, sensor.qe["C"], lights, Pixel(), Scenario())
+    return View(GRID, mosaic, qe, modified, sensor.qe["C"], lights, Pixel(), Scene())
 
 
 def _plain(cfa: str, sensor: SensorCurves, lights: Lights) -> dict[str, float]:

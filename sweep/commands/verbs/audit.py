@@ -12,9 +12,9 @@ PANEL = OF_RESULTS
 
 
 def audit(folder: RunFolder, data: DataFolder = None, allow_code: AllowCode = False) -> None:
-    """Recompute the front and 1 % of a run's rows with every effect on: promised beside realized error.
+    """Compute the front and 1 % of a run's rows again at the reference settings, and compare.
 
-    Exit code 5 says that an error is larger than promised.
+    Exit code 5 says that an error is larger than the study's tolerance allows.
     """
     from ...results.tables import AUDIT
     from ..audit import audit_output

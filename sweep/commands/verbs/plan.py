@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from typing import Annotated
 
 import typer
@@ -21,20 +20,15 @@ def plan(
     tolerance: Annotated[float | None, typer.Option(help="Tolerance of a CSD, DN.", show_default="the study's")] = None,
     changes: Changes = None,
     allow_code: AllowCode = False,
-    explain: Annotated[bool, typer.Option("--explain", help="Show the alternatives that were rejected.")] = False,
 ) -> None:
     """Say which effects each scene calls for, and why, without running it."""
     from ...report.plans import plan_lines
-    from ...run import with_plans
     from ...study import load_study
-    from ..progress import ProgressDisplay
 
     if tolerance is not None and not 0 < tolerance < math.inf:
         raise StudyError(f"--tolerance {tolerance:g}: must be above 0 DN, and finite")
     loaded = load_study(study, data, changes=changes_of(changes), allow_code=allow_code)
-    with ProgressDisplay() as display:
-        planned = with_plans(loaded, os.cpu_count() or 1, display.update, tolerance)
     for warning in loaded.warnings:
         typer.echo(f"Note: {warning}.")
-    for line in plan_lines(planned, explain=explain):
+    for line in plan_lines(loaded.with_plans(tolerance)):
         typer.echo(line)

@@ -8,8 +8,8 @@ from functools import partial
 import numpy as np
 
 from ...base.types import FloatArray, IndexArray
-from ...camera.imager import Imager
-from ...camera.noisy_readout import NoisyReadout
+from ...camera.forward import ForwardModel
+from ...camera.noise_readout import NoisyReadout
 from ...curves.lights import Pair, class_pairs, pair_name
 from .. import confusion
 from ..discrimination import (
@@ -55,7 +55,7 @@ class Confusion(NoiseMetric):
         return (*each, *(_quantity(metric, metric, asked.states) for metric in (STATE_ERROR, STATE_ERROR_BOUND)))
 
     def of_noise(
-        self, imager: Imager, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
+        self, imager: ForwardModel, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
     ) -> Columns:
         """Exact sums over the digital numbers of a few pixels; where these are too many, Gaussian errors or bounds."""
         mean, variance, _ = NoiseShape.of_cases(read)
@@ -98,7 +98,7 @@ def _quantity(metric: str, name: str, types: tuple[str, ...]) -> Quantity:
     )
 
 
-def state_errors(imager: Imager, curves: FloatArray, states: Sequence[str]) -> FloatArray:
+def state_errors(imager: ForwardModel, curves: FloatArray, states: Sequence[str]) -> FloatArray:
     """`STATE_ERROR` of designs, ndarray[n_designs], and nothing else; `curves`: see `designed_quantities`."""
     members = {name: imager.view.members[name] for name in states}
     exact = _exact(imager, curves, members)
@@ -108,9 +108,11 @@ def state_errors(imager: Imager, curves: FloatArray, states: Sequence[str]) -> F
     return np.asarray(np.max(list(error.values()), axis=0), dtype=float)
 
 
-def _exact(imager: Imager, curves: FloatArray, members: Mapping[str, IndexArray]) -> list[confusion.Errors] | None:
+def _exact(
+    imager: ForwardModel, curves: FloatArray, members: Mapping[str, IndexArray]
+) -> list[confusion.Errors] | None:
     """Errors and bounds in each case by sums over the digital numbers; None where these are too many."""
-    few = imager.readout.few_pixels
+    few = imager.few_pixels
     if few is None or not confusion.affordable(imager.readout.pixel, few):
         return None
     electrons = imager.pixel_electrons(curves)
@@ -127,7 +129,7 @@ def _gaussian(read: NoisyReadout, members: Mapping[str, IndexArray]) -> _ByPair:
 
 
 def _errors(
-    imager: Imager, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
+    imager: ForwardModel, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
 ) -> tuple[_ByPair, _ByPair, FloatArray]:
     """Error and bound of each pair, and the bound of all states, the largest over the cases."""
     exact, pairs = _exact(imager, curves, members), class_pairs(list(members))

@@ -14,9 +14,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...base.types import FloatArray, IndexArray
-from ...camera.imager import Imager
-from ...camera.noisy.gaussian import share_below
-from ...camera.noisy_readout import NoisyReadout
+from ...camera.forward import ForwardModel
+from ...camera.noise.gaussian import share_below
+from ...camera.noise_readout import NoisyReadout
 from ...curves.lights import class_pairs, pair_name
 from ..discrimination import NoiseShape
 from ..quantity import Asked, Columns, NoiseMetric, Quantity
@@ -56,7 +56,7 @@ class Probabilities(NoiseMetric):
         )
 
     def of_noise(
-        self, imager: Imager, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
+        self, imager: ForwardModel, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
     ) -> Columns:
         """From mean and variance of the digital numbers."""
         del curves

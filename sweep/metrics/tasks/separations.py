@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from ...base.types import IndexArray
-from ...camera.noisy.gaussian import share_below
+from ...camera.noise.gaussian import share_below
 from .color import ChannelNoise
 from .colorimetry import Smooth
 

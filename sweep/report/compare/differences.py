@@ -40,7 +40,8 @@ def origin_differences(runs: Mapping[str, Output]) -> pd.DataFrame:
 def _origin(provenance: Provenance) -> dict[str, Any]:
     kept = {"sensor", "lights", "model_version", "data_sha256", "versions", "designs"}
     simulated = {
-        name: {"tolerance_dn": plan.tolerance_dn} | {each.effect: each.method for each in plan.effects}
+        name: {"tolerance_dn": plan.tolerance_dn}
+        | {each.effect: "computed" if each.computed else "left out" for each in plan.effects}
         for name, plan in provenance.plans.items()
     }
     return provenance.model_dump(mode="json", include=kept) | {"simulated": simulated}

@@ -1,0 +1,231 @@
+"""What falls on pixels of the image of a disc, sharp or blurred by diffraction and defocus."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.cache import Cache
+from ..base.types import BoolArray, FloatArray, IndexArray
+from .psf import DiscProfile, gauss_legendre
+
+if TYPE_CHECKING:
+    from .sampling import Window
+
+_PIXELS_AT_ONCE = 200
+_MOST_KEPT = 6_000_000
+"""Most values of pixels that are kept."""
+
+
+def covered(x: FloatArray, y: FloatArray, half: float, radius: float) -> FloatArray:
+    """Share of a square that lies in a disc around the origin, from the exact areas.
+
+    Parameters
+    ----------
+    x, y : ndarray[...]
+        Center of the square; their shapes are broadcast.
+    half : float
+        Half of its side.
+    radius : float
+        Radius of the disc; all lengths are in one unit, such as pixels.
+
+    Returns
+    -------
+    ndarray[...]
+        0 to 1.
+    """
+    from .compiled_light import covered_shares  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+    x, y = np.broadcast_arrays(x, y)
+    return covered_shares(x.ravel(), y.ravel(), half, radius).reshape(x.shape)
+
+
+@dataclass(frozen=True)
+class PixelLight:
+    """Light of pixels relative to a uniform field, each different place once.
+
+    Attributes
+    ----------
+    values : ndarray[n_places, n_functions]
+        Of each function that the light is made of; the last place is dark.
+    place : ndarray[n_cases, rows, columns]
+        Index of each pixel's place.
+    shares : ndarray[n_functions, n_wavelengths] or None
+        How much of each function is in the light of each wavelength; None where all wavelengths see the same, which is
+        then one function.
+    """
+
+    values: FloatArray
+    place: IndexArray
+    shares: FloatArray | None
+
+    def by_pixel(self) -> FloatArray:
+        """Light of each pixel, ndarray[n_cases, rows, columns, n_wavelengths or 1]."""
+        return self._at_wavelengths(self.values)[self.place]
+
+    def folded(self, weights: FloatArray) -> FloatArray:
+        """Weighted sums over the pixels of each case.
+
+        Parameters
+        ----------
+        weights : ndarray[n_cases, rows, columns, n]
+            Of each pixel in each of n sums.
+
+        Returns
+        -------
+        ndarray[n_cases, n, n_wavelengths or 1]
+        """
+        result = np.empty((len(weights), weights.shape[-1], self.values.shape[1]))
+        for case, case_weights in enumerate(weights):
+            used = np.flatnonzero(case_weights.any(axis=2))
+            pixel_weights = case_weights.reshape(-1, case_weights.shape[2])[used]
+            result[case] = pixel_weights.T @ self.values[self.place[case].ravel()[used]]
+        return self._at_wavelengths(result)
+
+    def _at_wavelengths(self, values: FloatArray) -> FloatArray:
+        return values if self.shares is None else np.asarray(values @ self.shares)
+
+
+def different(window: Window, wanted: BoolArray) -> tuple[FloatArray, IndexArray, BoolArray]:
+    """Different places of pixels around the light's center: the image is round, so that mirrored places are one.
+
+    Parameters
+    ----------
+    window : Window
+        Pixels around the light, n_cases x rows x columns.
+    wanted : ndarray[n_cases, rows, columns]
+        Which of them are asked for.
+
+    Returns
+    -------
+    places_px : ndarray[n_places, 2]
+        Distances from the center along the rows and columns, the shorter one first, pixels.
+    place : ndarray[n_wanted]
+        Index of the place of each pixel that is wanted.
+    swapped : ndarray[n_wanted]
+        Whether its shorter distance is that along the columns, `dy`.
+    """
+    x, y = window.dx[:, 0, :], window.dy[:, :, 0]
+    along = np.round(np.abs(np.concatenate([x.ravel(), y.ravel()])), 12)
+    distances, which = np.unique(along, return_inverse=True)
+    case, row, column = np.nonzero(wanted)
+    of_x, of_y = which[: x.size].reshape(x.shape)[case, column], which[x.size :].reshape(y.shape)[case, row]
+    pairs, place = np.unique(np.minimum(of_x, of_y) * distances.size + np.maximum(of_x, of_y), return_inverse=True)
+    return distances[np.stack(np.divmod(pairs, distances.size), axis=1)], place, of_y < of_x
+
+
+def light_on_pixels(
+    window: Window, wanted: BoolArray, half_px: float, radius_px: float, profile: DiscProfile | None, pitch_um: float
+) -> PixelLight:
+    """Light of the pixels that are wanted; the others are dark.
+
+    Parameters
+    ----------
+    window : Window
+        Pixels around the light, n_cases x rows x columns.
+    wanted : ndarray[n_cases, rows, columns]
+        Which of them are asked for.
+    half_px : float
+        Half of the side of a pixel's light-sensitive square, pixels.
+    radius_px : float
+        Radius of the disc, pixels; a blurred one's is its profile's.
+    profile : DiscProfile or None
+        The blurred image; None for a sharp one.
+    pitch_um : float
+        Pixel pitch, micrometers.
+
+    Returns
+    -------
+    PixelLight
+        Means over the pixels, relative to a uniform field.
+    """
+    places_px, inverse, _ = different(window, wanted)
+    place = np.full(wanted.shape, len(places_px))
+    place[wanted] = inverse
+    if profile is None:
+        values, shares = covered(places_px[:, 0], places_px[:, 1], half_px, radius_px)[:, None], None
+    else:
+        values, shares = _kept_means(places_px, half_px, profile, pitch_um), profile.shares
+    return PixelLight(np.vstack([values, np.zeros((1, values.shape[1]))]), place, shares)
+
+
+class _KnownMeans:
+    """Means of one profile over pixels that were computed before.
+
+    Sampling phases on a lattice, and those between them, see many pixels at the same places, and so do CFAs whose
+    tiles are of one size. Threads take turns.
+    """
+
+    def __init__(self, n_functions: int) -> None:
+        self._places = np.empty(0, dtype=complex)  # ascending, with the row of each
+        self._rows = np.empty(0, dtype=np.intp)
+        self._means = np.empty((256, n_functions))
+        self._one_at_a_time = threading.Lock()
+
+    def of(self, places_px: FloatArray, make: Callable[[FloatArray], FloatArray]) -> FloatArray:
+        """Means at places, ndarray[n, 2] -> ndarray[n, n_functions]; `make` computes those that are not known."""
+        wanted = places_px @ np.array([1, 1j])
+        with self._one_at_a_time:
+            known = self._is_known(wanted)
+            means = np.empty((len(wanted), self._means.shape[1]))
+            means[known] = self._means[self._rows[np.searchsorted(self._places, wanted[known])]]
+            if known.all():
+                return means
+            means[~known] = make(places_px[~known])
+            if (self._places.size + len(wanted) - known.sum()) * means.shape[1] <= _MOST_KEPT:
+                self._add(wanted[~known], means[~known])
+            return means
+
+    def _is_known(self, places: NDArray[np.complex128]) -> BoolArray:
+        at = np.searchsorted(self._places, places)
+        known = at < self._places.size
+        known[known] = self._places[at[known]] == places[known]
+        return known
+
+    def _add(self, places: NDArray[np.complex128], means: FloatArray) -> None:
+        used, order = self._places.size, np.argsort(places)
+        if used + len(means) > len(self._means):
+            more = np.empty((max(len(self._means), len(means)), self._means.shape[1]))
+            self._means = np.concatenate([self._means, more])
+        self._means[used : used + len(means)] = means
+        at = np.searchsorted(self._places, places[order])
+        self._places = np.insert(self._places, at, places[order])
+        self._rows = np.insert(self._rows, at, used + order)
+
+
+_MEANS: Cache[tuple[DiscProfile, float], _KnownMeans] = Cache(4)
+
+
+def _kept_means(places_px: FloatArray, half_px: float, profile: DiscProfile, pitch_um: float) -> FloatArray:
+    """`_pixel_means`, of which the latest are kept."""
+    known = _MEANS.get((profile, half_px * pitch_um), lambda: _KnownMeans(len(profile.shares)))
+    return known.of(places_px, lambda new: _pixel_means(new, half_px, profile, pitch_um))
+
+
+def _pixel_means(places_px: FloatArray, half_px: float, profile: DiscProfile, pitch_um: float) -> FloatArray:
+    """Means of the profile's functions over pixels, by a Gauss-Legendre rule along each side.
+
+    Parameters
+    ----------
+    places_px : ndarray[n, 2]
+        Centers of the pixels from the disc's center, pixels.
+
+    Returns
+    -------
+    ndarray[n, n_functions]
+    """
+    nodes, weights = gauss_legendre(profile.order(2 * half_px * pitch_um))
+    u, v = (offsets.ravel() * half_px for offsets in np.meshgrid(nodes, nodes))
+    pixel_weights = np.outer(weights, weights).ravel() / 4
+    means = np.empty((len(places_px), len(profile.shares)))
+    for start in range(0, len(places_px), _PIXELS_AT_ONCE):
+        block = slice(start, start + _PIXELS_AT_ONCE)
+        x, y = places_px[block].T
+        r_um = np.sqrt((x[:, None] + u) ** 2 + (y[:, None] + v) ** 2) * pitch_um
+        means[block] = profile.sums(r_um, pixel_weights)
+    return means

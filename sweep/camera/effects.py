@@ -1,0 +1,247 @@
+"""Effects of the camera: when each is active, and a closed-form bound on what leaving it out changes in any CSD.
+
+A CSD is a distance of two points, each with a coordinate for every channel. Where leaving an effect out moves each
+coordinate of their difference by at most d, the distance changes by at most d sqrt(channels).
+
+Bounds are for every design of a box and in DN. Light that is a share s less moves a pixel of at most P DN by s P, and
+the difference of two pixels by at most twice as much. A readout that clips moves by no more than what it reads. One
+that rounds without noise may move by a whole step more for each pixel; with Gaussian read noise sigma (DN) the mean of
+the rounded value is steeper than the value by at most 1 + 2 sum over k of exp(-2 (pi k sigma)^2).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..base.types import FloatArray
+from . import pwm
+from .angular import known_at
+from .exposure import exposure_times, white_irradiance
+from .irradiance import air_transmittance, background_irradiance, relative_illumination, signal_irradiance
+from .noise import gaussian, tails
+from .view import View, per_photon
+
+_STEEPEST_TERMS = 50
+
+
+@dataclass(frozen=True)
+class Box:
+    """Designs of a scene: every channel's QE lies between `low` and `high`, ndarray[n_channels, n_wavelengths]."""
+
+    view: View
+    low: FloatArray
+    high: FloatArray
+
+    @cached_property
+    def _exposures_s(self) -> tuple[float, float]:
+        """Shortest and longest exposure."""
+        view = self.view
+        white = white_irradiance(view) * per_photon(view)
+        modified = list(view.modified)
+        ends = [exposure_times(view, (qe[modified] @ white)[None])[0] for qe in (self.high, self.low)]
+        return float(ends[0]), float(ends[1])
+
+    @cached_property
+    def light_range(self) -> tuple[float, float]:
+        """Least and most light of any exposure, relative to its mean."""
+        drive = self.view.scenario.drive
+        if drive is None:
+            return 1.0, 1.0
+        return pwm.smallest(drive, *self._exposures_s), pwm.largest(drive, *self._exposures_s)
+
+    @cached_property
+    def _highest(self) -> FloatArray:
+        """No ray sees more of a channel, ndarray[n_channels, n_wavelengths].
+
+        What an interference filter lets through of its carrier is nowhere more than where it lets most through.
+        """
+        highest = self.high.copy()
+        for channel in self.view.moving:
+            carrier = self.view.carrier(channel)
+            known = known_at(carrier)
+            highest[channel] = carrier * (self.high[channel, known] / carrier[known]).max()
+        return highest
+
+    @cached_property
+    def brightest_signal_dn(self) -> float:
+        """Largest response of any channel to a signal whose image is whole, unclipped and without black level, DN."""
+        dn = per_photon(self.view) * self._exposures_s[1] * self.light_range[1] * self.view.pixel.dn_per_e
+        return float((signal_irradiance(self.view) @ self._highest.T).max() * dn)
+
+    @cached_property
+    def brightest_pixel_dn(self) -> float:
+        """`brightest_signal_dn` with background and dark current."""
+        view, time_s = self.view, self._exposures_s[1]
+        background = (self._highest @ background_irradiance(view)).max() * per_photon(view)
+        return self.brightest_signal_dn + float(background + view.pixel.dark_e_per_s) * time_s * view.pixel.dn_per_e
+
+    @property
+    def _sqrt_channels(self) -> float:
+        return math.sqrt(len(self.view.mosaic.channels))
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One effect.
+
+    `inactive`: why it changes nothing in a box whatever is computed beside it, None where it may. `bound_dn`: on what
+    leaving it out changes in any CSD of a box, given the effects of the readout that are computed; None where no closed
+    form is known, so that an active effect is computed. `name` is that of the effect, `stage` the module that computes
+    it.
+    """
+
+    name: str
+    stage: str
+    inactive: Callable[[Box], str | None]
+    bound_dn: Callable[[Box, frozenset[str]], float] | None = None
+
+
+def _share_bound_dn(box: Box, share: float, readout: frozenset[str]) -> float:
+    """Bound for light that is a share less."""
+    result = 2 * share * box.brightest_pixel_dn * box._sqrt_channels
+    if "quantization" not in readout:
+        return result
+    if box.view.scenario.noise is None:
+        return result + 2 * box._sqrt_channels * (share > 0)
+    return result * _steepness(box.view.pixel.dn_per_e * box.view.pixel.read_noise_e)
+
+
+def _steepness(sigma_dn: float) -> float:
+    """Largest slope of the mean rounded value under read noise."""
+    k = np.arange(1, _STEEPEST_TERMS)
+    terms = np.exp(-2 * (math.pi * k * sigma_dn) ** 2)
+    return math.inf if terms[-1] > 1e-17 else 1 + 2 * float(terms.sum())
+
+
+def _no_noise(box: Box) -> str | None:
+    return "no noise asked for" if box.view.scenario.noise is None else None
+
+
+def _noise_bound_dn(box: Box, readout: frozenset[str]) -> float:
+    """What the full well and the ends of the ADC take from, or add to, the mean of noisy readouts.
+
+    The dark end adds most in the dark. The others' loss grows with the signal up to the first of them, and falls
+    beyond, where the readout of the mean stands still.
+    """
+    pixel = box.view.pixel
+    gain, read_e = pixel.dn_per_e, pixel.read_noise_e
+    at_e, end_e = min(box.brightest_pixel_dn / gain, pixel.saturation_e), (pixel.full_scale_dn - pixel.offset_dn) / gain
+    lost_e = tails.mean_above(pixel.well_e, at_e, pixel, 0.0) + tails.mean_above(end_e, at_e, pixel, read_e)
+    added_dn = gain * read_e * float(gaussian.ramp(np.array(-pixel.offset_dn / (gain * read_e)))) if read_e else 0.0
+    return (2 * added_dn + gain * lost_e) * box._sqrt_channels
+
+
+def _rounding_bound_dn(box: Box, readout: frozenset[str]) -> float:
+    """A step of rounding; under noise what read noise leaves of it.
+
+    The k-th harmonic of the mean rounding error is 1 / (pi k) exp(-2 (pi k sigma)^2), whatever the electrons are. Where
+    the ADC's range ends, half a DN is missing at most in the readouts beyond.
+    """
+    pixel = box.view.pixel
+    sigma = pixel.dn_per_e * pixel.read_noise_e
+    if box.view.scenario.noise is None or sigma == 0:
+        return box._sqrt_channels
+    first = math.exp(-2 * (math.pi * sigma) ** 2)
+    below = float(gaussian.share_below(np.array(-pixel.offset_dn / sigma)))
+    above_e = (pixel.full_scale_dn - pixel.offset_dn) / pixel.dn_per_e
+    beyond = below + tails.share_above(above_e, box.brightest_pixel_dn / pixel.dn_per_e, pixel, pixel.read_noise_e)
+    return min(1.0, 2 * (first / (math.pi * (1 - first)) + beyond / 2)) * box._sqrt_channels
+
+
+def _not_saturated(box: Box) -> str | None:
+    pixel = box.view.pixel
+    if box.view.scenario.noise is not None or box.brightest_pixel_dn / pixel.dn_per_e > pixel.saturation_e:
+        return None
+    return f"the brightest signal has at most {box.brightest_signal_dn:.0f} DN"
+
+
+def _saturation_bound_dn(box: Box, readout: frozenset[str]) -> float:
+    pixel = box.view.pixel
+    excess_e = max(0.0, box.brightest_pixel_dn / pixel.dn_per_e - pixel.saturation_e)
+    return excess_e * pixel.dn_per_e * box._sqrt_channels
+
+
+def _without_target(box: Box) -> str | None:
+    return "a patch that fills the field" if box.view.scenario.target is None else None
+
+
+def _not_moving(box: Box) -> str | None:
+    if box.view.moving:
+        return None
+    stated = any(technology is not None for technology in box.view.technologies)
+    return "pigments do not move with the angle" if stated else "no technology is stated: filters as on axis"
+
+
+def _one_phase(box: Box) -> str | None:
+    return _without_target(box) or (None if box.view.all_phases else "the scene names the place")
+
+
+def _one_field_position(box: Box) -> str | None:
+    field = box.view.scenario.field
+    if field is None:
+        return "one place of the sensor"
+    same = not box.view.moving and box.view.scenario.off_axis_deg == 0
+    return "all places of the sensor see the same" if same else None
+
+
+def _averaged(box: Box) -> str | None:
+    target = box.view.scenario.target
+    averaged = target is not None and target.readout == "mean"
+    return _without_target(box) or ("the raw pixels are averaged" if averaged else None)
+
+
+def _unpulsed(box: Box) -> str | None:
+    drive = box.view.scenario.drive
+    return "direct current" if drive is None or drive.duty == 1 else None
+
+
+def _pwm_bound_dn(box: Box, readout: frozenset[str]) -> float:
+    least, most = box.light_range
+    return _share_bound_dn(box, max(1 - least, most - 1) / most, readout)
+
+
+def _air_bound_dn(box: Box, readout: frozenset[str]) -> float:
+    lost = 1 - float(air_transmittance(box.view.scenario, box.view.grid.nodes_nm).min())
+    return _share_bound_dn(box, lost, readout)
+
+
+EFFECTS: dict[str, Effect] = {
+    effect.name: effect
+    for effect in (
+        Effect("noise", "readout", _no_noise, _noise_bound_dn),
+        Effect("quantization", "readout", lambda _: None, _rounding_bound_dn),
+        Effect("saturation", "readout", _not_saturated, _saturation_bound_dn),
+        Effect("pedestal", "readout", lambda box: None if box.view.pixel.offset_dn else "no pedestal"),
+        Effect("sampling", "sampling", _without_target),
+        Effect("phase", "phases", _one_phase),
+        Effect("demosaic", "demosaic", _averaged),
+        Effect("blur", "psf", _without_target),
+        Effect(
+            "crosstalk",
+            "crosstalk",
+            lambda box: None if box.view.pixel.crosstalk else "no crosstalk",
+            lambda box, readout: _share_bound_dn(box, 2 * box.view.pixel.crosstalk, readout),
+        ),
+        Effect("angle", "angular", _not_moving),
+        Effect(
+            "illumination",
+            "irradiance",
+            lambda box: None if box.view.scenario.off_axis_deg else "on axis",
+            lambda box, readout: _share_bound_dn(box, 1 - relative_illumination(box.view.scenario), readout),
+        ),
+        Effect("field", "field", _one_field_position),
+        Effect(
+            "extinction",
+            "irradiance",
+            lambda box: "clear air" if box.view.scenario.visibility_m is None else None,
+            _air_bound_dn,
+        ),
+        Effect("flicker", "pwm", _unpulsed, _pwm_bound_dn),
+    )
+}
+"""Each effect by its name: those of the readout first, which decide what the bounds of the others are."""

@@ -1,0 +1,63 @@
+"""Memory of the pixel responses of a scene, before they are made."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .field import field_heights
+from .phases import MOST_PHASES, Phases, n_phases
+from .sampling import reach_px
+from .view import View
+
+MOST_BYTES = 2 * 2**30
+"""What the images of a scene may take of a worker's memory."""
+_COPIES = 4
+"""So many arrays of the size of a response are held while it is made."""
+
+
+def pixels_per_phase(view: View) -> int:
+    """About how many pixels are computed around a light."""
+    target, rows_columns = view.scenario.target, view.mosaic.indices.shape
+    if target is None:
+        return int(np.prod(rows_columns))
+    reach = reach_px(view, target)
+    return int(np.prod([2 * reach + n + 3 for n in rows_columns]))
+
+
+def bytes_per_phase(view: View, *, by_pixel: bool) -> int:
+    """About how much memory the response at one phase takes while it is made.
+
+    Pixels are held in factors (see `split_light`), those of one field position after the other.
+    """
+    n = len(view.mosaic.channels)
+    if by_pixel:
+        return 8 * _COPIES * pixels_per_phase(view) * (view.grid.size + n)
+    return 8 * _COPIES * n * n * view.grid.size * len(field_heights(view))
+
+
+def blocks(view: View, phases: Phases) -> list[Phases]:
+    """Phases whose responses, pixel by pixel, fit into half of `MOST_BYTES` together."""
+    step = max(1, MOST_BYTES // 2 // bytes_per_phase(view, by_pixel=True))
+    return [phases.subset(slice(at, at + step)) for at in range(0, len(phases), step)]
+
+
+def too_large(view: View) -> tuple[str, str, str] | None:
+    """Why a target's response is not computed: problem, value, what is allowed; None when it is."""
+    if view.scenario.target is None:
+        return None
+    channels = f"{len(view.mosaic.channels)} channels and {view.grid.size} wavelengths"
+    if (one := bytes_per_phase(view, by_pixel=True)) > MOST_BYTES:
+        problem = f"{pixels_per_phase(view):,} pixels around the light, of {channels}, take too much memory"
+        return problem, f"{one / 2**30:.1f} GiB", f"at most {MOST_BYTES / 2**30:g} GiB"
+    places = n_phases(view)
+    if places > MOST_PHASES:
+        problem = f"a light at any place of a tile of {view.mosaic.indices.size:,} pixels has too many places"
+        return (
+            problem,
+            f"{places:,}",
+            f"at most {MOST_PHASES:,} (a tile of {MOST_PHASES // 16} pixels), or a named place",
+        )
+    if (every := places * bytes_per_phase(view, by_pixel=False)) > MOST_BYTES:
+        problem = f"{places:,} places of the light, of {channels}, take too much memory"
+        return problem, f"{every / 2**30:.1f} GiB", f"at most {MOST_BYTES / 2**30:g} GiB"
+    return None

@@ -1,0 +1,194 @@
+"""Compiled inner loops of noise: sums over electrons and digital numbers. They release the GIL."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...base.machine_code import njit
+from ...base.types import FloatArray, IndexArray
+
+_TAIL = 9.5
+"""Standard deviations beyond which a Gaussian is left out: less than 1e-20 of it."""
+_NONE = np.empty(0)
+_RARE = 1e-22
+"""Numbers of electrons that occur less often than this, relative to the most frequent one, are left out."""
+
+
+@njit(cache=True, nogil=True)
+def rounded_gaussian(mean: FloatArray, sigma: float, top: float, out: FloatArray) -> None:
+    """Mean and variance of round(clip(x, 0, top)) for Gaussian x, by the probability to pass each step.
+
+    `mean`: ndarray[n], `sigma` > 0; `out`: ndarray[2, n].
+    """
+    scale = 1 / (sigma * math.sqrt(2))
+    for i in range(mean.size):
+        center = min(max(math.floor(mean[i] + 0.5), 0.0), top)
+        first = second = 0.0
+        for side in (1.0, -1.0):
+            room = top - center if side > 0 else center
+            step = 1.0
+            while step <= room:
+                z = side * (center - mean[i]) + step - 0.5
+                if z > _TAIL * sigma:
+                    break
+                passed = 0.5 * math.erfc(z * scale)
+                first += side * passed
+                second += (2 * step - 1) * passed
+                step += 1
+        out[0, i] = center + first
+        out[1, i] = max(second - first * first, 0.0)
+
+
+@njit(cache=True, nogil=True)
+def poisson_shares(electrons: float, start: int, rare: float, shares: FloatArray) -> tuple[int, int]:
+    """How often each count from `start` on occurs, relative to the most frequent; where these begin and end.
+
+    `shares`: ndarray[n_counts], filled between the two; its last count takes all higher ones, too. Counts that occur
+    less often than `rare` are left out.
+    """
+    last, mode = shares.size - 1, int(electrons)
+    low = high = min(mode - start, last)
+    shares[low] = 0.0
+    share, k = 1.0, mode
+    while share > rare:
+        here = min(k - start, last)
+        if here > high:
+            high = here
+            shares[here] = 0.0
+        shares[here] += share
+        k += 1
+        share *= electrons / k
+    share, k = mode / max(electrons, 1e-300), mode - 1
+    while share > rare and k >= start:
+        here = min(k - start, last)
+        if here < low:
+            low = here
+            shares[here] = 0.0
+        shares[here] += share
+        share *= k / electrons
+        k -= 1
+    return low, high + 1
+
+
+@njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
+def _sum_off(shares: FloatArray, values: FloatArray, about: float) -> float:
+    """Sum of values less one of them, by their shares."""
+    total = 0.0
+    for k in range(shares.size):
+        total += shares[k] * (values[k] - about)
+    return total
+
+
+@njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})
+def _sum_square(shares: FloatArray, values: FloatArray, about: float, variance: FloatArray) -> float:
+    """Sum of variances and of the squares of values less another one, by their shares."""
+    total = 0.0
+    for k in range(shares.size):
+        off = values[k] - about
+        total += shares[k] * (variance[k] + off * off)
+    return total
+
+
+@njit(cache=True, nogil=True)
+def poisson_moments(
+    electrons: FloatArray, start: int, values: FloatArray, variance: FloatArray, out: FloatArray
+) -> None:
+    """Means of several quantities of a Poisson number of electrons; the variance of the last one, where asked for.
+
+    `electrons`: ndarray[n], expected numbers. `values`: ndarray[n_quantities, n_counts], of the counts from `start`
+    on; beyond the last count they stay as they are. `variance`: ndarray[n_counts], the last quantity's own at each
+    count, or empty. `out`: ndarray[n_quantities + 1, n].
+    """
+    quantities, counts = values.shape
+    shares = np.empty(counts)
+    for i in range(electrons.size):
+        low, high = poisson_shares(electrons[i], start, _RARE, shares)
+        own = shares[low:high]
+        weight = own.sum()
+        at = min(int(electrons[i]) - start, counts - 1)
+        for q in range(quantities):
+            # About the value at the most frequent count, so that no digits are lost.
+            out[q, i] = values[q, at] + _sum_off(own, values[q, low:high], values[q, at]) / weight
+        if variance.size:
+            last = values[quantities - 1, low:high]
+            out[quantities, i] = _sum_square(own, last, out[quantities - 1, i], variance[low:high]) / weight
+
+
+@njit(cache=True, nogil=True)
+def means_over_gains(
+    electrons: FloatArray,
+    prnu: float,
+    drawn: float,
+    per_deviation: float,
+    roots: FloatArray,
+    table: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Means over pixels' Gaussian gains by the trapezoidal rule, and the variance with that of the last mean.
+
+    `electrons`: ndarray[n], expected numbers. Gains of up to `drawn` standard deviations `prnu` count, in steps of one
+    over `per_deviation` and less where there are more electrons. `roots`, `table`: nodes and coefficients of a cubic
+    spline over the root of the electrons, ndarray[4, n_nodes - 1, 3]: two means and the variance. `out`: ndarray[3, n].
+    """
+    for i in range(electrons.size):
+        half = math.ceil(drawn * per_deviation * math.sqrt(1 + prnu * prnu * electrons[i]))
+        weight = first = second = square = spread = 0.0
+        # About the value of the mean gain, so that no digits are lost.
+        root = min(math.sqrt(electrons[i]), roots[-1])
+        at = max(np.searchsorted(roots, root) - 1, 0)
+        s, c = root - roots[at], table[:, at, 1]
+        about, at = ((c[0] * s + c[1]) * s + c[2]) * s + c[3], 0
+        for k in range(-half, half + 1):
+            z = drawn * k / half
+            root = min(math.sqrt(electrons[i] * (1 + prnu * z)), roots[-1])
+            while at < roots.size - 2 and root >= roots[at + 1]:
+                at += 1
+            s, of = root - roots[at], table[:, at]
+            unrounded = ((of[0, 0] * s + of[1, 0]) * s + of[2, 0]) * s + of[3, 0]
+            rounded = ((of[0, 1] * s + of[1, 1]) * s + of[2, 1]) * s + of[3, 1]
+            variance = ((of[0, 2] * s + of[1, 2]) * s + of[2, 2]) * s + of[3, 2]
+            share = math.exp(-0.5 * z * z)
+            weight += share
+            first += share * unrounded
+            second += share * (rounded - about)
+            square += share * (rounded - about) ** 2
+            spread += share * max(variance, 0.0)
+        mean = second / weight
+        out[0, i] = first / weight
+        out[1, i] = about + mean
+        out[2, i] = spread / weight + square / weight - mean * mean
+
+
+def poisson_means(electrons: FloatArray, start: int, values: FloatArray, variance: FloatArray = _NONE) -> FloatArray:
+    """`poisson_moments` into a new ndarray[n_quantities + 1, n]."""
+    out = np.empty((len(values) + 1, electrons.size))
+    poisson_moments(np.ascontiguousarray(electrons), start, values, variance, out)
+    return out
+
+
+@njit(cache=True, nogil=True)
+def cubic_of_electrons(
+    electrons: FloatArray,
+    prnu: float,
+    last_e: float,
+    nodes: FloatArray,
+    coefficients: FloatArray,
+    piece: IndexArray,
+    step: float,
+    out: FloatArray,
+) -> None:
+    """Values of a table at expected electrons, ndarray[n]: see `noisy.table.MomentTable`. Beyond `last_e` they stay."""
+    for i in range(electrons.size):
+        held = electrons[i]
+        held = last_e if held > last_e else held
+        at = np.sqrt(held)
+        if prnu > 0:
+            at = math.asinh(prnu * at) / prnu
+        if not at >= 0:  # NaN stays NaN
+            out[i] = at
+            continue
+        k = piece[min(int(at / step), piece.size - 1)]
+        s, own = at - nodes[k], coefficients[k]
+        out[i] = ((own[0] * s + own[1]) * s + own[2]) * s + own[3]

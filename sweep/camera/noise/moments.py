@@ -1,0 +1,174 @@
+"""Mean and variance of a pixel's digital number: Poisson electrons, full well, read noise, pedestal, ADC, rounding.
+
+Exact sums over the numbers of electrons wherever something bends or steps: near the dark, the full well and the ends of
+the ADC, and below 2^20 electrons wherever read noise does not hide the steps of rounding. Elsewhere the readout is
+straight, and from 2^20 electrons on the steps are dithered by a Gaussian.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...base.types import BoolArray, FloatArray
+from ..pixel import Pixel
+from . import gaussian
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+
+UNROUNDED, ROUNDED, VARIANCE = range(3)
+"""Rows of what `moments` gives: mean before rounding and after (DN), variance after (DN^2)."""
+COUNTED_E = 2.0**20
+"""Up to here electrons are counted one by one wherever rounding shows."""
+STEP = 1 / 64
+"""Distance of nodes in the root of the electrons, in which Poisson means are smooth at a scale of 1."""
+_REACH = 9.5
+DRAWN = 8.5
+"""Standard deviations of the gain beyond which it is left out: less than 1e-16."""
+_PER_DEVIATION = 1.3
+_FAR_ROOT = 16.0
+
+
+def straight(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+    """`moments` where nothing clips and noise, Gaussian in all, dithers the steps: ndarray[3, n]."""
+    mean = pixel.dn_per_e * electrons + pixel.offset_dn
+    sigma = pixel.dn_per_e * np.sqrt(electrons + (pixel.prnu * electrons) ** 2 + pixel.read_noise_e**2)
+    shift, variance = gaussian.rounding(mean, sigma)
+    return np.stack([mean, mean + shift, variance])
+
+
+def of_count(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+    """The same given the number of electrons, which then has no noise of its own."""
+    top, sigma = float(pixel.full_scale_dn), pixel.dn_per_e * pixel.read_noise_e
+    mean = pixel.dn_per_e * np.minimum(electrons, pixel.well_e) + pixel.offset_dn
+    return np.stack(
+        [gaussian.clipped_gaussian(mean, sigma, 0.0, top)[0], *gaussian.clipped_and_rounded(mean, sigma, top)]
+    )
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Where a pixel's readout is not straight.
+
+    Below `low_e` electrons the dark end of the ADC is felt, from `high_e` on the full well or the bright end, from
+    `full_e` on nothing changes any more. An expected number `last_e` is sure to exceed that.
+    """
+
+    low_e: float
+    high_e: float
+    full_e: float
+    last_e: float
+
+    @classmethod
+    def of(cls, pixel: Pixel) -> Ends:
+        """The ends of a pixel."""
+        reach_e = _REACH * pixel.read_noise_e
+        adc_e = (pixel.full_scale_dn - pixel.offset_dn) / pixel.dn_per_e
+        full_e = min(pixel.well_e, adc_e + reach_e)
+        last_e = _least_exceeding(full_e) / (1 - DRAWN * pixel.prnu)
+        return cls(reach_e - pixel.offset_dn / pixel.dn_per_e, min(pixel.well_e, adc_e - reach_e), full_e, last_e)
+
+
+def _least_exceeding(electrons: float) -> float:
+    """An expected number of electrons whose count is more than this, but for less than 1e-19."""
+    return ((_REACH + math.sqrt(_REACH**2 + 4 * max(electrons, 0.0))) / 2) ** 2
+
+
+def _felt(electrons: FloatArray, pixel: Pixel) -> BoolArray:
+    """Where counts of Poisson electrons reach an end, or show steps."""
+    ends = Ends.of(pixel)
+    sigma = _REACH * np.sqrt(electrons)
+    found = (electrons - sigma < ends.low_e) | (electrons + sigma + _REACH**2 > ends.high_e)
+    if pixel.dn_per_e * pixel.read_noise_e < gaussian.SMOOTH_DN:
+        found |= electrons <= COUNTED_E
+    return np.asarray(found, dtype=bool)
+
+
+def without_prnu(pixel: Pixel) -> Pixel:
+    """The pixel with the same gain as all others."""
+    return pixel.model_copy(update={"prnu": 0.0})
+
+
+def counted(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+    """`moments` of pixels without PRNU: ndarray[3, n] of ndarray[n] expected electrons, ascending."""
+    from .compiled import poisson_means  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+    found = straight(electrons, pixel)
+    for run, first, each in runs(electrons, pixel):
+        found[:, run] = poisson_means(electrons[run], first, each[:2], each[2])
+    return found
+
+
+def runs(electrons: FloatArray, pixel: Pixel) -> Iterator[tuple[slice, int, FloatArray]]:
+    """Runs of ascending expected electrons whose counts are summed, their first count, and `of_count` from it on."""
+    felt = _felt(electrons, pixel)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], felt, [False]])))
+    for left, right in zip(edges[::2], edges[1::2], strict=True):
+        first, last = counts_of(electrons[left:right], pixel)
+        yield slice(left, right), first, of_count(np.arange(first, last + 1, dtype=float), pixel)
+
+
+def counts_of(electrons: FloatArray, pixel: Pixel) -> tuple[int, int]:
+    """First and last count that these expected numbers of electrons, ascending, come to; the well holds no more."""
+    low, high = electrons[0], electrons[-1]
+    first = max(0, math.floor(low - (_REACH + 1) * math.sqrt(low)))
+    full = math.ceil(Ends.of(pixel).full_e)
+    most = math.ceil(high + (_REACH + 1) * math.sqrt(high) + (_REACH + 1) ** 2)
+    return min(first, full), max(min(most, full), min(first, full))
+
+
+def table_nodes(pixel: Pixel) -> FloatArray:
+    """Roots of the electrons at which a table without PRNU knows `counted`, ascending from 0 to the end."""
+    ends = Ends.of(pixel)
+    last = math.sqrt(_least_exceeding(ends.full_e))
+    every = np.arange(0, last + 2 * STEP, STEP)
+    # A straight readout is a parabola in the root, which a cubic meets with few nodes.
+    smooth = ~_felt(every**2, pixel) & (pixel.dn_per_e * np.hypot(every, pixel.read_noise_e) > gaussian.SMOOTH_DN)
+    inner = smooth.copy()
+    inner[1:] &= smooth[:-1]
+    inner[:-1] &= smooth[1:]
+    at = np.arange(every.size)
+    # Where nothing but the steps of rounding shows, half a DN at most, half as many nodes are still good for 1e-6 DN.
+    bent = (every < _FAR_ROOT) | (every > math.sqrt(max(ends.high_e, 0.0)) - _FAR_ROOT)
+    return np.asarray(every[(bent & ~inner) | (~inner & (at % 2 == 0)) | (at % 64 == 0)], dtype=float)
+
+
+@lru_cache(maxsize=8)
+def table_without_prnu(pixel: Pixel) -> CubicSpline:
+    """`counted` over the root of the electrons."""
+    from scipy.interpolate import CubicSpline  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
+    roots = table_nodes(pixel)
+    return CubicSpline(roots, counted(roots**2, pixel), axis=1)
+
+
+def with_prnu(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+    """`moments`, ndarray[3, n], by the trapezoidal rule over the pixels' Gaussian gains.
+
+    The integrand is a Gaussian times a function that is smooth over a deviation 2 / (prnu root of the electrons), so
+    that the rule converges exponentially; its step leaves less than 1e-13.
+    """
+    from .compiled import means_over_gains  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+    even = without_prnu(pixel)
+    table = table_without_prnu(even)
+    found = straight(electrons, pixel)
+    spread = 1 + DRAWN * pixel.prnu
+    ends = Ends.of(pixel)
+    felt = _felt(electrons * spread, even) | _felt(electrons * (2 - spread), even)
+    some = np.flatnonzero(felt & (electrons <= ends.last_e * 2))
+    averaged = np.empty((3, some.size))
+    means_over_gains(electrons[some], pixel.prnu, DRAWN, _PER_DEVIATION, table.x, table.c, averaged)
+    found[:, some] = averaged
+    return found
+
+
+def moments(electrons: FloatArray, pixel: Pixel) -> FloatArray:
+    """Means and variance, ndarray[3, n] (see `UNROUNDED`), of ndarray[n] expected electrons, ascending; exact sums."""
+    return with_prnu(electrons, pixel) if pixel.prnu else counted(electrons, pixel)

@@ -1,0 +1,172 @@
+"""Sampling phases: where the light's center falls on the mosaic.
+
+A scene names a phase, or asks for the worst of `any`. Then a lattice of phases over the tile is computed, those that
+see the same by symmetry once, and the worst of them are refined: neighbors at half the step are compared, from the
+lattice's own step down to the finest one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.types import FloatArray, IndexArray
+from .mosaic import Mosaic
+from .scene import Target
+from .view import View
+
+MOST_PHASES = 1024
+"""Phases of a lattice on a tile, at most."""
+_STARTS = 3
+"""Lattice phases from which each extreme is refined."""
+_NEIGHBORS = np.array([[x, y] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)])
+
+
+@dataclass(frozen=True)
+class Phases:
+    """Sampling phases and the pixel at which each is read out.
+
+    `center_px`: the light's center, ndarray[n_phases, 2] as (column, row), pixels. `nearest_px`: ndarray[n_phases, 2],
+    the pixel nearest to it; halfway between two it is either.
+    """
+
+    center_px: FloatArray
+    nearest_px: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.center_px)
+
+    def subset(self, which: slice | IndexArray) -> Phases:
+        """Some of the phases."""
+        return Phases(self.center_px[which], self.nearest_px[which])
+
+
+def lattice_px(mosaic: Mosaic, steps_per_px: int) -> FloatArray:
+    """Centers of a square lattice over the tile, ndarray[n, 2] as (column, row)."""
+    rows, columns = mosaic.indices.shape
+    x, y = np.meshgrid(np.arange(columns * steps_per_px) / steps_per_px, np.arange(rows * steps_per_px) / steps_per_px)
+    return np.stack([x.ravel(), y.ravel()], axis=1)
+
+
+def n_phases(view: View) -> int:
+    """Phases of the lattice of a scene; 1 where it names the phase, or the light fills the field."""
+    return view.accuracy.phases_per_px * view.mosaic.indices.size if view.all_phases else 1
+
+
+def scene_phases(view: View) -> Phases:
+    """The phases of a scene: the named one, or the whole lattice; halfway between two pixels the one before is read."""
+    target = view.scenario.target
+    rows, columns = view.mosaic.indices.shape
+    if target is None:
+        centers = np.zeros((1, 2))
+    elif target.phase_px == "any":
+        centers = lattice_px(view.mosaic, view.accuracy.phase_steps_per_px)
+    else:
+        centers = np.asarray(np.mod([target.phase_px], (columns, rows)), dtype=float)
+    return Phases(centers, np.ceil(centers - 0.5))
+
+
+def different_phases(view: View, phases: Phases) -> tuple[Phases, IndexArray]:
+    """Phases that see something else than all before them, and which of these each phase sees, ndarray[n].
+
+    Of a mean over the light, mirrored phases see the same.
+    """
+    target, tile = view.scenario.target, view.mosaic.indices
+    keys = np.concatenate([phases.center_px, phases.nearest_px], axis=1)
+    if target is not None and target.readout == "mean":
+        axes = zip(phases.center_px.T, (tile.T, tile), strict=True)
+        keys = np.stack([_folded(along, _mirror(rows), len(rows)) for along, rows in axes], axis=1)
+        if np.array_equal(tile, tile.T):
+            keys = np.sort(keys, axis=1)
+    _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    return phases.subset(first[order]), np.argsort(order)[which.ravel()]
+
+
+def _folded(along: FloatArray, mirror: float | None, period: int) -> FloatArray:
+    """Places along an axis, each as the one of its mirror images that stands for it."""
+    if mirror is None:
+        return np.asarray(np.mod(along, period))
+    beyond = np.mod(along - mirror, period)
+    return np.asarray(np.minimum(beyond, period - beyond))
+
+
+def _mirror(rows: IndexArray) -> float | None:
+    """Where rows are their own mirror image, pixels; None where they are not."""
+    n = len(rows)
+    mirrors = [m for m in range(n) if np.array_equal(rows[(m - np.arange(n)) % n], rows)]
+    return mirrors[0] / 2 if mirrors else None
+
+
+def read_at(target: Target, centers_px: FloatArray) -> Phases:
+    """Phases at some centers; of a readout at the center with each of the pixels that are equally near."""
+    low, high = np.ceil(centers_px - 0.5), np.floor(centers_px + 0.5)
+    result = Phases(centers_px, low)
+    if target.readout == "center":
+        for column, row in ((high[:, 0], low[:, 1]), (low[:, 0], high[:, 1]), (high[:, 0], high[:, 1])):
+            nearest = np.stack([column, row], axis=1)
+            more = np.flatnonzero((nearest != low).any(axis=1))
+            result = Phases(
+                np.concatenate([result.center_px, centers_px[more]]), np.concatenate([result.nearest_px, nearest[more]])
+            )
+    return result
+
+
+def refined_minima(
+    view: View, lattice: Phases, values: FloatArray, evaluate: Callable[[Phases], FloatArray]
+) -> FloatArray:
+    """Smallest values over all phases, ndarray[n_values], by refinement of the smallest ones of a lattice.
+
+    A pattern search: of the phases around a start at half the lattice's step the best one is the next start, and so on
+    with half the step before. It finds a minimum near the lattice's best phases; that no lower one lies elsewhere is
+    not proven.
+
+    Parameters
+    ----------
+    view : View
+        Scene and accuracy.
+    lattice : Phases
+        The phases that are known.
+    values : ndarray[n_values, n_lattice]
+        Functions of the phase at these.
+    evaluate : callable
+        From phases to the values there, ndarray[n_values, n_phases].
+    """
+    target, finest = view.scenario.target, view.accuracy.finest_phase_px
+    best = values.min(axis=1)
+    step = 0.5 / view.accuracy.phase_steps_per_px
+    if target is None or not finest or step < finest:
+        return np.asarray(best)
+    first = np.unique(different_phases(view, lattice)[1], return_index=True)[1]  # mirrored phases are no other starts
+    starts = first[np.argsort(values[:, first], axis=1, kind="stable")[:, :_STARTS]]
+    centers = lattice.center_px[starts]  # [n_values, n_starts, 2]
+    at_start = np.take_along_axis(values, starts, axis=1)
+    known: dict[tuple[float, ...], FloatArray] = {}
+    moving = np.ones(at_start.shape, dtype=bool)
+    while step >= finest:
+        around = np.unique((centers[moving][:, None] + step * _NEIGHBORS).reshape(-1, 2), axis=0)
+        read = read_at(target, around)
+        phases, which = different_phases(view, read)
+        at_phases = _known_or_evaluated(phases, known, evaluate)[:, which]
+        for value, start in np.argwhere(moving):
+            close = np.flatnonzero((np.abs(read.center_px - centers[value, start]) <= step * (1 + 1e-9)).all(axis=1))
+            lowest = close[int(at_phases[value, close].argmin())]
+            moving[value, start] = at_phases[value, lowest] < at_start[value, start]
+            if moving[value, start]:
+                at_start[value, start], centers[value, start] = at_phases[value, lowest], read.center_px[lowest]
+        if not moving.any():
+            moving[:], step = True, step / 2
+    return np.asarray(np.minimum(best, at_start.min(axis=1)))
+
+
+def _known_or_evaluated(
+    phases: Phases, known: dict[tuple[float, ...], FloatArray], evaluate: Callable[[Phases], FloatArray]
+) -> FloatArray:
+    """Values at phases, ndarray[n_values, n_phases], each evaluated once."""
+    keys = [tuple(row) for row in np.concatenate([phases.center_px, phases.nearest_px], axis=1).tolist()]
+    new = np.array([at for at, key in enumerate(keys) if key not in known], dtype=np.intp)
+    if new.size:
+        known.update(zip((keys[at] for at in new), evaluate(phases.subset(new)).T, strict=True))
+    return np.stack([known[key] for key in keys], axis=1)

@@ -1,0 +1,215 @@
+"""Pixel response: the weight of each quantum efficiency in each readout element, at each sampling phase.
+
+Optics do not depend on the filter. So everything between the scene and the pixels' electrons is a weight per wavelength
+for each readout element (a channel's mean, or a single pixel) and each channel whose filter it looks through.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ..base.cache import Cache
+from ..base.types import FloatArray
+from ..curves.hats import hats
+from . import crosstalk, disc_image, psf, sampling
+from .demosaic import center_weights
+from .field import field_heights, over_field
+from .irradiance import way_of_light
+from .memory import pixels_per_phase
+from .phases import Phases
+from .split_light import SplitLight
+from .view import View
+
+_HELD = 8_000_000
+"""Values of pixels that are held at once."""
+_KEPT_BYTES = 16 * 2**20
+"""Responses that take more are not kept."""
+
+
+@dataclass(frozen=True)
+class PixelResponse:
+    """Weights of a scene.
+
+    `source`: `light` as an array, or, of the pixels of a target, in factors. `uniform`: ndarray[n_phases, n_elements,
+    n_channels], the same of a uniform background, which nothing has dimmed yet. `readout`: ndarray[n_phases,
+    n_elements, n_channels], weight of each element in the value of each channel, `spread`: of its variance in that of
+    the channel. `by_channel`: whether each element is a channel; else it is a pixel.
+    """
+
+    source: FloatArray | SplitLight
+    uniform: FloatArray
+    readout: FloatArray
+    spread: FloatArray
+    by_channel: bool
+
+    @cached_property
+    def light(self) -> FloatArray:
+        """What an element gets of a signal's light through each channel's filter, relative to a uniform field on axis
+        in clear air, ndarray[n_phases, n_elements, n_channels, n_wavelengths].
+        """
+        return self.source.whole() if isinstance(self.source, SplitLight) else self.source
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Phases and elements."""
+        return self.source.shape[0], self.source.shape[1]
+
+
+def colorless(view: View) -> View:
+    """What responses depend on: the view without filters, which is the same for all CFAs whose tiles are alike."""
+    nothing = np.zeros_like(view.qe)
+    bare = replace(view, mosaic=view.mosaic.colorless, modified=(), technologies=())
+    return replace(bare, qe=nothing, clear_qe=np.zeros_like(view.clear_qe))
+
+
+def pixel_response(view: View, phases: Phases | None, *, by_pixel: bool) -> PixelResponse:
+    """The response at every wavelength of the grid, of one field position after the other.
+
+    Parameters
+    ----------
+    view : View
+        Camera, scene and accuracy.
+    phases : Phases or None
+        Sampling phases of a target; None where the light fills the field.
+    by_pixel : bool
+        Keep the pixels apart, for a readout that is not linear.
+    """
+    wavelength_nm = view.grid.nodes_nm
+    if view.scenario.field is not None:
+        return _joined([pixel_response(position, phases, by_pixel=by_pixel) for position in over_field(view)])
+    if phases is None:
+        made = _uniform(view, by_pixel=by_pixel)
+        return replace(made, source=made.light * way_of_light(view, wavelength_nm))
+    knots = psf.psf_knots_nm(wavelength_nm, view.accuracy.psf_step_nm)
+    if by_pixel:
+        made = _pixels(view, knots, phases, by_pixel=True)
+    else:
+        step = max(1, _HELD // (pixels_per_phase(view) * max(len(view.mosaic.channels) ** 2, knots.size)))
+        blocks = [phases.subset(slice(at, at + step)) for at in range(0, len(phases), step)]
+        made = _joined([_pixels(view, knots, block, by_pixel=False) for block in blocks])
+    same = knots.size == wavelength_nm.size or _one_light(made.source)
+    between = None if same else hats(wavelength_nm, knots)
+    factor = way_of_light(view, wavelength_nm)
+    if isinstance(made.source, SplitLight):
+        shares = made.source.shares
+        shares = shares if shares is None or between is None else shares @ between
+        return replace(made, source=replace(made.source, shares=shares, factor=factor))
+    return replace(made, source=(made.light if between is None else made.light @ between) * factor)
+
+
+def _one_light(source: FloatArray | SplitLight) -> bool:
+    """Whether every wavelength sees the same."""
+    return source.shares is None if isinstance(source, SplitLight) else bool(source.shape[-1] == 1)
+
+
+_RESPONSES: Cache[bytes, PixelResponse] = Cache(8)
+"""The latest responses of channels: CFAs with tiles of one pattern share theirs."""
+
+
+def kept_response(view: View, phases: Phases | None, *, by_pixel: bool) -> PixelResponse:
+    """`pixel_response` for the phases of the scene; kept where it is small."""
+    heights = field_heights(view)  # filters that move need more positions than those that do not
+    count = 1 if phases is None else len(phases)
+    if by_pixel or 8 * count * len(heights) * len(view.mosaic.channels) ** 2 * view.grid.size > _KEPT_BYTES:
+        return pixel_response(view, phases, by_pixel=by_pixel)
+    key = hashlib.sha256(pickle.dumps((heights, count, colorless(view)))).digest()
+    # The heights are those of the view's own filters, which a colorless one does not have.
+    return _RESPONSES.get(key, lambda: pixel_response(view, phases, by_pixel=False))
+
+
+def _uniform(view: View, *, by_pixel: bool) -> PixelResponse:
+    """A field without structure: one tile stands for all."""
+    tile, n = view.mosaic.indices, len(view.mosaic.channels)
+    own = (tile[..., None] == np.arange(n)).astype(float)
+    share = crosstalk.share(view)
+    split = crosstalk.mixed(own[None], share, periodic=True).reshape(1, tile.size, n, 1)
+    weights = own.reshape(-1, n) / view.mosaic.counts
+    if by_pixel and share and tile.size > n:
+        return PixelResponse(split, split[..., 0], weights[None], weights[None] ** 2, by_channel=False)
+    folded = np.einsum("uc,xukl->xckl", weights, split)
+    return PixelResponse(
+        folded, folded[..., 0], np.eye(n)[None], np.diag(1 / view.mosaic.counts)[None], by_channel=True
+    )
+
+
+def _joined(parts: list[PixelResponse]) -> PixelResponse:
+    if len(parts) == 1:
+        return parts[0]
+    arrays = ([part.light, part.uniform, part.readout, part.spread] for part in parts)
+    light, uniform, readout, spread = (np.concatenate(each) for each in zip(*arrays, strict=True))
+    return PixelResponse(light, uniform, readout, spread, parts[0].by_channel)
+
+
+def _profile(view: View, wavelength_nm: FloatArray) -> psf.DiscProfile | None:
+    """The light's blurred image, as far as any pixel of the readout can be; None where blur is left out."""
+    target = view.scenario.target
+    if target is None or not view.computes("blur"):
+        return None
+    pitch_um = view.pixel.pitch_um
+    furthest_px = 2**0.5 * (sampling.reach_px(view, target) + 2.5)
+    sizes = (sampling.radii_px(view, target)[0] * pitch_um, furthest_px * pitch_um)
+    w20_um = psf.defocus_um(view.scenario, pitch_um)
+    return psf.profile(*sizes, tuple(wavelength_nm * 1e-3), view.scenario.optics.f_number, w20_um)
+
+
+def _pixels(view: View, wavelength_nm: FloatArray, phases: Phases, *, by_pixel: bool) -> PixelResponse:
+    """Every pixel of the readout, at every phase."""
+    target, pixel, n = view.scenario.target, view.pixel, len(view.mosaic.channels)
+    assert target is not None
+    radius, half = sampling.radii_px(view, target)[0], pixel.fill_factor**0.5 / 2
+    seen, own, apart = _weights(view, phases)
+    share = crosstalk.share(view)
+    spread = crosstalk.mixed(apart, share) if share else apart
+    wanted = np.asarray((spread > 0).any(axis=3))
+    profile = _profile(view, wavelength_nm)
+    light = disc_image.light_on_pixels(seen, wanted, half, radius, profile, pixel.pitch_um)
+    if by_pixel:
+        return _apart(light, own, apart, share)
+    # What each channel's readout takes of the pixels of each channel: [cases, rows, columns, channels x channels].
+    taken = spread[..., :, None] * own[..., None, :]
+    shape = (len(apart), n, n)
+    folded = light.folded(taken.reshape(*taken.shape[:3], n * n)).reshape(*shape, -1)
+    weights = np.repeat(np.eye(n)[None], len(apart), axis=0)
+    return PixelResponse(folded, taken.sum(axis=(1, 2)), weights, weights, by_channel=True)
+
+
+def _weights(view: View, phases: Phases) -> tuple[sampling.Window, FloatArray, FloatArray]:
+    """The pixels around the light, whose channel each is, ndarray[rows, columns, n_channels], and its weight in the
+    value of each, ndarray[n_cases, rows, columns, n_channels].
+    """
+    target, mosaic, n = view.scenario.target, view.mosaic, len(view.mosaic.channels)
+    assert target is not None
+    seen = sampling.window(mosaic, phases.center_px, sampling.reach_px(view, target))
+    if target.readout == "mean":
+        half, readout = view.pixel.fill_factor**0.5 / 2, sampling.radii_px(view, target)[1]
+        weights = sampling.mean_weights(seen, half, readout, n)
+    else:
+        weights = center_weights(seen, phases.nearest_px - phases.center_px, mosaic)
+    own = (seen.channel[..., None] == np.arange(n)).astype(float)
+    return seen, own, weights[..., None] * own
+
+
+def _apart(light: disc_image.PixelLight, own: FloatArray, apart: FloatArray, share: float) -> PixelResponse:
+    """The pixels one by one: those with a weight in any readout."""
+    used = (apart > 0).any(axis=(0, 3))
+    rows, columns = np.nonzero(used)
+    taken = [((1 - share), rows, columns)]
+    if share:  # see `crosstalk.mixed`; a pixel at the border has no weight
+        steps = ((-1, 0), (1, 0), (0, -1), (0, 1))
+        taken += [(share / 4, rows + down, columns + right) for down, right in steps]
+    n = own.shape[2]
+    uniform = np.zeros((len(apart), rows.size, n))
+    pixels, channel = np.arange(rows.size), own.argmax(axis=2)
+    for part, row, column in taken:
+        uniform[:, pixels, channel[row, column]] += part
+    parts = np.array([part for part, _, _ in taken])
+    place = np.stack([light.place[:, row, column] for _, row, column in taken])
+    through = np.stack([channel[row, column] for _, row, column in taken])
+    split = SplitLight(light.values, light.shares, np.ones(1), parts, place, through, n)
+    readout = apart[:, used]
+    return PixelResponse(split, uniform, readout, readout**2, by_channel=False)

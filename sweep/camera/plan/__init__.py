@@ -1,1 +1,0 @@
-"""Which effects a scene calls for, and the proof of what the others change."""

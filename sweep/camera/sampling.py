@@ -1,0 +1,74 @@
+"""Mosaic sampling: which pixels a light covers, and how they are read out."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.types import FloatArray, IndexArray
+from .mosaic import Mosaic
+from .scene import Target
+from .view import View
+
+
+@dataclass(frozen=True)
+class Window:
+    """Pixels around a light for some places of its center.
+
+    `channel`: ndarray[rows, columns] of channel indices; `dx`, `dy`: ndarray[n_cases, rows, columns], pixels from the
+    light's center. One pixel of margin on every side has no weight in any readout.
+    """
+
+    channel: IndexArray
+    dx: FloatArray
+    dy: FloatArray
+
+    @property
+    def columns(self) -> FloatArray:
+        """`dx` of each column, ndarray[n_cases, columns]."""
+        return np.ascontiguousarray(self.dx[:, 0, :])
+
+    @property
+    def rows(self) -> FloatArray:
+        """`dy` of each row, ndarray[n_cases, rows]."""
+        return np.ascontiguousarray(self.dy[:, :, 0])
+
+
+def radii_px(view: View, target: Target) -> tuple[float, float]:
+    """Radius of the light and of the readout, in pixels; a readout reaches a pixel of every channel."""
+    radius = target.object_resolution_px / 2
+    rows, columns = view.mosaic.indices.shape
+    return radius, max(radius, math.hypot(rows, columns) / 2)
+
+
+def reach_px(view: View, target: Target) -> float:
+    """How far from the light's center a pixel may have a weight in the readout, along a row or column."""
+    if target.readout == "mean":
+        return radii_px(view, target)[1] + 0.5
+    return float(max(view.mosaic.indices.shape))
+
+
+def window(mosaic: Mosaic, phases_px: FloatArray, reach_px: float) -> Window:
+    """All pixels within `reach_px` (and the margin) of the light's centers, ndarray[n_cases, 2] as (column, row)."""
+    low = np.floor(phases_px.min(axis=0) - reach_px).astype(int) - 1
+    high = np.ceil(phases_px.max(axis=0) + reach_px).astype(int) + 1
+    columns, rows = (np.arange(a, b + 1) for a, b in zip(low, high, strict=True))
+    tile = mosaic.indices
+    channel = tile[np.ix_(rows % tile.shape[0], columns % tile.shape[1])]
+    shape = len(phases_px), rows.size, columns.size
+    dx = np.broadcast_to((columns - phases_px[:, :1])[:, None], shape)
+    dy = np.broadcast_to((rows - phases_px[:, 1:])[:, :, None], shape)
+    return Window(channel, dx, dy)
+
+
+def mean_weights(seen: Window, half: float, readout_px: float, n_channels: int) -> FloatArray:
+    """Weight of each pixel in the mean of its channel, ndarray[n_cases, rows, columns]; each channel's sum to 1."""
+    from .compiled_light import covered_by_disc  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+    weights = covered_by_disc(seen.columns, seen.rows, half, readout_px)
+    for channel in range(n_channels):
+        own = seen.channel == channel
+        weights[:, own] /= weights[:, own].sum(axis=1, keepdims=True)
+    return weights

@@ -1,0 +1,131 @@
+"""Rows of a run against the reference settings: every effect, and the finest accuracy."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+
+from ..base.types import FloatArray
+from ..camera.accuracy import REFERENCE
+from ..camera.forward import ForwardModel
+from ..camera.view import View
+from ..designs.space import Space
+from ..metrics.evaluate import evaluate
+from ..metrics.quantity import WORST_CASE
+from ..results.designs import row_space
+from ..results.facts import CheckFacts
+from ..study import Study
+from .routes import worst_cases
+
+_AT_ONCE = 64
+"""Designs that are computed again in one block."""
+_MOST_ROWS = 1000
+"""Rows of a check at the end of a run, at most."""
+
+Row = Mapping[str, Any]
+
+
+def reference_view(view: View) -> View:
+    """The view with every effect, at the reference settings."""
+    return replace(view.with_all_effects, accuracy=REFERENCE)
+
+
+def allowed_dn(view: View, tolerance_dn: float) -> float:
+    """Difference of a CSD from the reference that is no fault, DN.
+
+    That is the tolerance. A readout in whole numbers without noise steps between phases and field positions, by up to
+    sqrt(channels) DN: where the worst of all of them counts, that is added.
+    """
+    steps = view.scenario.noise is None and view.computes("quantization")
+    rounding = math.sqrt(len(view.mosaic.channels)) if steps and (view.all_phases or view.all_heights) else 0.0
+    return tolerance_dn + rounding
+
+
+def compared_rows(study: Study, rows: Sequence[Row]) -> Iterator[list[dict[str, Any]]]:
+    """Compare rows of the result table with the reference, a block of designs of one space and scene at a time.
+
+    Each has `design_id`, `filter_id`, `scenario`, `plan`, `allowed_dn`, `realized_dn`: the largest difference of any
+    CSD, infinite where only one of both is a number, and the `quantity` that has it.
+    """
+    groups: dict[tuple[int, str], tuple[Space, list[Row]]] = {}
+    for row in rows:
+        space = row_space(study, row)
+        groups.setdefault((id(space), row["scenario"]), (space, []))[1].append(row)
+    for (_, scenario), (space, own) in groups.items():
+        for start in range(0, len(own), _AT_ONCE):
+            yield _compared(study, space, scenario, own[start : start + _AT_ONCE])
+
+
+def _compared(study: Study, space: Space, scenario: str, rows: Sequence[Row]) -> list[dict[str, Any]]:
+    points = np.array([[row[name] for name in space.parameters] for row in rows], dtype=float)
+    view = study.view(space, scenario)
+    exact = _at_reference(study, space, view, points)
+    differences = []
+    for name, values in exact.items():
+        kept = np.array([row[name] for row in rows], dtype=float)
+        # A column that the scene does not have is missing in both; one that is missing in one of them is a fault.
+        both_missing = np.isnan(kept) & np.isnan(values)
+        differences.append(np.nan_to_num(np.where(both_missing, 0.0, np.abs(values - kept)), nan=np.inf))
+    each, names = np.stack(differences), list(exact)
+    allowed = allowed_dn(view, study.plans[scenario].tolerance_dn if study.plans else study.section.tolerance_dn)
+    return [
+        {key: row[key] for key in ("design_id", "filter_id", "scenario", "plan")}
+        | {"allowed_dn": allowed, "realized_dn": float(each[at, index]), "quantity": names[at]}
+        for index, (row, at) in enumerate(zip(rows, each.argmax(axis=0), strict=True))
+    ]
+
+
+def _at_reference(study: Study, space: Space, view: View, points: FloatArray) -> dict[str, FloatArray]:
+    """CSDs at the reference settings, ndarray[n_designs] each."""
+    model = ForwardModel(reference_view(view))
+    nominal = evaluate(model, space.curves(points, study.grid.size))
+    asked = [quantity for quantity in study.quantities.values() if quantity.promised]
+    worst = [quantity for quantity in asked if quantity.extreme == WORST_CASE]
+    found = {quantity.name: nominal[quantity.name] for quantity in asked if quantity not in worst}
+    return found | (worst_cases(space, model, points, nominal, worst, study.tolerance) if worst else {})
+
+
+def check_run(study: Study, results: Path, seconds: float) -> CheckFacts | None:
+    """Compare a seeded sample of a run's rows with the reference, as many as fit into some seconds, at least one.
+
+    None where no row of the table could be computed.
+    """
+    ended = time.monotonic() + seconds
+    rows: list[dict[str, Any]] = []
+    for row in _sampled(study, results):
+        for compared in compared_rows(study, [row]):
+            rows += compared
+        if time.monotonic() > ended:
+            break
+    if not rows:
+        return None
+    worst = max(rows, key=lambda row: row["realized_dn"] - row["allowed_dn"])
+    largest = max(rows, key=lambda row: row["realized_dn"])
+    shown = worst if worst["realized_dn"] > worst["allowed_dn"] else largest
+    return CheckFacts(
+        rows=len(rows),
+        design_id=int(shown["design_id"]),
+        scenario=str(shown["scenario"]),
+        quantity=str(shown["quantity"]),
+        largest_dn=float(shown["realized_dn"]),
+        allowed_dn=float(shown["allowed_dn"]),
+    )
+
+
+def _sampled(study: Study, results: Path) -> Iterator[dict[str, Any]]:
+    """Rows of a result table in a random order that the study's seed gives; those that failed are left out."""
+    with pq.ParquetFile(results) as table:
+        starts = np.cumsum([0, *(table.metadata.row_group(at).num_rows for at in range(table.num_row_groups))])
+        rng, n = np.random.default_rng([study.section.seed, 5]), int(starts[-1])
+        for index in rng.choice(n, size=min(n, _MOST_ROWS), replace=False).tolist():
+            group = int(np.searchsorted(starts, index, side="right")) - 1
+            (row,) = table.read_row_group(group).slice(index - int(starts[group]), 1).to_pylist()
+            if row["status"] == "ok":
+                yield {name: math.nan if value is None else value for name, value in row.items()}

@@ -1,0 +1,234 @@
+"""The image of a disc and what pixels see of it, against integrals, areas and what a pupil's autocorrelation says."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from sweep.base.types import FloatArray
+from sweep.camera import psf
+from sweep.camera.disc_image import MEANS, covered, different, light_on_pixels
+from sweep.camera.effects.sampling import Window
+from sweep.camera.pixel import Optics, Pixel
+from sweep.camera.scene import Scene, Target
+
+_VISIBLE_UM = np.arange(400, 701, 10) * 1e-3
+
+
+def window_around(places_px: list[tuple[float, float]], reach: int) -> Window:
+    """All pixels of which one is at most `reach` rows and columns from the origin."""
+    at = np.arange(-reach, reach + 1.0)
+    shape = len(places_px), at.size, at.size
+    x, y = np.array(places_px).T[..., None, None]
+    dx, dy = np.broadcast_to(at - x, shape), np.broadcast_to(at[:, None] - y, shape)
+    return Window(np.zeros(shape[1:], dtype=np.intp), dx, dy)
+
+
+def pixel_light(window: Window, profile: psf.DiscProfile | None, radius_px: float, pitch_um: float) -> FloatArray:
+    wanted = np.ones(window.dx.shape, dtype=bool)
+    return light_on_pixels(window, wanted, 0.5, radius_px, profile, pitch_um).by_pixel()
+
+
+@pytest.mark.parametrize(("radius_um", "f_number"), [(0.3, 4.0), (8.0, 2.0)])
+def test_an_image_in_focus_is_its_integral(radius_um: float, f_number: float) -> None:
+    from scipy.integrate import quad
+    from scipy.special import j0, j1
+
+    profile = psf.DiscProfile(radius_um, 12.0, _VISIBLE_UM, f_number, 0.0)
+    for index in (0, 17, -1):
+        cutoff = 1 / (_VISIBLE_UM[index] * f_number)
+        for r_um in (0.0, 0.9 * radius_um, radius_um, radius_um + 1.0, 11.7):
+
+            def integrand(nu: float, cutoff: float = cutoff, r_um: float = r_um) -> float:
+                s = min(nu / cutoff, 1.0)
+                otf = 2 / math.pi * (math.acos(s) - s * math.sqrt(1 - s * s))
+                disc = 2 * math.pi * radius_um * j1(2 * math.pi * radius_um * nu)
+                return float(disc * j0(2 * math.pi * r_um * nu) * otf)
+
+            expected = quad(integrand, 0.0, cutoff, epsabs=1e-12, epsrel=1e-12, limit=500)[0]
+            # The cubic spline between the table's nodes, 24 per period of the finest detail, is off by 1e-7.
+            assert profile.at(np.array(r_um))[index] == pytest.approx(expected, abs=3e-7)
+
+
+@pytest.mark.parametrize("w20_um", [0.0, 1.5])
+@pytest.mark.parametrize(("radius_um", "reach_um"), [(0.1, 1.0), (5.0, 6.0), (40.0, 70.0)])
+def test_few_functions_are_the_image_at_every_wavelength(radius_um: float, reach_um: float, w20_um: float) -> None:
+    from scipy.special import j0
+
+    profile = psf.DiscProfile(radius_um, reach_um, _VISIBLE_UM, 4.0, w20_um)
+    frequency, spectrum = profile.spectrum
+    r_um = profile._spline.t[4:-4]  # at its nodes a spline is what it goes through
+    exact = j0(2 * math.pi * np.outer(r_um, frequency)) @ spectrum
+    np.testing.assert_allclose(profile.at(r_um), exact, rtol=0, atol=1e-12)
+    assert len(profile.shares) <= _VISIBLE_UM.size
+    np.testing.assert_allclose(profile.shares @ profile.shares.T, np.eye(len(profile.shares)), atol=1e-13)
+
+
+def test_sums_are_those_of_the_image() -> None:
+    rng = np.random.default_rng(1)
+    profile = psf.DiscProfile(6.0, 20.0, _VISIBLE_UM, 2.8, 0.4)
+    r_um, weights = rng.uniform(0.0, 20.0, (30, 7)), rng.uniform(-1.0, 1.0, 7)
+    r_um[0] = 0.0, 1e-9, 0.01, 0.02, 19.97, 19.99, 20.0
+    expected = np.einsum("m,nmk->nk", weights, profile.at(r_um))
+    np.testing.assert_allclose(profile.sums(r_um, weights) @ profile.shares, expected, rtol=0, atol=1e-13)
+
+
+def test_the_same_profile_is_made_once() -> None:
+    given = 6.0, 20.0, tuple(_VISIBLE_UM), 2.8, 0.0
+    assert psf.profile(*given) is psf.profile(*given)
+    assert psf.profile(*given) is not psf.profile(*given[:-1], 0.1)
+
+
+@pytest.mark.parametrize("waves", [0.0, 0.3, 2.0])
+def test_the_otf_is_the_autocorrelation_of_the_pupil(waves: float) -> None:
+    wavelength_um, f_number, n = 0.55, 2.8, 1500
+    w20_um = waves * wavelength_um
+    for s in (0.0, 0.05, 0.2, 0.5, 0.8, 0.97):
+        # The pupil has radius 1, and its two copies are shifted by 2 s.
+        side = (np.arange(n) + 0.5) * 2 / n - 1
+        x, y = np.meshgrid(side, side)
+        copies = []
+        for shift in (s, -s):
+            squared = (x + shift) ** 2 + y**2
+            copies.append((squared <= 1) * np.exp(2j * math.pi * waves * squared))
+        expected = (copies[0] * copies[1].conj()).sum().real * (2 / n) ** 2 / math.pi
+        nu = np.array([s / (wavelength_um * f_number)])
+        result = psf.otf(nu, np.array([wavelength_um]), f_number, w20_um)[0, 0]
+        assert result == pytest.approx(expected, abs=1e-4)  # of the grid at the pupil's edge
+
+
+def test_the_otf_ends_at_the_cutoff() -> None:
+    nu = np.array([0.0, 0.5, 1.0, 2.0])
+    in_focus, defocused = (psf.otf(nu, np.array([0.5]), 2.0, w20_um)[:, 0] for w20_um in (0.0, 0.7))
+    for result in (in_focus, defocused):
+        assert result[0] == pytest.approx(1.0, abs=1e-14)
+        np.testing.assert_allclose(result[2:], 0.0, atol=1e-15)
+    assert abs(defocused[1]) < in_focus[1]
+
+
+@pytest.mark.parametrize("w20_um", [0.0, 0.2])
+def test_pixels_have_all_light_but_that_of_diffraction_tails(w20_um: float) -> None:
+    """A point's encircled energy 1 - J0^2 - J1^2 (Rayleigh) is 1 - 2 lambda N / (pi^2 r) far away, on average.
+
+    So its image is lambda N / (pi^3 r^3), which leaves 4 sqrt(2) lambda N / (pi^3 L) outside a square of side 2 L, 0.3
+    to 0.5 % here. Taken over a disc of radius R this is (1 + 5 / 16 (R / L)^2) times as much. What follows is of the
+    order of (R / L)^4, less than 1e-7 of the light. Defocus with a blur circle of radius b adds less than (b / L)^2.
+    """
+    radius_px, pitch_um, f_number, reach = 1.3, 2.0, 2.0, 24
+    wavelength_um = np.array([0.45, 0.55, 0.65])
+    outer_um = (reach + 0.5) * pitch_um
+    profile = psf.DiscProfile(radius_px * pitch_um, 2**0.5 * outer_um, wavelength_um, f_number, w20_um)
+    light = pixel_light(window_around([(0.0, 0.0)], reach), profile, radius_px, pitch_um)
+    share = light.sum(axis=(0, 1, 2)) / (math.pi * radius_px**2)
+    lost = 4 * 2**0.5 * wavelength_um * f_number / (math.pi**3 * outer_um)
+    lost *= 1 + 5 / 16 * (radius_px * pitch_um / outer_um) ** 2
+    blur_radius_um = 4 * f_number * w20_um
+    assert np.all(np.abs(share - (1 - lost)) < 1e-7 + lost * (blur_radius_um / outer_um) ** 2)
+
+
+def test_a_disc_has_all_light_but_that_of_diffraction_tails() -> None:
+    """As for pixels; the next term is of the order of (R / R')^2, 2e-8 of the light."""
+    wavelength_um, f_number, radius_um, readout_um = np.array([0.45, 0.65]), 2.0, 2.0, 400.0
+    share = psf.mean_over_disc(radius_um, readout_um, wavelength_um, f_number, 0.0) * (readout_um / radius_um) ** 2
+    lost = 2 * wavelength_um * f_number / (math.pi**2 * readout_um)
+    np.testing.assert_allclose(share, 1 - lost, rtol=0, atol=3e-8)
+
+
+def test_the_mean_over_a_disc_is_that_of_its_profile() -> None:
+    radius_um, readout_um = 5.0, 7.0
+    profile = psf.DiscProfile(radius_um, readout_um, _VISIBLE_UM, 4.0, 0.3)
+    nodes, weights = psf.gauss_legendre(200)
+    r_um = (nodes + 1) * readout_um / 2
+    expected = (weights * readout_um / 2 * 2 * r_um / readout_um**2) @ profile.at(r_um)
+    result = psf.mean_over_disc(radius_um, readout_um, _VISIBLE_UM, 4.0, 0.3)
+    np.testing.assert_allclose(result, expected, rtol=0, atol=1e-7)
+
+
+def test_a_fast_lens_is_sharp_in_the_limit() -> None:
+    radius_px, pitch_um, window = 1.8, 3.0, window_around([(0.1, 0.3)], 3)
+    sharp = pixel_light(window, None, radius_px, pitch_um)
+    np.testing.assert_allclose(sharp[..., 0], covered(window.dx, window.dy, 0.5, radius_px), rtol=0, atol=1e-14)
+    wavelength_um = np.array([0.1, 0.2, 0.4])
+    profile = psf.DiscProfile(radius_px * pitch_um, 5.5 * pitch_um, wavelength_um, 0.5, 0.0)
+    away = np.abs(pixel_light(window, profile, radius_px, pitch_um) - sharp).max(axis=(0, 1, 2))
+    assert away[0] < 0.1 / 3.0 * 0.5  # lambda N in pixels
+    # What goes over an edge is about proportional to lambda N.
+    assert np.all(away[:-1] < 0.55 * away[1:])
+
+
+@pytest.mark.parametrize("blurred", [False, True])
+def test_mirrored_pixels_see_the_same(blurred: bool) -> None:
+    radius_px, pitch_um = 1.7, 2.1
+    window = window_around([(0.0, 0.0), (0.25, 0.0), (-0.25, 0.0), (0.0, 0.25), (0.1, 0.3), (0.3, 0.1)], 4)
+    profile = psf.DiscProfile(radius_px * pitch_um, 7 * pitch_um, _VISIBLE_UM, 4.0, 0.1) if blurred else None
+    light = pixel_light(window, profile, radius_px, pitch_um)
+    np.testing.assert_array_equal(light[0], light[0].swapaxes(0, 1))
+    np.testing.assert_array_equal(light[0], light[0, ::-1])
+    np.testing.assert_array_equal(light[1], light[2, :, ::-1])
+    np.testing.assert_array_equal(light[1], light[3].swapaxes(0, 1))
+    np.testing.assert_array_equal(light[4], light[5].swapaxes(0, 1))
+
+
+def test_different_places_lead_back_to_each_pixel() -> None:
+    window = window_around([(0.0, 0.0), (0.25, 0.5), (0.5, 0.25)], 3)
+    wanted = np.hypot(window.dx, window.dy) < 3
+    places_px, place, swapped = different(window, wanted)
+    both = np.abs(np.stack([window.dx[wanted], window.dy[wanted]], axis=1))
+    np.testing.assert_allclose(places_px[place], np.sort(both, axis=1), atol=1e-12)
+    np.testing.assert_array_equal(swapped, both[:, 1] < both[:, 0])
+    assert len(np.unique(places_px, axis=0)) == len(places_px) < wanted.sum() / 3
+
+
+def test_pixels_that_are_not_wanted_are_dark_and_sums_are_weighted() -> None:
+    radius_px, pitch_um, rng = 2.0, 2.1, np.random.default_rng(2)
+    window = window_around([(0.0, 0.0), (0.25, 0.5)], 3)
+    wanted = np.hypot(window.dx, window.dy) < 2.5
+    profile = psf.DiscProfile(radius_px * pitch_um, 6 * pitch_um, _VISIBLE_UM, 4.0, 0.0)
+    MEANS.clear()
+    light = light_on_pixels(window, wanted, 0.5, radius_px, profile, pitch_um)
+    again = light_on_pixels(window, wanted, 0.5, radius_px, profile, pitch_um)
+    assert len(MEANS) == 1
+    np.testing.assert_array_equal(light.values, again.values)
+    by_pixel = light.by_pixel()
+    assert np.all(by_pixel[~wanted] == 0)
+    assert np.all(by_pixel[wanted] > 0)
+    weights = rng.uniform(0.0, 1.0, (*wanted.shape, 3)) * (rng.uniform(0.0, 1.0, wanted.shape) < 0.5)[..., None]
+    np.testing.assert_allclose(light.folded(weights), np.einsum("crxn,crxw->cnw", weights, by_pixel), atol=1e-13)
+
+
+def test_defocus_is_the_image_shift() -> None:
+    target = Target(distance_m=20.0, fov_deg=60.0)
+    assert psf.defocus_um(Scene(target=target), 2.1) == 0
+    assert psf.defocus_um(Scene(optics=Optics(focus_m=5.0)), 2.1) == 0
+    focal_m = target.focal_length_um(2.1) * 1e-6
+    shift_um = (1 / (1 / focal_m - 1 / 5.0) - 1 / (1 / focal_m - 1 / 20.0)) * 1e6
+    scene = Scene(target=target, optics=Optics(focus_m=5.0, f_number=2.0))
+    assert psf.defocus_um(scene, 2.1) == pytest.approx(shift_um / (8 * 2.0**2), rel=1e-9)
+
+
+def test_images_are_made_at_every_step_and_at_the_end() -> None:
+    grid = np.arange(400.0, 696.0)
+    np.testing.assert_array_equal(psf.psf_knots_nm(grid, 10.0), [*range(400, 700, 10), 695.0])
+    assert psf.psf_knots_nm(grid, 1.0) is grid
+    assert psf.psf_knots_nm(grid, 0.0) is grid
+
+
+@pytest.mark.parametrize(
+    ("distance_m", "diameter_m", "optics", "place"),
+    [
+        (20.0, 0.2, Optics(), None),
+        (5.0, 0.2, Optics(), ("target",)),
+        (0.01, 1e-4, Optics(), ("target", "distance_m")),
+        (20.0, 0.2, Optics(focus_m=0.01), ("optics", "focus_m")),
+        (20.0, 0.2, Optics(focus_m=0.1, f_number=0.5), ("optics", "focus_m")),
+        (20.0, 0.2, Optics(f_number=0.5), ("optics", "f_number")),
+    ],
+)
+def test_an_image_that_is_too_much_is_named(
+    distance_m: float, diameter_m: float, optics: Optics, place: tuple[str, ...] | None
+) -> None:
+    target = Target(distance_m=distance_m, diameter_m=diameter_m, fov_deg=60.0)
+    result = psf.too_much(Scene(target=target, optics=optics), Pixel())
+    assert (result if place is None else result and result[0]) == place
