@@ -29,9 +29,9 @@ from scipy.signal import fftconvolve
 from scipy.spatial.distance import cdist
 from scipy.special import j1
 
-from sweep.camera.imager import Imager
+from sweep.camera.forward import ForwardModel
 from sweep.camera.mosaic import Mosaic
-from sweep.camera.scenario import Scenario
+from sweep.camera.scene import Scene
 from sweep.camera.view import View
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
@@ -124,7 +124,7 @@ def swept(study: Study) -> tuple[Space, View]:
     return space, study.view(space, "chart")
 
 
-def distances(imager: Imager, block: Any) -> None:
+def distances(imager: ForwardModel, block: Any) -> None:
     """All CSDs of a block."""
     changing = imager.read_changing(block)
     assert changing is not None
@@ -137,7 +137,7 @@ def rate_of(route: str, study: Study, seconds: float) -> float:
     """Designs per second of a route in this process, over some seconds."""
     keep_freed_memory()
     space, view = swept(study)
-    imager, points = Imager(view), space.points(0, BLOCK)
+    imager, points = ForwardModel(view), space.points(0, BLOCK)
     edges = edges_of(space, 0, BLOCK)
     assert edges is not None
     work: dict[str, Callable[[], object]] = {
@@ -172,7 +172,7 @@ def kernels(study: Study, found: dict[str, Any]) -> None:
     """(a) Both routes against the scripts and the machine."""
     space, view = swept(study)
     points = space.points(0, BLOCK)
-    imager, members = Imager(view), view.members
+    imager, members = ForwardModel(view), view.members
     edges = edges_of(space, 0, BLOCK)
     assert edges is not None
     curves = space.curves(points, view.grid.size)
@@ -243,7 +243,7 @@ def exponents(study: Study, found: dict[str, Any]) -> None:
     space, view = swept(study)
 
     def timed(made: View, designs: int) -> float:
-        imager = Imager(made)
+        imager = ForwardModel(made)
         size = min(designs, BLOCK)
         some = space.curves(space.points(0, size), view.grid.size)
         if made.grid != view.grid:
@@ -296,16 +296,16 @@ def scene(study: Study, found: dict[str, Any]) -> None:
     """(f) A light at 250 m: each further design, and the first one with its kernels, against an image per design."""
     space, view = swept(study)
     far = {"target": {"distance_m": 250, "fov_deg": 30}, "optics": {"f_number": 2}}
-    view = replace(view, scenario=Scenario.model_validate(far))
+    view = replace(view, scenario=Scene.model_validate(far))
     target = view.scenario.target
     assert target is not None
     radius_um = target.object_resolution_px / 2 * view.pixel.pitch_um
     curves = space.curves(space.points(0, 64), view.grid.size)
-    imager = Imager(view)
+    imager = ForwardModel(view)
     direct = median_s(lambda: image_per_design(view, radius_um), 3)
     found["scene_image_s"] = direct
     found["scene_design_over_image"] = direct / (median_s(lambda: evaluate(imager, curves)) / len(curves))
-    found["scene_first_design_over_image"] = direct / median_s(lambda: evaluate(Imager(view), curves[:1]), 3)
+    found["scene_first_design_over_image"] = direct / median_s(lambda: evaluate(ForwardModel(view), curves[:1]), 3)
 
 
 def drawn(found: dict[str, Any]) -> None:

@@ -15,7 +15,7 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
-from sweep.camera.imager import Imager
+from sweep.camera.forward import ForwardModel
 from sweep.camera.view import View
 
 EPS = float(np.finfo(float).eps)
@@ -50,7 +50,7 @@ def terms_of(view: View) -> int:
 
 def brightest_dn(view: View, curves: np.ndarray) -> float:
     """The largest value that is read, DN, full scale or more: all its terms are positive, so it is their magnitude."""
-    return max(float(view.pixel.full_scale_dn), float(np.nanmax(np.abs(Imager(view).read(curves)[0]))))
+    return max(float(view.pixel.full_scale_dn), float(np.nanmax(np.abs(ForwardModel(view).read(curves)[0]))))
 
 
 def column_rounding(name: str, values: np.ndarray, view: View, magnitude_dn: float, more: int = 0) -> np.ndarray:

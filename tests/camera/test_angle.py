@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sweep.camera.imager import Imager
-from sweep.camera.linear import smooth_imager
+from sweep.camera.forward import ForwardModel
+from sweep.camera.linear import linear_model
 from sweep.camera.methods import REFERENCE
 from sweep.camera.plan.planner import Planner
 from sweep.camera.rays import Cone, rays
-from sweep.camera.scenario import Scenario
-from sweep.camera.seen import METHODS, RAYS, SeenFilters, cone_of
+from sweep.camera.scene import Scene
+from sweep.camera.angular import METHODS, RAYS, AngularResponse, cone_of
 from sweep.camera.sensor_field import SensorField
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.block import edges_of
@@ -71,7 +71,7 @@ def test_the_mean_over_a_cone_is_that_over_the_pupil(f_number: float, cra_deg: f
     channel, wave = made.view.modified[0], grid.nodes_nm
     base = made.view.base_qe[0]
     transmission = np.random.default_rng(3).uniform(size=wave.size)
-    seen = SeenFilters(made.view, "cone").curves((base * transmission)[None], [channel])[0] / base
+    seen = AngularResponse(made.view, "cone").curves((base * transmission)[None], [channel])[0] / base
     half = math.asin(0.5 / f_number)
     for at in (2, 11):
         exact = over_pupil(wave[at], wave, transmission, half, math.radians(cra_deg), 1.7)
@@ -122,16 +122,16 @@ def test_digital_numbers_are_means_over_rays(given: dict[str, Any], method: str)
     sine_squared, weights = rays(cone, RAYS[method]) if method in RAYS else single
     base, wave = view.base_qe[0], view.grid.nodes_nm
     filters = bare(wave, made.curves[0, 0] / base, np.arcsin(np.sqrt(sine_squared)), 1.8) * base
-    still = smooth_imager(replace(view, technologies=()))
+    still = linear_model(replace(view, technologies=()))
     expected = np.einsum("r,rxsc->xsc", weights, still.smooth(filters[:, None]))
-    np.testing.assert_allclose(smooth_imager(view).smooth(made.curves)[0], expected, rtol=1e-13, atol=1e-9)
+    np.testing.assert_allclose(linear_model(view).smooth(made.curves)[0], expected, rtol=1e-13, atol=1e-9)
 
 
 @pytest.mark.parametrize("given", GIVEN.values(), ids=GIVEN)
 def test_derivatives_see_what_the_rays_see(given: dict[str, Any]) -> None:
     """The response is affine in N: its derivative, and the weights of each wavelength, give it again."""
     made = moved(given | {"exposure": {"kind": "fixed", "exposure_s": 1e-3}})
-    imager, channel = smooth_imager(made.view), made.view.modified[0]
+    imager, channel = linear_model(made.view), made.view.modified[0]
     zero, own = imager.smooth(np.zeros_like(made.curves))[0], imager.smooth(made.curves)[0]
     scale = np.abs(own).max()
     by_curve = imager.gradient(made.curves[0], made.curves)[0]
@@ -148,8 +148,8 @@ def test_only_what_is_said_to_be_of_interference_moves() -> None:
         plans = [Planner([replace(made.box, view=view)]).plan("", tolerance) for tolerance in (1e-9, 10.0)]
         assert {plan.methods.angle for plan in plans} == {"skip"}
         for method in METHODS:
-            found = Imager(replace(view, methods=replace(REFERENCE, angle=method))).read(made.curves)[0]
-            np.testing.assert_array_equal(found, Imager(unsaid).read(made.curves)[0])
+            found = ForwardModel(replace(view, methods=replace(REFERENCE, angle=method))).read(made.curves)[0]
+            np.testing.assert_array_equal(found, ForwardModel(unsaid).read(made.curves)[0])
     reasons = {Planner([replace(made.box, view=view)])._exact["angle"] for view in (pigment, unsaid)}
     assert reasons == {"pigments do not move with the angle", "no technology is stated: filters as on axis"}
 
@@ -170,7 +170,7 @@ def test_a_plain_curve_of_interference_moves_on_the_clear_one() -> None:
     view = replace(made.view, technologies=moving, methods=replace(REFERENCE, angle="chief ray"))
     channel = view.fixed[0]
     own = np.minimum(view.qe[channel], clear)
-    seen = SeenFilters(view, "chief ray").curves(own[None], [channel])[0]
+    seen = AngularResponse(view, "chief ray").curves(own[None], [channel])[0]
     expected = clear * bare(wave, own / clear, np.array([math.radians(20.0)]), 1.8)[0]
     np.testing.assert_allclose(seen, expected, rtol=1e-12)
 
@@ -193,11 +193,11 @@ def test_a_field_is_the_worst_of_its_places(given: dict[str, Any]) -> None:
     each = []
     for height, cra_deg in zip((0.0, 0.5, 1.0), angles, strict=True):
         off_axis_deg = math.degrees(math.atan(height * math.tan(math.radians(35.0))))
-        own = Scenario.model_validate(
+        own = Scene.model_validate(
             given | {"optics": {"f_number": 1.6, "cra_deg": cra_deg}, "off_axis_deg": off_axis_deg}
         )
-        each.append(evaluate(Imager(replace(view, scenario=own)), curves))
-    imager = Imager(replace(view, scenario=field))
+        each.append(evaluate(ForwardModel(replace(view, scenario=own)), curves))
+    imager = ForwardModel(replace(view, scenario=field))
     names = promised_names(view, any_place=False)
     for designs in (curves, block):
         found = evaluate(imager, designs)
@@ -211,7 +211,7 @@ def test_derivatives_at_every_place_of_a_field() -> None:
     fixed = {"exposure": {"kind": "fixed", "exposure_s": 1e-3}, "background_cd_m2": 200.0, "off_axis_deg": 35.0}
     made = moved(fixed, cra_deg=0.0)
     field = made.view.scenario.model_copy(update={"field": SensorField(cra_max_deg=20.0, places=3)})
-    imager, channel = smooth_imager(replace(made.view, scenario=field)), made.view.modified[0]
+    imager, channel = linear_model(replace(made.view, scenario=field)), made.view.modified[0]
     zero, own = imager.smooth(np.zeros_like(made.curves))[0], imager.smooth(made.curves)[0]
     assert len(own) == 3
     scale = np.abs(own).max()
@@ -223,4 +223,4 @@ def test_derivatives_at_every_place_of_a_field() -> None:
 def test_a_field_in_which_nothing_moves_is_one_place() -> None:
     view = replace(moved({}, cra_deg=0.0).view, technologies=())
     field = view.scenario.model_copy(update={"field": SensorField(cra_max_deg=20.0)})
-    assert Imager(replace(view, scenario=field)).n_cases == 1
+    assert ForwardModel(replace(view, scenario=field)).n_cases == 1

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from sweep.base.cache import Cache
-from sweep.camera.imager import imager_of
+from sweep.camera.forward import forward_model
 from sweep.designs.block import Tables, edges_of
 
 from ..blocks import SPACE, VIEWS
@@ -117,6 +117,6 @@ def test_imagers_are_shared_by_threads() -> None:
     def work(number: int) -> None:
         for turn in range(20):
             mine = views[(turn * (number + 1)) % len(views)]
-            assert imager_of(mine).view.pixel.read_noise_e == mine.pixel.read_noise_e
+            assert forward_model(mine).view.pixel.read_noise_e == mine.pixel.read_noise_e
 
     at_once(work)

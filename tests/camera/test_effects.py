@@ -25,9 +25,9 @@ from sweep.camera.effects import (
     sampling,
     saturation,
 )
-from sweep.camera.noisy import gaussian, moments
+from sweep.camera.noise import gaussian, moments
 from sweep.camera.pixel import Pixel
-from sweep.camera.scenario import Scenario
+from sweep.camera.scene import Scene
 from sweep.camera.scene import Drive, FixedExposure, Target
 from sweep.curves.color import luminance_per_photon_radiance
 from sweep.curves.spectrum import LIGHT_M_S, PLANCK_J_S, WavelengthGrid
@@ -80,11 +80,11 @@ def test_the_transfer_function_is_the_autocorrelation_of_the_pupil(w20_um: float
 
 
 def test_defocus_is_the_shift_of_the_image() -> None:
-    scenario = Scenario.model_validate({"target": NEAR, "optics": {"f_number": 2.0, "focus_m": 2.0}})
+    scenario = Scene.model_validate({"target": NEAR, "optics": {"f_number": 2.0, "focus_m": 2.0}})
     f_mm = 2.1e-3 * 3840 / math.radians(120)
     shift_mm = 1 / (1 / f_mm - 1 / 2000) - 1 / (1 / f_mm - 1 / 20_000)
     assert blur.defocus_um(scenario, 2.1) == pytest.approx(1000 * shift_mm / (8 * 4), rel=1e-9)
-    assert blur.defocus_um(Scenario.model_validate({"target": NEAR, "optics": F2}), 2.1) == 0
+    assert blur.defocus_um(Scene.model_validate({"target": NEAR, "optics": F2}), 2.1) == 0
 
 
 @pytest.mark.parametrize("w20_um", [0.0, 0.7])
@@ -258,7 +258,7 @@ def test_flicker_by_sliding_an_exposure_over_the_pulses(duty: float, periods: fl
 
 
 def test_luminance_of_a_traffic_light() -> None:
-    assert Scenario(intensity_cd=200.0, exposure=FixedExposure(exposure_s=0.01)).luminance_cd_m2 == pytest.approx(
+    assert Scene(intensity_cd=200.0, exposure=FixedExposure(exposure_s=0.01)).luminance_cd_m2 == pytest.approx(
         6366, abs=0.5
     )
     grid = WavelengthGrid()

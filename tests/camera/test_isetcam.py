@@ -15,14 +15,14 @@ import numpy as np
 import pytest
 
 from sweep.camera.effects.blur import transfer
-from sweep.camera.imager import Imager
-from sweep.camera.linear import smooth_imager
+from sweep.camera.forward import ForwardModel
+from sweep.camera.linear import linear_model
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Optics, Pixel, irradiance_factor
 from sweep.camera.plan.bounds import Box
 from sweep.camera.plan.planner import Planner
 from sweep.camera.plan.work import DesignCount
-from sweep.camera.scenario import Scenario
+from sweep.camera.scene import Scene
 from sweep.camera.scene import FixedExposure
 from sweep.camera.view import View
 from sweep.curves.lights import Lights
@@ -63,7 +63,7 @@ def isetcam_view(mosaic: Mosaic, magnification: float, exposure_s: float, kept: 
     np.testing.assert_allclose(photons.sum(axis=1) * ref["bin_nm"], 1.0, rtol=1e-12)
     lights = Lights("isetcam", names, names, photons * kept, 1.0, "", False)
     qe = np.array(ref["qe"])[columns_of(mosaic)]
-    scenario = Scenario(
+    scenario = Scene(
         photon_radiance=total,
         optics=Optics(f_number=optics.f_number, transmission=dimmed),
         exposure=FixedExposure(exposure_s=exposure_s),
@@ -92,7 +92,7 @@ def electrons(cfa: str, mode: str) -> tuple[np.ndarray, dict[str, Any]]:
     run = next(r for r in ref["runs"] if r["cfa"] == cfa and r["mode"] == mode)
     every = Mosaic.from_rows("all", [ref["qe_names"]])
     view = isetcam_view(every, ref["skip_magnification"], run["skip_exposure_s"])
-    return smooth_imager(view).electrons.rates(NOTHING)[0, 0] * run["skip_exposure_s"], run
+    return linear_model(view).electrons.rates(NOTHING)[0, 0] * run["skip_exposure_s"], run
 
 
 @pytest.mark.parametrize("mode", ["fixed", "auto"])
@@ -114,7 +114,7 @@ def test_digital_numbers_are_the_same(cfa: str, channels: list[int], mode: str) 
         assert expected.max() < 4095
     # The only difference that is allowed: where ISETCam's ADC saturates at 4096, ours does at 4095.
     np.testing.assert_array_equal(
-        Imager(every_channel()).readout.transfer(found)[:, channels], np.minimum(expected, 4095)
+        ForwardModel(every_channel()).readout.transfer(found)[:, channels], np.minimum(expected, 4095)
     )
 
 
@@ -167,10 +167,10 @@ def test_a_uniform_field_agrees_through_the_whole_image_chain(cfa: str) -> None:
     view = isetcam_view(mosaic, constants["magnification"], run["exposure_s"], kept)
     plan = Planner([Box(view, view.qe, view.qe, DesignCount(1))]).plan("uniform", 0.1)
     assert "quantization" in plan.computed
-    smooth = smooth_imager(view).smooth(NOTHING)[0, 0]
+    smooth = linear_model(view).smooth(NOTHING)[0, 0]
     volts = np.array(run["uniform_volts_unclipped"], dtype=float)[:, columns]
     np.testing.assert_allclose(smooth, 4096 * volts, atol=0.1, rtol=0)
-    dn = Imager(replace(view, methods=plan.methods)).read(NOTHING)[0][0, 0]
+    dn = ForwardModel(replace(view, methods=plan.methods)).read(NOTHING)[0][0, 0]
     expected = np.minimum(np.array(run["uniform_dn"], dtype=float)[:, columns], 4095)
     near_a_step = np.abs(4096 * volts - np.floor(4096 * volts) - 0.5) < 0.1
     assert ((dn == expected) | near_a_step).all()

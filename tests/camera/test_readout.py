@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sweep.camera.effects import quantization
-from sweep.camera.noisy import moments, table
+from sweep.camera.noise import moments, table
 from sweep.camera.pixel import Pixel
 
 from .. import readout_oracle

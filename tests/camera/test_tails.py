@@ -8,7 +8,7 @@ from scipy.stats import norm, poisson
 
 from sweep.camera.effects.noise import range_of_pixel
 from sweep.camera.effects.quantization import smoothed
-from sweep.camera.noisy import moments, tails
+from sweep.camera.noise import moments, tails
 from sweep.camera.pixel import Pixel
 
 from ..cases import thinned

@@ -13,10 +13,10 @@ import pytest
 import tmm
 from scipy.optimize import minimize_scalar
 
-from sweep.camera.linear import smooth_imager
+from sweep.camera.linear import linear_model
 from sweep.camera.methods import REFERENCE
 from sweep.camera.rays import rays
-from sweep.camera.seen import cone_of
+from sweep.camera.angular import cone_of
 from sweep.metrics.separation import separation
 
 from ..conftest import STUDIES
@@ -82,7 +82,7 @@ def missed(seed: int) -> tuple[float, float, float]:
     index = minimize_scalar(lambda n: float(((moved(n) - tilted) ** 2).sum()), bounds=(1.2, 3.0), method="bounded").x
     still = replace(made.view, technologies=(), methods=REFERENCE)
     curves = np.stack([weights @ tilted, weights @ moved(index), np.interp(wave, fine, straight)]) * base
-    response = smooth_imager(still).smooth(curves[:, None])[:, 0]
+    response = linear_model(still).smooth(curves[:, None])[:, 0]
     exact, model, on_axis = separation(response, made.view.members["yellow"], made.view.members["red"])
     return float(exact), float(model), float(on_axis)
 

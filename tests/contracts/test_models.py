@@ -13,10 +13,10 @@ from scipy.spatial.distance import cdist
 
 from sweep.base.errors import SweepError
 from sweep.camera.effects import quantization, saturation
-from sweep.camera.imager import Imager
+from sweep.camera.forward import ForwardModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Optics, Pixel, irradiance_factor
-from sweep.camera.scenario import Scenario
+from sweep.camera.scene import Scene
 from sweep.camera.scene import FixedExposure, Geometry
 from sweep.camera.view import View
 from sweep.curves.lights import Lights
@@ -132,9 +132,9 @@ def test_electrons_of_a_flat_light() -> None:
     qe = np.full((2, 301), 0.25)
     grid, factor = WavelengthGrid(), irradiance_factor(Optics())
     light = Lights("flat", ("flat",), ("flat",), np.full((1, 301), 1 / 301), 1.0, "", True)
-    scenario = Scenario(photon_radiance=1e15 * 301 / factor, exposure=FixedExposure(exposure_s=1.0))
+    scenario = Scene(photon_radiance=1e15 * 301 / factor, exposure=FixedExposure(exposure_s=1.0))
     view = View(grid, Mosaic.from_rows("RB", [["R", "B"]]), qe, (), qe[0], light, pixel, scenario)
-    rate = Imager(view).electrons.rates(np.empty((1, 0, 301)))
+    rate = ForwardModel(view).electrons.rates(np.empty((1, 0, 301)))
     # 1e15 photons/s/m^2/nm x 301 nm x 0.25 x 2e-12 m^2
     np.testing.assert_allclose(rate, 1e15 * 301 * 0.25 * 2e-12, rtol=1e-13)
 

@@ -13,8 +13,8 @@ from scipy.integrate import quad
 from scipy.spatial.distance import cdist
 from scipy.stats import norm
 
-from sweep.camera.imager import Imager
-from sweep.camera.linear import smooth_imager
+from sweep.camera.forward import ForwardModel
+from sweep.camera.linear import linear_model
 from sweep.camera.methods import Methods
 from sweep.camera.view import View
 from sweep.metrics.discrimination import error_bounds
@@ -36,7 +36,7 @@ class Made:
     def __init__(self, view: View, states: tuple[str, ...] = ()) -> None:
         self.view, self.family, self.states = view, FAMILY, states
         self.curves = FAMILY.curves(X)
-        imager = Imager(view)
+        imager = ForwardModel(view)
         self.found = evaluate(imager, self.curves, states, probabilities=bool(states)) | family_quantities(FAMILY, X)
         self.read, self.exposure_s = imager.read(self.curves)
         self.noisy = imager.read_with_noise(self.curves) if states else None
@@ -244,7 +244,7 @@ DITHERED = scene("dithered", "RYNCy", {"noise": True}, {"read_noise_e": 12, "off
 def test_smooth_rows_under_noise_are_the_quantity(name: str) -> None:
     quantity, made = QUANTITIES[name], Made(DITHERED, ("yellow", "red"))
     assert quantity.smooth is not None
-    design = [quantity.smooth(SmoothDesign(smooth_imager(DITHERED), FAMILY, x, FREE, SPAN)) for x in X]
+    design = [quantity.smooth(SmoothDesign(linear_model(DITHERED), FAMILY, x, FREE, SPAN)) for x in X]
     if quantity.metric == "error_bound":
         members = DITHERED.members
         both = made.noisy.mean[:, 0], made.noisy.variance[:, 0]
@@ -258,7 +258,7 @@ def test_smooth_rows_under_noise_are_the_quantity(name: str) -> None:
 @pytest.mark.parametrize("name", [name for name in NAMES if QUANTITIES[name].smooth is not None])
 def test_smooth_rows_are_the_quantity_with_its_derivative(name: str) -> None:
     quantity, view = QUANTITIES[name], DITHERED if name in OF_NOISE else MADE["lattice"].view
-    straight = smooth_imager(view)
+    straight = linear_model(view)
 
     def rows(x: np.ndarray) -> Rows:
         assert quantity.smooth is not None
@@ -266,7 +266,7 @@ def test_smooth_rows_are_the_quantity_with_its_derivative(name: str) -> None:
 
     for x in X:
         if name not in OF_NOISE:
-            found = evaluate(Imager(straight.view), FAMILY.curves(x[None])) | family_quantities(FAMILY, x[None])
+            found = evaluate(ForwardModel(straight.view), FAMILY.curves(x[None])) | family_quantities(FAMILY, x[None])
             assert quantity.value(rows(x)) == pytest.approx(found[name][0], rel=1e-12)
         for at, span in enumerate(SPAN):
             step = np.eye(5)[at] * span * 1e-5

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
 from sweep.camera import electrons
-from sweep.camera.imager import Imager
+from sweep.camera.forward import ForwardModel
 from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
 from sweep.designs import block as blocks
 from sweep.designs.block import CurveBlock, edges_of
@@ -36,8 +36,8 @@ def test_both_routes_say_the_same(name: str) -> None:
     view = VIEWS[name]
     edges = edges_of(SPACE, 3, 69)
     assert edges is not None
-    dense = evaluate(Imager(view), CurveBlock(edges.curves()))
-    fast = evaluate(Imager(view), edges)
+    dense = evaluate(ForwardModel(view), CurveBlock(edges.curves()))
+    fast = evaluate(ForwardModel(view), edges)
     assert list(fast) == list(dense)
     magnitude_dn = brightest_dn(view, edges.curves())
     for column, values in dense.items():
@@ -71,7 +71,7 @@ def test_pairs_that_are_never_the_nearest_are_left_out() -> None:
     edges = edges_of(neighbors, 0, neighbors.size)
     assert edges is not None
     view = replace(VIEWS["chart"], lights=BUILT_IN_LIGHTS["tl16"](GRID))
-    changing = Imager(view).read_changing(edges)
+    changing = ForwardModel(view).read_changing(edges)
     assert changing is not None
     members = view.members
     apart = separation.pairs_apart(np.delete(changing.fixed[0], changing.channel, axis=1), members)
@@ -94,7 +94,7 @@ def test_few_designs_are_the_same_within_rounding_without_compiled_code(
         monkeypatch.setattr(blocks, "_MANY", many)
         monkeypatch.setattr(separation, "_MANY", many)
         monkeypatch.setattr(electrons, "_MANY", many)
-        found.append([evaluate(Imager(VIEWS[name]), block) for block in (curves, edges)])
+        found.append([evaluate(ForwardModel(VIEWS[name]), block) for block in (curves, edges)])
     magnitude_dn = brightest_dn(VIEWS[name], edges.curves())
     for plain, compiled in zip(*found, strict=True):
         assert list(plain) == list(compiled)
@@ -107,7 +107,7 @@ def test_no_spectrum_is_made_by_the_separable_route(monkeypatch: pytest.MonkeyPa
     assert edges is not None
     monkeypatch.setattr(Stopband, "curves", None)
     monkeypatch.setattr(Stopband, "edges", None)
-    evaluate(Imager(VIEWS["rounded"]), edges)
+    evaluate(ForwardModel(VIEWS["rounded"]), edges)
 
 
 def test_designs_that_set_the_exposure_take_the_dense_route() -> None:
@@ -115,7 +115,7 @@ def test_designs_that_set_the_exposure_take_the_dense_route() -> None:
     crossed = replace(SPACE, axes=((690.0, 600.0), (5.0,), (410.0, 650.0), (5.0,), (0.5, 1.0)))
     edges = edges_of(crossed, 0, crossed.size)
     assert edges is not None
-    imager = Imager(VIEWS["chart"])
+    imager = ForwardModel(VIEWS["chart"])
     changing = imager.read_changing(edges)
     assert changing is not None
     found, dense = evaluate(imager, edges), evaluate(imager, edges.curves())

@@ -19,7 +19,7 @@ from ..conftest import ROOT
 NAMES = {
     *("load_study", "make_study", "read_run", "read_curves", "studies", "sensor", "lights", "evaluate"),
     *("LoadedStudy", "FinishedRun", "Quantity", "SweepError"),
-    *("Pixel", "Optics", "Scenario", "Target", "WavelengthGrid"),
+    *("Pixel", "Optics", "Scene", "Target", "WavelengthGrid"),
     *("Stopband", "MultiStopband", "Dual", "FreeForm"),
 }
 """What users rely on: a name that goes, or comes, is a decision."""

@@ -10,11 +10,11 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 
-from sweep.camera.imager import Imager
+from sweep.camera.forward import ForwardModel
 from sweep.camera.methods import Methods
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
-from sweep.camera.scenario import Scenario
+from sweep.camera.scene import Scene
 from sweep.camera.scene import FixedExposure
 from sweep.camera.view import View
 from sweep.curves.lights import Lights
@@ -57,7 +57,7 @@ def made(
     """A view whose channel N, if there is one, is modified."""
     mosaic = Mosaic.from_name(cfa)
     modified = (mosaic.channels.index("N"),) if "N" in mosaic.channels else ()
-    given = Scenario.model_validate(scenario or {})
+    given = Scene.model_validate(scenario or {})
     return View(GRID, mosaic, qe, modified, np.full(N, 0.9), lights, Pixel(**(pixel or {})), given, Methods(**methods))
 
 
@@ -101,7 +101,7 @@ def metamers() -> Result:
         qe = random_qe(1, 3)
         qe[:, RED] = qe[:, YELLOW]
         view = made(qe, lights, scenario, pixel, **methods)
-        errors += [evaluate(Imager(view), plain(view))["csd_yellow_red"], smooth_csd(view, plain(view), PAIR)]
+        errors += [evaluate(ForwardModel(view), plain(view))["csd_yellow_red"], smooth_csd(view, plain(view), PAIR)]
     return Result(float(np.max(errors)), 0.0)
 
 
@@ -121,7 +121,7 @@ def metamers_beside_a_band() -> Result:
     x = np.random.default_rng(3).uniform([605, 0, 618, 0, 0], [612, 6, 626, 6, 1], (200, 5))
     curves = Stopband(WAVE, qe[2], 0.1 * qe[2]).curves(x)
     assert (curves[:, 0] != qe[2]).any()
-    found = [evaluate(Imager(view), curves)["csd_yellow_red"], smooth_csd(view, curves, PAIR)]
+    found = [evaluate(ForwardModel(view), curves)["csd_yellow_red"], smooth_csd(view, curves, PAIR)]
     return Result(float(np.max(found)), 0.0)
 
 
@@ -145,7 +145,7 @@ def broad_metamers() -> Result:
     view = made(qe, lights_of(PAIR, photons), {"exposure": {"kind": "fixed", "exposure_s": 1e-3}})
     found = smooth_csd(view, plain(view), PAIR)[0]
     response = float(smooth_response(view, plain(view)).max())
-    read = evaluate(Imager(view), plain(view))["csd_yellow_red"][0]
+    read = evaluate(ForwardModel(view), plain(view))["csd_yellow_red"][0]
     return Result(found if read == 0 else math.inf, 64 * EPS / 2 * response * 2 * math.sqrt(3))
 
 
@@ -178,7 +178,7 @@ def exposures() -> Result:
         gain = electrons_per_s(1.0) * mp.mpf(exposure_s) * 4095 / 10_000
         exact = gain * mp.sqrt(sum((mp.mpf(float(a)) - mp.mpf(float(b))) ** 2 for a, b in qe[:, [YELLOW, RED]]))
         allowed = 12 * EPS * float(gain) * math.sqrt(3) + 4 * 5e-324
-        read = evaluate(Imager(view), plain(view))["csd_yellow_red"][0]  # all is dark, or full
+        read = evaluate(ForwardModel(view), plain(view))["csd_yellow_red"][0]  # all is dark, or full
         results.append((relative(found, exact), float(allowed / exact)))
         results.append((float(read), 0.0))
     return worst(results)
@@ -212,10 +212,10 @@ def no_light() -> Result:
     good = True
     for qe, radiance in ((np.zeros((3, N)), 2e18), (random_qe(8, 3), 5e-324)):
         view = beyond(made(qe, lights, FIXED), photon_radiance=radiance)
-        good &= evaluate(Imager(view), plain(view))["csd_yellow_red"][0] == 0 == smooth_csd(view, plain(view), PAIR)
+        good &= evaluate(ForwardModel(view), plain(view))["csd_yellow_red"][0] == 0 == smooth_csd(view, plain(view), PAIR)
     with np.errstate(invalid="ignore"):
         view = made(np.zeros((3, N)), lights)
-        dark = evaluate(Imager(view), plain(view))
+        dark = evaluate(ForwardModel(view), plain(view))
     return outcome(bool(good and np.isnan(dark["csd_yellow_red"][0]) and np.isinf(dark["exposure_s"][0])))
 
 
@@ -232,7 +232,7 @@ def everything_clipped() -> Result:
     for pixel in pixels:
         for more in ({}, {"target": NEAR | {"readout": "center"}}, {"drive": {"duty": 0.9, "frequency_hz": 100.0}}):
             view = made(random_qe(9, 3), lights, bright | more, pixel)
-            found = evaluate(Imager(view), plain(view))
+            found = evaluate(ForwardModel(view), plain(view))
             errors += [v for name, v in found.items() if name.startswith(("csd_", "best_place_"))]
     return Result(float(np.max(errors)), 0.0)
 
@@ -268,7 +268,7 @@ def float32_curves() -> Result:
     curves = Stopband(WAVE, qe[2], 0.2 * qe[2]).curves(x)
     view = made(qe, lights, FIXED, cfa="RYNC")
     narrow, small = replace(view, qe=qe.astype(np.float32)), curves.astype(np.float32)
-    found = evaluate(Imager(narrow), small)
+    found = evaluate(ForwardModel(narrow), small)
     base, counts = narrow.qe[2], narrow.mosaic.counts
     results = []
     for index, curve in enumerate(small[:, 0]):
@@ -302,7 +302,7 @@ def nan_in_one_design() -> Result:
     bad[17, 0, RED] = np.nan
     error = 0.0
     for scenario, pixel, methods in SCENES.values():
-        imager = Imager(made(qe, lights, scenario, pixel, "RYNC", **methods))
+        imager = ForwardModel(made(qe, lights, scenario, pixel, "RYNC", **methods))
         one, other = evaluate(imager, clean), evaluate(imager, bad)
         if not np.isnan(other["csd_yellow_red"][17]):
             return Result(np.inf, 0.0)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import mpmath as mp
 import numpy as np
 
-from sweep.camera.effects.noise import draws_dn
-from sweep.camera.imager import Imager
+from sweep.camera.readout import draws_dn
+from sweep.camera.forward import ForwardModel
 from sweep.camera.mosaic import Mosaic
-from sweep.camera.noisy.gaussian import rounding
-from sweep.camera.noisy.moments import moments
+from sweep.camera.noise.gaussian import rounding
+from sweep.camera.noise.moments import moments
 from sweep.camera.pixel import Pixel
-from sweep.camera.scenario import Scenario
+from sweep.camera.scene import Scene
 from sweep.camera.view import View
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
@@ -132,12 +132,12 @@ def at_the_ends() -> Result:
     return moments_result([*cases, (PIXELS["ADC first"], 6700.0), (PIXELS["well below the ADC"], 9990.0)])
 
 
-def chain(pixel: Pixel) -> Imager:
+def chain(pixel: Pixel) -> ForwardModel:
     """A scene of noise whose table of readouts the chain uses."""
     grid = WavelengthGrid(step_nm=100)
     lights = Lights("two", ("a", "b"), ("a", "b"), np.eye(4)[:2] / 100, 1.0, "", True)
-    scenario = Scenario.model_validate({"noise": True, "exposure": {"kind": "fixed", "exposure_s": 1.0}})
-    return Imager(View(grid, Mosaic.from_rows("W", [["W"]]), np.ones((1, 4)), (), np.ones(4), lights, pixel, scenario))
+    scenario = Scene.model_validate({"noise": True, "exposure": {"kind": "fixed", "exposure_s": 1.0}})
+    return ForwardModel(View(grid, Mosaic.from_rows("W", [["W"]]), np.ones((1, 4)), (), np.ones(4), lights, pixel, scenario))
 
 
 @hard_case(

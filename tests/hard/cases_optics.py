@@ -13,7 +13,7 @@ from sweep.camera.effects.blur import Profile, mean_over_disc, too_much, transfe
 from sweep.camera.effects.sampling import covered
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
-from sweep.camera.scenario import Scenario
+from sweep.camera.scene import Scene
 from sweep.metrics.smooth import smooth_response
 
 from .cases_chain import FIXED, PAIR, RED, YELLOW, lights_of, lines, made, plain, random_qe
@@ -265,7 +265,7 @@ def nearly_filled_frame() -> Result:
 )
 def size_limit() -> Result:
     def refusal(across_px: float, f_number: float) -> str | None:
-        scenario = Scenario.model_validate(disc_scene(across_px) | {"optics": {"f_number": f_number}})
+        scenario = Scene.model_validate(disc_scene(across_px) | {"optics": {"f_number": f_number}})
         found = too_much(scenario, Pixel())
         return None if found is None else found[1]
 

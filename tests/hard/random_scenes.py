@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from sweep.camera.effects.image_height import all_heights_count
-from sweep.camera.imager import Imager
+from sweep.camera.forward import ForwardModel
 from sweep.camera.methods import Methods
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.plan.bounds import Box
 from sweep.camera.plan.work import DesignCount
-from sweep.camera.scenario import Scenario
-from sweep.camera.seen import moves
+from sweep.camera.scene import Scene
+from sweep.camera.angular import moves
 from sweep.camera.view import View
 from sweep.curves.lights import class_pairs
 from sweep.designs.families.dual import Dual
@@ -91,7 +91,7 @@ def random_scene(seed: int, *, moved: bool = False) -> RandomScene:
     cfa = _WITH_N[seed % len(_WITH_N)] if moved and cfa not in _WITH_N else cfa
     mosaic = _TWO if cfa == "two" else TILES[cfa]
     modified = tuple(mosaic.channels.index(name) for name in ("N", "M") if name in mosaic.channels)
-    scenario = Scenario.model_validate(given)
+    scenario = Scene.model_validate(given)
     view = View(
         grid=GRID,
         mosaic=mosaic,
@@ -121,7 +121,7 @@ def _technologies(seed: int, mosaic: Mosaic, *, moved: bool) -> tuple[Technology
 
 def columns(made: RandomScene, methods: Methods) -> dict[str, np.ndarray]:
     """Every promised column of all designs of a scene, ndarray[n_designs], as a run has them."""
-    imager = Imager(replace(made.view, methods=methods))
+    imager = ForwardModel(replace(made.view, methods=methods))
     cases = [evaluate(imager, curves) for curves in made.curves]
     promised = promised_names(made.view, any_place=made.anywhere)
     found = {name: cases[0][name] for name in promised}

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from sweep.camera.imager import Imager
+from sweep.camera.forward import ForwardModel
 from sweep.camera.methods import Methods
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.plan.bounds import Box
 from sweep.camera.plan.work import DesignCount
-from sweep.camera.scenario import Scenario
+from sweep.camera.scene import Scene
 from sweep.camera.sensor import BUILT_IN_SENSORS
 from sweep.camera.view import View
 from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
@@ -216,7 +216,7 @@ HARD: tuple[Scene, ...] = (
 def columns(made: Scene, methods: Methods) -> np.ndarray:
     """Every promised column of the scene's design; of the best place only where any is asked for."""
     anywhere = asks_for_any_place(made)
-    found = evaluate(Imager(replace(made.view, methods=methods)), made.curves)
+    found = evaluate(ForwardModel(replace(made.view, methods=methods)), made.curves)
     return np.array([found[name][0] for name in promised_names(made.view, any_place=anywhere)])
 
 

@@ -13,7 +13,7 @@ import pytest
 import sweep
 from sweep.base.errors import StudyError
 from sweep.camera.effects import noise
-from sweep.camera.imager import AllApart, Imager
+from sweep.camera.forward import AllPhases, ForwardModel
 from sweep.curves.lights import Lights
 from sweep.metrics.columns.confusion import D_PRIME, ERROR, STATE_ERROR
 from sweep.metrics.evaluate import evaluate
@@ -42,10 +42,10 @@ NOISY = (
 
 @pytest.mark.parametrize("made", NOISY, ids=lambda made: made.name)
 def test_mean_and_variance_of_the_readout_agree_with_draws_of_every_pixel(made: Scene) -> None:
-    imager = Imager(made.view)
+    imager = ForwardModel(made.view)
     read = imager.read_with_noise(made.curves)
     mean, variance = read.mean, read.variance
-    np.testing.assert_array_equal(mean, Imager(made.view).read(made.curves)[0])
+    np.testing.assert_array_equal(mean, ForwardModel(made.view).read(made.curves)[0])
     electrons = imager.pixel_electrons(made.curves)[0]
     per_place = len(electrons) // imager.n_cases
     draws, rng = 20_000, np.random.default_rng(7)
@@ -76,7 +76,7 @@ def test_the_most_likely_signal_errs_as_rarely_as_its_closed_forms_say() -> None
     lights = made.view.lights
     kept = [lights.types.index("yellow"), lights.types.index("red")]
     two = Lights("two", ("y", "r"), ("yellow", "red"), lights.photons[kept], lights.photon_ratio, "", True)
-    imager, states = AllApart(replace(made.view, lights=two)), ["yellow", "red"]
+    imager, states = AllPhases(replace(made.view, lights=two)), ["yellow", "red"]
     closed = {name: values[0] for name, values in evaluate(imager, made.curves, states).items()}
     found = recognize(imager, made.curves, states, 40_000, np.random.default_rng(3))
     least, most = 1 - found[f"{MOST_LIKELY}_accuracy_high"], 1 - found[f"{MOST_LIKELY}_accuracy_low"]
@@ -95,7 +95,7 @@ def test_more_noise_is_never_better() -> None:
         noise_of = made.view.scenario.noise
         assert noise_of is not None
         view = replace(made.view, pixel=noise_of.of(made.view.pixel))
-        found.append(evaluate(Imager(view), made.curves, made.view.lights.classes))
+        found.append(evaluate(ForwardModel(view), made.curves, made.view.lights.classes))
     for name in found[0]:
         values = [float(columns[name][0]) for columns in found]
         if name.startswith((D_PRIME, "cnr_")):
@@ -107,7 +107,7 @@ def test_more_noise_is_never_better() -> None:
 @pytest.mark.parametrize("pixel", [{"offset_dn": 4090}, {"bits": 2}])
 def test_readouts_that_are_certain_and_the_same_tell_nothing(pixel: dict[str, float]) -> None:
     made = scene("patch", "RGGB", {"noise": {"read_noise_e": 3}}, pixel)
-    imager = AllApart(replace(made.view, pixel=made.view.pixel.model_copy(update={"read_noise_e": 3.0})))
+    imager = AllPhases(replace(made.view, pixel=made.view.pixel.model_copy(update={"read_noise_e": 3.0})))
     read = imager.read_with_noise(made.curves)
     mean, variance = read.mean, read.variance
     certain = variance == 0

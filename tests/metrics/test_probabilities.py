@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from sweep.camera.imager import Imager
+from sweep.camera.forward import ForwardModel
 from sweep.camera.methods import REFERENCE
 from sweep.camera.pixel import Pixel
-from sweep.camera.scenario import Scenario
+from sweep.camera.scene import Scene
 from sweep.metrics.columns.probabilities import detection
 from sweep.metrics.evaluate import evaluate
 from sweep.study import load_study
@@ -25,9 +25,9 @@ def test_what_it_does_not_see_d_prime_does() -> None:
     study = load_study(STUDIES / "stopband.yaml")
     assert study.search is not None
     problem = study.problem(study.search)
-    scenario = Scenario.model_validate({"noise": True})
+    scenario = Scene.model_validate({"noise": True})
     pixel = Pixel(read_noise_e=10, prnu=0.01, offset_dn=168)
-    imager = Imager(replace(problem.view, scenario=scenario, pixel=pixel, methods=REFERENCE))
+    imager = ForwardModel(replace(problem.view, scenario=scenario, pixel=pixel, methods=REFERENCE))
     curves = problem.family.curves(TWO)
     assert "cdp_yellow_red" not in evaluate(imager, curves, ("yellow", "red"))
     found = evaluate(imager, curves, ("yellow", "red"), probabilities=True)

@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 from scipy.spatial.distance import cdist
 from scipy.stats import norm
 
-from sweep.camera.linear import smooth_imager
+from sweep.camera.linear import linear_model
 from sweep.camera.view import View
 from sweep.curves.builtin.task_sets import group, separation_task, shipped
 from sweep.curves.tasks import SHIPPED, Conditions, StudyTasks
@@ -297,7 +297,7 @@ def test_color_figures_are_those_of_their_chart() -> None:
 def test_a_figure_has_the_derivative_of_its_rows(name: str) -> None:
     """Central differences of the rows with two steps, extrapolated (Richardson), to 1e-6."""
     quantity, (view, family) = quantities()[name], scene()
-    imager = smooth_imager(view)
+    imager = linear_model(view)
 
     def rows(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         assert quantity.smooth is not None

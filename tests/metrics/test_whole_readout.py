@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sweep.base.own_code import OwnCode
-from sweep.camera.imager import Imager
+from sweep.camera.forward import ForwardModel
 from sweep.designs.block import CurveBlock, EdgeBlock, edges_of
 from sweep.metrics import evaluate as route
 from sweep.metrics import registry, whole_readout
@@ -79,7 +79,7 @@ def counted(monkeypatch: pytest.MonkeyPatch, name: str) -> list[int]:
 
 def by_hand(name: str, block: EdgeBlock) -> dict[str, np.ndarray]:
     """Both metrics from the readout of the designs' curves."""
-    response, _ = Imager(SCENES[name]).read(block.curves())
+    response, _ = ForwardModel(SCENES[name]).read(block.curves())
     best = response.max(axis=3)
     return {"darkest_dn": best.min(axis=(1, 2)), "brightest": best.max(axis=(1, 2))}
 
@@ -93,9 +93,9 @@ def test_csds_are_those_without_other_metrics_and_these_are_of_the_whole_readout
     monkeypatch.setattr(whole_readout, "_READ_AT_ONCE", at_once)
     block, spent = edges_of(SPACE, 3, 9 if name == "anywhere" else 69), Spent()
     assert block is not None
-    columns = evaluate(Imager(SCENES[name]), block, own=[BRIGHTEST], spent=spent)
+    columns = evaluate(ForwardModel(SCENES[name]), block, own=[BRIGHTEST], spent=spent)
     monkeypatch.setattr(whole_readout, "OTHERS", [])
-    alone = evaluate(Imager(SCENES[name]), block)
+    alone = evaluate(ForwardModel(SCENES[name]), block)
     assert {*columns} == {*alone, "darkest_dn", "brightest"}
     for column, values in alone.items():
         np.testing.assert_array_equal(columns[column], values, err_msg=column)
@@ -112,7 +112,7 @@ def test_other_metrics_switch_no_fast_route_off(name: str, way: str, n: int, mon
     fast, slow = counted(monkeypatch, way), counted(monkeypatch, "_read")
     block = edges_of(SPACE, 0, n)
     assert block is not None
-    evaluate(Imager(SCENES[name]), block, own=[BRIGHTEST])
+    evaluate(ForwardModel(SCENES[name]), block, own=[BRIGHTEST])
     assert (len(fast), len(slow)) == (1, 0)
 
 
@@ -121,7 +121,7 @@ def test_a_cfa_that_lacks_an_own_metric_says_so_of_one_design() -> None:
     calls.clear()
     for block in (edges_of(SPACE, 0, SPACE.size), CurveBlock(SPACE.curves(SPACE.points(0, 9), 301))):
         assert block is not None
-        columns = evaluate(Imager(VIEWS["rounded"]), block, own=[ABSENT, BRIGHTEST])
+        columns = evaluate(ForwardModel(VIEWS["rounded"]), block, own=[ABSENT, BRIGHTEST])
         assert np.isnan(columns["absent"]).all()
         assert np.isfinite(columns["brightest"]).all()
     assert calls == [1, 1]

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sweep.camera.imager import Imager, imager_of
+from sweep.camera.forward import ForwardModel, forward_model
 from sweep.designs.block import edges_of
 from sweep.metrics.columns.sensitivity import cfa_sensitivity_at
 from sweep.metrics.limiting import limiting_lights
@@ -122,7 +122,7 @@ def test_each_swept_design_of_the_page_is_limited_by_its_nearest_lights(finished
     block = edges_of(space, 0, space.size)
     assert block is not None
     view = study.view(space, "chart")
-    read = Imager(view).read_changing(block.some(output.swept_points - first))
+    read = ForwardModel(view).read_changing(block.some(output.swept_points - first))
     assert read is not None
     whole_response, names = read.whole[:, 0], np.array(view.lights.names)
     for one, other in study.pairs:
@@ -154,7 +154,7 @@ def test_lights_without_a_distance_limit_nothing() -> None:
     space = next(space for space in study.spaces if space.filter is not None)
     view = study.view(space, "chart")
     nothing = np.zeros((1, 1, study.grid.size))
-    response = imager_of(view).read(nothing)[0]
+    response = forward_model(view).read(nothing)[0]
     assert set(limiting_lights(view, response)) == set(study.pairs)
     assert all(lights[0] is not None for lights in limiting_lights(view, response).values())
     assert all(lights[0] is None for lights in limiting_lights(view, response * np.nan).values())

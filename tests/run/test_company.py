@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sweep.camera.imager import Imager
+from sweep.camera.forward import ForwardModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
-from sweep.camera.scenario import Scenario
+from sweep.camera.scene import Scene
 from sweep.camera.view import View
 from sweep.designs.block import CurveBlock, edges_of
 from sweep.designs.families.dual import Dual
@@ -63,7 +63,7 @@ SOME = [*((name, True) for name in (*VIEWS, *MORE) if name not in ("pulsed", "no
 def test_a_design_alone_is_the_one_of_its_block_within_rounding(name: str, separable: bool, step: int) -> None:
     view = (VIEWS | MORE)[name]
     states = STATES if view.methods.quantization != "skip" and view.methods.noise != "skip" else ()
-    imager = Imager(view)
+    imager = ForwardModel(view)
     space = MIXED if view.scenario.target is None else SPACE
     block = edges_of(space, 0, space.size)
     assert block is not None
@@ -81,7 +81,7 @@ def test_a_design_alone_is_the_one_of_its_block_within_rounding(name: str, separ
 
 @pytest.mark.parametrize("separable", [True, False])
 def test_a_bad_design_changes_no_other_beyond_rounding(separable: bool) -> None:
-    imager = Imager(VIEWS["saturated" if separable else "chart"])  # one exposure for all; one that the design sets
+    imager = ForwardModel(VIEWS["saturated" if separable else "chart"])  # one exposure for all; one that the design sets
     fine = edges_of(SPACE, 0, SPACE.size)
     assert fine is not None
     bad = np.array([0, 17, 30])
@@ -150,11 +150,11 @@ def test_two_modified_channels_within_rounding(scenario: dict[str, Any]) -> None
     mosaic = Mosaic.from_rows("RAACy", [["R", "Na"], ["Nb", "Cy"]])
     qe = SENSOR.mosaic_qe(mosaic, {"Na": "Y", "Nb": "Y"})
     modified = tuple(mosaic.channels.index(name) for name in ("Na", "Nb"))
-    view = View(GRID, mosaic, qe, modified, SENSOR.qe["C"], lights(), Pixel(), Scenario.model_validate(scenario))
+    view = View(GRID, mosaic, qe, modified, SENSOR.qe["C"], lights(), Pixel(), Scene.model_validate(scenario))
     family = Dual(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["C"])
     space = Space("sweep", "dual", "RAACy", Filter(family, {"Na": "Y", "Nb": "Y"}, "C"), AXES)
     curves = space.curves(space.points(0, 40), GRID.size)
-    imager = Imager(view)
+    imager = ForwardModel(view)
     whole, magnitude_dn = evaluate(imager, curves), brightest_dn(view, curves)
     for at in range(0, 40, 3):
         assert_same(whole, slice(at, at + 1), evaluate(imager, curves[at : at + 1]), view, magnitude_dn)

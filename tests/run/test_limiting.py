@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sweep.camera.imager import imager_of
+from sweep.camera.forward import forward_model
 from sweep.designs.block import EdgeBlock
 from sweep.metrics.nearest import nearest_pairs
 from sweep.results import thinning
@@ -59,7 +59,7 @@ def distances(study: Study, row: dict[str, Any]) -> Iterator[tuple[str, dict[str
     """Of each pair of types every pair of lights with its smallest distance over the cases, from the curves alone."""
     space, curves = row_curves(study, row)
     view = study.view(space, row["scenario"])
-    cases = imager_of(view).read(curves)[0][0]
+    cases = forward_model(view).read(curves)[0][0]
     lights = list(zip(view.lights.names, view.lights.types, np.moveaxis(cases, 1, 0), strict=True))
     for one, other in study.pairs:
         found = {

@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from sweep.base.types import FloatArray
-from sweep.camera.imager import Imager
+from sweep.camera.forward import ForwardModel
 from sweep.camera.readout import Readout
 from sweep.results.tables import LIMITED_BY, POINTS, RECOGNITION
 from sweep.run import run_study
@@ -44,13 +44,13 @@ def ran(folder: Path, jobs: int = 1) -> dict[str, list[object]]:
 
 
 def test_each_scene_of_each_cfa_is_made_ready_once(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    made, usual = [], Imager.__init__
+    made, usual = [], ForwardModel.__init__
 
-    def counted(self: Imager, *given: object, **named: object) -> None:
+    def counted(self: ForwardModel, *given: object, **named: object) -> None:
         made.append(given)
         usual(self, *given, **named)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(Imager, "__init__", counted)
+    monkeypatch.setattr(ForwardModel, "__init__", counted)
     found = ran(folder)
     assert len(made) == 2 * 2  # RGGB and the design
     assert [len(found[name]) for name in (LIMITED_BY, RECOGNITION)] == [4, 4]

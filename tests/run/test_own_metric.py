@@ -14,7 +14,7 @@ from scipy.spatial.distance import cdist
 import sweep
 from sweep.base.errors import StudyError, SweepError
 from sweep.base.own_code import OwnCode
-from sweep.camera.linear import smooth_imager
+from sweep.camera.linear import linear_model
 from sweep.metrics.own import OwnMetric
 from sweep.metrics.smooth import SmoothDesign
 from sweep.report import make_report, read_output, summary_lines
@@ -124,7 +124,7 @@ def test_slopes_are_those_of_the_metric(tmp_path: Path) -> None:
     exact = made.quantities["csd_yellow_red"]
     view, free = scene("chart", "RYNCy", {}).view, np.arange(5)
     design = SmoothDesign(
-        smooth_imager(view), FAMILY, np.array([600.0, 8, 640, 9, 0.8]), free, np.array([30.0, 10, 30, 10, 0.5])
+        linear_model(view), FAMILY, np.array([600.0, 8, 640, 9, 0.8]), free, np.array([30.0, 10, 30, 10, 0.5])
     )
     assert own.smooth is not None
     assert exact.smooth is not None
@@ -241,9 +241,9 @@ def test_a_design_that_the_metric_fails_on_costs_a_row(tmp_path: Path) -> None:
     run_study(made, tmp_path / "all", 1, lambda *_: None)
     space = next(space for space in made.spaces if space.kind == "sweep")
     view = made.plan("chart") and made.view(space, "chart")
-    from sweep.camera.imager import imager_of
+    from sweep.camera.forward import forward_model
 
-    edge = imager_of(view).read(space.curves(space.points(3, 4), made.grid.size))[0][0, 0, 0, -1]
+    edge = forward_model(view).read(space.curves(space.points(3, 4), made.grid.size))[0][0, 0, 0, -1]
     bad = study(tmp_path, OWN_METRIC.partition("search:")[0], f"EDGE = {edge!r}\n".replace("np.float64(", "(") + code)
     run_study(bad, tmp_path / "some", 1, lambda *_: None)
     found = rows_of(tmp_path / "some")

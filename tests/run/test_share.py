@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.stats import binom
 
-from sweep.camera.linear import LinearImager
+from sweep.camera.linear import LinearModel
 from sweep.designs.tolerance import Off
 from sweep.metrics import drawn as drawn_module
 from sweep.metrics.bound import Bound
@@ -109,8 +109,8 @@ def test_many_designs_are_made_in_blocks_and_read_out_once_for_all_pairs_within_
     pairs = [("green", "yellow"), YELLOW_RED]
     size, read, made = loaded.grid.size, list[int](), list[int]()
     monkeypatch.setattr(drawn_module, "_HELD", 3 * 101 * size)
-    smooth = LinearImager.smooth
-    monkeypatch.setattr(LinearImager, "smooth", lambda self, curves: read.append(len(curves)) or smooth(self, curves))
+    smooth = LinearModel.smooth
+    monkeypatch.setattr(LinearModel, "smooth", lambda self, curves: read.append(len(curves)) or smooth(self, curves))
 
     def come_out(off: Off, some: slice) -> np.ndarray:
         made.append(len(points[some]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from sweep.camera.pixel import Pixel
-from sweep.camera.scenario import Scenario
+from sweep.camera.scene import Scene
 from sweep.metrics.objective import Objective
 from sweep.search.problem import Evaluation, Problem, best_feasible, starting_points
 from sweep.search.solver import search_from
@@ -21,7 +21,7 @@ def problem_of(name: str, read_noise_e: float, level: float, objective: Objectiv
     study = load_study(STUDIES / f"{name}.yaml")
     assert study.search is not None
     problem = study.problem(study.search)
-    scenario = Scenario.model_validate({"noise": True, "exposure": {"kind": "white_patch", "level": level}})
+    scenario = Scene.model_validate({"noise": True, "exposure": {"kind": "white_patch", "level": level}})
     pixel = Pixel(read_noise_e=read_noise_e, prnu=0.01, offset_dn=168)
     view = replace(problem.view, scenario=scenario, pixel=pixel)
     return replace(problem, view=view, states=STATES, objective=objective)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sweep.base.errors import SweepError
-from sweep.camera.scenario import Scenario
+from sweep.camera.scene import Scene
 from sweep.camera.scene import FixedExposure
 from sweep.camera.view import View
 from sweep.curves.lights import Lights
@@ -190,7 +190,7 @@ def test_no_limit_is_claimed_where_it_would_not_hold() -> None:
     assert why_not(above) == "filters of the box may exceed the curve that they replace"
     below = replace(PROBLEM, family=Stopband(wave, PROBLEM.view.base_qe[0], -0.1 * green))
     assert why_not(below) == "filters of the box may be below 0"
-    scenario = replace(PROBLEM.view, scenario=Scenario(exposure=FixedExposure(exposure_s=1000.0)))
+    scenario = replace(PROBLEM.view, scenario=Scene(exposure=FixedExposure(exposure_s=1000.0)))
     assert why_not(replace(PROBLEM, view=scenario)) == "signals exceed the full well or the range of the ADC"
 
 

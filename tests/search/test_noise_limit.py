@@ -9,9 +9,9 @@ import pytest
 from scipy.optimize import linprog
 
 from sweep.base.errors import SweepError
-from sweep.camera.linear import smooth_imager
+from sweep.camera.linear import linear_model
 from sweep.camera.methods import REFERENCE
-from sweep.camera.scenario import Scenario
+from sweep.camera.scene import Scene
 from sweep.metrics.bound import Bound
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth_noise import smooth_detectability
@@ -36,7 +36,7 @@ SCENES = {
 
 def problem_in(scene: str) -> Problem:
     problem = problem_of("stopband", 5, 0.3, GOAL)
-    scenario = Scenario.model_validate(SCENES[scene])
+    scenario = Scene.model_validate(SCENES[scene])
     assert scenario.noise is not None
     view = replace(problem.view, scenario=scenario, pixel=scenario.noise.of(problem.view.pixel), methods=REFERENCE)
     return replace(problem, view=view, constraints={"sensitivity": Bound(min=0.9)})
@@ -73,7 +73,7 @@ def test_of_each_error_without_a_limit_it_is_said_why() -> None:
 @pytest.mark.parametrize("scene", SCENES)
 def test_no_filter_has_less_noise_or_a_larger_d_prime(scene: str) -> None:
     problem = problem_in(scene)
-    imager, base = smooth_imager(problem.view), problem.view.base_qe[0]
+    imager, base = linear_model(problem.view), problem.view.base_qe[0]
     curves = filters(problem, 200)[:, None]
     row, channel = np.ones_like(base) / base.sum(), problem.view.modified[0]
     least = least_variance(imager, base, (np.zeros_like(base), base), row, 0.9)
@@ -91,10 +91,10 @@ def test_no_filter_has_less_noise_or_a_larger_d_prime(scene: str) -> None:
 
 def test_the_least_light_is_that_of_a_linear_program() -> None:
     problem = problem_in("chart")
-    imager, base = smooth_imager(problem.view), problem.view.base_qe[0]
+    imager, base = linear_model(problem.view), problem.view.base_qe[0]
     row, channel, gain = np.ones_like(base) / base.sum(), problem.view.modified[0], problem.view.pixel.dn_per_e
     no_prnu = replace(problem.view, pixel=problem.view.pixel.model_copy(update={"prnu": 0.0}))
-    least = least_variance(smooth_imager(no_prnu), base, (0.2 * base, base), row, 0.9)[0]
+    least = least_variance(linear_model(no_prnu), base, (0.2 * base, base), row, 0.9)[0]
     light = imager.per_qe(0, base[None])[0, :, channel] / gain
     for signal in (0, 20, 40):
         found = linprog(light[signal], A_ub=-row[None], b_ub=[-0.9], bounds=np.column_stack([0.2 * base, base]))

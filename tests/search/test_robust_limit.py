@@ -12,7 +12,7 @@ import pytest
 from scipy.optimize import linprog
 
 from sweep.camera.kernel import KERNELS
-from sweep.camera.linear import LinearImager, smooth_imager
+from sweep.camera.linear import LinearModel, linear_model
 from sweep.camera.sensor_field import SensorField
 from sweep.camera.sensor_places import SensorPlaces
 from sweep.metrics.evaluate import designed_quantities
@@ -214,10 +214,10 @@ def test_kernels_of_filters_that_move_are_their_own() -> None:
     (space,) = [each for each in STUDY.spaces if each.name == "robust"]
     view, curves = STUDY.view(space, "field"), space.curves(space.points(0, 1), STUDY.grid.size)
     KERNELS.clear()
-    still, moving = smooth_imager(replace(view, technologies=())), smooth_imager(view)
+    still, moving = linear_model(replace(view, technologies=())), linear_model(view)
     assert still.n_cases == 1 < moving.n_cases
     KERNELS.clear()
-    np.testing.assert_array_equal(moving.smooth(curves), LinearImager(moving.view).smooth(curves))
+    np.testing.assert_array_equal(moving.smooth(curves), LinearModel(moving.view).smooth(curves))
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ import pytest
 
 from sweep.camera.methods import REFERENCE
 from sweep.camera.pixel import Pixel
-from sweep.camera.scenario import Scenario
+from sweep.camera.scene import Scene
 from sweep.metrics.bound import Bound
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.objective import Objective
@@ -89,7 +89,7 @@ def test_derivatives_agree_with_differences(name: str, objective: Objective) -> 
 def test_derivatives_hold_in_scenes(scenario: dict[str, object], crosstalk: float) -> None:
     view = replace(
         STOPBAND.view,
-        scenario=Scenario.model_validate(scenario),
+        scenario=Scene.model_validate(scenario),
         pixel=Pixel(crosstalk=crosstalk),
         methods=replace(REFERENCE, phase="pixel", blur="every 10 nm"),
     )
@@ -104,7 +104,7 @@ def test_derivatives_hold_in_scenes(scenario: dict[str, object], crosstalk: floa
 
 def test_a_search_in_a_far_scene_stays_below_its_limit() -> None:
     far = {"target": {"distance_m": 250, "fov_deg": 30}, "optics": {"f_number": 2.0}}
-    view = replace(STOPBAND.view, scenario=Scenario.model_validate(far))
+    view = replace(STOPBAND.view, scenario=Scene.model_validate(far))
     problem = replace(STOPBAND, view=view)
     limit = limit_of(problem)
     assert limit.curve is not None

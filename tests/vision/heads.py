@@ -8,7 +8,7 @@ import numpy as np
 
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
-from sweep.camera.scenario import Scenario
+from sweep.camera.scene import Scene
 from sweep.camera.sensor import ar0820_sensor
 from sweep.camera.view import View
 from sweep.curves.builtin.data_sets.tl16 import lights
@@ -32,7 +32,7 @@ def head_view(cfa: str = "RGGB", grid: WavelengthGrid = GRID, **pixel: Any) -> V
     sensor, mosaic = ar0820_sensor(grid, surrogate_parameters()), Mosaic.from_name(cfa)
     noise = {"read_noise_e": 2.0, "offset_dn": 168.0, "prnu": 0.01, "crosstalk": 0.01} | pixel
     qe = sensor.mosaic_qe(mosaic)
-    return View(grid, mosaic, qe, (), sensor.curve("C"), lights(grid), Pixel(**noise), Scenario())
+    return View(grid, mosaic, qe, (), sensor.curve("C"), lights(grid), Pixel(**noise), Scene())
 
 
 NO_FILTERS = np.empty((0, GRID.size))

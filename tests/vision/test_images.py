@@ -12,12 +12,12 @@ import pytest
 from scipy.spatial.distance import cdist
 
 from sweep.camera.effects.demosaic import center_weights
-from sweep.camera.effects.noise import draws_dn
+from sweep.camera.readout import draws_dn
 from sweep.camera.effects.sampling import Window
-from sweep.camera.imager import Imager
+from sweep.camera.forward import ForwardModel
 from sweep.camera.methods import Methods
 from sweep.camera.mosaic import Mosaic
-from sweep.camera.noisy import table
+from sweep.camera.noise import table
 from sweep.curves.builtin.spectra import shipped_groups
 from sweep.curves.color import luminance_per_photon_radiance
 from sweep.curves.spectrum import WavelengthGrid
@@ -48,7 +48,7 @@ def test_a_lamp_is_what_the_product_reads(cfa: str, place: int) -> None:
     assert there.scenario.target is not None
     target = there.scenario.target.model_copy(update={"phase_px": (float(center[0]), float(center[1]))})
     scenario = there.scenario.model_copy(update={"target": target, "intensity_cd": candelas})
-    wanted = Imager(replace(there, methods=EXACT, scenario=scenario)).read(NO_FILTERS[None])[0][0, 0]
+    wanted = ForwardModel(replace(there, methods=EXACT, scenario=scenario)).read(NO_FILTERS[None])[0][0, 0]
     heads = camera.electrons(0, 0)
     lamps = heads.lamps[place, 1] * heads.time_s * candelas * view.pixel.dn_per_e
     across = np.arange(asked.crop_px)
