@@ -1,5 +1,6 @@
 from .base.errors import SweepError
 from .camera.pixel import Optics, Pixel
+from .camera.scene import Scene, Target
 from .curves.spectrum import WavelengthGrid
 from .designs.families.dual import Dual
 from .designs.families.free_form import FreeForm

@@ -13,17 +13,21 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 
-def places_of_lights() -> None:
-    """Images of a small light at any place, promises, plans."""
-    from sweep.camera.methods import REFERENCE
-    from sweep.camera.plan.planner import Planner
+def phases_of_lights() -> None:
+    """Images of a small light at any sampling phase, behind a linear readout and one in whole numbers."""
+    from sweep.run import run_study
+    from sweep.study import load_study
 
-    from .hard.scenes import F2, TINY, columns, scene
+    from .build import STUDY
 
-    for cfa, wide, target in (("RYNCy", False, TINY), ("RGGB", True, TINY | {"phase_px": [0.3, 1.2]})):
-        made = scene("small", cfa, {"target": target, "optics": F2}, wide=wide)
-        columns(made, Planner([made.box]).plan("small", 1.0).methods)
-        columns(made, REFERENCE)
+    dim, budget = "exposure: {kind: fixed, exposure_s: 0.002}", "starts: 4, max_evaluations: 200"
+    small = "target: {distance_m: 600, fov_deg: 60, phase_px: any}, optics: {f_number: 2}"
+    text = STUDY.replace("COUNT", "2").replace("count: 51", "count: 2").replace(budget, "starts: 1, max_evaluations: 10")
+    with TemporaryDirectory() as folder:
+        for name, scene in (("whole numbers", small), ("linear", f"{small}, noise: {{read_noise_e: 10}}")):
+            path = Path(folder) / f"{name}.yaml"
+            path.write_text(text.replace(dim, scene))
+            run_study(load_study(path), Path(folder) / name, 1, lambda *_: None)
 
 
 def designs_and_metrics() -> None:
@@ -62,7 +66,7 @@ def designs_and_metrics() -> None:
     HeadCamera(view, NO_FILTERS, asked).images(scenes)
 
 
-WORKS: tuple[Callable[[], None], ...] = (places_of_lights, designs_and_metrics)
+WORKS: tuple[Callable[[], None], ...] = (phases_of_lights, designs_and_metrics)
 
 
 def compile_kernels() -> None:

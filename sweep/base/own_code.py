@@ -16,7 +16,7 @@ from typing import Any, Literal
 from .disk import read_input
 from .errors import Fault, SweepError
 
-Offered = Literal["sweep.families", "sweep.metrics", "sweep.sensors", "sweep.lights"]
+Offered = Literal["sweep.families", "sweep.metrics", "sweep.effects", "sweep.sensors", "sweep.lights"]
 """Groups of entry points, by which an installed package offers what a study can name."""
 CODE_OF = "code of "
 """How the digest of an installed package's code is named among those of a study's files."""

@@ -241,6 +241,11 @@ EFFECTS: dict[str, Effect] = {
             lambda box: "clear air" if box.view.scenario.visibility_m is None else None,
             _air_bound_dn,
         ),
+        Effect(
+            "veiling glare",
+            "irradiance",
+            lambda box: "no veiling glare" if box.view.scenario.veiling_glare is None else None,
+        ),
         Effect("flicker", "pwm", _unpulsed, _pwm_bound_dn),
     )
 }

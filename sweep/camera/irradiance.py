@@ -1,5 +1,7 @@
 """Photon irradiance on the sensor: radiance of the lights through air and lens.
 
+`scene_irradiance` makes that of a scene, and hands it to the effects of a user's own, one after the other.
+
 Extinction by haze and fog dims a target and not the background, which is nearer. Off axis a lens without vignetting
 gives cos^4 of the light, of the background, too.
 """
@@ -7,6 +9,7 @@ gives cos^4 of the light, of the background, too.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,11 +23,67 @@ _REFERENCE_NM = 550.0
 _CONTRAST = 0.02
 
 
-def signal_irradiance(view: View) -> FloatArray:
-    """Photon irradiance of each signal where its image is whole, on axis, in clear air, photons/s/m^2/nm.
+@dataclass(frozen=True)
+class Irradiance:
+    """Photon irradiance on the sensor, on axis, before air and relative illumination dim it; photons/s/m^2/nm.
 
-    ndarray[n_signals, n_wavelengths].
+    Attributes
+    ----------
+    wavelength_nm : ndarray[n_wavelengths]
+        Equidistant, ascending.
+    signals : ndarray[n_signals, n_wavelengths]
+        Each signal's where its image is whole.
+    background : ndarray[n_wavelengths]
+        Uniform over the field.
     """
+
+    wavelength_nm: FloatArray
+    signals: FloatArray
+    background: FloatArray
+
+
+def scene_irradiance(view: View) -> Irradiance:
+    """Return the irradiance of a scene behind the effects of a user's own."""
+    irradiance = Irradiance(view.grid.nodes_nm, _signals(view), _uniform(view, view.scenario.background_cd_m2))
+    if view.scenario.veiling_glare is not None:
+        glare = view.scenario.veiling_glare
+        mean_cd_m2 = view.scenario.background_cd_m2 if glare.field_cd_m2 is None else glare.field_cd_m2
+        irradiance = with_veiling_glare(irradiance, glare.share, _uniform(view, mean_cd_m2))
+    for effect in view.own_effects:
+        signals, background = effect.applied(irradiance, view.scenario)
+        irradiance = replace(irradiance, signals=signals, background=background)
+    return irradiance
+
+
+def with_veiling_glare(irradiance: Irradiance, share: float, mean: FloatArray) -> Irradiance:
+    """Spread a share of the mean light of the field evenly over the field (ISO 9358's integral of veiling glare).
+
+    Parameters
+    ----------
+    irradiance : Irradiance
+        That of a lens without glare.
+    share : float
+        0 to 1, which every pixel lacks of its own light.
+    mean : ndarray[n_wavelengths]
+        Mean irradiance of the field. The light of a signal, which is small in the field, is left out of it.
+    """
+    kept = 1 - share
+    background = kept * irradiance.background + share * mean
+    return replace(irradiance, signals=kept * irradiance.signals, background=background)
+
+
+def signal_irradiance(view: View) -> FloatArray:
+    """Photon irradiance of each signal, ndarray[n_signals, n_wavelengths]; see `Irradiance`."""
+    return scene_irradiance(view).signals
+
+
+def background_irradiance(view: View) -> FloatArray:
+    """Photon irradiance of the uniform background, ndarray[n_wavelengths]; see `Irradiance`."""
+    return scene_irradiance(view).background
+
+
+def _signals(view: View) -> FloatArray:
+    """Irradiance of each signal, of its radiance or its luminance, ndarray[n_signals, n_wavelengths]."""
     scene = view.scenario
     factor = irradiance_factor(scene.optics)
     luminance = scene.luminance_cd_m2
@@ -34,13 +93,13 @@ def signal_irradiance(view: View) -> FloatArray:
     return view.lights.photons * (luminance / per_photon_radiance * factor)[:, None]
 
 
-def background_irradiance(view: View) -> FloatArray:
-    """Photon irradiance of the uniform background on axis, flat in photons, ndarray[n_wavelengths]."""
-    grid, luminance = view.grid, view.scenario.background_cd_m2
-    if not luminance:
+def _uniform(view: View, luminance_cd_m2: float) -> FloatArray:
+    """Irradiance of a uniform light of some luminance, flat in photons, ndarray[n_wavelengths]."""
+    grid = view.grid
+    if not luminance_cd_m2:
         return np.zeros(grid.size)
     flat = np.full((1, grid.size), 1 / (grid.size * grid.step_nm))
-    radiance = luminance / luminance_per_photon_radiance(grid, flat)[0]
+    radiance = luminance_cd_m2 / luminance_per_photon_radiance(grid, flat)[0]
     return np.asarray(flat[0] * radiance * irradiance_factor(view.scenario.optics), dtype=float)
 
 

@@ -12,6 +12,8 @@ from .accuracy import Accuracy
 from .effects import EFFECTS, Box, Effect
 from .view import READOUT
 
+_OWN = "an effect of the study's own: always computed"
+
 
 @dataclass(frozen=True)
 class Choice:
@@ -95,7 +97,9 @@ def plan_scene(
                 budget_dn -= bound_dn or 0.0
                 computed -= {name}
             choices[name] = Choice(name, not leave_out, bound_dn, _reason(bound_dn, leave_out, needed))
-    return Plan(scenario, tolerance_dn, accuracy, tuple(choice for choice in choices.values() if choice is not None))
+    made = [choice for choice in choices.values() if choice is not None]
+    made += [Choice(effect.name, True, None, _OWN) for effect in boxes[0].view.own_effects]
+    return Plan(scenario, tolerance_dn, accuracy, tuple(made))
 
 
 def _inactive(effect: Effect, boxes: Sequence[Box]) -> Choice | None:

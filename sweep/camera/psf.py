@@ -321,41 +321,6 @@ def profile(
     return PROFILES.get(key, lambda: DiscProfile(radius_um, reach_um, np.array(wavelengths_um), f_number, w20_um))
 
 
-def mean_over_disc(
-    radius_um: float, readout_um: float, wavelength_um: FloatArray, f_number: float, w20_um: float
-) -> FloatArray:
-    """Mean of h over a disc around the same center.
-
-    The integral of h(r) over a disc of radius R' is
-      (2 R / R') integral_0^(1 / lambda N) J1(2 pi R nu) J1(2 pi R' nu) OTF(nu) / nu dnu
-    times its area. For a small R it is the encircled energy of a point, times that of the disc.
-
-    Parameters
-    ----------
-    radius_um : float
-        Radius R of the disc's sharp image, micrometers.
-    readout_um : float
-        Radius R' of what the mean is taken over, micrometers.
-    wavelength_um : ndarray[n_wavelengths]
-        Wavelengths, micrometers.
-    f_number : float
-        f-number of the lens.
-    w20_um : float
-        Defocus, micrometers: see `defocus_um`.
-
-    Returns
-    -------
-    ndarray[n_wavelengths]
-        Relative to a uniform field: 1 is no light lost, where R' is at most R.
-    """
-    from scipy.special import j1  # noqa: PLC0415  (slow to import)
-
-    frequency, weight = _frequency_rule(radius_um + readout_um, wavelength_um, f_number)
-    discs = j1(2 * math.pi * radius_um * frequency) * j1(2 * math.pi * readout_um * frequency)
-    factor = (2 * radius_um / readout_um) * discs / frequency * weight
-    return np.asarray(factor @ otf(frequency, wavelength_um, f_number, w20_um), dtype=float)
-
-
 def psf_knots_nm(wavelength_nm: FloatArray, step_nm: float) -> FloatArray:
     """Wavelengths at which images are made; between them they are interpolated linearly.
 

@@ -65,7 +65,7 @@ def window(mosaic: Mosaic, phases_px: FloatArray, reach_px: float) -> Window:
 
 def mean_weights(seen: Window, half: float, readout_px: float, n_channels: int) -> FloatArray:
     """Weight of each pixel in the mean of its channel, ndarray[n_cases, rows, columns]; each channel's sum to 1."""
-    from .compiled_light import covered_by_disc  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from .compiled_coverage import covered_by_disc  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     weights = covered_by_disc(seen.columns, seen.rows, half, readout_px)
     for channel in range(n_channels):

@@ -97,6 +97,16 @@ class Drive(Section):
     frequency_hz: float = Field(ge=1e-6, le=1e12)
 
 
+class VeilingGlare(Section):
+    """Light that the lens spreads evenly over the field: a `share` of its mean, which is then missing in the image.
+
+    `field_cd_m2`: mean luminance of the whole field, flat in photons; left out, that of the background.
+    """
+
+    share: Share
+    field_cd_m2: float | None = Field(default=None, ge=0, le=1e15)
+
+
 class Noise(Section):
     """Photon, read and dark noise and PRNU of the study's pixel; what is given here replaces the pixel's figure."""
 
@@ -127,7 +137,7 @@ class Scene(Section):
     is added over the whole field, also in front of the target, flat in photons. `drive`: of a pulsed LED. `field`: the
     worst place of the sensor. `off_axis_deg`: the field angle, off which a lens without vignetting gives cos^4 of the
     light. `visibility_m`: the distance at which haze or fog leaves 2 % of a target's light (Koschmieder's
-    meteorological range). `noise`: photon, read and dark noise and PRNU act before the mean is taken;
+    meteorological range). `veiling_glare`: light that the lens spreads over the field. `noise`: photon, read and dark noise and PRNU act before the mean is taken;
     true, or figures of its own. Limits: 1 to 1e40 photons (the sun's disc: 1e25), 1e-12 to 1e15 cd, a background up to
     1e15 cd/m^2 (the sun: 2e9).
     """
@@ -142,6 +152,7 @@ class Scene(Section):
     field: SensorField | None = None
     off_axis_deg: float = Field(default=0.0, ge=0, lt=90)
     visibility_m: Meters | None = None
+    veiling_glare: VeilingGlare | None = None
     noise: Annotated[Noise | None, BeforeValidator(_noise, json_schema_input_type=bool | Noise | None)] = None
 
     @model_validator(mode="after")
@@ -154,6 +165,8 @@ class Scene(Section):
             raise ValueError("`field` needs a light at a named place of the mosaic, not `phase_px: any`")
         if self.visibility_m is not None and self.target is None:
             raise ValueError("visibility_m needs a target with a distance")
+        if self.veiling_glare is not None and self.target is None:
+            raise ValueError("veiling_glare needs a target: of a light that fills the field it takes nothing")
         return self
 
     @property

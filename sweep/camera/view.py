@@ -14,6 +14,7 @@ from ..curves.tasks import StudyTasks
 from ..designs.technology import Technology, index_of
 from .accuracy import STANDARD, Accuracy
 from .mosaic import Mosaic
+from .own_effects import OwnEffect
 from .pixel import Pixel
 from .scene import Scene
 
@@ -29,7 +30,7 @@ class View:
     (channel indices, one per curve that a family makes) hold the base curve. `clear_qe`: the reference of the CFA's
     sensitivity, ndarray[n_wavelengths]. `technologies`: by what each channel's filter works, None where that is not
     stated; empty where it is of none. `tasks`: what else the study asks of its designs. `accuracy`: numerical settings;
-    `left_out`: effects that are not computed (see `effects`).
+    `left_out`: effects that are not computed (see `effects`); `own_effects`: those of a user's own.
     """
 
     grid: WavelengthGrid
@@ -44,6 +45,7 @@ class View:
     tasks: StudyTasks | None = field(default=None, kw_only=True)
     accuracy: Accuracy = field(default=STANDARD, kw_only=True)
     left_out: frozenset[str] = field(default=frozenset(), kw_only=True)
+    own_effects: tuple[OwnEffect, ...] = field(default=(), kw_only=True)
 
     @property
     def base_qe(self) -> FloatArray:

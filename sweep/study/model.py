@@ -11,6 +11,7 @@ import numpy as np
 from ..base.errors import Fault, StudyError
 from ..camera.effects import Box
 from ..camera.mosaic import Mosaic
+from ..camera.own_effects import OwnEffect
 from ..camera.pixel import Pixel
 from ..camera.plan import Plan, plan_scene
 from ..camera.scene import Geometry, Scene
@@ -66,6 +67,7 @@ class Study:
     held_out: Lights | None = None
     tasks: StudyTasks | None = None
     own: tuple[OwnMetric, ...] = ()
+    own_effects: tuple[OwnEffect, ...] = ()
     plans: Mapping[str, Plan] = field(default_factory=dict)
 
     @property
@@ -184,6 +186,7 @@ class Study:
             technologies=tuple(technologies) if any(technologies) else (),
             tasks=self.tasks,
             accuracy=self.section.accuracy,
+            own_effects=self.own_effects,
             left_out=self.plans[scenario].left_out if scenario in self.plans else frozenset(),
         )
 

@@ -27,6 +27,7 @@ from .light_files import with_light_files
 from .luminances import check_luminances
 from .model import Search, Study
 from .own_codes import offered_curves
+from .own_effects import own_effects, try_effects
 from .own_metrics import check_names, own_metrics, try_metrics
 from .populations import check_range, with_population
 from .schema import CfaSection, StudySection
@@ -78,6 +79,7 @@ class _Resolver:
         self.read_tasks()
         metrics = self.had(lambda: own_metrics(section, self.sources))
         self.own = metrics or ()
+        effects = self.had(lambda: own_effects(section, self.sources))
         spaces = self.spaces(sensor, mosaics)
         check_regions(section, self.sources)
         self.check_images()
@@ -107,8 +109,10 @@ class _Resolver:
             held_out=held_out,
             tasks=self.tasks,
             own=self.own,
+            own_effects=effects or (),
         )
         check_memory(study, self.sources)
+        try_effects(study, self.sources)
         try_metrics(study, self.sources)
         check_range(study, self.sources)
         if self.faults:

@@ -275,6 +275,8 @@ class StudySection(Documented):
         list[Name], BeforeValidator(_listed, json_schema_input_type=list[Name] | Name), Field(max_length=_MOST_OWN)
     ] = []
     """Own metrics: FILE.py:NAME, or names that installed packages offer; each is a column like any other."""
+    effects: Annotated[list[Name], Field(max_length=_MOST_OWN)] = []
+    """Own effects on the light: FILE.py:NAME, or names that installed packages offer; always computed."""
     objective: Objective = Objective(minimum={"csd_yellow_red": 1.0})
     """What is maximized: a CSD or sensitivity, or several: {minimum: {...}} or {sum: {...}} with weights; or, of errors
     under noise, made small: {least: {...}}."""

@@ -1,0 +1,52 @@
+"""An effect of a user's own, or one that an installed package offers: a function of the irradiance on the sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.errors import Fault, SweepError
+from ..base.own_code import OwnCode, own_name
+from ..base.types import FloatArray
+
+if TYPE_CHECKING:
+    from .irradiance import Irradiance
+    from .scene import Scene
+
+
+@dataclass(frozen=True)
+class OwnEffect:
+    """A function of an `Irradiance` and its `Scene` that returns an `Irradiance`.
+
+    It is always computed, since it has no bound. It must not depend on anything else, so that a study gives the same
+    rows again.
+    """
+
+    code: OwnCode
+
+    @property
+    def name(self) -> str:
+        """Its name in plans and provenance."""
+        return own_name(self.code.name)
+
+    def applied(self, irradiance: Irradiance, scene: Scene) -> tuple[FloatArray, FloatArray]:
+        """Irradiance of signals and background behind the effect, in the shapes of those before it.
+
+        Raises SweepError for what is raised, and for what is no irradiance: another shape, negative or not finite.
+        """
+        result = self.code.called(self.code.loaded, irradiance, scene)
+        behind = []
+        for part in ("signals", "background"):
+            before = getattr(irradiance, part)
+            values = self.code.called(np.asarray, self.code.called(getattr, result, part), float)
+            if values.shape != before.shape:
+                problem = f"{self.code.name} gives another shape of `{part}`"
+                raise SweepError(Fault(problem, value=values.shape, allowed=f"{before.shape}"))
+            if not (np.isfinite(values) & (values >= 0)).all():
+                problem = f"{self.code.name} gives no irradiance in `{part}`"
+                worst = float(values[~(np.isfinite(values) & (values >= 0))][0])
+                raise SweepError(Fault(problem, value=worst, allowed="finite numbers, 0 or more"))
+            behind.append(values)
+        return behind[0], behind[1]
