@@ -22,7 +22,9 @@ def phases_of_lights() -> None:
 
     dim, budget = "exposure: {kind: fixed, exposure_s: 0.002}", "starts: 4, max_evaluations: 200"
     small = "target: {distance_m: 600, fov_deg: 60, phase_px: any}, optics: {f_number: 2}"
-    text = STUDY.replace("COUNT", "2").replace("count: 51", "count: 2").replace(budget, "starts: 1, max_evaluations: 10")
+    text = (
+        STUDY.replace("COUNT", "2").replace("count: 51", "count: 2").replace(budget, "starts: 1, max_evaluations: 10")
+    )
     with TemporaryDirectory() as folder:
         for name, scene in (("whole numbers", small), ("linear", f"{small}, noise: {{read_noise_e: 10}}")):
             path = Path(folder) / f"{name}.yaml"

@@ -9,37 +9,19 @@ gives cos^4 of the light, of the background, too.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ..base.types import FloatArray
 from ..curves.color import luminance_per_photon_radiance
+from .own_effects import Irradiance
 from .pixel import irradiance_factor
 from .scene import Scene
 from .view import View
 
 _REFERENCE_NM = 550.0
 _CONTRAST = 0.02
-
-
-@dataclass(frozen=True)
-class Irradiance:
-    """Photon irradiance on the sensor, on axis, before air and relative illumination dim it; photons/s/m^2/nm.
-
-    Attributes
-    ----------
-    wavelength_nm : ndarray[n_wavelengths]
-        Equidistant, ascending.
-    signals : ndarray[n_signals, n_wavelengths]
-        Each signal's where its image is whole.
-    background : ndarray[n_wavelengths]
-        Uniform over the field.
-    """
-
-    wavelength_nm: FloatArray
-    signals: FloatArray
-    background: FloatArray
 
 
 def scene_irradiance(view: View) -> Irradiance:

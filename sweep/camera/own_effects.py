@@ -3,17 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.errors import Fault, SweepError
 from ..base.own_code import OwnCode, own_name
 from ..base.types import FloatArray
+from .scene import Scene
 
-if TYPE_CHECKING:
-    from .irradiance import Irradiance
-    from .scene import Scene
+
+@dataclass(frozen=True)
+class Irradiance:
+    """Photon irradiance on the sensor, on axis, before air and relative illumination dim it; photons/s/m^2/nm.
+
+    Attributes
+    ----------
+    wavelength_nm : ndarray[n_wavelengths]
+        Equidistant, ascending.
+    signals : ndarray[n_signals, n_wavelengths]
+        Each signal's where its image is whole.
+    background : ndarray[n_wavelengths]
+        Uniform over the field.
+    """
+
+    wavelength_nm: FloatArray
+    signals: FloatArray
+    background: FloatArray
 
 
 @dataclass(frozen=True)

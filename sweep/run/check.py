@@ -22,7 +22,7 @@ from ..metrics.quantity import WORST_CASE
 from ..results.designs import row_space
 from ..results.facts import CheckFacts
 from ..study import Study
-from .routes import worst_cases
+from .routes import text_of, worst_cases
 
 _AT_ONCE = 64
 """Designs that are computed again in one block."""
@@ -92,24 +92,26 @@ def _at_reference(study: Study, space: Space, view: View, points: FloatArray) ->
     return found | (worst_cases(space, model, points, nominal, worst, study.tolerance) if worst else {})
 
 
-def check_run(study: Study, results: Path, seconds: float) -> CheckFacts | None:
+def check_run(study: Study, results: Path, seconds: float) -> tuple[CheckFacts | None, list[str]]:
     """Compare a seeded sample of a run's rows with the reference, as many as fit into some seconds, at least one.
 
-    None where no row of the table could be computed.
+    Returns the result, None where no row could be compared, and a warning for each row that could not.
     """
     ended = time.monotonic() + seconds
     rows: list[dict[str, Any]] = []
+    warnings: list[str] = []
     for row in _sampled(study, results):
-        for compared in compared_rows(study, [row]):
-            rows += compared
+        try:
+            for compared in compared_rows(study, [row]):
+                rows += compared
+        except Exception as error:  # a finished run must not be lost to its check
+            warnings.append(f"design {row['design_id']} cannot be computed at the reference settings: {text_of(error)}")
         if time.monotonic() > ended:
             break
     if not rows:
-        return None
-    worst = max(rows, key=lambda row: row["realized_dn"] - row["allowed_dn"])
-    largest = max(rows, key=lambda row: row["realized_dn"])
-    shown = worst if worst["realized_dn"] > worst["allowed_dn"] else largest
-    return CheckFacts(
+        return None, warnings
+    shown = max(rows, key=lambda row: (row["realized_dn"] > row["allowed_dn"], row["realized_dn"]))
+    check = CheckFacts(
         rows=len(rows),
         design_id=int(shown["design_id"]),
         scenario=str(shown["scenario"]),
@@ -117,6 +119,7 @@ def check_run(study: Study, results: Path, seconds: float) -> CheckFacts | None:
         largest_dn=float(shown["realized_dn"]),
         allowed_dn=float(shown["allowed_dn"]),
     )
+    return check, warnings
 
 
 def _sampled(study: Study, results: Path) -> Iterator[dict[str, Any]]:

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from sweep.camera.forward import ForwardModel
-from sweep.camera.linear import linear_model
 from sweep.camera.methods import REFERENCE
 from sweep.camera.plan.planner import Planner
 from sweep.camera.rays import Cone, rays
-from sweep.camera.scene import Scene
+
 from sweep.camera.angular import METHODS, RAYS, AngularResponse, cone_of
+from sweep.camera.forward import ForwardModel
+from sweep.camera.linear import linear_model
+from sweep.camera.scene import Scene
 from sweep.camera.sensor_field import SensorField
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.block import edges_of

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from sweep.camera.methods import REFERENCE
-from sweep.camera.mosaic import Mosaic
 from sweep.camera.plan.bounds import Box
 from sweep.camera.plan.planner import Planner
 from sweep.camera.plan.work import DesignCount
+
+from sweep.camera.mosaic import Mosaic
 
 from ..hard.scenes import SENSOR, Scene, columns, scene, target
 

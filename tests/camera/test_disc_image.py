@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from sweep.camera.effects.sampling import Window
 
 from sweep.base.types import FloatArray
 from sweep.camera import psf
 from sweep.camera.disc_image import MEANS, covered, different, light_on_pixels
-from sweep.camera.effects.sampling import Window
 from sweep.camera.pixel import Optics, Pixel
 from sweep.camera.scene import Scene, Target
 

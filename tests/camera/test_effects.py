@@ -27,8 +27,7 @@ from sweep.camera.effects import (
 )
 from sweep.camera.noise import gaussian, moments
 from sweep.camera.pixel import Pixel
-from sweep.camera.scene import Scene
-from sweep.camera.scene import Drive, FixedExposure, Target
+from sweep.camera.scene import Drive, FixedExposure, Scene, Target
 from sweep.curves.color import luminance_per_photon_radiance
 from sweep.curves.spectrum import LIGHT_M_S, PLANCK_J_S, WavelengthGrid
 

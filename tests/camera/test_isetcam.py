@@ -13,17 +13,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 from sweep.camera.effects.blur import transfer
+from sweep.camera.plan.bounds import Box
+from sweep.camera.plan.planner import Planner
+from sweep.camera.plan.work import DesignCount
+
 from sweep.camera.forward import ForwardModel
 from sweep.camera.linear import linear_model
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Optics, Pixel, irradiance_factor
-from sweep.camera.plan.bounds import Box
-from sweep.camera.plan.planner import Planner
-from sweep.camera.plan.work import DesignCount
-from sweep.camera.scene import Scene
-from sweep.camera.scene import FixedExposure
+from sweep.camera.scene import FixedExposure, Scene
 from sweep.camera.view import View
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid

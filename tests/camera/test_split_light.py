@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from sweep.camera.effects import phase
 from sweep.camera.kernel import Kernel, make_kernel
 from sweep.camera.methods import REFERENCE
+
+from sweep.camera.effects import phase
 from sweep.camera.split_light import SplitLight
 
 from ..hard.scenes import DARK, F2, FAR, Scene, scene

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.stats import norm, poisson
-
 from sweep.camera.effects.noise import range_of_pixel
 from sweep.camera.effects.quantization import smoothed
+
 from sweep.camera.noise import moments, tails
 from sweep.camera.pixel import Pixel
 

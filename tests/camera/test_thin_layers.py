@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 import tmm
 from scipy.optimize import minimize_scalar
-
-from sweep.camera.linear import linear_model
 from sweep.camera.methods import REFERENCE
 from sweep.camera.rays import rays
+
 from sweep.camera.angular import cone_of
+from sweep.camera.linear import linear_model
 from sweep.metrics.separation import separation
 
 from ..conftest import STUDIES

@@ -40,7 +40,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, pd.DataFrame]:
     return study, pd.read_parquet(folder / "out" / "results.parquet")
 
 
-def test_every_promised_column_is_compared(run: tuple[Study, pd.DataFrame]) -> None:
+def test_every_csd_is_compared(run: tuple[Study, pd.DataFrame]) -> None:
     study, frame = run
     assert audit_rows(study, [frame]).faults == []
     promised = [name for name, quantity in study.quantities.items() if quantity.promised]
@@ -62,18 +62,18 @@ def test_progress_counts_all_that_is_recomputed(run: tuple[Study, pd.DataFrame])
     found = audit_rows(study, [frame.iloc[:5], frame.iloc[5:]], lambda *call: calls.append(call))
     total = len(sampled(frame))
     assert total == len(found.rows) >= 5
-    assert {(phase, n) for phase, _, n in calls} == {("designs recomputed", total)}
+    assert {(phase, n) for phase, _, n in calls} == {("designs computed again", total)}
     assert [done for _, done, _ in calls] == sorted({done for _, done, _ in calls})
     assert calls[-1][1] == total
 
 
 def broken_audit() -> Audit:
-    columns = {"design_id": [3, 4, 7], "scenario": ["chart"] * 3, "plan": "x", "promised_dn": 0.1}
+    columns = {"design_id": [3, 4, 7], "scenario": ["chart"] * 3, "plan": "x", "allowed_dn": 0.1}
     realized = {"realized_dn": [0.05, 1.4, 0.3], "quantity": "worst_csd_yellow_red"}
     return Audit(pd.DataFrame(columns | realized), 1000)
 
 
-def test_a_broken_promise_has_an_exit_code_of_its_own(
+def test_an_error_above_the_tolerance_has_an_exit_code_of_its_own(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     monkeypatch.setattr("sweep.commands.audit.audit_output", lambda *_, **__: broken_audit())
@@ -82,9 +82,9 @@ def test_a_broken_promise_has_an_exit_code_of_its_own(
         cli.main()
     assert left.value.code == BrokenPromiseError.exit_code == 5
     said = capsys.readouterr()
-    assert "2 errors are larger than promised" in said.out
+    assert "2 errors are larger than allowed" in said.out
     assert said.err == (
-        "sweep: chart: design 4: worst_csd_yellow_red is off by more than promised (got '1.4 DN'); "
+        "sweep: chart: design 4: worst_csd_yellow_red is off by more than allowed (got '1.4 DN'); "
         "allowed: at most 0.1 DN\n"
     )
     kept = broken_audit().rows.iloc[:1]

@@ -12,12 +12,11 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
 from sweep.base.errors import SweepError
-from sweep.camera.effects import quantization, saturation
 from sweep.camera.forward import ForwardModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Optics, Pixel, irradiance_factor
-from sweep.camera.scene import Scene
-from sweep.camera.scene import FixedExposure, Geometry
+from sweep.camera.readout import rounded
+from sweep.camera.scene import FixedExposure, Geometry, Scene
 from sweep.camera.view import View
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
@@ -140,7 +139,7 @@ def test_electrons_of_a_flat_light() -> None:
 
 
 def read_out(electrons: np.ndarray, pixel: Pixel) -> np.ndarray:
-    return quantization.rounded(saturation.clipped(electrons, pixel) * pixel.dn_per_e, pixel)
+    return rounded(np.minimum(electrons, pixel.saturation_e) * pixel.dn_per_e, pixel)
 
 
 def test_digital_numbers_clip_the_well_before_the_adc() -> None:

@@ -13,9 +13,9 @@ from scipy.integrate import quad
 from scipy.spatial.distance import cdist
 from scipy.stats import norm
 
+from sweep.camera.accuracy import Accuracy
 from sweep.camera.forward import ForwardModel
 from sweep.camera.linear import linear_model
-from sweep.camera.methods import Methods
 from sweep.camera.view import View
 from sweep.metrics.discrimination import error_bounds
 from sweep.metrics.evaluate import evaluate, family_quantities
@@ -200,7 +200,7 @@ MADE = {
     "lattice": Made(
         replace(
             scene("lattice", "RYNCy", {"target": target(100, 60, phase_px="any"), "optics": {"f_number": 4.0}}).view,
-            methods=Methods(phase="half pixel"),
+            accuracy=Accuracy(phases_per_px=4, finest_phase_px=0),
         )
     ),
     "noise": Made(scene("noise", "RYNCy", NOISY).view, ("yellow", "red")),

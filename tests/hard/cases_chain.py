@@ -9,13 +9,12 @@ from typing import Any
 
 import mpmath as mp
 import numpy as np
+from sweep.camera.methods import Methods
 
 from sweep.camera.forward import ForwardModel
-from sweep.camera.methods import Methods
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
-from sweep.camera.scene import Scene
-from sweep.camera.scene import FixedExposure
+from sweep.camera.scene import FixedExposure, Scene
 from sweep.camera.view import View
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
@@ -212,7 +211,9 @@ def no_light() -> Result:
     good = True
     for qe, radiance in ((np.zeros((3, N)), 2e18), (random_qe(8, 3), 5e-324)):
         view = beyond(made(qe, lights, FIXED), photon_radiance=radiance)
-        good &= evaluate(ForwardModel(view), plain(view))["csd_yellow_red"][0] == 0 == smooth_csd(view, plain(view), PAIR)
+        good &= (
+            evaluate(ForwardModel(view), plain(view))["csd_yellow_red"][0] == 0 == smooth_csd(view, plain(view), PAIR)
+        )
     with np.errstate(invalid="ignore"):
         view = made(np.zeros((3, N)), lights)
         dark = evaluate(ForwardModel(view), plain(view))

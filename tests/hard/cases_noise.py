@@ -5,12 +5,12 @@ from __future__ import annotations
 import mpmath as mp
 import numpy as np
 
-from sweep.camera.readout import draws_dn
 from sweep.camera.forward import ForwardModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.noise.gaussian import rounding
 from sweep.camera.noise.moments import moments
 from sweep.camera.pixel import Pixel
+from sweep.camera.readout import draws_dn
 from sweep.camera.scene import Scene
 from sweep.camera.view import View
 from sweep.curves.lights import Lights
@@ -137,7 +137,9 @@ def chain(pixel: Pixel) -> ForwardModel:
     grid = WavelengthGrid(step_nm=100)
     lights = Lights("two", ("a", "b"), ("a", "b"), np.eye(4)[:2] / 100, 1.0, "", True)
     scenario = Scene.model_validate({"noise": True, "exposure": {"kind": "fixed", "exposure_s": 1.0}})
-    return ForwardModel(View(grid, Mosaic.from_rows("W", [["W"]]), np.ones((1, 4)), (), np.ones(4), lights, pixel, scenario))
+    return ForwardModel(
+        View(grid, Mosaic.from_rows("W", [["W"]]), np.ones((1, 4)), (), np.ones(4), lights, pixel, scenario)
+    )
 
 
 @hard_case(

@@ -7,10 +7,10 @@ from functools import cache
 
 import mpmath as mp
 import numpy as np
-
-from sweep.camera.effects import blur, sampling
 from sweep.camera.effects.blur import Profile, mean_over_disc, too_much, transfer
 from sweep.camera.effects.sampling import covered
+
+from sweep.camera.effects import blur, sampling
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene

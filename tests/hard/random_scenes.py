@@ -7,16 +7,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-
 from sweep.camera.effects.image_height import all_heights_count
-from sweep.camera.forward import ForwardModel
 from sweep.camera.methods import Methods
-from sweep.camera.mosaic import Mosaic
-from sweep.camera.pixel import Pixel
 from sweep.camera.plan.bounds import Box
 from sweep.camera.plan.work import DesignCount
-from sweep.camera.scene import Scene
+
 from sweep.camera.angular import moves
+from sweep.camera.forward import ForwardModel
+from sweep.camera.mosaic import Mosaic
+from sweep.camera.pixel import Pixel
+from sweep.camera.scene import Scene
 from sweep.camera.view import View
 from sweep.curves.lights import class_pairs
 from sweep.designs.families.dual import Dual

@@ -8,13 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from sweep.camera.effects import Box
 from sweep.camera.forward import ForwardModel
-from sweep.camera.methods import Methods
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
-from sweep.camera.plan.bounds import Box
-from sweep.camera.plan.work import DesignCount
-from sweep.camera.scene import Scene
+from sweep.camera.scene import Scene as CameraScene
 from sweep.camera.sensor import BUILT_IN_SENSORS
 from sweep.camera.view import View
 from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
@@ -91,7 +89,7 @@ def scene(
         sensor.qe["C"],
         lights(grid),
         Pixel(**(pixel or {})),
-        Scenario.model_validate(scenario),
+        CameraScene.model_validate(scenario),
         technologies=() if index is None else moving(mosaic, index),
     )
     x = LOW + (HIGH - LOW) * np.random.default_rng(seed).uniform(size=5)
@@ -100,7 +98,7 @@ def scene(
     if modified:
         hull = family.hull(LOW, HIGH) if wide else (curves[0], curves[0])
         low[list(modified)], high[list(modified)] = hull
-    return Scene(name, view, curves, Box(view, low, high, DesignCount(1000)))
+    return Scene(name, view, curves, Box(view, low, high))
 
 
 def target(distance_m: float, fov_deg: float, **more: Any) -> dict[str, Any]:
@@ -213,10 +211,10 @@ HARD: tuple[Scene, ...] = (
 )
 
 
-def columns(made: Scene, methods: Methods) -> np.ndarray:
+def columns(made: Scene, left_out: frozenset[str] = frozenset()) -> np.ndarray:
     """Every promised column of the scene's design; of the best place only where any is asked for."""
     anywhere = asks_for_any_place(made)
-    found = evaluate(ForwardModel(replace(made.view, methods=methods)), made.curves)
+    found = evaluate(ForwardModel(replace(made.view, left_out=left_out)), made.curves)
     return np.array([found[name][0] for name in promised_names(made.view, any_place=anywhere)])
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from sweep.camera.methods import REFERENCE
 
 from sweep.camera.forward import ForwardModel
-from sweep.camera.methods import REFERENCE
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene
 from sweep.metrics.columns.probabilities import detection

@@ -22,7 +22,7 @@ from sweep.report.page import _drawings, _parts
 from sweep.report.page_data import payload
 from sweep.report.published import comparison_with_published
 from sweep.report.scenes import scene_groups
-from sweep.results.facts import EffectFacts
+from sweep.results.facts import CheckFacts
 from sweep.results.identity import CHUNK
 from sweep.results.output import Output
 from sweep.results.profiles import ParameterProfile, Profiles
@@ -99,23 +99,27 @@ def test_what_keeps_the_objective_is_around_the_best_value() -> None:
     assert profile.drop == 90.0
 
 
-def test_what_is_off_is_not_told_as_simulated(finished: Finished) -> None:
-    line = next(line for line in summary_lines(read_output(finished("stopband"))) if line.startswith("Simulated: "))
-    assert line == "Simulated: quantization, quadrature; nothing else changes a CSD (tolerance 0.1 DN)."
+def test_effects_that_are_left_out_are_not_told_as_simulated(finished: Finished) -> None:
+    output = read_output(finished("stopband"))
+    line = next(line for line in summary_lines(output) if line.startswith("Simulated: "))
+    check = output.provenance.check
+    assert check is not None
+    assert line == f"Simulated: quantization; no other effect changes a CSD. {check.sentence}"
 
 
-@pytest.mark.parametrize("short", [("far", "near"), ("near",)])
-def test_what_cannot_be_promised_is_said_short_with_its_cause(finished: Finished, short: tuple[str, ...]) -> None:
+def test_the_check_of_a_run_is_told_with_its_largest_difference(finished: Finished) -> None:
     output = read_output(finished("stopband"))
     kept = output.provenance.plans["chart"]
-    blur = EffectFacts(effect="blur", method="every wavelength", promised_dn=8190.0, reason="of a test")
-    wide = kept.model_copy(update={"promised_dn": 8190.5, "effects": (*kept.effects, blur)})
-    plans = {name: wide if name in short else kept for name in ("near", "far")}
-    facts = output.provenance.model_copy(update={"plans": plans})
+    check = CheckFacts(rows=3, design_id=7, scenario="far", quantity="csd_yellow_red", largest_dn=0.3, allowed_dn=0.1)
+    plans = {"near": kept, "far": kept.model_copy(update={"error_bound_dn": 0.04})}
+    facts = output.provenance.model_copy(update={"plans": plans, "check": check})
     line = next(line for line in summary_lines(replace(output, provenance=facts)) if line.startswith("Simulated"))
-    where = f" in {'any of 2 scenarios' if len(short) > 1 else 'the other 1'}"
-    assert f"The tolerance of 0.1 DN cannot be promised{where} (blur: no more than 8,190 DN is proven in near);" in line
-    assert ("nothing else changes a CSD (tolerance 0.1 DN) in 1 of 2 scenarios." in line) == (len(short) == 1)
+    assert "; the other effects change a CSD by at most 0.04 DN. " in line
+    assert line.endswith(
+        "Checked: 3 rows differ from the reference settings by at most 0.3 DN (csd_yellow_red of design 7 in far; "
+        "allowed 0.1 DN)."
+    )
+    assert not check.passed
 
 
 @pytest.mark.slow

@@ -75,7 +75,8 @@ def test_the_report_draws_the_nominal_design_beside_the_robust_one(tiny: Path) -
     assert "<h2>Over the sensor</h2>" in page
     assert told_map(figure) in page
     lens = read_output(tiny).few.set_index(["scenario", "name"]).loc[("lens", "nominal")]
-    assert abs(lens["csd_yellow_red"] - nominal.min()) <= lens["promised_dn"]
+    # The row is refined between the heights of the map.
+    assert -1 < lens["csd_yellow_red"] - nominal.min() <= 1e-9
     assert np.diff(figure.maps[0].heights).max() == pytest.approx(1 / 40)
 
 

@@ -15,7 +15,7 @@ from sweep.base.errors import OutputError
 from sweep.commands.status import status_lines
 from sweep.report import read_output
 from sweep.results.journal import SHARDS, Journal
-from sweep.run import output_folder, with_plans
+from sweep.run import output_folder
 from sweep.run.rows import rules_of
 from sweep.run.stop import Stop
 from sweep.run.sweep import Sweep
@@ -98,7 +98,7 @@ def test_a_finished_run_gives_its_chunks_back(plain: Study, tmp_path: Path) -> N
     journal = half_done(study, tmp_path)
     kept = {entry.key: pq.read_table(tmp_path / SHARDS / entry.file) for entry in journal.entries.values()}
     ran(study, tmp_path, 1)
-    study, journal = with_plans(study, 1, lambda *_: None), Journal(tmp_path)
+    study, journal = study.with_plans(), Journal(tmp_path)
     sweep = Sweep(study, rules_of(study), journal, Workers(1, Stop()))
     sweep.refill(tmp_path / "results.parquet")
     whole = pq.read_table(tmp_path / "results.parquet")

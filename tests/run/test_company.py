@@ -62,7 +62,7 @@ SOME = [*((name, True) for name in (*VIEWS, *MORE) if name not in ("pulsed", "no
 )
 def test_a_design_alone_is_the_one_of_its_block_within_rounding(name: str, separable: bool, step: int) -> None:
     view = (VIEWS | MORE)[name]
-    states = STATES if view.methods.quantization != "skip" and view.methods.noise != "skip" else ()
+    states = STATES if view.computes("quantization") and view.computes("noise") else ()
     imager = ForwardModel(view)
     space = MIXED if view.scenario.target is None else SPACE
     block = edges_of(space, 0, space.size)
@@ -81,7 +81,9 @@ def test_a_design_alone_is_the_one_of_its_block_within_rounding(name: str, separ
 
 @pytest.mark.parametrize("separable", [True, False])
 def test_a_bad_design_changes_no_other_beyond_rounding(separable: bool) -> None:
-    imager = ForwardModel(VIEWS["saturated" if separable else "chart"])  # one exposure for all; one that the design sets
+    imager = ForwardModel(
+        VIEWS["saturated" if separable else "chart"]
+    )  # one exposure for all; one that the design sets
     fine = edges_of(SPACE, 0, SPACE.size)
     assert fine is not None
     bad = np.array([0, 17, 30])

@@ -16,13 +16,12 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from sweep.base.errors import FailedDesignError, OutputError, SweepError
-from sweep.camera.scene import Target
 from sweep.commands.status import status_lines
 from sweep.report import make_report, read_output
 from sweep.results.identity import CHUNK
 from sweep.results.journal import SHARDS, Journal
 from sweep.results.lock import locked
-from sweep.run import Wishes, output_folder, run_study, to_do, to_do_lines, with_plans
+from sweep.run import Wishes, output_folder, run_study, to_do, to_do_lines
 from sweep.run.stop import Stop
 from sweep.run.sweep import KILLED
 from sweep.run.worker_process import growth_bytes
@@ -81,21 +80,6 @@ def test_a_design_that_kills_its_worker_is_a_row(plain: Study, tmp_path: Path, s
     pd.testing.assert_frame_equal(found.loc[~killed, same].astype(words), fine.loc[~killed, same].astype(words))
 
 
-@pytest.mark.slow
-def test_a_worker_that_is_killed_while_scenes_are_planned_costs_nothing(plain: Study, tmp_path: Path) -> None:
-    wish = tmp_path / "wish"
-    wish.write_text("kill 1 ")
-    target = Target(distance_m=100, fov_deg=60, phase_px="any")  # what a plan looks at designs for
-    scenes = {name: scene.model_copy(update={"target": target}) for name, scene in plain.scenarios.items()}
-    study = mischievous(replace(plain, scenarios=scenes), wish)
-    single = replace(study.spaces[-1], axes=((590.0,), (5.0,), (660.0,), (5.0,), (1.0,)))
-    study = replace(study, spaces=(*study.spaces[:-1], single))
-    plans = with_plans(study, 2, lambda *_: None).plans
-    assert wish.read_text().count("done") >= 2
-    wish.unlink()
-    assert plans == with_plans(study, 1, lambda *_: None).plans
-
-
 def test_failing_designs_stop_a_run_or_are_tried_again(fewer: Study, unharmed: pd.DataFrame, tmp_path: Path) -> None:
     wish = tmp_path / "wish"
     wish.write_text("fail ")
@@ -114,17 +98,23 @@ def test_failing_designs_stop_a_run_or_are_tried_again(fewer: Study, unharmed: p
 
 @pytest.mark.usefixtures("plain_pictures")
 @pytest.mark.parametrize("all_fail", thinned([False, True]))
-def test_a_named_design_that_fails_is_a_row(plain: Study, tmp_path: Path, all_fail: bool) -> None:
+def test_a_named_design_that_fails_is_a_row(
+    plain: Study, tmp_path: Path, all_fail: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     wish = tmp_path / "wish"
     named = next(space for space in plain.spaces if space.kind == "design")
     bad = replace(mischievous(plain, wish).spaces[-1], kind="design", name="bad", axes=((590.0,), *named.axes[1:]))
     study = replace(plain, spaces=(bad,) if all_fail else (*plain.spaces[:-1], bad))
 
-    def fail_from_here(phase: str, done: int, total: int) -> None:
-        if phase == "scenes planned" and done == total:
-            wish.write_text("fail ")
+    with_plans = Study.with_plans
 
-    run_study(study, tmp_path / "out", 1, fail_from_here)
+    def fail_once_planned(own: Study) -> Study:
+        planned = with_plans(own)
+        wish.write_text("fail ")
+        return planned
+
+    monkeypatch.setattr(Study, "with_plans", fail_once_planned)
+    run_study(study, tmp_path / "out", 1, lambda *_: None)
     found = rows(tmp_path / "out")
     failed = found["name"] == "bad"
     assert found.loc[failed, "status"].str.contains("no such filter").all()
@@ -162,16 +152,16 @@ def test_status_of_a_run(plain: Study, tmp_path: Path) -> None:
 
 
 def test_dry_run_counts_what_is_finished(plain: Study, tmp_path: Path) -> None:
-    found = to_do(plain, tmp_path / "out", 1, lambda *_: None)
+    found = to_do(plain, tmp_path / "out", 1)
     assert found.finished == 0
     assert not (tmp_path / "out").exists()
     half_done(plain, tmp_path / "out")
     kept = sum(entry.rows for entry in Journal(tmp_path / "out").entries.values())
-    found = to_do(plain, tmp_path / "out", 2, lambda *_: None)
+    found = to_do(plain, tmp_path / "out", 2)
     assert found.finished == kept
     assert f": {kept:,} finished, {plain.n_designs - kept:,} in " in next(to_do_lines(found, tmp_path))
     ran(plain, tmp_path / "out", 1)
-    first, *_, last = to_do_lines(to_do(plain, tmp_path / "out", 1, lambda *_: None), tmp_path)
+    first, *_, last = to_do_lines(to_do(plain, tmp_path / "out", 1), tmp_path)
     assert first.endswith(f"{plain.n_designs:,} rows: {plain.n_designs:,} finished, 0 in 0 chunks to compute.")
     assert last.endswith("nothing was computed or written.")
 
@@ -184,7 +174,7 @@ def test_a_dry_run_says_what_is_searched_and_computed_and_computes_no_design(
     path.write_text(path.read_text().replace("starts: 4, max_evaluations: 200", asked))
     monkeypatch.setattr("sweep.run.sweep.run_job", None)
     study = load_study(path)
-    found = to_do(study, tmp_path / "out", 1, lambda *_: None)
+    found = to_do(study, tmp_path / "out", 1)
     _, search, front, *effects, _ = to_do_lines(found, tmp_path / "out")
     assert search == "Search: 4 starts, 40 evaluations at most."
     assert front == "Its front: 3 levels, 100 evaluations at most."  # two starts each, and one from each neighbor

@@ -137,7 +137,7 @@ def test_rows_stand_in_order_whenever_their_scene_is_computed(
         order.append(index)
         join(self, index, few, waits=waits)
 
-    monkeypatch.setattr(Sweep, "_work", lambda _, scenario: heavier[scenario])
+    monkeypatch.setattr(Sweep, "_light_px", lambda _, scenario: heavier[scenario])
     monkeypatch.setattr(_InOrder, "found", found)
     monkeypatch.setattr("sweep.results.joined._AS_THEY_ARE", 1)
     ran(study, tmp_path, 1)

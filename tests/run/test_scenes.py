@@ -7,7 +7,6 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from sweep.commands.accuracy.ladder import TOLERANCES_DN, measure_accuracy
 from sweep.commands.audit import audit_output, audit_rows, sampled
 from sweep.report import make_report, read_output
 from sweep.run import run_study
@@ -34,30 +33,35 @@ def test_scenes_are_planned_and_drawn(road: tuple[Study, Path]) -> None:
     frame = pd.read_parquet(folder / "results.parquet")
     assert set(frame["status"]) == {"ok"}
     assert (frame["csd_yellow_red"] < frame["best_place_csd_yellow_red"]).all()
-    assert (frame["promised_dn"] <= 5).all()
+    assert (frame["promised_dn"] <= 2.5).all()
     assert (frame["promised_dn"] > 0).all()
     output = read_output(folder)
     make_report(output)
     assert (folder / "figures" / "series-1.svg").is_file()
     plans = output.provenance.plans
     assert frame["plan"].iloc[0] == plans["road distance_m=150"].key
-    effects = plans["road distance_m=150"].effects
-    method = next(effect.method for effect in effects if effect.effect == "phase")
-    assert method in (folder / "report.html").read_text()
+    page = (folder / "report.html").read_text()
+    assert all(effect.reason in page for effect in plans["road distance_m=150"].effects)
+    check = output.provenance.check
+    assert check is not None
+    assert check.passed
+    assert check.sentence in page
 
 
 @pytest.mark.slow
-def test_scenes_keep_their_promise_in_an_audit(road: tuple[Study, Path]) -> None:
+def test_scenes_pass_an_audit(road: tuple[Study, Path]) -> None:
     _, folder = road
     lines = audit_output(folder, None).lines
     audited = pd.read_parquet(folder / "audit.parquet")
     frame = pd.read_parquet(folder / "results.parquet")
-    assert lines[0].startswith(f"{len(audited)} of {len(frame)} designs recomputed with every effect on: no error")
-    assert (audited["realized_dn"] <= audited["promised_dn"]).all()
+    assert lines[0].startswith(
+        f"{len(audited)} of {len(frame)} designs computed again at the reference settings: no error"
+    )
+    assert (audited["realized_dn"] <= audited["allowed_dn"]).all()
     assert audited["realized_dn"].max() > 1e-9
 
 
-def test_an_audit_notices_a_wrong_row_in_any_promised_column(road: tuple[Study, Path]) -> None:
+def test_an_audit_notices_a_wrong_row_in_any_csd(road: tuple[Study, Path]) -> None:
     study, folder = road
     frame = pd.read_parquet(folder / "results.parquet")
     few = frame[(frame["kind"] == "reference") & (frame["scenario"] == "road distance_m=250")]
@@ -103,41 +107,3 @@ def test_a_study_of_a_searched_box_alone(tmp_path: Path) -> None:
 def test_an_audit_of_nothing_finds_nothing_broken() -> None:
     frame = pd.DataFrame({"design_id": [0], "kind": ["reference"], "pareto": [False], "status": ["not finite"]})
     assert audit_rows(load_study(STUDIES / "stopband.yaml"), [frame]).broken.empty
-
-
-@pytest.mark.slow
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("place", "distances", "designs"),
-    [
-        ("[0.3, 0.6]", "[150, 250]", 4),
-        ("any", "[250]", 2),
-    ],
-)
-def test_accuracy_measures_a_ladder_of_tolerances(tmp_path: Path, place: str, distances: str, designs: int) -> None:
-    path = tmp_path / "scenes.yaml"
-    path.write_text(SCENES.replace("any", place).replace("[150, 250]", distances))
-    lines = measure_accuracy(
-        load_study(path),
-        lambda step_nm: load_study(path, None, step_nm),
-        tmp_path / "out",
-        lambda *_: None,
-        most_designs=designs,
-    )
-    table = pd.read_parquet(tmp_path / "out" / "accuracy.parquet")
-    counts = len(distances.split(",")) * len(TOLERANCES_DN)
-    assert list(table.groupby("designs").size()) == [counts] * 2  # one, and all
-    assert (table["plan_s"] > 0).all()
-    paid = pd.read_parquet(tmp_path / "out" / "plans.parquet")
-    assert list(paid["designs"]) == ["one"] * len(paid[paid["designs"] == "one"]) + ["all"] * (len(paid) // 2)
-    assert (paid["factor"] > 0).all()
-    assert (table["promised_dn"] <= table["tolerance_dn"]).all()
-    assert (table["realized_dn"] <= table["promised_dn"] * (1 + 1e-9) + 1e-9).all()
-    for _, rows in table.groupby(["scenario", "designs"]):
-        assert list(rows["work"]) == sorted(rows["work"])  # from the coarsest tolerance to the finest
-        # Where nothing is saved, a plan adds no more than the tenth that it may take.
-        assert (rows["work"] < 1.1 * rows["reference_work"]).all()
-        assert rows["work"].iloc[0] < 0.9 * rows["reference_work"].iloc[0]
-        assert rows["plan"].nunique() >= 2
-    assert f"{len(table)} of {len(table)} realized errors are within their promise." in lines
-    assert (tmp_path / "out" / "accuracy.svg").is_file()

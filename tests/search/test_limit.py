@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from sweep.base.errors import SweepError
-from sweep.camera.scene import Scene
-from sweep.camera.scene import FixedExposure
+from sweep.camera.scene import FixedExposure, Scene
 from sweep.camera.view import View
 from sweep.curves.lights import Lights
 from sweep.designs.families.stopband import Stopband

@@ -10,7 +10,6 @@ from scipy.optimize import linprog
 
 from sweep.base.errors import SweepError
 from sweep.camera.linear import linear_model
-from sweep.camera.methods import REFERENCE
 from sweep.camera.scene import Scene
 from sweep.metrics.bound import Bound
 from sweep.metrics.objective import Objective
@@ -38,7 +37,7 @@ def problem_in(scene: str) -> Problem:
     problem = problem_of("stopband", 5, 0.3, GOAL)
     scenario = Scene.model_validate(SCENES[scene])
     assert scenario.noise is not None
-    view = replace(problem.view, scenario=scenario, pixel=scenario.noise.of(problem.view.pixel), methods=REFERENCE)
+    view = replace(problem.view, scenario=scenario, pixel=scenario.noise.of(problem.view.pixel), left_out=frozenset())
     return replace(problem, view=view, constraints={"sensitivity": Bound(min=0.9)})
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sweep.camera.methods import REFERENCE
+from sweep.camera.accuracy import Accuracy
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene
 from sweep.metrics.bound import Bound
@@ -91,7 +91,7 @@ def test_derivatives_hold_in_scenes(scenario: dict[str, object], crosstalk: floa
         STOPBAND.view,
         scenario=Scene.model_validate(scenario),
         pixel=Pixel(crosstalk=crosstalk),
-        methods=replace(REFERENCE, phase="pixel", blur="every 10 nm"),
+        accuracy=Accuracy(phases_per_px=1),
     )
     problem = replace(STOPBAND, view=view)
     u, step = np.full(problem.free.size, 0.4), 1e-5

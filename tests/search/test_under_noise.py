@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from sweep.base.errors import StudyError
-from sweep.camera.effects import noise
+from sweep.camera.accuracy import Accuracy
 from sweep.camera.forward import ForwardModel
 from sweep.camera.linear import linear_model
-from sweep.camera.methods import REFERENCE, Methods
+from sweep.camera.readout import draws_dn
 from sweep.designs.families.dual import Dual
 from sweep.designs.families.free_form import FreeForm
 from sweep.designs.families.stopband import MultiStopband
@@ -74,7 +74,7 @@ def differences_off(seed: int) -> float:
     made = random_scene(seed)
     family, x, span = family_of(seed, len(made.view.modified))
     # A lattice of pixels: more places take long, and are computed alike.
-    view = replace(made.view, methods=Methods(phase="pixel"))
+    view = replace(made.view, accuracy=Accuracy(phases_per_px=1))
     imager, free = linear_model(view), np.arange(x.size)
 
     def rows(at: np.ndarray, free: np.ndarray = free[:1]) -> list[Rows]:
@@ -134,7 +134,7 @@ def test_the_objective_is_met_by_the_readout() -> None:
     """Of the design that is found: exact sums over digital numbers, as the result table has them."""
     problem = problem_of("stopband", 30, 0.3, Objective(least={"state_error": 1.0}))
     best = searched(problem)
-    imager = ForwardModel(replace(problem.view, methods=REFERENCE))
+    imager = ForwardModel(problem.view.with_all_effects)
     found = evaluate(imager, problem.family.curves(best.x[None]), STATES)
     # Gaussians beside exact sums of Poisson electrons: the error itself within 5 %.
     assert problem.objective.of(found)[0] == pytest.approx(best.objective, abs=0.02)
@@ -145,7 +145,7 @@ def test_bounds_on_errors_are_kept_and_their_reach_is_told() -> None:
     problem = replace(problem_of("stopband", 30, 0.3, Objective(minimum={"cfa_sensitivity": 1.0})), constraints=bounds)
     best = searched(problem)
     curves = problem.family.curves(best.x[None])
-    found = evaluate(ForwardModel(replace(problem.view, methods=REFERENCE)), curves, STATES)
+    found = evaluate(ForwardModel(problem.view.with_all_effects), curves, STATES)
     assert found["dprime_yellow_red"][0] == pytest.approx(5.0, rel=2e-3)  # light is bought with distance
     assert found["error_green_red"][0] <= 1e-4
     alone = {"error_yellow_red": Bound(max=1e-12)}
@@ -186,14 +186,14 @@ def test_what_cannot_be_asked_of_errors_is_a_line(told: str, fault: str, tmp_pat
 
 def drawn_error(problem: Problem, x: np.ndarray, rng: np.random.Generator, draws: int) -> float:
     """How often the most likely of the worst two lights is the wrong one, of patches drawn pixel by pixel."""
-    imager, curves = ForwardModel(replace(problem.view, methods=REFERENCE)), problem.family.curves(x[None])
+    imager, curves = ForwardModel(problem.view.with_all_effects), problem.family.curves(x[None])
     read, members = imager.read_with_noise(curves), problem.view.members
     mean, variance, electrons = read.mean[0, 0], read.variance[0, 0], imager.pixel_electrons(curves)[0, 0]
     pairs = [(a, b) for a in members["yellow"] for b in members["red"]]
     worst = max(pairs, key=lambda p: pairwise_error(mean[None], variance[None], np.array([p[0]]), np.array([p[1]]))[0])
     wrong = 0
     for own, other in (worst, worst[::-1]):
-        pixels = noise.draws_dn(np.broadcast_to(electrons[own], (draws, electrons.shape[1])), imager.readout.pixel, rng)
+        pixels = draws_dn(np.broadcast_to(electrons[own], (draws, electrons.shape[1])), imager.readout.pixel, rng)
         read_out = imager.readout.channels_of(pixels, 0)
         far = [((read_out - mean[i]) ** 2 / variance[i] + np.log(variance[i])).sum(axis=1) for i in (own, other)]
         wrong += int((far[0] > far[1]).sum())

@@ -211,13 +211,3 @@ def test_a_lens_file_that_is_not_there_has_a_near_name(tmp_path: Path) -> None:
     assert len(found) == 1
     assert found[0].startswith("tiny.yaml:22: scenarios.a.field.profile: no such file (got 'lends.csv')")
     assert found[0].endswith("did you mean 'lens.csv'?")
-
-
-def test_all_places_need_a_lens_whose_cone_has_a_width(tmp_path: Path) -> None:
-    moved = BASE.replace("to: G, at:", f"to: G, {LAYERS}, at:", 1)
-    scene = "scenarios: {a: {optics: {f_number: 128}, field: {cra_max_deg: 9, places: any}}}\n"
-    assert faults(tmp_path, moved + scene) == [
-        "tiny.yaml:22: scenarios.a.optics.f_number: all places of the sensor are too many behind so slow a lens, where "
-        "filters move with the angle (got 128.0); allowed: up to 100, or named places"
-    ]
-    assert load(tmp_path, BASE + scene).scenarios["a"].field is not None

@@ -10,14 +10,14 @@ from typing import get_args
 import numpy as np
 import pytest
 from scipy.spatial.distance import cdist
-
 from sweep.camera.effects.demosaic import center_weights
-from sweep.camera.readout import draws_dn
 from sweep.camera.effects.sampling import Window
-from sweep.camera.forward import ForwardModel
 from sweep.camera.methods import Methods
+
+from sweep.camera.forward import ForwardModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.noise import table
+from sweep.camera.readout import draws_dn
 from sweep.curves.builtin.spectra import shipped_groups
 from sweep.curves.color import luminance_per_photon_radiance
 from sweep.curves.spectrum import WavelengthGrid

@@ -1,0 +1,83 @@
+"""Effects of a user's own, and the one that is shipped: veiling glare."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sweep.base.errors import StudyError, SweepError
+from sweep.base.own_code import OwnCode
+from sweep.camera.irradiance import background_irradiance, scene_irradiance, signal_irradiance
+from sweep.camera.own_effects import OwnEffect
+from sweep.camera.scene import Scene
+from sweep.study import load_study
+
+from ..hard.scenes import scene, target
+
+LIT = {"target": target(50, 60), "exposure": {"kind": "fixed", "exposure_s": 2e-3}, "background_cd_m2": 300.0}
+
+
+def own_effect(body: str) -> OwnEffect:
+    source = f"from dataclasses import replace\nimport numpy as np\ndef effect(irradiance, scene):\n    {body}\n"
+    return OwnEffect(OwnCode("my.py:effect", source))
+
+
+def test_effects_are_applied_in_order() -> None:
+    view = scene("lit", "RGGB", LIT).view
+    halved = own_effect("return replace(irradiance, signals=irradiance.signals / 2)")
+    added = own_effect("return replace(irradiance, signals=irradiance.signals + irradiance.background)")
+    seen = scene_irradiance(replace(view, own_effects=(halved, added)))
+    np.testing.assert_allclose(seen.signals, signal_irradiance(view) / 2 + background_irradiance(view), rtol=1e-14)
+    np.testing.assert_array_equal(seen.background, background_irradiance(view))
+
+
+def test_an_effect_sees_its_scene() -> None:
+    view = scene("lit", "RGGB", LIT).view
+    nearer = own_effect("return replace(irradiance, signals=irradiance.signals * scene.target.distance_m)")
+    seen = signal_irradiance(replace(view, own_effects=(nearer,)))
+    np.testing.assert_allclose(seen, 50 * signal_irradiance(view), rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ("return replace(irradiance, signals=irradiance.signals[0])", "another shape of `signals`"),
+        ("return replace(irradiance, background=-irradiance.background)", "no irradiance in `background`"),
+        ("return replace(irradiance, signals=irradiance.signals * np.nan)", "no irradiance in `signals`"),
+        ("return irradiance.signals", "AttributeError"),
+        ("raise SystemExit(3)", "SystemExit: 3"),
+        ("return replace(irradiance, signals='bright')", "ValueError"),
+    ],
+)
+def test_what_is_no_irradiance_is_one_line(body: str, message: str) -> None:
+    view = replace(scene("lit", "RGGB", LIT).view, own_effects=(own_effect(body),))
+    with pytest.raises(SweepError, match=message):
+        scene_irradiance(view)
+
+
+def test_a_failing_effect_is_refused_with_the_study(tmp_path: Path) -> None:
+    (tmp_path / "my.py").write_text("def effect(irradiance, scene):\n    return None\n")
+    study = tmp_path / "mine.yaml"
+    study.write_text("study: mine\nsensor: ar0820\nlights: tl16\ncfas: [RGGB]\neffects: ['my.py:effect']\n")
+    with pytest.raises(StudyError, match=r"mine.yaml:5: effects: my.py:effect: AttributeError"):
+        load_study(study, allow_code=True)
+
+
+@pytest.mark.parametrize(("field_cd_m2", "mean_cd_m2"), [(None, 300.0), (5000.0, 5000.0), (0.0, 0.0)])
+def test_veiling_glare_spreads_a_share_of_the_mean_light(field_cd_m2: float | None, mean_cd_m2: float) -> None:
+    plain = scene("lit", "RGGB", LIT).view
+    glare = {"share": 0.05, "field_cd_m2": field_cd_m2}
+    view = scene("glare", "RGGB", LIT | {"veiling_glare": glare}).view
+    mean = background_irradiance(plain) * mean_cd_m2 / 300
+    np.testing.assert_allclose(signal_irradiance(view), 0.95 * signal_irradiance(plain), rtol=1e-13)
+    np.testing.assert_allclose(
+        background_irradiance(view), 0.95 * background_irradiance(plain) + 0.05 * mean, rtol=1e-13
+    )
+
+
+def test_veiling_glare_needs_a_target() -> None:
+    with pytest.raises(ValueError, match="veiling_glare needs a target"):
+        Scene.model_validate({"veiling_glare": {"share": 0.05}})
