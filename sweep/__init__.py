@@ -9,7 +9,7 @@ Three lines of Python judge a filter of one's own:
 Names are loaded when they are first used; what type they have stands in `__init__.pyi`.
 """
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 _HOMES = {
     "load_study": "door.opening:opened_study",

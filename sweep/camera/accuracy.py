@@ -64,4 +64,4 @@ AccuracySection = Annotated[
     Accuracy,
     WrapValidator(_from_preset, json_schema_input_type=Preset | Accuracy),
 ]
-"""The `accuracy` key of a study: `fast`, `standard`, `reference`, or a mapping of settings with an optional `preset`."""
+"""The `accuracy` key of a study: `fast`, `standard`, `reference`, or settings with an optional `preset`."""

@@ -122,7 +122,7 @@ def _no_noise(box: Box) -> str | None:
     return "no noise asked for" if box.view.scenario.noise is None else None
 
 
-def _noise_bound_dn(box: Box, readout: frozenset[str]) -> float:
+def _noise_bound_dn(box: Box, _: frozenset[str]) -> float:
     """What the full well and the ends of the ADC take from, or add to, the mean of noisy readouts.
 
     The dark end adds most in the dark. The others' loss grows with the signal up to the first of them, and falls
@@ -136,7 +136,7 @@ def _noise_bound_dn(box: Box, readout: frozenset[str]) -> float:
     return (2 * added_dn + gain * lost_e) * box._sqrt_channels
 
 
-def _rounding_bound_dn(box: Box, readout: frozenset[str]) -> float:
+def _rounding_bound_dn(box: Box, _: frozenset[str]) -> float:
     """A step of rounding; under noise what read noise leaves of it.
 
     The k-th harmonic of the mean rounding error is 1 / (pi k) exp(-2 (pi k sigma)^2), whatever the electrons are. Where
@@ -160,7 +160,7 @@ def _not_saturated(box: Box) -> str | None:
     return f"the brightest signal has at most {box.brightest_signal_dn:.0f} DN"
 
 
-def _saturation_bound_dn(box: Box, readout: frozenset[str]) -> float:
+def _saturation_bound_dn(box: Box, _: frozenset[str]) -> float:
     pixel = box.view.pixel
     excess_e = max(0.0, box.brightest_pixel_dn / pixel.dn_per_e - pixel.saturation_e)
     return excess_e * pixel.dn_per_e * box._sqrt_channels

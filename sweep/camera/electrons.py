@@ -1,7 +1,7 @@
 """Expected electrons of a scene on a sensor, for a block of designs: what light, filters, drive and exposure give.
 
-In the physical order: light through optics and filters onto the elements of the pixel response, a uniform background, dark
-current, a pulse's moment, the exposure. Nothing is clipped, rounded or noisy yet.
+In the physical order: light through optics and filters onto the elements of the pixel response, a uniform background,
+dark current, a pulse's moment, the exposure. Nothing is clipped, rounded or noisy yet.
 """
 
 from __future__ import annotations

@@ -62,7 +62,8 @@ def refined_heights(
 ) -> tuple[FloatArray, FloatArray]:
     """Smallest values over all image heights and where, ndarray[n_values] each, by refinement of the smallest known.
 
-    `values`: ndarray[n_values, n_heights], known at ascending `heights`; `evaluate`: from a height to ndarray[n_values].
+    `values`: ndarray[n_values, n_heights], known at ascending `heights`; `evaluate`: from a height to
+    ndarray[n_values].
     The steps around a start are halved; that no lower value lies elsewhere is not proven.
     """
     known = dict(zip(heights, values.T, strict=True))

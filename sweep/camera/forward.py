@@ -46,7 +46,7 @@ class ForwardModel:
     """Whether all phases are kept."""
 
     def __init__(self, view: View, phases: Phases | None = None, *, once: bool = False) -> None:
-        """`phases`: sampling phases instead of those of the scene. `once`: for a single use, so that no table is made."""
+        """`phases`: sampling phases instead of the scene's. `once`: for a single use, so that no table is made."""
         self.view = view
         self._once = once
         # Parts whose pixels would be too many to hold together: field positions, or blocks of phases.

@@ -140,7 +140,7 @@ class Readout:
 
     @property
     def few_pixels(self) -> tuple[IndexArray, ...] | None:
-        """For each channel the pixels of `ForwardModel.pixel_electrons` of which it is the mean; None where they are many."""
+        """Pixels of `ForwardModel.pixel_electrons` of which each channel is the mean; None where they are many."""
         view = self.view
         if view.scenario.target is not None or view.mosaic.counts.max() > _FEW:
             return None

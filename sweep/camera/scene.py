@@ -137,9 +137,9 @@ class Scene(Section):
     is added over the whole field, also in front of the target, flat in photons. `drive`: of a pulsed LED. `field`: the
     worst place of the sensor. `off_axis_deg`: the field angle, off which a lens without vignetting gives cos^4 of the
     light. `visibility_m`: the distance at which haze or fog leaves 2 % of a target's light (Koschmieder's
-    meteorological range). `veiling_glare`: light that the lens spreads over the field. `noise`: photon, read and dark noise and PRNU act before the mean is taken;
-    true, or figures of its own. Limits: 1 to 1e40 photons (the sun's disc: 1e25), 1e-12 to 1e15 cd, a background up to
-    1e15 cd/m^2 (the sun: 2e9).
+    meteorological range). `veiling_glare`: light that the lens spreads over the field. `noise`: photon, read and dark
+    noise and PRNU act before the mean is taken; true, or figures of its own. Limits: 1 to 1e40 photons (the sun's disc:
+    1e25), 1e-12 to 1e15 cd, a background up to 1e15 cd/m^2 (the sun: 2e9).
     """
 
     photon_radiance: float = Field(default=2e18, ge=1, le=1e40)

@@ -43,7 +43,7 @@ class SensorField(Section):
     whose second one the angle in degrees; or between the angles `cra_deg` at the relative `heights`, in equal steps
     where these are left out. `corner_mm`: the image height of the corner; left out, a file's last row is the corner.
     `places`: so many, in equal steps of image height (9 where left out, or those of a list `cra_deg`), or `any`: all
-    real places, of which the smallest CSDs are found with proof. A scene's `off_axis_deg` is then the field angle of
+    places, of which the smallest CSDs are looked for. A scene's `off_axis_deg` is then the field angle of
     the corner.
     """
 

@@ -92,7 +92,7 @@ class View:
     @property
     def linear(self) -> bool:
         """Whether digital numbers are linear in electrons: neither clipped nor rounded."""
-        return READOUT <= self.left_out
+        return self.left_out >= READOUT
 
     @property
     def all_phases(self) -> bool:

@@ -24,10 +24,12 @@ def _lines(plans: list[Plan]) -> Iterator[str]:
     first, last = plans[0].scenario, plans[-1].scenario
     names = first if len(plans) == 1 else f"{first} ... {last} ({len(plans)} scenes)"
     left_out_dn = max(plan.error_bound_dn for plan in plans)
-    yield f"{names}: what is left out changes a CSD by at most {left_out_dn:.2g} DN (tolerance {plans[0].tolerance_dn:g} DN)"
+    tolerance_dn = plans[0].tolerance_dn
+    yield f"{names}: what is left out changes a CSD by at most {left_out_dn:.2g} DN (tolerance {tolerance_dn:g} DN)"
     width = max(len(choice.effect) for choice in plans[0].choices)
     for choices in zip(*(plan.choices for plan in plans), strict=True):
         choice = max(choices, key=lambda c: c.bound_dn or 0.0)
         bound = "no bound" if choice.bound_dn is None else f"{choice.bound_dn:.2g} DN"
-        yield f"  {choice.effect:<{width}}  {'computed' if choice.computed else 'left out'}  {bound:>11}  {choice.reason}"
+        done = "computed" if choice.computed else "left out"
+        yield f"  {choice.effect:<{width}}  {done}  {bound:>11}  {choice.reason}"
     yield ""

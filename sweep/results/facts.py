@@ -32,7 +32,7 @@ class SensorOrigin(Origin):
 
 
 class EffectFacts(_Facts):
-    """Whether an effect was computed, a bound on what it changes in a CSD (DN, None where no bound is known), and why."""
+    """Whether an effect was computed, and why; a bound on what it changes in a CSD, DN, None where none is known."""
 
     effect: str
     computed: bool
