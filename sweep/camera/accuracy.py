@@ -29,7 +29,7 @@ class Accuracy(Section):
     field_positions: int = Field(default=33, ge=2, le=257)
     rays: Annotated[int, Field(ge=1, le=64)] | None = None
     psf_step_nm: float = Field(default=10.0, gt=0, le=100)
-    pwm_moments: int = Field(default=9, ge=2, le=1000)
+    pwm_moments: int = Field(default=17, ge=2, le=1000)
     single_precision: bool = False
 
     @property
@@ -40,10 +40,10 @@ class Accuracy(Section):
 
 STANDARD = Accuracy()
 PRESETS: dict[str, Accuracy] = {
-    "fast": Accuracy(finest_phase_px=0.0, field_positions=9, rays=16, psf_step_nm=10.0, pwm_moments=3),
+    "fast": Accuracy(finest_phase_px=0.0, field_positions=9, rays=16, psf_step_nm=10.0, pwm_moments=5),
     "standard": STANDARD,
     "reference": Accuracy(
-        phases_per_px=64, finest_phase_px=1 / 512, field_positions=129, psf_step_nm=1e-3, pwm_moments=33
+        phases_per_px=64, finest_phase_px=1 / 512, field_positions=129, psf_step_nm=1e-3, pwm_moments=129
     ),
 }
 REFERENCE = PRESETS["reference"]

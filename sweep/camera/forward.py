@@ -24,7 +24,7 @@ from .field import over_field
 from .memory import blocks
 from .noise_readout import NoisyReadout
 from .phases import Phases, different_phases, scene_phases
-from .pixel_response import PixelResponse, kept_response, pixel_response
+from .pixel_response import ChannelResponses, PixelResponse, channel_responses, kept_response, pixel_response
 from .readout import Readout
 from .scene_light import SceneLight
 from .view import View
@@ -79,6 +79,8 @@ class ForwardModel:
         """The same scene at other phases, for a single use."""
         model = ForwardModel(self.view, phases, once=True)
         model.__dict__["light"] = self.light
+        if self._of_channels:
+            model.__dict__["_channels"] = self._channels
         return model
 
     @cached_property
@@ -89,9 +91,21 @@ class ForwardModel:
     @cached_property
     def _response(self) -> PixelResponse:
         by_pixel = not self.view.linear
+        if self._of_channels:
+            assert self.phases is not None
+            return self._channels.at(self.view, self.phases)
         if self._of_scene:
             return kept_response(self.view, self.phases, by_pixel=by_pixel)
         return pixel_response(self.view, self.phases, by_pixel=by_pixel)
+
+    @property
+    def _of_channels(self) -> bool:
+        """Whether the response is that of a target's channels, whose phases are kept one by one."""
+        return self.view.linear and self.view.all_phases and self.view.scenario.field is None
+
+    @cached_property
+    def _channels(self) -> ChannelResponses:
+        return channel_responses(self.view)
 
     @cached_property
     def electrons(self) -> Electrons:

@@ -38,6 +38,11 @@ class Phases:
     def __len__(self) -> int:
         return len(self.center_px)
 
+    @property
+    def keys(self) -> list[tuple[float, ...]]:
+        """A key of each phase."""
+        return [tuple(row) for row in np.concatenate([self.center_px, self.nearest_px], axis=1).tolist()]
+
     def subset(self, which: slice | IndexArray) -> Phases:
         """Some of the phases."""
         return Phases(self.center_px[which], self.nearest_px[which])
@@ -165,7 +170,7 @@ def _known_or_evaluated(
     phases: Phases, known: dict[tuple[float, ...], FloatArray], evaluate: Callable[[Phases], FloatArray]
 ) -> FloatArray:
     """Values at phases, ndarray[n_values, n_phases], each evaluated once."""
-    keys = [tuple(row) for row in np.concatenate([phases.center_px, phases.nearest_px], axis=1).tolist()]
+    keys = phases.keys
     new = np.array([at for at, key in enumerate(keys) if key not in known], dtype=np.intp)
     if new.size:
         known.update(zip((keys[at] for at in new), evaluate(phases.subset(new)).T, strict=True))

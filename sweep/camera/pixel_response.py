@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import pickle
+import threading
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -27,7 +28,7 @@ from .view import View
 
 _HELD = 8_000_000
 """Values of pixels that are held at once."""
-_KEPT_BYTES = 16 * 2**20
+_KEPT_BYTES = 32 * 2**20
 """Responses that take more are not kept."""
 
 
@@ -107,8 +108,38 @@ def _one_light(source: FloatArray | SplitLight) -> bool:
     return source.shares is None if isinstance(source, SplitLight) else bool(source.shape[-1] == 1)
 
 
+class ChannelResponses:
+    """Responses of channels at phases, each made once for all CFAs whose tiles are alike; threads take turns."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[float, ...], tuple[FloatArray, FloatArray]] = {}
+        self._one_at_a_time = threading.Lock()
+
+    def at(self, view: View, phases: Phases) -> PixelResponse:
+        """The response at some phases."""
+        keys = phases.keys
+        with self._one_at_a_time:
+            new = [at for at, key in enumerate(keys) if key not in self._known]
+            if new:
+                made = pixel_response(view, phases.subset(np.array(new)), by_pixel=False)
+                if (len(self._known) + len(new)) * made.light[0].nbytes > _KEPT_BYTES:
+                    self._known.clear()
+                    return made if len(new) == len(keys) else pixel_response(view, phases, by_pixel=False)
+                parts = zip(made.light, made.uniform, strict=True)
+                self._known.update(zip((keys[at] for at in new), parts, strict=True))
+            light, uniform = (np.stack(part) for part in zip(*(self._known[key] for key in keys), strict=True))
+        weights = np.repeat(np.eye(uniform.shape[2])[None], len(keys), axis=0)
+        return PixelResponse(light, uniform, weights, weights, by_channel=True)
+
+
+_CHANNELS: Cache[bytes, ChannelResponses] = Cache(4)
 _RESPONSES: Cache[bytes, PixelResponse] = Cache(8)
-"""The latest responses of channels: CFAs with tiles of one pattern share theirs."""
+"""The latest ones: CFAs with tiles of one pattern share theirs."""
+
+
+def channel_responses(view: View) -> ChannelResponses:
+    """The responses of a target's channels in a scene, kept."""
+    return _CHANNELS.get(hashlib.sha256(pickle.dumps(colorless(view))).digest(), ChannelResponses)
 
 
 def kept_response(view: View, phases: Phases | None, *, by_pixel: bool) -> PixelResponse:

@@ -43,9 +43,10 @@ def largest(drive: Drive, shortest_s: float, longest_s: float) -> float:
 
 
 def scales(view: View, exposure_s: FloatArray) -> FloatArray:
-    """Light relative to its mean in the moments that are computed, ndarray[n_designs, n_moments].
+    """Light relative to its mean at the moments that are computed, ndarray[n_designs, n_moments].
 
-    Behind a linear readout the two ends are the extremes.
+    Behind a linear readout the two ends are the extremes. Behind one that clips the distance of two signals may be
+    smallest at any moment between them.
     """
     drive = view.scenario.drive
     if drive is None or not view.computes("flicker"):

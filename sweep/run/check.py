@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 
-from ..base.types import FloatArray
+from ..base.types import FloatArray, delayed
 from ..camera.accuracy import REFERENCE
 from ..camera.forward import ForwardModel
 from ..camera.view import View
@@ -21,13 +21,15 @@ from ..metrics.evaluate import evaluate
 from ..metrics.quantity import WORST_CASE
 from ..results.designs import row_space
 from ..results.facts import CheckFacts
+from ..results.tables import holds
 from ..study import Study
 from .routes import text_of, worst_cases
+from .workers import Workers
 
 _AT_ONCE = 64
 """Designs that are computed again in one block."""
-_MOST_ROWS = 1000
-"""Rows of a check at the end of a run, at most."""
+_MOST_ROWS, _ENOUGH_ROWS = 200, 5000
+"""Rows of a check at the end of a run, at most; row groups are read until they have so many to choose from."""
 
 Row = Mapping[str, Any]
 
@@ -92,22 +94,20 @@ def _at_reference(study: Study, space: Space, view: View, points: FloatArray) ->
     return found | (worst_cases(space, model, points, nominal, worst, study.tolerance) if worst else {})
 
 
-def check_run(study: Study, results: Path, seconds: float) -> tuple[CheckFacts | None, list[str]]:
+def check_run(study: Study, results: Path, seconds: float, crew: Workers) -> tuple[CheckFacts | None, list[str]]:
     """Compare a seeded sample of a run's rows with the reference, as many as fit into some seconds, at least one.
 
-    Returns the result, None where no row could be compared, and a warning for each row that could not.
+    Every worker, which knows the scenes, takes a part of them. Returns the result, None where no row could be compared,
+    and a warning for each row that could not.
     """
-    ended = time.monotonic() + seconds
+    sample = _sampled(study, results)
+    parts = [sample[at :: crew.count] for at in range(crew.count)]
     rows: list[dict[str, Any]] = []
     warnings: list[str] = []
-    for row in _sampled(study, results):
-        try:
-            for compared in compared_rows(study, [row]):
-                rows += compared
-        except Exception as error:  # a finished run must not be lost to its check
-            warnings.append(f"design {row['design_id']} cannot be computed at the reference settings: {text_of(error)}")
-        if time.monotonic() > ended:
-            break
+    calls = (delayed(_checked, study, part, seconds) for part in parts if part)
+    for compared, faults in crew(calls, killed=lambda _: ([], ["a worker was killed in the check of the run"])):
+        rows += compared
+        warnings += faults
     if not rows:
         return None, warnings
     shown = max(rows, key=lambda row: (row["realized_dn"] > row["allowed_dn"], row["realized_dn"]))
@@ -122,13 +122,30 @@ def check_run(study: Study, results: Path, seconds: float) -> tuple[CheckFacts |
     return check, warnings
 
 
-def _sampled(study: Study, results: Path) -> Iterator[dict[str, Any]]:
+def _checked(study: Study, rows: Sequence[Row], seconds: float) -> tuple[list[dict[str, Any]], list[str]]:
+    """`compared_rows` of some rows, until the time is over; and what could not be compared."""
+    ended = time.monotonic() + seconds
+    result: list[dict[str, Any]] = []
+    warnings: list[str] = []
+    for row in rows:
+        try:
+            for compared in compared_rows(study, [row]):
+                result += compared
+        except Exception as error:  # a finished run must not be lost to its check
+            warnings.append(f"design {row['design_id']} cannot be computed at the reference settings: {text_of(error)}")
+        if time.monotonic() > ended:
+            break
+    return result, warnings
+
+
+def _sampled(study: Study, results: Path) -> list[Row]:
     """Rows of a result table in a random order that the study's seed gives; those that failed are left out."""
+    rng = np.random.default_rng([study.section.seed, 5])
     with pq.ParquetFile(results) as table:
-        starts = np.cumsum([0, *(table.metadata.row_group(at).num_rows for at in range(table.num_row_groups))])
-        rng, n = np.random.default_rng([study.section.seed, 5]), int(starts[-1])
-        for index in rng.choice(n, size=min(n, _MOST_ROWS), replace=False).tolist():
-            group = int(np.searchsorted(starts, index, side="right")) - 1
-            (row,) = table.read_row_group(group).slice(index - int(starts[group]), 1).to_pylist()
-            if row["status"] == "ok":
-                yield {name: math.nan if value is None else value for name, value in row.items()}
+        groups = rng.permutation(table.num_row_groups)
+        sizes = np.cumsum([table.metadata.row_group(int(group)).num_rows for group in groups])
+        part = table.read_row_groups(sorted(groups[: 1 + int(np.searchsorted(sizes, _ENOUGH_ROWS))].tolist()))
+    part = part.filter(holds(part, "status", "ok"))
+    some = rng.choice(part.num_rows, size=min(part.num_rows, _MOST_ROWS), replace=False)
+    rows = part.take(some).to_pylist()
+    return [{name: math.nan if value is None else value for name, value in row.items()} for row in rows]

@@ -279,7 +279,7 @@ class Making:
                 found["hypervolume_least_sensitivity"] = answer.search.levels[0]
         self.inventory.facts.setdefault("duration_s", round(time.monotonic() - self.started, 3))
         seconds = max(_CHECK_S, _CHECK_SHARE * float(self.inventory.facts["duration_s"]))
-        found["check"], unchecked = check_run(study, self.inventory.path(RESULTS), seconds)
+        found["check"], unchecked = check_run(study, self.inventory.path(RESULTS), seconds, self.crew)
         warnings += unchecked
         return Provenance(**provenance(study, self.inventory.facts), **found, warnings=tuple(warnings))
 
