@@ -42,7 +42,7 @@ oldest: $(OLDEST)/.oldest
 
 accuracy: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest tests/hard/test_hard_cases.py -m "slow or not slow" --hard-cases outputs/accuracy/hard_cases.json
-	$(ONE_THREAD) $(BIN)/sweep accuracy studies/accuracy.yaml --shipped $(ARGS)
+	$(ONE_THREAD) $(BIN)/sweep accuracy studies/accuracy.yaml $(ARGS)
 
 check: $(VENV)/.ready-dev
 	$(BIN)/ruff check sweep tests

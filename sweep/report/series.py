@@ -10,14 +10,12 @@ import numpy as np
 
 from ..base.types import FloatArray
 from ..metrics.quantity import DN
-from .figures import CURVE_CYCLE, canvas, canvas_grid
+from .figures import CURVE_CYCLE, canvas
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.figure import Figure
 
 _WIDE = 15.0
-_LEAST_DN = 1e-6
 _LEAST_LEAD = 1.0
 """DN; who separates less is not said to lead."""
 _LABELS = {
@@ -177,61 +175,4 @@ def draw_series(series: SeriesFigure) -> Figure:
     axes.set_title(series.title)
     legend = f"band: {series.band}" if series.band else None
     axes.legend(title=legend, fontsize=8, title_fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False)
-    return figure
-
-
-def draw_work_precision(table: pd.DataFrame, name: str) -> Figure:
-    """Error against time for each scenario's ladder of tolerances, a panel for each number of designs.
-
-    Realized errors are full lines, promised ones dashed; the time is that of plan and run, and from the run alone a
-    thin line leads to it: the share of planning. `table`: columns scenario, designs, tolerance_dn, plan_s, seconds (of
-    the run), reference_s, promised_dn, realized_dn. Errors below 1e-6 DN are drawn there.
-    """
-    counts = sorted(table["designs"].unique())
-    figure, panels = canvas_grid(1, len(counts), 4.2 * len(counts) + 1.6, 4.6)
-    colors = dict(zip(table["scenario"].unique(), CURVE_CYCLE * 4, strict=False))
-    for axes, designs in zip(panels, counts, strict=True):
-        for scenario, rows in table[table["designs"] == designs].groupby("scenario", sort=False):
-            ladder, color = rows.sort_values("tolerance_dn"), colors[scenario]
-            for column, style in (("realized_dn", "o-"), ("promised_dn", "x--")):
-                label = str(scenario) if column == "realized_dn" else None
-                errors, seconds = ladder[column].clip(lower=_LEAST_DN), ladder["plan_s"] + ladder["seconds"]
-                axes.plot(seconds, errors, style, color=color, label=label, linewidth=1.3, markersize=4)
-                if column == "realized_dn":
-                    axes.hlines(errors, ladder["seconds"], seconds, color=color, linewidth=0.6, alpha=0.6)
-            axes.axvline(float(rows["reference_s"].iloc[0]), color=color, linestyle=":", linewidth=1.0)
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-        axes.set_xlabel("plan + run / s (dotted: everything on)", fontsize=8)
-        axes.set_title("1 design" if designs == 1 else f"{designs:,} designs", fontsize=9)
-    panels[0].set_ylabel("error of a CSD / DN (full: realized, dashed: promised)", fontsize=8)
-    panels[-1].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0, frameon=False)
-    figure.suptitle(f"{name}: what accuracy costs (thin: the share of planning)")
-    return figure
-
-
-def draw_knobs(table: pd.DataFrame, name: str) -> Figure:
-    """A panel per knob: the error of each of its settings against its time, named at the points.
-
-    `table`: columns knob, scenario, setting, error_dn, seconds, oracle. Errors below 1e-6 DN are drawn there.
-    """
-    knobs = list(table.groupby("knob", sort=False))
-    figure, panels = canvas_grid(2, 3, 12.0, 7.0)
-    for axes, (knob, rows) in zip(panels, knobs, strict=False):
-        axes.plot(rows["seconds"], rows["error_dn"].clip(lower=_LEAST_DN), "o", color=CURVE_CYCLE[0], markersize=4)
-        for row in rows.to_dict("records"):
-            at = (row["seconds"], max(row["error_dn"], _LEAST_DN))
-            axes.annotate(row["setting"], at, xytext=(4, 3), textcoords="offset points", fontsize=7)
-        if rows["seconds"].max() / rows["seconds"].min() > _WIDE:
-            axes.set_xscale("log")
-        else:
-            axes.set_xlim(0, 1.25 * rows["seconds"].max())
-        axes.set_yscale("log")
-        axes.margins(x=0.25, y=0.15)
-        axes.set_title(f"{knob} ({rows['scenario'].iloc[0]})", fontsize=9)
-        axes.set_xlabel("time / s", fontsize=8)
-        axes.set_ylabel(f"error / DN (against {rows['oracle'].iloc[0]})", fontsize=8)
-    for axes in panels[len(knobs) :]:
-        axes.set_visible(False)
-    figure.suptitle(f"{name}: what single settings cost")
     return figure

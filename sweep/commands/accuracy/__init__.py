@@ -1,1 +1,0 @@
-"""What accuracy costs in time."""

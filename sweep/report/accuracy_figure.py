@@ -1,0 +1,116 @@
+"""Error against time of accuracy settings, a panel for each scene."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from .figures import CURVE_CYCLE, canvas_grid
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+PRESET = "preset"
+_LEAST_DN = 1e-6
+_COLUMNS = 4
+_STAR: dict[str, Any] = {
+    "color": "black",
+    "marker": "*",
+    "linestyle": "",
+    "markersize": 11,
+    "markerfacecolor": "none",
+    "markeredgewidth": 1.1,
+}
+_COLORS = (*CURVE_CYCLE, "#8c6d31")
+_MARKERS = "osv^D<P>"
+_TOGETHER = (0.8, 0.7)
+"""Decades of time and of error within which presets share a label."""
+
+
+def draw_accuracy(table: pd.DataFrame, name: str) -> Figure:
+    """Draw the error of presets and single settings against the time of the study's designs.
+
+    Presets are stars with their names; the values of a single setting are joined by a line.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Columns scenario, setting, value, designs, error_dn (DN), total_s (s). Errors below 1e-6 DN are drawn there.
+    name : str
+        Name of the study.
+    """
+    counts = sorted(table["designs"].unique())
+    designs = counts[min(1, len(counts) - 1)]
+    drawn = table[table["designs"] == designs]
+    scenes = list(drawn.groupby("scenario", sort=False))
+    columns = min(_COLUMNS, len(scenes))
+    lines = math.ceil(len(scenes) / columns)
+    figure, panels = canvas_grid(lines, columns, 3.4 * columns + 1.4, 3.1 * lines + 0.6)
+    settings = [setting for setting in drawn["setting"].unique() if setting != PRESET]
+    for at, (axes, (scenario, rows)) in enumerate(zip(panels, scenes, strict=False)):
+        for number, setting in enumerate(settings):
+            values = rows[rows["setting"] == setting]
+            errors = values["error_dn"].clip(lower=_LEAST_DN)
+            axes.plot(values["total_s"], errors, alpha=0.85, **_style(number))
+        _mark_presets(axes, rows[rows["setting"] == PRESET])
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_ylim(_LEAST_DN / 3, max(10.0, 30 * drawn["error_dn"].max()))
+        axes.set_xlim(drawn["total_s"].min() / 2, drawn["total_s"].max() * 2)  # the same in all panels
+        axes.set_title(str(scenario), fontsize=9)
+        if at >= len(scenes) - columns:
+            axes.set_xlabel("one design / s" if designs == 1 else f"{designs:,} designs / s", fontsize=8)
+        if at % columns == 0:
+            axes.set_ylabel("error of a CSD / DN", fontsize=8)
+        axes.tick_params(labelsize=7)
+    for axes in panels[len(scenes) :]:
+        axes.set_visible(False)
+    _add_legend(panels[columns - 1], settings)
+    figure.suptitle(
+        f"{name}: what accuracy costs in time (errors below {_LEAST_DN:g} DN lie at the bottom)", fontsize=11
+    )
+    return figure
+
+
+def _style(number: int) -> dict[str, Any]:
+    """Line and marker of a single setting by its number."""
+    color, marker = _COLORS[number % len(_COLORS)], _MARKERS[number % len(_MARKERS)]
+    return {"color": color, "marker": marker, "linestyle": "-", "linewidth": 0.8, "markersize": 4.5}
+
+
+def _mark_presets(axes: Axes, presets: pd.DataFrame) -> None:
+    """Presets as stars with their names; those that lie together share a label."""
+    labels: list[tuple[float, float, list[str]]] = []
+    for row in presets.to_dict("records"):
+        seconds, error_dn = row["total_s"], max(row["error_dn"], _LEAST_DN)
+        axes.plot(seconds, error_dn, zorder=5, **_STAR)
+        for other_s, other_dn, names in labels:
+            apart = abs(math.log10(seconds / other_s)), abs(math.log10(error_dn / other_dn))
+            if apart[0] < _TOGETHER[0] and apart[1] < _TOGETHER[1]:
+                names.append(row["value"])
+                break
+        else:
+            labels.append((seconds, error_dn, [row["value"]]))
+    for seconds, error_dn, names in labels:
+        axes.annotate(
+            "\n".join(names),
+            (seconds, error_dn),
+            xytext=(0, 8),
+            textcoords="offset points",
+            fontsize=7.5,
+            fontweight="bold",
+            ha="center",
+            va="bottom",
+            linespacing=1.0,
+            bbox={"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 0.5},
+        )
+
+
+def _add_legend(axes: Axes, settings: list[str]) -> None:
+    """What the markers stand for, beside the last panel of the first row."""
+    axes.plot([], [], label="preset", **_STAR)
+    for number, setting in enumerate(settings):
+        axes.plot([], [], label=setting, **_style(number))
+    axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0, frameon=False)
