@@ -32,7 +32,7 @@ SETTINGS: Mapping[str, Sequence[Any]] = {
     "field_positions": (5, 9, 17, 33, 129),
     "rays": (1, 4, 16, None),
     "psf_step_nm": (20.0, 10.0, 5.0, 2.0, 1.0),
-    "pwm_moments": (2, 3, 9, 33),
+    "pwm_moments": (2, 5, 17, 65),
     "single_precision": (True,),
     GRID: (5.0, 1.0, 0.25),
 }
