@@ -39,7 +39,7 @@ def covered(x: FloatArray, y: FloatArray, half: float, radius: float) -> FloatAr
     ndarray[...]
         0 to 1.
     """
-    from .compiled_coverage import covered_shares  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from .compiled import covered_shares  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     x, y = np.broadcast_arrays(x, y)
     return covered_shares(x.ravel(), y.ravel(), half, radius).reshape(x.shape)

@@ -16,11 +16,9 @@ import numpy as np
 from ..base.types import BoolArray, FloatArray
 from ..designs.block import Block, EdgeBlock, EdgeSums
 from ..designs.products import row_products
-from .exposure import exposure_times
+from .exposure import SceneLight, exposure_times
 from .irradiance import background_irradiance, way_of_light
-from .pixel_response import PixelResponse
-from .scene_light import SceneLight
-from .split_light import SplitLight
+from .pixel_response import PixelResponse, SplitLight
 from .view import View, per_photon
 
 KEPT = 15_000_000
@@ -79,11 +77,11 @@ class Changing:
 
 
 def _expose(rates: FloatArray, fixed: FloatArray, uniform: FloatArray, time_s: float) -> None:
-    """`compiled_readout.expose`, of few values without what is compiled: the same sums."""
+    """`compiled.expose`, of few values without what is compiled: the same sums."""
     if rates.size < _MANY:
         rates[:] = ((fixed + rates) + uniform[..., None]) * time_s
         return
-    from .compiled_readout import expose  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from .compiled import expose  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     expose(rates, fixed, uniform, time_s)
 

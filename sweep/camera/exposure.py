@@ -1,10 +1,14 @@
-"""How long each design is exposed: as long as it is told, or until its brightest channel sees white well."""
+"""Exposure time: fixed, or set by the brightest channel on a white patch; and the light of a scene before any pixel."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ..base.types import FloatArray
+from . import pwm
+from .angular import AngularResponse
+from .field import over_field
+from .irradiance import signal_irradiance
 from .pixel import irradiance_factor
 from .scene import WhitePatchExposure
 from .view import View, per_photon
@@ -73,3 +77,28 @@ def relative_slope(view: View, white: FloatArray, curves: FloatArray, curves_gra
         return np.zeros(len(curves_gradient))
     top = int(np.argmax(rates))
     return np.asarray(-(curves_gradient[:, top] @ white) / rates[top], dtype=float)
+
+
+class SceneLight:
+    """The light of a scene.
+
+    `signals`, `white`: electrons/s for each QE of light and the white patch at every wavelength, ndarray[n_signals,
+    n_wavelengths] and ndarray[n_wavelengths]; `fixed_white`: of the brightest channel that no design modifies.
+    `positions`: a view of each field position; `angular`: the filters as the rays see them there.
+    """
+
+    def __init__(self, view: View) -> None:
+        self.view = view
+        self.signals = signal_irradiance(view) * per_photon(view)
+        self.white = white_irradiance(view) * per_photon(view)
+        self.fixed_white = fixed_white(view)
+        self.positions = over_field(view)
+        self.angular = [AngularResponse(position) for position in self.positions]
+
+    def exposure_s(self, curves: FloatArray) -> FloatArray:
+        """Exposure of each design, s, ndarray[n_designs]; `curves`: ndarray[n_designs, n_modified, n_wavelengths]."""
+        return exposure_times(self.view, curves @ self.white, self.fixed_white)
+
+    def scales(self, exposure_s: FloatArray) -> FloatArray:
+        """Light relative to its mean at the moments of a pulsed light, ndarray[n_designs, n_moments]."""
+        return pwm.scales(self.view, exposure_s)

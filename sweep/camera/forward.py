@@ -20,13 +20,12 @@ from ..base.errors import Fault, SweepError
 from ..base.types import FloatArray, IndexArray
 from ..designs.block import Block
 from .electrons import Changing, Electrons
+from .exposure import SceneLight
 from .field import over_field
 from .memory import blocks
-from .noise_readout import NoisyReadout
 from .phases import Phases, different_phases, scene_phases
 from .pixel_response import ChannelResponses, PixelResponse, channel_responses, kept_response, pixel_response
-from .readout import Readout
-from .scene_light import SceneLight
+from .readout import NoisyReadout, Readout
 from .view import View
 
 _Result = TypeVar("_Result")

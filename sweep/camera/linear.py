@@ -19,7 +19,7 @@ from ..base.types import FloatArray, IndexArray
 from .exposure import relative_slope
 from .forward import ForwardModel
 from .pixel import unquantized
-from .split_light import SplitLight
+from .pixel_response import SplitLight
 from .view import READOUT, View
 
 _STEPS_DN2 = 1 / 12

@@ -27,7 +27,7 @@ def pixels_per_phase(view: View) -> int:
 def bytes_per_phase(view: View, *, by_pixel: bool) -> int:
     """About how much memory the response at one phase takes while it is made.
 
-    Pixels are held in factors (see `split_light`), those of one field position after the other.
+    Pixels are held in factors (see `SplitLight`), those of one field position after the other.
     """
     n = len(view.mosaic.channels)
     if by_pixel:

@@ -9,7 +9,6 @@ import numpy as np
 from ..base.errors import Fault, SweepError
 from ..base.own_code import OwnCode, own_name
 from ..base.types import FloatArray
-from .scene import Scene
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,7 @@ class OwnEffect:
         """Its name in plans and provenance."""
         return own_name(self.code.name)
 
-    def applied(self, irradiance: Irradiance, scene: Scene) -> tuple[FloatArray, FloatArray]:
+    def applied(self, irradiance: Irradiance, scene: object) -> tuple[FloatArray, FloatArray]:
         """Irradiance of signals and background behind the effect, in the shapes of those before it.
 
         Raises SweepError for what is raised, and for what is no irradiance: another shape, negative or not finite.

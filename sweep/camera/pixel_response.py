@@ -9,27 +9,90 @@ from __future__ import annotations
 import hashlib
 import pickle
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from ..base.cache import Cache
-from ..base.types import FloatArray
+from ..base.types import FloatArray, IndexArray
 from ..curves.hats import hats
-from . import crosstalk, disc_image, psf, sampling
-from .demosaic import center_weights
+from . import disc_image, psf, sampling
 from .field import field_heights, over_field
 from .irradiance import way_of_light
 from .memory import pixels_per_phase
 from .phases import Phases
-from .split_light import SplitLight
 from .view import View
 
 _HELD = 8_000_000
 """Values of pixels that are held at once."""
 _KEPT_BYTES = 32 * 2**20
 """Responses that take more are not kept."""
+
+
+@dataclass(frozen=True)
+class SplitLight:
+    """`PixelResponse.light` of pixels, ndarray[n_cases, n_units, n_channels, n_wavelengths], in factors.
+
+    `values`: functions of the light at each different place, ndarray[n_places, n_functions]; `shares`: how much of each
+    is in each wavelength, ndarray[n_functions, n_wavelengths], None where all see the same; `factor`: of the light's
+    way, ndarray[n_wavelengths]. A pixel is a sum of parts: `parts`: how much of each, ndarray[n_parts]; `place`: where
+    it is, ndarray[n_parts, n_cases, n_units]; `through`: whose filter it has, ndarray[n_parts, n_units].
+    """
+
+    values: FloatArray
+    shares: FloatArray | None
+    factor: FloatArray
+    parts: FloatArray
+    place: IndexArray
+    through: IndexArray
+    n_channels: int
+
+    @property
+    def shape(self) -> tuple[int, int, int, int]:
+        """That of the array."""
+        return (*self.place.shape[1:], self.n_channels, self.factor.size)
+
+    def whole(self) -> FloatArray:
+        """The array itself."""
+        by_place = (self.values if self.shares is None else self.values @ self.shares) * self.factor
+        found = np.zeros(self.shape)
+        pixels = np.arange(self.place.shape[2])
+        for share, place, through in zip(self.parts, self.place, self.through, strict=True):
+            found[:, pixels, through] += share * by_place[place]
+        return found
+
+    def _seen(self, spectra: FloatArray) -> FloatArray:
+        """Sums over the wavelengths at each place: ndarray[..., n, n_wavelengths] -> ndarray[..., n_places, n]."""
+        seen = spectra * self.factor
+        by_function = seen.sum(axis=-1, keepdims=True) if self.shares is None else seen @ self.shares.T
+        return np.asarray(self.values @ np.swapaxes(by_function, -1, -2), dtype=float)
+
+    def add_sums(self, spectra: FloatArray, channels: Sequence[int], found: FloatArray) -> None:
+        """Add sums over channels and wavelengths to `found`, ndarray[n_designs, n_cases, n_signals, n_units].
+
+        `spectra`: QE times signals, ndarray[n_designs, n_channels, n_signals, n_wavelengths], of the `channels`. Other
+        designs change one by no more than rounding.
+        """
+        from .compiled import gather  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+        row = np.full(self.n_channels, -1)
+        row[list(channels)] = np.arange(len(channels))
+        gather(np.ascontiguousarray(self._seen(spectra)), self.parts, self.place, row[self.through], found)
+
+    def folded(self, weights: FloatArray, channel: int) -> FloatArray:
+        """Weighted sums over the units of what they get through one channel's filter, ndarray[n_cases, n_wavelengths].
+
+        `weights`: ndarray[n_cases, n_units].
+        """
+        by_place = np.zeros((len(weights), len(self.values)))
+        for share, place, through in zip(self.parts, self.place, self.through, strict=True):
+            own = np.flatnonzero(through == channel)
+            for case in range(len(weights)):
+                np.add.at(by_place[case], place[case, own], share * weights[case, own])
+        seen = by_place @ self.values
+        return np.asarray((seen if self.shares is None else seen @ self.shares) * self.factor, dtype=float)
 
 
 @dataclass(frozen=True)
@@ -157,8 +220,8 @@ def _uniform(view: View, *, by_pixel: bool) -> PixelResponse:
     """A field without structure: one tile stands for all."""
     tile, n = view.mosaic.indices, len(view.mosaic.channels)
     own = (tile[..., None] == np.arange(n)).astype(float)
-    share = crosstalk.share(view)
-    split = crosstalk.mixed(own[None], share, periodic=True).reshape(1, tile.size, n, 1)
+    share = sampling.crosstalk_share(view)
+    split = sampling.with_crosstalk(own[None], share, periodic=True).reshape(1, tile.size, n, 1)
     weights = own.reshape(-1, n) / view.mosaic.counts
     if by_pixel and share and tile.size > n:
         return PixelResponse(split, split[..., 0], weights[None], weights[None] ** 2, by_channel=False)
@@ -194,8 +257,8 @@ def _pixels(view: View, wavelength_nm: FloatArray, phases: Phases, *, by_pixel: 
     assert target is not None
     radius, half = sampling.radii_px(view, target)[0], pixel.fill_factor**0.5 / 2
     seen, own, apart = _weights(view, phases)
-    share = crosstalk.share(view)
-    spread = crosstalk.mixed(apart, share) if share else apart
+    share = sampling.crosstalk_share(view)
+    spread = sampling.with_crosstalk(apart, share) if share else apart
     wanted = np.asarray((spread > 0).any(axis=3))
     profile = _profile(view, wavelength_nm)
     light = disc_image.light_on_pixels(seen, wanted, half, radius, profile, pixel.pitch_um)
@@ -220,7 +283,7 @@ def _weights(view: View, phases: Phases) -> tuple[sampling.Window, FloatArray, F
         half, readout = view.pixel.fill_factor**0.5 / 2, sampling.radii_px(view, target)[1]
         weights = sampling.mean_weights(seen, half, readout, n)
     else:
-        weights = center_weights(seen, phases.nearest_px - phases.center_px, mosaic)
+        weights = sampling.center_weights(seen, phases.nearest_px - phases.center_px, mosaic)
     own = (seen.channel[..., None] == np.arange(n)).astype(float)
     return seen, own, weights[..., None] * own
 
@@ -230,7 +293,7 @@ def _apart(light: disc_image.PixelLight, own: FloatArray, apart: FloatArray, sha
     used = (apart > 0).any(axis=(0, 3))
     rows, columns = np.nonzero(used)
     taken = [((1 - share), rows, columns)]
-    if share:  # see `crosstalk.mixed`; a pixel at the border has no weight
+    if share:  # see `with_crosstalk`; a pixel at the border has no weight
         steps = ((-1, 0), (1, 0), (0, -1), (0, 1))
         taken += [(share / 4, rows + down, columns + right) for down, right in steps]
     n = own.shape[2]

@@ -302,7 +302,7 @@ class DiscProfile:
         ndarray[n, n_functions]
             Sums of each function; times `shares` those of h.
         """
-        from .compiled_spline_sums import sums_of_cubic  # noqa: PLC0415  (compiled: kept off the start-up path)
+        from .compiled import sums_of_cubic  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         result = np.empty((len(r_um), len(self.shares)))
         sums_of_cubic(r_um, weights, self._spline.t, self._coefficients, result)

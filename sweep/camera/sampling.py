@@ -1,4 +1,8 @@
-"""Mosaic sampling: which pixels a light covers, and how they are read out."""
+"""Mosaic sampling: which pixels a light covers, optical crosstalk between them, and their weights in the readout.
+
+Crosstalk: part of a pixel's light comes through the filters of its four neighbors. A readout is the mean over the disc,
+or demosaicking at one pixel, for any tile.
+"""
 
 from __future__ import annotations
 
@@ -65,10 +69,51 @@ def window(mosaic: Mosaic, phases_px: FloatArray, reach_px: float) -> Window:
 
 def mean_weights(seen: Window, half: float, readout_px: float, n_channels: int) -> FloatArray:
     """Weight of each pixel in the mean of its channel, ndarray[n_cases, rows, columns]; each channel's sum to 1."""
-    from .compiled_coverage import covered_by_disc  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from .compiled import covered_by_disc  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     weights = covered_by_disc(seen.columns, seen.rows, half, readout_px)
     for channel in range(n_channels):
         own = seen.channel == channel
         weights[:, own] /= weights[:, own].sum(axis=1, keepdims=True)
     return weights
+
+
+def center_weights(seen: Window, home: FloatArray, mosaic: Mosaic) -> FloatArray:
+    """Weight of each pixel in the value of its channel at the pixel that is read out.
+
+    `home`: ndarray[n_cases, 2], that pixel from the light's center (column, row), pixels. Returns ndarray[n_cases,
+    rows, columns]; each channel's sum to 1. Normalized convolution with a tent as wide as the tile,
+    (1 - |dx| / columns)(1 - |dy| / rows), which for a Bayer tile is bilinear interpolation.
+    """
+    # From pixel to pixel: whole numbers, so that equal weights are equal to the last bit.
+    dx, dy = (np.rint(a - home[:, axis, None, None]) for axis, a in enumerate((seen.dx, seen.dy)))
+    rows, columns = mosaic.indices.shape
+    weights = np.maximum(0.0, 1 - np.abs(dx) / columns) * np.maximum(0.0, 1 - np.abs(dy) / rows)
+    for channel in range(len(mosaic.channels)):
+        own = seen.channel == channel
+        values = weights[:, own]
+        weights[:, own] = values / values.sum(axis=1, keepdims=True)
+    return np.asarray(weights, dtype=float)
+
+
+def with_crosstalk(light: FloatArray, share: float, *, periodic: bool = False) -> FloatArray:
+    """(1 - share) of a pixel's own and share / 4 of each neighbor's: ndarray[n_cases, rows, columns, ...], same shape.
+
+    Beyond the border is nothing, or, for the tile of a uniform field, the other side.
+    """
+    found = (1 - share) * light
+    given = share / 4 * light
+    for axis in (1, 2):
+        if periodic:
+            found += np.roll(given, 1, axis=axis)
+            found += np.roll(given, -1, axis=axis)
+            continue
+        to, of = np.moveaxis(found, axis, 0), np.moveaxis(given, axis, 0)
+        to[1:] += of[:-1]
+        to[:-1] += of[1:]
+    return np.asarray(found, dtype=float)
+
+
+def crosstalk_share(view: View) -> float:
+    """Share of a pixel's light that comes through the filters of its neighbors."""
+    return view.pixel.crosstalk if view.computes("crosstalk") else 0.0

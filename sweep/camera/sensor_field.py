@@ -108,11 +108,6 @@ class SensorField(Section):
         return float(np.interp(height, *self.knots))
 
     @property
-    def angles_deg(self) -> tuple[float, ...]:
-        """The chief ray angle at each of the `seen_heights`."""
-        return tuple(self.cra_at(height) for height in self.seen_heights)
-
-    @property
     def steepest_deg(self) -> float:
         """The largest chief ray angle of any place."""
         return max(self.knots[1])

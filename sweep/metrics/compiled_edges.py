@@ -48,7 +48,7 @@ def _number(held_e: float, top_e: float, dn_per_e: float, rest: float, whole: fl
 def _read(edges: Edges, exposed: Exposed, line: ReadAs, begin: int, rows: Floats32) -> None:
     """Digital numbers of the designs from `begin` on, ndarray[LANES, n_signals]; behind the last, of the first.
 
-    The sums of `designs.compiled.through_edges`, `camera.compiled_readout.expose` and `whole_numbers`, in their order.
+    The sums of `designs.compiled.through_edges`, `camera.compiled.expose` and `whole_numbers`, in their order.
     """
     base, left, right, _, at_left, at_right, depth = edges
     fixed, uniform, time_s = exposed

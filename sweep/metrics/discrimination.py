@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..base.types import BoolArray, FloatArray, IndexArray
 from ..camera.noise.gaussian import share_below
-from ..camera.noise_readout import NoisyReadout
+from ..camera.readout import NoisyReadout
 from ..curves.lights import Pair, class_pairs
 from .separation import pair_blocks
 

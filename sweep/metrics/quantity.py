@@ -12,7 +12,7 @@ import numpy as np
 
 from ..base.types import FloatArray, IndexArray
 from ..camera.forward import ForwardModel
-from ..camera.noise_readout import NoisyReadout
+from ..camera.readout import NoisyReadout
 from ..camera.view import View
 from ..curves.lights import Pair
 from ..curves.tasks import TaskName

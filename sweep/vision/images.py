@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.types import FloatArray, IndexArray
-from ..camera import crosstalk
 from ..camera.angular import AngularResponse
 from ..camera.irradiance import signal_irradiance
 from ..camera.pixel import Pixel, irradiance_factor
+from ..camera.sampling import crosstalk_share, with_crosstalk
 from ..camera.scene import FixedExposure, Noise, Scene
 from ..camera.view import View, per_photon
 from ..curves.color import luminance_per_photon_radiance
@@ -162,10 +162,10 @@ class HeadCamera:
         for channel in range(len(self.qe)):
             own = self._channel == channel
             found[:, :, own] = np.moveaxis(light[:, own] @ weight[channel], 2, 1)
-        share = crosstalk.share(view)
+        share = crosstalk_share(view)
         if share:
             flat = found.reshape(-1, *self._channel.shape)
-            found = crosstalk.mixed(flat, share).reshape(found.shape)
+            found = with_crosstalk(flat, share).reshape(found.shape)
         inner = slice(MARGIN, -MARGIN)
         return found[:, :, inner, inner].reshape(*found.shape[:2], -1)
 

@@ -16,7 +16,6 @@ from scipy.special import j0, j1
 
 from sweep.camera.effects import (
     blur,
-    crosstalk,
     demosaic,
     extinction,
     flicker,
@@ -211,8 +210,8 @@ def test_the_nearest_pixels_of_four_channels_weigh_to_the_last_bit_as_a_tent_doe
 def test_crosstalk_by_hand() -> None:
     rng = np.random.default_rng(2)
     light = rng.uniform(size=(1, 4, 5))
-    found = crosstalk.mixed(light, 0.2)
-    periodic = crosstalk.mixed(light, 0.2, periodic=True)
+    found = with_crosstalk(light, 0.2)
+    periodic = with_crosstalk(light, 0.2, periodic=True)
     for row in range(4):
         for column in range(5):
             near = [(row + 1, column), (row - 1, column), (row, column + 1), (row, column - 1)]

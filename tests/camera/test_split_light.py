@@ -11,7 +11,7 @@ from sweep.camera.kernel import Kernel, make_kernel
 from sweep.camera.methods import REFERENCE
 
 from sweep.camera.effects import phase
-from sweep.camera.split_light import SplitLight
+from sweep.camera.pixel_response import SplitLight
 
 from ..hard.scenes import DARK, F2, FAR, Scene, scene
 from ..rounding import rounding

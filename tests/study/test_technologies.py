@@ -135,7 +135,7 @@ def test_a_field_grows_linearly_or_as_listed(tmp_path: Path) -> None:
     scenes += "c: {field: {cra_deg: [0, 18, 20], places: 5}}, d: {field: {cra_deg: [0, 8, 9], heights: [0, 0.8, 1]}}}\n"
     study = load(tmp_path, BASE + scenes)
     fields = {name: scenario.field for name, scenario in study.scenarios.items()}
-    assert {name: field and field.angles_deg for name, field in fields.items()} == {
+    assert {name: field and tuple(map(field.cra_at, field.seen_heights)) for name, field in fields.items()} == {
         "a": (0.0, 10.0, 20.0, 30.0),
         "b": (0.0, 18.0, 20.0),
         "c": (0.0, 9.0, 18.0, 19.0, 20.0),

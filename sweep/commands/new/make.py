@@ -10,7 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from ...base.errors import DataError, Fault, OutputError, StudyError, SweepError
-from ...camera.emva1288 import pixel_figures
 from ...curves.light_files import lights_file
 from ...curves.light_unit import LightUnit
 from ...door.channels import Layout, layout_of
@@ -18,6 +17,7 @@ from ...door.files import sensor_file
 from ...results.atomic import atomic, write_text
 from ...study import Study, folder_name, load_study
 from ...study.editors import SCHEMA_FILE, schema_text
+from ..emva1288 import pixel_figures
 from .template import TYPICAL_NM, LightsText, PixelText, SensorText, one_line, study_text
 
 _MOST_LETTERS = 100

@@ -28,7 +28,7 @@ def describe(
 ) -> None:
     """Plot and check a file of curves: what it holds, what is wrong with it, which colors its lights have."""
     if file.suffix.casefold() == ".xml" and clean is None and quantity is None:
-        from ...camera.emva1288 import pixel_lines
+        from ..emva1288 import pixel_lines
 
         for line in pixel_lines(file):
             typer.echo(line)

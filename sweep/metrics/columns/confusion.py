@@ -9,7 +9,7 @@ import numpy as np
 
 from ...base.types import FloatArray, IndexArray
 from ...camera.forward import ForwardModel
-from ...camera.noise_readout import NoisyReadout
+from ...camera.readout import NoisyReadout
 from ...curves.lights import Pair, class_pairs, pair_name
 from .. import confusion
 from ..discrimination import (

@@ -14,8 +14,8 @@ from xml.etree.ElementTree import Element
 from pydantic import ValidationError
 
 from ..base.errors import DataError, Fault
+from ..camera.pixel import Pixel
 from ..curves.instrument_files import read_xml
-from .pixel import Pixel
 
 _WHAT = "EMVA 1288 results"
 
