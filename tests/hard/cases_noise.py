@@ -5,12 +5,12 @@ from __future__ import annotations
 import mpmath as mp
 import numpy as np
 
-from sweep.camera.readout import draws_dn
 from sweep.camera.forward import ForwardModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.noise.gaussian import rounding
 from sweep.camera.noise.moments import moments
 from sweep.camera.pixel import Pixel
+from sweep.camera.readout import draws_dn
 from sweep.camera.scene import Scene
 from sweep.camera.view import View
 from sweep.curves.lights import Lights
@@ -137,7 +137,9 @@ def chain(pixel: Pixel) -> ForwardModel:
     grid = WavelengthGrid(step_nm=100)
     lights = Lights("two", ("a", "b"), ("a", "b"), np.eye(4)[:2] / 100, 1.0, "", True)
     scenario = Scene.model_validate({"noise": True, "exposure": {"kind": "fixed", "exposure_s": 1.0}})
-    return ForwardModel(View(grid, Mosaic.from_rows("W", [["W"]]), np.ones((1, 4)), (), np.ones(4), lights, pixel, scenario))
+    return ForwardModel(
+        View(grid, Mosaic.from_rows("W", [["W"]]), np.ones((1, 4)), (), np.ones(4), lights, pixel, scenario)
+    )
 
 
 @hard_case(
@@ -155,9 +157,9 @@ def a_blinding_signal() -> Result:
             exact.append(exact_moments(float(n), pixel)[1])
         wide = pixel.dn_per_e * np.hypot(np.sqrt(n), pixel.read_noise_e)
         allowed.append((12.8 * wide + 177 * 0.5) * 5 / 384 / 32**4)
-    imager = chain(pixel)
+    model = chain(pixel)
     for brightest in (2e4, 1e8, 1e12, 1e100, 1e300, np.inf):
-        found = imager.readout.transfer(np.append(electrons, brightest))[:-1]
+        found = model.readout.transfer(np.append(electrons, brightest))[:-1]
         results += [(abs(float(f - e)), a) for f, e, a in zip(found, exact, allowed, strict=True)]
     return worst(results)
 
@@ -230,10 +232,10 @@ def poisson_draws() -> Result:
     why="beyond the full well the table stands still: gain x full well, rounded once; counts below it are rarer than 1e-20",
 )
 def all_clipped() -> Result:
-    imager = chain(Pixel())
+    model = chain(Pixel())
     electrons = np.array([1e8, 2e8, 1e14, 1e100, 1e300, np.inf])
-    found = imager.readout.transfer(electrons)
-    spread = float(np.ptp(found) + imager.readout.variance_dn(electrons).max())
+    found = model.readout.transfer(electrons)
+    spread = float(np.ptp(found) + model.readout.variance_dn(electrons).max())
     return worst([(spread, 1e-20 * 4095), (float(np.abs(found - 4095).max()), EPS * 4095)])
 
 

@@ -11,8 +11,7 @@ from sweep.camera.forward import forward_model
 from sweep.camera.linear import linear_model
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Optics, Pixel
-from sweep.camera.scene import Scene
-from sweep.camera.scene import FixedExposure, WhitePatchExposure
+from sweep.camera.scene import FixedExposure, Scene, WhitePatchExposure
 from sweep.camera.sensor import BUILT_IN_SENSORS
 from sweep.camera.view import View
 from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
