@@ -9,9 +9,9 @@ import pytest
 
 from sweep.base.types import FloatArray
 from sweep.camera import psf
-from sweep.camera.disc_image import MEANS, covered, different, light_on_pixels
-from sweep.camera.effects.sampling import Window
+from sweep.camera.disc_image import _MEANS, covered, different, light_on_pixels
 from sweep.camera.pixel import Optics, Pixel
+from sweep.camera.sampling import Window
 from sweep.camera.scene import Scene, Target
 
 _VISIBLE_UM = np.arange(400, 701, 10) * 1e-3
@@ -186,10 +186,10 @@ def test_pixels_that_are_not_wanted_are_dark_and_sums_are_weighted() -> None:
     window = window_around([(0.0, 0.0), (0.25, 0.5)], 3)
     wanted = np.hypot(window.dx, window.dy) < 2.5
     profile = psf.DiscProfile(radius_px * pitch_um, 6 * pitch_um, _VISIBLE_UM, 4.0, 0.0)
-    MEANS.clear()
+    _MEANS.clear()
     light = light_on_pixels(window, wanted, 0.5, radius_px, profile, pitch_um)
     again = light_on_pixels(window, wanted, 0.5, radius_px, profile, pitch_um)
-    assert len(MEANS) == 1
+    assert len(_MEANS) == 1
     np.testing.assert_array_equal(light.values, again.values)
     by_pixel = light.by_pixel()
     assert np.all(by_pixel[~wanted] == 0)
