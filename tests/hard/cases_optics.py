@@ -12,7 +12,7 @@ from sweep.camera import sampling
 from sweep.camera.disc_image import covered, light_on_pixels
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
-from sweep.camera.psf import DiscProfile, mean_over_disc, otf, too_much
+from sweep.camera.psf import DiscProfile, otf, too_much
 from sweep.camera.scene import Scene
 from sweep.metrics.smooth import smooth_response
 
@@ -141,22 +141,6 @@ def many_wavelengths() -> Result:
             for value, wave in zip(found, waves, strict=True):
                 allowed = kink_bound(radius, radius, 0.4, float(wave), f_number) + ROUNDINGS
                 results.append((abs(float(value - encircled(radius, float(wave), f_number))), allowed))
-    return worst(results)
-
-
-@hard_case(
-    "the energy of a point in discs from a pixel to 130 pixels",
-    oracle="1 - J0^2 - J1^2, 50 digits",
-    why=ENDS + "; a point of 1e-9 um is none to 1e-16",
-)
-def energy_of_a_point() -> Result:
-    results, point = [], 1e-9
-    for f_number in NUMBERS:
-        for radius in (WIDTH_UM / 2, 12.0, 136.5):
-            found = mean_over_disc(point, radius, ONE_LIGHT, f_number, 0.0)[0] * (radius / point) ** 2
-            # By symmetry the mean over the disc of a point's image is the disc's image at the point.
-            allowed = kink_bound(radius, point, 0.55, 0.55, f_number) + ROUNDINGS
-            results.append((abs(float(found - encircled(radius, 0.55, f_number))), allowed))
     return worst(results)
 
 
