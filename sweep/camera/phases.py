@@ -56,7 +56,7 @@ def n_phases(view: View) -> int:
 
 
 def scene_phases(view: View) -> Phases:
-    """The phases of a scene: the whole lattice, or the named one, which halfway between two pixels reads the one before."""
+    """The phases of a scene: the whole lattice, or the named one; this one, halfway, is read at the pixel before."""
     target = view.scenario.target
     rows, columns = view.mosaic.indices.shape
     if target is None:
@@ -105,9 +105,9 @@ def read_at(target: Target, centers_px: FloatArray) -> Phases:
     low, high = np.ceil(centers_px - 0.5), np.floor(centers_px + 0.5)
     result = Phases(centers_px, low)
     if target.readout == "center":
-        for column, row in ((high[:, 0], low[:, 1]), (low[:, 0], high[:, 1]), (high[:, 0], high[:, 1])):
-            nearest = np.stack([column, row], axis=1)
-            more = np.flatnonzero((nearest != low).any(axis=1))
+        for beyond in ((True, False), (False, True), (True, True)):  # along the columns, along the rows
+            nearest = np.where(beyond, high, low)
+            more = np.flatnonzero(((nearest != low) == beyond).all(axis=1))
             result = Phases(
                 np.concatenate([result.center_px, centers_px[more]]), np.concatenate([result.nearest_px, nearest[more]])
             )
@@ -119,9 +119,10 @@ def refined_minima(
 ) -> FloatArray:
     """Smallest values over all phases, ndarray[n_values], by refinement of the smallest ones of a lattice.
 
-    A pattern search: from each of the best known phases, none within a step of a better one, to the best of those around
-    it at half the lattice's step, as long as it is better; then again from all that is known, with half the step before.
-    It finds a minimum near good phases; that no lower one lies elsewhere is not proven.
+    A pattern search: from each of the best known phases, none within a step of a better one, to the best of those
+    around it at half the lattice's step, as long as it is better; then again, from the best of all that is known by
+    then, with half the step before. It finds a minimum near good phases; that no lower one lies elsewhere is not
+    proven.
 
     Parameters
     ----------

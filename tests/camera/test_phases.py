@@ -6,16 +6,19 @@ import math
 from dataclasses import replace
 from itertools import cycle, product
 
+import numpy as np
 import pytest
 
 from sweep.camera.accuracy import STANDARD
-from sweep.camera.forward import ForwardModel
-from sweep.camera.phases import different_phases, lattice_px, read_at
+from sweep.camera.forward import AllPhases, ForwardModel
+from sweep.camera.phases import Phases, different_phases, lattice_px, read_at, refined_minima, scene_phases
+from sweep.camera.view import READOUT, View
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.quantity import BEST_PLACE
 from sweep.metrics.separation import csd_name, separations
 
-from ..hard.scenes import DARK, HARD, DesignScene, scene, target
+from ..cases import thinned
+from ..hard.scenes import DARK, F2, FAR, HARD, DesignScene, scene, target
 from ..hard.scenes_alone import ALONE
 
 STEPS_PER_PX = 32
@@ -54,8 +57,8 @@ def _scenes() -> list[tuple[DesignScene, str]]:
 SCENES = _scenes()
 
 
-def view_of(made: DesignScene, how: str):  # type: ignore[no-untyped-def]
-    left_out = frozenset({"noise", "quantization", "saturation"}) if how == "linear" else frozenset()
+def view_of(made: DesignScene, how: str) -> View:
+    left_out = READOUT if how == "linear" else frozenset()
     return replace(made.view, left_out=left_out, accuracy=STANDARD)
 
 
@@ -106,3 +109,62 @@ def test_no_phase_of_a_fine_lattice_is_worse_or_better_than_the_refined_ones(mad
     above, below = missed_dn(made, how)
     assert above <= allowed_dn(made, how)
     assert below <= allowed_dn(made, how)
+
+
+MIRRORED = {"RGGB": 15, "RYNCy": 25, "1x3": 36, "3x3": 78}
+"""Lattice phases that see different things when each channel's mean is read."""
+
+
+@pytest.mark.parametrize("readout", ["mean", "center"])
+@pytest.mark.parametrize("name", list(MIRRORED))
+def test_a_phase_reads_what_its_mirror_images_read(name: str, readout: str) -> None:
+    given = {"target": FAR | {"phase_px": "any", "readout": readout}, "optics": F2, "noise": True}
+    made = scene("mirrored", name, given, DARK | {"crosstalk": 0.05})
+    every = scene_phases(made.view)
+    few, which = different_phases(made.view, every)
+    assert len(few) == (MIRRORED[name] if readout == "mean" else len(every))
+    model = ForwardModel(made.view)
+    assert model.n_cases == len(few)
+    own, whole = (each.read_with_noise(made.curves) for each in (model, AllPhases(made.view)))
+    np.testing.assert_allclose(own.mean[:, which], whole.mean, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(own.variance[:, which], whole.variance, rtol=1e-9)
+
+
+@pytest.mark.parametrize("readout", ["mean", "center"])
+def test_halfway_between_pixels_a_center_is_read_at_each_of_them(readout: str) -> None:
+    light = scene("light", "RGGB", {"target": FAR | {"phase_px": "any", "readout": readout}}).view.scenario.target
+    assert light is not None
+    read = read_at(light, np.array([[0.25, 0.75], [0.5, 1.0], [1.5, 0.5]]))
+    nearest = {tuple(center): set() for center in read.center_px.tolist()}
+    for center, pixel in zip(read.center_px.tolist(), read.nearest_px.tolist(), strict=True):
+        nearest[tuple(center)].add(tuple(pixel))
+    every = {(0.25, 0.75): {(0, 1)}, (0.5, 1.0): {(0, 1), (1, 1)}, (1.5, 0.5): {(1, 0), (2, 0), (1, 1), (2, 1)}}
+    if readout == "center":
+        assert nearest == every
+    else:
+        assert len(read) == len(every)
+
+
+def test_named_and_missing_lights_have_one_phase() -> None:
+    named = scene("named", "RGGB", {"target": FAR | {"phase_px": [0.5, 2.25]}}).view
+    np.testing.assert_array_equal(scene_phases(named).center_px, [[0.5, 0.25]])
+    np.testing.assert_array_equal(scene_phases(named).nearest_px, [[0, 0]])
+    assert len(scene_phases(scene("patch", "RGGB", {}).view)) == 1
+
+
+@pytest.mark.parametrize("finest_phase_px", thinned([1 / 8, 1 / 16, 1 / 64], 2))
+def test_finer_steps_find_no_worse_an_extreme_of_a_smooth_function(finest_phase_px: float) -> None:
+    """A function with one minimum over the tile: within the curvature times the square of a step."""
+    made = scene("any", "RGGB", {"target": FAR | {"phase_px": "any", "readout": "center"}})
+    view = replace(made.view, accuracy=STANDARD.model_copy(update={"finest_phase_px": finest_phase_px}))
+    lowest = np.array([0.83, 1.37])
+
+    def value(phases: Phases) -> np.ndarray:
+        off = np.mod(phases.center_px - lowest + 1, 2) - 1
+        return (off**2).sum(axis=1)[None]
+
+    lattice = scene_phases(view)
+    found = refined_minima(view, lattice, value(lattice), value)
+    assert 0 <= found[0] <= finest_phase_px**2 / 2 * (1 + 1e-9)
+    unrefined = replace(view, accuracy=STANDARD.model_copy(update={"finest_phase_px": 0.0}))
+    assert refined_minima(unrefined, lattice, value(lattice), value)[0] == value(lattice).min() > found[0]
