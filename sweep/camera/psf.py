@@ -256,8 +256,7 @@ class DiscProfile:
 
         step_um = 1 / (_NODES_PER_CYCLE * self.highest_per_um)
         n_nodes = max(8, 2 + int(reach_um / step_um))
-        # Near its ends a spline is off tenfold. So they lie below 0, where h goes on as an even function, and beyond the
-        # reach.
+        # A spline is off tenfold near its ends: they lie below 0, where h goes on evenly, and beyond the reach.
         table_um = np.arange(-_BEYOND, n_nodes + _BEYOND) * ((reach_um + step_um) / (n_nodes - 1))
         nodes = _chebyshev_nodes(table_um[-1], self.highest_per_um)
         samples = _hankel_sums(table_um[-1] * np.sqrt((1 + nodes) / 2), frequency, spectrum)
