@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from sweep.camera.accuracy import Accuracy
 from sweep.camera.view import READOUT, View
 from sweep.designs.space import Filter, Space
 
@@ -22,20 +23,22 @@ def view_of(
     return replace(scene("scene", "RYNCy", scenario, pixel).view, left_out=left_out)
 
 
-LINEAR = READOUT
-
+EVERY_PIXEL = Accuracy(phases_per_px=1, finest_phase_px=0.0)
+"""A light at one phase in each pixel of the tile."""
 
 VIEWS = {
-    "chart": view_of({}, left_out=LINEAR),
+    "chart": view_of({}, left_out=READOUT),
     "saturated": view_of(
         {"intensity_cd": 200, "exposure": {"kind": "fixed", "exposure_s": 4e-2}}, left_out=frozenset({"quantization"})
     ),
     "rounded": view_of({}),
     "noise": view_of({"noise": True}, DARK | {"prnu": 0.01}),
-    "background": view_of({"background_cd_m2": 300, "intensity_cd": 200, "exposure": FIXED}, left_out=LINEAR),
-    "far": view_of({"target": FAR, "optics": F2}, left_out=LINEAR),
+    "background": view_of({"background_cd_m2": 300, "intensity_cd": 200, "exposure": FIXED}, left_out=READOUT),
+    "far": view_of({"target": FAR, "optics": F2}, left_out=READOUT),
     "far, pixel by pixel": view_of({"target": FAR, "optics": F2}),
-    "any place": view_of({"target": FAR | {"phase_px": "any"}, "optics": F2}, left_out=LINEAR),
+    "any place": replace(
+        view_of({"target": FAR | {"phase_px": "any"}, "optics": F2}, left_out=READOUT), accuracy=EVERY_PIXEL
+    ),
     "crosstalk": view_of({}, {"crosstalk": 0.1}),
     "pulsed": view_of({"drive": {"duty": 0.5, "frequency_hz": 90}, "exposure": {"kind": "fixed", "exposure_s": 0.003}}),
 }

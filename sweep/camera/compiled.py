@@ -168,7 +168,7 @@ def sums_of_cubic(
     weights : ndarray[m]
         The same for each row.
     knots : ndarray[n_coefficients + 4]
-        From 0 on, equidistant but for the second and the last but one, which a not-a-knot spline leaves out.
+        Equidistant but for the second and the last but one, which a not-a-knot spline leaves out.
     coefficients : ndarray[n_coefficients, n_values]
         Of the cubic B-splines.
     out : ndarray[n, n_values]
@@ -179,7 +179,7 @@ def sums_of_cubic(
     for row in range(len(x)):
         low, high = last, 3
         for at in range(weights.size):
-            first = min(max(int(x[row, at] * per_unit) + 2, 3), last)
+            first = min(max(int((x[row, at] - knots[0]) * per_unit) + 2, 3), last)
             if 6 <= first <= last - 3:
                 _inner_basis((x[row, at] - knots[first]) * per_unit, four)
             else:

@@ -19,8 +19,8 @@ from .view import View
 
 MOST_PHASES = 1024
 """Phases of a lattice on a tile, at most."""
-_STARTS = 3
-"""Lattice phases from which each extreme is refined."""
+_STARTS = 6
+"""Phases from which each extreme is refined."""
 _NEIGHBORS = np.array([[x, y] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)])
 
 
@@ -61,13 +61,13 @@ def n_phases(view: View) -> int:
 
 
 def scene_phases(view: View) -> Phases:
-    """The phases of a scene: the named one, or the whole lattice; halfway between two pixels the one before is read."""
+    """The phases of a scene: the whole lattice, or the named one; this one, halfway, is read at the pixel before."""
     target = view.scenario.target
     rows, columns = view.mosaic.indices.shape
     if target is None:
         centers = np.zeros((1, 2))
     elif target.phase_px == "any":
-        centers = lattice_px(view.mosaic, view.accuracy.phase_steps_per_px)
+        return read_at(target, lattice_px(view.mosaic, view.accuracy.phase_steps_per_px))
     else:
         centers = np.asarray(np.mod([target.phase_px], (columns, rows)), dtype=float)
     return Phases(centers, np.ceil(centers - 0.5))
@@ -110,9 +110,9 @@ def read_at(target: Target, centers_px: FloatArray) -> Phases:
     low, high = np.ceil(centers_px - 0.5), np.floor(centers_px + 0.5)
     result = Phases(centers_px, low)
     if target.readout == "center":
-        for column, row in ((high[:, 0], low[:, 1]), (low[:, 0], high[:, 1]), (high[:, 0], high[:, 1])):
-            nearest = np.stack([column, row], axis=1)
-            more = np.flatnonzero((nearest != low).any(axis=1))
+        for beyond in ((True, False), (False, True), (True, True)):  # along the columns, along the rows
+            nearest = np.where(beyond, high, low)
+            more = np.flatnonzero(((nearest != low) == beyond).all(axis=1))
             result = Phases(
                 np.concatenate([result.center_px, centers_px[more]]), np.concatenate([result.nearest_px, nearest[more]])
             )
@@ -124,9 +124,10 @@ def refined_minima(
 ) -> FloatArray:
     """Smallest values over all phases, ndarray[n_values], by refinement of the smallest ones of a lattice.
 
-    A pattern search: of the phases around a start at half the lattice's step the best one is the next start, and so on
-    with half the step before. It finds a minimum near the lattice's best phases; that no lower one lies elsewhere is
-    not proven.
+    A pattern search: from each of the best known phases, none within a step of a better one, to the best of those
+    around it at half the lattice's step, as long as it is better; then again, from the best of all that is known by
+    then, with half the step before. It finds a minimum near good phases; that no lower one lies elsewhere is not
+    proven.
 
     Parameters
     ----------
@@ -140,30 +141,42 @@ def refined_minima(
         From phases to the values there, ndarray[n_values, n_phases].
     """
     target, finest = view.scenario.target, view.accuracy.finest_phase_px
-    best = values.min(axis=1)
     step = 0.5 / view.accuracy.phase_steps_per_px
     if target is None or not finest or step < finest:
-        return np.asarray(best)
+        return np.asarray(values.min(axis=1))
     first = np.unique(different_phases(view, lattice)[1], return_index=True)[1]  # mirrored phases are no other starts
-    starts = first[np.argsort(values[:, first], axis=1, kind="stable")[:, :_STARTS]]
-    centers = lattice.center_px[starts]  # [n_values, n_starts, 2]
-    at_start = np.take_along_axis(values, starts, axis=1)
-    known: dict[tuple[float, ...], FloatArray] = {}
-    moving = np.ones(at_start.shape, dtype=bool)
+    known = dict(zip(lattice.subset(first).keys, values[:, first].T, strict=True))
+    period = np.array(view.mosaic.indices.shape[::-1])
     while step >= finest:
-        around = np.unique((centers[moving][:, None] + step * _NEIGHBORS).reshape(-1, 2), axis=0)
-        read = read_at(target, around)
-        phases, which = different_phases(view, read)
-        at_phases = _known_or_evaluated(phases, known, evaluate)[:, which]
-        for value, start in np.argwhere(moving):
-            close = np.flatnonzero((np.abs(read.center_px - centers[value, start]) <= step * (1 + 1e-9)).all(axis=1))
-            lowest = close[int(at_phases[value, close].argmin())]
-            moving[value, start] = at_phases[value, lowest] < at_start[value, start]
-            if moving[value, start]:
-                at_start[value, start], centers[value, start] = at_phases[value, lowest], read.center_px[lowest]
-        if not moving.any():
-            moving[:], step = True, step / 2
-    return np.asarray(np.minimum(best, at_start.min(axis=1)))
+        places, so_far = np.array(list(known))[:, :2], np.stack(list(known.values()), axis=1)
+        starts = np.stack([_apart(places, own, 2 * step, period) for own in so_far])
+        centers, at_start = places[starts], np.take_along_axis(so_far, starts, axis=1)  # [n_values, n_starts, ...]
+        moving = np.ones(at_start.shape, dtype=bool)
+        while moving.any():
+            around = np.unique((centers[moving][:, None] + step * _NEIGHBORS).reshape(-1, 2), axis=0)
+            read = read_at(target, around)
+            phases, which = different_phases(view, read)
+            at_phases = _known_or_evaluated(phases, known, evaluate)[:, which]
+            for value, start in np.argwhere(moving):
+                off = np.abs(read.center_px - centers[value, start])
+                close = np.flatnonzero((off <= step * (1 + 1e-9)).all(axis=1))
+                lowest = close[int(at_phases[value, close].argmin())]
+                moving[value, start] = at_phases[value, lowest] < at_start[value, start]
+                if moving[value, start]:
+                    at_start[value, start], centers[value, start] = at_phases[value, lowest], read.center_px[lowest]
+        step /= 2
+    return np.asarray(np.minimum(values, np.stack(list(known.values()), axis=1).min(axis=1)[:, None]).min(axis=1))
+
+
+def _apart(centers_px: FloatArray, values: FloatArray, step_px: float, period_px: IndexArray) -> IndexArray:
+    """Indices of the smallest values, of which none lies within a step of one that is smaller, ndarray[n_starts]."""
+    found: list[int] = []
+    order = np.argsort(values, kind="stable")
+    while len(found) < _STARTS and order.size:
+        found.append(int(order[0]))
+        off = np.mod(centers_px[order] - centers_px[order[0]], period_px)
+        order = order[np.minimum(off, period_px - off).max(axis=1) > step_px * (1 + 1e-9)]
+    return np.array((found * _STARTS)[:_STARTS])
 
 
 def _known_or_evaluated(

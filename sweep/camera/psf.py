@@ -35,6 +35,8 @@ _PHASE_PER_PANEL = 20.0
 """Radians by which the phase changes over a panel, on average; at most it is about twice that."""
 _NODES_PER_CYCLE = 12
 """Nodes of the table of h(r) per period of the highest frequency."""
+_BEYOND = 6
+"""Nodes of the table below 0 and beyond the reach."""
 _RESIDUAL = 1e-10
 """What the table leaves out of h(r) is less at each radius where it is computed, relative to a uniform field."""
 _MOST_AT_ONCE = 2_000_000
@@ -253,7 +255,9 @@ class DiscProfile:
         self.highest_per_um = float(frequency[-1])
 
         step_um = 1 / (_NODES_PER_CYCLE * self.highest_per_um)
-        table_um = np.linspace(0.0, reach_um + step_um, max(8, 2 + int(reach_um / step_um)))
+        n_nodes = max(8, 2 + int(reach_um / step_um))
+        # A spline is off tenfold near its ends: they lie below 0, where h goes on evenly, and beyond the reach.
+        table_um = np.arange(-_BEYOND, n_nodes + _BEYOND) * ((reach_um + step_um) / (n_nodes - 1))
         nodes = _chebyshev_nodes(table_um[-1], self.highest_per_um)
         samples = _hankel_sums(table_um[-1] * np.sqrt((1 + nodes) / 2), frequency, spectrum)
         # What the first columns leave of any sample is at most the size of the next entry on the diagonal.

@@ -42,12 +42,12 @@ def reference_view(view: View) -> View:
 def allowed_dn(view: View, tolerance_dn: float) -> float:
     """Difference of a CSD from the reference that is no fault, DN.
 
-    That is the tolerance. A readout in whole numbers without noise steps between phases, field positions and moments of
-    a pulse, by up to sqrt(channels) DN: where the worst of all of them counts, that is added.
+    That is the tolerance. A readout in whole numbers without noise steps by up to sqrt(channels) DN between neighboring
+    values of what is sampled: where images of a light, moments of a pulse or all field positions count, that is added.
     """
-    steps = view.scenario.noise is None and view.computes("quantization")
-    any_of_many = view.all_phases or view.all_heights or view.scenario.drive is not None
-    return tolerance_dn + (math.sqrt(len(view.mosaic.channels)) if steps and any_of_many else 0.0)
+    scene, steps = view.scenario, view.scenario.noise is None and view.computes("quantization")
+    sampled = scene.target is not None or scene.drive is not None or view.all_heights
+    return tolerance_dn + (math.sqrt(len(view.mosaic.channels)) if steps and sampled else 0.0)
 
 
 def compared_rows(study: Study, rows: Sequence[Row]) -> Iterator[list[dict[str, Any]]]:

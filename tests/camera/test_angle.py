@@ -8,15 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sweep.camera.methods import REFERENCE
-from sweep.camera.plan.planner import Planner
-from sweep.camera.rays import Cone, rays
 
-from sweep.camera.angular import METHODS, RAYS, AngularResponse, cone_of
+from sweep.camera.angular import AngularResponse, Cone, cone_of, gauss_rays
 from sweep.camera.forward import ForwardModel
 from sweep.camera.linear import linear_model
+from sweep.camera.plan import plan_scene
 from sweep.camera.scene import Scene
 from sweep.camera.sensor_field import SensorField
+from sweep.camera.view import View
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.block import edges_of
 from sweep.designs.technology import Technology
@@ -25,7 +24,7 @@ from sweep.study import load_study
 
 from ..cases import thinned
 from ..conftest import STUDIES
-from ..hard.scenes import FAR, FINE, Scene, promised_names, scene
+from ..hard.scenes import FAR, FINE, DesignScene, csd_columns, scene
 
 SPACE = next(space for space in load_study(STUDIES / "stopband.yaml").spaces if space.kind == "sweep")
 SPACE = replace(SPACE, axes=((600.0, 615.0), (6.0, 20.0), (650.0,), (8.0,), (0.7, 1.0)))
@@ -71,7 +70,7 @@ def test_the_mean_over_a_cone_is_that_over_the_pupil(f_number: float, cra_deg: f
     channel, wave = made.view.modified[0], grid.nodes_nm
     base = made.view.base_qe[0]
     transmission = np.random.default_rng(3).uniform(size=wave.size)
-    seen = AngularResponse(made.view, "cone").curves((base * transmission)[None], [channel])[0] / base
+    seen = AngularResponse(made.view).curves((base * transmission)[None], [channel])[0] / base
     half = math.asin(0.5 / f_number)
     for at in (2, 11):
         exact = over_pupil(wave[at], wave, transmission, half, math.radians(cra_deg), 1.7)
@@ -86,8 +85,8 @@ def test_few_rays_stand_for_the_cone(f_number: float, cra_deg: float) -> None:
     radius, azimuth = np.meshgrid((np.arange(4000) + 0.5) / 4000, (np.arange(64) + 0.5) * math.pi / 32)
     p = math.cos(half) * math.sin(chief) + math.sin(half) * math.cos(chief) * radius * np.cos(azimuth)
     sine_squared = p**2 + (math.sin(half) * radius * np.sin(azimuth)) ** 2
-    for count in RAYS.values():
-        at, weight = rays(cone, count)
+    for count in (4, 16):
+        at, weight = gauss_rays(cone, count)
         assert at.size == count
         assert weight.min() > 0
         for power in range(5):
@@ -96,14 +95,18 @@ def test_few_rays_stand_for_the_cone(f_number: float, cra_deg: float) -> None:
 
 
 def test_a_ray_of_no_cone_is_the_chief_ray() -> None:
-    at, weight = rays(Cone(1e-9, 0.3), 4)
+    at, weight = gauss_rays(Cone(1e-9, 0.3), 4)
     np.testing.assert_allclose(at, math.sin(0.3) ** 2, rtol=1e-8)
     assert weight.sum() == pytest.approx(1.0)
 
 
-def moved(given: dict[str, Any], f_number: float = 1.6, cra_deg: float = 20.0) -> Scene:
+def moved(given: dict[str, Any], f_number: float = 1.6, cra_deg: float = 20.0) -> DesignScene:
     optics = {"optics": {"f_number": f_number, "cra_deg": cra_deg}}
     return scene("angle", "RYNCy", given | optics, {"dark_e_per_s": 50.0}, grid=FINE, index=1.8)
+
+
+def with_rays(view: View, count: int | None) -> View:
+    return replace(view, accuracy=view.accuracy.model_copy(update={"rays": count}))
 
 
 GIVEN: dict[str, dict[str, Any]] = {
@@ -113,13 +116,12 @@ GIVEN: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("given", GIVEN.values(), ids=GIVEN)
-@pytest.mark.parametrize("method", ["chief ray", "4 rays", "16 rays"])
-def test_digital_numbers_are_means_over_rays(given: dict[str, Any], method: str) -> None:
+@pytest.mark.parametrize("count", [1, 4, 16])
+def test_digital_numbers_are_means_over_rays(given: dict[str, Any], count: int) -> None:
     """Each ray's filter put in as a design that does not move: digital numbers are the weighted sum."""
     made = moved(given)
-    view, cone = replace(made.view, methods=replace(REFERENCE, angle=method)), cone_of(made.view.scenario)
-    single = np.array([math.sin(cone.chief_rad) ** 2]), np.ones(1)
-    sine_squared, weights = rays(cone, RAYS[method]) if method in RAYS else single
+    view = with_rays(made.view, count)
+    sine_squared, weights = gauss_rays(cone_of(view.scenario), count)
     base, wave = view.base_qe[0], view.grid.nodes_nm
     filters = bare(wave, made.curves[0, 0] / base, np.arcsin(np.sqrt(sine_squared)), 1.8) * base
     still = linear_model(replace(view, technologies=()))
@@ -131,47 +133,41 @@ def test_digital_numbers_are_means_over_rays(given: dict[str, Any], method: str)
 def test_derivatives_see_what_the_rays_see(given: dict[str, Any]) -> None:
     """The response is affine in N: its derivative, and the weights of each wavelength, give it again."""
     made = moved(given | {"exposure": {"kind": "fixed", "exposure_s": 1e-3}})
-    imager, channel = linear_model(made.view), made.view.modified[0]
-    zero, own = imager.smooth(np.zeros_like(made.curves))[0], imager.smooth(made.curves)[0]
+    model, channel = linear_model(made.view), made.view.modified[0]
+    zero, own = model.smooth(np.zeros_like(made.curves))[0], model.smooth(made.curves)[0]
     scale = np.abs(own).max()
-    by_curve = imager.gradient(made.curves[0], made.curves)[0]
+    by_curve = model.gradient(made.curves[0], made.curves)[0]
     np.testing.assert_allclose(by_curve, own - zero, atol=1e-12 * scale)
-    by_wavelength = imager.per_qe(0, made.curves[0])[:, :, channel] @ made.curves[0, 0]
+    by_wavelength = model.per_qe(0, made.curves[0])[:, :, channel] @ made.curves[0, 0]
     np.testing.assert_allclose(by_wavelength, (own - zero)[..., channel], atol=1e-12 * scale)
 
 
 def test_only_what_is_said_to_be_of_interference_moves() -> None:
     made = moved({})
     pigment = replace(made.view, technologies=(Technology(),) * len(made.view.mosaic.channels))
-    unsaid = replace(made.view, technologies=())
+    unsaid, reasons = replace(made.view, technologies=()), []
     for view in (pigment, unsaid):
-        plans = [Planner([replace(made.box, view=view)]).plan("", tolerance) for tolerance in (1e-9, 10.0)]
-        assert {plan.methods.angle for plan in plans} == {"skip"}
-        for method in METHODS:
-            found = ForwardModel(replace(view, methods=replace(REFERENCE, angle=method))).read(made.curves)[0]
+        for tolerance_dn in (1e-9, 10.0):
+            plan = plan_scene("", [replace(made.box, view=view)], tolerance_dn, view.accuracy)
+            choices = {choice.effect: choice for choice in plan.choices}
+            assert (choices["angle"].computed, choices["angle"].bound_dn) == (False, 0.0)
+        for count in (1, 4, None):
+            found = ForwardModel(with_rays(view, count)).read(made.curves)[0]
             np.testing.assert_array_equal(found, ForwardModel(unsaid).read(made.curves)[0])
-    reasons = {Planner([replace(made.box, view=view)])._exact["angle"] for view in (pigment, unsaid)}
-    assert reasons == {"pigments do not move with the angle", "no technology is stated: filters as on axis"}
-
-
-def test_a_plan_computes_no_more_of_the_cone_than_it_must() -> None:
-    """A slow lens on axis needs nothing, a fast one off axis a few rays."""
-    found = {}
-    for f_number, cra_deg in ((22.0, 0.0), (1.6, 20.0)):
-        made = moved({"exposure": {"kind": "fixed", "exposure_s": 1e-3}, "noise": True}, f_number, cra_deg)
-        found[f_number] = Planner([made.box]).plan("", 0.5).methods.angle
-    assert found == {22.0: "skip", 1.6: "4 rays"}
+        reasons.append(choices["angle"].reason)
+    assert reasons == ["pigments do not move with the angle", "no technology is stated: filters as on axis"]
 
 
 def test_a_plain_curve_of_interference_moves_on_the_clear_one() -> None:
     made = moved({})
     clear, wave = made.view.clear_qe, made.view.grid.nodes_nm
     moving = tuple(made.view.technologies[made.view.modified[0]] for _ in made.view.mosaic.channels)
-    view = replace(made.view, technologies=moving, methods=replace(REFERENCE, angle="chief ray"))
+    view = replace(made.view, technologies=moving, accuracy=made.view.accuracy.model_copy(update={"rays": 1}))
     channel = view.fixed[0]
     own = np.minimum(view.qe[channel], clear)
-    seen = AngularResponse(view, "chief ray").curves(own[None], [channel])[0]
-    expected = clear * bare(wave, own / clear, np.array([math.radians(20.0)]), 1.8)[0]
+    seen = AngularResponse(view).curves(own[None], [channel])[0]
+    sine_squared, _ = gauss_rays(cone_of(view.scenario), 1)
+    expected = clear * bare(wave, own / clear, np.arcsin(np.sqrt(sine_squared)), 1.8)[0]
     np.testing.assert_allclose(seen, expected, rtol=1e-12)
 
 
@@ -197,10 +193,10 @@ def test_a_field_is_the_worst_of_its_places(given: dict[str, Any]) -> None:
             given | {"optics": {"f_number": 1.6, "cra_deg": cra_deg}, "off_axis_deg": off_axis_deg}
         )
         each.append(evaluate(ForwardModel(replace(view, scenario=own)), curves))
-    imager = ForwardModel(replace(view, scenario=field))
-    names = promised_names(view, any_place=False)
+    model = ForwardModel(replace(view, scenario=field))
+    names = csd_columns(view)
     for designs in (curves, block):
-        found = evaluate(imager, designs)
+        found = evaluate(model, designs)
         for name in names:
             worst = np.min([place[name] for place in each], axis=0)
             np.testing.assert_allclose(found[name], worst, atol=1e-9)
@@ -211,12 +207,12 @@ def test_derivatives_at_every_place_of_a_field() -> None:
     fixed = {"exposure": {"kind": "fixed", "exposure_s": 1e-3}, "background_cd_m2": 200.0, "off_axis_deg": 35.0}
     made = moved(fixed, cra_deg=0.0)
     field = made.view.scenario.model_copy(update={"field": SensorField(cra_max_deg=20.0, places=3)})
-    imager, channel = linear_model(replace(made.view, scenario=field)), made.view.modified[0]
-    zero, own = imager.smooth(np.zeros_like(made.curves))[0], imager.smooth(made.curves)[0]
+    model, channel = linear_model(replace(made.view, scenario=field)), made.view.modified[0]
+    zero, own = model.smooth(np.zeros_like(made.curves))[0], model.smooth(made.curves)[0]
     assert len(own) == 3
     scale = np.abs(own).max()
-    np.testing.assert_allclose(imager.gradient(made.curves[0], made.curves)[0], own - zero, atol=1e-12 * scale)
-    by_wavelength = imager.per_qe(0, made.curves[0])[:, :, channel] @ made.curves[0, 0]
+    np.testing.assert_allclose(model.gradient(made.curves[0], made.curves)[0], own - zero, atol=1e-12 * scale)
+    by_wavelength = model.per_qe(0, made.curves[0])[:, :, channel] @ made.curves[0, 0]
     np.testing.assert_allclose(by_wavelength, (own - zero)[..., channel], atol=1e-12 * scale)
 
 

@@ -13,15 +13,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sweep.camera.effects.blur import transfer
-from sweep.camera.plan.bounds import Box
-from sweep.camera.plan.planner import Planner
-from sweep.camera.plan.work import DesignCount
 
+from sweep.camera.effects import Box
 from sweep.camera.forward import ForwardModel
 from sweep.camera.linear import linear_model
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Optics, Pixel, irradiance_factor
+from sweep.camera.plan import plan_scene
+from sweep.camera.psf import otf as transfer_function
 from sweep.camera.scene import FixedExposure, Scene
 from sweep.camera.view import View
 from sweep.curves.lights import Lights
@@ -143,7 +142,7 @@ def kept_at_the_center(f_number: float) -> np.ndarray:
     nu = np.hypot(*np.meshgrid(*[np.fft.fftfreq(len(field), sample_um)] * 2))
     kept = []
     for wave_nm in ref["wave_nm"]:
-        otf = transfer(nu.ravel(), np.array([wave_nm * 1e-3]), f_number, 0.0).reshape(nu.shape)
+        otf = transfer_function(nu.ravel(), np.array([wave_nm * 1e-3]), f_number, 0.0).reshape(nu.shape)
         kept.append(np.fft.ifft2(np.fft.fft2(field) * otf).real[len(field) // 2, len(field) // 2])
     return np.array(kept)
 
@@ -164,12 +163,12 @@ def test_a_uniform_field_agrees_through_the_whole_image_chain(cfa: str) -> None:
     columns, constants = columns_of(mosaic), ref["constants"]
     kept = kept_at_the_center(float(constants["f_number"]))
     view = isetcam_view(mosaic, constants["magnification"], run["exposure_s"], kept)
-    plan = Planner([Box(view, view.qe, view.qe, DesignCount(1))]).plan("uniform", 0.1)
+    plan = plan_scene("uniform", [Box(view, view.qe, view.qe)], 0.1, view.accuracy)
     assert "quantization" in plan.computed
     smooth = linear_model(view).smooth(NOTHING)[0, 0]
     volts = np.array(run["uniform_volts_unclipped"], dtype=float)[:, columns]
     np.testing.assert_allclose(smooth, 4096 * volts, atol=0.1, rtol=0)
-    dn = ForwardModel(replace(view, methods=plan.methods)).read(NOTHING)[0][0, 0]
+    dn = ForwardModel(replace(view, left_out=plan.left_out)).read(NOTHING)[0][0, 0]
     expected = np.minimum(np.array(run["uniform_dn"], dtype=float)[:, columns], 4095)
     near_a_step = np.abs(4096 * volts - np.floor(4096 * volts) - 0.5) < 0.1
     assert ((dn == expected) | near_a_step).all()

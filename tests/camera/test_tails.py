@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.stats import norm, poisson
-from sweep.camera.effects.noise import range_of_pixel
-from sweep.camera.effects.quantization import smoothed
 
 from sweep.camera.noise import moments, tails
 from sweep.camera.pixel import Pixel
 
 from ..cases import thinned
+from .one_pixel import readout_bound_dn
 
 
 def gains(prnu: float) -> tuple[np.ndarray, np.ndarray]:
@@ -77,16 +76,16 @@ def test_rounding_and_clipping_shift_no_mean_by_more(seed: int) -> None:
     brightest_e = float(rng.uniform(0.1, 1.2)) * min(pixel.well_e, pixel.full_scale_dn / pixel.dn_per_e)
     found = moments.moments(np.linspace(0, brightest_e, 400), pixel)
     shift = found[moments.ROUNDED] - found[moments.UNROUNDED]
-    assert np.ptp(shift) <= smoothed(pixel, brightest_e) + 1e-9
+    assert np.ptp(shift) <= readout_bound_dn("quantization", pixel, brightest_e) + 1e-9
     lost = np.linspace(0, brightest_e, 400) * pixel.dn_per_e + pixel.offset_dn - found[moments.UNROUNDED]
     top_e = min(pixel.well_e, (pixel.full_scale_dn - pixel.offset_dn) / pixel.dn_per_e)
     below = np.linspace(0, brightest_e, 400) <= top_e
-    assert np.ptp(lost[below]) <= range_of_pixel(pixel, brightest_e * pixel.dn_per_e) + 1e-9
+    assert np.ptp(lost[below]) <= readout_bound_dn("noise", pixel, brightest_e) + 1e-9
 
 
 def test_closed_forms_serve_a_usual_sensor() -> None:
     """Two electrons of read noise, a pedestal, and a light that stays a tenth below the full well."""
     pixel = Pixel(read_noise_e=2.0, offset_dn=168.0, prnu=0.01)
-    assert 0 < smoothed(pixel, 8500.0) < 1e-5
-    assert 0 < range_of_pixel(pixel, 8500.0 * pixel.dn_per_e) < 1e-5
-    assert smoothed(Pixel(), 100.0) == 1.0
+    assert 0 < readout_bound_dn("quantization", pixel, 8500.0) < 1e-5
+    assert 0 < readout_bound_dn("noise", pixel, 8500.0) < 1e-5
+    assert readout_bound_dn("quantization", Pixel(), 100.0) == 1.0

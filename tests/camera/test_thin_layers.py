@@ -12,10 +12,8 @@ import numpy as np
 import pytest
 import tmm
 from scipy.optimize import minimize_scalar
-from sweep.camera.methods import REFERENCE
-from sweep.camera.rays import rays
 
-from sweep.camera.angular import cone_of
+from sweep.camera.angular import cone_of, gauss_rays
 from sweep.camera.linear import linear_model
 from sweep.metrics.separation import separation
 
@@ -70,7 +68,7 @@ def test_characteristic_matrices_transmit_what_tmm_says() -> None:
 def missed(seed: int) -> tuple[float, float, float]:
     """A stack's CSD of yellow and red by its layers and by its effective index, DN, and on axis, with parallel rays."""
     made = scene("layers", "RYNCy", {"optics": {"f_number": 1.6, "cra_deg": 20.0}}, index=1.8)
-    sine_squared, weights = rays(cone_of(made.view.scenario), 4)
+    sine_squared, weights = gauss_rays(cone_of(made.view.scenario), 4)
     stack, wave, base = layers(np.random.default_rng([seed, 5])), GRID.nodes_nm, made.view.base_qe[0]
     fine = np.arange(GRID.start_nm, 800.0, GRID.step_nm)
     straight = transmitted(stack, 0.0, fine)
@@ -80,7 +78,7 @@ def missed(seed: int) -> tuple[float, float, float]:
         return np.array([np.interp(wave / np.sqrt(1 - s / index**2), fine, straight) for s in sine_squared])
 
     index = minimize_scalar(lambda n: float(((moved(n) - tilted) ** 2).sum()), bounds=(1.2, 3.0), method="bounded").x
-    still = replace(made.view, technologies=(), methods=REFERENCE)
+    still = replace(made.view, technologies=())
     curves = np.stack([weights @ tilted, weights @ moved(index), np.interp(wave, fine, straight)]) * base
     response = linear_model(still).smooth(curves[:, None])[:, 0]
     exact, model, on_axis = separation(response, made.view.members["yellow"], made.view.members["red"])

@@ -9,7 +9,6 @@ from typing import Any
 
 import mpmath as mp
 import numpy as np
-from sweep.camera.methods import Methods
 
 from sweep.camera.forward import ForwardModel
 from sweep.camera.mosaic import Mosaic
@@ -51,13 +50,14 @@ def made(
     scenario: dict[str, Any] | None = None,
     pixel: dict[str, Any] | None = None,
     cfa: str = "RGGB",
-    **methods: str,
+    left_out: frozenset[str] = frozenset(),
 ) -> View:
     """A view whose channel N, if there is one, is modified."""
     mosaic = Mosaic.from_name(cfa)
     modified = (mosaic.channels.index("N"),) if "N" in mosaic.channels else ()
     given = Scene.model_validate(scenario or {})
-    return View(GRID, mosaic, qe, modified, np.full(N, 0.9), lights, Pixel(**(pixel or {})), given, Methods(**methods))
+    own = Pixel(**(pixel or {}))
+    return View(GRID, mosaic, qe, modified, np.full(N, 0.9), lights, own, given, left_out=left_out)
 
 
 def beyond(view: View, **scenario: object) -> View:
@@ -77,14 +77,16 @@ def electrons_per_s(qe: float, radiance: float = 2e18, f_number: float = 4.0) ->
 
 
 FIXED = {"exposure": {"kind": "fixed", "exposure_s": 2e-3}}
-SCENES: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, str]]] = {
-    "white patch": ({}, {}, {}),
-    "fixed": (FIXED, {"offset_dn": 168.0}, {}),
-    "noise": (FIXED | {"noise": True}, {"offset_dn": 168.0, "read_noise_e": 2.0, "prnu": 0.01}, {}),
-    "off axis, crosstalk": (FIXED | {"off_axis_deg": 33.0}, {"crosstalk": 0.07}, {}),
-    "fog": (FIXED | {"target": NEAR, "visibility_m": 100.0}, {}, {"blur": "skip"}),
-    "center": (FIXED | {"target": NEAR | {"readout": "center"}}, {"crosstalk": 0.02}, {"blur": "skip"}),
-    "pulses": (FIXED | {"drive": {"duty": 0.4, "frequency_hz": 90.0}}, {}, {}),
+NONE: frozenset[str] = frozenset()
+SHARP = frozenset({"blur"})
+SCENES: dict[str, tuple[dict[str, Any], dict[str, Any], frozenset[str]]] = {
+    "white patch": ({}, {}, NONE),
+    "fixed": (FIXED, {"offset_dn": 168.0}, NONE),
+    "noise": (FIXED | {"noise": True}, {"offset_dn": 168.0, "read_noise_e": 2.0, "prnu": 0.01}, NONE),
+    "off axis, crosstalk": (FIXED | {"off_axis_deg": 33.0}, {"crosstalk": 0.07}, NONE),
+    "fog": (FIXED | {"target": NEAR, "visibility_m": 100.0}, {}, SHARP),
+    "center": (FIXED | {"target": NEAR | {"readout": "center"}}, {"crosstalk": 0.02}, SHARP),
+    "pulses": (FIXED | {"drive": {"duty": 0.4, "frequency_hz": 90.0}}, {}, NONE),
 }
 
 
@@ -96,10 +98,10 @@ SCENES: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, str]]] = {
 def metamers() -> Result:
     errors = []
     lights = lights_of(("yellow", "red"), lines(YELLOW, RED))
-    for scenario, pixel, methods in SCENES.values():
+    for scenario, pixel, left_out in SCENES.values():
         qe = random_qe(1, 3)
         qe[:, RED] = qe[:, YELLOW]
-        view = made(qe, lights, scenario, pixel, **methods)
+        view = made(qe, lights, scenario, pixel, left_out=left_out)
         errors += [evaluate(ForwardModel(view), plain(view))["csd_yellow_red"], smooth_csd(view, plain(view), PAIR)]
     return Result(float(np.max(errors)), 0.0)
 
@@ -302,12 +304,12 @@ def nan_in_one_design() -> Result:
     bad = clean.copy()
     bad[17, 0, RED] = np.nan
     error = 0.0
-    for scenario, pixel, methods in SCENES.values():
-        imager = ForwardModel(made(qe, lights, scenario, pixel, "RYNC", **methods))
-        one, other = evaluate(imager, clean), evaluate(imager, bad)
+    for scenario, pixel, left_out in SCENES.values():
+        model = ForwardModel(made(qe, lights, scenario, pixel, "RYNC", left_out))
+        one, other = evaluate(model, clean), evaluate(model, bad)
         if not np.isnan(other["csd_yellow_red"][17]):
             return Result(np.inf, 0.0)
         for name in one:
             off = np.abs(np.delete(one[name], 17) - np.delete(other[name], 17)).max()
-            error = max(error, float(off) / (imager.readout.pixel.full_scale_dn if "csd" in name else 1.0))
+            error = max(error, float(off) / (model.readout.pixel.full_scale_dn if "csd" in name else 1.0))
     return Result(error, 64 * EPS)

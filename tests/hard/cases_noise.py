@@ -157,9 +157,9 @@ def a_blinding_signal() -> Result:
             exact.append(exact_moments(float(n), pixel)[1])
         wide = pixel.dn_per_e * np.hypot(np.sqrt(n), pixel.read_noise_e)
         allowed.append((12.8 * wide + 177 * 0.5) * 5 / 384 / 32**4)
-    imager = chain(pixel)
+    model = chain(pixel)
     for brightest in (2e4, 1e8, 1e12, 1e100, 1e300, np.inf):
-        found = imager.readout.transfer(np.append(electrons, brightest))[:-1]
+        found = model.readout.transfer(np.append(electrons, brightest))[:-1]
         results += [(abs(float(f - e)), a) for f, e, a in zip(found, exact, allowed, strict=True)]
     return worst(results)
 
@@ -232,10 +232,10 @@ def poisson_draws() -> Result:
     why="beyond the full well the table stands still: gain x full well, rounded once; counts below it are rarer than 1e-20",
 )
 def all_clipped() -> Result:
-    imager = chain(Pixel())
+    model = chain(Pixel())
     electrons = np.array([1e8, 2e8, 1e14, 1e100, 1e300, np.inf])
-    found = imager.readout.transfer(electrons)
-    spread = float(np.ptp(found) + imager.readout.variance_dn(electrons).max())
+    found = model.readout.transfer(electrons)
+    spread = float(np.ptp(found) + model.readout.variance_dn(electrons).max())
     return worst([(spread, 1e-20 * 4095), (float(np.abs(found - 4095).max()), EPS * 4095)])
 
 

@@ -7,16 +7,16 @@ from functools import cache
 
 import mpmath as mp
 import numpy as np
-from sweep.camera.effects.blur import Profile, mean_over_disc, too_much, transfer
-from sweep.camera.effects.sampling import covered
 
-from sweep.camera.effects import blur, sampling
+from sweep.camera import sampling
+from sweep.camera.disc_image import covered, light_on_pixels
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
+from sweep.camera.psf import DiscProfile, otf, too_much
 from sweep.camera.scene import Scene
 from sweep.metrics.smooth import smooth_response
 
-from .cases_chain import FIXED, PAIR, RED, YELLOW, lights_of, lines, made, plain, random_qe
+from .cases_chain import FIXED, PAIR, RED, SHARP, YELLOW, lights_of, lines, made, plain, random_qe
 from .registry import EPS, Result, hard_case, outcome, relative, worst
 
 WIDTH_UM = 2.1
@@ -126,7 +126,7 @@ def at_the_center() -> Result:
     results = []
     for f_number in NUMBERS:
         for radius in (0.01, 1.0, 12.0):
-            found = Profile(radius, 0.1 * radius, ONE_LIGHT, f_number, 0.0).at(np.zeros(1))[0, 0]
+            found = DiscProfile(radius, 0.1 * radius, ONE_LIGHT, f_number, 0.0).at(np.zeros(1))[0, 0]
             allowed = kink_bound(radius, 0.1 * radius, 0.55, 0.55, f_number) + ROUNDINGS
             results.append((abs(float(found - encircled(radius, 0.55, f_number))), allowed))
     return worst(results)
@@ -137,26 +137,10 @@ def many_wavelengths() -> Result:
     waves, results = np.array([0.4, 0.473, 0.55, 0.61, 0.7]), []
     for f_number in NUMBERS:
         for radius in (1.0, 12.0):
-            found = Profile(radius, radius, waves, f_number, 0.0).at(np.zeros(1))[0]
+            found = DiscProfile(radius, radius, waves, f_number, 0.0).at(np.zeros(1))[0]
             for value, wave in zip(found, waves, strict=True):
                 allowed = kink_bound(radius, radius, 0.4, float(wave), f_number) + ROUNDINGS
                 results.append((abs(float(value - encircled(radius, float(wave), f_number))), allowed))
-    return worst(results)
-
-
-@hard_case(
-    "the energy of a point in discs from a pixel to 130 pixels",
-    oracle="1 - J0^2 - J1^2, 50 digits",
-    why=ENDS + "; a point of 1e-9 um is none to 1e-16",
-)
-def energy_of_a_point() -> Result:
-    results, point = [], 1e-9
-    for f_number in NUMBERS:
-        for radius in (WIDTH_UM / 2, 12.0, 136.5):
-            found = mean_over_disc(point, radius, ONE_LIGHT, f_number, 0.0)[0] * (radius / point) ** 2
-            # By symmetry the mean over the disc of a point's image is the disc's image at the point.
-            allowed = kink_bound(radius, point, 0.55, 0.55, f_number) + ROUNDINGS
-            results.append((abs(float(found - encircled(radius, 0.55, f_number))), allowed))
     return worst(results)
 
 
@@ -172,7 +156,7 @@ def transfer_in_focus() -> Result:
             nu = share / (0.55 * f_number)
             s = min(mp.mpf(nu) * mp.mpf(0.55) * mp.mpf(f_number), mp.mpf(1))
             exact = 2 / mp.pi * (mp.acos(s) - s * mp.sqrt(1 - s * s))
-            found = transfer(np.array([nu]), ONE_LIGHT, f_number, 0.0)[0, 0]
+            found = otf(np.array([nu]), ONE_LIGHT, f_number, 0.0)[0, 0]
             results.append((abs(float(found - exact)), 4 * EPS))
             if share > 1:
                 results.append((abs(float(found)), 0.0))
@@ -200,7 +184,7 @@ def transfer_out_of_focus() -> Result:
             with mp.workdps(25):
                 pieces = mp.linspace(0, 1 - s, 2 + int(k * (1 - s) / 20))
                 exact = 4 / mp.pi * mp.quad(along, pieces)
-            found = transfer(np.array([nu]), ONE_LIGHT, f_number, w20)[0, 0]
+            found = otf(np.array([nu]), ONE_LIGHT, f_number, w20)[0, 0]
             results.append((abs(float(found - exact)), (8 * float(k) + 40) * EPS))
     return worst(results)
 
@@ -214,7 +198,7 @@ def disc_scene(across_px: float, **target: object) -> dict[str, object]:
 
 def response_of(scenario: dict[str, object], cfa: str = "RGGB") -> np.ndarray:
     qe = random_qe(21, len(Mosaic.from_name(cfa).channels))
-    view = made(qe, lights_of(PAIR, lines(YELLOW, RED)), scenario, cfa=cfa, blur="skip")
+    view = made(qe, lights_of(PAIR, lines(YELLOW, RED)), scenario, cfa=cfa, left_out=SHARP)
     return smooth_response(view, plain(view))[0, 0]
 
 
@@ -285,14 +269,12 @@ def blurred_pixels() -> Result:
     results = []
     for f_number in (2.0, 1000.0):
         radius = 6.2
-        profile = blur.Profile(radius, 14.0, ONE_LIGHT, f_number, 0.0)
+        profile = DiscProfile(radius, 14.0, ONE_LIGHT, f_number, 0.0)
         seen = sampling.window(Mosaic.from_name("RGGB"), np.array([[0.0, 0.0]]), 1.0)
         wanted = np.hypot(seen.dx, seen.dy) < 0.1
-        light = sampling.light_on_pixels(seen, wanted, 0.05, radius / WIDTH_UM, profile, WIDTH_UM).by_pixel()[wanted][
-            0, 0
-        ]
+        light = light_on_pixels(seen, wanted, 0.05, radius / WIDTH_UM, profile, WIDTH_UM).by_pixel()[wanted][0, 0]
         exact = float(encircled(radius, 0.55, f_number))
         bend = (2 * math.pi / (0.55 * f_number)) ** 2 / 4 * (0.05 * WIDTH_UM) ** 2 * 2 / 3 / 2
         allowed = kink_bound(radius, 14.0, 0.55, 0.55, f_number) + ROUNDINGS + bend * min(1.0, exact)
         results.append((abs(float(light - exact)), allowed))
-    return worst([*results, (relative(float(transfer(np.zeros(1), ONE_LIGHT, 2.0, 0.0)[0, 0]), mp.mpf(1)), EPS)])
+    return worst([*results, (relative(float(otf(np.zeros(1), ONE_LIGHT, 2.0, 0.0)[0, 0]), mp.mpf(1)), EPS)])

@@ -1,4 +1,4 @@
-"""A random generator of scenes: any mixture of effects, with boxes of designs, and all columns that a plan promises."""
+"""A random generator of scenes: any mixture of effects, with boxes of designs, and all their CSDs."""
 
 from __future__ import annotations
 
@@ -7,12 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from sweep.camera.effects.image_height import all_heights_count
-from sweep.camera.methods import Methods
-from sweep.camera.plan.bounds import Box
-from sweep.camera.plan.work import DesignCount
 
-from sweep.camera.angular import moves
+from sweep.camera.accuracy import Accuracy
+from sweep.camera.effects import Box
 from sweep.camera.forward import ForwardModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
@@ -28,7 +25,7 @@ from sweep.metrics.evaluate import evaluate
 from sweep.metrics.quantity import WORST
 from sweep.metrics.separation import csd_name
 
-from .scenes import FAMILY, GRID, SENSOR, TILES, lights, moving, promised_names, target
+from .scenes import FAMILY, GRID, SENSOR, TILES, csd_columns, lights, moving, target
 
 _DUAL = Dual(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["C"])
 _TWO_BANDS = MultiStopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"], 2)
@@ -63,18 +60,17 @@ class RandomScene:
     @property
     def moves(self) -> bool:
         """Whether any filter moves with the angle of the light."""
-        return moves(self.view)
+        return bool(self.view.moving)
 
     @property
     def everywhere(self) -> bool:
         """Whether all places of the sensor count."""
-        return all_heights_count(self.view)
+        return self.view.all_heights
 
     @property
     def anywhere(self) -> bool:
         """Whether any place of the light is asked for."""
-        target = self.view.scenario.target
-        return target is not None and target.phase_px == "any"
+        return self.view.all_phases
 
 
 def random_scene(seed: int, *, moved: bool = False) -> RandomScene:
@@ -109,7 +105,7 @@ def random_scene(seed: int, *, moved: bool = False) -> RandomScene:
         curves, lower, upper = _designs(rng, len(modified))
         low[list(modified)], high[list(modified)] = lower, upper
     tolerance = float(10 ** rng.uniform(-2, 2.5))
-    return RandomScene(f"random {seed}", view, curves, Box(view, low, high, DesignCount(1000)), tolerance)
+    return RandomScene(f"random {seed}", view, curves, Box(view, low, high), tolerance)
 
 
 def _technologies(seed: int, mosaic: Mosaic, *, moved: bool) -> tuple[Technology, ...]:
@@ -119,12 +115,11 @@ def _technologies(seed: int, mosaic: Mosaic, *, moved: bool) -> tuple[Technology
     return moving(mosaic, float(np.random.default_rng([seed, 20]).uniform(1.4, 2.2)))
 
 
-def columns(made: RandomScene, methods: Methods) -> dict[str, np.ndarray]:
-    """Every promised column of all designs of a scene, ndarray[n_designs], as a run has them."""
-    imager = ForwardModel(replace(made.view, methods=methods))
-    cases = [evaluate(imager, curves) for curves in made.curves]
-    promised = promised_names(made.view, any_place=made.anywhere)
-    found = {name: cases[0][name] for name in promised}
+def columns(made: RandomScene, left_out: frozenset[str], accuracy: Accuracy) -> dict[str, np.ndarray]:
+    """Every CSD of all designs of a scene, ndarray[n_designs], as a run has them."""
+    model = ForwardModel(replace(made.view, left_out=left_out, accuracy=accuracy))
+    cases = [evaluate(model, curves) for curves in made.curves]
+    found = {name: cases[0][name] for name in csd_columns(made.view)}
     if len(cases) > 1:
         distances = [csd_name(pair) for pair in class_pairs(made.view.lights.classes)]
         found |= {WORST + name: np.min([case[name] for case in cases], axis=0) for name in distances}

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from sweep.camera.accuracy import REFERENCE, Accuracy
 from sweep.camera.effects import Box
 from sweep.camera.forward import ForwardModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
-from sweep.camera.scene import Scene as CameraScene
+from sweep.camera.scene import Scene
 from sweep.camera.sensor import BUILT_IN_SENSORS
 from sweep.camera.view import View
 from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
@@ -57,7 +58,7 @@ def moving(mosaic: Mosaic, index: float) -> tuple[Technology, ...]:
 
 
 @dataclass(frozen=True)
-class Scene:
+class DesignScene:
     """A scene with one design, and the box of designs that the plan is for."""
 
     name: str
@@ -75,7 +76,7 @@ def scene(
     seed: int = 1,
     grid: WavelengthGrid = GRID,
     index: float | None = None,
-) -> Scene:
+) -> DesignScene:
     """`wide`: plan for a box of filters; else for the one design. `index`: N moves with the angle of the light."""
     mosaic = TILES[cfa]
     sensor = SENSOR if grid is GRID else BUILT_IN_SENSORS["ar0820"](grid)
@@ -89,7 +90,7 @@ def scene(
         sensor.qe["C"],
         lights(grid),
         Pixel(**(pixel or {})),
-        CameraScene.model_validate(scenario),
+        Scene.model_validate(scenario),
         technologies=() if index is None else moving(mosaic, index),
     )
     x = LOW + (HIGH - LOW) * np.random.default_rng(seed).uniform(size=5)
@@ -98,7 +99,7 @@ def scene(
     if modified:
         hull = family.hull(LOW, HIGH) if wide else (curves[0], curves[0])
         low[list(modified)], high[list(modified)] = hull
-    return Scene(name, view, curves, Box(view, low, high))
+    return DesignScene(name, view, curves, Box(view, low, high))
 
 
 def target(distance_m: float, fov_deg: float, **more: Any) -> dict[str, Any]:
@@ -111,7 +112,7 @@ F2, F4 = {"f_number": 2.0}, {"f_number": 4.0}
 FIXED = {"kind": "fixed", "exposure_s": 2e-3}
 DARK = {"read_noise_e": 2.0, "offset_dn": 64.0}
 
-HARD: tuple[Scene, ...] = (
+HARD: tuple[DesignScene, ...] = (
     scene("paper", "RYNCy", {}),
     scene("paper, box", "RYNCy", {}, wide=True),
     scene("near", "RYNCy", {"target": NEAR, "optics": F4}),
@@ -211,19 +212,13 @@ HARD: tuple[Scene, ...] = (
 )
 
 
-def columns(made: Scene, left_out: frozenset[str] = frozenset()) -> np.ndarray:
-    """Every promised column of the scene's design; of the best place only where any is asked for."""
-    anywhere = asks_for_any_place(made)
-    found = evaluate(ForwardModel(replace(made.view, left_out=left_out)), made.curves)
-    return np.array([found[name][0] for name in promised_names(made.view, any_place=anywhere)])
+def columns(made: DesignScene, left_out: frozenset[str] = frozenset(), accuracy: Accuracy = REFERENCE) -> np.ndarray:
+    """Every CSD of the scene's design; of the best phase only where any is asked for."""
+    found = evaluate(ForwardModel(replace(made.view, left_out=left_out, accuracy=accuracy)), made.curves)
+    return np.array([found[name][0] for name in csd_columns(made.view)])
 
 
-def promised_names(view: View, *, any_place: bool) -> list[str]:
-    """Columns that a plan's promise holds for."""
-    asked = Asked(view.lights.classes, any_place=any_place)
+def csd_columns(view: View) -> list[str]:
+    """Columns of CSDs, of which a plan and an accuracy bound the error."""
+    asked = Asked(view.lights.classes, any_place=view.all_phases)
     return [name for name, quantity in quantities_of(asked).items() if quantity.promised]
-
-
-def asks_for_any_place(made: Scene) -> bool:
-    target = made.view.scenario.target
-    return target is not None and target.phase_px == "any"

@@ -1,13 +1,13 @@
-"""Scenes that show what a single method changes with everything else on: under noise the reference is smooth."""
+"""Scenes that show what a single effect changes with all others computed: under noise the reference is smooth."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from .scenes import DARK, F2, F4, FAR, FINE, FIXED, GRID, MIDDLE, TINY, Scene, scene
+from .scenes import DARK, F2, F4, FAR, FINE, FIXED, GRID, MIDDLE, TINY, DesignScene, scene
 
 
-def noisy(name: str, cfa: str, given: dict[str, Any], pixel: dict[str, Any] = DARK, **more: Any) -> Scene:
+def noisy(name: str, cfa: str, given: dict[str, Any], pixel: dict[str, Any] = DARK, **more: Any) -> DesignScene:
     return scene(f"noise, {name}", cfa, {"noise": True} | given, pixel, **more)
 
 
@@ -28,7 +28,7 @@ def hazy(visibility_m: float, off_axis_deg: float) -> dict[str, Any]:
     return {"visibility_m": visibility_m, "off_axis_deg": off_axis_deg}
 
 
-ALONE: tuple[Scene, ...] = (
+ALONE: tuple[DesignScene, ...] = (
     noisy("dark", "RYNCy", {"photon_radiance": 3e15, "exposure": FIXED}, {"read_noise_e": 6.0, "offset_dn": 1.5}),
     noisy("a fraction of a pedestal", "RGGB", {}, {"read_noise_e": 0.5, "offset_dn": 168.5}),
     noisy(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from sweep.camera.methods import REFERENCE
 
 from sweep.camera.forward import ForwardModel
 from sweep.camera.pixel import Pixel
@@ -27,10 +26,10 @@ def test_what_it_does_not_see_d_prime_does() -> None:
     problem = study.problem(study.search)
     scenario = Scene.model_validate({"noise": True})
     pixel = Pixel(read_noise_e=10, prnu=0.01, offset_dn=168)
-    imager = ForwardModel(replace(problem.view, scenario=scenario, pixel=pixel, methods=REFERENCE))
+    model = ForwardModel(replace(problem.view, scenario=scenario, pixel=pixel))
     curves = problem.family.curves(TWO)
-    assert "cdp_yellow_red" not in evaluate(imager, curves, ("yellow", "red"))
-    found = evaluate(imager, curves, ("yellow", "red"), probabilities=True)
+    assert "cdp_yellow_red" not in evaluate(model, curves, ("yellow", "red"))
+    found = evaluate(model, curves, ("yellow", "red"), probabilities=True)
     good, poor = found["dprime_yellow_red"]
     assert good > 1.8 * poor
     assert (found["cdp_yellow_red"] > 0.995).all()

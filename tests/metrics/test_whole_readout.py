@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from sweep.base.own_code import OwnCode
+from sweep.camera.accuracy import Accuracy
 from sweep.camera.forward import ForwardModel
 from sweep.designs.block import CurveBlock, EdgeBlock, edges_of
 from sweep.metrics import evaluate as route
@@ -22,7 +23,7 @@ from sweep.metrics.whole_readout import Spent, whole_readout_metrics
 from ..blocks import SPACE, VIEWS
 
 VIEW = VIEWS["any place"]
-SCENES = VIEWS | {"anywhere": replace(VIEW, methods=replace(VIEW.methods, phase="within 10 DN"))}
+SCENES = VIEWS | {"refined": replace(VIEW, accuracy=Accuracy(phases_per_px=1, finest_phase_px=1 / 4))}
 CODE = """\
 import numpy as np
 
@@ -91,7 +92,7 @@ def test_csds_are_those_without_other_metrics_and_these_are_of_the_whole_readout
     name: str, at_once: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(whole_readout, "_READ_AT_ONCE", at_once)
-    block, spent = edges_of(SPACE, 3, 9 if name == "anywhere" else 69), Spent()
+    block, spent = edges_of(SPACE, 3, 9 if name == "refined" else 69), Spent()
     assert block is not None
     columns = evaluate(ForwardModel(SCENES[name]), block, own=[BRIGHTEST], spent=spent)
     monkeypatch.setattr(whole_readout, "OTHERS", [])
@@ -106,7 +107,7 @@ def test_csds_are_those_without_other_metrics_and_these_are_of_the_whole_readout
 
 @pytest.mark.usefixtures("darkest")
 @pytest.mark.parametrize(
-    ("name", "way", "n"), [("rounded", "separations_by_edges", SPACE.size), ("anywhere", "_by_search", 3)]
+    ("name", "way", "n"), [("rounded", "separations_by_edges", SPACE.size), ("refined", "_refine_phases", 3)]
 )
 def test_other_metrics_switch_no_fast_route_off(name: str, way: str, n: int, monkeypatch: pytest.MonkeyPatch) -> None:
     fast, slow = counted(monkeypatch, way), counted(monkeypatch, "_read")

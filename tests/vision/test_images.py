@@ -10,14 +10,13 @@ from typing import get_args
 import numpy as np
 import pytest
 from scipy.spatial.distance import cdist
-from sweep.camera.effects.demosaic import center_weights
-from sweep.camera.effects.sampling import Window
-from sweep.camera.methods import Methods
 
 from sweep.camera.forward import ForwardModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.noise import table
 from sweep.camera.readout import draws_dn
+from sweep.camera.sampling import Window, center_weights
+from sweep.camera.view import READOUT
 from sweep.curves.builtin.spectra import shipped_groups
 from sweep.curves.color import luminance_per_photon_radiance
 from sweep.curves.spectrum import WavelengthGrid
@@ -34,7 +33,6 @@ from ..cases import thinned
 from .heads import NO_FILTERS, head_view, vision
 
 FOUR = ["red", "orange", "yellow", "green"]
-EXACT = Methods(saturation="skip", quantization="skip", noise="skip", pedestal="skip")
 
 
 @pytest.mark.parametrize(("cfa", "place"), thinned([("RGGB", 7), ("RCCB", 12)]))
@@ -48,7 +46,10 @@ def test_a_lamp_is_what_the_product_reads(cfa: str, place: int) -> None:
     assert there.scenario.target is not None
     target = there.scenario.target.model_copy(update={"phase_px": (float(center[0]), float(center[1]))})
     scenario = there.scenario.model_copy(update={"target": target, "intensity_cd": candelas})
-    wanted = ForwardModel(replace(there, methods=EXACT, scenario=scenario)).read(NO_FILTERS[None])[0][0, 0]
+    wanted = (
+        ForwardModel(replace(there, left_out=READOUT, scenario=scenario)).read(NO_FILTERS[None])[0][0, 0]
+        - view.pixel.offset_dn
+    )
     heads = camera.electrons(0, 0)
     lamps = heads.lamps[place, 1] * heads.time_s * candelas * view.pixel.dn_per_e
     across = np.arange(asked.crop_px)
@@ -201,7 +202,7 @@ def test_demosaicking_is_the_product_s_own(tile: list[list[str]]) -> None:
         seen = Window(
             channel, np.broadcast_to(at - column, (1, 18, 18)), np.broadcast_to((at - row)[:, None], (1, 18, 18))
         )
-        weights = center_weights(seen, np.zeros((1, 2)), "tent", mosaic)[0]
+        weights = center_weights(seen, np.zeros((1, 2)), mosaic)[0]
         for number in range(len(mosaic.channels)):
             wanted = (images * weights * (channel == number)).sum(axis=(1, 2))
             np.testing.assert_allclose(found[:, row, column, number], wanted, rtol=1e-12)

@@ -1,0 +1,170 @@
+"""Any sampling phase: lattice and refinement against all phases of a fine lattice; phases that see the same."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import cycle, product
+
+import numpy as np
+import pytest
+
+from sweep.camera.accuracy import STANDARD
+from sweep.camera.forward import AllPhases, ForwardModel
+from sweep.camera.phases import Phases, different_phases, lattice_px, read_at, refined_minima, scene_phases
+from sweep.camera.view import READOUT, View
+from sweep.metrics.evaluate import evaluate
+from sweep.metrics.quantity import BEST_PLACE
+from sweep.metrics.separation import csd_name, separations
+
+from ..cases import thinned
+from ..hard.scenes import DARK, F2, FAR, HARD, DesignScene, scene, target
+from ..hard.scenes_alone import ALONE
+
+STEPS_PER_PX = 32
+READOUTS = ("linear", "quantized", "saturated", "noisy")
+_SIZES_PX = (0.7, 1.0, 1.5, 2.2, 3.0, 4.0)
+_F_NUMBERS = (1.4, 2.0, 4.0)
+_MOST_PX = 7.0
+"""Larger lights of the hard scenes take too long at every phase."""
+
+
+def any_phase(name: str, cfa: str, how: str, readout: str, across_px: float, f_number: float) -> DesignScene:
+    """A small light anywhere; the linear readout without any effect of the readout, the noisy one with all."""
+    light = target(0.2 / 2 / math.tan(math.radians(across_px * 30 / 3840) / 2), 30, phase_px="any", readout=readout)
+    given: dict[str, object] = {"target": light, "optics": {"f_number": f_number}, "noise": how == "noisy"}
+    if how == "saturated":
+        given |= {"intensity_cd": 200, "exposure": {"kind": "fixed", "exposure_s": 2e-2 * (f_number / 2) ** 2}}
+    return scene(name, cfa, given, DARK | {"crosstalk": 0.02} if how == "noisy" else None)
+
+
+def _scenes() -> list[tuple[DesignScene, str]]:
+    """34 scenes, each with its readout."""
+    found = []
+    for made in HARD + ALONE:
+        light = made.view.scenario.target
+        if made.view.all_phases and light is not None and light.object_resolution_px < _MOST_PX:
+            found.append((made, "quantized" if made.view.scenario.noise is None else "noisy"))
+    sizes, numbers = cycle(_SIZES_PX), cycle(_F_NUMBERS)
+    every = product(READOUTS, ("RGGB", "RCCC", "RYNCy", "3x3", "1x3"), ("mean", "center"))
+    for at, (how, cfa, readout) in enumerate(every):
+        size, f_number = next(sizes), next(numbers)
+        if at % 8 not in (3, 6, 7) and len(found) < 34:
+            found.append((any_phase(f"{cfa}, {readout}, {how}, {size} px", cfa, how, readout, size, f_number), how))
+    return found
+
+
+SCENES = _scenes()
+
+
+def view_of(made: DesignScene, how: str) -> View:
+    left_out = READOUT if how == "linear" else frozenset()
+    return replace(made.view, left_out=left_out, accuracy=STANDARD)
+
+
+def brute_force(made: DesignScene, how: str) -> dict[str, tuple[float, float]]:
+    """Smallest and largest over a fine lattice of the smallest CSD over the moments."""
+    view = view_of(made, how)
+    light = view.scenario.target
+    assert light is not None
+    phases = read_at(light, lattice_px(view.mosaic, STEPS_PER_PX))
+    if light.readout == "mean":
+        phases = different_phases(view, phases)[0]
+    response = ForwardModel(view, phases, once=True).read(made.curves)[0][0]
+    ends = {}
+    for pair, distances in separations(response, view.members).items():
+        each = distances.reshape(len(phases), -1).min(axis=1)
+        ends[csd_name(pair)] = (float(each.min()), float(each.max()))
+    return ends
+
+
+def allowed_dn(made: DesignScene, how: str) -> float:
+    """Whole numbers without noise step between phases."""
+    return 0.05 if how in ("linear", "noisy") else math.sqrt(len(made.view.mosaic.channels))
+
+
+def missed_dn(made: DesignScene, how: str) -> tuple[float, float]:
+    """By how much the smallest CSDs are above, and the largest ones below, those of all phases, at most."""
+    columns = evaluate(ForwardModel(view_of(made, how)), made.curves)
+    above = below = -math.inf
+    for name, (smallest, largest) in brute_force(made, how).items():
+        above = max(above, float(columns[name][0]) - smallest)
+        below = max(below, largest - float(columns[BEST_PLACE + name][0]))
+    return above, below
+
+
+def test_scenes_are_of_each_tile_readout_and_kind() -> None:
+    assert len(SCENES) == 34
+    assert {how for _, how in SCENES} == {*READOUTS}
+    assert {made.view.mosaic.name for made, _ in SCENES} >= {"RGGB", "RCCC", "RYNCy", "3x3", "1x3"}
+    saturated = [made for made, how in SCENES if how == "saturated"]
+    assert all(
+        made.box.brightest_pixel_dn / made.view.pixel.dn_per_e > made.view.pixel.saturation_e for made in saturated
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("made", "how"), SCENES, ids=[made.name for made, _ in SCENES])
+def test_no_phase_of_a_fine_lattice_is_worse_or_better_than_the_refined_ones(made: DesignScene, how: str) -> None:
+    above, below = missed_dn(made, how)
+    assert above <= allowed_dn(made, how)
+    assert below <= allowed_dn(made, how)
+
+
+MIRRORED = {"RGGB": 15, "RYNCy": 25, "1x3": 36, "3x3": 78}
+"""Lattice phases that see different things when each channel's mean is read."""
+
+
+@pytest.mark.parametrize("readout", ["mean", "center"])
+@pytest.mark.parametrize("name", list(MIRRORED))
+def test_a_phase_reads_what_its_mirror_images_read(name: str, readout: str) -> None:
+    given = {"target": FAR | {"phase_px": "any", "readout": readout}, "optics": F2, "noise": True}
+    made = scene("mirrored", name, given, DARK | {"crosstalk": 0.05})
+    every = scene_phases(made.view)
+    few, which = different_phases(made.view, every)
+    assert len(few) == (MIRRORED[name] if readout == "mean" else len(every))
+    model = ForwardModel(made.view)
+    assert model.n_cases == len(few)
+    own, whole = (each.read_with_noise(made.curves) for each in (model, AllPhases(made.view)))
+    np.testing.assert_allclose(own.mean[:, which], whole.mean, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(own.variance[:, which], whole.variance, rtol=1e-9)
+
+
+@pytest.mark.parametrize("readout", ["mean", "center"])
+def test_halfway_between_pixels_a_center_is_read_at_each_of_them(readout: str) -> None:
+    light = scene("light", "RGGB", {"target": FAR | {"phase_px": "any", "readout": readout}}).view.scenario.target
+    assert light is not None
+    read = read_at(light, np.array([[0.25, 0.75], [0.5, 1.0], [1.5, 0.5]]))
+    nearest = {tuple(center): set() for center in read.center_px.tolist()}
+    for center, pixel in zip(read.center_px.tolist(), read.nearest_px.tolist(), strict=True):
+        nearest[tuple(center)].add(tuple(pixel))
+    every = {(0.25, 0.75): {(0, 1)}, (0.5, 1.0): {(0, 1), (1, 1)}, (1.5, 0.5): {(1, 0), (2, 0), (1, 1), (2, 1)}}
+    if readout == "center":
+        assert nearest == every
+    else:
+        assert len(read) == len(every)
+
+
+def test_named_and_missing_lights_have_one_phase() -> None:
+    named = scene("named", "RGGB", {"target": FAR | {"phase_px": [0.5, 2.25]}}).view
+    np.testing.assert_array_equal(scene_phases(named).center_px, [[0.5, 0.25]])
+    np.testing.assert_array_equal(scene_phases(named).nearest_px, [[0, 0]])
+    assert len(scene_phases(scene("patch", "RGGB", {}).view)) == 1
+
+
+@pytest.mark.parametrize("finest_phase_px", thinned([1 / 8, 1 / 16, 1 / 64], 2))
+def test_finer_steps_find_no_worse_an_extreme_of_a_smooth_function(finest_phase_px: float) -> None:
+    """A function with one minimum over the tile: within the curvature times the square of a step."""
+    made = scene("any", "RGGB", {"target": FAR | {"phase_px": "any", "readout": "center"}})
+    view = replace(made.view, accuracy=STANDARD.model_copy(update={"finest_phase_px": finest_phase_px}))
+    lowest = np.array([0.83, 1.37])
+
+    def value(phases: Phases) -> np.ndarray:
+        off = np.mod(phases.center_px - lowest + 1, 2) - 1
+        return (off**2).sum(axis=1)[None]
+
+    lattice = scene_phases(view)
+    found = refined_minima(view, lattice, value(lattice), value)
+    assert 0 <= found[0] <= finest_phase_px**2 / 2 * (1 + 1e-9)
+    unrefined = replace(view, accuracy=STANDARD.model_copy(update={"finest_phase_px": 0.0}))
+    assert refined_minima(unrefined, lattice, value(lattice), value)[0] == value(lattice).min() > found[0]
