@@ -20,7 +20,7 @@ from .view import View
 MOST_PHASES = 1024
 """Phases of a lattice on a tile, at most."""
 _STARTS = 6
-"""Phases from which each extreme is refined."""
+"""Phases from which each extreme is refined at the first step; half as many at each finer one."""
 _NEIGHBORS = np.array([[x, y] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)])
 
 
@@ -147,9 +147,10 @@ def refined_minima(
     first = np.unique(different_phases(view, lattice)[1], return_index=True)[1]  # mirrored phases are no other starts
     known = dict(zip(lattice.subset(first).keys, values[:, first].T, strict=True))
     period = np.array(view.mosaic.indices.shape[::-1])
+    n_starts = _STARTS
     while step >= finest:
         places, so_far = np.array(list(known))[:, :2], np.stack(list(known.values()), axis=1)
-        starts = np.stack([_apart(places, own, 2 * step, period) for own in so_far])
+        starts = np.stack([_apart(places, own, n_starts, 2 * step, period) for own in so_far])
         centers, at_start = places[starts], np.take_along_axis(so_far, starts, axis=1)  # [n_values, n_starts, ...]
         moving = np.ones(at_start.shape, dtype=bool)
         while moving.any():
@@ -164,19 +165,21 @@ def refined_minima(
                 moving[value, start] = at_phases[value, lowest] < at_start[value, start]
                 if moving[value, start]:
                     at_start[value, start], centers[value, start] = at_phases[value, lowest], read.center_px[lowest]
-        step /= 2
+        step, n_starts = step / 2, max(1, n_starts // 2)
     return np.asarray(np.minimum(values, np.stack(list(known.values()), axis=1).min(axis=1)[:, None]).min(axis=1))
 
 
-def _apart(centers_px: FloatArray, values: FloatArray, step_px: float, period_px: IndexArray) -> IndexArray:
+def _apart(
+    centers_px: FloatArray, values: FloatArray, n_starts: int, step_px: float, period_px: IndexArray
+) -> IndexArray:
     """Indices of the smallest values, of which none lies within a step of one that is smaller, ndarray[n_starts]."""
     found: list[int] = []
     order = np.argsort(values, kind="stable")
-    while len(found) < _STARTS and order.size:
+    while len(found) < n_starts and order.size:
         found.append(int(order[0]))
         off = np.mod(centers_px[order] - centers_px[order[0]], period_px)
         order = order[np.minimum(off, period_px - off).max(axis=1) > step_px * (1 + 1e-9)]
-    return np.array((found * _STARTS)[:_STARTS])
+    return np.array((found * n_starts)[:n_starts])
 
 
 def _known_or_evaluated(
