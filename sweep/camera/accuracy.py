@@ -29,7 +29,7 @@ class Accuracy(Section):
     field_positions: int = Field(default=33, ge=2, le=257)
     rays: Annotated[int, Field(ge=1, le=64)] | None = None
     psf_step_nm: float = Field(default=10.0, gt=0, le=100)
-    pwm_moments: int = Field(default=17, ge=2, le=1000)
+    pwm_moments: int = Field(default=9, ge=2, le=1000)
     single_precision: bool = False
 
     @property

@@ -84,11 +84,12 @@ class SceneLight:
 
     `signals`, `white`: electrons/s for each QE of light and the white patch at every wavelength, ndarray[n_signals,
     n_wavelengths] and ndarray[n_wavelengths]; `fixed_white`: of the brightest channel that no design modifies.
-    `positions`: a view of each field position; `angular`: the filters as the rays see them there.
+    `moments`: of a pulse, instead of those of the accuracy (see `pwm.scales`). `positions`: a view of each field position; `angular`: the filters as the rays see them there.
     """
 
     def __init__(self, view: View) -> None:
         self.view = view
+        self.moments: FloatArray | None = None
         self.signals = signal_irradiance(view) * per_photon(view)
         self.white = white_irradiance(view) * per_photon(view)
         self.fixed_white = fixed_white(view)
@@ -101,4 +102,4 @@ class SceneLight:
 
     def scales(self, exposure_s: FloatArray) -> FloatArray:
         """Light relative to its mean at the moments of a pulsed light, ndarray[n_designs, n_moments]."""
-        return pwm.scales(self.view, exposure_s)
+        return pwm.scales(self.view, exposure_s, self.moments)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import pickle
 from collections.abc import Callable, Iterator
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, TypeVar
@@ -74,10 +75,11 @@ class ForwardModel:
     def _in_parts(self) -> bool:
         return bool(self._positions or self._phase_blocks)
 
-    def at(self, phases: Phases) -> ForwardModel:
-        """The same scene at other phases, for a single use."""
-        model = ForwardModel(self.view, phases, once=True)
-        model.__dict__["light"] = self.light
+    def at(self, phases: Phases | None, moments: FloatArray | None = None) -> ForwardModel:
+        """The same scene at other phases, and other moments of a pulse (see `pwm.scales`), for a single use."""
+        model, light = ForwardModel(self.view, phases, once=True), copy(self.light)
+        light.moments = moments
+        model.__dict__["light"] = light
         if self._of_channels:
             model.__dict__["_channels"] = self._channels
         return model

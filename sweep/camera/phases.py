@@ -121,8 +121,8 @@ def read_at(target: Target, centers_px: FloatArray) -> Phases:
 
 def refined_minima(
     view: View, lattice: Phases, values: FloatArray, evaluate: Callable[[Phases], FloatArray]
-) -> FloatArray:
-    """Smallest values over all phases, ndarray[n_values], by refinement of the smallest ones of a lattice.
+) -> tuple[FloatArray, Phases]:
+    """Smallest values over all phases, ndarray[n_values], and where, by refinement of the smallest ones of a lattice.
 
     A pattern search: from each of the best known phases, none within a step of a better one, to the best of those
     around it at half the lattice's step, as long as it is better; then again, from the best of all that is known by
@@ -143,7 +143,7 @@ def refined_minima(
     target, finest = view.scenario.target, view.accuracy.finest_phase_px
     step = 0.5 / view.accuracy.phase_steps_per_px
     if target is None or not finest or step < finest:
-        return np.asarray(values.min(axis=1))
+        return values.min(axis=1), lattice.subset(values.argmin(axis=1))
     first = np.unique(different_phases(view, lattice)[1], return_index=True)[1]  # mirrored phases are no other starts
     known = dict(zip(lattice.subset(first).keys, values[:, first].T, strict=True))
     period = np.array(view.mosaic.indices.shape[::-1])
@@ -166,7 +166,8 @@ def refined_minima(
                 if moving[value, start]:
                     at_start[value, start], centers[value, start] = at_phases[value, lowest], read.center_px[lowest]
         step, n_starts = step / 2, max(1, n_starts // 2)
-    return np.asarray(np.minimum(values, np.stack(list(known.values()), axis=1).min(axis=1)[:, None]).min(axis=1))
+    every, so_far = np.array(list(known)), np.stack(list(known.values()), axis=1)
+    return so_far.min(axis=1), Phases(*np.split(every[so_far.argmin(axis=1)], 2, axis=1))
 
 
 def _apart(

@@ -31,6 +31,8 @@ from .registry import METRICS
 from .separation import csd_name, separations, separations_along, separations_by_edges
 from .whole_readout import Spent, WholeReadout, by_case, over_cases
 
+_PULSE_ROUNDS, _PULSE_STEPS = 3, 9
+"""Rounds in which the worst moment of a pulse is refined, and moments of each."""
 _CSD = [metric for metric in METRICS if isinstance(metric, ColorSeparation)]
 
 
@@ -79,8 +81,49 @@ def _by_phase(model: ForwardModel, cases: Columns, n_places: int) -> FloatArray:
 
 def _csds(model: ForwardModel, curves: FloatArray) -> FloatArray:
     """CSDs of one design at each phase, the smallest over the moments, ndarray[n_pairs, n_phases]."""
-    distances = separations(model.read(curves)[0][0], model.view.members)
-    return np.stack([each.reshape(model.n_cases, -1).min(axis=1) for each in distances.values()])
+    response = model.read(curves)[0]
+    cases = {csd_name(pair): each[:, None] for pair, each in separations(response[0], model.view.members).items()}
+    return np.asarray(_by_phase(model, cases, model.n_cases)[0])
+
+
+def _bends_over_pulse(view: View) -> bool:
+    """Whether CSDs may be smallest at any moment of a pulse: behind a readout that clips, and has no steps."""
+    drive, steps = view.scenario.drive, view.scenario.noise is None and view.computes("quantization")
+    return drive is not None and view.computes("flicker") and not view.linear and not steps
+
+
+def _over_pulse(model: ForwardModel, curves: FloatArray, pairs: Sequence[int], phases: Phases | None) -> FloatArray:
+    """Smallest CSDs of some pairs of one design at one phase over the moments of a pulse, ndarray[n_pairs].
+
+    Moments around the worst one are read until they lie close together.
+    """
+
+    def distances(moments: FloatArray) -> list[FloatArray]:
+        response = model.at(phases, moments).read(curves)[0][0]
+        return list(separations(response, model.view.members).values())
+
+    first = np.linspace(0.0, 1.0, model.view.accuracy.pwm_moments)
+    at_first = distances(first)
+    smallest = np.array([at_first[pair].min() for pair in pairs])
+    for number, pair in enumerate(pairs):
+        moments, worst = first, int(at_first[pair].argmin())
+        for _ in range(_PULSE_ROUNDS):
+            if not 0 < worst < len(moments) - 1:
+                break
+            moments = np.linspace(moments[worst - 1], moments[worst + 1], _PULSE_STEPS)
+            values = distances(moments)[pair]
+            worst = int(values.argmin())
+            smallest[number] = min(smallest[number], values[worst])
+    return smallest
+
+
+def _refine_moments(model: ForwardModel, block: Block, columns: Columns) -> None:
+    """Put the smallest distances over all moments of a pulse into the columns; of a light at one phase."""
+    names = [csd_name(pair) for pair in class_pairs(model.view.lights.classes)]
+    for design in np.flatnonzero(np.isfinite(columns[names[0]])):
+        curves = block.some(slice(design, design + 1)).curves()
+        for name, least in zip(names, _over_pulse(model, curves, range(len(names)), model.phases), strict=True):
+            columns[name][design] = min(columns[name][design], least)
 
 
 def _refine_phases(model: ForwardModel, block: Block, cases: Columns, columns: Columns) -> None:
@@ -97,10 +140,14 @@ def _refine_phases(model: ForwardModel, block: Block, cases: Columns, columns: C
             return np.concatenate([apart, -apart])
 
         known = np.concatenate([on_lattice[design], -on_lattice[design]])
-        smallest, largest = np.split(refined_minima(view, phases, known, both_ends), 2)
-        for name, least, most in zip(names, smallest, -largest, strict=True):
-            columns[name][design] = least
-            columns[BEST_PLACE + name][design] = most
+        extremes, at = refined_minima(view, phases, known, both_ends)
+        smallest, largest = np.split(extremes, 2)
+        for number, name in enumerate(names):
+            columns[name][design] = smallest[number]
+            columns[BEST_PLACE + name][design] = -largest[number]
+            if _bends_over_pulse(view):
+                worst = at.subset(np.array([number]))
+                columns[name][design] = min(smallest[number], _over_pulse(model, curves, [number], worst)[0])
 
 
 def _refine_heights(model: ForwardModel, block: Block, cases: Columns, columns: Columns) -> None:
@@ -156,6 +203,8 @@ def evaluate(
         )
     if view.all_phases:
         _refine_phases(model, block, cases, columns)
+    elif _bends_over_pulse(view) and view.scenario.field is None:
+        _refine_moments(model, block, columns)
     if view.all_heights:
         _refine_heights(model, block, cases, columns)
     return columns | designed_quantities(view, block)
