@@ -30,10 +30,11 @@ def test_a_notebook_runs(
     assert len(re.findall(r"^# %%$", text, re.MULTILINE)) >= 3
     assert len(re.findall(r"^# %% \[markdown\]$", text, re.MULTILINE)) >= 3
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", [str(notebook)])
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     runpy.run_path(str(notebook), run_name="__main__")
     assert "csd_yellow_red" in capsys.readouterr().out
 
 
 def test_there_is_a_notebook_for_each_way_in() -> None:
-    assert {path.stem for path in NOTEBOOKS} >= {"first_filter", "own_sensor_and_lights", "own_family"}
+    assert {path.stem for path in NOTEBOOKS} >= {"first_filter", "own_sensor_and_lights", "own_family", "calibrate"}

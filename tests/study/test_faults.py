@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 
 from sweep.base.errors import StudyError
-from sweep.study import load_study
+from sweep.study import Study, load_study
 
 from ..build import BASE, faults, one_line
 from ..commanded import commanded
+from ..conftest import STUDIES
 
 MEANING = BASE.replace("    cfa: RYNCy", "    cfa: RYNX").replace("sensitivity:", "sensitivty:")
 NOISY = "recognition: {}\nscenarios: {chart: {noise: true}}\n"
@@ -141,3 +142,21 @@ def test_faults_of_the_file_beside_those_of_an_option_have_their_lines(tmp_path:
     code, _, err = commanded("check", path, "--set", "scenarios.chart.noise=yes")
     assert code == 2
     assert "--set scenarios.chart.noise=yes: scenarios.chart.noise: true or false expected: write true" in err
+
+
+def test_published_names_are_checked(tmp_path: Path) -> None:
+    def loaded(old: str, new: str) -> Study:
+        path = tmp_path / "paper.yaml"
+        text = (STUDIES / "paper.yaml").read_text()
+        assert old in text
+        path.write_text(text.replace(old, new, 1))
+        return load_study(path)
+
+    for old, new, word in (
+        ("    RGGB: {csd", "    RGBG: {csd", "did you mean 'RGGB'"),
+        ("RGGB: {csd_green_yellow", "RGGB: {csd_green_yelow", "did you mean 'csd_green_yellow'"),
+        ("urban: {object_resolution_px", "urban: {sensitivity", "allowed: object_resolution_px"),
+        ("at: RYN_2Cy", "at: RYN_5Cy", "unknown built-in filter"),
+    ):
+        with pytest.raises(StudyError, match=word):
+            loaded(old, new)

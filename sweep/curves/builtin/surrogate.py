@@ -68,7 +68,7 @@ class StopbandParameters(Section):
 
 
 class SurrogateParameters(Section):
-    """The whole file: `data/surrogate.yaml` as shipped, `data/prior.yaml` as the calibration's start."""
+    """The whole file: `surrogate.yaml` as shipped, `prior.yaml` as the start of `studies/notebooks/calibrate.py`."""
 
     provenance: dict[str, str | int | float]
     photon_ratio: Positive
