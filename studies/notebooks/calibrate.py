@@ -271,11 +271,12 @@ def parameter_file(objective, x, jacobian, made_by):
 def main(arguments):
     """Fit, compare, and write where asked to."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--starts", type=int, choices=range(1, 1000), default=1, metavar="N", help="starting points")
+    parser.add_argument("--starts", type=int, default=1, metavar="N", help="the prior's mean, then draws of the prior")
     parser.add_argument("--output", type=Path, metavar="FILE", help="write the parameter file")
     asked = parser.parse_args(arguments)
-    objective = Objective(PRINTED)
-    fits = []
+    if asked.starts < 1:
+        parser.error("--starts must be at least 1")
+    objective, fits = Objective(PRINTED), []
     for start in range(asked.starts):
         fits.append(fit(objective, start))
         print(f"start {start}: cost {fits[-1][1].cost:.1f} after {fits[-1][1].nfev} evaluations", flush=True)
@@ -288,8 +289,7 @@ def main(arguments):
     print("\ncsd_yellow_red, DN", distances.round(1), sep="\n")
     qe, spectra = curve_differences(*(objective.parameters(values) for values in both.values()))
     print("\nQE: largest difference of each curve", qe.round(3).to_string(), sep="\n")
-    title = "\nSpectra: largest difference of each signal, percent of the shipped peak"
-    print(title, spectra.round(1).to_string(na_rep=""), sep="\n")
+    print("\nSpectra: largest difference, percent of the shipped peak", spectra.round(1).to_string(na_rep=""), sep="\n")
     if asked.output:
         command = f"python studies/notebooks/calibrate.py --starts {asked.starts}"
         asked.output.write_text(parameter_file(objective, x, found.jac, command), encoding="utf-8")

@@ -84,7 +84,8 @@ class SceneLight:
 
     `signals`, `white`: electrons/s for each QE of light and the white patch at every wavelength, ndarray[n_signals,
     n_wavelengths] and ndarray[n_wavelengths]; `fixed_white`: of the brightest channel that no design modifies.
-    `moments`: of a pulse, instead of those of the accuracy (see `pwm.scales`). `positions`: a view of each field position; `angular`: the filters as the rays see them there.
+    `moments`: of a pulse, instead of those of the accuracy (see `pwm.scales`). `positions`: a view of each field
+    position; `angular`: the filters as the rays see them there.
     """
 
     def __init__(self, view: View) -> None:

@@ -19,8 +19,9 @@ from .view import View
 
 MOST_PHASES = 1024
 """Phases of a lattice on a tile, at most."""
-_STARTS = 6
-"""Phases from which each extreme is refined at the first step; half as many at each finer one."""
+_STARTS, _NONLINEAR_STARTS, _FINE_PX = 4, 6, 1 / 16
+"""Phases from which each extreme is refined, behind a linear readout and a nonlinear one; half as many at each step
+that is finer."""
 _NEIGHBORS = np.array([[x, y] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)])
 
 
@@ -147,7 +148,7 @@ def refined_minima(
     first = np.unique(different_phases(view, lattice)[1], return_index=True)[1]  # mirrored phases are no other starts
     known = dict(zip(lattice.subset(first).keys, values[:, first].T, strict=True))
     period = np.array(view.mosaic.indices.shape[::-1])
-    n_starts = _STARTS
+    n_starts = _STARTS if view.linear else _NONLINEAR_STARTS
     while step >= finest:
         places, so_far = np.array(list(known))[:, :2], np.stack(list(known.values()), axis=1)
         starts = np.stack([_apart(places, own, n_starts, 2 * step, period) for own in so_far])
@@ -165,7 +166,7 @@ def refined_minima(
                 moving[value, start] = at_phases[value, lowest] < at_start[value, start]
                 if moving[value, start]:
                     at_start[value, start], centers[value, start] = at_phases[value, lowest], read.center_px[lowest]
-        step, n_starts = step / 2, max(1, n_starts // 2)
+        step, n_starts = step / 2, max(1, n_starts // 2) if step <= _FINE_PX else n_starts
     every, so_far = np.array(list(known)), np.stack(list(known.values()), axis=1)
     return so_far.min(axis=1), Phases(*np.split(every[so_far.argmin(axis=1)], 2, axis=1))
 
