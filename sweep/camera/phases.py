@@ -19,7 +19,7 @@ from .view import View
 
 MOST_PHASES = 1024
 """Phases of a lattice on a tile, at most."""
-_STARTS, _NONLINEAR_STARTS, _FINE_PX = 4, 6, 1 / 16
+_STARTS, _NONLINEAR_STARTS, _FINE_PX = 3, 6, 1 / 16
 """Phases from which each extreme is refined, behind a linear readout and a nonlinear one; half as many at each step
 that is finer."""
 _NEIGHBORS = np.array([[x, y] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)])
