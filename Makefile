@@ -55,7 +55,6 @@ documents: $(VENV)/.ready-dev
 bench: $(VENV)/.ready-bench
 	$(ONE_THREAD) $(BIN)/python tests/bench.py $(ARGS)
 	$(ONE_THREAD) $(BIN)/python tests/bench_search.py $(ARGS)
-	$(ONE_THREAD) $(BIN)/python tests/bench_work.py
 
 clean:
 	rm -rf $(VENV) $(OLDEST) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

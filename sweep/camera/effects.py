@@ -132,7 +132,8 @@ def _noise_bound_dn(box: Box, _: frozenset[str]) -> float:
     gain, read_e = pixel.dn_per_e, pixel.read_noise_e
     at_e, end_e = min(box.brightest_pixel_dn / gain, pixel.saturation_e), (pixel.full_scale_dn - pixel.offset_dn) / gain
     lost_e = tails.mean_above(pixel.well_e, at_e, pixel, 0.0) + tails.mean_above(end_e, at_e, pixel, read_e)
-    added_dn = gain * read_e * float(gaussian.ramp(np.array(-pixel.offset_dn / (gain * read_e)))) if read_e else 0.0
+    sigma = gain * read_e
+    added_dn = sigma * float(gaussian.ramp(np.array(-pixel.offset_dn / sigma))) if sigma else 0.0
     return (2 * added_dn + gain * lost_e) * box._sqrt_channels
 
 

@@ -42,8 +42,8 @@ class ForwardModel:
     read.
     """
 
-    all_apart = False
-    """Whether all phases are kept."""
+    all_apart, together = False, False
+    """Whether all phases are kept; whether the pixels of all field positions are held together."""
 
     def __init__(self, view: View, phases: Phases | None = None, *, once: bool = False) -> None:
         """`phases`: sampling phases instead of the scene's. `once`: for a single use, so that no table is made."""
@@ -60,7 +60,7 @@ class ForwardModel:
         self.phases = phases
         if view.linear or phases is None:
             return
-        if view.scenario.field is not None:
+        if view.scenario.field is not None and not self.together:
             self._positions = [type(self)(position, phases, once=once) for position in over_field(view)]
             return
         some = blocks(view, phases)

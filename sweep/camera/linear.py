@@ -153,9 +153,7 @@ class LinearModel(ForwardModel):
 class _ByPixel(LinearModel):
     """A linear model whose pixels are kept apart, those of all field positions together."""
 
-    def __init__(self, view: View) -> None:
-        super().__init__(view)
-        self._positions = []
+    together = True
 
 
 _models: Cache[bytes, LinearModel] = Cache(16)

@@ -123,7 +123,8 @@ def _refine_moments(model: ForwardModel, block: Block, columns: Columns) -> None
     for design in np.flatnonzero(np.isfinite(columns[names[0]])):
         curves = block.some(slice(design, design + 1)).curves()
         for name, least in zip(names, _over_pulse(model, curves, range(len(names)), model.phases), strict=True):
-            columns[name][design] = min(columns[name][design], least)
+            for column in {name, BEST_PLACE + name} & columns.keys():
+                columns[column][design] = min(columns[column][design], least)
 
 
 def _refine_phases(model: ForwardModel, block: Block, cases: Columns, columns: Columns) -> None:
@@ -146,8 +147,9 @@ def _refine_phases(model: ForwardModel, block: Block, cases: Columns, columns: C
             columns[name][design] = smallest[number]
             columns[BEST_PLACE + name][design] = -largest[number]
             if _bends_over_pulse(view):
-                worst = at.subset(np.array([number]))
-                columns[name][design] = min(smallest[number], _over_pulse(model, curves, [number], worst)[0])
+                for column, end in ((name, number), (BEST_PLACE + name, number + len(names))):
+                    there = _over_pulse(model, curves, [number], at.subset(np.array([end])))[0]
+                    columns[column][design] = min(columns[column][design], there)
 
 
 def _refine_heights(model: ForwardModel, block: Block, cases: Columns, columns: Columns) -> None:

@@ -173,13 +173,13 @@ def test_what_several_parts_of_a_report_need_is_made_once(
 
 
 @pytest.mark.slow
-def test_every_scene_is_told_once_with_its_largest_promise(finished: Finished) -> None:
+def test_every_scene_is_told_once_with_its_largest_bound(finished: Finished) -> None:
     output = read_output(finished("fog"))
     groups = scene_groups(output)
     assert sorted(name for group in groups for name in group.scenarios) == sorted(output.scenarios)
     for group in groups:
         plans = [output.provenance.plans[name] for name in group.scenarios]
-        assert group.promised_dn == max(plan.promised_dn for plan in plans)
+        assert group.error_bound_dn == max(plan.error_bound_dn for plan in plans)
         assert group.realized_dn is None
     rows = pd.DataFrame({"scenario": [groups[0].scenarios[0]] * 2, "realized_dn": [0.01, 0.03]})
     assert scene_groups(replace(output, audited=rows))[0].realized_dn == 0.03

@@ -31,12 +31,12 @@ from ..warm import Warm
 SLOWED = Path(__file__).parent.parent / "slowed"
 SAID = "sweep: interrupted; finished chunks are kept, the same command continues\n"
 PHASES = {
-    "planning": ("sweep.study.model:Study.plan", 2),
     "search": ("sweep.search.solver:search_from", 3),
     "sweep": ("sweep.metrics.evaluate:evaluate", 6),
     "recognition": ("sweep.metrics.recognition:recognize", 2),
     "tables": ("sweep.results.joined:Joining.finish", 1),
     "points": ("sweep.results.tables:write_table", 2),
+    "check": ("sweep.run.check:_checked", 1),
     "report": ("sweep.report.page:make_report", 1),
 }
 WITHIN_S = 15.0
