@@ -91,12 +91,10 @@ class Effect:
 
     `inactive`: why it changes nothing in a box whatever is computed beside it, None where it may. `bound_dn`: on what
     leaving it out changes in any CSD of a box, given the effects of the readout that are computed; None where no closed
-    form is known, so that an active effect is computed. `name` is that of the effect, `stage` the module that computes
-    it.
+    form is known, so that an active effect is computed.
     """
 
     name: str
-    stage: str
     inactive: Callable[[Box], str | None]
     bound_dn: Callable[[Box, frozenset[str]], float] | None = None
 
@@ -123,7 +121,7 @@ def _no_noise(box: Box) -> str | None:
 
 
 def _noise_bound_dn(box: Box, _: frozenset[str]) -> float:
-    """What the full well and the ends of the ADC take from, or add to, the mean of noisy readouts.
+    """Bound on how far the full well and the ends of the ADC shift the mean of noisy readouts.
 
     The dark end adds most in the dark. The others' loss grows with the signal up to the first of them, and falls
     beyond, where the readout of the mean stands still.
@@ -186,8 +184,7 @@ def _one_field_position(box: Box) -> str | None:
     field = box.view.scenario.field
     if field is None:
         return "one place of the sensor"
-    same = not box.view.moving and box.view.scenario.off_axis_deg == 0
-    return "all places of the sensor see the same" if same else None
+    return None if box.view.positions_differ else "all places of the sensor see the same"
 
 
 def _averaged(box: Box) -> str | None:
@@ -214,40 +211,36 @@ def _air_bound_dn(box: Box, readout: frozenset[str]) -> float:
 EFFECTS: dict[str, Effect] = {
     effect.name: effect
     for effect in (
-        Effect("noise", "readout", _no_noise, _noise_bound_dn),
-        Effect("quantization", "readout", lambda _: None, _rounding_bound_dn),
-        Effect("saturation", "readout", _not_saturated, _saturation_bound_dn),
-        Effect("pedestal", "readout", lambda box: None if box.view.pixel.offset_dn else "no pedestal"),
-        Effect("sampling", "sampling", _without_target),
-        Effect("phase", "phases", _one_phase),
-        Effect("demosaic", "demosaic", _averaged),
-        Effect("blur", "psf", _without_target),
+        Effect("noise", _no_noise, _noise_bound_dn),
+        Effect("quantization", lambda _: None, _rounding_bound_dn),
+        Effect("saturation", _not_saturated, _saturation_bound_dn),
+        Effect("pedestal", lambda box: None if box.view.pixel.offset_dn else "no pedestal"),
+        Effect("sampling", _without_target),
+        Effect("phase", _one_phase),
+        Effect("demosaic", _averaged),
+        Effect("blur", _without_target),
         Effect(
-            "crosstalk",
             "crosstalk",
             lambda box: None if box.view.pixel.crosstalk else "no crosstalk",
             lambda box, readout: _share_bound_dn(box, 2 * box.view.pixel.crosstalk, readout),
         ),
-        Effect("angle", "angular", _not_moving),
+        Effect("angle", _not_moving),
         Effect(
             "illumination",
-            "irradiance",
             lambda box: None if box.view.scenario.off_axis_deg else "on axis",
             lambda box, readout: _share_bound_dn(box, 1 - relative_illumination(box.view.scenario), readout),
         ),
-        Effect("field", "field", _one_field_position),
+        Effect("field", _one_field_position),
         Effect(
             "extinction",
-            "irradiance",
             lambda box: "clear air" if box.view.scenario.visibility_m is None else None,
             _air_bound_dn,
         ),
         Effect(
             "veiling glare",
-            "irradiance",
             lambda box: "no veiling glare" if box.view.scenario.veiling_glare is None else None,
         ),
-        Effect("flicker", "pwm", _unpulsed, _pwm_bound_dn),
+        Effect("flicker", _unpulsed, _pwm_bound_dn),
     )
 }
 """Each effect by its name: those of the readout first, which decide what the bounds of the others are."""

@@ -38,11 +38,7 @@ def view_at(view: View, height: float) -> View:
 def field_heights(view: View) -> tuple[float, ...]:
     """Image heights at which a scene is computed; 0 where all of them see the same."""
     scene = view.scenario
-    if scene.field is None:
-        return (0.0,)
-    still = not view.computes("angle") or not view.moving
-    bright = not view.computes("illumination") or scene.off_axis_deg == 0
-    if still and bright:
+    if scene.field is None or not view.positions_differ:
         return (0.0,)
     if not scene.field.everywhere:
         return scene.field.seen_heights
@@ -68,8 +64,8 @@ def refined_heights(
     """
     known = dict(zip(heights, values.T, strict=True))
     at, lowest = np.zeros(len(values)), values.min(axis=1)
-    for value, own in enumerate(values):
-        for start in np.argsort(own, kind="stable")[:_STARTS]:
+    for value, starts in enumerate(np.argsort(values, axis=1, kind="stable")[:, :_STARTS]):
+        for start in starts:
             best = heights[start]
             step = max(np.diff(heights)[max(start - 1, 0) : start + 1]) / 2
             for _ in range(_HALVINGS):
@@ -79,6 +75,6 @@ def refined_heights(
                 near = [height for height in (best - step, best, best + step) if 0 <= height <= 1]
                 best = min(near, key=lambda height: known[height][value])
                 step /= 2
-            if start == np.argsort(own, kind="stable")[0] or known[best][value] < lowest[value]:
+            if start == starts[0] or known[best][value] < lowest[value]:
                 lowest[value], at[value] = known[best][value], best
     return lowest, at

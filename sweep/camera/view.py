@@ -1,4 +1,4 @@
-"""What a block of designs shares: sensor, CFA, lights and scene, and how accurately the scene is simulated."""
+"""View of a block of designs: sensor, CFA, lights and scene, and how accurately the scene is simulated."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ READOUT = frozenset({"noise", "quantization", "saturation"})
 
 @dataclass(frozen=True)
 class View:
-    """What a block of designs shares.
+    """Sensor, CFA, lights and scene that a block of designs shares.
 
     `qe`: ndarray[n_channels, n_wavelengths] of the mosaic's channels, electrons per photon; the rows of `modified`
     (channel indices, one per curve that a family makes) hold the base curve. `clear_qe`: the reference of the CFA's
@@ -58,7 +58,7 @@ class View:
         return tuple(i for i in range(len(self.mosaic.channels)) if i not in self.modified)
 
     def effective_index(self, channel: int) -> float:
-        """That of a channel's filter; infinite for one that does not move with the angle of the light."""
+        """Effective index of a channel's filter; infinite for one that does not move with the angle of the light."""
         return index_of(self.technologies[channel]) if self.technologies else math.inf
 
     @property
@@ -67,7 +67,7 @@ class View:
         return tuple(c for c in range(len(self.mosaic.channels)) if math.isfinite(self.effective_index(c)))
 
     def carrier(self, channel: int) -> FloatArray:
-        """What a channel is under its filter and stays at every angle: its base, or of a plain one the clear pixel."""
+        """Curve of a channel under its filter, the same at every angle: its base, or if plain the clear pixel's."""
         return self.qe[channel] if channel in self.modified else self.clear_qe
 
     @property
@@ -81,7 +81,7 @@ class View:
         return self.lights.members
 
     def computes(self, effect: str) -> bool:
-        """Whether an effect is not left out."""
+        """True for an effect that is not left out."""
         return effect not in self.left_out
 
     @property
@@ -91,20 +91,25 @@ class View:
 
     @property
     def linear(self) -> bool:
-        """Whether digital numbers are linear in electrons: neither clipped nor rounded."""
+        """True where digital numbers are linear in electrons: neither clipped nor rounded."""
         return self.left_out >= READOUT
 
     @property
     def all_phases(self) -> bool:
-        """Whether the worst of all sampling phases is asked for."""
+        """True where the worst of all sampling phases is asked for."""
         return self.scenario.any_phase
 
     @property
+    def positions_differ(self) -> bool:
+        """True where field positions see something else by the effects that are computed."""
+        tilted = self.computes("angle") and bool(self.moving)
+        return tilted or (self.computes("illumination") and self.scenario.off_axis_deg != 0)
+
+    @property
     def all_heights(self) -> bool:
-        """Whether the worst of all places of the sensor is asked for, and they differ."""
-        scene = self.scenario
-        differ = bool(self.moving) or scene.off_axis_deg != 0
-        return scene.field is not None and scene.field.everywhere and differ
+        """True where the worst of all field positions is asked for, and they differ."""
+        field = self.scenario.field
+        return field is not None and field.everywhere and self.positions_differ
 
 
 def per_photon(view: View) -> float:

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.types import FloatArray
-from ..camera.field import refined_heights, view_at
+from ..camera.field import field_heights, refined_heights, view_at
 from ..camera.linear import LinearModel, linear_model
 from ..camera.sensor_field import SensorField
 from ..metrics.quantity import DN
@@ -33,8 +33,7 @@ class AnyHeight:
         assert field is not None
         self._whole, self._field = whole, field
         self._heights = {*field.seen_heights, *field.knots[0]}
-        count = whole.view.accuracy.field_positions
-        self._looked_at = tuple(sorted({*(at / (count - 1) for at in range(count)), *field.knots[0]}))
+        self._looked_at = field_heights(whole.view)
         self._models: dict[float, LinearModel] = {}
         asked = {*whole.objective.weights, *whole.constraints} & whole.pairs.keys()
         self._pairs = {name: whole.pairs[name] for name in sorted(asked) if whole.quantities[name].apart == DN}

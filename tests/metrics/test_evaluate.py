@@ -13,6 +13,7 @@ from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Optics, Pixel
 from sweep.camera.scene import FixedExposure, Scene, WhitePatchExposure
 from sweep.camera.sensor import BUILT_IN_SENSORS
+from sweep.camera.sensor_field import SensorField
 from sweep.camera.view import View
 from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
 from sweep.curves.spectrum import WavelengthGrid
@@ -123,3 +124,12 @@ def test_gradients_agree_with_central_differences(kind: str) -> None:
         values = designed_quantities(made, ends)
         for name, gradient in amounts.items():
             assert gradient[index] == pytest.approx((values[name][0] - values[name][1]) / (2 * step), abs=1e-8)
+
+
+def test_field_positions_that_differ_by_nothing_that_is_computed_are_one() -> None:
+    """The light's fall-off, left out of a slightly tilted scene with pigments, is all that differs between positions."""
+    scenario = Scene(off_axis_deg=0.4, field=SensorField(cra_max_deg=20.0, places="any"))
+    tilted = replace(view(scenario=scenario), left_out=frozenset({"illumination"}))
+    found, on_axis = (evaluate(forward_model(v), FAMILY.curves(X)) for v in (tilted, view()))
+    for name, values in on_axis.items():
+        np.testing.assert_allclose(found[name], values, rtol=1e-12, err_msg=name)
