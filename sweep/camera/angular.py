@@ -140,7 +140,7 @@ def gauss_rays(cone: Cone, count: int) -> tuple[FloatArray, FloatArray]:
 
 
 class Stretches:
-    """Where the rays of a cone see a filter: shares of them, and of their m, below any m."""
+    """Distribution of the stretch m over the rays of a cone: shares of the rays, and of their m, below any m."""
 
     def __init__(self, cone: Cone, index: float) -> None:
         self._index = index
@@ -153,12 +153,12 @@ class Stretches:
         shares, sums = np.zeros(m.size), np.zeros(m.size)
         sine_squared = np.clip(1 - 1 / np.maximum(m, 1.0) ** 2, 0.0, 1.0) * self._index**2
         for arc in self._arcs:
-            own = np.clip(arc.place(sine_squared), 0.0, 1.0)
-            edges = np.union1d(np.linspace(0.0, 1.0, _PANELS + 1), own)
+            ends = np.clip(arc.place(sine_squared), 0.0, 1.0)
+            edges = np.union1d(np.linspace(0.0, 1.0, _PANELS + 1), ends)
             at, weight = _points(edges)
             rays_there = arc.density(at) * weight
             moved = rays_there * stretch(arc.sine_squared(at), self._index)
-            where = np.searchsorted(edges, own)
+            where = np.searchsorted(edges, ends)
             shares += np.append(0.0, np.cumsum(rays_there.sum(axis=1)))[where]
             sums += np.append(0.0, np.cumsum(moved.sum(axis=1)))[where]
         return shares, sums
@@ -168,7 +168,7 @@ _STEEPEST_RAD = math.radians(85.0)
 _Entries = tuple[IndexArray, IndexArray, FloatArray]
 """Rows, columns and values of a sparse matrix, ndarray[n] each."""
 _LEAST_BASE = 1e-9
-"""Where the base lets less of its largest value through, what is on it is not known."""
+"""A filter is not known where its base lets less than this share of its largest value through."""
 
 
 def cone_of(scene: Scene) -> Cone:
@@ -177,7 +177,7 @@ def cone_of(scene: Scene) -> Cone:
 
 
 def too_steep(scene: Scene) -> tuple[tuple[str, ...], str, str, str] | None:
-    """Where a scene's rays graze a filter that moves with them: key, problem, value, what is allowed."""
+    """Fault of a scene whose rays graze a filter that moves with them: key, problem, value, what is allowed."""
     chief_deg = scene.optics.cra_deg if scene.field is None else scene.field.steepest_deg
     steepest = cone_of(scene).half_rad + math.radians(chief_deg)
     if steepest <= _STEEPEST_RAD:
@@ -192,7 +192,7 @@ class AngularResponse:
 
     def __init__(self, view: View) -> None:
         self.matrices: dict[int, csr_matrix] = {}
-        """Of each channel that moves, [n_wavelengths, n_wavelengths]: its curve as seen is matrix @ curve."""
+        """Matrix of each channel that moves, [n_wavelengths, n_wavelengths]: its curve as seen is matrix @ curve."""
         if view.computes("angle"):
             cone, wave, rays = cone_of(view.scenario), view.grid.nodes_nm, view.accuracy.rays
             self.matrices = {
@@ -210,17 +210,17 @@ class AngularResponse:
     def _applied(self, values: FloatArray, channels: Sequence[int], *, of_light: bool) -> FloatArray:
         if not any(channel in self.matrices for channel in channels):
             return values
-        found = np.array(values, dtype=float)
+        result = np.array(values, dtype=float)
         for at, channel in enumerate(channels):
             if channel in self.matrices:
-                own = self.matrices[channel].T if of_light else self.matrices[channel]
-                flat = found[..., at, :].reshape(-1, found.shape[-1])
-                found[..., at, :] = (own @ flat.T).T.reshape(found[..., at, :].shape)
-        return found
+                matrix = self.matrices[channel].T if of_light else self.matrices[channel]
+                flat = result[..., at, :].reshape(-1, result.shape[-1])
+                result[..., at, :] = (matrix @ flat.T).T.reshape(result[..., at, :].shape)
+        return result
 
 
 def known_at(carrier: FloatArray) -> IndexArray:
-    """At which wavelengths a carrier lets enough light through that what is on it is known."""
+    """Indices of the wavelengths where a carrier lets enough light through to know the filter on it."""
     return np.flatnonzero(carrier > _LEAST_BASE * carrier.max())
 
 
@@ -228,7 +228,7 @@ _MATRICES: Cache[bytes, csr_matrix] = Cache(256)
 
 
 def _matrix(wavelength_nm: FloatArray, carrier: FloatArray, index: float, cone: Cone, n_rays: int | None) -> csr_matrix:
-    """What takes a curve on a carrier to what the rays see of it; remembered."""
+    """Matrix from a curve on a carrier to the curve as the rays see it; kept."""
     key = wavelength_nm.tobytes() + carrier.tobytes() + repr((index, cone, n_rays)).encode()
 
     def made() -> csr_matrix:

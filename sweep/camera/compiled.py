@@ -51,7 +51,7 @@ def covered_shares(x: FloatArray, y: FloatArray, half: float, radius: float) -> 
 
 @njit(cache=True, nogil=True)
 def covered_by_disc(x: FloatArray, y: FloatArray, half: float, radius: float) -> FloatArray:
-    """How much of each pixel a disc covers, ndarray[n, n_rows, n_columns]; `x`: ndarray[n, n_columns], `y` likewise."""
+    """Share of each pixel in a disc, ndarray[n, n_rows, n_columns]; `x`: ndarray[n, n_columns], `y` likewise."""
     found = np.empty((len(x), y.shape[1], x.shape[1]))
     for case in range(len(x)):
         for row in range(y.shape[1]):

@@ -1,4 +1,4 @@
-"""What falls on pixels of the image of a disc, sharp or blurred by diffraction and defocus."""
+"""Image of a disc on the pixels, sharp or blurred by diffraction and defocus."""
 
 from __future__ import annotations
 

@@ -139,7 +139,7 @@ class Electrons:
         )
 
     def _products(self, light: FloatArray, qe: FloatArray, of: Sequence[int]) -> FloatArray:
-        """Sum over channels and wavelengths of kernel, QE and signals, [n_designs, n_cases, n_signals, n_units].
+        """Sum over channels and wavelengths of light, QE and signals, [n_designs, n_cases, n_signals, n_elements].
 
         `light`, `qe`: of the channels `of`.
         """
@@ -176,7 +176,7 @@ class Electrons:
         return np.ascontiguousarray(product.reshape(-1, channels * size).T)
 
     def rates(self, curves: FloatArray) -> FloatArray:
-        """Electrons/s of each signal, ndarray[n_designs, n_cases, n_signals, n_units].
+        """Electrons/s of each signal, ndarray[n_designs, n_cases, n_signals, n_elements].
 
         `curves`: QE of the modified channels, ndarray[n_designs, n_modified, n_wavelengths].
         """
@@ -194,7 +194,7 @@ class Electrons:
         return found
 
     def expected(self, curves: FloatArray, scales: FloatArray, exposure_s: FloatArray) -> FloatArray:
-        """Expected electrons before the full well, ndarray[n_designs, n_cases x n_scales, n_signals, n_units]."""
+        """Expected electrons before the full well, ndarray[n_designs, n_cases x n_scales, n_signals, n_elements]."""
         uniform = self._fixed_uniform + self.through_filters(self.of_background(curves))
         uniform = uniform + self.view.pixel.dark_e_per_s
         rates = self.rates(curves)
@@ -215,7 +215,7 @@ class Electrons:
         return np.asarray(np.einsum("nml,pml->npm", curves, self.background), dtype=float)
 
     def through_filters(self, rates: FloatArray) -> FloatArray:
-        """What the units get of a uniform light, ndarray[n_designs, n_cases, n_units].
+        """Uniform light on the elements, ndarray[n_designs, n_cases, n_elements].
 
         `rates`: electrons/s of the modified channels, ndarray[n_designs, n_places, n_modified].
         """
@@ -225,9 +225,9 @@ class Electrons:
         return found
 
     def changing(self, block: Block) -> Changing | None:
-        """Electrons of designs that differ in one channel alone, each unit a channel; None where they do not.
+        """Electrons of designs that differ in one channel alone, each element a channel; None where they do not.
 
-        Needs a modified channel that no other unit looks through, and a light that does not pulse. Designs whose
+        Needs a modified channel that no other element looks through, and a light that does not pulse. Designs whose
         modified channel sets the exposure are left out.
         """
         view = self.view

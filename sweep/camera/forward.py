@@ -43,7 +43,7 @@ class ForwardModel:
     """
 
     all_apart, together = False, False
-    """Whether all phases are kept; whether the pixels of all field positions are held together."""
+    """True: all phases are kept; True: the pixels of all field positions are held together."""
 
     def __init__(self, view: View, phases: Phases | None = None, *, once: bool = False) -> None:
         """`phases`: sampling phases instead of the scene's. `once`: for a single use, so that no table is made."""
@@ -55,16 +55,16 @@ class ForwardModel:
         self._of_scene = phases is None
         self._latest: dict[str, tuple[bytes, Any]] = {}
         if phases is None and view.scenario.target is not None:
-            every = scene_phases(view)
-            phases = every if self.all_apart else different_phases(view, every)[0]
+            phases = scene_phases(view)
+            phases = phases if self.all_apart else different_phases(view, phases)[0]
         self.phases = phases
         if view.linear or phases is None:
             return
         if view.scenario.field is not None and not self.together:
             self._positions = [type(self)(position, phases, once=once) for position in over_field(view)]
             return
-        some = blocks(view, phases)
-        self._phase_blocks = some if len(some) > 1 else []
+        phase_blocks = blocks(view, phases)
+        self._phase_blocks = phase_blocks if len(phase_blocks) > 1 else []
 
     def _parts(self) -> Iterator[ForwardModel]:
         """Models of the field positions, or of the blocks of phases, made as they are read; none of a whole model."""
@@ -101,7 +101,7 @@ class ForwardModel:
 
     @property
     def _of_channels(self) -> bool:
-        """Whether the response is that of a target's channels, whose phases are kept one by one."""
+        """True where the response is that of a target's channels, whose phases are kept one by one."""
         return self.view.linear and self.view.all_phases and self.view.scenario.field is None
 
     @cached_property
@@ -129,10 +129,10 @@ class ForwardModel:
         """`Electrons.changing` as read, DN; None, too, where a channel is read from several elements."""
         if self._in_parts or not self.readout.by_channel:
             return None
-        found = self.electrons.changing(block)
-        if found is None:
+        electrons = self.electrons.changing(block)
+        if electrons is None:
             return None
-        transfer, electrons, by_edges = self.readout.transfer, found, found.by_edges
+        transfer, by_edges = self.readout.transfer, electrons.by_edges
         if by_edges is not None:
             line = self.readout.line()
             by_edges = None if line is None else by_edges._replace(line=line)
@@ -140,7 +140,7 @@ class ForwardModel:
         def make(part: slice) -> FloatArray:
             return transfer(electrons.make(part))
 
-        return replace(found, fixed=transfer(found.fixed), make=make, by_edges=by_edges)
+        return replace(electrons, fixed=transfer(electrons.fixed), make=make, by_edges=by_edges)
 
     def read(self, curves: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The readout, DN, ndarray[n_designs, n_cases, n_signals, n_channels], and exposure, s, ndarray[n_designs]."""
@@ -150,11 +150,11 @@ class ForwardModel:
         exposure_s = self.light.exposure_s(curves)
         if self._in_parts:
             return np.concatenate([part.read(curves)[0] for part in self._parts()], axis=1), exposure_s
-        each = [self.readout.folded(self.readout.transfer(e)) for e in self._blocks(curves, exposure_s)]
-        return np.concatenate(each), exposure_s
+        dn = [self.readout.folded(self.readout.transfer(e)) for e in self._blocks(curves, exposure_s)]
+        return np.concatenate(dn), exposure_s
 
     def _read_once(self, how: str, curves: FloatArray, read: Callable[[FloatArray], _Result]) -> _Result:
-        """What `read` gives; of one design, of which several tables are made one after the other, not made again."""
+        """Result of `read`; that of a single design is kept, since several tables are made of it in a row."""
         if len(curves) != 1 or self._in_parts:
             return read(curves)
         asked = curves.tobytes()
@@ -173,12 +173,12 @@ class ForwardModel:
 
     def _read_with_noise(self, curves: FloatArray) -> NoisyReadout:
         if self._in_parts:
-            each = [part.read_with_noise(curves) for part in self._parts()]
+            readouts = [part.read_with_noise(curves) for part in self._parts()]
             joined = {
-                name: np.concatenate([getattr(one, name) for one in each], axis=1)
+                name: np.concatenate([getattr(one, name) for one in readouts], axis=1)
                 for name in ("mean", "variance", "gaussian", "reach_dn")
             }
-            return replace(each[0], **joined)
+            return replace(readouts[0], **joined)
         exposure_s = self.light.exposure_s(curves)
         parts = [self.readout.with_noise(electrons) for electrons in self._blocks(curves, exposure_s)]
         mean, variance, gaussian, reach = (np.concatenate(values) for values in zip(*parts, strict=True))
@@ -232,7 +232,7 @@ class AllPhases(ForwardModel):
 
 _models: Cache[tuple[type[ForwardModel], bytes], ForwardModel] = Cache(16)
 _known: Cache[tuple[type[ForwardModel], int], tuple[View, ForwardModel]] = Cache(4)
-"""Those of the views of the last blocks, by the views themselves, which nobody changes."""
+"""Models of the last blocks' views, by the identity of the view, which nobody changes."""
 
 
 def forward_model(view: View, kind: type[ForwardModel] = ForwardModel) -> ForwardModel:

@@ -10,7 +10,7 @@ from .sampling import reach_px
 from .view import View
 
 MOST_BYTES = 2 * 2**30
-"""What the images of a scene may take of a worker's memory."""
+"""Most memory of a worker for the images of a scene, bytes."""
 _COPIES = 4
 """So many arrays of the size of a response are held while it is made."""
 
@@ -18,8 +18,7 @@ _COPIES = 4
 def pixels_per_phase(view: View) -> int:
     """About how many pixels are computed around a light."""
     target, rows_columns = view.scenario.target, view.mosaic.indices.shape
-    if target is None:
-        return int(np.prod(rows_columns))
+    assert target is not None
     reach = reach_px(view, target)
     return int(np.prod([2 * reach + n + 3 for n in rows_columns]))
 
@@ -57,7 +56,7 @@ def too_large(view: View) -> tuple[str, str, str] | None:
             f"{places:,}",
             f"at most {MOST_PHASES:,} (a tile of {MOST_PHASES // 16} pixels), or a named place",
         )
-    if (every := places * bytes_per_phase(view, by_pixel=False)) > MOST_BYTES:
+    if (total := places * bytes_per_phase(view, by_pixel=False)) > MOST_BYTES:
         problem = f"{places:,} places of the light, of {channels}, take too much memory"
-        return problem, f"{every / 2**30:.1f} GiB", f"at most {MOST_BYTES / 2**30:g} GiB"
+        return problem, f"{total / 2**30:.1f} GiB", f"at most {MOST_BYTES / 2**30:g} GiB"
     return None

@@ -100,7 +100,7 @@ def _folded(along: FloatArray, mirror: float | None, period: int) -> FloatArray:
 
 
 def _mirror(rows: IndexArray) -> float | None:
-    """Where rows are their own mirror image, pixels; None where they are not."""
+    """Position where rows are their own mirror image, pixels; None where they are not."""
     n = len(rows)
     mirrors = [m for m in range(n) if np.array_equal(rows[(m - np.arange(n)) % n], rows)]
     return mirrors[0] / 2 if mirrors else None
@@ -151,7 +151,7 @@ def refined_minima(
     n_starts = _STARTS if view.linear else _NONLINEAR_STARTS
     while step >= finest:
         places, so_far = np.array(list(known))[:, :2], np.stack(list(known.values()), axis=1)
-        starts = np.stack([_apart(places, own, n_starts, 2 * step, period) for own in so_far])
+        starts = np.stack([_apart(places, row, n_starts, 2 * step, period) for row in so_far])
         centers, at_start = places[starts], np.take_along_axis(so_far, starts, axis=1)  # [n_values, n_starts, ...]
         moving = np.ones(at_start.shape, dtype=bool)
         while moving.any():
@@ -167,21 +167,21 @@ def refined_minima(
                 if moving[value, start]:
                     at_start[value, start], centers[value, start] = at_phases[value, lowest], read.center_px[lowest]
         step, n_starts = step / 2, max(1, n_starts // 2) if step <= _FINE_PX else n_starts
-    every, so_far = np.array(list(known)), np.stack(list(known.values()), axis=1)
-    return so_far.min(axis=1), Phases(*np.split(every[so_far.argmin(axis=1)], 2, axis=1))
+    places, so_far = np.array(list(known)), np.stack(list(known.values()), axis=1)
+    return so_far.min(axis=1), Phases(*np.split(places[so_far.argmin(axis=1)], 2, axis=1))
 
 
 def _apart(
     centers_px: FloatArray, values: FloatArray, n_starts: int, step_px: float, period_px: IndexArray
 ) -> IndexArray:
     """Indices of the smallest values, of which none lies within a step of one that is smaller, ndarray[n_starts]."""
-    found: list[int] = []
+    starts: list[int] = []
     order = np.argsort(values, kind="stable")
-    while len(found) < n_starts and order.size:
-        found.append(int(order[0]))
+    while len(starts) < n_starts and order.size:
+        starts.append(int(order[0]))
         off = np.mod(centers_px[order] - centers_px[order[0]], period_px)
         order = order[np.minimum(off, period_px - off).max(axis=1) > step_px * (1 + 1e-9)]
-    return np.array((found * n_starts)[:n_starts])
+    return np.array((starts * n_starts)[:n_starts])
 
 
 def _known_or_evaluated(

@@ -33,12 +33,12 @@ _KEPT_BYTES = 32 * 2**20
 
 @dataclass(frozen=True)
 class SplitLight:
-    """`PixelResponse.light` of pixels, ndarray[n_cases, n_units, n_channels, n_wavelengths], in factors.
+    """`PixelResponse.light` of pixels, ndarray[n_cases, n_elements, n_channels, n_wavelengths], in factors.
 
     `values`: functions of the light at each different place, ndarray[n_places, n_functions]; `shares`: how much of each
     is in each wavelength, ndarray[n_functions, n_wavelengths], None where all see the same; `factor`: of the light's
     way, ndarray[n_wavelengths]. A pixel is a sum of parts: `parts`: how much of each, ndarray[n_parts]; `place`: where
-    it is, ndarray[n_parts, n_cases, n_units]; `through`: whose filter it has, ndarray[n_parts, n_units].
+    it is, ndarray[n_parts, n_cases, n_elements]; `through`: whose filter it has, ndarray[n_parts, n_elements].
     """
 
     values: FloatArray
@@ -51,17 +51,17 @@ class SplitLight:
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
-        """That of the array."""
+        """Shape of the array."""
         return (*self.place.shape[1:], self.n_channels, self.factor.size)
 
     def whole(self) -> FloatArray:
         """The array itself."""
         by_place = (self.values if self.shares is None else self.values @ self.shares) * self.factor
-        found = np.zeros(self.shape)
+        result = np.zeros(self.shape)
         pixels = np.arange(self.place.shape[2])
         for share, place, through in zip(self.parts, self.place, self.through, strict=True):
-            found[:, pixels, through] += share * by_place[place]
-        return found
+            result[:, pixels, through] += share * by_place[place]
+        return result
 
     def _seen(self, spectra: FloatArray) -> FloatArray:
         """Sums over the wavelengths at each place: ndarray[..., n, n_wavelengths] -> ndarray[..., n_places, n]."""
@@ -70,7 +70,7 @@ class SplitLight:
         return np.asarray(self.values @ np.swapaxes(by_function, -1, -2), dtype=float)
 
     def add_sums(self, spectra: FloatArray, channels: Sequence[int], found: FloatArray) -> None:
-        """Add sums over channels and wavelengths to `found`, ndarray[n_designs, n_cases, n_signals, n_units].
+        """Add sums over channels and wavelengths to `found`, ndarray[n_designs, n_cases, n_signals, n_elements].
 
         `spectra`: QE times signals, ndarray[n_designs, n_channels, n_signals, n_wavelengths], of the `channels`. Other
         designs change one by no more than rounding.
@@ -82,15 +82,15 @@ class SplitLight:
         gather(np.ascontiguousarray(self._seen(spectra)), self.parts, self.place, row[self.through], found)
 
     def folded(self, weights: FloatArray, channel: int) -> FloatArray:
-        """Weighted sums over the units of what they get through one channel's filter, ndarray[n_cases, n_wavelengths].
+        """Weighted sums over the elements of their light through one channel's filter, ndarray[n_cases, n_wavelengths].
 
-        `weights`: ndarray[n_cases, n_units].
+        `weights`: ndarray[n_cases, n_elements].
         """
         by_place = np.zeros((len(weights), len(self.values)))
         for share, place, through in zip(self.parts, self.place, self.through, strict=True):
-            own = np.flatnonzero(through == channel)
+            at = np.flatnonzero(through == channel)
             for case in range(len(weights)):
-                np.add.at(by_place[case], place[case, own], share * weights[case, own])
+                np.add.at(by_place[case], place[case, at], share * weights[case, at])
         seen = by_place @ self.values
         return np.asarray((seen if self.shares is None else seen @ self.shares) * self.factor, dtype=float)
 
@@ -113,7 +113,7 @@ class PixelResponse:
 
     @cached_property
     def light(self) -> FloatArray:
-        """What an element gets of a signal's light through each channel's filter, relative to a uniform field on axis
+        """Light of a signal on an element through each channel's filter, relative to a uniform field on axis
         in clear air, ndarray[n_phases, n_elements, n_channels, n_wavelengths].
         """
         return self.source.whole() if isinstance(self.source, SplitLight) else self.source
@@ -125,7 +125,7 @@ class PixelResponse:
 
 
 def colorless(view: View) -> View:
-    """What responses depend on: the view without filters, which is the same for all CFAs whose tiles are alike."""
+    """The view without filters, which is all that responses depend on; the same for CFAs whose tiles are alike."""
     nothing = np.zeros_like(view.qe)
     bare = replace(view, mosaic=view.mosaic.colorless, modified=(), technologies=())
     return replace(bare, qe=nothing, clear_qe=np.zeros_like(view.clear_qe))
@@ -167,7 +167,7 @@ def pixel_response(view: View, phases: Phases | None, *, by_pixel: bool) -> Pixe
 
 
 def _one_light(source: FloatArray | SplitLight) -> bool:
-    """Whether every wavelength sees the same."""
+    """True where every wavelength sees the same."""
     return source.shares is None if isinstance(source, SplitLight) else bool(source.shape[-1] == 1)
 
 
@@ -219,10 +219,10 @@ def kept_response(view: View, phases: Phases | None, *, by_pixel: bool) -> Pixel
 def _uniform(view: View, *, by_pixel: bool) -> PixelResponse:
     """A field without structure: one tile stands for all."""
     tile, n = view.mosaic.indices, len(view.mosaic.channels)
-    own = (tile[..., None] == np.arange(n)).astype(float)
+    of_channel = (tile[..., None] == np.arange(n)).astype(float)
     share = sampling.crosstalk_share(view)
-    split = sampling.with_crosstalk(own[None], share, periodic=True).reshape(1, tile.size, n, 1)
-    weights = own.reshape(-1, n) / view.mosaic.counts
+    split = sampling.with_crosstalk(of_channel[None], share, periodic=True).reshape(1, tile.size, n, 1)
+    weights = of_channel.reshape(-1, n) / view.mosaic.counts
     if by_pixel and share and tile.size > n:
         return PixelResponse(split, split[..., 0], weights[None], weights[None] ** 2, by_channel=False)
     folded = np.einsum("uc,xukl->xckl", weights, split)
@@ -235,7 +235,7 @@ def _joined(parts: list[PixelResponse]) -> PixelResponse:
     if len(parts) == 1:
         return parts[0]
     arrays = ([part.light, part.uniform, part.readout, part.spread] for part in parts)
-    light, uniform, readout, spread = (np.concatenate(each) for each in zip(*arrays, strict=True))
+    light, uniform, readout, spread = (np.concatenate(values) for values in zip(*arrays, strict=True))
     return PixelResponse(light, uniform, readout, spread, parts[0].by_channel)
 
 
@@ -256,16 +256,16 @@ def _pixels(view: View, wavelength_nm: FloatArray, phases: Phases, *, by_pixel: 
     target, pixel, n = view.scenario.target, view.pixel, len(view.mosaic.channels)
     assert target is not None
     radius, half = sampling.radii_px(view, target)[0], pixel.fill_factor**0.5 / 2
-    seen, own, apart = _weights(view, phases)
+    seen, of_channel, apart = _weights(view, phases)
     share = sampling.crosstalk_share(view)
     spread = sampling.with_crosstalk(apart, share) if share else apart
     wanted = np.asarray((spread > 0).any(axis=3))
     profile = _profile(view, wavelength_nm)
     light = disc_image.light_on_pixels(seen, wanted, half, radius, profile, pixel.pitch_um)
     if by_pixel:
-        return _apart(light, own, apart, share)
+        return _apart(light, of_channel, apart, share)
     # What each channel's readout takes of the pixels of each channel: [cases, rows, columns, channels x channels].
-    taken = spread[..., :, None] * own[..., None, :]
+    taken = spread[..., :, None] * of_channel[..., None, :]
     shape = (len(apart), n, n)
     folded = light.folded(taken.reshape(*taken.shape[:3], n * n)).reshape(*shape, -1)
     weights = np.repeat(np.eye(n)[None], len(apart), axis=0)
@@ -284,11 +284,11 @@ def _weights(view: View, phases: Phases) -> tuple[sampling.Window, FloatArray, F
         weights = sampling.mean_weights(seen, half, readout, n)
     else:
         weights = sampling.center_weights(seen, phases.nearest_px - phases.center_px, mosaic)
-    own = (seen.channel[..., None] == np.arange(n)).astype(float)
-    return seen, own, weights[..., None] * own
+    of_channel = (seen.channel[..., None] == np.arange(n)).astype(float)
+    return seen, of_channel, weights[..., None] * of_channel
 
 
-def _apart(light: disc_image.PixelLight, own: FloatArray, apart: FloatArray, share: float) -> PixelResponse:
+def _apart(light: disc_image.PixelLight, of_channel: FloatArray, apart: FloatArray, share: float) -> PixelResponse:
     """The pixels one by one: those with a weight in any readout."""
     used = (apart > 0).any(axis=(0, 3))
     rows, columns = np.nonzero(used)
@@ -296,9 +296,9 @@ def _apart(light: disc_image.PixelLight, own: FloatArray, apart: FloatArray, sha
     if share:  # see `with_crosstalk`; a pixel at the border has no weight
         steps = ((-1, 0), (1, 0), (0, -1), (0, 1))
         taken += [(share / 4, rows + down, columns + right) for down, right in steps]
-    n = own.shape[2]
+    n = of_channel.shape[2]
     uniform = np.zeros((len(apart), rows.size, n))
-    pixels, channel = np.arange(rows.size), own.argmax(axis=2)
+    pixels, channel = np.arange(rows.size), of_channel.argmax(axis=2)
     for part, row, column in taken:
         uniform[:, pixels, channel[row, column]] += part
     parts = np.array([part for part, _, _ in taken])

@@ -30,7 +30,7 @@ class Choice:
 
 @dataclass(frozen=True)
 class Plan:
-    """How one scene is simulated: accuracy settings, and a choice for each effect.
+    """Plan of one scene's simulation: accuracy settings, and a choice for each effect.
 
     The bounds of what is left out sum to at most half the tolerance; the other half is that of the settings, whose
     error is measured (`sweep audit`).

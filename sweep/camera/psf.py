@@ -38,7 +38,7 @@ _NODES_PER_CYCLE = 12
 _BEYOND = 6
 """Nodes of the table below 0 and beyond the reach."""
 _RESIDUAL = 1e-10
-"""What the table leaves out of h(r) is less at each radius where it is computed, relative to a uniform field."""
+"""Functions that change h(r) by less at each of its samples are left out, relative to a uniform field."""
 _MOST_AT_ONCE = 2_000_000
 """Values of Bessel functions that are held at once."""
 
@@ -273,7 +273,7 @@ class DiscProfile:
         self._coefficients = np.ascontiguousarray(self._spline.c)  # by columns, from some versions of SciPy
 
     def order(self, width_um: float) -> int:
-        """Order of a Gauss-Legendre rule that integrates h over a width in micrometers, to 2e-8."""
+        """Order of a Gauss-Legendre rule for h over a width in micrometers: 2 for each of its finest periods, and 3."""
         return 3 + math.ceil(2 * self.highest_per_um * width_um)
 
     def at(self, r_um: FloatArray) -> FloatArray:

@@ -64,8 +64,8 @@ class NoisyReadout:
     `gaussian`: where its noise may be taken as Gaussian. No pixel is cut by full well or an end of the ADC, and read
     noise dithers each pixel (0.7 DN), or the deviation is at least 4 steps of the pixel that weighs most. In random
     pixels and pairs the error of Gaussians was then never less than 1 / 1.2 of the exact one, down to 1e-12
-    (`tests/test_confusion.py`): evidence, not a proof. `reach_dn`: no pixel moves the channel further from its mean,
-    but for 1e-15. `exposure_s`: ndarray[n_designs].
+    (`tests/metrics/test_confusion.py`): evidence, not a proof. `reach_dn`: no pixel moves the channel further from its
+    mean, but for 1e-15. `exposure_s`: ndarray[n_designs].
     """
 
     mean: FloatArray
@@ -88,14 +88,14 @@ def is_gaussian(variance: FloatArray, heaviest: FloatArray, cut: BoolArray, pixe
 
 
 def reach_dn(electrons: FloatArray, pixel: Pixel) -> FloatArray:
-    """How far a pixel's number is from its mean at most, but for 1e-15, DN: of the brightest of the last axis, kept."""
+    """Largest distance of a pixel's number from its mean, but for 1e-15, DN: of the brightest on the last axis."""
     reach_e = 9 * (np.sqrt(electrons) + pixel.prnu * electrons + pixel.read_noise_e) + 27
-    found = np.minimum(pixel.dn_per_e * reach_e + 1, float(pixel.full_scale_dn))
-    return np.asarray(found.max(axis=-1, keepdims=True), dtype=float)
+    reach = np.minimum(pixel.dn_per_e * reach_e + 1, float(pixel.full_scale_dn))
+    return np.asarray(reach.max(axis=-1, keepdims=True), dtype=float)
 
 
 class Readout:
-    """How a camera reads the elements of a pixel response. `by_channel`: whether each element is a channel already."""
+    """Readout of the elements of a pixel response. `by_channel`: each element is a channel already."""
 
     def __init__(self, view: View, response: PixelResponse) -> None:
         self.view = view
@@ -142,15 +142,15 @@ class Readout:
         return self._line(self.view.computes("saturation"))
 
     def variance_dn(self, electrons: FloatArray) -> FloatArray:
-        """Variance of the units' digital numbers, DN^2, with their rounding."""
+        """Variance of the elements' digital numbers, DN^2, with their rounding."""
         return table.variance(electrons, self.pixel)
 
     def folded(self, dn: FloatArray) -> FloatArray:
-        """Value of each channel from those of the units: the last axis n_units -> n_channels."""
+        """Value of each channel from those of the elements: the last axis n_elements -> n_channels."""
         return dn if self.by_channel else self._weighed(dn, self._weights)
 
     def spread(self, variance: FloatArray) -> FloatArray:
-        """Variance of each channel from those of the units: the last axis n_units -> n_channels."""
+        """Variance of each channel from those of the elements: the last axis n_elements -> n_channels."""
         return self._weighed(variance, self._spread)
 
     def with_noise(self, electrons: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray, FloatArray]:
@@ -187,7 +187,7 @@ class Readout:
         return tuple(np.flatnonzero(channels == at) for at in range(len(view.mosaic.channels)))
 
     def _weighed(self, values: FloatArray, weights: FloatArray) -> FloatArray:
-        """Sums over the units by their `weights`, ndarray[n_cases, n_units, n_channels]."""
+        """Sums over the elements by their `weights`, ndarray[n_cases, n_elements, n_channels]."""
         repeats = values.shape[1] // self.n_cases
         return np.asarray(values @ np.repeat(weights, repeats, axis=0))
 

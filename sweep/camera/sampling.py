@@ -48,7 +48,7 @@ def radii_px(view: View, target: Target) -> tuple[float, float]:
 
 
 def reach_px(view: View, target: Target) -> float:
-    """How far from the light's center a pixel may have a weight in the readout, along a row or column."""
+    """Largest distance from the light's center of a pixel with a weight, along a row or column."""
     if target.readout == "mean":
         return radii_px(view, target)[1] + 0.5
     return float(max(view.mosaic.indices.shape))

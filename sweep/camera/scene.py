@@ -171,7 +171,7 @@ class Scene(Section):
 
     @property
     def any_phase(self) -> bool:
-        """Whether the light may fall anywhere on the mosaic."""
+        """True where the light may fall anywhere on the mosaic."""
         return self.target is not None and self.target.phase_px == "any"
 
     @property

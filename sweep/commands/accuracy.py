@@ -110,7 +110,7 @@ def measure_accuracy(
 def _settings_of(
     view: View, first: bool, settings: Mapping[str, Sequence[Any]], presets: Sequence[str]
 ) -> Iterator[Setting]:
-    """The presets, and those single settings that can change anything in a scene; `first`: whether it is the first."""
+    """The presets, and those single settings that can change anything in a scene; `first`: it is the first."""
     for name in dict.fromkeys((*presets, _REFERENCE)):
         yield Setting(PRESET, name, PRESETS[name])
     drive = view.scenario.drive

@@ -117,7 +117,7 @@ def _measure(view: View, space: Space, numbers: IndexArray, dense: Space | None,
 
 
 def _repeated(compute: Callable[[], FloatArray]) -> tuple[FloatArray, float]:
-    """What is computed, and the shortest time of three that it takes, s; what takes long is computed once."""
+    """Result of a computation, and its time, s: the shortest of three, the only one of a long computation."""
     times: list[float] = []
     while len(times) < _REPEATS and sum(times) < _SHORT_S:
         started = time.perf_counter()
@@ -127,7 +127,7 @@ def _repeated(compute: Callable[[], FloatArray]) -> tuple[FloatArray, float]:
 
 
 def _that_fit(model: ForwardModel, space: Space, numbers: IndexArray, seconds: float) -> IndexArray:
-    """Those of the designs, one at least, that are computed in some seconds, as the first of them tells."""
+    """Designs, one at least, that are computed in some seconds, going by the time of the first one."""
     started = time.perf_counter()
     _csds(model, _block(model.view, space, numbers[:1]))
     return numbers[: max(1, int(seconds / (time.perf_counter() - started)))]

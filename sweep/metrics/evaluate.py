@@ -75,19 +75,19 @@ def _by_phase(model: ForwardModel, cases: Columns, n_places: int) -> FloatArray:
     `cases`: ndarray[n_cases x n_moments, n_designs] by column.
     """
     names = [csd_name(pair) for pair in class_pairs(model.view.lights.classes)]
-    each = np.stack([cases[name] for name in names])  # [n_pairs, n_cases x n_moments, n_designs]
-    return np.moveaxis(each.reshape(len(names), n_places, -1, each.shape[-1]).min(axis=2), -1, 0)
+    distances = np.stack([cases[name] for name in names])  # [n_pairs, n_cases x n_moments, n_designs]
+    return np.moveaxis(distances.reshape(len(names), n_places, -1, distances.shape[-1]).min(axis=2), -1, 0)
 
 
 def _csds(model: ForwardModel, curves: FloatArray) -> FloatArray:
     """CSDs of one design at each phase, the smallest over the moments, ndarray[n_pairs, n_phases]."""
     response = model.read(curves)[0]
-    cases = {csd_name(pair): each[:, None] for pair, each in separations(response[0], model.view.members).items()}
+    cases = {csd_name(pair): dn[:, None] for pair, dn in separations(response[0], model.view.members).items()}
     return np.asarray(_by_phase(model, cases, model.n_cases)[0])
 
 
 def _bends_over_pulse(view: View) -> bool:
-    """Whether CSDs may be smallest at any moment of a pulse: behind a readout that clips, and has no steps."""
+    """True where a CSD may be smallest at any moment of a pulse: behind a readout that clips, and has no steps."""
     drive, steps = view.scenario.drive, view.scenario.noise is None and view.computes("quantization")
     return drive is not None and view.computes("flicker") and not view.linear and not steps
 
@@ -222,7 +222,7 @@ def _merged(which: BoolArray, some: FloatArray, others: FloatArray) -> FloatArra
 def _distances_along(model: ForwardModel, changing: Changing, extra: WholeReadout) -> tuple[Columns, Columns]:
     """CSDs in each case, and the columns, of designs that differ in one channel alone."""
     by_edges = separations_by_edges(changing, model.view.members)
-    each = (
+    distances = (
         [by_edges]
         if by_edges is not None
         else [
@@ -230,7 +230,7 @@ def _distances_along(model: ForwardModel, changing: Changing, extra: WholeReadou
             for case, fixed in enumerate(changing.fixed)
         ]
     )
-    cases = {csd_name(pair): np.stack([case[pair] for case in each]) for pair in each[0]}
+    cases = {csd_name(pair): np.stack([case[pair] for case in distances]) for pair in distances[0]}
     n = int(changing.which.sum())
     columns = over_cases(model, cases) | {EXPOSURE: np.full(n, changing.exposure_s)}
     return cases, columns | extra.of(n, changing.whole_of)

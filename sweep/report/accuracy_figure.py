@@ -109,7 +109,7 @@ def _mark_presets(axes: Axes, presets: pd.DataFrame) -> None:
 
 
 def _add_legend(axes: Axes, settings: list[str]) -> None:
-    """What the markers stand for, beside the last panel of the first row."""
+    """Legend of the markers, beside the last panel of the first row."""
     axes.plot([], [], label="preset", **_STAR)
     for number, setting in enumerate(settings):
         axes.plot([], [], label=setting, **_style(number))

@@ -1,4 +1,4 @@
-"""How each scene was simulated: effects computed and left out, the bound on what that changes, and measured errors."""
+"""Simulation of each scene: effects computed and left out, the bound on what that changes, and measured errors."""
 
 from __future__ import annotations
 
@@ -42,24 +42,24 @@ def scene_groups(output: Output) -> list[SceneGroup]:
     groups: dict[tuple[str, ...], list[str]] = {}
     for name, plan in plans.items():
         groups.setdefault(tuple(plan.computed), []).append(name)
-    found = []
+    result = []
     for names in groups.values():
-        own = [plans[name] for name in names]
+        alike = [plans[name] for name in names]
         effects = (
             max(choices, key=lambda each: each.bound_dn or 0.0)
-            for choices in zip(*(plan.effects for plan in own), strict=True)
+            for choices in zip(*(plan.effects for plan in alike), strict=True)
         )
-        bound_dn = max(plan.error_bound_dn for plan in own)
-        realized_dn, tolerance_dn = _realized(output, names), own[0].tolerance_dn
-        found.append(SceneGroup(tuple(names), tuple(effects), bound_dn, realized_dn, tolerance_dn))
-    return found
+        bound_dn = max(plan.error_bound_dn for plan in alike)
+        realized_dn, tolerance_dn = _realized(output, names), alike[0].tolerance_dn
+        result.append(SceneGroup(tuple(names), tuple(effects), bound_dn, realized_dn, tolerance_dn))
+    return result
 
 
 def _realized(output: Output, names: list[str]) -> float | None:
     if output.audited is None:
         return None
-    own = output.audited[output.audited["scenario"].isin(names)]
-    return float(own["realized_dn"].max()) if len(own) else None
+    audited = output.audited[output.audited["scenario"].isin(names)]
+    return float(audited["realized_dn"].max()) if len(audited) else None
 
 
 def scene_table(groups: Sequence[SceneGroup]) -> pd.DataFrame:

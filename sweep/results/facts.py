@@ -32,7 +32,7 @@ class SensorOrigin(Origin):
 
 
 class EffectFacts(_Facts):
-    """Whether an effect was computed, and why; a bound on what it changes in a CSD, DN, None where none is known."""
+    """An effect, computed or not, and why; a bound on what it changes in a CSD, DN, None where none is known."""
 
     effect: str
     computed: bool
@@ -41,7 +41,7 @@ class EffectFacts(_Facts):
 
 
 class PlanFacts(_Facts):
-    """How a scene was simulated; `error_bound_dn`: by how much all that was left out changes a CSD at most."""
+    """Simulation of a scene; `error_bound_dn`: all that was left out changes a CSD by no more."""
 
     key: str
     tolerance_dn: float
@@ -67,7 +67,7 @@ class CheckFacts(_Facts):
 
     @property
     def passed(self) -> bool:
-        """Whether no difference is larger than allowed; rounding of the arithmetic is not counted."""
+        """True where no difference is larger than allowed; rounding of the arithmetic is not counted."""
         return self.largest_dn <= self.allowed_dn * (1 + 1e-9) + 1e-9
 
     @property

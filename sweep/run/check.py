@@ -60,9 +60,9 @@ def compared_rows(study: Study, rows: Sequence[Row]) -> Iterator[list[dict[str, 
     for row in rows:
         space = row_space(study, row)
         groups.setdefault((id(space), row["scenario"]), (space, []))[1].append(row)
-    for (_, scenario), (space, own) in groups.items():
-        for start in range(0, len(own), _AT_ONCE):
-            yield _compared(study, space, scenario, own[start : start + _AT_ONCE])
+    for (_, scenario), (space, group) in groups.items():
+        for start in range(0, len(group), _AT_ONCE):
+            yield _compared(study, space, scenario, group[start : start + _AT_ONCE])
 
 
 def _compared(study: Study, space: Space, scenario: str, rows: Sequence[Row]) -> list[dict[str, Any]]:
@@ -75,12 +75,12 @@ def _compared(study: Study, space: Space, scenario: str, rows: Sequence[Row]) ->
         # A column that the scene does not have is missing in both; one that is missing in one of them is a fault.
         both_missing = np.isnan(kept) & np.isnan(values)
         differences.append(np.nan_to_num(np.where(both_missing, 0.0, np.abs(values - kept)), nan=np.inf))
-    each, names = np.stack(differences), list(exact)
+    realized, names = np.stack(differences), list(exact)
     allowed = allowed_dn(view, study.plans[scenario].tolerance_dn if study.plans else study.section.tolerance_dn)
     return [
         {key: row[key] for key in ("design_id", "filter_id", "scenario", "plan")}
-        | {"allowed_dn": allowed, "realized_dn": float(each[at, index]), "quantity": names[at]}
-        for index, (row, at) in enumerate(zip(rows, each.argmax(axis=0), strict=True))
+        | {"allowed_dn": allowed, "realized_dn": float(realized[at, index]), "quantity": names[at]}
+        for index, (row, at) in enumerate(zip(rows, realized.argmax(axis=0), strict=True))
     ]
 
 
@@ -90,8 +90,8 @@ def _at_reference(study: Study, space: Space, view: View, points: FloatArray) ->
     nominal = evaluate(model, space.curves(points, study.grid.size))
     asked = [quantity for quantity in study.quantities.values() if quantity.promised]
     worst = [quantity for quantity in asked if quantity.extreme == WORST_CASE]
-    found = {quantity.name: nominal[quantity.name] for quantity in asked if quantity not in worst}
-    return found | (worst_cases(space, model, points, nominal, worst, study.tolerance) if worst else {})
+    csds = {quantity.name: nominal[quantity.name] for quantity in asked if quantity not in worst}
+    return csds | (worst_cases(space, model, points, nominal, worst, study.tolerance) if worst else {})
 
 
 def check_run(study: Study, results: Path, seconds: float, crew: Workers) -> tuple[CheckFacts | None, list[str]]:
