@@ -43,7 +43,7 @@ PRESETS: dict[str, Accuracy] = {
     "fast": Accuracy(finest_phase_px=0.0, field_positions=9, rays=16, psf_step_nm=10.0, pwm_moments=5),
     "standard": STANDARD,
     "reference": Accuracy(
-        phases_per_px=64, finest_phase_px=1 / 512, field_positions=129, psf_step_nm=1e-3, pwm_moments=129
+        phases_per_px=64, finest_phase_px=1 / 512, field_positions=129, psf_step_nm=1e-3, pwm_moments=17
     ),
 }
 REFERENCE = PRESETS["reference"]

@@ -152,42 +152,50 @@ def _add_four(shares: FloatArray, coefficients: FloatArray, result: FloatArray) 
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
-def sums_of_cubic(
-    x: FloatArray, weights: FloatArray, knots: FloatArray, coefficients: FloatArray, out: FloatArray
+def means_of_cubic(
+    places: FloatArray,
+    nodes: FloatArray,
+    weights: FloatArray,
+    knots: FloatArray,
+    coefficients: FloatArray,
+    out: FloatArray,
 ) -> None:
-    """Sum a spline's values over the last axis of `x` by weights.
+    """Means over squares of a spline in the distance from the origin, by one rule along both sides.
 
     The weights go to the spline's coefficients first, so that no more is done for each function than one product. That
     takes less than a third of the time of SciPy's `BSpline.design_matrix` and a sixth of that of calling the spline.
-    Each row is summed by itself: the same values in whatever company it is asked for.
+    Each square is summed by itself: the same values in whatever company it is asked for.
 
     Parameters
     ----------
-    x : ndarray[n, m]
-        Where the spline is evaluated. Beyond the end the last piece goes on.
-    weights : ndarray[m]
-        The same for each row.
+    places : ndarray[n, 2]
+        Centers of the squares.
+    nodes, weights : ndarray[m]
+        Nodes from the center, and weights that add up to 1.
     knots : ndarray[n_coefficients + 4]
         Equidistant but for the second and the last but one, which a not-a-knot spline leaves out.
     coefficients : ndarray[n_coefficients, n_values]
-        Of the cubic B-splines.
+        Of the cubic B-splines. Beyond the end the last piece goes on.
     out : ndarray[n, n_values]
-        What the sums are put into.
+        What the means are put into.
     """
     last, per_unit = len(coefficients) - 1, 1 / (knots[5] - knots[4])
     four, folded = np.empty(4), np.zeros(len(coefficients))
-    for row in range(len(x)):
+    for place in range(len(places)):
         low, high = last, 3
-        for at in range(weights.size):
-            first = min(max(int((x[row, at] - knots[0]) * per_unit) + 2, 3), last)
-            if 6 <= first <= last - 3:
-                _inner_basis((x[row, at] - knots[first]) * per_unit, four)
-            else:
-                _basis(x[row, at], first, knots, four)
-            for part in range(4):
-                folded[first - 3 + part] += weights[at] * four[part]
-            low, high = min(low, first), max(high, first)
-        out[row] = 0.0
+        for i in range(nodes.size):
+            squared = (places[place, 0] + nodes[i]) ** 2
+            for j in range(nodes.size):
+                x = math.sqrt(squared + (places[place, 1] + nodes[j]) ** 2)
+                first = min(max(int((x - knots[0]) * per_unit) + 2, 3), last)
+                if 6 <= first <= last - 3:
+                    _inner_basis((x - knots[first]) * per_unit, four)
+                else:
+                    _basis(x, first, knots, four)
+                for part in range(4):
+                    folded[first - 3 + part] += weights[i] * weights[j] * four[part]
+                low, high = min(low, first), max(high, first)
+        out[place] = 0.0
         for node in range(low - 3, high + 1, 4):
-            _add_four(folded[node : node + 4], coefficients[node : node + 4], out[row])
+            _add_four(folded[node : node + 4], coefficients[node : node + 4], out[place])
         folded[low - 3 : high + 1] = 0.0

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.cache import Cache
 from ..base.types import BoolArray, FloatArray, IndexArray
-from .psf import DiscProfile, gauss_legendre
+from .psf import DiscProfile
 
 if TYPE_CHECKING:
     from .sampling import Window
 
-_PIXELS_AT_ONCE = 200
-_MOST_KEPT = 6_000_000
-"""Most values of pixels that are kept."""
+_LATTICE = 100
+"""Places of the light's center from which on the pixels' light is kept: all CFAs whose tiles are of one size ask for
+that of a lattice of phases."""
+_LATTICES: Cache[tuple[DiscProfile, float, bytes], FloatArray] = Cache(4)
 
 
 def covered(x: FloatArray, y: FloatArray, half: float, radius: float) -> FloatArray:
@@ -150,82 +148,10 @@ def light_on_pixels(
     if profile is None:
         values, shares = covered(places_px[:, 0], places_px[:, 1], half_px, radius_px)[:, None], None
     else:
-        values, shares = _kept_means(places_px, half_px, profile, pitch_um), profile.shares
+        places_um, half_um, shares = places_px * pitch_um, half_px * pitch_um, profile.shares
+        if len(wanted) < _LATTICE:
+            values = profile.pixel_means(places_um, half_um)
+        else:
+            key = profile, half_um, places_um.tobytes()
+            values = _LATTICES.get(key, lambda: profile.pixel_means(places_um, half_um))
     return PixelLight(np.vstack([values, np.zeros((1, values.shape[1]))]), place, shares)
-
-
-class _KnownMeans:
-    """Means of one profile over pixels that were computed before.
-
-    Sampling phases on a lattice, and those between them, see many pixels at the same places, and so do CFAs whose
-    tiles are of one size. Threads take turns.
-    """
-
-    def __init__(self, n_functions: int) -> None:
-        self._places = np.empty(0, dtype=complex)  # ascending, with the row of each
-        self._rows = np.empty(0, dtype=np.intp)
-        self._means = np.empty((256, n_functions))
-        self._one_at_a_time = threading.Lock()
-
-    def of(self, places_px: FloatArray, make: Callable[[FloatArray], FloatArray]) -> FloatArray:
-        """Means at places, ndarray[n, 2] -> ndarray[n, n_functions]; `make` computes those that are not known."""
-        wanted = places_px @ np.array([1, 1j])
-        with self._one_at_a_time:
-            known = self._is_known(wanted)
-            means = np.empty((len(wanted), self._means.shape[1]))
-            means[known] = self._means[self._rows[np.searchsorted(self._places, wanted[known])]]
-            if known.all():
-                return means
-            means[~known] = make(places_px[~known])
-            if (self._places.size + len(wanted) - known.sum()) * means.shape[1] <= _MOST_KEPT:
-                self._add(wanted[~known], means[~known])
-            return means
-
-    def _is_known(self, places: NDArray[np.complex128]) -> BoolArray:
-        at = np.searchsorted(self._places, places)
-        known = at < self._places.size
-        known[known] = self._places[at[known]] == places[known]
-        return known
-
-    def _add(self, places: NDArray[np.complex128], means: FloatArray) -> None:
-        used, order = self._places.size, np.argsort(places)
-        if used + len(means) > len(self._means):
-            more = np.empty((max(len(self._means), len(means)), self._means.shape[1]))
-            self._means = np.concatenate([self._means, more])
-        self._means[used : used + len(means)] = means
-        at = np.searchsorted(self._places, places[order])
-        self._places = np.insert(self._places, at, places[order])
-        self._rows = np.insert(self._rows, at, used + order)
-
-
-_MEANS: Cache[tuple[DiscProfile, float], _KnownMeans] = Cache(4)
-
-
-def _kept_means(places_px: FloatArray, half_px: float, profile: DiscProfile, pitch_um: float) -> FloatArray:
-    """`_pixel_means`, of which the latest are kept."""
-    known = _MEANS.get((profile, half_px * pitch_um), lambda: _KnownMeans(len(profile.shares)))
-    return known.of(places_px, lambda new: _pixel_means(new, half_px, profile, pitch_um))
-
-
-def _pixel_means(places_px: FloatArray, half_px: float, profile: DiscProfile, pitch_um: float) -> FloatArray:
-    """Means of the profile's functions over pixels, by a Gauss-Legendre rule along each side.
-
-    Parameters
-    ----------
-    places_px : ndarray[n, 2]
-        Centers of the pixels from the disc's center, pixels.
-
-    Returns
-    -------
-    ndarray[n, n_functions]
-    """
-    nodes, weights = gauss_legendre(profile.order(2 * half_px * pitch_um))
-    u, v = (offsets.ravel() * half_px for offsets in np.meshgrid(nodes, nodes))
-    pixel_weights = np.outer(weights, weights).ravel() / 4
-    means = np.empty((len(places_px), len(profile.shares)))
-    for start in range(0, len(places_px), _PIXELS_AT_ONCE):
-        block = slice(start, start + _PIXELS_AT_ONCE)
-        x, y = places_px[block].T
-        r_um = np.sqrt((x[:, None] + u) ** 2 + (y[:, None] + v) ** 2) * pitch_um
-        means[block] = profile.sums(r_um, pixel_weights)
-    return means

@@ -1,8 +1,8 @@
 """Sampling phases: where the light's center falls on the mosaic.
 
 A scene names a phase, or asks for the worst of `any`. Then a lattice of phases over the tile is computed, those that
-see the same by symmetry once, and the worst of them are refined: neighbors at half the step are compared, from the
-lattice's own step down to the finest one.
+see the same by symmetry once. For CSDs it is four times as fine, and its worst phases are refined: neighbors at half
+the step are compared, down to the finest one.
 """
 
 from __future__ import annotations
@@ -19,9 +19,12 @@ from .view import View
 
 MOST_PHASES = 1024
 """Phases of a lattice on a tile, at most."""
-_STARTS, _NONLINEAR_STARTS, _FINE_PX = 3, 6, 1 / 16
-"""Phases from which each extreme is refined, behind a linear readout and a nonlinear one; half as many at each step
-that is finer."""
+_FINER, _MOST_FINE = 4, 1200
+"""How much finer the lattice is from which extremes are refined, and of how many different phases it is at most."""
+_STARTS = 2
+"""Phases from which each extreme is refined at the first step, then one."""
+_FLAT_DN = 0.02
+"""A start whose neighbors differ from it by less is not refined: nothing around it is lower by more than about half."""
 _NEIGHBORS = np.array([[x, y] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)])
 
 
@@ -120,8 +123,19 @@ def read_at(target: Target, centers_px: FloatArray) -> Phases:
     return result
 
 
+def fine_lattice(view: View) -> tuple[Phases, float]:
+    """Different phases of the lattice from which extremes are refined, and its step, pixels."""
+    target, steps = view.scenario.target, _FINER * view.accuracy.phase_steps_per_px
+    assert target is not None
+    while True:
+        phases = different_phases(view, read_at(target, lattice_px(view.mosaic, steps)))[0]
+        if len(phases) <= _MOST_FINE or steps <= view.accuracy.phase_steps_per_px:
+            return phases, 1 / steps
+        steps //= 2
+
+
 def refined_minima(
-    view: View, lattice: Phases, values: FloatArray, evaluate: Callable[[Phases], FloatArray]
+    view: View, lattice: Phases, step_px: float, values: FloatArray, evaluate: Callable[[Phases], FloatArray]
 ) -> tuple[FloatArray, Phases]:
     """Smallest values over all phases, ndarray[n_values], and where, by refinement of the smallest ones of a lattice.
 
@@ -135,25 +149,27 @@ def refined_minima(
     view : View
         Scene and accuracy.
     lattice : Phases
-        The phases that are known.
+        The different phases that are known.
+    step_px : float
+        Their distance along rows and columns, pixels.
     values : ndarray[n_values, n_lattice]
         Functions of the phase at these.
     evaluate : callable
         From phases to the values there, ndarray[n_values, n_phases].
     """
-    target, finest = view.scenario.target, view.accuracy.finest_phase_px
-    step = 0.5 / view.accuracy.phase_steps_per_px
-    if target is None or not finest or step < finest:
-        return values.min(axis=1), lattice.subset(values.argmin(axis=1))
-    first = np.unique(different_phases(view, lattice)[1], return_index=True)[1]  # mirrored phases are no other starts
-    known = dict(zip(lattice.subset(first).keys, values[:, first].T, strict=True))
+    target, finest, n_starts = view.scenario.target, view.accuracy.finest_phase_px, _STARTS
+    assert target is not None
+    known = dict(zip(lattice.keys, values.T, strict=True))
     period = np.array(view.mosaic.indices.shape[::-1])
-    n_starts = _STARTS if view.linear else _NONLINEAR_STARTS
+    step = step_px / 2
     while step >= finest:
         places, so_far = np.array(list(known))[:, :2], np.stack(list(known.values()), axis=1)
         starts = np.stack([_apart(places, row, n_starts, 2 * step, period) for row in so_far])
         centers, at_start = places[starts], np.take_along_axis(so_far, starts, axis=1)  # [n_values, n_starts, ...]
-        moving = np.ones(at_start.shape, dtype=bool)
+        apart_px = np.abs(np.mod(places[None, None] - centers[:, :, None] + period / 2, period) - period / 2)
+        known_around = (apart_px <= 2 * step * (1 + 1e-9)).all(axis=3)
+        off = np.abs(so_far[:, None] - at_start[..., None])
+        moving = np.max(off, axis=2, where=known_around, initial=0.0) > _FLAT_DN
         while moving.any():
             around = np.unique((centers[moving][:, None] + step * _NEIGHBORS).reshape(-1, 2), axis=0)
             read = read_at(target, around)
@@ -166,7 +182,8 @@ def refined_minima(
                 moving[value, start] = at_phases[value, lowest] < at_start[value, start]
                 if moving[value, start]:
                     at_start[value, start], centers[value, start] = at_phases[value, lowest], read.center_px[lowest]
-        step, n_starts = step / 2, max(1, n_starts // 2) if step <= _FINE_PX else n_starts
+            moving &= step < 2 * finest  # elsewhere the next step reaches as far
+        step, n_starts = step / 2, 1
     places, so_far = np.array(list(known)), np.stack(list(known.values()), axis=1)
     return so_far.min(axis=1), Phases(*np.split(places[so_far.argmin(axis=1)], 2, axis=1))
 

@@ -272,10 +272,6 @@ class DiscProfile:
         self._spline = make_interp_spline(table_um, table, k=3)
         self._coefficients = np.ascontiguousarray(self._spline.c)  # by columns, from some versions of SciPy
 
-    def order(self, width_um: float) -> int:
-        """Order of a Gauss-Legendre rule for h over a width in micrometers: 2 for each of its finest periods, and 3."""
-        return 3 + math.ceil(2 * self.highest_per_um * width_um)
-
     def at(self, r_um: FloatArray) -> FloatArray:
         """Image at distances from the disc's center.
 
@@ -291,25 +287,27 @@ class DiscProfile:
         """
         return np.asarray(self._spline(r_um) @ self.shares, dtype=float)
 
-    def sums(self, r_um: FloatArray, weights: FloatArray) -> FloatArray:
-        """Weighted sums of the functions of the radius.
+    def pixel_means(self, places_um: FloatArray, half_um: float) -> FloatArray:
+        """Means of the functions of the radius over square pixels, by a Gauss-Legendre rule along each side.
 
         Parameters
         ----------
-        r_um : ndarray[n, m]
-            Distances from the disc's center, micrometers, up to the table's reach.
-        weights : ndarray[m]
-            Weights of the sum over the last axis.
+        places_um : ndarray[n, 2]
+            Centers of the pixels from the disc's center, micrometers; within the table's reach.
+        half_um : float
+            Half of the side of a pixel's light-sensitive square, micrometers.
 
         Returns
         -------
         ndarray[n, n_functions]
-            Sums of each function; times `shares` those of h.
+            Means of each function; times `shares` those of h.
         """
-        from .compiled import sums_of_cubic  # noqa: PLC0415  (compiled: kept off the start-up path)
+        from .compiled import means_of_cubic  # noqa: PLC0415  (compiled: kept off the start-up path)
 
-        result = np.empty((len(r_um), len(self.shares)))
-        sums_of_cubic(r_um, weights, self._spline.t, self._coefficients, result)
+        nodes, weights = gauss_legendre(3 + math.ceil(4 * self.highest_per_um * half_um))  # 2 for each finest period
+        result = np.empty((len(places_um), len(self.shares)))
+        places_um = np.ascontiguousarray(places_um)
+        means_of_cubic(places_um, nodes * half_um, weights / 2, self._spline.t, self._coefficients, result)
         return result
 
 

@@ -10,7 +10,7 @@ from ..base.types import BoolArray, FloatArray
 from ..camera.electrons import Changing
 from ..camera.field import field_heights, refined_heights, view_at
 from ..camera.forward import ForwardModel, forward_model
-from ..camera.phases import Phases, refined_minima
+from ..camera.phases import Phases, fine_lattice, refined_minima
 from ..camera.view import View
 from ..curves.lights import class_pairs
 from ..designs.block import Block, CurveBlock
@@ -127,21 +127,24 @@ def _refine_moments(model: ForwardModel, block: Block, columns: Columns) -> None
                 columns[column][design] = min(columns[column][design], least)
 
 
-def _refine_phases(model: ForwardModel, block: Block, cases: Columns, columns: Columns) -> None:
+def _refine_phases(model: ForwardModel, block: Block, columns: Columns) -> None:
     """Put the extremes over all sampling phases into the columns, which hold those over the lattice."""
-    view, phases = model.view, model.phases
-    assert phases is not None
+    view = model.view
+    if not view.accuracy.finest_phase_px:
+        return
     names = [csd_name(pair) for pair in class_pairs(view.lights.classes)]
-    on_lattice = _by_phase(model, cases, len(phases))
-    for design in np.flatnonzero(np.isfinite(on_lattice).all(axis=(1, 2))):
+    lattice, step_px = fine_lattice(view)
+    on_lattice = model.at(lattice)
+    for design in np.flatnonzero(np.isfinite(columns[names[0]])):
         curves = block.some(slice(design, design + 1)).curves()
 
-        def both_ends(at: Phases, curves: FloatArray = curves) -> FloatArray:
-            apart = _csds(model.at(at), curves)
+        def both_ends(model: ForwardModel, curves: FloatArray = curves) -> FloatArray:
+            apart = _csds(model, curves)
             return np.concatenate([apart, -apart])
 
-        known = np.concatenate([on_lattice[design], -on_lattice[design]])
-        extremes, at = refined_minima(view, phases, known, both_ends)
+        extremes, at = refined_minima(
+            view, lattice, step_px, both_ends(on_lattice), lambda phases: both_ends(model.at(phases))
+        )
         smallest, largest = np.split(extremes, 2)
         for number, name in enumerate(names):
             columns[name][design] = smallest[number]
@@ -204,7 +207,7 @@ def evaluate(
             for along, rest in zip(*parts, strict=True)
         )
     if view.all_phases:
-        _refine_phases(model, block, cases, columns)
+        _refine_phases(model, block, columns)
     elif _bends_over_pulse(view) and view.scenario.field is None:
         _refine_moments(model, block, columns)
     if view.all_heights:

@@ -96,7 +96,7 @@ def over_cases(imager: ForwardModel, cases: Columns) -> Columns:
         if len(each) == 1:
             found |= {own: each[0].copy() for own in (name, best.get(name)) if own is not None}
             continue
-        moments = np.stack([quantities[name].worse(place) for place in np.split(each, imager.n_cases)])
+        moments = quantities[name].worse(np.swapaxes(each.reshape(imager.n_cases, -1, each.shape[1]), 0, 1))
         found[name] = quantities[name].worse(moments)
         if name in best:
             found[best[name]] = moments.max(axis=0)

@@ -97,14 +97,14 @@ def _at_reference(study: Study, space: Space, view: View, points: FloatArray) ->
 def check_run(study: Study, results: Path, seconds: float, crew: Workers) -> tuple[CheckFacts | None, list[str]]:
     """Compare a seeded sample of a run's rows with the reference, as many as fit into some seconds, at least one.
 
-    Every worker, which knows the scenes, takes a part of them. Returns the result, None where no row could be compared,
+    Every worker, which knows the scenes, takes a part of them and of the time, and at least one row. Returns the result, None where no row could be compared,
     and a warning for each row that could not.
     """
     sample = _sampled(study, results)
     parts = [sample[at :: crew.count] for at in range(crew.count)]
     rows: list[dict[str, Any]] = []
     warnings: list[str] = []
-    calls = (delayed(_checked, study, part, seconds) for part in parts if part)
+    calls = (delayed(_checked, study, part, seconds / crew.count) for part in parts if part)
     for compared, faults in crew(calls, killed=lambda _: ([], ["a worker was killed in the check of the run"])):
         rows += compared
         warnings += faults

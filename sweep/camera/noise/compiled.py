@@ -171,7 +171,6 @@ def poisson_means(electrons: FloatArray, start: int, values: FloatArray, varianc
 @njit(cache=True, nogil=True)
 def cubic_of_electrons(
     electrons: FloatArray,
-    prnu: float,
     last_e: float,
     nodes: FloatArray,
     coefficients: FloatArray,
@@ -179,16 +178,15 @@ def cubic_of_electrons(
     step: float,
     out: FloatArray,
 ) -> None:
-    """Values of a table at expected electrons, ndarray[n]: see `noisy.table.MomentTable`. Beyond `last_e` they stay."""
+    """Values of a table at expected electrons, ndarray[n]: see `table.MomentTable`. Beyond `last_e` they stay."""
     for i in range(electrons.size):
         held = electrons[i]
         held = last_e if held > last_e else held
         at = np.sqrt(held)
-        if prnu > 0:
-            at = math.asinh(prnu * at) / prnu
         if not at >= 0:  # NaN stays NaN
             out[i] = at
             continue
         k = piece[min(int(at / step), piece.size - 1)]
+        k += at >= nodes[k + 1] and k + 2 < nodes.size
         s, own = at - nodes[k], coefficients[k]
         out[i] = ((own[0] * s + own[1]) * s + own[2]) * s + own[3]

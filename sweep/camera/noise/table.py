@@ -15,11 +15,10 @@ _CUT = 1e-5
 
 
 class MomentTable(NamedTuple):
-    """Cubics over twice the standard deviation of the electrons: the root of their number, or with PRNU the inverse
-    hyperbolic sine of PRNU times that root, over PRNU.
+    """Cubics over the root of the expected electrons.
 
-    `nodes`: ndarray[n + 1], multiples of `moments.STEP`; `coefficients`: ndarray[3, n, 4], for each of
-    `moments.moments`; `piece`: which of them each step from 0 up is in.
+    `nodes`: ndarray[n + 1], at least `moments.STEP` apart; `coefficients`: ndarray[3, n, 4], for each of
+    `moments.moments`; `piece`: ndarray of the piece at each multiple of `moments.STEP` from 0 up.
     """
 
     nodes: FloatArray
@@ -45,8 +44,7 @@ def variance(electrons: FloatArray, pixel: Pixel) -> FloatArray:
 @lru_cache(maxsize=64)
 def unclipped_e(pixel: Pixel) -> tuple[float, float]:
     """From and up to how many electrons neither end takes more from the mean than 1e-5 of the noise."""
-    nodes = tables(pixel).nodes
-    electrons = (np.sinh(pixel.prnu * nodes) / pixel.prnu if pixel.prnu else nodes) ** 2
+    electrons = tables(pixel).nodes ** 2
     sigma = pixel.dn_per_e * np.sqrt(electrons + (pixel.prnu * electrons) ** 2 + pixel.read_noise_e**2)
     off = mean_unrounded(electrons, pixel) - pixel.dn_per_e * electrons - pixel.offset_dn
     kept = electrons[np.abs(off) <= _CUT * sigma + 1e-9]
@@ -59,23 +57,25 @@ def _looked_up(electrons: FloatArray, pixel: Pixel, row: int) -> FloatArray:
     table, found = tables(pixel), np.empty(electrons.shape)
     of = table.nodes, table.coefficients[row], table.piece
     last_e = moments.Ends.of(pixel).last_e
-    cubic_of_electrons(
-        np.ascontiguousarray(electrons, dtype=float).ravel(), pixel.prnu, last_e, *of, moments.STEP, found.ravel()
-    )
+    cubic_of_electrons(np.ascontiguousarray(electrons, dtype=float).ravel(), last_e, *of, moments.STEP, found.ravel())
     return found
 
 
 @lru_cache(maxsize=8)
 def tables(pixel: Pixel) -> MomentTable:
-    """That of a pixel."""
+    """Table of a pixel.
+
+    With PRNU the noise grows faster than the root of the electrons; the nodes lie further apart where it does:
+    equidistant in asinh(PRNU root) / PRNU, which is twice the standard deviation.
+    """
     from scipy.interpolate import CubicSpline  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
     if pixel.prnu:
         last = np.arcsinh(pixel.prnu * np.sqrt(moments.Ends.of(pixel).last_e)) / pixel.prnu
-        nodes = np.arange(0, last + 2 * moments.STEP, moments.STEP)
-        whole = CubicSpline(nodes, moments.moments((np.sinh(pixel.prnu * nodes) / pixel.prnu) ** 2, pixel), axis=1)
+        nodes = np.sinh(pixel.prnu * np.arange(0, last + 2 * moments.STEP, moments.STEP)) / pixel.prnu
+        whole = CubicSpline(nodes, moments.moments(nodes**2, pixel), axis=1)
     else:
         whole = moments.table_without_prnu(pixel)
-    steps = np.rint(np.diff(whole.x) / moments.STEP).astype(int)
-    piece = np.repeat(np.arange(steps.size), steps)
+    multiples = moments.STEP * np.arange(int(whole.x[-1] / moments.STEP) + 1)
+    piece = np.minimum(np.searchsorted(whole.x, multiples, side="right") - 1, whole.x.size - 2)
     return MomentTable(whole.x, np.ascontiguousarray(whole.c.T), piece)
