@@ -32,7 +32,7 @@ from scipy.special import j1
 from sweep.camera.forward import ForwardModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.scene import Scene
-from sweep.camera.view import View
+from sweep.camera.setup import Setup
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.block import CurveBlock, edges_of
@@ -62,17 +62,17 @@ def median_s(work: Callable[[], object], repeats: int = REPEATS) -> float:
     return statistics.median(times)
 
 
-def script(view: View, target: np.ndarray, points: np.ndarray) -> np.ndarray:
+def script(setup: Setup, target: np.ndarray, points: np.ndarray) -> np.ndarray:
     """All CSDs of stopbands, one design at a time, as an engineer writes it with NumPy and SciPy: ndarray[n, n_pairs].
 
     `target`: QE inside the band. What no design changes is computed once; edges are smooth steps; then a matrix-vector product, and `cdist`.
     """
-    (modified,) = view.modified
-    wave, base = view.grid.nodes_nm, view.qe[modified]
-    scale = 0.95 * 4095 * view.lights.photon_ratio / (view.qe.sum(axis=1).max() / wave.size)
-    signals = view.lights.photons * scale
-    fixed = np.floor(view.qe @ signals.T + 0.5)
-    members = list(view.members.values())
+    (modified,) = setup.camera.modified
+    wave, base = setup.camera.grid.nodes_nm, setup.camera.qe[modified]
+    scale = 0.95 * 4095 * setup.lights.photon_ratio / (setup.camera.qe.sum(axis=1).max() / wave.size)
+    signals = setup.lights.photons * scale
+    fixed = np.floor(setup.camera.qe @ signals.T + 0.5)
+    members = list(setup.members.values())
     pairs = [(a, b) for at, a in enumerate(members) for b in members[at + 1 :]]
     found = np.empty((len(points), len(pairs)))
     for row, (left, left_width, right, right_width, depth) in enumerate(points):
@@ -86,49 +86,49 @@ def script(view: View, target: np.ndarray, points: np.ndarray) -> np.ndarray:
     return found
 
 
-def colour_script(view: View, space: Space, points: np.ndarray) -> None:
+def colour_script(setup: Setup, space: Space, points: np.ndarray) -> None:
     """The same with colour-science's spectral distributions."""
-    waves = view.grid.nodes_nm
-    shape = colour.SpectralShape(waves[0], waves[-1], view.grid.step_nm)
-    lights = [colour.SpectralDistribution(photons, waves).align(shape) for photons in view.lights.photons]
+    waves = setup.camera.grid.nodes_nm
+    shape = colour.SpectralShape(waves[0], waves[-1], setup.camera.grid.step_nm)
+    lights = [colour.SpectralDistribution(photons, waves).align(shape) for photons in setup.lights.photons]
     for point in points:
-        qe = view.qe.copy()
-        qe[view.modified[0]] = space.curves(point[None], view.grid.size)[0, 0]
+        qe = setup.camera.qe.copy()
+        qe[setup.camera.modified[0]] = space.curves(point[None], setup.camera.grid.size)[0, 0]
         channels = [colour.SpectralDistribution(curve, waves).align(shape) for curve in qe]
         response = np.array([[(light * channel).values.sum() for channel in channels] for light in lights])
-        members = list(view.members.values())
+        members = list(setup.members.values())
         for i, first in enumerate(members):
             for second in members[i + 1 :]:
                 cdist(response[first], response[second]).min()
 
 
-def image_per_design(view: View, radius_um: float, pixels: int = 24, per_pixel: int = 8) -> None:
+def image_per_design(setup: Setup, radius_um: float, pixels: int = 24, per_pixel: int = 8) -> None:
     """A disc's image through an f/2 lens for every wavelength, sampled by the pixels, for one design."""
-    pitch = view.pixel.pitch_um
+    pitch = setup.camera.pixel.pitch_um
     x = (np.arange(pixels * per_pixel) + 0.5) / per_pixel * pitch - pixels * pitch / 2
     r = np.hypot(*np.meshgrid(x, x))
     disc = (r <= radius_um).astype(float)
-    light = np.empty((view.grid.size, pixels, pixels))
-    for index, wave_nm in enumerate(view.grid.nodes_nm):
+    light = np.empty((setup.camera.grid.size, pixels, pixels))
+    for index, wave_nm in enumerate(setup.camera.grid.nodes_nm):
         v = np.maximum(np.pi * r / (wave_nm * 1e-3 * 2.0), 1e-9)
         airy = (2 * j1(v) / v) ** 2
         image = fftconvolve(disc, airy / airy.sum(), mode="same")
         light[index] = image.reshape(pixels, per_pixel, pixels, per_pixel).mean(axis=(1, 3))
-    for qe in view.qe:
-        np.tensordot(view.lights.photons * qe, light, axes=1)
+    for qe in setup.camera.qe:
+        np.tensordot(setup.lights.photons * qe, light, axes=1)
 
 
-def swept(study: Study) -> tuple[Space, View]:
-    """The study's sweep and its view."""
+def swept(study: Study) -> tuple[Space, Setup]:
+    """The study's sweep and its setup."""
     space = next(s for s in study.spaces if s.kind == "sweep")
-    return space, study.view(space, "chart")
+    return space, study.setup(space, "chart")
 
 
 def distances(imager: ForwardModel, block: Any) -> None:
     """All CSDs of a block."""
     changing = imager.read_changing(block)
     assert changing is not None
-    members = imager.view.members
+    members = imager.setup.members
     if separations_by_edges(changing, members) is None:
         separations_along(changing.fixed[0], changing.channel, changing.values[:, 0], members)
 
@@ -136,13 +136,13 @@ def distances(imager: ForwardModel, block: Any) -> None:
 def rate_of(route: str, study: Study, seconds: float) -> float:
     """Designs per second of a route in this process, over some seconds."""
     keep_freed_memory()
-    space, view = swept(study)
-    imager, points = ForwardModel(view), space.points(0, BLOCK)
+    space, setup = swept(study)
+    imager, points = ForwardModel(setup), space.points(0, BLOCK)
     edges = edges_of(space, 0, BLOCK)
     assert edges is not None
     work: dict[str, Callable[[], object]] = {
         "separable": lambda: distances(imager, edges),
-        "dense": lambda: distances(imager, CurveBlock(space.curves(points, view.grid.size))),
+        "dense": lambda: distances(imager, CurveBlock(space.curves(points, setup.camera.grid.size))),
         "all_columns": lambda: evaluate(imager, edges),
     }
     work[route]()
@@ -170,27 +170,27 @@ def on_all_cores(study: Study, found: dict[str, Any], seconds: float = 2.0) -> N
 
 def kernels(study: Study, found: dict[str, Any]) -> None:
     """(a) Both routes against the scripts and the machine."""
-    space, view = swept(study)
+    space, setup = swept(study)
     points = space.points(0, BLOCK)
-    imager, members = ForwardModel(view), view.members
+    imager, members = ForwardModel(setup), setup.members
     edges = edges_of(space, 0, BLOCK)
     assert edges is not None
-    curves = space.curves(points, view.grid.size)
-    flat, table = curves[:, 0], np.ascontiguousarray(view.lights.photons.T)
+    curves = space.curves(points, setup.camera.grid.size)
+    flat, table = curves[:, 0], np.ascontiguousarray(setup.lights.photons.T)
     ours = evaluate(imager, edges)
     target = study.sensor.qe["G"]
-    theirs = script(view, target, points[:SCRIPTED]).T
+    theirs = script(setup, target, points[:SCRIPTED]).T
     for pair, distances_dn in zip(class_pairs(list(members)), theirs, strict=True):  # the same figures, or no yardstick
         np.testing.assert_allclose(ours[csd_name(pair)][:SCRIPTED], distances_dn, rtol=1e-12)
-    found["script_designs_per_s"] = SCRIPTED / median_s(lambda: script(view, target, points[:SCRIPTED]), 5)
-    found["colour_designs_per_s"] = 2 / median_s(lambda: colour_script(view, space, points[:2]), 1)
+    found["script_designs_per_s"] = SCRIPTED / median_s(lambda: script(setup, target, points[:SCRIPTED]), 5)
+    found["colour_designs_per_s"] = 2 / median_s(lambda: colour_script(setup, space, points[:2]), 1)
     found["separable_designs_per_s"] = BLOCK / median_s(lambda: distances(imager, edges), 30)
     found["dense_designs_per_s"] = BLOCK / median_s(
-        lambda: distances(imager, CurveBlock(space.curves(points, view.grid.size)))
+        lambda: distances(imager, CurveBlock(space.curves(points, setup.camera.grid.size)))
     )
     found["all_columns_designs_per_s"] = BLOCK / median_s(lambda: evaluate(imager, edges))
     bare = median_s(lambda: flat @ table, 30)
-    product = median_s(lambda: CurveBlock(curves).product(table, np.arange(view.grid.size)), 30)
+    product = median_s(lambda: CurveBlock(curves).product(table, np.arange(setup.camera.grid.size)), 30)
     found["dense_product_over_bare_product"] = bare / product
     found["dgemm_gflops"] = 2 * flat.shape[0] * flat.shape[1] * table.shape[1] / bare / 1e9
     large = np.ones(20_000_000)
@@ -240,15 +240,17 @@ def end_to_end(found: dict[str, Any]) -> None:
 
 def exponents(study: Study, found: dict[str, Any]) -> None:
     """(d) How the dense route's time grows, in blocks as a run has them: d log(time) / d log(size), from a fit."""
-    space, view = swept(study)
+    space, setup = swept(study)
 
-    def timed(made: View, designs: int) -> float:
+    def timed(made: Setup, designs: int) -> float:
         imager = ForwardModel(made)
         size = min(designs, BLOCK)
-        some = space.curves(space.points(0, size), view.grid.size)
-        if made.grid != view.grid:
-            some = np.array([[np.interp(made.grid.nodes_nm, view.grid.nodes_nm, c) for c in d] for d in some])
-        block = CurveBlock(np.repeat(some, len(made.modified), axis=1))
+        some = space.curves(space.points(0, size), setup.camera.grid.size)
+        if made.camera.grid != setup.camera.grid:
+            some = np.array(
+                [[np.interp(made.camera.grid.nodes_nm, setup.camera.grid.nodes_nm, c) for c in d] for d in some]
+            )
+        block = CurveBlock(np.repeat(some, len(made.camera.modified), axis=1))
 
         def all_blocks() -> None:
             for _ in range(designs // size):
@@ -256,37 +258,39 @@ def exponents(study: Study, found: dict[str, Any]) -> None:
 
         return median_s(all_blocks, 5)
 
-    def with_signals(n: int) -> View:
-        at = np.arange(n) % len(view.lights.names)
+    def with_signals(n: int) -> Setup:
+        at = np.arange(n) % len(setup.lights.names)
         kinds = ("green", "yellow", "orange", "red")
         types = tuple(kinds[k * 4 // n] for k in range(n))
         names = tuple(map(str, range(n)))
-        lights = Lights("many", names, types, view.lights.photons[at], view.lights.photon_ratio, "", True)
-        return replace(view, lights=lights)
+        lights = Lights("many", names, types, setup.lights.photons[at], setup.lights.photon_ratio, "", True)
+        return replace(setup, lights=lights)
 
-    def with_channels(n: int) -> View:
+    def with_channels(n: int) -> Setup:
         """A camera whose n channels are all modified."""
         names = tuple(f"N{k}" for k in range(n))
         mosaic = Mosaic.from_rows("many", [names])
-        qe = np.repeat(view.base_qe, n, axis=0)
-        return replace(view, mosaic=mosaic, qe=qe, modified=tuple(range(n)))
+        qe = np.repeat(setup.camera.base_qe, n, axis=0)
+        return setup.with_camera(mosaic=mosaic, qe=qe, modified=tuple(range(n)))
 
-    def with_wavelengths(n: int) -> View:
-        old = view.grid.nodes_nm
+    def with_wavelengths(n: int) -> Setup:
+        old = setup.camera.grid.nodes_nm
         grid = WavelengthGrid(start_nm=old[0], stop_nm=old[-1], step_nm=(old[-1] - old[0]) / (n - 1))
 
         def of(curves: np.ndarray) -> np.ndarray:
             return np.array([np.interp(grid.nodes_nm, old, curve) for curve in curves])
 
-        lights = replace(view.lights, photons=of(view.lights.photons))
-        return replace(view, grid=grid, qe=of(view.qe), clear_qe=of(view.clear_qe[None])[0], lights=lights)
+        lights = replace(setup.lights, photons=of(setup.lights.photons))
+        return setup.with_camera(
+            grid=grid, qe=of(setup.camera.qe), clear_qe=of(setup.camera.clear_qe[None])[0], lights=lights
+        )
 
     def exponent(sizes: tuple[int, ...], times: list[float]) -> float:
         return float(np.polyfit(np.log(sizes), np.log(times), 1)[0])
 
     designs, signals = (4096, 8192, 16384, 32768), (40, 80, 160, 320)
     channels, wavelengths = (1, 2, 3, 4), (151, 301, 601, 1201)
-    found["exponent_designs"] = exponent(designs, [timed(view, n) for n in designs])
+    found["exponent_designs"] = exponent(designs, [timed(setup, n) for n in designs])
     found["exponent_signals"] = exponent(signals, [timed(with_signals(n), 1024) for n in signals])
     found["exponent_channels"] = exponent(channels, [timed(with_channels(n), 1024) for n in channels])
     found["exponent_wavelengths"] = exponent(wavelengths, [timed(with_wavelengths(n), 1024) for n in wavelengths])
@@ -294,18 +298,18 @@ def exponents(study: Study, found: dict[str, Any]) -> None:
 
 def scene(study: Study, found: dict[str, Any]) -> None:
     """(f) A light at 250 m: each further design, and the first one with its kernels, against an image per design."""
-    space, view = swept(study)
+    space, setup = swept(study)
     far = {"target": {"distance_m": 250, "fov_deg": 30}, "optics": {"f_number": 2}}
-    view = replace(view, scenario=Scene.model_validate(far))
-    target = view.scenario.target
+    setup = replace(setup, scene=Scene.model_validate(far))
+    target = setup.scene.target
     assert target is not None
-    radius_um = target.object_resolution_px / 2 * view.pixel.pitch_um
-    curves = space.curves(space.points(0, 64), view.grid.size)
-    imager = ForwardModel(view)
-    direct = median_s(lambda: image_per_design(view, radius_um), 3)
+    radius_um = target.object_resolution_px / 2 * setup.camera.pixel.pitch_um
+    curves = space.curves(space.points(0, 64), setup.camera.grid.size)
+    imager = ForwardModel(setup)
+    direct = median_s(lambda: image_per_design(setup, radius_um), 3)
     found["scene_image_s"] = direct
     found["scene_design_over_image"] = direct / (median_s(lambda: evaluate(imager, curves)) / len(curves))
-    found["scene_first_design_over_image"] = direct / median_s(lambda: evaluate(ForwardModel(view), curves[:1]), 3)
+    found["scene_first_design_over_image"] = direct / median_s(lambda: evaluate(ForwardModel(setup), curves[:1]), 3)
 
 
 def drawn(found: dict[str, Any]) -> None:

@@ -47,10 +47,10 @@ class Counted:
             problem = self.problem
             x = problem.from_unit(u)[None]
             curves = problem.family.curves(x)
-            first, second = (problem.view.members[name] for name in problem.pairs["csd_yellow_red"])
-            csd = float(separation(smooth_response(problem.view, curves)[:, 0], first, second)[0])
+            first, second = (problem.setup.members[name] for name in problem.pairs["csd_yellow_red"])
+            csd = float(separation(smooth_response(problem.setup, curves)[:, 0], first, second)[0])
             own = np.maximum(problem.family.violation(x).max(axis=1), 0) / 100
-            amounts = designed_quantities(problem.view, curves)
+            amounts = designed_quantities(problem.setup, curves)
             violation = float(total_violation(amounts, problem.constraints, own)[0])
             self._seen = {key: (csd, violation)}
             self.log.append(csd if violation <= FEASIBLE else 0.0)

@@ -45,7 +45,7 @@ def designs_and_metrics() -> None:
     from sweep.vision.scenes import SHUFFLED, draw_scenes
 
     from .build import STUDY
-    from .vision.heads import NO_FILTERS, head_view, vision
+    from .vision.heads import NO_FILTERS, head_setup, vision
 
     dim, budget = "exposure: {kind: fixed, exposure_s: 0.002}", "starts: 4, max_evaluations: 200"
     assert dim in STUDY
@@ -63,9 +63,9 @@ def designs_and_metrics() -> None:
     for well_e, bits in ((100.0, 8), (1e5, 16)):
         pixel = Pixel(well_e=well_e, bits=bits, read_noise_e=1.0)
         confusion.errors(np.array([[[9.0, 9, 9], [12.0, 12, 20]]]), channels, pixel, types)
-    asked, view = vision(), head_view()
-    scenes = draw_scenes(asked, split_lamps(view.lights, asked, (1, 0))[TEST], SHUFFLED, 1, (5,))
-    HeadCamera(view, NO_FILTERS, asked).images(scenes)
+    asked, setup = vision(), head_setup()
+    scenes = draw_scenes(asked, split_lamps(setup.lights, asked, (1, 0))[TEST], SHUFFLED, 1, (5,))
+    HeadCamera(setup, NO_FILTERS, asked).images(scenes)
 
 
 WORKS: tuple[Callable[[], None], ...] = (phases_of_lights, designs_and_metrics)

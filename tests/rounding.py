@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from sweep.camera.forward import ForwardModel
-from sweep.camera.view import View
+from sweep.camera.setup import Setup
 
 EPS = float(np.finfo(float).eps)
 _FACTORS = 16
@@ -43,23 +43,23 @@ def rounding_of_distance(terms: int, magnitude: float, channels: int) -> float:
     return 2 * math.sqrt(channels) * rounding(terms + channels + 2, magnitude)
 
 
-def terms_of(view: View) -> int:
+def terms_of(setup: Setup) -> int:
     """Number of terms of a digital number: the wavelengths of each modified channel; the sum over the others is one."""
-    return max(1, len(view.modified)) * view.grid.size + _FACTORS
+    return max(1, len(setup.camera.modified)) * setup.camera.grid.size + _FACTORS
 
 
-def brightest_dn(view: View, curves: np.ndarray) -> float:
+def brightest_dn(setup: Setup, curves: np.ndarray) -> float:
     """The largest value that is read, DN, full scale or more: all its terms are positive, so it is their magnitude."""
-    return max(float(view.pixel.full_scale_dn), float(np.nanmax(np.abs(ForwardModel(view).read(curves)[0]))))
+    return max(float(setup.camera.pixel.full_scale_dn), float(np.nanmax(np.abs(ForwardModel(setup).read(curves)[0]))))
 
 
-def column_rounding(name: str, values: np.ndarray, view: View, magnitude_dn: float, more: int = 0) -> np.ndarray:
+def column_rounding(name: str, values: np.ndarray, setup: Setup, magnitude_dn: float, more: int = 0) -> np.ndarray:
     """Largest change of each value of a column of `evaluate`.
 
-    `magnitude_dn`: see `brightest_dn`; `more`: terms beside `terms_of` the view.
+    `magnitude_dn`: see `brightest_dn`; `more`: terms beside `terms_of` the setup.
     """
-    terms = terms_of(view) + more
-    distance = rounding_of_distance(terms, magnitude_dn, len(view.mosaic.channels))
+    terms = terms_of(setup) + more
+    distance = rounding_of_distance(terms, magnitude_dn, len(setup.camera.mosaic.channels))
     if "csd" in name:
         return np.full(np.shape(values), distance)
     if name.startswith(("cnr", "dprime")):  # a distance in units of its noise, which is rounded, too
@@ -74,22 +74,22 @@ def column_rounding(name: str, values: np.ndarray, view: View, magnitude_dn: flo
 
 
 def assert_within_rounding(
-    name: str, found: np.ndarray, expected: np.ndarray, view: View, magnitude_dn: float, more: int = 0
+    name: str, found: np.ndarray, expected: np.ndarray, setup: Setup, magnitude_dn: float, more: int = 0
 ) -> None:
     """Check that a column of one route or block is that of another one, up to `column_rounding`."""
     finite = np.isfinite(expected)
     np.testing.assert_array_equal(found[~finite], expected[~finite], err_msg=name)
     off = np.abs(found[finite] - expected[finite])
-    allowed = column_rounding(name, expected[finite], view, magnitude_dn, more)
+    allowed = column_rounding(name, expected[finite], setup, magnitude_dn, more)
     assert (off <= allowed).all(), f"{name}: up to {np.max(off - allowed)} more apart than by rounding"
 
 
 def assert_tables_within_rounding(
-    found: pd.DataFrame, expected: pd.DataFrame, view: View, magnitude_dn: float, given: Iterable[str] = ()
+    found: pd.DataFrame, expected: pd.DataFrame, setup: Setup, magnitude_dn: float, given: Iterable[str] = ()
 ) -> None:
     """Check rows of one scene: numbers up to `column_rounding`; words, flags, counts and what is `given` are equal."""
     computed = [name for name in expected.select_dtypes(float).columns if name not in set(given)]
     pd.testing.assert_frame_equal(found.drop(columns=computed), expected.drop(columns=computed), check_exact=True)
     assert list(found) == list(expected)
     for name in computed:
-        assert_within_rounding(name, found[name].to_numpy(), expected[name].to_numpy(), view, magnitude_dn)
+        assert_within_rounding(name, found[name].to_numpy(), expected[name].to_numpy(), setup, magnitude_dn)

@@ -33,11 +33,12 @@ import pandas as pd
 from scipy.optimize import least_squares
 
 import sweep
+from sweep.camera.camera import Camera
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene
 from sweep.camera.sensor import ar0820_sensor
-from sweep.camera.view import View
+from sweep.camera.setup import Setup
 from sweep.curves import builtin
 from sweep.curves.builtin.surrogate import SurrogateParameters, parameter_tree
 from sweep.curves.builtin.tl16 import SIGNAL_TYPES, tl16
@@ -136,11 +137,11 @@ def figures(parameters, rows):
             base, modified = {"N": "Y"}, (mosaic.channels.index("N"),)
             curves = Stopband(GRID.nodes_nm, sensor.qe["Y"], sensor.qe["G"]).curves(edges_of(parameters, [row]))
         qe = sensor.mosaic_qe(mosaic, base)
-        view = View(GRID, mosaic, qe, modified, sensor.qe["C"], lights, Pixel(), Scene())
-        distances = separations(smooth_response(view, curves)[:, 0], lights.members)
+        setup = Setup(Camera(GRID, mosaic, qe, modified, sensor.qe["C"], Pixel()), lights, Scene())
+        distances = separations(smooth_response(setup, curves)[:, 0], lights.members)
         found[row] = {csd_name(pair): float(value[0]) for pair, value in distances.items()}
         if filtered:
-            found[row]["sensitivity"] = float(designed_quantities(view, curves)["sensitivity"][0])
+            found[row]["sensitivity"] = float(designed_quantities(setup, curves)["sensitivity"][0])
     return found
 
 

@@ -15,13 +15,13 @@ class Accuracy(Section):
     """Numerical settings of the simulation; `make accuracy` measures what each costs and which error it leaves.
 
     `phases_per_px`: sampling phases of a light that may fall anywhere, on a square lattice in each pixel of the tile;
-    phases that see the same by symmetry are computed once. `finest_phase_px`: the worst lattice phases are refined
-    down to this step, 0: not at all. `field_positions`: image heights from the middle of the sensor to its corner,
-    where all of them count; the worst are refined, too, unless `finest_phase_px` is 0. `rays`: of the lens's cone that
-    an interference filter sees, null: the integral over all of them. `psf_step_nm`: wavelengths at which the point
-    spread function is computed, linear in between; a grid that is coarser is not refined. `pwm_moments`: moments of a
-    pulse behind a nonlinear readout (behind a linear one its two ends are the extremes). `single_precision`: of the
-    product of filters and light.
+    phases that see the same by symmetry are computed once. `finest_phase_px`: CSDs are computed on a lattice four times
+    as fine, whose worst phases are refined down to this step; 0: on the lattice alone. `field_positions`: image heights
+    from the middle of the sensor to its corner, where all of them count; the worst are refined, too, unless
+    `finest_phase_px` is 0. `rays`: of the lens's cone that an interference filter sees, null: the integral over all of
+    them. `psf_step_nm`: wavelengths at which the point spread function is computed, linear in between; a grid that is
+    coarser is not refined. `pwm_moments`: moments of a pulse behind a nonlinear readout (behind a linear one its two
+    ends are the extremes). `single_precision`: of the product of filters and light.
     """
 
     phases_per_px: Literal[1, 4, 16, 64] = 16

@@ -28,7 +28,7 @@ import numpy as np
 from ..base.cache import Cache
 from ..base.types import FloatArray, IndexArray
 from .scene import Scene
-from .view import View
+from .setup import Setup
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -188,15 +188,16 @@ def too_steep(scene: Scene) -> tuple[tuple[str, ...], str, str, str] | None:
 
 
 class AngularResponse:
-    """Filters of a view as the rays of its lens see them, and the light as the filters see it."""
+    """Filters of a setup as the rays of its lens see them, and the light as the filters see it."""
 
-    def __init__(self, view: View) -> None:
+    def __init__(self, setup: Setup) -> None:
         self.matrices: dict[int, csr_matrix] = {}
         """Matrix of each channel that moves, [n_wavelengths, n_wavelengths]: its curve as seen is matrix @ curve."""
-        if view.computes("angle"):
-            cone, wave, rays = cone_of(view.scenario), view.grid.nodes_nm, view.accuracy.rays
+        if setup.computes("angle"):
+            cone, wave, rays = cone_of(setup.scene), setup.camera.grid.nodes_nm, setup.accuracy.rays
             self.matrices = {
-                c: _matrix(wave, view.carrier(c), view.effective_index(c), cone, rays) for c in view.moving
+                c: _matrix(wave, setup.camera.base_transmission(c), setup.camera.effective_index(c), cone, rays)
+                for c in setup.camera.moving
             }
 
     def curves(self, qe: FloatArray, channels: Sequence[int]) -> FloatArray:

@@ -24,7 +24,7 @@ from .angular import known_at
 from .exposure import exposure_times, white_irradiance
 from .irradiance import air_transmittance, background_irradiance, relative_illumination, signal_irradiance
 from .noise import gaussian, tails
-from .view import View, per_photon
+from .setup import Setup
 
 _STEEPEST_TERMS = 50
 
@@ -33,23 +33,23 @@ _STEEPEST_TERMS = 50
 class Box:
     """Designs of a scene: every channel's QE lies between `low` and `high`, ndarray[n_channels, n_wavelengths]."""
 
-    view: View
+    setup: Setup
     low: FloatArray
     high: FloatArray
 
     @cached_property
     def _exposures_s(self) -> tuple[float, float]:
         """Shortest and longest exposure."""
-        view = self.view
-        white = white_irradiance(view) * per_photon(view)
-        modified = list(view.modified)
-        ends = [exposure_times(view, (qe[modified] @ white)[None])[0] for qe in (self.high, self.low)]
+        setup = self.setup
+        white = white_irradiance(setup) * setup.camera.area_step_m2_nm
+        modified = list(setup.camera.modified)
+        ends = [exposure_times(setup, (qe[modified] @ white)[None])[0] for qe in (self.high, self.low)]
         return float(ends[0]), float(ends[1])
 
     @cached_property
     def light_range(self) -> tuple[float, float]:
         """Least and most light of any exposure, relative to its mean."""
-        drive = self.view.scenario.drive
+        drive = self.setup.scene.drive
         if drive is None:
             return 1.0, 1.0
         return pwm.smallest(drive, *self._exposures_s), pwm.largest(drive, *self._exposures_s)
@@ -61,8 +61,8 @@ class Box:
         What an interference filter lets through of its carrier is nowhere more than where it lets most through.
         """
         highest = self.high.copy()
-        for channel in self.view.moving:
-            carrier = self.view.carrier(channel)
+        for channel in self.setup.camera.moving:
+            carrier = self.setup.camera.base_transmission(channel)
             known = known_at(carrier)
             highest[channel] = carrier * (self.high[channel, known] / carrier[known]).max()
         return highest
@@ -70,19 +70,21 @@ class Box:
     @cached_property
     def brightest_signal_dn(self) -> float:
         """Largest response of any channel to a signal whose image is whole, unclipped and without black level, DN."""
-        dn = per_photon(self.view) * self._exposures_s[1] * self.light_range[1] * self.view.pixel.dn_per_e
-        return float((signal_irradiance(self.view) @ self._highest.T).max() * dn)
+        camera = self.setup.camera
+        dn = camera.area_step_m2_nm * self._exposures_s[1] * self.light_range[1] * camera.pixel.dn_per_e
+        return float((signal_irradiance(self.setup) @ self._highest.T).max() * dn)
 
     @cached_property
     def brightest_pixel_dn(self) -> float:
         """`brightest_signal_dn` with background and dark current."""
-        view, time_s = self.view, self._exposures_s[1]
-        background = (self._highest @ background_irradiance(view)).max() * per_photon(view)
-        return self.brightest_signal_dn + float(background + view.pixel.dark_e_per_s) * time_s * view.pixel.dn_per_e
+        setup, time_s = self.setup, self._exposures_s[1]
+        camera = setup.camera
+        background = (self._highest @ background_irradiance(setup)).max() * camera.area_step_m2_nm
+        return self.brightest_signal_dn + float(background + camera.pixel.dark_e_per_s) * time_s * camera.pixel.dn_per_e
 
     @property
     def _sqrt_channels(self) -> float:
-        return math.sqrt(len(self.view.mosaic.channels))
+        return math.sqrt(len(self.setup.camera.mosaic.channels))
 
 
 @dataclass(frozen=True)
@@ -104,9 +106,9 @@ def _share_bound_dn(box: Box, share: float, readout: frozenset[str]) -> float:
     result = 2 * share * box.brightest_pixel_dn * box._sqrt_channels
     if "quantization" not in readout:
         return result
-    if box.view.scenario.noise is None:
+    if box.setup.scene.noise is None:
         return result + 2 * box._sqrt_channels * (share > 0)
-    return result * _steepness(box.view.pixel.dn_per_e * box.view.pixel.read_noise_e)
+    return result * _steepness(box.setup.camera.pixel.dn_per_e * box.setup.camera.pixel.read_noise_e)
 
 
 def _steepness(sigma_dn: float) -> float:
@@ -117,7 +119,7 @@ def _steepness(sigma_dn: float) -> float:
 
 
 def _no_noise(box: Box) -> str | None:
-    return "no noise asked for" if box.view.scenario.noise is None else None
+    return "no noise asked for" if box.setup.scene.noise is None else None
 
 
 def _noise_bound_dn(box: Box, _: frozenset[str]) -> float:
@@ -126,7 +128,7 @@ def _noise_bound_dn(box: Box, _: frozenset[str]) -> float:
     The dark end adds most in the dark. The others' loss grows with the signal up to the first of them, and falls
     beyond, where the readout of the mean stands still.
     """
-    pixel = box.view.pixel
+    pixel = box.setup.camera.pixel
     gain, read_e = pixel.dn_per_e, pixel.read_noise_e
     at_e, end_e = min(box.brightest_pixel_dn / gain, pixel.saturation_e), (pixel.full_scale_dn - pixel.offset_dn) / gain
     lost_e = tails.mean_above(pixel.well_e, at_e, pixel, 0.0) + tails.mean_above(end_e, at_e, pixel, read_e)
@@ -141,9 +143,9 @@ def _rounding_bound_dn(box: Box, _: frozenset[str]) -> float:
     The k-th harmonic of the mean rounding error is 1 / (pi k) exp(-2 (pi k sigma)^2), whatever the electrons are. Where
     the ADC's range ends, half a DN is missing at most in the readouts beyond.
     """
-    pixel = box.view.pixel
+    pixel = box.setup.camera.pixel
     sigma = pixel.dn_per_e * pixel.read_noise_e
-    if box.view.scenario.noise is None or sigma == 0:
+    if box.setup.scene.noise is None or sigma == 0:
         return box._sqrt_channels
     first = math.exp(-2 * (math.pi * sigma) ** 2)
     below = float(gaussian.share_below(np.array(-pixel.offset_dn / sigma)))
@@ -153,48 +155,48 @@ def _rounding_bound_dn(box: Box, _: frozenset[str]) -> float:
 
 
 def _not_saturated(box: Box) -> str | None:
-    pixel = box.view.pixel
-    if box.view.scenario.noise is not None or box.brightest_pixel_dn / pixel.dn_per_e > pixel.saturation_e:
+    pixel = box.setup.camera.pixel
+    if box.setup.scene.noise is not None or box.brightest_pixel_dn / pixel.dn_per_e > pixel.saturation_e:
         return None
     return f"the brightest signal has at most {box.brightest_signal_dn:.0f} DN"
 
 
 def _saturation_bound_dn(box: Box, _: frozenset[str]) -> float:
-    pixel = box.view.pixel
+    pixel = box.setup.camera.pixel
     excess_e = max(0.0, box.brightest_pixel_dn / pixel.dn_per_e - pixel.saturation_e)
     return excess_e * pixel.dn_per_e * box._sqrt_channels
 
 
 def _without_target(box: Box) -> str | None:
-    return "a patch that fills the field" if box.view.scenario.target is None else None
+    return "a patch that fills the field" if box.setup.scene.target is None else None
 
 
 def _not_moving(box: Box) -> str | None:
-    if box.view.moving:
+    if box.setup.camera.moving:
         return None
-    stated = any(technology is not None for technology in box.view.technologies)
+    stated = any(technology is not None for technology in box.setup.camera.technologies)
     return "pigments do not move with the angle" if stated else "no technology is stated: filters as on axis"
 
 
 def _one_phase(box: Box) -> str | None:
-    return _without_target(box) or (None if box.view.all_phases else "the scene names the place")
+    return _without_target(box) or (None if box.setup.all_phases else "the scene names the place")
 
 
 def _one_field_position(box: Box) -> str | None:
-    field = box.view.scenario.field
+    field = box.setup.scene.field
     if field is None:
         return "one place of the sensor"
-    return None if box.view.positions_differ else "all places of the sensor see the same"
+    return None if box.setup.positions_differ else "all places of the sensor see the same"
 
 
 def _averaged(box: Box) -> str | None:
-    target = box.view.scenario.target
+    target = box.setup.scene.target
     averaged = target is not None and target.readout == "mean"
     return _without_target(box) or ("the raw pixels are averaged" if averaged else None)
 
 
 def _unpulsed(box: Box) -> str | None:
-    drive = box.view.scenario.drive
+    drive = box.setup.scene.drive
     return "direct current" if drive is None or drive.duty == 1 else None
 
 
@@ -204,7 +206,7 @@ def _pwm_bound_dn(box: Box, readout: frozenset[str]) -> float:
 
 
 def _air_bound_dn(box: Box, readout: frozenset[str]) -> float:
-    lost = 1 - float(air_transmittance(box.view.scenario, box.view.grid.nodes_nm).min())
+    lost = 1 - float(air_transmittance(box.setup.scene, box.setup.camera.grid.nodes_nm).min())
     return _share_bound_dn(box, lost, readout)
 
 
@@ -214,31 +216,31 @@ EFFECTS: dict[str, Effect] = {
         Effect("noise", _no_noise, _noise_bound_dn),
         Effect("quantization", lambda _: None, _rounding_bound_dn),
         Effect("saturation", _not_saturated, _saturation_bound_dn),
-        Effect("pedestal", lambda box: None if box.view.pixel.offset_dn else "no pedestal"),
+        Effect("pedestal", lambda box: None if box.setup.camera.pixel.offset_dn else "no pedestal"),
         Effect("sampling", _without_target),
         Effect("phase", _one_phase),
         Effect("demosaic", _averaged),
         Effect("blur", _without_target),
         Effect(
             "crosstalk",
-            lambda box: None if box.view.pixel.crosstalk else "no crosstalk",
-            lambda box, readout: _share_bound_dn(box, 2 * box.view.pixel.crosstalk, readout),
+            lambda box: None if box.setup.camera.pixel.crosstalk else "no crosstalk",
+            lambda box, readout: _share_bound_dn(box, 2 * box.setup.camera.pixel.crosstalk, readout),
         ),
         Effect("angle", _not_moving),
         Effect(
             "illumination",
-            lambda box: None if box.view.scenario.off_axis_deg else "on axis",
-            lambda box, readout: _share_bound_dn(box, 1 - relative_illumination(box.view.scenario), readout),
+            lambda box: None if box.setup.scene.off_axis_deg else "on axis",
+            lambda box, readout: _share_bound_dn(box, 1 - relative_illumination(box.setup.scene), readout),
         ),
         Effect("field", _one_field_position),
         Effect(
             "extinction",
-            lambda box: "clear air" if box.view.scenario.visibility_m is None else None,
+            lambda box: "clear air" if box.setup.scene.visibility_m is None else None,
             _air_bound_dn,
         ),
         Effect(
             "veiling glare",
-            lambda box: "no veiling glare" if box.view.scenario.veiling_glare is None else None,
+            lambda box: "no veiling glare" if box.setup.scene.veiling_glare is None else None,
         ),
         Effect("flicker", _unpulsed, _pwm_bound_dn),
     )

@@ -19,7 +19,7 @@ from ..designs.products import row_products
 from .exposure import SceneLight, exposure_times
 from .irradiance import background_irradiance, way_of_light
 from .pixel_response import PixelResponse, SplitLight
-from .view import View, per_photon
+from .setup import Setup
 
 KEPT = 15_000_000
 """Largest table of signals times kernel that is kept."""
@@ -86,10 +86,10 @@ def _expose(rates: FloatArray, fixed: FloatArray, uniform: FloatArray, time_s: f
     expose(rates, fixed, uniform, time_s)
 
 
-def _background(view: View) -> FloatArray:
+def _background(setup: Setup) -> FloatArray:
     """Electrons/s of the background for each QE, behind all that dims it, ndarray[n_wavelengths]."""
-    dimmed = way_of_light(view, view.grid.nodes_nm, background=True)
-    return np.asarray(background_irradiance(view) * per_photon(view) * dimmed, dtype=float)
+    dimmed = way_of_light(setup, setup.camera.grid.nodes_nm, background=True)
+    return np.asarray(background_irradiance(setup) * setup.camera.area_step_m2_nm * dimmed, dtype=float)
 
 
 class Electrons:
@@ -102,9 +102,9 @@ class Electrons:
 
     def __init__(self, light: SceneLight, response: PixelResponse, *, once: bool = False) -> None:
         """`once`: for a single use, so that no table is made."""
-        self.view = view = light.view
+        self.setup = setup = light.setup
         self.light, self.response = light, response
-        fixed, modified = list(view.fixed), list(view.modified)
+        fixed, modified = list(setup.camera.fixed), list(setup.camera.modified)
         positions, angular = light.positions, light.angular
         self.position = np.repeat(np.arange(len(positions)), response.shape[0] // len(positions))
         self._split = response.source if isinstance(response.source, SplitLight) and len(positions) == 1 else None
@@ -112,11 +112,13 @@ class Electrons:
         each = [np.repeat(dimmed[None], len(modified), axis=0) for dimmed in background]
         self.background = np.stack([own.light(dimmed, modified) for own, dimmed in zip(angular, each, strict=True)])
         if self._split is None:
-            self.fixed = self._products(response.light[:, :, fixed], view.qe[None, fixed], fixed)[0]
+            self.fixed = self._products(response.light[:, :, fixed], setup.camera.qe[None, fixed], fixed)[0]
         else:
             self.fixed = np.zeros((response.shape[0], len(light.signals), response.shape[1]))
-            self._add_pixels(self._split, view.qe[None, fixed], fixed, self.fixed[None])
-        rates = [own.curves(view.qe[fixed], fixed) @ dimmed for own, dimmed in zip(angular, background, strict=True)]
+            self._add_pixels(self._split, setup.camera.qe[None, fixed], fixed, self.fixed[None])
+        rates = [
+            own.curves(setup.camera.qe[fixed], fixed) @ dimmed for own, dimmed in zip(angular, background, strict=True)
+        ]
         self._fixed_uniform = np.einsum("xuc,xc->xu", response.uniform[:, :, fixed], np.stack(rates)[self.position])
         self._modified_uniform = response.uniform[:, :, modified]
         # Elements that look through a filter that changes; electrons/s per QE of it, kept where the table is small.
@@ -127,7 +129,7 @@ class Electrons:
             self._kept: FloatArray | None = None
             if 0 < size <= KEPT and not once:
                 self._kept = self._table()
-                if view.accuracy.single_precision:
+                if setup.accuracy.single_precision:
                     self._kept = np.asarray(self._kept, dtype=np.float32)
         else:
             self._touched, self._kept = np.empty(0, dtype=np.intp), None
@@ -154,7 +156,7 @@ class Electrons:
     def _products_at(self, place: int, light: FloatArray, qe: FloatArray, of: Sequence[int]) -> FloatArray:
         """Of the cases of one place of the field."""
         cases, units, channels, _ = light.shape
-        size, n, n_signals = self.view.grid.size, len(qe), len(self.light.signals)
+        size, n, n_signals = self.setup.camera.grid.size, len(qe), len(self.light.signals)
         weights = np.broadcast_to(light, (cases, units, channels, size)).reshape(cases * units, channels * size)
         # [n_designs, channels, n_signals, n_wavelengths]
         seen = self.light.angular[place].curves(qe, of)[:, :, None] * self.light.signals
@@ -172,7 +174,7 @@ class Electrons:
             np.multiply(response[:, :, :, None], self.light.signals.T[:, None, :, None], out=found)
             return found.reshape(channels * size, -1)
         product = self._modified[:, None] * self.light.signals[:, None, None, :]
-        product = self.at_each_position(product, self.view.modified)
+        product = self.at_each_position(product, self.setup.camera.modified)
         return np.ascontiguousarray(product.reshape(-1, channels * size).T)
 
     def rates(self, curves: FloatArray) -> FloatArray:
@@ -181,12 +183,12 @@ class Electrons:
         `curves`: QE of the modified channels, ndarray[n_designs, n_modified, n_wavelengths].
         """
         found = np.repeat(self.fixed[None], len(curves), axis=0)
-        if self._split is not None and self.view.modified:
-            self._add_pixels(self._split, curves, self.view.modified, found)
+        if self._split is not None and self.setup.camera.modified:
+            self._add_pixels(self._split, curves, self.setup.camera.modified, found)
         if not self._touched.size:
             return found
         if self._kept is None:
-            part = self._products(self._modified, curves, self.view.modified)
+            part = self._products(self._modified, curves, self.setup.camera.modified)
         else:
             qe = curves.reshape(len(curves), -1).astype(self._kept.dtype)
             part = row_products(qe, self._kept).reshape(len(curves), *self.fixed.shape[:2], self._touched.size)
@@ -196,7 +198,7 @@ class Electrons:
     def expected(self, curves: FloatArray, scales: FloatArray, exposure_s: FloatArray) -> FloatArray:
         """Expected electrons before the full well, ndarray[n_designs, n_cases x n_scales, n_signals, n_elements]."""
         uniform = self._fixed_uniform + self.through_filters(self.of_background(curves))
-        uniform = uniform + self.view.pixel.dark_e_per_s
+        uniform = uniform + self.setup.camera.pixel.dark_e_per_s
         rates = self.rates(curves)
         if scales.shape[1] > 1:
             rates = np.repeat(rates, scales.shape[1], axis=1)
@@ -230,19 +232,19 @@ class Electrons:
         Needs a modified channel that no other element looks through, and a light that does not pulse. Designs whose
         modified channel sets the exposure are left out.
         """
-        view = self.view
+        setup = self.setup
         touched = np.flatnonzero((self._modified_uniform != 0).any(axis=(0, 2)))
-        if len(view.modified) != 1 or self._kept is None or self._touched.size != 1:
+        if len(setup.camera.modified) != 1 or self._kept is None or self._touched.size != 1:
             return None
         if not np.array_equal(touched, self._touched):
             return None
-        everywhere = np.arange(view.grid.size)
-        time_s = exposure_times(view, np.zeros((1, 1)), self.light.fixed_white)
+        everywhere = np.arange(setup.camera.grid.size)
+        time_s = exposure_times(setup, np.zeros((1, 1)), self.light.fixed_white)
         white = block.product(self.light.white[:, None], everywhere)
         if white.max(initial=0.0) <= self.light.fixed_white:
             which = np.ones(len(block), dtype=bool)
         else:
-            which = exposure_times(view, white, self.light.fixed_white) == time_s
+            which = exposure_times(setup, white, self.light.fixed_white) == time_s
         if not which.any() or not np.isfinite(time_s[0]) or self.light.scales(time_s).shape[1] > 1:
             return None
         some = block if which.all() else block.some(np.flatnonzero(which))
@@ -251,8 +253,8 @@ class Electrons:
         if self.background.any():
             uniform = some.product(np.ascontiguousarray(self.background[:, 0].T), everywhere)[:, self.position]
             uniform *= self._modified_uniform[:, unit, 0]
-        uniform = self._fixed_uniform[:, unit] + uniform + view.pixel.dark_e_per_s
-        rest = self.fixed + (self._fixed_uniform + view.pixel.dark_e_per_s)[:, None]
+        uniform = self._fixed_uniform[:, unit] + uniform + setup.camera.pixel.dark_e_per_s
+        rest = self.fixed + (self._fixed_uniform + setup.camera.pixel.dark_e_per_s)[:, None]
         fixed, kept = np.ascontiguousarray(self.fixed[:, :, unit]), self._kept
 
         def make(part: slice) -> FloatArray:

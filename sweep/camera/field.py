@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base.types import FloatArray
 from .scene import Scene
-from .view import View
+from .setup import Setup
 
 _STARTS = 2
 """Image heights from which the smallest value is refined."""
@@ -30,27 +30,27 @@ def scene_at(scene: Scene, height: float) -> Scene:
     return scene.model_copy(update={"field": None, "optics": optics, **off_axis})
 
 
-def view_at(view: View, height: float) -> View:
-    """The view at an image height, 0 to 1."""
-    return replace(view, scenario=scene_at(view.scenario, height))
+def setup_at(setup: Setup, height: float) -> Setup:
+    """The setup at an image height, 0 to 1."""
+    return replace(setup, scene=scene_at(setup.scene, height))
 
 
-def field_heights(view: View) -> tuple[float, ...]:
+def field_heights(setup: Setup) -> tuple[float, ...]:
     """Image heights at which a scene is computed; 0 where all of them see the same."""
-    scene = view.scenario
-    if scene.field is None or not view.positions_differ:
+    scene = setup.scene
+    if scene.field is None or not setup.positions_differ:
         return (0.0,)
     if not scene.field.everywhere:
         return scene.field.seen_heights
-    count = view.accuracy.field_positions
+    count = setup.accuracy.field_positions
     return tuple(sorted({*(at / (count - 1) for at in range(count)), *scene.field.knots[0]}))
 
 
-def over_field(view: View) -> tuple[View, ...]:
-    """A view of each field position that is computed; the view itself where the scene has no field."""
-    if view.scenario.field is None:
-        return (view,)
-    return tuple(view_at(view, height) for height in field_heights(view))
+def over_field(setup: Setup) -> tuple[Setup, ...]:
+    """A setup of each field position that is computed; the setup itself where the scene has no field."""
+    if setup.scene.field is None:
+        return (setup,)
+    return tuple(setup_at(setup, height) for height in field_heights(setup))
 
 
 def refined_heights(

@@ -1,7 +1,7 @@
 """The forward model: light on the pixels, electrons, full well, readout, for a block of designs.
 
 In the physical order: optics, pixel aperture and mosaic sampling with crosstalk (the pixel response), photon noise,
-full well, read noise, black level, ADC, readout. Effects that the view leaves out are not computed.
+full well, read noise, black level, ADC, readout. Effects that the setup leaves out are not computed.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from .memory import blocks
 from .phases import Phases, different_phases, scene_phases
 from .pixel_response import ChannelResponses, PixelResponse, channel_responses, kept_response, pixel_response
 from .readout import NoisyReadout, Readout
-from .view import View
+from .setup import Setup
 
 _Result = TypeVar("_Result")
 _BLOCK = 2_000_000
@@ -45,31 +45,31 @@ class ForwardModel:
     all_apart, together = False, False
     """True: all phases are kept; True: the pixels of all field positions are held together."""
 
-    def __init__(self, view: View, phases: Phases | None = None, *, once: bool = False) -> None:
+    def __init__(self, setup: Setup, phases: Phases | None = None, *, once: bool = False) -> None:
         """`phases`: sampling phases instead of the scene's. `once`: for a single use, so that no table is made."""
-        self.view = view
+        self.setup = setup
         self._once = once
         # Parts whose pixels would be too many to hold together: field positions, or blocks of phases.
         self._positions: list[ForwardModel] = []
         self._phase_blocks: list[Phases] = []
         self._of_scene = phases is None
         self._latest: dict[str, tuple[bytes, Any]] = {}
-        if phases is None and view.scenario.target is not None:
-            phases = scene_phases(view)
-            phases = phases if self.all_apart else different_phases(view, phases)[0]
+        if phases is None and setup.scene.target is not None:
+            phases = scene_phases(setup)
+            phases = phases if self.all_apart else different_phases(setup, phases)[0]
         self.phases = phases
-        if view.linear or phases is None:
+        if setup.linear or phases is None:
             return
-        if view.scenario.field is not None and not self.together:
-            self._positions = [type(self)(position, phases, once=once) for position in over_field(view)]
+        if setup.scene.field is not None and not self.together:
+            self._positions = [type(self)(position, phases, once=once) for position in over_field(setup)]
             return
-        phase_blocks = blocks(view, phases)
+        phase_blocks = blocks(setup, phases)
         self._phase_blocks = phase_blocks if len(phase_blocks) > 1 else []
 
     def _parts(self) -> Iterator[ForwardModel]:
         """Models of the field positions, or of the blocks of phases, made as they are read; none of a whole model."""
         yield from self._positions
-        yield from (type(self)(self.view, block, once=True) for block in self._phase_blocks)
+        yield from (type(self)(self.setup, block, once=True) for block in self._phase_blocks)
 
     @property
     def _in_parts(self) -> bool:
@@ -77,7 +77,7 @@ class ForwardModel:
 
     def at(self, phases: Phases | None, moments: FloatArray | None = None) -> ForwardModel:
         """The same scene at other phases, and other moments of a pulse (see `pwm.scales`), for a single use."""
-        model, light = ForwardModel(self.view, phases, once=True), copy(self.light)
+        model, light = ForwardModel(self.setup, phases, once=True), copy(self.light)
         light.moments = moments
         model.__dict__["light"] = light
         if self._of_channels:
@@ -87,26 +87,26 @@ class ForwardModel:
     @cached_property
     def light(self) -> SceneLight:
         """The light of the scene."""
-        return SceneLight(self.view)
+        return SceneLight(self.setup)
 
     @cached_property
     def _response(self) -> PixelResponse:
-        by_pixel = not self.view.linear
+        by_pixel = not self.setup.linear
         if self._of_channels:
             assert self.phases is not None
-            return self._channels.at(self.view, self.phases)
+            return self._channels.at(self.setup, self.phases)
         if self._of_scene:
-            return kept_response(self.view, self.phases, by_pixel=by_pixel)
-        return pixel_response(self.view, self.phases, by_pixel=by_pixel)
+            return kept_response(self.setup, self.phases, by_pixel=by_pixel)
+        return pixel_response(self.setup, self.phases, by_pixel=by_pixel)
 
     @property
     def _of_channels(self) -> bool:
         """True where the response is that of a target's channels, whose phases are kept one by one."""
-        return self.view.linear and self.view.all_phases and self.view.scenario.field is None
+        return self.setup.linear and self.setup.all_phases and self.setup.scene.field is None
 
     @cached_property
     def _channels(self) -> ChannelResponses:
-        return channel_responses(self.view)
+        return channel_responses(self.setup)
 
     @cached_property
     def electrons(self) -> Electrons:
@@ -116,7 +116,7 @@ class ForwardModel:
     @cached_property
     def readout(self) -> Readout:
         """The readout of the elements."""
-        return Readout(self.view, self._response)
+        return Readout(self.setup, self._response)
 
     @property
     def n_cases(self) -> int:
@@ -206,8 +206,8 @@ class ForwardModel:
             return np.concatenate([part.pixel_electrons(curves) for part in self._parts()], axis=1)
         exposure_s = self.light.exposure_s(curves)
         result = self.electrons.expected(curves, self.light.scales(exposure_s), exposure_s)
-        if self.readout.by_channel and self.view.scenario.target is None:
-            return result[..., self.view.mosaic.indices.ravel()]
+        if self.readout.by_channel and self.setup.scene.target is None:
+            return result[..., self.setup.camera.mosaic.indices.ravel()]
         return result
 
     def channels_of(self, pixels: FloatArray, case: int) -> FloatArray:
@@ -221,7 +221,7 @@ class ForwardModel:
     @property
     def few_pixels(self) -> tuple[IndexArray, ...] | None:
         """`Readout.few_pixels`; None where a target's pixels are many."""
-        return None if self.view.scenario.target is not None else self.readout.few_pixels
+        return None if self.setup.scene.target is not None else self.readout.few_pixels
 
 
 class AllPhases(ForwardModel):
@@ -231,14 +231,14 @@ class AllPhases(ForwardModel):
 
 
 _models: Cache[tuple[type[ForwardModel], bytes], ForwardModel] = Cache(16)
-_known: Cache[tuple[type[ForwardModel], int], tuple[View, ForwardModel]] = Cache(4)
-"""Models of the last blocks' views, by the identity of the view, which nobody changes."""
+_known: Cache[tuple[type[ForwardModel], int], tuple[Setup, ForwardModel]] = Cache(4)
+"""Models of the last blocks' setups, by the identity of the setup, which nobody changes."""
 
 
-def forward_model(view: View, kind: type[ForwardModel] = ForwardModel) -> ForwardModel:
-    """The forward model of a view; the latest ones are kept, so that a response is made once in a process."""
+def forward_model(setup: Setup, kind: type[ForwardModel] = ForwardModel) -> ForwardModel:
+    """The forward model of a setup; the latest ones are kept, so that a response is made once in a process."""
 
-    def made() -> tuple[View, ForwardModel]:
-        return view, _models.get((kind, hashlib.sha256(pickle.dumps(view)).digest()), lambda: kind(view))
+    def made() -> tuple[Setup, ForwardModel]:
+        return setup, _models.get((kind, hashlib.sha256(pickle.dumps(setup)).digest()), lambda: kind(setup))
 
-    return _known.get((kind, id(view)), made)[1]
+    return _known.get((kind, id(setup)), made)[1]

@@ -18,21 +18,21 @@ from ..curves.color import luminance_per_photon_radiance
 from .own_effects import Irradiance
 from .pixel import irradiance_factor
 from .scene import Scene
-from .view import View
+from .setup import Setup
 
 _REFERENCE_NM = 550.0
 _CONTRAST = 0.02
 
 
-def scene_irradiance(view: View) -> Irradiance:
+def scene_irradiance(setup: Setup) -> Irradiance:
     """Return the irradiance of a scene behind the effects of a user's own."""
-    irradiance = Irradiance(view.grid.nodes_nm, _signals(view), _uniform(view, view.scenario.background_cd_m2))
-    if view.scenario.veiling_glare is not None:
-        glare = view.scenario.veiling_glare
-        mean_cd_m2 = view.scenario.background_cd_m2 if glare.field_cd_m2 is None else glare.field_cd_m2
-        irradiance = with_veiling_glare(irradiance, glare.share, _uniform(view, mean_cd_m2))
-    for effect in view.own_effects:
-        signals, background = effect.applied(irradiance, view.scenario)
+    irradiance = Irradiance(setup.camera.grid.nodes_nm, _signals(setup), _uniform(setup, setup.scene.background_cd_m2))
+    if setup.scene.veiling_glare is not None:
+        glare = setup.scene.veiling_glare
+        mean_cd_m2 = setup.scene.background_cd_m2 if glare.field_cd_m2 is None else glare.field_cd_m2
+        irradiance = with_veiling_glare(irradiance, glare.share, _uniform(setup, mean_cd_m2))
+    for effect in setup.own_effects:
+        signals, background = effect.applied(irradiance, setup.scene)
         irradiance = replace(irradiance, signals=signals, background=background)
     return irradiance
 
@@ -54,35 +54,35 @@ def with_veiling_glare(irradiance: Irradiance, share: float, mean: FloatArray) -
     return replace(irradiance, signals=kept * irradiance.signals, background=background)
 
 
-def signal_irradiance(view: View) -> FloatArray:
+def signal_irradiance(setup: Setup) -> FloatArray:
     """Photon irradiance of each signal, ndarray[n_signals, n_wavelengths]; see `Irradiance`."""
-    return scene_irradiance(view).signals
+    return scene_irradiance(setup).signals
 
 
-def background_irradiance(view: View) -> FloatArray:
+def background_irradiance(setup: Setup) -> FloatArray:
     """Photon irradiance of the uniform background, ndarray[n_wavelengths]; see `Irradiance`."""
-    return scene_irradiance(view).background
+    return scene_irradiance(setup).background
 
 
-def _signals(view: View) -> FloatArray:
+def _signals(setup: Setup) -> FloatArray:
     """Irradiance of each signal, of its radiance or its luminance, ndarray[n_signals, n_wavelengths]."""
-    scene = view.scenario
+    scene = setup.scene
     factor = irradiance_factor(scene.optics)
     luminance = scene.luminance_cd_m2
     if luminance is None:
-        return view.lights.photons * (scene.photon_radiance * factor)
-    per_photon_radiance = luminance_per_photon_radiance(view.grid, view.lights.photons)
-    return view.lights.photons * (luminance / per_photon_radiance * factor)[:, None]
+        return setup.lights.photons * (scene.photon_radiance * factor)
+    per_photon_radiance = luminance_per_photon_radiance(setup.camera.grid, setup.lights.photons)
+    return setup.lights.photons * (luminance / per_photon_radiance * factor)[:, None]
 
 
-def _uniform(view: View, luminance_cd_m2: float) -> FloatArray:
+def _uniform(setup: Setup, luminance_cd_m2: float) -> FloatArray:
     """Irradiance of a uniform light of some luminance, flat in photons, ndarray[n_wavelengths]."""
-    grid = view.grid
+    grid = setup.camera.grid
     if not luminance_cd_m2:
         return np.zeros(grid.size)
     flat = np.full((1, grid.size), 1 / (grid.size * grid.step_nm))
     radiance = luminance_cd_m2 / luminance_per_photon_radiance(grid, flat)[0]
-    return np.asarray(flat[0] * radiance * irradiance_factor(view.scenario.optics), dtype=float)
+    return np.asarray(flat[0] * radiance * irradiance_factor(setup.scene.optics), dtype=float)
 
 
 def size_exponent(visibility_m: float) -> float:
@@ -114,11 +114,11 @@ def relative_illumination(scene: Scene) -> float:
     return math.cos(math.radians(scene.off_axis_deg)) ** 4
 
 
-def way_of_light(view: View, wavelength_nm: FloatArray, *, background: bool = False) -> FloatArray:
+def way_of_light(setup: Setup, wavelength_nm: FloatArray, *, background: bool = False) -> FloatArray:
     """Factor of air and lens on a signal's light, or on that of the `background`, ndarray[n_wavelengths]."""
     result = np.ones(wavelength_nm.size)
-    if view.computes("illumination"):
-        result *= relative_illumination(view.scenario)
-    if view.computes("extinction") and not background:
-        result *= air_transmittance(view.scenario, wavelength_nm)
+    if setup.computes("illumination"):
+        result *= relative_illumination(setup.scene)
+    if setup.computes("extinction") and not background:
+        result *= air_transmittance(setup.scene, wavelength_nm)
     return result

@@ -20,7 +20,7 @@ from .exposure import relative_slope
 from .forward import ForwardModel
 from .pixel import unquantized
 from .pixel_response import SplitLight
-from .view import READOUT, View
+from .setup import READOUT, Setup
 
 _STEPS_DN2 = 1 / 12
 """Variance of rounding to whole digital numbers, DN^2."""
@@ -47,7 +47,7 @@ class LinearModel(ForwardModel):
         """`smooth` of one design, ndarray[n_cases, n_signals, n_channels], and its `gradient`."""
         whole, slope = self._with_slope(curves, curves_gradient)
         response = self.readout.folded(unquantized(whole, self.readout.pixel))
-        return response, self.readout.folded(slope * self.view.pixel.dn_per_e)
+        return response, self.readout.folded(slope * self.setup.camera.pixel.dn_per_e)
 
     def variance(self, curves: FloatArray) -> FloatArray:
         """Variance of the noise, DN^2, of the shape of `smooth`."""
@@ -69,13 +69,13 @@ class LinearModel(ForwardModel):
     def spread_shares(self) -> FloatArray:
         """Sum of the shares that the pixels have in a channel's variance, ndarray[n_cases, n_channels]."""
         response = self.by_pixel.electrons.response
-        repeats = self.by_pixel._expected(self.view.base_qe[None]).shape[1] // len(response.spread)
+        repeats = self.by_pixel._expected(self.setup.camera.base_qe[None]).shape[1] // len(response.spread)
         return np.repeat(response.spread.sum(axis=1), repeats, axis=0)
 
     @cached_property
     def members(self) -> dict[str, IndexArray]:
         """Signal type -> indices of its signals."""
-        return self.view.members
+        return self.setup.members
 
     @cached_property
     def by_pixel(self) -> LinearModel:
@@ -83,8 +83,8 @@ class LinearModel(ForwardModel):
 
         Raises SweepError where the pixels of all places of the light do not fit into memory.
         """
-        view = replace(self.view, left_out=self.view.left_out - {"saturation", "quantization"})
-        result = _ByPixel(view)
+        setup = replace(self.setup, left_out=self.setup.left_out - {"saturation", "quantization"})
+        result = _ByPixel(setup)
         if result._phase_blocks:
             most = f"at most those of {len(result._phase_blocks[0])} places: a smaller light, or a named place"
             problem = "too many pixels for a search under noise"
@@ -106,7 +106,7 @@ class LinearModel(ForwardModel):
         light = (own.rates(curves_gradient) - own.fixed)[:, :, None] * scales[0][None, None, :, None, None]
         uniform = own.through_filters(own.of_background(curves_gradient))
         slope = (light + uniform[:, :, None, None, :]).reshape(n, *whole.shape) * exposure_s
-        relative = relative_slope(self.view, self.light.white, curves, curves_gradient)
+        relative = relative_slope(self.setup, self.light.white, curves, curves_gradient)
         return whole, np.asarray(slope + relative[:, None, None, None] * whole, dtype=float)
 
     def per_qe(self, modified: int, curves: FloatArray) -> FloatArray:
@@ -115,16 +115,16 @@ class LinearModel(ForwardModel):
         ndarray[n_cases, n_signals, n_units, n_wavelengths]; the smooth response is linear in it where N does not set
         the exposure.
         """
-        response, channel = self.electrons.response, self.view.modified[modified]
+        response, channel = self.electrons.response, self.setup.camera.modified[modified]
         rates = self._per_qe(modified, curves, response.light[:, :, channel], response.uniform[:, :, channel])
-        return rates * self.view.pixel.dn_per_e
+        return rates * self.setup.camera.pixel.dn_per_e
 
     def spread_per_qe(self, modified: int, curves: FloatArray) -> FloatArray:
         """Electrons per QE of one modified channel in its pixels, each with its share of the channel's variance.
 
         ndarray[n_cases, n_signals, n_wavelengths]; see `per_qe`.
         """
-        own, channel = self.by_pixel, self.view.modified[modified]
+        own, channel = self.by_pixel, self.setup.camera.modified[modified]
         response = own.electrons.response
         share = response.spread[:, :, channel]
         split = response.source
@@ -140,7 +140,7 @@ class LinearModel(ForwardModel):
 
         `light`, `uniform`: what units get through it, see `PixelResponse`, without the axis of the channels.
         """
-        own, channel = self.electrons, self.view.modified[modified]
+        own, channel = self.electrons, self.setup.camera.modified[modified]
         exposure_s = self.light.exposure_s(curves[None])
         scales = self.light.scales(exposure_s)[0]
         seen = light[:, None, None] * self.light.signals[:, None, :]
@@ -159,14 +159,14 @@ class _ByPixel(LinearModel):
 _models: Cache[bytes, LinearModel] = Cache(16)
 
 
-def linear_model(view: View) -> LinearModel:
-    """The linear model of a view: what a search sees.
+def linear_model(setup: Setup) -> LinearModel:
+    """The linear model of a setup: what a search sees.
 
     The latest ones are kept, so that a response is made once in a process. All places of the sensor are seen at few
     field positions.
     """
-    few = view.accuracy.model_copy(
-        update={"field_positions": min(view.accuracy.field_positions, _FIELD_POSITIONS), "pwm_moments": 2}
+    few = setup.accuracy.model_copy(
+        update={"field_positions": min(setup.accuracy.field_positions, _FIELD_POSITIONS), "pwm_moments": 2}
     )
-    seen = replace(view, left_out=view.left_out | READOUT, accuracy=few)
+    seen = replace(setup, left_out=setup.left_out | READOUT, accuracy=few)
     return _models.get(hashlib.sha256(pickle.dumps(seen)).digest(), lambda: LinearModel(seen))

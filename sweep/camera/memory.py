@@ -7,7 +7,7 @@ import numpy as np
 from .field import field_heights
 from .phases import MOST_PHASES, Phases, n_phases
 from .sampling import reach_px
-from .view import View
+from .setup import Setup
 
 MOST_BYTES = 2 * 2**30
 """Most memory of a worker for the images of a scene, bytes."""
@@ -15,48 +15,48 @@ _COPIES = 4
 """So many arrays of the size of a response are held while it is made."""
 
 
-def pixels_per_phase(view: View) -> int:
+def pixels_per_phase(setup: Setup) -> int:
     """About how many pixels are computed around a light."""
-    target, rows_columns = view.scenario.target, view.mosaic.indices.shape
+    target, rows_columns = setup.scene.target, setup.camera.mosaic.indices.shape
     assert target is not None
-    reach = reach_px(view, target)
+    reach = reach_px(setup, target)
     return int(np.prod([2 * reach + n + 3 for n in rows_columns]))
 
 
-def bytes_per_phase(view: View, *, by_pixel: bool) -> int:
+def bytes_per_phase(setup: Setup, *, by_pixel: bool) -> int:
     """About how much memory the response at one phase takes while it is made.
 
     Pixels are held in factors (see `SplitLight`), those of one field position after the other.
     """
-    n = len(view.mosaic.channels)
+    n = len(setup.camera.mosaic.channels)
     if by_pixel:
-        return 8 * _COPIES * pixels_per_phase(view) * (view.grid.size + n)
-    return 8 * _COPIES * n * n * view.grid.size * len(field_heights(view))
+        return 8 * _COPIES * pixels_per_phase(setup) * (setup.camera.grid.size + n)
+    return 8 * _COPIES * n * n * setup.camera.grid.size * len(field_heights(setup))
 
 
-def blocks(view: View, phases: Phases) -> list[Phases]:
+def blocks(setup: Setup, phases: Phases) -> list[Phases]:
     """Phases whose responses, pixel by pixel, fit into half of `MOST_BYTES` together."""
-    step = max(1, MOST_BYTES // 2 // bytes_per_phase(view, by_pixel=True))
+    step = max(1, MOST_BYTES // 2 // bytes_per_phase(setup, by_pixel=True))
     return [phases.subset(slice(at, at + step)) for at in range(0, len(phases), step)]
 
 
-def too_large(view: View) -> tuple[str, str, str] | None:
+def too_large(setup: Setup) -> tuple[str, str, str] | None:
     """Why a target's response is not computed: problem, value, what is allowed; None when it is."""
-    if view.scenario.target is None:
+    if setup.scene.target is None:
         return None
-    channels = f"{len(view.mosaic.channels)} channels and {view.grid.size} wavelengths"
-    if (one := bytes_per_phase(view, by_pixel=True)) > MOST_BYTES:
-        problem = f"{pixels_per_phase(view):,} pixels around the light, of {channels}, take too much memory"
+    channels = f"{len(setup.camera.mosaic.channels)} channels and {setup.camera.grid.size} wavelengths"
+    if (one := bytes_per_phase(setup, by_pixel=True)) > MOST_BYTES:
+        problem = f"{pixels_per_phase(setup):,} pixels around the light, of {channels}, take too much memory"
         return problem, f"{one / 2**30:.1f} GiB", f"at most {MOST_BYTES / 2**30:g} GiB"
-    places = n_phases(view)
+    places = n_phases(setup)
     if places > MOST_PHASES:
-        problem = f"a light at any place of a tile of {view.mosaic.indices.size:,} pixels has too many places"
+        problem = f"a light at any place of a tile of {setup.camera.mosaic.indices.size:,} pixels has too many places"
         return (
             problem,
             f"{places:,}",
             f"at most {MOST_PHASES:,} (a tile of {MOST_PHASES // 16} pixels), or a named place",
         )
-    if (total := places * bytes_per_phase(view, by_pixel=False)) > MOST_BYTES:
+    if (total := places * bytes_per_phase(setup, by_pixel=False)) > MOST_BYTES:
         problem = f"{places:,} places of the light, of {channels}, take too much memory"
         return problem, f"{total / 2**30:.1f} GiB", f"at most {MOST_BYTES / 2**30:g} GiB"
     return None

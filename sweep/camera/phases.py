@@ -15,7 +15,7 @@ import numpy as np
 from ..base.types import FloatArray, IndexArray
 from .mosaic import Mosaic
 from .scene import Target
-from .view import View
+from .setup import Setup
 
 MOST_PHASES = 1024
 """Phases of a lattice on a tile, at most."""
@@ -59,30 +59,30 @@ def lattice_px(mosaic: Mosaic, steps_per_px: int) -> FloatArray:
     return np.stack([x.ravel(), y.ravel()], axis=1)
 
 
-def n_phases(view: View) -> int:
+def n_phases(setup: Setup) -> int:
     """Phases of the lattice of a scene; 1 where it names the phase, or the light fills the field."""
-    return view.accuracy.phases_per_px * view.mosaic.indices.size if view.all_phases else 1
+    return setup.accuracy.phases_per_px * setup.camera.mosaic.indices.size if setup.all_phases else 1
 
 
-def scene_phases(view: View) -> Phases:
+def scene_phases(setup: Setup) -> Phases:
     """The phases of a scene: the whole lattice, or the named one; this one, halfway, is read at the pixel before."""
-    target = view.scenario.target
-    rows, columns = view.mosaic.indices.shape
+    target = setup.scene.target
+    rows, columns = setup.camera.mosaic.indices.shape
     if target is None:
         centers = np.zeros((1, 2))
     elif target.phase_px == "any":
-        return read_at(target, lattice_px(view.mosaic, view.accuracy.phase_steps_per_px))
+        return read_at(target, lattice_px(setup.camera.mosaic, setup.accuracy.phase_steps_per_px))
     else:
         centers = np.asarray(np.mod([target.phase_px], (columns, rows)), dtype=float)
     return Phases(centers, np.ceil(centers - 0.5))
 
 
-def different_phases(view: View, phases: Phases) -> tuple[Phases, IndexArray]:
+def different_phases(setup: Setup, phases: Phases) -> tuple[Phases, IndexArray]:
     """Phases that see something else than all before them, and which of these each phase sees, ndarray[n].
 
     Of a mean over the light, mirrored phases see the same.
     """
-    target, tile = view.scenario.target, view.mosaic.indices
+    target, tile = setup.scene.target, setup.camera.mosaic.indices
     keys = np.concatenate([phases.center_px, phases.nearest_px], axis=1)
     if target is not None and target.readout == "mean":
         axes = zip(phases.center_px.T, (tile.T, tile), strict=True)
@@ -123,19 +123,19 @@ def read_at(target: Target, centers_px: FloatArray) -> Phases:
     return result
 
 
-def fine_lattice(view: View) -> tuple[Phases, float]:
+def fine_lattice(setup: Setup) -> tuple[Phases, float]:
     """Different phases of the lattice from which extremes are refined, and its step, pixels."""
-    target, steps = view.scenario.target, _FINER * view.accuracy.phase_steps_per_px
+    target, steps = setup.scene.target, _FINER * setup.accuracy.phase_steps_per_px
     assert target is not None
     while True:
-        phases = different_phases(view, read_at(target, lattice_px(view.mosaic, steps)))[0]
-        if len(phases) <= _MOST_FINE or steps <= view.accuracy.phase_steps_per_px:
+        phases = different_phases(setup, read_at(target, lattice_px(setup.camera.mosaic, steps)))[0]
+        if len(phases) <= _MOST_FINE or steps <= setup.accuracy.phase_steps_per_px:
             return phases, 1 / steps
         steps //= 2
 
 
 def refined_minima(
-    view: View, lattice: Phases, step_px: float, values: FloatArray, evaluate: Callable[[Phases], FloatArray]
+    setup: Setup, lattice: Phases, step_px: float, values: FloatArray, evaluate: Callable[[Phases], FloatArray]
 ) -> tuple[FloatArray, Phases]:
     """Smallest values over all phases, ndarray[n_values], and where, by refinement of the smallest ones of a lattice.
 
@@ -146,7 +146,7 @@ def refined_minima(
 
     Parameters
     ----------
-    view : View
+    setup : Setup
         Scene and accuracy.
     lattice : Phases
         The different phases that are known.
@@ -157,10 +157,10 @@ def refined_minima(
     evaluate : callable
         From phases to the values there, ndarray[n_values, n_phases].
     """
-    target, finest, n_starts = view.scenario.target, view.accuracy.finest_phase_px, _STARTS
+    target, finest, n_starts = setup.scene.target, setup.accuracy.finest_phase_px, _STARTS
     assert target is not None
     known = dict(zip(lattice.keys, values.T, strict=True))
-    period = np.array(view.mosaic.indices.shape[::-1])
+    period = np.array(setup.camera.mosaic.indices.shape[::-1])
     step = step_px / 2
     while step >= finest:
         places, so_far = np.array(list(known))[:, :2], np.stack(list(known.values()), axis=1)
@@ -173,7 +173,7 @@ def refined_minima(
         while moving.any():
             around = np.unique((centers[moving][:, None] + step * _NEIGHBORS).reshape(-1, 2), axis=0)
             read = read_at(target, around)
-            phases, which = different_phases(view, read)
+            phases, which = different_phases(setup, read)
             at_phases = _known_or_evaluated(phases, known, evaluate)[:, which]
             for value, start in np.argwhere(moving):
                 off = np.abs(read.center_px - centers[value, start])

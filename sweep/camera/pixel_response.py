@@ -23,7 +23,7 @@ from .field import field_heights, over_field
 from .irradiance import way_of_light
 from .memory import pixels_per_phase
 from .phases import Phases
-from .view import View
+from .setup import Setup
 
 _HELD = 8_000_000
 """Values of pixels that are held at once."""
@@ -124,41 +124,41 @@ class PixelResponse:
         return self.source.shape[0], self.source.shape[1]
 
 
-def colorless(view: View) -> View:
-    """The view without filters, which is all that responses depend on; the same for CFAs whose tiles are alike."""
-    nothing = np.zeros_like(view.qe)
-    bare = replace(view, mosaic=view.mosaic.colorless, modified=(), technologies=())
-    return replace(bare, qe=nothing, clear_qe=np.zeros_like(view.clear_qe))
+def colorless(setup: Setup) -> Setup:
+    """The setup without filters, which is all that responses depend on; the same for CFAs whose tiles are alike."""
+    camera = setup.camera
+    dark = {"qe": np.zeros_like(camera.qe), "clear_qe": np.zeros_like(camera.clear_qe)}
+    return setup.with_camera(mosaic=camera.mosaic.colorless, modified=(), technologies=(), **dark)
 
 
-def pixel_response(view: View, phases: Phases | None, *, by_pixel: bool) -> PixelResponse:
+def pixel_response(setup: Setup, phases: Phases | None, *, by_pixel: bool) -> PixelResponse:
     """The response at every wavelength of the grid, of one field position after the other.
 
     Parameters
     ----------
-    view : View
+    setup : Setup
         Camera, scene and accuracy.
     phases : Phases or None
         Sampling phases of a target; None where the light fills the field.
     by_pixel : bool
         Keep the pixels apart, for a readout that is not linear.
     """
-    wavelength_nm = view.grid.nodes_nm
-    if view.scenario.field is not None:
-        return _joined([pixel_response(position, phases, by_pixel=by_pixel) for position in over_field(view)])
+    wavelength_nm = setup.camera.grid.nodes_nm
+    if setup.scene.field is not None:
+        return _joined([pixel_response(position, phases, by_pixel=by_pixel) for position in over_field(setup)])
     if phases is None:
-        made = _uniform(view, by_pixel=by_pixel)
-        return replace(made, source=made.light * way_of_light(view, wavelength_nm))
-    knots = psf.psf_knots_nm(wavelength_nm, view.accuracy.psf_step_nm)
+        made = _uniform(setup, by_pixel=by_pixel)
+        return replace(made, source=made.light * way_of_light(setup, wavelength_nm))
+    knots = psf.psf_knots_nm(wavelength_nm, setup.accuracy.psf_step_nm)
     if by_pixel:
-        made = _pixels(view, knots, phases, by_pixel=True)
+        made = _pixels(setup, knots, phases, by_pixel=True)
     else:
-        step = max(1, _HELD // (pixels_per_phase(view) * max(len(view.mosaic.channels) ** 2, knots.size)))
+        step = max(1, _HELD // (pixels_per_phase(setup) * max(len(setup.camera.mosaic.channels) ** 2, knots.size)))
         blocks = [phases.subset(slice(at, at + step)) for at in range(0, len(phases), step)]
-        made = _joined([_pixels(view, knots, block, by_pixel=False) for block in blocks])
+        made = _joined([_pixels(setup, knots, block, by_pixel=False) for block in blocks])
     same = knots.size == wavelength_nm.size or _one_light(made.source)
     between = None if same else hats(wavelength_nm, knots)
-    factor = way_of_light(view, wavelength_nm)
+    factor = way_of_light(setup, wavelength_nm)
     if isinstance(made.source, SplitLight):
         shares = made.source.shares
         shares = shares if shares is None or between is None else shares @ between
@@ -178,16 +178,16 @@ class ChannelResponses:
         self._known: dict[tuple[float, ...], tuple[FloatArray, FloatArray]] = {}
         self._one_at_a_time = threading.Lock()
 
-    def at(self, view: View, phases: Phases) -> PixelResponse:
+    def at(self, setup: Setup, phases: Phases) -> PixelResponse:
         """The response at some phases."""
         keys = phases.keys
         with self._one_at_a_time:
             new = [at for at, key in enumerate(keys) if key not in self._known]
             if new:
-                made = pixel_response(view, phases.subset(np.array(new)), by_pixel=False)
+                made = pixel_response(setup, phases.subset(np.array(new)), by_pixel=False)
                 if (len(self._known) + len(new)) * made.light[0].nbytes > _KEPT_BYTES:
                     self._known.clear()
-                    return made if len(new) == len(keys) else pixel_response(view, phases, by_pixel=False)
+                    return made if len(new) == len(keys) else pixel_response(setup, phases, by_pixel=False)
                 parts = zip(made.light, made.uniform, strict=True)
                 self._known.update(zip((keys[at] for at in new), parts, strict=True))
             light, uniform = (np.stack(part) for part in zip(*(self._known[key] for key in keys), strict=True))
@@ -200,34 +200,37 @@ _RESPONSES: Cache[bytes, PixelResponse] = Cache(8)
 """The latest ones: CFAs with tiles of one pattern share theirs."""
 
 
-def channel_responses(view: View) -> ChannelResponses:
+def channel_responses(setup: Setup) -> ChannelResponses:
     """The responses of a target's channels in a scene, kept."""
-    return _CHANNELS.get(hashlib.sha256(pickle.dumps(colorless(view))).digest(), ChannelResponses)
+    return _CHANNELS.get(hashlib.sha256(pickle.dumps(colorless(setup))).digest(), ChannelResponses)
 
 
-def kept_response(view: View, phases: Phases | None, *, by_pixel: bool) -> PixelResponse:
+def kept_response(setup: Setup, phases: Phases | None, *, by_pixel: bool) -> PixelResponse:
     """`pixel_response` for the phases of the scene; kept where it is small."""
-    heights = field_heights(view)  # filters that move need more positions than those that do not
+    heights = field_heights(setup)  # filters that move need more positions than those that do not
     count = 1 if phases is None else len(phases)
-    if by_pixel or 8 * count * len(heights) * len(view.mosaic.channels) ** 2 * view.grid.size > _KEPT_BYTES:
-        return pixel_response(view, phases, by_pixel=by_pixel)
-    key = hashlib.sha256(pickle.dumps((heights, count, colorless(view)))).digest()
-    # The heights are those of the view's own filters, which a colorless one does not have.
-    return _RESPONSES.get(key, lambda: pixel_response(view, phases, by_pixel=False))
+    if (
+        by_pixel
+        or 8 * count * len(heights) * len(setup.camera.mosaic.channels) ** 2 * setup.camera.grid.size > _KEPT_BYTES
+    ):
+        return pixel_response(setup, phases, by_pixel=by_pixel)
+    key = hashlib.sha256(pickle.dumps((heights, count, colorless(setup)))).digest()
+    # The heights are those of the setup's own filters, which a colorless one does not have.
+    return _RESPONSES.get(key, lambda: pixel_response(setup, phases, by_pixel=False))
 
 
-def _uniform(view: View, *, by_pixel: bool) -> PixelResponse:
+def _uniform(setup: Setup, *, by_pixel: bool) -> PixelResponse:
     """A field without structure: one tile stands for all."""
-    tile, n = view.mosaic.indices, len(view.mosaic.channels)
+    tile, n = setup.camera.mosaic.indices, len(setup.camera.mosaic.channels)
     of_channel = (tile[..., None] == np.arange(n)).astype(float)
-    share = sampling.crosstalk_share(view)
+    share = sampling.crosstalk_share(setup)
     split = sampling.with_crosstalk(of_channel[None], share, periodic=True).reshape(1, tile.size, n, 1)
-    weights = of_channel.reshape(-1, n) / view.mosaic.counts
+    weights = of_channel.reshape(-1, n) / setup.camera.mosaic.counts
     if by_pixel and share and tile.size > n:
         return PixelResponse(split, split[..., 0], weights[None], weights[None] ** 2, by_channel=False)
     folded = np.einsum("uc,xukl->xckl", weights, split)
     return PixelResponse(
-        folded, folded[..., 0], np.eye(n)[None], np.diag(1 / view.mosaic.counts)[None], by_channel=True
+        folded, folded[..., 0], np.eye(n)[None], np.diag(1 / setup.camera.mosaic.counts)[None], by_channel=True
     )
 
 
@@ -239,28 +242,28 @@ def _joined(parts: list[PixelResponse]) -> PixelResponse:
     return PixelResponse(light, uniform, readout, spread, parts[0].by_channel)
 
 
-def _profile(view: View, wavelength_nm: FloatArray) -> psf.DiscProfile | None:
+def _profile(setup: Setup, wavelength_nm: FloatArray) -> psf.DiscProfile | None:
     """The light's blurred image, as far as any pixel of the readout can be; None where blur is left out."""
-    target = view.scenario.target
-    if target is None or not view.computes("blur"):
+    target = setup.scene.target
+    if target is None or not setup.computes("blur"):
         return None
-    pitch_um = view.pixel.pitch_um
-    furthest_px = 2**0.5 * (sampling.reach_px(view, target) + 2.5)
-    sizes = (sampling.radii_px(view, target)[0] * pitch_um, furthest_px * pitch_um)
-    w20_um = psf.defocus_um(view.scenario, pitch_um)
-    return psf.profile(*sizes, tuple(wavelength_nm * 1e-3), view.scenario.optics.f_number, w20_um)
+    pitch_um = setup.camera.pixel.pitch_um
+    furthest_px = 2**0.5 * (sampling.reach_px(setup, target) + 2.5)
+    sizes = (sampling.radii_px(setup, target)[0] * pitch_um, furthest_px * pitch_um)
+    w20_um = psf.defocus_um(setup.scene, pitch_um)
+    return psf.profile(*sizes, tuple(wavelength_nm * 1e-3), setup.scene.optics.f_number, w20_um)
 
 
-def _pixels(view: View, wavelength_nm: FloatArray, phases: Phases, *, by_pixel: bool) -> PixelResponse:
+def _pixels(setup: Setup, wavelength_nm: FloatArray, phases: Phases, *, by_pixel: bool) -> PixelResponse:
     """Every pixel of the readout, at every phase."""
-    target, pixel, n = view.scenario.target, view.pixel, len(view.mosaic.channels)
+    target, pixel, n = setup.scene.target, setup.camera.pixel, len(setup.camera.mosaic.channels)
     assert target is not None
-    radius, half = sampling.radii_px(view, target)[0], pixel.fill_factor**0.5 / 2
-    seen, of_channel, apart = _weights(view, phases)
-    share = sampling.crosstalk_share(view)
+    radius, half = sampling.radii_px(setup, target)[0], pixel.fill_factor**0.5 / 2
+    seen, of_channel, apart = _weights(setup, phases)
+    share = sampling.crosstalk_share(setup)
     spread = sampling.with_crosstalk(apart, share) if share else apart
     wanted = np.asarray((spread > 0).any(axis=3))
-    profile = _profile(view, wavelength_nm)
+    profile = _profile(setup, wavelength_nm)
     light = disc_image.light_on_pixels(seen, wanted, half, radius, profile, pixel.pitch_um)
     if by_pixel:
         return _apart(light, of_channel, apart, share)
@@ -272,15 +275,15 @@ def _pixels(view: View, wavelength_nm: FloatArray, phases: Phases, *, by_pixel: 
     return PixelResponse(folded, taken.sum(axis=(1, 2)), weights, weights, by_channel=True)
 
 
-def _weights(view: View, phases: Phases) -> tuple[sampling.Window, FloatArray, FloatArray]:
+def _weights(setup: Setup, phases: Phases) -> tuple[sampling.Window, FloatArray, FloatArray]:
     """The pixels around the light, whose channel each is, ndarray[rows, columns, n_channels], and its weight in the
     value of each, ndarray[n_cases, rows, columns, n_channels].
     """
-    target, mosaic, n = view.scenario.target, view.mosaic, len(view.mosaic.channels)
+    target, mosaic, n = setup.scene.target, setup.camera.mosaic, len(setup.camera.mosaic.channels)
     assert target is not None
-    seen = sampling.window(mosaic, phases.center_px, sampling.reach_px(view, target))
+    seen = sampling.window(mosaic, phases.center_px, sampling.reach_px(setup, target))
     if target.readout == "mean":
-        half, readout = view.pixel.fill_factor**0.5 / 2, sampling.radii_px(view, target)[1]
+        half, readout = setup.camera.pixel.fill_factor**0.5 / 2, sampling.radii_px(setup, target)[1]
         weights = sampling.mean_weights(seen, half, readout, n)
     else:
         weights = sampling.center_weights(seen, phases.nearest_px - phases.center_px, mosaic)

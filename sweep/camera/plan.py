@@ -10,7 +10,7 @@ from functools import cached_property
 
 from .accuracy import Accuracy
 from .effects import EFFECTS, Box, Effect
-from .view import READOUT
+from .setup import READOUT
 
 _OWN = "an effect of the study's own: always computed"
 
@@ -98,7 +98,7 @@ def plan_scene(
                 computed -= {name}
             choices[name] = Choice(name, not leave_out, bound_dn, _reason(bound_dn, leave_out, needed))
     made = [choice for choice in choices.values() if choice is not None]
-    made += [Choice(effect.name, True, None, _OWN) for effect in boxes[0].view.own_effects]
+    made += [Choice(effect.name, True, None, _OWN) for effect in boxes[0].setup.own_effects]
     return Plan(scenario, tolerance_dn, accuracy, tuple(made))
 
 

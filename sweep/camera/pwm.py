@@ -6,7 +6,7 @@ import numpy as np
 
 from ..base.types import FloatArray
 from .scene import Drive
-from .view import View
+from .setup import Setup
 
 
 def extremes(drive: Drive, exposure_s: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -42,16 +42,16 @@ def largest(drive: Drive, shortest_s: float, longest_s: float) -> float:
     return float(extremes(drive, np.array([shortest_s, longest_s, *inside]))[1].max())
 
 
-def scales(view: View, exposure_s: FloatArray, moments: FloatArray | None = None) -> FloatArray:
+def scales(setup: Setup, exposure_s: FloatArray, moments: FloatArray | None = None) -> FloatArray:
     """Light relative to its mean at the moments that are computed, ndarray[n_designs, n_moments].
 
     Behind a linear readout the two ends are the extremes. Behind one that clips the distance of two signals may be
     smallest at any moment between them. `moments`: from 0 (least light) to 1 (most), ndarray[n_moments], instead of
     those of the accuracy.
     """
-    drive = view.scenario.drive
-    if drive is None or not view.computes("flicker"):
+    drive = setup.scene.drive
+    if drive is None or not setup.computes("flicker"):
         return np.ones((len(exposure_s), 1))
     least, most = extremes(drive, exposure_s)
-    share = np.linspace(0.0, 1.0, 2 if view.linear else view.accuracy.pwm_moments) if moments is None else moments
+    share = np.linspace(0.0, 1.0, 2 if setup.linear else setup.accuracy.pwm_moments) if moments is None else moments
     return np.asarray(least[:, None] + share * (most - least)[:, None], dtype=float)

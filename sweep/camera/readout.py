@@ -14,7 +14,7 @@ from ..base.types import BoolArray, FloatArray, IndexArray
 from .noise import table
 from .pixel import Pixel, unquantized
 from .pixel_response import PixelResponse
-from .view import View
+from .setup import Setup
 
 _CERTAIN_DN2 = 1e-9
 _FEW = 16
@@ -97,19 +97,19 @@ def reach_dn(electrons: FloatArray, pixel: Pixel) -> FloatArray:
 class Readout:
     """Readout of the elements of a pixel response. `by_channel`: each element is a channel already."""
 
-    def __init__(self, view: View, response: PixelResponse) -> None:
-        self.view = view
+    def __init__(self, setup: Setup, response: PixelResponse) -> None:
+        self.setup = setup
         self.n_cases = response.shape[0]
         self._weights, self._spread = response.readout, response.spread
-        self.pixel = view.pixel
+        self.pixel = setup.camera.pixel
         self.by_channel = response.by_channel
 
     def transfer(self, electrons: FloatArray) -> FloatArray:
         """Digital numbers of the elements from their expected electrons; the mean of those that noise gives."""
-        view, pixel = self.view, self.pixel
-        clips, rounds = view.computes("saturation"), view.computes("quantization")
-        noisy = view.scenario.noise is not None
-        if noisy and view.computes("noise"):
+        setup, pixel = self.setup, self.pixel
+        clips, rounds = setup.computes("saturation"), setup.computes("quantization")
+        noisy = setup.scene.noise is not None
+        if noisy and setup.computes("noise"):
             return (table.mean_rounded if rounds else table.mean_unrounded)(electrons, pixel)
         if rounds and not noisy and electrons.size > _MANY:
             return self._whole_numbers(electrons, clips)
@@ -137,9 +137,9 @@ class Readout:
 
     def line(self) -> tuple[float, float, float, float] | None:
         """`_line` for whoever reads values by himself; None where a readout is more than whole numbers."""
-        if not self.view.computes("quantization") or self.view.scenario.noise is not None:
+        if not self.setup.computes("quantization") or self.setup.scene.noise is not None:
             return None
-        return self._line(self.view.computes("saturation"))
+        return self._line(self.setup.computes("saturation"))
 
     def variance_dn(self, electrons: FloatArray) -> FloatArray:
         """Variance of the elements' digital numbers, DN^2, with their rounding."""
@@ -171,20 +171,20 @@ class Readout:
 
         ndarray[n, n_pixels] -> ndarray[n, n_channels].
         """
-        view = self.view
-        if view.scenario.target is None:
-            own = view.mosaic.indices.ravel()[:, None] == np.arange(len(view.mosaic.channels))
-            return np.asarray(pixels @ (own / view.mosaic.counts), dtype=float)
+        setup = self.setup
+        if setup.scene.target is None:
+            own = setup.camera.mosaic.indices.ravel()[:, None] == np.arange(len(setup.camera.mosaic.channels))
+            return np.asarray(pixels @ (own / setup.camera.mosaic.counts), dtype=float)
         return np.asarray(pixels @ self._weights[place], dtype=float)
 
     @property
     def few_pixels(self) -> tuple[IndexArray, ...] | None:
         """Pixels of `ForwardModel.pixel_electrons` of which each channel is the mean; None where they are many."""
-        view = self.view
-        if view.scenario.target is not None or view.mosaic.counts.max() > _FEW:
+        setup = self.setup
+        if setup.scene.target is not None or setup.camera.mosaic.counts.max() > _FEW:
             return None
-        channels = view.mosaic.indices.ravel()
-        return tuple(np.flatnonzero(channels == at) for at in range(len(view.mosaic.channels)))
+        channels = setup.camera.mosaic.indices.ravel()
+        return tuple(np.flatnonzero(channels == at) for at in range(len(setup.camera.mosaic.channels)))
 
     def _weighed(self, values: FloatArray, weights: FloatArray) -> FloatArray:
         """Sums over the elements by their `weights`, ndarray[n_cases, n_elements, n_channels]."""
@@ -194,7 +194,7 @@ class Readout:
     def _shape_of_noise(self, electrons: FloatArray, variance: FloatArray) -> tuple[BoolArray, FloatArray]:
         """`NoisyReadout.gaussian` and `reach_dn` of a block."""
         repeats = electrons.shape[1] // self.n_cases
-        heaviest = self._weights.max(axis=1) if self.view.scenario.target else 1 / self.view.mosaic.counts[None]
+        heaviest = self._weights.max(axis=1) if self.setup.scene.target else 1 / self.setup.camera.mosaic.counts[None]
         heaviest = np.repeat(np.broadcast_to(heaviest, (self.n_cases, variance.shape[-1])), repeats, axis=0)[:, None]
         cut = self._weighed(is_cut(electrons, self.pixel), (self._weights > 0).astype(float)) > 0
         return is_gaussian(variance, heaviest, cut, self.pixel), reach_dn(electrons, self.pixel) * heaviest

@@ -14,7 +14,7 @@ import numpy as np
 from ..base.types import FloatArray, IndexArray
 from .mosaic import Mosaic
 from .scene import Target
-from .view import View
+from .setup import Setup
 
 
 @dataclass(frozen=True)
@@ -40,18 +40,18 @@ class Window:
         return np.ascontiguousarray(self.dy[:, :, 0])
 
 
-def radii_px(view: View, target: Target) -> tuple[float, float]:
+def radii_px(setup: Setup, target: Target) -> tuple[float, float]:
     """Radius of the light and of the readout, in pixels; a readout reaches a pixel of every channel."""
     radius = target.object_resolution_px / 2
-    rows, columns = view.mosaic.indices.shape
+    rows, columns = setup.camera.mosaic.indices.shape
     return radius, max(radius, math.hypot(rows, columns) / 2)
 
 
-def reach_px(view: View, target: Target) -> float:
+def reach_px(setup: Setup, target: Target) -> float:
     """Largest distance from the light's center of a pixel with a weight, along a row or column."""
     if target.readout == "mean":
-        return radii_px(view, target)[1] + 0.5
-    return float(max(view.mosaic.indices.shape))
+        return radii_px(setup, target)[1] + 0.5
+    return float(max(setup.camera.mosaic.indices.shape))
 
 
 def window(mosaic: Mosaic, phases_px: FloatArray, reach_px: float) -> Window:
@@ -114,6 +114,6 @@ def with_crosstalk(light: FloatArray, share: float, *, periodic: bool = False) -
     return np.asarray(found, dtype=float)
 
 
-def crosstalk_share(view: View) -> float:
+def crosstalk_share(setup: Setup) -> float:
     """Share of a pixel's light that comes through the filters of its neighbors."""
-    return view.pixel.crosstalk if view.computes("crosstalk") else 0.0
+    return setup.camera.pixel.crosstalk if setup.computes("crosstalk") else 0.0

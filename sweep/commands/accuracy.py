@@ -14,7 +14,7 @@ import pyarrow as pa
 from ..base.errors import StudyError
 from ..base.types import IndexArray, Progress
 from ..camera.accuracy import PRESETS, REFERENCE, STANDARD, Accuracy
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..designs.space import Space
 from ..report.accuracy_figure import PRESET, draw_accuracy
 from ..report.figures import pictures_of
@@ -108,26 +108,26 @@ def measure_accuracy(
 
 
 def _settings_of(
-    view: View, first: bool, settings: Mapping[str, Sequence[Any]], presets: Sequence[str]
+    setup: Setup, first: bool, settings: Mapping[str, Sequence[Any]], presets: Sequence[str]
 ) -> Iterator[Setting]:
     """The presets, and those single settings that can change anything in a scene; `first`: it is the first."""
     for name in dict.fromkeys((*presets, _REFERENCE)):
         yield Setting(PRESET, name, PRESETS[name])
-    drive = view.scenario.drive
+    drive = setup.scene.drive
     active = {
-        _UNREFINED: view.all_phases,
-        "finest_phase_px": view.all_phases,
-        "field_positions": view.all_heights,
-        "rays": bool(view.moving),
-        "psf_step_nm": view.scenario.target is not None,
-        "pwm_moments": drive is not None and drive.duty < 1 and not view.linear,
+        _UNREFINED: setup.all_phases,
+        "finest_phase_px": setup.all_phases,
+        "field_positions": setup.all_heights,
+        "rays": bool(setup.camera.moving),
+        "psf_step_nm": setup.scene.target is not None,
+        "pwm_moments": drive is not None and drive.duty < 1 and not setup.linear,
         "single_precision": first,
         GRID: first,
     }
     for name, values in settings.items():
         for value in values if active[name] else ():
             if name == GRID:
-                yield Setting(name, f"{value:g}", STANDARD, None if value == view.grid.step_nm else value)
+                yield Setting(name, f"{value:g}", STANDARD, None if value == setup.camera.grid.step_nm else value)
             else:
                 changes = {name: value} | ({"finest_phase_px": 0.0} if name == _UNREFINED else {})
                 yield Setting(name, _text(value), STANDARD.model_copy(update=changes))
@@ -166,8 +166,8 @@ class _Bench:
             study = self.study if step_nm is None else self.regridded(step_nm)
             space = _largest(study)
             dense = denser(space) if step_nm is None and accuracy in PRESETS.values() else None
-            view = replace(study.view(space, scenario).with_all_effects, accuracy=accuracy)
-            self.known[key] = in_new_process(view, space, self.numbers, dense, self.seconds)
+            setup = replace(study.setup(space, scenario).with_all_effects, accuracy=accuracy)
+            self.known[key] = in_new_process(setup, space, self.numbers, dense, self.seconds)
         return self.known[key]
 
     def compared(self, scenario: str, setting: Setting) -> tuple[Measured, Measured] | None:
@@ -195,7 +195,7 @@ def _measurements(
     jobs = [
         (scenario, setting)
         for at, scenario in enumerate(bench.study.scenarios)
-        for setting in _settings_of(bench.study.view(bench.space, scenario), at == 0, settings, presets)
+        for setting in _settings_of(bench.study.setup(bench.space, scenario), at == 0, settings, presets)
     ]
     for done, (scenario, setting) in enumerate(jobs):
         progress("measurements", done, len(jobs))

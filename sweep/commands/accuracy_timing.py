@@ -18,7 +18,7 @@ from ..base.errors import Fault, SweepError
 from ..base.types import FloatArray, IndexArray
 from ..camera.accuracy import Accuracy
 from ..camera.forward import ForwardModel
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..curves.lights import class_pairs
 from ..designs.block import Block, CurveBlock, edges_of_some
 from ..designs.space import Space
@@ -72,12 +72,12 @@ def denser(space: Space) -> Space | None:
     return replace(space, axes=tuple(axes), gridded=True, rows=None)
 
 
-def in_new_process(view: View, space: Space, numbers: IndexArray, dense: Space | None, seconds: float) -> Measured:
-    """Measure designs of a view in a process of its own, with one thread; raises SweepError when that is killed.
+def in_new_process(setup: Setup, space: Space, numbers: IndexArray, dense: Space | None, seconds: float) -> Measured:
+    """Measure designs of a setup in a process of its own, with one thread; raises SweepError when that is killed.
 
     Parameters
     ----------
-    view : View
+    setup : Setup
         Scene and accuracy.
     space : Space
         Designs.
@@ -91,25 +91,25 @@ def in_new_process(view: View, space: Space, numbers: IndexArray, dense: Space |
     context, parent = get_context("spawn"), (os.getpid(),)
     try:
         with ProcessPoolExecutor(1, mp_context=context, initializer=prepare_worker, initargs=parent) as pool:
-            return pool.submit(_measure, view, space, numbers, dense, seconds).result()
+            return pool.submit(_measure, setup, space, numbers, dense, seconds).result()
     except BrokenProcessPool:
         raise SweepError(Fault("the process of a measurement was killed", key="accuracy")) from None
 
 
-def _measure(view: View, space: Space, numbers: IndexArray, dense: Space | None, seconds: float) -> Measured:
-    """CSDs and times of a view with one thread, in a process that has computed nothing but what warms it up."""
+def _measure(setup: Setup, space: Space, numbers: IndexArray, dense: Space | None, seconds: float) -> Measured:
+    """CSDs and times of a setup with one thread, in a process that has computed nothing but what warms it up."""
     with threadpool_limits(1):
-        _warm_up(view, space)
+        _warm_up(setup, space)
         started = time.perf_counter()
-        model = ForwardModel(view)
-        csds = [_csds(model, _block(view, space, numbers[:1]))]
+        model = ForwardModel(setup)
+        csds = [_csds(model, _block(setup, space, numbers[:1]))]
         first_s = time.perf_counter() - started
         rest = numbers[1:]
         if len(rest) * first_s > seconds:  # as many as fit: the first one took longer than one that follows
             rest = _that_fit(model, space, rest, seconds)
         rest_s, many_s = 0.0, None
         if rest.size:
-            values, rest_s = _repeated(lambda: _csds(model, _block(view, space, rest)))
+            values, rest_s = _repeated(lambda: _csds(model, _block(setup, space, rest)))
             csds.append(values)
         if dense is not None and rest.size == len(numbers) - 1 and first_s + rest_s < _SHORT_S:
             many_s = first_s + _sweep_s(model, dense)
@@ -129,7 +129,7 @@ def _repeated(compute: Callable[[], FloatArray]) -> tuple[FloatArray, float]:
 def _that_fit(model: ForwardModel, space: Space, numbers: IndexArray, seconds: float) -> IndexArray:
     """Designs, one at least, that are computed in some seconds, going by the time of the first one."""
     started = time.perf_counter()
-    _csds(model, _block(model.view, space, numbers[:1]))
+    _csds(model, _block(model.setup, space, numbers[:1]))
     return numbers[: max(1, int(seconds / (time.perf_counter() - started)))]
 
 
@@ -138,32 +138,32 @@ def _sweep_s(model: ForwardModel, dense: Space) -> float:
     numbers = np.arange(1, MANY) * dense.size // MANY
     started = time.perf_counter()
     for start in range(0, len(numbers), CHUNK):
-        evaluate(model, _block(model.view, dense, numbers[start : start + CHUNK]))
+        evaluate(model, _block(model.setup, dense, numbers[start : start + CHUNK]))
     return time.perf_counter() - started
 
 
-def _warm_up(view: View, space: Space) -> None:
+def _warm_up(setup: Setup, space: Space) -> None:
     """Load what a measurement imports and its machine code: a chart, and the scene itself behind another lens."""
     one = replace(space, axes=tuple(axis[:1] for axis in space.axes), gridded=True, rows=None)
-    scene = view.scenario
+    scene = setup.scene
     optics = scene.optics.model_copy(update={"f_number": _OTHER_F_NUMBER * scene.optics.f_number})
     elsewhere = scene.model_copy(update={"optics": optics})
     chart = elsewhere.model_copy(update={"target": None, "field": None})
     for other, n_designs in ((chart, _WARM_DESIGNS), (elsewhere, 2)):
-        warm = replace(view, scenario=other, accuracy=_WARM)
+        warm = replace(setup, scene=other, accuracy=_WARM)
         evaluate(ForwardModel(warm), _block(warm, one, np.zeros(n_designs, dtype=np.intp)))
 
 
-def _block(view: View, space: Space, numbers: IndexArray) -> Block:
+def _block(setup: Setup, space: Space, numbers: IndexArray) -> Block:
     """Designs of a space by their edges where it is separable, as a run takes them; else by their curves."""
     by_edges = edges_of_some(space, numbers)
-    return CurveBlock(space.curves(space.points_of(numbers), view.grid.size)) if by_edges is None else by_edges
+    return CurveBlock(space.curves(space.points_of(numbers), setup.camera.grid.size)) if by_edges is None else by_edges
 
 
 def _csds(model: ForwardModel, block: Block) -> FloatArray:
     """All CSDs, those of the best place too where all count, ndarray[n_csds, n_designs]."""
     columns = evaluate(model, block)
-    names: Iterable[str] = [csd_name(pair) for pair in class_pairs(model.view.lights.classes)]
-    if model.view.all_phases:
+    names: Iterable[str] = [csd_name(pair) for pair in class_pairs(model.setup.lights.classes)]
+    if model.setup.all_phases:
         names = [*names, *(BEST_PLACE + name for name in names)]
     return np.stack([columns[name] for name in names])

@@ -108,12 +108,12 @@ def export_design(
 def filters_of(study: Study, row: Mapping[Any, Any]) -> Filters:
     """The channels of a row's CFA, with its filters computed from its parameters."""
     space, made = row_curves(study, row)
-    view = study.view(space, row["scenario"])
-    qe = view.qe.copy()
-    qe[list(view.modified)] = made[0]
+    setup = study.setup(space, row["scenario"])
+    qe = setup.camera.qe.copy()
+    qe[list(setup.camera.modified)] = made[0]
     bases = {} if space.filter is None else space.filter.bases
     replaced = {channel: study.sensor.curve(base) for channel, base in bases.items()}
-    return Filters(view.mosaic, study.grid.nodes_nm, qe, bases, replaced)
+    return Filters(setup.camera.mosaic, study.grid.nodes_nm, qe, bases, replaced)
 
 
 def _verify(output: Output, row: Mapping[Any, Any], filters: Filters) -> None:

@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 
 from ..camera.exposure import leaves_exposure
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..designs.families.stopband import Stopband
 from ..designs.family import Family
 from ..metrics.bound import Bound
@@ -18,14 +18,14 @@ from ..search.problem import Problem
 from ..study import Study
 
 
-def any_filter(study: Study, view: View) -> Problem:
+def any_filter(study: Study, setup: Setup) -> Problem:
     """The problem of the best filter between nothing and the curve that it replaces, under the study's constraints."""
-    base = view.base_qe[0]
+    base = setup.camera.base_qe[0]
     # The limit asks a family only for how large and how small its filters can be.
     family = cast(Family, Stopband(study.grid.nodes_nm, base, np.zeros_like(base)))
     low, high = (np.array([getattr(p, end) for p in family.parameters], dtype=float) for end in ("low", "high"))
     return Problem(
-        view,
+        setup,
         family,
         low,
         high,
@@ -49,7 +49,7 @@ def at_least(problem: Problem, quantity: str, value: float) -> Problem:
 
 def as_exposed(problem: Problem) -> Problem:
     """The problem of filters that are not the brightest on white, and so leave the exposure to other pixels."""
-    most = min(1.0, leaves_exposure(problem.view))
+    most = min(1.0, leaves_exposure(problem.setup))
     old = problem.constraints.get(SENSITIVITY)
     bound = Bound(
         min=None if old is None else old.min, max=most if old is None or old.max is None else min(most, old.max)

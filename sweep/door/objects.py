@@ -18,7 +18,7 @@ from ..search.limit import Limit
 from ..study import Study, folder_name
 from .given import CurveLike, on_grid, over_nm
 from .limits import any_filter, at_least, limit_or_reason
-from .own_filters import bases_of, cfa_with, judged, table_of, view_with, with_units
+from .own_filters import bases_of, cfa_with, judged, setup_with, table_of, with_units
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -112,8 +112,8 @@ class LoadedStudy:
         chosen = cfa_with(study, list(channels)) if cfa is None else self._cfa(cfa, list(channels))
         bases = bases_of(study, chosen, list(channels), base)
         curves = np.stack([*rows.values()], axis=1)
-        views = {name: view_with(study, chosen, name, bases) for name in scenarios}
-        found = {name: judged(study, view, curves) for name, view in views.items()}
+        setups = {name: setup_with(study, chosen, name, bases) for name in scenarios}
+        found = {name: judged(study, setup, curves) for name, setup in setups.items()}
         return table_of(study, [("own", chosen, n, columns) for n, columns in found.items()])
 
     def _own(self, cfa: str | None, scenarios: list[str]) -> pd.DataFrame:
@@ -131,7 +131,7 @@ class LoadedStudy:
         rows = []
         for name in scenarios:
             for space in spaces:
-                found = block_of(space, 0, space.points(0, space.size), study.view(space, name), request)
+                found = block_of(space, 0, space.points(0, space.size), study.setup(space, name), request)
                 for text in found.faults.values():
                     raise SweepError(Fault(f"{space.name} in {name}: {text}"))
                 own = space.violation(space.points(0, space.size))
@@ -157,7 +157,7 @@ class LoadedStudy:
         space = self._modified(cfa, channel)
         assert space.filter is not None
         scene = next(iter(self.study.scenarios)) if scenario is None else self._scenario(scenario)
-        problem = any_filter(self.study, self.study.view(space, scene))
+        problem = any_filter(self.study, self.study.setup(space, scene))
         if sensitivity is not None:
             problem = at_least(problem, "sensitivity", sensitivity)
         found, reason = limit_or_reason(problem)

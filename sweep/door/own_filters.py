@@ -10,7 +10,7 @@ import numpy as np
 from ..base.errors import DataError, Fault, nearest
 from ..base.types import FloatArray
 from ..camera.forward import forward_model
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..curves.lights import class_pairs
 from ..metrics.bound import FEASIBLE, total_violation
 from ..metrics.evaluate import evaluate, family_quantities, image_quantities
@@ -56,7 +56,7 @@ def bases_of(study: Study, cfa: str, channels: Sequence[str], base: str | None) 
     return found
 
 
-def view_with(study: Study, cfa: str, scenario: str, bases: Mapping[str, str]) -> View:
+def setup_with(study: Study, cfa: str, scenario: str, bases: Mapping[str, str]) -> Setup:
     """A scene for own filters: of the technology that the study states for its own ones in these channels.
 
     Raises DataError where it states several.
@@ -66,7 +66,7 @@ def view_with(study: Study, cfa: str, scenario: str, bases: Mapping[str, str]) -
     if len(stated) > 1:
         several = ", ".join("none" if made is None else made.told for made in stated.values())
         raise DataError(Fault(f"several technologies are stated for {' and '.join(bases)} of {cfa}", value=several))
-    return study.view_of(cfa, scenario, bases, next(iter(stated.values()), None))
+    return study.setup_of(cfa, scenario, bases, next(iter(stated.values()), None))
 
 
 def cfa_with(study: Study, channels: Sequence[str]) -> str:
@@ -89,8 +89,8 @@ def cfa_with(study: Study, channels: Sequence[str]) -> str:
     return chosen[0]
 
 
-def judged(study: Study, view: View, curves: FloatArray) -> Columns:
-    """Every quantity of filters in the modified channels of a view, and `violation` of the study's constraints.
+def judged(study: Study, setup: Setup, curves: FloatArray) -> Columns:
+    """Every quantity of filters in the modified channels of a setup, and `violation` of the study's constraints.
 
     `curves`: QE, ndarray[n_designs, n_modified, n_wavelengths]. What only a family's parameters say (edges, bands,
     their shifts in production) is NaN. Raises DataError for a QE above 1.
@@ -99,19 +99,19 @@ def judged(study: Study, view: View, curves: FloatArray) -> Columns:
         allowed = "0 to 1; a transmission is relative to a curve (`relative_to`), percent are divided by 100"
         raise DataError(Fault("a QE above 1", value=round(float(curves.max()), 6), allowed=allowed))
     asked = study.asked
-    found = evaluate(forward_model(view), curves, asked.states, probabilities=asked.probabilities, own=asked.own)
-    if view.lights.population is not None and not study.tolerance:
+    found = evaluate(forward_model(setup), curves, asked.states, probabilities=asked.probabilities, own=asked.own)
+    if setup.lights.population is not None and not study.tolerance:
         from ..metrics.members import population_imager  # noqa: PLC0415  (only where lights have a population)
 
-        found |= {WORST + name: values for name, values in population_imager(view).worst(curves).items()}
+        found |= {WORST + name: values for name, values in population_imager(setup).worst(curves).items()}
         if asked.wanted_yield:
             from ..metrics.drawn import LampsAndCameras  # noqa: PLC0415
 
-            drawn = LampsAndCameras(population_imager(view), study.tolerance, study.section.seed)
-            kept = drawn.columns(lambda _, some: curves[some], len(curves), class_pairs(view.lights.classes))
+            drawn = LampsAndCameras(population_imager(setup), study.tolerance, study.section.seed)
+            kept = drawn.columns(lambda _, some: curves[some], len(curves), class_pairs(setup.lights.classes))
             found |= {YIELD + name: values for name, values in kept.items()}
     found |= family_quantities(None, np.empty((len(curves), 0)))
-    found |= image_quantities(view, curves, study.section.vision, study.section.seed)
+    found |= image_quantities(setup, curves, study.section.vision, study.section.seed)
     lacking = np.full(len(curves), np.nan)
     columns = {name: found.get(name, lacking) for name in study.quantities if name != COMBINED}
     if COMBINED in study.quantities:

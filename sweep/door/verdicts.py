@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -162,7 +162,7 @@ def judge(asked: Judged) -> Verdict:
     for scene in study.scenarios:
         for cfa in study.mosaics:
             bases, made = (asked.bases, curves) if cfa == own else ({}, nothing)
-            rows.append((scene, cfa, judged(study, study.view_of(cfa, scene, bases, asked.technology), made)))
+            rows.append((scene, cfa, judged(study, study.setup_of(cfa, scene, bases, asked.technology), made)))
     first = next(columns for _, cfa, columns in rows if cfa == own)
     light = float(first[CFA_SENSITIVITY][0])
     smooth, limit, below, reason = _limit(study, own, asked, curves, light)
@@ -191,8 +191,8 @@ def _limit(
     ((channel, base),) = bases.items()
     clear_name = study.sensor.clear
     curve, replaced, clear = curves[0, 0], study.sensor.curve(base), study.sensor.curve(clear_name)
-    view = study.view_of(own, scenario, {channel: base}, asked.technology)
-    smooth = float(smooth_csd(view, curves, asked.pair)[0])
+    setup = study.setup_of(own, scenario, {channel: base}, asked.technology)
+    smooth = float(smooth_csd(setup, curves, asked.pair)[0])
     larger = base if _below(curve, replaced) else f"the larger of {base} and itself"
     for below, ceiling, exposed in (
         (base, replaced, False),
@@ -200,10 +200,10 @@ def _limit(
         (f"{larger}, which leaves the exposure to other pixels,", np.maximum(replaced, curve), True),
     ):
         if _below(curve, ceiling):
-            qe = view.qe.copy()
-            qe[view.modified[0]] = ceiling
-            problem = at_least(any_filter(study, replace(view, qe=qe)), CFA_SENSITIVITY, light)
-            if exposed and may_set_exposure(problem.view, float(curve.sum() / ceiling.sum())):
+            qe = setup.camera.qe.copy()
+            qe[setup.camera.modified[0]] = ceiling
+            problem = at_least(any_filter(study, setup.with_camera(qe=qe)), CFA_SENSITIVITY, light)
+            if exposed and may_set_exposure(problem.setup, float(curve.sum() / ceiling.sum())):
                 return None, None, "", "the filter is the brightest on white, and sets the exposure"
             found, reason = limit_or_reason(as_exposed(problem) if exposed else problem)
             if found is not None:

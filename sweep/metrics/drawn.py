@@ -150,7 +150,9 @@ class LampsAndCameras:
         """
         imager = self.seen.imager
         found = {pair: np.empty(self.draws(pair).size) for pair in pairs}
-        step = max(1, _HELD // (imager.n_cases * self.seen.view.lights.photons.shape[0] * len(self.seen.view.qe)))
+        step = max(
+            1, _HELD // (imager.n_cases * self.seen.setup.lights.photons.shape[0] * len(self.seen.setup.camera.qe))
+        )
         for start in range(0, len(curves), step):
             for off, response in enumerate(imager.smooth(curves[start : start + step]), start):
                 for pair, distances in found.items():
@@ -172,8 +174,8 @@ class LampsAndCameras:
         `made`: how some of them come out, ndarray[n_some, n_modified, n_wavelengths]; so many are made at once that no
         more than `_HELD` values are held.
         """
-        offs, view = self.draws(pairs[0]).offs, self.seen.view
-        step = max(1, _HELD // (len(offs) * max(1, len(view.modified)) * view.grid.size))
+        offs, setup = self.draws(pairs[0]).offs, self.seen.setup
+        step = max(1, _HELD // (len(offs) * max(1, len(setup.camera.modified)) * setup.camera.grid.size))
         found: dict[str, list[float]] = {csd_name(pair): [] for pair in pairs}
         for start in range(0, n_designs, step):
             some = slice(start, min(start + step, n_designs))

@@ -8,10 +8,10 @@ import numpy as np
 
 from ..base.types import BoolArray, FloatArray
 from ..camera.electrons import Changing
-from ..camera.field import field_heights, refined_heights, view_at
+from ..camera.field import field_heights, refined_heights, setup_at
 from ..camera.forward import ForwardModel, forward_model
 from ..camera.phases import Phases, fine_lattice, refined_minima
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..curves.lights import class_pairs
 from ..designs.block import Block, CurveBlock
 from ..designs.family import Family
@@ -36,13 +36,13 @@ _PULSE_ROUNDS, _PULSE_STEPS = 3, 9
 _CSD = [metric for metric in METRICS if isinstance(metric, ColorSeparation)]
 
 
-def designed_quantities(view: View, designs: FloatArray | Block) -> Columns:
+def designed_quantities(setup: Setup, designs: FloatArray | Block) -> Columns:
     """What designs give without any light, each ndarray[n_designs].
 
     `designs`: a block, or the QE of its modified channels, ndarray[n_designs, n_modified, n_wavelengths].
     """
     block = _block(designs)
-    return _joined([metric.of_designs(view, block) for metric in METRICS if isinstance(metric, DesignMetric)])
+    return _joined([metric.of_designs(setup, block) for metric in METRICS if isinstance(metric, DesignMetric)])
 
 
 def family_quantities(family: Family | None, points: FloatArray) -> Columns:
@@ -50,7 +50,7 @@ def family_quantities(family: Family | None, points: FloatArray) -> Columns:
     return _joined([metric.of_parameters(family, points) for metric in METRICS if isinstance(metric, FamilyMetric)])
 
 
-def image_quantities(view: View, curves: FloatArray, vision: Vision | None, seed: int) -> Columns:
+def image_quantities(setup: Setup, curves: FloatArray, vision: Vision | None, seed: int) -> Columns:
     """What images of signal heads give, each ndarray[n_designs]; nothing where a study does not ask.
 
     `curves`: ndarray[n_designs, n_modified, n_wavelengths]; `seed`: the study's.
@@ -58,7 +58,7 @@ def image_quantities(view: View, curves: FloatArray, vision: Vision | None, seed
     if vision is None:
         return {}
     metrics = [metric for metric in METRICS if isinstance(metric, VisionMetric)]
-    return _joined([metric.of_images(view, curves, vision, seed) for metric in metrics])
+    return _joined([metric.of_images(setup, curves, vision, seed) for metric in metrics])
 
 
 def _block(designs: FloatArray | Block) -> Block:
@@ -74,7 +74,7 @@ def _by_phase(model: ForwardModel, cases: Columns, n_places: int) -> FloatArray:
 
     `cases`: ndarray[n_cases x n_moments, n_designs] by column.
     """
-    names = [csd_name(pair) for pair in class_pairs(model.view.lights.classes)]
+    names = [csd_name(pair) for pair in class_pairs(model.setup.lights.classes)]
     distances = np.stack([cases[name] for name in names])  # [n_pairs, n_cases x n_moments, n_designs]
     return np.moveaxis(distances.reshape(len(names), n_places, -1, distances.shape[-1]).min(axis=2), -1, 0)
 
@@ -82,14 +82,14 @@ def _by_phase(model: ForwardModel, cases: Columns, n_places: int) -> FloatArray:
 def _csds(model: ForwardModel, curves: FloatArray) -> FloatArray:
     """CSDs of one design at each phase, the smallest over the moments, ndarray[n_pairs, n_phases]."""
     response = model.read(curves)[0]
-    cases = {csd_name(pair): dn[:, None] for pair, dn in separations(response[0], model.view.members).items()}
+    cases = {csd_name(pair): dn[:, None] for pair, dn in separations(response[0], model.setup.members).items()}
     return np.asarray(_by_phase(model, cases, model.n_cases)[0])
 
 
-def _bends_over_pulse(view: View) -> bool:
+def _bends_over_pulse(setup: Setup) -> bool:
     """True where a CSD may be smallest at any moment of a pulse: behind a readout that clips, and has no steps."""
-    drive, steps = view.scenario.drive, view.scenario.noise is None and view.computes("quantization")
-    return drive is not None and view.computes("flicker") and not view.linear and not steps
+    drive, steps = setup.scene.drive, setup.scene.noise is None and setup.computes("quantization")
+    return drive is not None and setup.computes("flicker") and not setup.linear and not steps
 
 
 def _over_pulse(model: ForwardModel, curves: FloatArray, pairs: Sequence[int], phases: Phases | None) -> FloatArray:
@@ -100,9 +100,9 @@ def _over_pulse(model: ForwardModel, curves: FloatArray, pairs: Sequence[int], p
 
     def distances(moments: FloatArray) -> list[FloatArray]:
         response = model.at(phases, moments).read(curves)[0][0]
-        return list(separations(response, model.view.members).values())
+        return list(separations(response, model.setup.members).values())
 
-    first = np.linspace(0.0, 1.0, model.view.accuracy.pwm_moments)
+    first = np.linspace(0.0, 1.0, model.setup.accuracy.pwm_moments)
     at_first = distances(first)
     smallest = np.array([at_first[pair].min() for pair in pairs])
     for number, pair in enumerate(pairs):
@@ -119,7 +119,7 @@ def _over_pulse(model: ForwardModel, curves: FloatArray, pairs: Sequence[int], p
 
 def _refine_moments(model: ForwardModel, block: Block, columns: Columns) -> None:
     """Put the smallest distances over all moments of a pulse into the columns; of a light at one phase."""
-    names = [csd_name(pair) for pair in class_pairs(model.view.lights.classes)]
+    names = [csd_name(pair) for pair in class_pairs(model.setup.lights.classes)]
     for design in np.flatnonzero(np.isfinite(columns[names[0]])):
         curves = block.some(slice(design, design + 1)).curves()
         for name, least in zip(names, _over_pulse(model, curves, range(len(names)), model.phases), strict=True):
@@ -129,11 +129,11 @@ def _refine_moments(model: ForwardModel, block: Block, columns: Columns) -> None
 
 def _refine_phases(model: ForwardModel, block: Block, columns: Columns) -> None:
     """Put the extremes over all sampling phases into the columns, which hold those over the lattice."""
-    view = model.view
-    if not view.accuracy.finest_phase_px:
+    setup = model.setup
+    if not setup.accuracy.finest_phase_px:
         return
-    names = [csd_name(pair) for pair in class_pairs(view.lights.classes)]
-    lattice, step_px = fine_lattice(view)
+    names = [csd_name(pair) for pair in class_pairs(setup.lights.classes)]
+    lattice, step_px = fine_lattice(setup)
     on_lattice = model.at(lattice)
     for design in np.flatnonzero(np.isfinite(columns[names[0]])):
         curves = block.some(slice(design, design + 1)).curves()
@@ -143,13 +143,13 @@ def _refine_phases(model: ForwardModel, block: Block, columns: Columns) -> None:
             return np.concatenate([apart, -apart])
 
         extremes, at = refined_minima(
-            view, lattice, step_px, both_ends(on_lattice), lambda phases: both_ends(model.at(phases))
+            setup, lattice, step_px, both_ends(on_lattice), lambda phases: both_ends(model.at(phases))
         )
         smallest, largest = np.split(extremes, 2)
         for number, name in enumerate(names):
             columns[name][design] = smallest[number]
             columns[BEST_PLACE + name][design] = -largest[number]
-            if _bends_over_pulse(view):
+            if _bends_over_pulse(setup):
                 for column, end in ((name, number), (BEST_PLACE + name, number + len(names))):
                     there = _over_pulse(model, curves, [number], at.subset(np.array([end])))[0]
                     columns[column][design] = min(columns[column][design], there)
@@ -157,16 +157,16 @@ def _refine_phases(model: ForwardModel, block: Block, columns: Columns) -> None:
 
 def _refine_heights(model: ForwardModel, block: Block, cases: Columns, columns: Columns) -> None:
     """Put the smallest distances over all places of the sensor into the columns, which hold those of some heights."""
-    view = model.view
-    names, heights = [csd_name(pair) for pair in class_pairs(view.lights.classes)], field_heights(view)
-    if not view.accuracy.finest_phase_px:
+    setup = model.setup
+    names, heights = [csd_name(pair) for pair in class_pairs(setup.lights.classes)], field_heights(setup)
+    if not setup.accuracy.finest_phase_px:
         return
     at_heights = _by_phase(model, cases, len(heights))
     for design in np.flatnonzero(np.isfinite(at_heights).all(axis=(1, 2))):
         curves = block.some(slice(design, design + 1)).curves()
 
         def at_height(height: float, curves: FloatArray = curves) -> FloatArray:
-            return np.asarray(_csds(forward_model(view_at(view, height)), curves).min(axis=1))
+            return np.asarray(_csds(forward_model(setup_at(setup, height)), curves).min(axis=1))
 
         smallest, _ = refined_heights(heights, at_heights[design], at_height)
         for name, least in zip(names, smallest, strict=True):
@@ -191,7 +191,7 @@ def evaluate(
     over the moments. Where all phases or all places of the sensor count, the CSDs are refined between those of the
     lattice; other metrics are the worst over the lattice.
     """
-    block, extra, view = _block(designs), WholeReadout(model, own, spent or Spent()), model.view
+    block, extra, setup = _block(designs), WholeReadout(model, own, spent or Spent()), model.setup
     changing = None if states else model.read_changing(block)
     if changing is None:
         cases, columns = _read(model, block, extra, states, probabilities=probabilities)
@@ -206,13 +206,13 @@ def evaluate(
             {name: _merged(changing.which, along[name], rest[name]) for name in along}
             for along, rest in zip(*parts, strict=True)
         )
-    if view.all_phases:
+    if setup.all_phases:
         _refine_phases(model, block, columns)
-    elif _bends_over_pulse(view) and view.scenario.field is None:
+    elif _bends_over_pulse(setup) and setup.scene.field is None:
         _refine_moments(model, block, columns)
-    if view.all_heights:
+    if setup.all_heights:
         _refine_heights(model, block, cases, columns)
-    return columns | designed_quantities(view, block)
+    return columns | designed_quantities(setup, block)
 
 
 def _merged(which: BoolArray, some: FloatArray, others: FloatArray) -> FloatArray:
@@ -224,12 +224,12 @@ def _merged(which: BoolArray, some: FloatArray, others: FloatArray) -> FloatArra
 
 def _distances_along(model: ForwardModel, changing: Changing, extra: WholeReadout) -> tuple[Columns, Columns]:
     """CSDs in each case, and the columns, of designs that differ in one channel alone."""
-    by_edges = separations_by_edges(changing, model.view.members)
+    by_edges = separations_by_edges(changing, model.setup.members)
     distances = (
         [by_edges]
         if by_edges is not None
         else [
-            separations_along(fixed, changing.channel, changing.values[:, case], model.view.members)
+            separations_along(fixed, changing.channel, changing.values[:, case], model.setup.members)
             for case, fixed in enumerate(changing.fixed)
         ]
     )
@@ -243,7 +243,7 @@ def _read(
     model: ForwardModel, block: Block, extra: WholeReadout, states: Sequence[str] = (), *, probabilities: bool = False
 ) -> tuple[Columns, Columns]:
     """CSDs in each case, and the columns, of any designs; with `states`, what noise does to them, too."""
-    curves, members, apart = block.curves(), model.view.members, Columns()
+    curves, members, apart = block.curves(), model.setup.members, Columns()
     if states:
         read = model.read_with_noise(curves)
         response, exposure_s = read.mean, read.exposure_s

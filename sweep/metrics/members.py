@@ -17,7 +17,7 @@ import numpy as np
 from ..base.cache import Cache
 from ..base.types import FloatArray, IndexArray
 from ..camera.linear import LinearModel, linear_model
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..curves.lights import Pair, class_pairs
 from ..curves.members import Members
 from .separation import csd_name
@@ -68,16 +68,16 @@ class PopulationImager:
 
     parts = 5
 
-    def __init__(self, view: View) -> None:
-        """Everything is on, whatever the plan of `view` leaves out: plans promise nothing of other members."""
-        self.members = Members(view.lights, view.grid)
-        self.view = replace(view.with_all_effects, lights=self.members.lights)
+    def __init__(self, setup: Setup) -> None:
+        """Everything is on, whatever the plan of `setup` leaves out: plans promise nothing of other members."""
+        self.members = Members(setup.lights, setup.camera.grid)
+        self.setup = replace(setup.with_all_effects, lights=self.members.lights)
         self._tables: dict[Pair, _Table] = {}
 
     @cached_property
     def imager(self) -> LinearModel:
         """The smooth response to every spectrum of the members."""
-        return linear_model(self.view)
+        return linear_model(self.setup)
 
     def worst(self, curves: FloatArray, pairs: Sequence[Pair] = ()) -> dict[str, FloatArray]:
         """The smallest CSD of each pair over all members and places, DN, by the name of the CSD, ndarray[n_designs].
@@ -85,9 +85,9 @@ class PopulationImager:
         `curves`: QE of the modified channels, ndarray[n_designs, n_modified, n_wavelengths]; `pairs`: all, if none are
         named. NaN where the response is no number.
         """
-        pairs = pairs or class_pairs(self.view.lights.classes)
+        pairs = pairs or class_pairs(self.setup.lights.classes)
         found = {pair: np.full(len(curves), np.nan) for pair in pairs}
-        step = max(1, _HELD // (self.imager.n_cases * self.view.lights.photons.shape[0] * len(self.view.qe)))
+        step = max(1, _HELD // (self.imager.n_cases * self.setup.lights.photons.shape[0] * len(self.setup.camera.qe)))
         for start in range(0, len(curves), step):
             for index, response in enumerate(self.imager.smooth(curves[start : start + step]), start):
                 if np.isfinite(response).all():
@@ -123,6 +123,6 @@ class PopulationImager:
 _imagers: Cache[bytes, PopulationImager] = Cache(16)
 
 
-def population_imager(view: View) -> PopulationImager:
-    """That of a view whose lights have a population; the latest ones are kept."""
-    return _imagers.get(hashlib.sha256(pickle.dumps(view)).digest(), lambda: PopulationImager(view))
+def population_imager(setup: Setup) -> PopulationImager:
+    """That of a setup whose lights have a population; the latest ones are kept."""
+    return _imagers.get(hashlib.sha256(pickle.dumps(setup)).digest(), lambda: PopulationImager(setup))

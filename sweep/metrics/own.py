@@ -13,7 +13,7 @@ import numpy as np
 from ..base.errors import Fault, SweepError
 from ..base.own_code import OwnCode, own_name
 from ..base.types import FloatArray
-from ..camera.view import View
+from ..camera.setup import Setup
 
 _NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,39}")
 _MOST_DIGITS = 12
@@ -35,12 +35,12 @@ class Readings:
     pedestal_dn: float
 
     @staticmethod
-    def of_view(view: View, dn: FloatArray) -> Readings:
-        """Digital numbers, which the metric cannot change, of the signals and channels of a view."""
+    def of_setup(setup: Setup, dn: FloatArray) -> Readings:
+        """Digital numbers, which the metric cannot change, of the signals and channels of a setup."""
         fixed = np.asarray(dn, dtype=float).view()
         fixed.flags.writeable = False
-        lights = view.lights
-        return Readings(fixed, lights.types, lights.names, view.mosaic.channels, view.pixel.offset_dn)
+        lights = setup.lights
+        return Readings(fixed, lights.types, lights.names, setup.camera.mosaic.channels, setup.camera.pixel.offset_dn)
 
     def of(self, kind: str) -> FloatArray:
         """Digital numbers of one signal type's signals, ndarray[n_designs, n_of_the_type, n_channels]."""
@@ -130,12 +130,12 @@ class OwnMetric:
             raise SweepError(Fault(f"{self.code.name} is not finite", value=other))
         return np.asarray(values.reshape(n, -1), dtype=float)
 
-    def of_cases(self, view: View, response: FloatArray) -> FloatArray:
+    def of_cases(self, setup: Setup, response: FloatArray) -> FloatArray:
         """The worst over the cases, ndarray[n_designs], NaN where the CFA has none.
 
         `response`: ndarray[n_designs, n_cases, n_signals, n_channels], DN.
         """
-        each = [self.parts(Readings.of_view(view, response[:, case])) for case in range(response.shape[1])]
+        each = [self.parts(Readings.of_setup(setup, response[:, case])) for case in range(response.shape[1])]
         some = [values for values in each if values is not None]
         if len(some) < len(each):
             return np.full(len(response), np.nan)
@@ -143,6 +143,6 @@ class OwnMetric:
         return np.asarray(joined.min(axis=1) if self.wanted == "more" else joined.max(axis=1), dtype=float)
 
 
-def own_quantities(own: Sequence[OwnMetric], view: View, response: FloatArray) -> dict[str, FloatArray]:
+def own_quantities(own: Sequence[OwnMetric], setup: Setup, response: FloatArray) -> dict[str, FloatArray]:
     """The column of each metric; see `OwnMetric.of_cases`."""
-    return {metric.name: metric.of_cases(view, response) for metric in own}
+    return {metric.name: metric.of_cases(setup, response) for metric in own}

@@ -13,7 +13,7 @@ import numpy as np
 from ..base.types import FloatArray, IndexArray
 from ..camera.forward import ForwardModel
 from ..camera.readout import NoisyReadout
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..curves.lights import Pair
 from ..curves.tasks import TaskName
 from ..designs.block import Block
@@ -134,7 +134,7 @@ class Quantity(Column):
     smooth: Callable[[SmoothDesign], Rows] | None = field(default=None, repr=False)
     smooth_members: Callable[[SmoothDesign], Rows] | None = field(default=None, repr=False)
     smooth_drawn: Callable[[SmoothDesign], Rows] | None = field(default=None, repr=False)
-    linear: Callable[[View], LinearRows] | None = field(default=None, repr=False)
+    linear: Callable[[Setup], LinearRows] | None = field(default=None, repr=False)
 
     @property
     def has_limit(self) -> bool:
@@ -220,7 +220,7 @@ class DesignMetric(Metric):
     """What designs give without any light."""
 
     @abstractmethod
-    def of_designs(self, view: View, block: Block) -> Columns:
+    def of_designs(self, setup: Setup, block: Block) -> Columns:
         """Each column, ndarray[n_designs]."""
 
 
@@ -255,7 +255,7 @@ class VisionMetric(Metric):
     """What images of signal heads give, where a study asks for a benchmark of vision."""
 
     @abstractmethod
-    def of_images(self, view: View, curves: FloatArray, vision: Vision, seed: int) -> Columns:
+    def of_images(self, setup: Setup, curves: FloatArray, vision: Vision, seed: int) -> Columns:
         """Each column, ndarray[n_designs]; `seed`: the study's.
 
         `curves`: ndarray[n_designs, n_modified, n_wavelengths].

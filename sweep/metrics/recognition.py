@@ -41,7 +41,7 @@ def recognize(
     other. The most likely rule takes the channels' readout and the signal with the largest Gaussian likelihood at the
     patch's place, and says its state. Intervals: see `share_interval`.
     """
-    members = [imager.view.members[name] for name in states]
+    members = [imager.setup.members[name] for name in states]
     signals = np.concatenate(members)
     state = np.repeat(np.arange(len(states)), [len(own) for own in members])
     electrons = imager.pixel_electrons(curves)[0]

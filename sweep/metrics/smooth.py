@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.types import FloatArray, IndexArray
 from ..camera.linear import LinearModel, linear_model
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..curves.lights import Pair
 from ..designs.family import Family
 from ..vision.section import SeededVision
@@ -91,7 +91,7 @@ class SmoothDesign:
         `images`: the same of images of signal heads.
         """
         self.images = images
-        self.view: View = imager.view
+        self.setup: Setup = imager.setup
         self._members, self._drawn = members, drawn
         self.family, self.x = family, x
         self.curves = family.curves(x[None])[0]
@@ -188,17 +188,17 @@ class SmoothDesign:
         return imager.smooth_with_gradient(self.curves, self.by_u)
 
 
-def smooth_response(view: View, curves: FloatArray) -> FloatArray:
+def smooth_response(setup: Setup, curves: FloatArray) -> FloatArray:
     """Unquantized, unclipped response, DN: ndarray[n_designs, n_cases, n_signals, n_channels].
 
     `curves`: ndarray[n_designs, n_modified, n_wavelengths].
     """
-    return linear_model(view).smooth(curves)
+    return linear_model(setup).smooth(curves)
 
 
-def smooth_csd(view: View, curves: FloatArray, pair: Pair) -> FloatArray:
+def smooth_csd(setup: Setup, curves: FloatArray, pair: Pair) -> FloatArray:
     """CSD of the smooth response, the smallest over the cases, DN, ndarray[n_designs]."""
-    response = smooth_response(view, curves)
-    first, second = (view.members[name] for name in pair)
+    response = smooth_response(setup, curves)
+    first, second = (setup.members[name] for name in pair)
     over = [separation(response[:, case], first, second) for case in range(response.shape[1])]
     return np.asarray(np.min(over, axis=0), dtype=float)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..base.types import FloatArray
 from ..camera.linear import linear_model
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..curves.lights import Pair, class_pairs
 from .discrimination import detectability
 from .smooth import Rows, SmoothDesign
@@ -103,7 +103,7 @@ def bound_rows(design: SmoothDesign, *, types: Sequence[str]) -> Rows:
     See `discrimination.state_error_bound`.
     """
     sums: dict[str, list[Rows]] = {name: [] for name in types}  # [n_cases x n_own x n_others] of each other type
-    n_cases, sizes = len(design.response), {name: len(index) for name, index in design.view.members.items()}
+    n_cases, sizes = len(design.response), {name: len(index) for name, index in design.setup.members.items()}
     for a, b in class_pairs(tuple(types)):
         rows = _between(design, (a, b), overlap)
         values = rows.values.reshape(n_cases, sizes[a], sizes[b])
@@ -130,7 +130,7 @@ def _between(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:
 
 
 def _of_signals(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:
-    members = design.view.members
+    members = design.setup.members
     one, other = (members[name] for name in pair)
 
     def of_both(values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -152,10 +152,10 @@ def _of_signals(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:
     return Rows(found.values, by_u.T)
 
 
-def smooth_detectability(view: View, curves: FloatArray, pair: Pair) -> FloatArray:
+def smooth_detectability(setup: Setup, curves: FloatArray, pair: Pair) -> FloatArray:
     """d' of the smooth response, the smallest over the cases, ndarray[n_designs]; see `smooth.smooth_csd`."""
-    imager = linear_model(view)
+    imager = linear_model(setup)
     mean, variance = imager.smooth(curves), imager.variance(curves)
-    both = view.members[pair[0]], view.members[pair[1]]
+    both = setup.members[pair[0]], setup.members[pair[1]]
     over = [detectability(mean[:, case], variance[:, case], *both) for case in range(mean.shape[1])]
     return np.asarray(np.min(over, axis=0), dtype=float)

@@ -51,12 +51,12 @@ class WholeReadout:
         """
         if not (self.own or OTHERS):
             return {}
-        started, view = time.perf_counter(), self.imager.view
-        first = own_quantities(self.own, view, whole(slice(0, 1))) if self.own else {}
+        started, setup = time.perf_counter(), self.imager.setup
+        first = own_quantities(self.own, setup, whole(slice(0, 1))) if self.own else {}
         columns = {name: np.full(n, values[0]) for name, values in first.items()}
         present = [metric for metric in self.own if np.isfinite(first[metric.name][0])]
         if present or OTHERS:
-            values_per_design = self.imager.n_cases * len(view.lights.names) * len(view.mosaic.channels)
+            values_per_design = self.imager.n_cases * len(setup.lights.names) * len(setup.camera.mosaic.channels)
             step = max(1, _READ_AT_ONCE // values_per_design)
             parts = [self._of(whole(slice(start, start + step)), present) for start in range(0, n, step)]
             columns |= {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
@@ -64,8 +64,8 @@ class WholeReadout:
         return columns
 
     def _of(self, response: FloatArray, own: Sequence[OwnMetric]) -> Columns:
-        others = over_cases(self.imager, by_case(response, self.imager.view.members, OTHERS)) if OTHERS else {}
-        return others | own_quantities(own, self.imager.view, response)
+        others = over_cases(self.imager, by_case(response, self.imager.setup.members, OTHERS)) if OTHERS else {}
+        return others | own_quantities(own, self.imager.setup, response)
 
 
 def by_case(response: FloatArray, members: Mapping[str, IndexArray], metrics: Sequence[ReadoutMetric]) -> Columns:
@@ -89,7 +89,7 @@ def over_cases(imager: ForwardModel, cases: Columns) -> Columns:
 
     `cases`: ndarray[n_cases, n_designs] each.
     """
-    quantities = quantities_of(Asked(imager.view.lights.classes, any_place=True))
+    quantities = quantities_of(Asked(imager.setup.lights.classes, any_place=True))
     best = {quantity.of: name for name, quantity in quantities.items() if quantity.extreme == "best place"}
     found: Columns = {}
     for name, each in cases.items():

@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.forward import ForwardModel
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..curves.lights import Lights
 from ..curves.single_leds import Norm, SingleLeds, every_led
 from ..results.designs import row_curves
@@ -48,8 +48,8 @@ def regions_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
     calls = []
     for row in shown:
         space, curves = row_curves(study, row)
-        view = study.view(space, row["scenario"]).with_all_effects
-        calls.append(delayed(_cells, view, curves, allowed, asked.wanted_dn))
+        setup = study.setup(space, row["scenario"]).with_all_effects
+        calls.append(delayed(_cells, setup, curves, allowed, asked.wanted_dn))
     found: list[dict[str, Any]] = []
     for done, (row, cells) in enumerate(zip(shown, parallel(calls), strict=True), 1):
         found += [{"design_id": row["design_id"], **cell} for cell in cells]
@@ -58,12 +58,12 @@ def regions_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
 
 
 def _cells(
-    view: View, curves: FloatArray, allowed: Mapping[Norm, tuple[SingleLeds, SingleLeds]], wanted_dn: float
+    setup: Setup, curves: FloatArray, allowed: Mapping[Norm, tuple[SingleLeds, SingleLeds]], wanted_dn: float
 ) -> list[dict[str, Any]]:
     """The rows of a design; `allowed`: the yellow and the red LEDs of each norm."""
     found = list[dict[str, Any]]()
     for norm, (yellow, red) in allowed.items():
-        yellow_dn, red_dn = (_read(view, curves, each) for each in (yellow, red))
+        yellow_dn, red_dn = (_read(setup, curves, each) for each in (yellow, red))
         for one in np.unique(yellow.peak_nm):
             of_one = np.flatnonzero(yellow.peak_nm == one)
             apart = apart_dn(yellow_dn[:, of_one], red_dn)
@@ -86,14 +86,14 @@ def _cells(
     return found
 
 
-def _read(view: View, curves: FloatArray, leds: SingleLeds) -> FloatArray:
+def _read(setup: Setup, curves: FloatArray, leds: SingleLeds) -> FloatArray:
     """What a design reads of LEDs with the photons of the study's lights, DN, ndarray[n_cases, n_leds, n_channels]."""
-    photons, parts = leds.photons(view.grid), []
+    photons, parts = leds.photons(setup.camera.grid), []
     for start in range(0, len(photons), _TOGETHER):
         some = photons[start : start + _TOGETHER]
         names = tuple(str(number) for number in range(len(some)))
-        lights = Lights("leds", names, names, some, view.lights.photon_ratio, "modeled", surrogate=True)
-        parts.append(ForwardModel(replace(view, lights=lights), once=True).read(curves)[0][0])
+        lights = Lights("leds", names, names, some, setup.lights.photon_ratio, "modeled", surrogate=True)
+        parts.append(ForwardModel(replace(setup, lights=lights), once=True).read(curves)[0][0])
     return np.concatenate(parts, axis=1)
 
 

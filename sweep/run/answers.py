@@ -82,5 +82,5 @@ def _fits(answer: Any, call: Call) -> bool:
             e.x.shape == low.shape and bool(((low <= e.x) & (e.x <= high)).all()) for e in answer.log
         )
     if isinstance(answer, Limit) and answer.curve is not None:
-        return answer.curve.shape == (problem.view.grid.size,) and bool(np.isfinite(answer.curve).all())
+        return answer.curve.shape == (problem.setup.camera.grid.size,) and bool(np.isfinite(answer.curve).all())
     return True

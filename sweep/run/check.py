@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 from ..base.types import FloatArray, delayed
 from ..camera.accuracy import REFERENCE
 from ..camera.forward import ForwardModel
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..designs.space import Space
 from ..metrics.evaluate import evaluate
 from ..metrics.quantity import WORST_CASE
@@ -34,20 +34,20 @@ _MOST_ROWS, _ENOUGH_ROWS = 200, 5000
 Row = Mapping[str, Any]
 
 
-def reference_view(view: View) -> View:
-    """The view with every effect, at the reference settings."""
-    return replace(view.with_all_effects, accuracy=REFERENCE)
+def reference_setup(setup: Setup) -> Setup:
+    """The setup with every effect, at the reference settings."""
+    return replace(setup.with_all_effects, accuracy=REFERENCE)
 
 
-def allowed_dn(view: View, tolerance_dn: float) -> float:
+def allowed_dn(setup: Setup, tolerance_dn: float) -> float:
     """Difference of a CSD from the reference that is no fault, DN.
 
     That is the tolerance. A readout in whole numbers without noise steps by up to sqrt(channels) DN between neighboring
     values of what is sampled: where images of a light, moments of a pulse or all field positions count, that is added.
     """
-    scene, steps = view.scenario, view.scenario.noise is None and view.computes("quantization")
-    sampled = scene.target is not None or scene.drive is not None or view.all_heights
-    return tolerance_dn + (math.sqrt(len(view.mosaic.channels)) if steps and sampled else 0.0)
+    scene, steps = setup.scene, setup.scene.noise is None and setup.computes("quantization")
+    sampled = scene.target is not None or scene.drive is not None or setup.all_heights
+    return tolerance_dn + (math.sqrt(len(setup.camera.mosaic.channels)) if steps and sampled else 0.0)
 
 
 def compared_rows(study: Study, rows: Sequence[Row]) -> Iterator[list[dict[str, Any]]]:
@@ -67,8 +67,8 @@ def compared_rows(study: Study, rows: Sequence[Row]) -> Iterator[list[dict[str, 
 
 def _compared(study: Study, space: Space, scenario: str, rows: Sequence[Row]) -> list[dict[str, Any]]:
     points = np.array([[row[name] for name in space.parameters] for row in rows], dtype=float)
-    view = study.view(space, scenario)
-    exact = _at_reference(study, space, view, points)
+    setup = study.setup(space, scenario)
+    exact = _at_reference(study, space, setup, points)
     differences = []
     for name, values in exact.items():
         kept = np.array([row[name] for row in rows], dtype=float)
@@ -76,7 +76,7 @@ def _compared(study: Study, space: Space, scenario: str, rows: Sequence[Row]) ->
         both_missing = np.isnan(kept) & np.isnan(values)
         differences.append(np.nan_to_num(np.where(both_missing, 0.0, np.abs(values - kept)), nan=np.inf))
     realized, names = np.stack(differences), list(exact)
-    allowed = allowed_dn(view, study.plans[scenario].tolerance_dn if study.plans else study.section.tolerance_dn)
+    allowed = allowed_dn(setup, study.plans[scenario].tolerance_dn if study.plans else study.section.tolerance_dn)
     return [
         {key: row[key] for key in ("design_id", "filter_id", "scenario", "plan")}
         | {"allowed_dn": allowed, "realized_dn": float(realized[at, index]), "quantity": names[at]}
@@ -84,9 +84,9 @@ def _compared(study: Study, space: Space, scenario: str, rows: Sequence[Row]) ->
     ]
 
 
-def _at_reference(study: Study, space: Space, view: View, points: FloatArray) -> dict[str, FloatArray]:
+def _at_reference(study: Study, space: Space, setup: Setup, points: FloatArray) -> dict[str, FloatArray]:
     """CSDs at the reference settings, ndarray[n_designs] each."""
-    model = ForwardModel(reference_view(view))
+    model = ForwardModel(reference_setup(setup))
     nominal = evaluate(model, space.curves(points, study.grid.size))
     asked = [quantity for quantity in study.quantities.values() if quantity.promised]
     worst = [quantity for quantity in asked if quantity.extreme == WORST_CASE]
@@ -97,8 +97,8 @@ def _at_reference(study: Study, space: Space, view: View, points: FloatArray) ->
 def check_run(study: Study, results: Path, seconds: float, crew: Workers) -> tuple[CheckFacts | None, list[str]]:
     """Compare a seeded sample of a run's rows with the reference, as many as fit into some seconds, at least one.
 
-    Every worker, which knows the scenes, takes a part of them and of the time, and at least one row. Returns the result, None where no row could be compared,
-    and a warning for each row that could not.
+    Every worker, which knows the scenes, takes a part of them and of the time, and at least one row. Returns the
+    result, None where no row could be compared, and a warning for each row that could not.
     """
     sample = _sampled(study, results)
     parts = [sample[at :: crew.count] for at in range(crew.count)]

@@ -36,7 +36,7 @@ def _shown(study: Study, highlights: pd.DataFrame) -> Iterator[tuple[dict[str, A
     rows = highlights[highlights["kind"].isin(FEW) & (highlights["status"] == "ok")]
     for row in rows.to_dict("records"):
         space, curves = row_curves(study, row)
-        yield {key: row[key] for key in _TOLD}, Looks(study.view(space, row["scenario"]), curves)
+        yield {key: row[key] for key in _TOLD}, Looks(study.setup(space, row["scenario"]), curves)
 
 
 def _chart_of(tasks: StudyTasks) -> tuple[tuple[str, ...], Chart]:

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.forward import ForwardModel
 from ..camera.scene import Scene
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..metrics.columns.confusion import STATE_ERROR, state_errors
 from ..results.designs import row_curves
 from ..results.tables import FEW
@@ -39,19 +39,19 @@ _FIELDS = [
 class ScenesBetween:
     """Scenes of a study between two that differ in one number: the keys to it, and what all of them say.
 
-    `view`: of the lower one, as a CFA sees it.
+    `setup`: of the lower one, as a CFA sees it.
     """
 
-    view: View
+    setup: Setup
     study: Study
     said: Mapping[str, Any]
     path: tuple[str, ...]
 
-    def at(self, number: float) -> View:
+    def at(self, number: float) -> Setup:
         """The scene with another number, everything on. Raises ValidationError where a study may not have it."""
         said = _with(self.said, self.path, number)
         scene = Scene.model_validate(said)
-        return replace(self.view, scenario=scene, pixel=self.study.pixel_in(scene), left_out=frozenset())
+        return replace(self.setup, scene=scene, left_out=frozenset()).with_camera(pixel=self.study.pixel_in(scene))
 
 
 def crossings_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
@@ -69,7 +69,7 @@ def crossings_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progre
         for row, ends, errors in _passing(few, scenarios, asked.error_max):
             space, curves = row_curves(study, row)
             numbers = (scenarios[ends[0]], scenarios[ends[1]])
-            between = _between(study, study.view(space, ends[0]), ends, numbers)
+            between = _between(study, study.setup(space, ends[0]), ends, numbers)
             if between is not None:
                 calls.append(delayed(_crossing, between, curves, study.states, numbers, errors, asked.error_max))
                 own = {"design_id": row["design_id"], "name": row["name"], "series": series, "key": key}
@@ -95,8 +95,8 @@ def _passing(
             yield by_scene[a], (a, b), (errors[a], errors[b])
 
 
-def _between(study: Study, view: View, ends: tuple[str, str], numbers: tuple[float, float]) -> ScenesBetween | None:
-    """The scenes between two of a study, seen as `view` sees the first.
+def _between(study: Study, setup: Setup, ends: tuple[str, str], numbers: tuple[float, float]) -> ScenesBetween | None:
+    """The scenes between two of a study, seen as `setup` sees the first.
 
     None where more than a number differs, or this number is not the one in their names (`numbers`).
     """
@@ -111,7 +111,7 @@ def _between(study: Study, view: View, ends: tuple[str, str], numbers: tuple[flo
         for value, number in zip(values, numbers, strict=True)
     ):
         return None
-    return ScenesBetween(view, study, first, paths[0])
+    return ScenesBetween(setup, study, first, paths[0])
 
 
 def _leaves(said: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
@@ -127,9 +127,9 @@ def _with(said: Mapping[str, Any], path: tuple[str, ...], number: float) -> dict
     return {**said, path[0]: inner}
 
 
-def state_error_of(view: View, curves: FloatArray, states: tuple[str, ...]) -> float:
+def state_error_of(setup: Setup, curves: FloatArray, states: tuple[str, ...]) -> float:
     """How often noise confuses the worst two states of a filter; `curves`: ndarray[1, n_modified, n_wavelengths]."""
-    return float(state_errors(ForwardModel(view, once=True), curves, states)[0])
+    return float(state_errors(ForwardModel(setup, once=True), curves, states)[0])
 
 
 def _crossing(

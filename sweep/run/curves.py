@@ -63,7 +63,7 @@ def points_table(study: Study, rows: pd.DataFrame, on_front: pd.DataFrame, looks
             np.full(response.size, row["design_id"]),
             np.repeat(study.lights.types, channels),
             np.repeat(study.lights.names, channels),
-            np.tile(study.view(row_space(study, row), row["scenario"]).mosaic.channels, signals),
+            np.tile(study.setup(row_space(study, row), row["scenario"]).camera.mosaic.channels, signals),
             response.ravel(),
         )
         arrays = [pa.array(values, type=kind) for values, kind in zip(columns, schema.types, strict=True)]

@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.forward import forward_model
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..curves.lights import Lights, class_pairs
 from ..metrics.evaluate import evaluate
 from ..metrics.objective import Objective
@@ -44,7 +44,7 @@ def held_out_table(
     calls = []
     for row in shown:
         space, curves = row_curves(study, row)
-        calls.append(delayed(_on_lights, replace(study.view(space, row["scenario"]), lights=lights), curves))
+        calls.append(delayed(_on_lights, replace(study.setup(space, row["scenario"]), lights=lights), curves))
     found: list[dict[str, Any]] = []
     for row, values in zip(shown, parallel(calls), strict=True):
         found.append({"design_id": row["design_id"], **values})
@@ -54,9 +54,9 @@ def held_out_table(
     return pa.Table.from_pylist(found, schema=schema)
 
 
-def _on_lights(view: View, curves: FloatArray) -> dict[str, float]:
-    columns = evaluate(forward_model(view), np.asarray(curves, dtype=float))
-    names = [csd_name(pair) for pair in class_pairs(view.lights.classes)]
+def _on_lights(setup: Setup, curves: FloatArray) -> dict[str, float]:
+    columns = evaluate(forward_model(setup), np.asarray(curves, dtype=float))
+    names = [csd_name(pair) for pair in class_pairs(setup.lights.classes)]
     return {HELD_OUT + name: float(columns[name][0]) for name in names}
 
 
@@ -123,7 +123,7 @@ def _nominal_problem(problem: Problem) -> Problem:
 def _left_out_signals(problem: Problem) -> list[int]:
     """Lights of the objective's types that are not alone in theirs."""
     asked = {name for column in problem.objective.weights for name in _types(problem, column)}
-    lights = problem.view.lights
+    lights = problem.setup.lights
     members = {name: len(own) for name, own in lights.members.items()}
     return [i for i, kind in enumerate(lights.types) if kind in asked and members[kind] > 1]
 
@@ -131,7 +131,7 @@ def _left_out_signals(problem: Problem) -> list[int]:
 def _types(problem: Problem, column: str) -> tuple[str, ...]:
     quantity = problem.quantities[column]
     if quantity.needs == "own":  # it may be of any
-        return problem.view.lights.classes
+        return problem.setup.lights.classes
     return quantity.states if quantity.pair is None else quantity.pair
 
 
@@ -139,7 +139,7 @@ def _without(
     problem: Problem, light: int, starts: Sequence[FloatArray], algorithm: str, evaluations: int, seed: int
 ) -> tuple[float, float, float] | None:
     """The optimum without a light: its objective without and with it, and the difference; None without a design."""
-    fewer = replace(problem, view=replace(problem.view, lights=_some(problem.view.lights, light)))
+    fewer = replace(problem, setup=replace(problem.setup, lights=_some(problem.setup.lights, light)))
     log = [e for i, u in enumerate(starts) for e in search_from(fewer, i, u, algorithm, evaluations, seed).log]
     found = best_feasible(log)
     if found is None:

@@ -10,7 +10,7 @@ import pyarrow as pa
 
 from ..base.types import IndexArray, Parallel, Progress, delayed
 from ..camera.forward import ForwardModel, forward_model
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..curves.lights import class_pairs
 from ..designs.block import CurveBlock, edges_of_some
 from ..designs.space import Space
@@ -52,9 +52,9 @@ def _limits_of_swept(study: Study, ids: IndexArray, parallel: Parallel, progress
     scenarios, calls, parts = list(study.scenarios), [], list[IndexArray]()
     for scene, at in dict.fromkeys(zip(of_scene.tolist(), of_space.tolist(), strict=True)):
         space, mine = study.spaces[at], (of_scene == scene) & (of_space == at)
-        numbers, view = number[mine] - (ends[at] - space.size), study.view(space, scenarios[scene])
+        numbers, setup = number[mine] - (ends[at] - space.size), study.setup(space, scenarios[scene])
         for start in range(0, numbers.size, _AT_ONCE):
-            calls.append(delayed(_limits, view, space, numbers[start : start + _AT_ONCE]))
+            calls.append(delayed(_limits, setup, space, numbers[start : start + _AT_ONCE]))
             parts.append(ids[mine][start : start + _AT_ONCE])
     found = list[_Part]()
     for own, blocks in zip(parts, parallel(calls), strict=True):
@@ -63,17 +63,17 @@ def _limits_of_swept(study: Study, ids: IndexArray, parallel: Parallel, progress
     return found
 
 
-def _limits(view: View, space: Space, numbers: IndexArray) -> list[LimitingLights]:
+def _limits(setup: Setup, space: Space, numbers: IndexArray) -> list[LimitingLights]:
     """The lights that limit some designs of a space, by their numbers in it; a block of them after the other."""
-    imager = forward_model(view)
-    values = imager.n_cases * len(view.lights.names) * len(view.mosaic.channels)
+    imager = forward_model(setup)
+    values = imager.n_cases * len(setup.lights.names) * len(setup.camera.mosaic.channels)
     step = max(1, _MOST_VALUES // values)
     return [_of_block(imager, space, numbers[start : start + step]) for start in range(0, numbers.size, step)]
 
 
 def _of_block(imager: ForwardModel, space: Space, numbers: IndexArray) -> LimitingLights:
     """The same of a block, by the routes that `routes.block_of` tries; no lights where a design takes none of them."""
-    grid, pairs = imager.view.grid, class_pairs(imager.view.lights.classes)
+    grid, pairs = imager.setup.camera.grid, class_pairs(imager.setup.lights.classes)
     with suppress(Exception):
         edges = edges_of_some(space, numbers)
         if edges is not None:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.forward import AllPhases, ForwardModel, forward_model
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..curves.lights import Pair
 from ..metrics.limiting import limiting_lights
 from ..metrics.recognition import recognize
@@ -78,14 +78,14 @@ class Looking:
             found.add(RECOGNITION)
         return self.tables & found
 
-    def at(self, view: View, seen: _Seen) -> Look:
+    def at(self, setup: Setup, seen: _Seen) -> Look:
         """Look at a design. The random numbers of its patches follow from the study's seed and its id."""
         design_id, curves, wanted = seen
-        imager = forward_model(view, AllPhases if RECOGNITION in wanted else ForwardModel)
+        imager = forward_model(setup, AllPhases if RECOGNITION in wanted else ForwardModel)
         limited_by = dn = recognized = None
         if wanted & {LIMITED_BY, POINTS}:
             response = imager.read(curves)[0]
-            limited_by = {pair: lights[0] for pair, lights in limiting_lights(view, response).items()}
+            limited_by = {pair: lights[0] for pair, lights in limiting_lights(setup, response).items()}
             dn = response[0, 0].copy()
         if RECOGNITION in wanted:
             rng = np.random.default_rng((self.seed, design_id))
@@ -93,7 +93,7 @@ class Looking:
             recognized = recognize(imager, curves, self.states, self.patches, rng)
         return Look(limited_by, dn, recognized)
 
-    def beside_rows(self, job: Job, view: View, table: pa.Table) -> dict[int, Look]:
+    def beside_rows(self, job: Job, setup: Setup, table: pa.Table) -> dict[int, Look]:
         """Looks at the designs of a job, where all are shown, by their ids.
 
         One that cannot be looked at is left out: `looks_of` looks again, once all rows are kept, and tells why not.
@@ -103,10 +103,10 @@ class Looking:
         if not wanted or job.space.kind not in FEW:
             return found
         for index in np.flatnonzero(holds(table, "status", "ok")):
-            curves = job.space.curves(job.space.points(job.start, job.stop)[index : index + 1], view.grid.size)
+            curves = job.space.curves(job.space.points(job.start, job.stop)[index : index + 1], setup.camera.grid.size)
             with suppress(Exception):
                 design_id = job.first_id + int(index)
-                found[design_id] = self.at(view, (design_id, curves, wanted))
+                found[design_id] = self.at(setup, (design_id, curves, wanted))
         return found
 
 
@@ -122,21 +122,21 @@ def looks_of(
     """Looks at the designs to draw and those on the front by their ids; `known`: those that are there already."""
     found = dict(known)
     groups: dict[tuple[str, ...], list[_Seen]] = {}
-    views: dict[tuple[str, ...], View] = {}
+    setups: dict[tuple[str, ...], Setup] = {}
     for row, wanted in _shown(looking, rows, on_front):
         if wanted and int(row["design_id"]) not in found:
             space, curves = row_curves(study, row)
             key = (str(row["scenario"]), space.cfa, *(() if space.filter is None else space.filter.channels))
-            views.setdefault(key, study.view(space, key[0]))
+            setups.setdefault(key, study.setup(space, key[0]))
             groups.setdefault(key, []).append((int(row["design_id"]), curves, wanted))
     parts = [
-        (views[key], own[start : start + _AT_ONCE])
+        (setups[key], own[start : start + _AT_ONCE])
         for key, own in groups.items()
         for start in range(0, len(own), _AT_ONCE)
     ]
     # The CFAs of a scene share its kernels: in one call, where few designs of each are looked at.
-    calls: list[list[tuple[View, list[_Seen]]]] = []
-    for _, own_parts in groupby(parts, lambda part: part[0].scenario):
+    calls: list[list[tuple[Setup, list[_Seen]]]] = []
+    for _, own_parts in groupby(parts, lambda part: part[0].scene):
         scene = list(own_parts)
         calls += [scene] if sum(len(designs) for _, designs in scene) <= _AT_ONCE else [[part] for part in scene]
     for looks in parallel(delayed(_looked, looking, call) for call in calls):
@@ -153,5 +153,5 @@ def _shown(looking: Looking, rows: pd.DataFrame, on_front: pd.DataFrame) -> Iter
         yield row, looking.wanted(kind, scenario, on_front=row["design_id"] in front)
 
 
-def _looked(looking: Looking, parts: Sequence[tuple[View, Sequence[_Seen]]]) -> dict[int, Look]:
-    return {seen[0]: looking.at(view, seen) for view, designs in parts for seen in designs}
+def _looked(looking: Looking, parts: Sequence[tuple[Setup, Sequence[_Seen]]]) -> dict[int, Look]:
+    return {seen[0]: looking.at(setup, seen) for setup, designs in parts for seen in designs}

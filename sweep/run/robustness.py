@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from ..base.types import FloatArray, Parallel, Progress, delayed
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..curves.lights import Pair
 from ..designs.space import Space
 from ..designs.tolerance import AS_DESIGNED, Off, Tolerance
@@ -40,22 +40,22 @@ _FIELDS = [
 class Candidate:
     """A design in a scene; `point`: its parameters, ndarray[1, n_parameters]."""
 
-    view: View
+    setup: Setup
     space: Space
     point: FloatArray
     tolerance: Tolerance
 
     def imager(self, scale: float) -> PopulationImager:
         """The scene with the population of its lights so many times as large."""
-        population = self.view.lights.population
+        population = self.setup.lights.population
         assert population is not None
         return population_imager(
-            replace(self.view, lights=replace(self.view.lights, population=population.scaled(scale)))
+            replace(self.setup, lights=replace(self.setup.lights, population=population.scaled(scale)))
         )
 
     def curves(self, off: Off) -> FloatArray:
         """Its filters as production has them."""
-        return np.asarray(self.space.curves(self.point, self.view.grid.size, off), dtype=float)
+        return np.asarray(self.space.curves(self.point, self.setup.camera.grid.size, off), dtype=float)
 
     def worst(self, pair: Pair, scale: float) -> tuple[float, Off]:
         """The smallest CSD over population and tolerances so many times as far, DN, and how its filter came out."""
@@ -94,7 +94,7 @@ def robustness_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progr
 def _design(study: Study, row: dict[Any, Any]) -> Candidate:
     space = row_space(study, row)
     point = np.array([[row[name] for name in space.parameters]], dtype=float)
-    return Candidate(study.view(space, row["scenario"]), space, point, study.tolerance)
+    return Candidate(study.setup(space, row["scenario"]), space, point, study.tolerance)
 
 
 def _robustness(
@@ -102,7 +102,7 @@ def _robustness(
 ) -> tuple[dict[str, float], dict[str, str]]:
     """What is found of a design, numbers and names of lights by their columns, in a form that a run can keep."""
     numbers, lights = ({}, {}) if rival is None else _breaks(design, rival, pair)
-    population = design.view.lights.population
+    population = design.setup.lights.population
     assert population is not None
     if population.wanted_dn is not None:
         kept = int((drawn_dn(design, pair, seed) >= population.wanted_dn).sum())
@@ -125,7 +125,7 @@ def _breaks(design: Candidate, rival: Candidate, pair: Pair) -> tuple[dict[str, 
     response = imager.imager.smooth(design.curves(off))[0]
     near = min((imager.nearest(case, pair) for case in response), key=lambda each: float(each.squared.min()))
     at = np.unravel_index(int(near.squared.argmin()), near.squared.shape)
-    lights, population = design.view.lights, design.imager(scale).members.population
+    lights, population = design.setup.lights, design.imager(scale).members.population
     names = dict[str, str]()
     found: dict[str, float] = {"breaks_at": scale, "breaks_dn": least, "breaks_edge_nm": off.shift_nm}
     found["breaks_thickness"] = off.thickness
@@ -161,7 +161,7 @@ def drawn_dn(design: Candidate, pair: Pair, seed: int) -> FloatArray:
 
     Every number is drawn whatever the design, so that all designs see the same lamps and cameras.
     """
-    imager = population_imager(design.view)
+    imager = population_imager(design.setup)
     tolerance = design.tolerance if design.space.filter is not None else Tolerance()
     draws = draws_of(imager.members, pair, tolerance, (seed, 1))
     found = np.empty(draws.size)

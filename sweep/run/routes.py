@@ -13,7 +13,7 @@ import numpy as np
 
 from ..base.types import FloatArray
 from ..camera.forward import AllPhases, ForwardModel, forward_model
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..designs.block import Block, CurveBlock, EdgeBlock, edges_of
 from ..designs.space import Space
 from ..designs.tolerance import AS_DESIGNED, Tolerance
@@ -47,9 +47,9 @@ class Request:
     drawn: bool = False
     """Whether raw patches are drawn of plain CFAs and named designs, from the same readout."""
 
-    def imager(self, kind: str, view: View) -> ForwardModel:
-        """The imager of a view for designs of a `kind` of rows."""
-        return forward_model(view, AllPhases if self.drawn and kind in FEW else ForwardModel)
+    def imager(self, kind: str, setup: Setup) -> ForwardModel:
+        """The imager of a setup for designs of a `kind` of rows."""
+        return forward_model(setup, AllPhases if self.drawn and kind in FEW else ForwardModel)
 
     @property
     def needs_curves(self) -> bool:
@@ -77,19 +77,19 @@ class Found:
     spent_s: float = 0.0
 
 
-def found_of(space: Space, start: int, points: FloatArray, view: View, request: Request) -> Found:
+def found_of(space: Space, start: int, points: FloatArray, setup: Setup, request: Request) -> Found:
     """Designs of a space from `start` on, a block at a time, which stays in the cache; see `block_of`.
 
     More than a chunk of them are seen by their edges.
     """
-    return _in_blocks(CHUNK * (1 if request.needs_curves else _CHUNKS_BY_EDGES), space, start, points, view, request)
+    return _in_blocks(CHUNK * (1 if request.needs_curves else _CHUNKS_BY_EDGES), space, start, points, setup, request)
 
 
-def _in_blocks(size: int, space: Space, start: int, points: FloatArray, view: View, request: Request) -> Found:
+def _in_blocks(size: int, space: Space, start: int, points: FloatArray, setup: Setup, request: Request) -> Found:
     parts: list[Found] = []
     faults: dict[int, str] = {}
     for begin in range(0, len(points), size):
-        part = block_of(space, start + begin, points[begin : begin + size], view, request)
+        part = block_of(space, start + begin, points[begin : begin + size], setup, request)
         parts.append(part)
         faults |= {begin + index: text for index, text in part.faults.items()}
     names = request.quantities.keys() & parts[0].columns.keys()
@@ -98,7 +98,7 @@ def _in_blocks(size: int, space: Space, start: int, points: FloatArray, view: Vi
     return Found(columns, faults, sum((part.detours for part in parts), Counter()), spent_s)
 
 
-def block_of(space: Space, start: int, points: FloatArray, view: View, request: Request) -> Found:
+def block_of(space: Space, start: int, points: FloatArray, setup: Setup, request: Request) -> Found:
     """Designs of a space from `start` on, of which these are the `points`.
 
     By their edges where the family is separable, else from their curves. Where the fast way fails, in chunks; in that
@@ -112,17 +112,17 @@ def block_of(space: Space, start: int, points: FloatArray, view: View, request: 
     spent = Spent()
     try:
         fast = edges_of(space, start, start + len(points))
-        columns = _columns(space, view, points, request, spent, fast)
+        columns = _columns(space, setup, points, request, spent, fast)
     except Exception as error:  # one design must not take the others with it
         if len(points) > CHUNK:
-            return _in_blocks(CHUNK, space, start, points, view, request)
+            return _in_blocks(CHUNK, space, start, points, setup, request)
         own = text_of(error)
         try:
-            columns = _columns(space, view, points, request, spent)
+            columns = _columns(space, setup, points, request, spent)
             detours[BY_CURVES, own] = len(points)
         except Exception:
-            columns, faults, detours = _one_by_one(space, start, view, points, request, spent, own)
-    return Found(columns, _not_finite(columns, view, request) | faults, detours, spent.seconds)
+            columns, faults, detours = _one_by_one(space, start, setup, points, request, spent, own)
+    return Found(columns, _not_finite(columns, setup, request) | faults, detours, spent.seconds)
 
 
 def text_of(error: Exception) -> str:
@@ -131,22 +131,22 @@ def text_of(error: Exception) -> str:
 
 
 def _columns(
-    space: Space, view: View, points: FloatArray, request: Request, spent: Spent, block: Block | None = None
+    space: Space, setup: Setup, points: FloatArray, request: Request, spent: Spent, block: Block | None = None
 ) -> Columns:
     """Every quantity of a block of designs, ndarray[n_designs] each; `block`: these very designs, if a faster one."""
-    size = view.grid.size
-    imager = request.imager(space.kind, view)
+    size = setup.camera.grid.size
+    imager = request.imager(space.kind, setup)
     designs = CurveBlock(space.curves(points, size)) if block is None else block
     asked = request.asked
     columns = evaluate(imager, designs, asked.states, probabilities=asked.probabilities, own=asked.own, spent=spent)
     columns |= family_quantities(None if space.filter is None else space.filter.family, points)
     if request.vision is not None:
-        columns |= image_quantities(view, space.curves(points, size), request.vision, request.seed)
+        columns |= image_quantities(setup, space.curves(points, size), request.vision, request.seed)
     worst = [quantity for quantity in request.quantities.values() if quantity.extreme == WORST_CASE]
     if worst:
         columns |= worst_cases(space, imager, points, columns, worst, request.tolerance, asked.own, spent)
     if request.asked.wanted_yield:
-        columns |= of_a_share(space, view, points, request)
+        columns |= of_a_share(space, setup, points, request)
     if request.objective.column == COMBINED:
         columns[COMBINED] = request.objective.of(columns)
     return columns
@@ -167,32 +167,32 @@ def worst_cases(
     `nominal`: what `evaluate` gives of them; `worst`: the quantities that are asked for; `own`, `spent`:
     see `evaluate`.
     """
-    view = imager.view
+    setup = imager.setup
     places = [off for off in tolerance.places if any(off)] if space.filter is not None else []
-    curves = [space.curves(points, view.grid.size, off) for off in (AS_DESIGNED, *places)]
+    curves = [space.curves(points, setup.camera.grid.size, off) for off in (AS_DESIGNED, *places)]
     cases = [nominal, *(evaluate(imager, shifted, own=own, spent=spent) for shifted in curves[1:])]
-    if view.lights.population is not None:
+    if setup.lights.population is not None:
         from ..metrics.members import population_imager  # noqa: PLC0415  (only where lights have a population)
 
-        members = population_imager(view)
+        members = population_imager(setup)
         cases = [case | members.worst(shifted) for case, shifted in zip(cases, curves, strict=True)]
     return {quantity.name: quantity.worse([case[quantity.of] for case in cases]) for quantity in worst}
 
 
-def of_a_share(space: Space, view: View, points: FloatArray, request: Request) -> Columns:
+def of_a_share(space: Space, setup: Setup, points: FloatArray, request: Request) -> Columns:
     """What the wanted share of random lamps and cameras has of each design, see `LampsAndCameras`."""
     from ..metrics.drawn import LampsAndCameras  # noqa: PLC0415  (only where a share of lamps and cameras counts)
     from ..metrics.members import population_imager  # noqa: PLC0415
 
     tolerance = request.tolerance if space.filter is not None else Tolerance()
-    drawn = LampsAndCameras(population_imager(view), tolerance, request.seed)
+    drawn = LampsAndCameras(population_imager(setup), tolerance, request.seed)
     pairs = [q.pair for q in request.quantities.values() if q.extreme == OF_A_SHARE and q.pair is not None]
-    found = drawn.columns(lambda off, some: space.curves(points[some], view.grid.size, off), len(points), pairs)
+    found = drawn.columns(lambda off, some: space.curves(points[some], setup.camera.grid.size, off), len(points), pairs)
     return {YIELD + name: values for name, values in found.items()}
 
 
 def _one_by_one(
-    space: Space, start: int, view: View, points: FloatArray, request: Request, spent: Spent, own: str
+    space: Space, start: int, setup: Setup, points: FloatArray, request: Request, spent: Spent, own: str
 ) -> tuple[Columns, dict[int, str], Detours]:
     """Each design by its own route, else from its curves; `own`: the fault of the whole block."""
     found: list[Columns | None] = []
@@ -201,11 +201,11 @@ def _one_by_one(
     for index, point in enumerate(points):
         at = start + index
         try:
-            found.append(_columns(space, view, point[None], request, spent, edges_of(space, at, at + 1)))
+            found.append(_columns(space, setup, point[None], request, spent, edges_of(space, at, at + 1)))
             detours[ALONE, own] += 1
         except Exception as error:
             try:
-                found.append(_columns(space, view, point[None], request, spent))
+                found.append(_columns(space, setup, point[None], request, spent))
                 detours[BY_CURVES, text_of(error)] += 1
             except Exception as last:  # the row says what happened
                 found.append(None)
@@ -215,9 +215,9 @@ def _one_by_one(
     return columns, faults, detours
 
 
-def _not_finite(columns: Columns, view: View, request: Request) -> dict[int, str]:
+def _not_finite(columns: Columns, setup: Setup, request: Request) -> dict[int, str]:
     """Designs with a quantity that is no finite number, though each of them has it."""
-    lacking = _may_lack(view, request)
+    lacking = _may_lack(setup, request)
     infinite = {name for name, quantity in request.quantities.items() if quantity.infinite}
     faulty: set[int] = set()
     for name in columns.keys() - lacking:
@@ -228,9 +228,9 @@ def _not_finite(columns: Columns, view: View, request: Request) -> dict[int, str
     return dict.fromkeys(sorted(faulty), "not finite")
 
 
-def _may_lack(view: View, request: Request) -> set[str]:
+def _may_lack(setup: Setup, request: Request) -> set[str]:
     """Quantities that a design may not have: those of a family; of a plain CFA, all that a modified channel has."""
-    without = ("family", "own") if view.modified else ("family", "own", "modified")
+    without = ("family", "own") if setup.camera.modified else ("family", "own", "modified")
     lacking = {name for name, quantity in request.quantities.items() if quantity.needs in without}
     if lacking & set(request.objective.weights):
         lacking.add(COMBINED)

@@ -14,7 +14,7 @@ import pyarrow as pa
 
 from ..base.types import BoolArray, FloatArray
 from ..camera.plan import Plan
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..designs.block import by_edges
 from ..designs.space import Space
 from ..metrics.bound import FEASIBLE, Bound, total_violation
@@ -94,7 +94,7 @@ def _job_size(study: Study, space: Space) -> int:
     return CHUNK * min(max(1, space.size // (CHUNK * _LEAST_JOBS)), _MOST_CHUNKS)
 
 
-def run_job(job: Job, view: View, rules: Rules) -> pa.Table:
+def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
     """Evaluate a job; a design that fails is a row with its status, and the others are kept.
 
     `pareto` marks the non-dominated designs of this job alone, among those that meet every constraint but those on the
@@ -102,7 +102,7 @@ def run_job(job: Job, view: View, rules: Rules) -> pa.Table:
     another route than their block's own, `spent_on` it what metrics of the whole readout took.
     """
     points = job.space.points(job.start, job.stop)
-    found = found_of(job.space, job.start, points, view, rules.request)
+    found = found_of(job.space, job.start, points, setup, rules.request)
     columns, faults = found.columns, found.faults
     ok = np.ones(len(points), dtype=bool)
     ok[list(faults)] = False

@@ -99,7 +99,7 @@ def answer_row(study: Study, answer: SearchAnswer, rules: Rules, parallel: Paral
     found = Space("search", name, space.cfa, space.filter, axes)
     job = Job(found, answer.search.scenario, 0, 1, study.n_designs, study.n_filters)
     # Workers have loaded what this takes, and this process has not.
-    (row,) = parallel([delayed(run_job, job, study.view(found, job.scenario), rules)])
+    (row,) = parallel([delayed(run_job, job, study.setup(found, job.scenario), rules)])
     values: dict[str, Any] = {"space": space.name}
     if answer.limit is not None:
         values |= {"limit": answer.limit.proven, "gap": answer.gap}
@@ -185,11 +185,11 @@ def search_log(answer: SearchAnswer) -> pa.Table:
 
 def front_table(study: Study, answer: SearchAnswer) -> pa.Table:
     """A row per level of sensitivity, and of sensitivities between with the limit alone; nulls where nothing is."""
-    names, view = answer.search.space.parameters, study.view(answer.search.space, answer.search.scenario)
+    names, setup = answer.search.space.parameters, study.setup(answer.search.space, answer.search.scenario)
     rows = []
     for point in answer.front:
         row: dict[str, Any] = {"sensitivity_min": point.level, "evaluations": sum(len(run.log) for run in point.runs)}
-        row["cfa_sensitivity_min"] = cfa_sensitivity_at(view, point.level)
+        row["cfa_sensitivity_min"] = cfa_sensitivity_at(setup, point.level)
         if point.best is not None:
             row |= {"objective": point.best.objective, "sensitivity": point.best.sensitivity}
             row["cfa_sensitivity"] = point.best.cfa_sensitivity
@@ -200,6 +200,6 @@ def front_table(study: Study, answer: SearchAnswer) -> pa.Table:
         rows.append(row)
         for sensitivity, proven in point.onward:
             if np.isfinite(proven):
-                whole = cfa_sensitivity_at(view, sensitivity)
+                whole = cfa_sensitivity_at(setup, sensitivity)
                 rows.append({"sensitivity_min": sensitivity, "cfa_sensitivity_min": whole, "limit": proven})
     return pa.Table.from_pylist(rows, schema=front_schema(names))

@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 
 from ..base.errors import FailedDesignError, Fault, OutputError
 from ..base.types import Call, IndexArray, Progress, delayed
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..results.identity import fingerprint
 from ..results.joined import Joining, RowsPart
 from ..results.journal import Entry, Journal, Shard
@@ -34,8 +34,8 @@ _SCENES_PER_WORKER, _FEW = 2, 64
 KILLED = "error: its worker died twice"
 _Finished = tuple[Shard, pa.Table, dict[int, Look]]
 """A job's rows as a file, the few that `Gathered` takes in, and looks at its designs by their ids."""
-_Asked = tuple[Job, View, Path | None]
-"""A job, its view, and beside which path its rows are to be hidden; None: they come back as bytes."""
+_Asked = tuple[Job, Setup, Path | None]
+"""A job, its setup, and beside which path its rows are to be hidden; None: they come back as bytes."""
 
 
 @dataclass
@@ -74,19 +74,19 @@ class Sweep:
         return [job_key(job, self.fingerprint, self.study.plans.get(job.scenario)) for job in self.jobs]
 
     @cached_property
-    def _views(self) -> dict[tuple[str, str, str], View]:
+    def _setups(self) -> dict[tuple[str, str, str], Setup]:
         return {
-            (space.kind, space.name, scenario): self.study.view(space, scenario)
+            (space.kind, space.name, scenario): self.study.setup(space, scenario)
             for scenario in self.study.scenarios
             for space in self.study.spaces
         }
 
-    def _view(self, job: Job) -> View:
-        return self._views[job.space.kind, job.space.name, job.scenario]
+    def _setup(self, job: Job) -> Setup:
+        return self._setups[job.space.kind, job.space.name, job.scenario]
 
     def compute(self, job: Job) -> pa.Table:
         """Rows of a job, in this process."""
-        return run_job(job, self._view(job), self.rules)
+        return run_job(job, self._setup(job), self.rules)
 
     def refill(self, results: Path) -> None:
         """Take what the journal lacks out of a result table of this study, but for chunks with failed designs.
@@ -130,7 +130,7 @@ class Sweep:
         done = sum(entries[key].rows for key in self.keys if key in entries)
         progress("designs", done, self.study.n_designs)
         batches = self._batches(todo)
-        asked = ([(self.jobs[i], self._view(self.jobs[i]), self._path(i)) for i in batch] for batch in batches)
+        asked = ([(self.jobs[i], self._setup(self.jobs[i]), self._path(i)) for i in batch] for batch in batches)
         calls = (delayed(_shards, batch, self.rules, self.looking) for batch in asked)
 
         def keep(at: int, found: list[_Finished]) -> None:
@@ -180,7 +180,7 @@ class Sweep:
         content = self.journal.content(key, just_kept=just_kept)
         if content is None:
             self._tell_damaged(index)
-            shard, *_ = _finished((job, self._view(job), None), self.rules, partial(self.compute, job))
+            shard, *_ = _finished((job, self._setup(job), None), self.rules, partial(self.compute, job))
             self.journal.save(key, index, shard)
             assert isinstance(shard.file, bytes)
             content = shard.file
@@ -252,11 +252,11 @@ def _finished(
     asked: _Asked, rules: Rules, computed: Callable[[], pa.Table], looking: Looking | None = None
 ) -> _Finished:
     """A job's rows, once they are computed."""
-    job, view, path = asked
+    job, setup, path = asked
     started = time.monotonic()
     table = computed()
     shard = Shard.of(table, time.monotonic() - started, path)
-    return shard, few_of(table, rules), {} if looking is None else looking.beside_rows(job, view, table)
+    return shard, few_of(table, rules), {} if looking is None else looking.beside_rows(job, setup, table)
 
 
 def _quarantined(call: Call) -> list[_Finished]:
@@ -265,19 +265,19 @@ def _quarantined(call: Call) -> list[_Finished]:
     """
     batch, rules, _ = call[1]
     again = _halved if len(batch) == 1 else _table_alone
-    return [_finished((job, view, None), rules, partial(again, job, view, rules)) for job, view, _ in batch]
+    return [_finished((job, setup, None), rules, partial(again, job, setup, rules)) for job, setup, _ in batch]
 
 
-def _table_alone(job: Job, view: View, rules: Rules) -> pa.Table:
+def _table_alone(job: Job, setup: Setup, rules: Rules) -> pa.Table:
     """Rows of a job, in a process of its own; by halves if that dies."""
     try:
-        table: pa.Table = alone((run_job, (job, view, rules), {}))
+        table: pa.Table = alone((run_job, (job, setup, rules), {}))
         return table
     except WorkerKilledError:
-        return _halved(job, view, rules)
+        return _halved(job, setup, rules)
 
 
-def _halved(job: Job, view: View, rules: Rules) -> pa.Table:
+def _halved(job: Job, setup: Setup, rules: Rules) -> pa.Table:
     """Rows of a job that kills its worker."""
     if job.stop - job.start == 1:
         return failed_rows(job, rules, KILLED)
@@ -285,7 +285,7 @@ def _halved(job: Job, view: View, rules: Rules) -> pa.Table:
     first = middle - job.start
     second = replace(job, start=middle, first_id=job.first_id + first, first_filter=job.first_filter + first)
     halves = replace(job, stop=middle), second
-    return joined([_table_alone(half, view, rules) for half in halves])
+    return joined([_table_alone(half, setup, rules) for half in halves])
 
 
 def _first_failure(table: pa.Table) -> FailedDesignError:

@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from ..base.types import FloatArray, Parallel, Progress, delayed
 from ..camera.forward import ForwardModel
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..curves.lights import class_pairs, pair_name
 from ..metrics.columns.confusion import D_PRIME, STATE_ERROR
 from ..metrics.evaluate import evaluate
@@ -19,7 +19,7 @@ from ..metrics.separation import csd_name
 from ..results.designs import row_curves
 from ..results.tables import FEW, FOUND, VISION, VISION_CONDITIONS, VISION_MISREAD
 from ..study import Study
-from ..vision.images import view_at
+from ..vision.images import setup_at
 from ..vision.readers import Answers, SeedReading, read_images
 from ..vision.scenes import ORDERS, SEEN, UNSEEN, states_of
 from ..vision.section import Vision
@@ -71,12 +71,12 @@ def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
     shown = rows[rows["kind"].isin(FEW) & (rows["status"] == "ok")]
     shown = shown[(shown["scenario"] == next(iter(study.scenarios))) | (shown["kind"] == FOUND)]
     designs = shown.to_dict("records")
-    views = []
+    setups = []
     for row in designs:
         space, curves = row_curves(study, row)
-        views.append((study.view(space, row["scenario"]), np.asarray(curves[0], dtype=float)))
+        setups.append((study.setup(space, row["scenario"]), np.asarray(curves[0], dtype=float)))
     each = [(at, seed) for seed in range(vision.seeds) for at in range(len(designs))]
-    calls = [delayed(read_images, *views[at], vision, (study.section.seed, seed)) for at, seed in each]
+    calls = [delayed(read_images, *setups[at], vision, (study.section.seed, seed)) for at, seed in each]
     images: list[dict[str, Any]] = []
     pictures: list[dict[str, Any]] = []
     for done, ((at, seed), reading) in enumerate(zip(each, parallel(calls), strict=True), 1):
@@ -85,7 +85,7 @@ def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress
         pictures += _picture_rows(design | {"seed": seed}, reading)
         progress("images read (designs x seeds)", done, len(each))
     conditions: list[dict[str, Any]] = []
-    known = parallel([delayed(predictors, *view, vision) for view in views])
+    known = parallel([delayed(predictors, *setup, vision) for setup in setups])
     for row, found in zip(designs, known, strict=True):
         conditions += _condition_rows(vision, {name: row[name] for name, _ in _DESIGN}, found)
     return {
@@ -136,16 +136,16 @@ def _condition_rows(vision: Vision, key: dict[str, Any], found: Predictors) -> I
             yield key | {"distance_m": distance_m, "level": level} | {name: float(v) for name, v in values.items()}
 
 
-def predictors(view: View, curves: FloatArray, vision: Vision) -> Predictors:
+def predictors(setup: Setup, curves: FloatArray, vision: Vision) -> Predictors:
     """See `Predictors`; `curves`: of the modified channels, ndarray[n_modified, n_wavelengths]."""
     middle_cd = sorted(vision.intensities_cd)[len(vision.intensities_cd) // 2]
     shape = (len(vision.distances_m), len(vision.levels))
     found = Predictors(np.empty(shape), np.empty(shape), np.empty(shape))
-    pairs = class_pairs(tuple(kind for kind in view.lights.classes if kind in vision.lenses))
+    pairs = class_pairs(tuple(kind for kind in setup.lights.classes if kind in vision.lenses))
     for i, distance_m in enumerate(vision.distances_m):
         for j, level in enumerate(vision.levels.values()):
-            there = view_at(view, vision, distance_m, level)
-            there = replace(there, scenario=there.scenario.model_copy(update={"intensity_cd": middle_cd}))
+            there = setup_at(setup, vision, distance_m, level)
+            there = replace(there, scene=there.scene.model_copy(update={"intensity_cd": middle_cd}))
             columns = evaluate(ForwardModel(there, once=True), curves[None], vision.lenses)
             found.csd[i, j] = min(columns[csd_name(pair)][0] for pair in pairs)
             found.dprime[i, j] = min(_of_pair(columns, pair) for pair in pairs)

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.types import FloatArray
-from ..camera.field import field_heights, refined_heights, view_at
+from ..camera.field import field_heights, refined_heights, setup_at
 from ..camera.linear import LinearModel, linear_model
 from ..camera.sensor_field import SensorField
 from ..metrics.quantity import DN
@@ -29,11 +29,11 @@ class AnyHeight:
     """The problem at those image heights that are known; `whole` asks for all places of the sensor."""
 
     def __init__(self, whole: Problem) -> None:
-        field = whole.view.scenario.field
+        field = whole.setup.scene.field
         assert field is not None
         self._whole, self._field = whole, field
         self._heights = {*field.seen_heights, *field.knots[0]}
-        self._looked_at = field_heights(whole.view)
+        self._looked_at = field_heights(whole.setup)
         self._models: dict[float, LinearModel] = {}
         asked = {*whole.objective.weights, *whole.constraints} & whole.pairs.keys()
         self._pairs = {name: whole.pairs[name] for name in sorted(asked) if whole.quantities[name].apart == DN}
@@ -43,17 +43,17 @@ class AnyHeight:
         """The problem at the known heights."""
         heights = tuple(sorted(self._heights))
         field = SensorField(heights=heights, cra_deg=tuple(map(self._field.cra_at, heights)))
-        scene = self._whole.view.scenario.model_copy(update={"field": field})
-        return replace(self._whole, view=replace(self._whole.view, scenario=scene))
+        scene = self._whole.setup.scene.model_copy(update={"field": field})
+        return replace(self._whole, setup=replace(self._whole.setup, scene=scene))
 
     def _worst(self, curve: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Smallest distance of each pair for a filter, ndarray[n_wavelengths], DN, and its height, ndarray[n_pairs]."""
-        view = self._whole.view
+        setup = self._whole.setup
 
         def at_height(height: float) -> FloatArray:
             if height not in self._models:
-                self._models[height] = linear_model(view_at(view, height))
-            distances = separations(self._models[height].smooth(curve[None, None])[0], view.members)
+                self._models[height] = linear_model(setup_at(setup, height))
+            distances = separations(self._models[height].smooth(curve[None, None])[0], setup.members)
             return np.array([distances[pair].min() for pair in self._pairs.values()])
 
         known = np.stack([at_height(height) for height in self._looked_at], axis=1)
@@ -65,8 +65,8 @@ class AnyHeight:
 
     def more(self, curve: FloatArray) -> bool:
         """Add the worst heights for a filter; False where they are no worse than the known ones."""
-        known, view = len(self._heights), self.problem.view
+        known, setup = len(self._heights), self.problem.setup
         for pair, distance_dn, height in zip(self._pairs.values(), *self._worst(curve), strict=True):
-            if distance_dn < smooth_csd(view, curve[None, None], pair)[0] - _WORSE_DN:
+            if distance_dn < smooth_csd(setup, curve[None, None], pair)[0] - _WORSE_DN:
                 self._heights.add(float(height))
         return known < len(self._heights) <= _MOST_HEIGHTS

@@ -73,7 +73,7 @@ class FilterProgram:
         """`members`: those of worst cases."""
         self.problem = problem
         self._members = members
-        self.base = problem.view.base_qe[0]
+        self.base = problem.setup.camera.base_qe[0]
         bound = problem.constraints.get("min_transmission", Bound(min=0.0))
         least = bound.min or 0.0
         self.low = self.base * least
@@ -100,7 +100,7 @@ class FilterProgram:
             weight = self.problem.objective.weights.get(quantity.name)
             if quantity.linear is None or (bound.min is None and bound.max is None and weight is None):
                 continue
-            made = quantity.linear(self.problem.view)
+            made = quantity.linear(self.problem.setup)
             slack = FEASIBLE * bound.scale * made.scale
             least = -np.inf if bound.min is None else bound.min * made.scale
             if least > -np.inf or weight is not None:
@@ -118,14 +118,14 @@ class FilterProgram:
 
     def _distances(self) -> Iterator[tuple[str, Distances]]:
         """Each distance's name, and its pairs."""
-        view = self.problem.view
-        imager, channel = linear_model(view), view.modified[0]
+        setup = self.problem.setup
+        imager, channel = linear_model(setup), setup.camera.modified[0]
         # Exposure does not depend on N, so the response to a filter is linear, plus what does not depend on it.
         gain = imager.per_qe(0, self.base[None])[:, :, channel]
         fixed = np.delete(imager.smooth(self.base[None, None])[0], channel, axis=2)
         noise = self._noise(imager) if self.noisy else None
         for name, (a, b) in self.problem.pairs.items():
-            first, second = view.members[a], view.members[b]
+            first, second = setup.members[a], setup.members[b]
             apart = gain[:, first, None] - gain[:, None, second]
             squares = (fixed[:, first, None] - fixed[:, None, second]) ** 2
             if noise is not None and self.problem.quantities[name].apart == "noise":
@@ -165,7 +165,7 @@ class FilterProgram:
         bound = self.problem.constraints.get(SENSITIVITY)
         if bound is not None and bound.min is not None:
             row, least = 1 / self.base.sum() + row, bound.min - FEASIBLE * bound.scale
-        others = np.delete(imager.variance(self.base[None, None])[0], imager.view.modified[0], axis=2)
+        others = np.delete(imager.variance(self.base[None, None])[0], imager.setup.camera.modified[0], axis=2)
         return least_variance(imager, self.base, self._box, row, least), others
 
     @property

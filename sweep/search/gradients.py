@@ -17,7 +17,7 @@ import numpy as np
 
 from ..base.types import FloatArray, IndexArray
 from ..camera.linear import linear_model
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..designs.tolerance import AS_DESIGNED, Off
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, SENSITIVITY, light_of
@@ -66,16 +66,16 @@ class Point:
         return np.sqrt(least) if self.power == 2 else np.array(least)
 
 
-def _members_of(view: View) -> PopulationImager:
+def _members_of(setup: Setup) -> PopulationImager:
     from ..metrics.members import population_imager  # noqa: PLC0415  (only where lights have a population)
 
-    return population_imager(view)
+    return population_imager(setup)
 
 
 def _drawn_of(problem: Problem) -> LampsAndCameras:
     from ..metrics.drawn import LampsAndCameras  # noqa: PLC0415  (only where a share of lamps and cameras counts)
 
-    return LampsAndCameras(_members_of(problem.view), problem.tolerance, problem.seed)
+    return LampsAndCameras(_members_of(problem.setup), problem.tolerance, problem.seed)
 
 
 def _finite(point: Point) -> Point:
@@ -97,7 +97,7 @@ class Model:
     def __init__(self, problem: Problem, run: SearchRun, budget: int) -> None:
         self._problem = problem
         self._quantities = problem.quantities
-        self._imager = linear_model(problem.view)
+        self._imager = linear_model(problem.setup)
         self._run = run
         self._budget = budget
         self.stop: Callable[[], object] | None = None
@@ -111,7 +111,7 @@ class Model:
         places = dict.fromkeys((AS_DESIGNED, *(off for every in self._produced.values() for off in every)))
         self._families = {off: problem.family.produced(off) if any(off) else problem.family for off in places}
         over = any(problem.over_population(name) for name in wanted)
-        self._members = _members_of(problem.view) if over else None
+        self._members = _members_of(problem.setup) if over else None
         self._drawn = _drawn_of(problem) if any(problem.of_a_share(name) for name in wanted) else None
         wanted_less = self._rule.wanted == "less"
         self._power = 1 if problem.signed_goal or wanted_less else 2  # what may be below 0 has no root

@@ -29,7 +29,7 @@ def least_variance(
     Filters lie in the `box`, ndarray[n_wavelengths] each, and have row @ N >= least, for a row >= 0. The variance grows
     with the light of every pixel. `base`: the curve at which the variance is known.
     """
-    pixel, channel = imager.readout.pixel, imager.view.modified[0]
+    pixel, channel = imager.readout.pixel, imager.setup.camera.modified[0]
     per_qe = imager.spread_per_qe(0, base[None])
     at_base = imager.spread_electrons(base[None, None])[0, :, :, channel]
     share = imager.spread_shares()[:, None, channel]

@@ -85,7 +85,7 @@ def limit_of(
     if refused is not None:
         raise SweepError(Fault(f"no limit: {refused}"))
     relaxed, left_out = _relaxed(problem)
-    heights = _any_height_of(relaxed) if relaxed.view.all_heights else None
+    heights = _any_height_of(relaxed) if relaxed.setup.all_heights else None
     distances = any(relaxed.quantities[name].apart for name in relaxed.objective.weights)
     tolerance = tolerance_dn if distances else _SENSITIVITY_TOLERANCE
     over = [n for n in dict.fromkeys((*relaxed.objective.weights, *relaxed.constraints)) if relaxed.worst_distance(n)]
@@ -190,12 +190,12 @@ def why_not(problem: Problem) -> str | None:
         why = "is not convex in the filter: its noise grows with the light; d' has a limit"
     if problem.own_goal:
         why = "is an own metric, of which nothing is known"
-    base, family = problem.view.base_qe[0], problem.family
+    base, family = problem.setup.camera.base_qe[0], problem.family
     reasons: tuple[tuple[Callable[[], bool], str], ...] = (
         (lambda: family.n_modified != 1, "more than one modified channel"),
         (lambda: not problem.objective.rule.smallest, f"the objective is a {problem.objective.rule.name}"),
         (lambda: bool(unknown), f"{', '.join(unknown)} {why}"),
-        (lambda: problem.view.pixel.crosstalk > 0, "crosstalk mixes the modified channel into others"),
+        (lambda: problem.setup.camera.pixel.crosstalk > 0, "crosstalk mixes the modified channel into others"),
         (
             lambda: bool((_top(problem) > base * (1 + ROUNDING)).any()),
             "filters of the box may exceed the curve that they replace",
@@ -206,7 +206,7 @@ def why_not(problem: Problem) -> str | None:
         ),
         (lambda: _clips(problem), "signals exceed the full well or the range of the ADC"),
         (
-            lambda: may_set_exposure(problem.view, _most_sensitive(problem)),
+            lambda: may_set_exposure(problem.setup, _most_sensitive(problem)),
             "the modified channel could set the exposure",
         ),
     )
@@ -277,9 +277,9 @@ def _top(problem: Problem) -> FloatArray:
 
 def _clips(problem: Problem) -> bool:
     """Whether the base curve's response, the largest that any of the filters has, is cut off when it is read out."""
-    view = problem.view
-    smooth = smooth_response(view, view.base_qe[None])
-    top_dn = unquantized(np.array(view.pixel.saturation_e), view.pixel)
+    setup = problem.setup
+    smooth = smooth_response(setup, setup.camera.base_qe[None])
+    top_dn = unquantized(np.array(setup.camera.pixel.saturation_e), setup.camera.pixel)
     return bool((smooth > top_dn).any())
 
 
@@ -290,7 +290,7 @@ def _inside(
 
     Of worst cases by the members that are known, as the program counts them.
     """
-    base = problem.view.base_qe[0]
+    base = problem.setup.camera.base_qe[0]
     for end in (base,) if inside is None else (base, inside):
         for share in _SHARES:
             moved = np.asarray(curve + share * (end - curve), dtype=float)
@@ -307,10 +307,10 @@ def _attained(problem: Problem, curve: FloatArray, over: Mapping[str, float]) ->
     `over`: worst cases, or distances of which a scene has no smaller ones.
     """
     curves = curve[None, None]
-    found = designed_quantities(problem.view, curves) | {name: np.array([value]) for name, value in over.items()}
+    found = designed_quantities(problem.setup, curves) | {name: np.array([value]) for name, value in over.items()}
     for name in {*problem.objective.weights, *problem.constraints} & problem.pairs.keys():
         of = smooth_csd if problem.quantities[name].apart == DN else smooth_detectability
-        found[name] = np.minimum(of(problem.view, curves, problem.pairs[name]), over.get(name, np.inf))
+        found[name] = np.minimum(of(problem.setup, curves, problem.pairs[name]), over.get(name, np.inf))
     for name, bound in problem.constraints.items():
         if not bound.violation(found[name])[0] <= FEASIBLE:
             return -np.inf

@@ -58,13 +58,13 @@ class MemberPairs:
     """
 
     def __init__(self, problem: Problem, names: Sequence[str]) -> None:
-        view = problem.view
-        if view.lights.population is None:
+        setup = problem.setup
+        if setup.lights.population is None:
             alone = Population.model_validate({"drift_nm_per_k": 0.0})
-            view = replace(view, lights=replace(view.lights, population=alone))
-        self._seen, self.names, self._ways = population_imager(view), tuple(names), ways_of(problem)
+            setup = replace(setup, lights=replace(setup.lights, population=alone))
+        self._seen, self.names, self._ways = population_imager(setup), tuple(names), ways_of(problem)
         self._types = {name: pair for name in names if (pair := problem.quantities[name].pair) is not None}
-        imager, channel, base = self._seen.imager, problem.view.modified[0], problem.view.base_qe
+        imager, channel, base = self._seen.imager, problem.setup.camera.modified[0], problem.setup.camera.base_qe
         self._gain = imager.per_qe(0, base)[:, :, channel]
         self._others = np.delete(imager.smooth(base[None])[0], channel, axis=2)
         self._made: dict[str, Distances] = {}

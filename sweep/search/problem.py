@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..base.types import FloatArray, IndexArray
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..curves.lights import Pair
 from ..designs.family import Family
 from ..designs.tolerance import AS_DESIGNED, Off, Tolerance
@@ -25,12 +25,12 @@ class Problem:
     """Maximize `objective` over the box `low`..`high` (ndarray[n_parameters]) under `constraints`.
 
     Quantities are those of `metrics.registry` with smooth rows; the worst ones are over edges that come out up to
-    `edge_shift_nm` and films that come out up to the share `thickness` off, and over the population of the view's
+    `edge_shift_nm` and films that come out up to the share `thickness` off, and over the population of the setup's
     lights. `states`: signal types that noise may confuse; `seed`: of random lamps and cameras; `vision`: images that
     readers of signal heads are shown.
     """
 
-    view: View
+    setup: Setup
     family: Family
     low: FloatArray
     high: FloatArray
@@ -46,9 +46,9 @@ class Problem:
     @property
     def quantities(self) -> Mapping[str, Quantity]:
         """What objective and constraints may name."""
-        tasks = () if self.view.tasks is None else self.view.tasks.keys
-        asked = Asked(self.view.lights.classes, self.states, edge_shift=True, tasks=tasks, own=self.own)
-        population = self.view.lights.population
+        tasks = () if self.setup.tasks is None else self.setup.tasks.keys
+        asked = Asked(self.setup.lights.classes, self.states, edge_shift=True, tasks=tasks, own=self.own)
+        population = self.setup.lights.population
         wanted = 0.0 if population is None else population.wanted_yield or 0.0
         asked = replace(asked, population=self.population, wanted_yield=wanted, vision=self.vision is not None)
         return quantities_of(asked)
@@ -56,7 +56,7 @@ class Problem:
     @property
     def population(self) -> bool:
         """Whether worst cases are over a population of the lights, too."""
-        return self.view.lights.population is not None
+        return self.setup.lights.population is not None
 
     def over_population(self, quantity: str) -> bool:
         """Whether a quantity is a worst case over the population of the lights."""

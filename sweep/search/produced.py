@@ -82,8 +82,8 @@ def ways_of(problem: Problem) -> tuple[Produced, ...]:
 
     Where all places of the light or the sensor count, only as designed.
     """
-    anywhere = problem.view.all_heights or problem.view.all_phases
-    return (_as_designed(problem.view.base_qe[0]), *(() if anywhere else _moves(problem)))
+    anywhere = problem.setup.all_heights or problem.setup.all_phases
+    return (_as_designed(problem.setup.camera.base_qe[0]), *(() if anywhere else _moves(problem)))
 
 
 def all_ways(problem: Problem) -> bool:
@@ -97,7 +97,7 @@ def _as_designed(base: FloatArray) -> Produced:
 
 
 def _moves(problem: Problem) -> Iterator[Produced]:
-    family, step_nm = problem.family, problem.view.grid.step_nm
+    family, step_nm = problem.family, problem.setup.camera.grid.step_nm
     if not isinstance(family, MovedFamily):
         return
     for off in problem.tolerance.places:
@@ -105,7 +105,7 @@ def _moves(problem: Problem) -> Iterator[Produced]:
         if any(off) and not off.thickness and abs(off.shift_nm / step_nm - steps) < _WHOLE:
             own: Family = family.produced(off)
             ends = (end(problem.low, problem.high)[0] for end in (own.lower, own.upper))
-            yield _moved(problem.view.base_qe[0], *family.moved, steps, *ends)
+            yield _moved(problem.setup.camera.base_qe[0], *family.moved, steps, *ends)
 
 
 def _moved(

@@ -121,7 +121,7 @@ def _epigraph(
 
     # No term exceeds its largest weight times the longest distance between two digital numbers; noise has no such end.
     noisy = any(problem.quantities[name].states for name in problem.objective.weights)
-    far = _FAR * scale if noisy else max(problem.objective.weights.values()) * problem.view.longest_distance_dn
+    far = _FAR * scale if noisy else max(problem.objective.weights.values()) * problem.setup.camera.longest_distance_dn
     least, most = [0.0 if power == 2 else -_FAR] * scale.size, [max(float(r), 1.0) for r in far / scale]
     if problem.signed_goal:  # nothing is known of it
         least, most = [-_UNKNOWN] * scale.size, [_UNKNOWN] * scale.size

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..base.errors import Fault, StudyError
+from ..camera.camera import Camera
 from ..camera.effects import Box
 from ..camera.mosaic import Mosaic
 from ..camera.own_effects import OwnEffect
@@ -16,7 +17,7 @@ from ..camera.pixel import Pixel
 from ..camera.plan import Plan, plan_scene
 from ..camera.scene import Geometry, Scene
 from ..camera.sensor import SensorCurves
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..curves.lights import Lights, Pair, class_pairs
 from ..curves.spectrum import WavelengthGrid
 from ..curves.tasks import StudyTasks
@@ -157,13 +158,15 @@ class Study:
         """Designs of all spaces, over all scenarios."""
         return self.n_filters * len(self.scenarios)
 
-    def view(self, space: Space, scenario: str) -> View:
+    def setup(self, space: Space, scenario: str) -> Setup:
         """What the designs of `space` share in a scenario."""
         bases = {} if space.filter is None else space.filter.bases
         technology = None if space.filter is None else space.filter.technology
-        return self.view_of(space.cfa, scenario, bases, technology)
+        return self.setup_of(space.cfa, scenario, bases, technology)
 
-    def view_of(self, cfa: str, scenario: str, bases: Mapping[str, str], technology: Technology | None = None) -> View:
+    def setup_of(
+        self, cfa: str, scenario: str, bases: Mapping[str, str], technology: Technology | None = None
+    ) -> Setup:
         """What designs of a CFA share in a scenario; `bases`: modified channel -> the curve that it replaces.
 
         `technology`: that of the modified channels' filters.
@@ -174,16 +177,19 @@ class Study:
         technologies = [self.sensor.technologies.get(name) for name in self.sensor.mosaic_curves(mosaic, replaced)]
         for channel in modified:
             technologies[channel] = technology
-        return View(
+        camera = Camera(
             grid=self.grid,
             mosaic=mosaic,
             qe=self.sensor.mosaic_qe(mosaic, replaced),
             modified=modified,
             clear_qe=self.sensor.curve(self.sensor.clear),
-            lights=self.lights,
             pixel=self.pixel_in(scene),
-            scenario=scene,
             technologies=tuple(technologies) if any(technologies) else (),
+        )
+        return Setup(
+            camera,
+            self.lights,
+            scene,
             tasks=self.tasks,
             accuracy=self.section.accuracy,
             own_effects=self.own_effects,
@@ -196,15 +202,15 @@ class Study:
 
     def box(self, space: Space, scenario: str) -> Box:
         """The range of the designs of `space`, for a plan of the scenario."""
-        view = self.view(space, scenario).with_all_effects
-        low, high = view.qe.copy(), view.qe.copy()
+        setup = self.setup(space, scenario).with_all_effects
+        low, high = setup.camera.qe.copy(), setup.camera.qe.copy()
         if space.filter is not None:
             ends = [np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max)]
             families = [space.filter.family.produced(off) for off in self.tolerance.places]
             lows, highs = zip(*(family.hull(*ends) for family in families), strict=True)
-            low[list(view.modified)] = np.min(lows, axis=0)
-            high[list(view.modified)] = np.max(highs, axis=0)
-        return Box(view, low, high)
+            low[list(setup.camera.modified)] = np.min(lows, axis=0)
+            high[list(setup.camera.modified)] = np.max(highs, axis=0)
+        return Box(setup, low, high)
 
     def plan(self, scenario: str, tolerance_dn: float | None = None) -> Plan:
         """The plan of a scene, for all designs of the study; `tolerance_dn` instead of the study's own.
@@ -229,7 +235,7 @@ class Study:
         """The search as a mathematical problem."""
         assert search.space.filter is not None
         return Problem(
-            view=self.view(search.space, search.scenario),
+            setup=self.setup(search.space, search.scenario),
             family=search.space.filter.family,
             low=np.array([min(axis) for axis in search.space.axes], dtype=float),
             high=np.array([max(axis) for axis in search.space.axes], dtype=float),

@@ -38,7 +38,7 @@ def try_effects(study: Study, sources: Sources) -> None:
         return
     for name in study.scenarios:
         try:
-            scene_irradiance(study.view(study.spaces[0], name))
+            scene_irradiance(study.setup(study.spaces[0], name))
         except SweepError as error:
             sources.told(("effects",), error)
             raise StudyError(sources.faults) from None

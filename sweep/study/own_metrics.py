@@ -10,7 +10,7 @@ import numpy as np
 from ..base.errors import Fault, StudyError, SweepError
 from ..base.own_code import Offered, is_in_file, offers
 from ..camera.scene import Scene
-from ..camera.view import View
+from ..camera.setup import Setup
 from ..designs.space import Space
 from ..metrics.own import OwnMetric, Readings
 from ..metrics.quantity import WORST, Asked
@@ -81,14 +81,14 @@ def check_names(own: Sequence[OwnMetric], asked: Asked, spaces: Sequence[Space],
 
 def try_metrics(study: Study, sources: Sources) -> None:
     """Compute own metrics of every CFA, of a light that fills the field. Raises StudyError where one fails."""
-    views = {space.cfa: study.view(space, next(iter(study.scenarios))) for space in study.spaces} if study.own else {}
+    setups = {space.cfa: study.setup(space, next(iter(study.scenarios))) for space in study.spaces} if study.own else {}
     searched = None if study.search is None else study.search.space.cfa
     wanted = {*study.objective.weights, *study.constraints}
     lacking: dict[str, list[str]] = {metric.name: [] for metric in study.own}
     for metric in study.own:
-        for cfa, view in views.items():
+        for cfa, setup in setups.items():
             try:
-                lacking[metric.name] += [] if _tried(metric, view) else [cfa]
+                lacking[metric.name] += [] if _tried(metric, setup) else [cfa]
             except SweepError as error:
                 sources.told(("metrics",), error)
                 break  # it fails on the others, too
@@ -98,16 +98,16 @@ def try_metrics(study: Study, sources: Sources) -> None:
         raise StudyError(sources.faults)
 
 
-def _tried(metric: OwnMetric, view: View) -> bool:
+def _tried(metric: OwnMetric, setup: Setup) -> bool:
     """Whether a CFA has it; it gives the same alone and beside others. Raises SweepError where it does not.
 
     Its filters are the curves that they replace, and darker ones.
     """
-    plain = replace(view, scenario=Scene(), left_out=frozenset(), technologies=())
-    base = plain.base_qe[None]
+    plain = replace(setup, scene=Scene(), left_out=frozenset()).with_camera(technologies=())
+    base = plain.camera.base_qe[None]
     response = smooth_response(plain, np.concatenate([base, 0.9 * base, 0.8 * base]))[:, 0]
-    every = metric.parts(Readings.of_view(view, response))
-    alone = [metric.parts(Readings.of_view(view, response[[at]])) for at in range(len(response))]
+    every = metric.parts(Readings.of_setup(setup, response))
+    alone = [metric.parts(Readings.of_setup(setup, response[[at]])) for at in range(len(response))]
     some = [values for values in alone if values is not None]
     if every is None:
         return False

@@ -73,8 +73,8 @@ def check_range(study: Study, sources: Sources) -> None:
     for name in study.scenarios:
         for space in study.spaces:
             box = study.box(space, name)
-            brightest_dn = replace(box, view=replace(box.view, lights=lights)).brightest_pixel_dn
-            top_dn = float(unquantized(np.array(box.view.pixel.saturation_e), box.view.pixel))
+            brightest_dn = replace(box, setup=replace(box.setup, lights=lights)).brightest_pixel_dn
+            top_dn = float(unquantized(np.array(box.setup.camera.pixel.saturation_e), box.setup.camera.pixel))
             if brightest_dn > top_dn:
                 problem = f"lights of the population exceed the full well or the range of the ADC (CFA {space.cfa})"
                 sources.add(("scenarios", name), problem, f"{brightest_dn:,.0f} DN", f"up to {top_dn:,.0f} DN")

@@ -46,19 +46,19 @@ def out_of_reach(study: Study, space: Space, scenario: str) -> list[Fault]:
 
 def _most(study: Study, space: Space, scenario: str) -> Iterator[tuple[str, float]]:
     """Quantities with the largest values that they can have in a space."""
-    view = study.view(space, scenario)
+    setup = study.setup(space, scenario)
     for name, quantity in study.quantities.items():
         if quantity.apart == DN and not quantity.extreme:
-            yield name, view.longest_distance_dn
+            yield name, setup.camera.longest_distance_dn
     if space.filter is None:
         return
     low, high = (np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max))
     made = [space.filter.family.produced(off) for off in study.tolerance.places]
     top = np.max([family.hull(low, high)[1] for family in made], axis=0)
-    counts, modified = view.mosaic.counts, list(view.modified)
-    qe = view.qe.copy()
+    counts, modified = setup.camera.mosaic.counts, list(setup.camera.modified)
+    qe = setup.camera.qe.copy()
     qe[modified] = top
-    yield SENSITIVITY, float(top.sum() / view.base_qe.sum())
-    yield CFA_SENSITIVITY, float((qe.sum(axis=1) * counts).sum() / (counts.sum() * view.clear_qe.sum()))
+    yield SENSITIVITY, float(top.sum() / setup.camera.base_qe.sum())
+    yield CFA_SENSITIVITY, float((qe.sum(axis=1) * counts).sum() / (counts.sum() * setup.camera.clear_qe.sum()))
     for name, rows in space.filter.family.dimensions.items():
         yield name, float(np.maximum(rows * low, rows * high).sum(axis=1).min())

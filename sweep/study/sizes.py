@@ -14,7 +14,7 @@ def check_memory(study: Study, sources: Sources) -> None:
     """The kernels of every scene and CFA fit into memory. Raises StudyError."""
     for name in study.scenarios:
         for space in study.spaces:
-            if (refused := too_large(study.view(space, name))) is not None:
+            if (refused := too_large(study.setup(space, name))) is not None:
                 problem, value, allowed = refused
                 sources.add(("scenarios", name, "target"), f"{problem} (CFA {space.cfa})", value, allowed)
                 raise StudyError(sources.faults)

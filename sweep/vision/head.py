@@ -18,7 +18,7 @@ from ..camera.disc_image import light_on_pixels
 from ..camera.mosaic import Mosaic
 from ..camera.sampling import Window
 from ..camera.scene import Target
-from ..camera.view import View
+from ..camera.setup import Setup
 from .section import Vision
 
 SPACING = 1.5
@@ -65,22 +65,32 @@ def head_places_px(vision: Vision, mosaic: Mosaic) -> FloatArray:
 _maps: Cache[tuple[object, ...], HeadMaps] = Cache(12)
 
 
-def head_maps(view: View, vision: Vision) -> HeadMaps:
-    """The maps of the view's target; they do not depend on filters, and the latest ones are kept."""
-    target, pixel = view.scenario.target, view.pixel
+def head_maps(setup: Setup, vision: Vision) -> HeadMaps:
+    """The maps of the setup's target; they do not depend on filters, and the latest ones are kept."""
+    target, pixel = setup.scene.target, setup.camera.pixel
     assert target is not None
     optics = vision.optics
-    key = (target, optics, pixel.pitch_um, pixel.fill_factor, view.grid, vision.crop_px, vision.places_per_pixel)
-    return _maps.get((*key, view.mosaic.indices.shape, len(vision.lenses)), lambda: _made(view, vision, target))
+    key = (
+        target,
+        optics,
+        pixel.pitch_um,
+        pixel.fill_factor,
+        setup.camera.grid,
+        vision.crop_px,
+        vision.places_per_pixel,
+    )
+    return _maps.get(
+        (*key, setup.camera.mosaic.indices.shape, len(vision.lenses)), lambda: _made(setup, vision, target)
+    )
 
 
-def _made(view: View, vision: Vision, target: Target) -> HeadMaps:
-    knots = psf.psf_knots_nm(view.grid.nodes_nm, _PSF_STEP_NM)
-    places, across = head_places_px(vision, view.mosaic), target.object_resolution_px
-    lenses = [_disc(view, vision, places + np.array([0, across * height]), knots) for height in heights(vision)]
+def _made(setup: Setup, vision: Vision, target: Target) -> HeadMaps:
+    knots = psf.psf_knots_nm(setup.camera.grid.nodes_nm, _PSF_STEP_NM)
+    places, across = head_places_px(vision, setup.camera.mosaic), target.object_resolution_px
+    lenses = [_disc(setup, vision, places + np.array([0, across * height]), knots) for height in heights(vision)]
     more = SPACING * (len(vision.lenses) - 1)
     housing, backplate = (
-        _rectangle(view, vision, places, (wide * across, (high + more) * across), knots)
+        _rectangle(setup, vision, places, (wide * across, (high + more) * across), knots)
         for wide, high in (_HOUSING, _BACKPLATE)
     )
     return HeadMaps(knots, np.stack(lenses, axis=1), housing, backplate)
@@ -92,9 +102,9 @@ def _apart(vision: Vision, centers: FloatArray) -> tuple[FloatArray, FloatArray]
     return at - centers[:, :1], at - centers[:, 1:]
 
 
-def _disc(view: View, vision: Vision, centers: FloatArray, knots_nm: FloatArray) -> FloatArray:
+def _disc(setup: Setup, vision: Vision, centers: FloatArray, knots_nm: FloatArray) -> FloatArray:
     """A lens by the product's own image of a disc, ndarray[n_places, side, side, n_knots]."""
-    target, pixel = view.scenario.target, view.pixel
+    target, pixel = setup.scene.target, setup.camera.pixel
     assert target is not None
     dx, dy = _apart(vision, centers)
     shape = (len(centers), dy.shape[1], dx.shape[1])
@@ -103,7 +113,7 @@ def _disc(view: View, vision: Vision, centers: FloatArray, knots_nm: FloatArray)
     )
     radius = target.object_resolution_px / 2
     furthest = (float(np.hypot(np.abs(dx).max(), np.abs(dy).max())) + 2) * pixel.pitch_um
-    defocus = psf.defocus_um(view.scenario, pixel.pitch_um)
+    defocus = psf.defocus_um(setup.scene, pixel.pitch_um)
     wave = tuple(knots_nm * 1e-3)
     profile = psf.profile(radius * pixel.pitch_um, furthest, wave, vision.optics.f_number, defocus)
     every = np.ones(shape, dtype=bool)
@@ -111,15 +121,15 @@ def _disc(view: View, vision: Vision, centers: FloatArray, knots_nm: FloatArray)
 
 
 def _rectangle(
-    view: View, vision: Vision, centers: FloatArray, size_px: tuple[float, float], knots_nm: FloatArray
+    setup: Setup, vision: Vision, centers: FloatArray, size_px: tuple[float, float], knots_nm: FloatArray
 ) -> FloatArray:
     """A rectangle through the same lens onto the same pixels, ndarray[n_places, side, side, n_knots].
 
     The spectrum of rectangle and pixel times the product's transfer function, which ends at 1 / (lambda N): a cosine
     series of a period that leaves its neighbors far away.
     """
-    pixel, pitch = view.pixel, view.pixel.pitch_um
-    defocus = psf.defocus_um(view.scenario, pitch)
+    pixel, pitch = setup.camera.pixel, setup.camera.pixel.pitch_um
+    defocus = psf.defocus_um(setup.scene, pitch)
     highest = 1 / (knots_nm[0] * 1e-3 * vision.optics.f_number) * pitch  # per pixel
     orders = np.arange(math.ceil(highest * _PERIOD_PX) + 1)
     nu = orders / _PERIOD_PX

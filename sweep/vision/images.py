@@ -14,7 +14,7 @@ from ..camera.irradiance import signal_irradiance
 from ..camera.pixel import Pixel, irradiance_factor
 from ..camera.sampling import crosstalk_share, with_crosstalk
 from ..camera.scene import FixedExposure, Noise, Scene
-from ..camera.view import View, per_photon
+from ..camera.setup import Setup
 from ..curves.color import luminance_per_photon_radiance
 from ..curves.hats import hats
 from .compiled_images import draw_numbers
@@ -28,8 +28,8 @@ Numbers = NDArray[np.int16]
 """Digital numbers of images, ndarray[n_images, crop_px, crop_px]."""
 
 
-def view_at(view: View, vision: Vision, distance_m: float, level: LightLevel) -> View:
-    """The view's camera before a head at a distance: lamps of 1 cd, exposed as the level says."""
+def setup_at(setup: Setup, vision: Vision, distance_m: float, level: LightLevel) -> Setup:
+    """The setup's camera before a head at a distance: lamps of 1 cd, exposed as the level says."""
     scenario = Scene(
         target=vision.target(distance_m),
         optics=vision.optics,
@@ -37,7 +37,7 @@ def view_at(view: View, vision: Vision, distance_m: float, level: LightLevel) ->
         exposure=FixedExposure(exposure_s=level.exposure_s),
         noise=Noise(),
     )
-    return replace(view, scenario=scenario, left_out=frozenset())
+    return replace(setup, scene=scenario, left_out=frozenset())
 
 
 @dataclass(frozen=True)
@@ -81,21 +81,21 @@ class HeadCamera:
     `curves`: QE of the modified channels, ndarray[n_modified, n_wavelengths].
     """
 
-    def __init__(self, view: View, curves: FloatArray, vision: Vision) -> None:
-        qe = view.qe.copy()
-        qe[list(view.modified)] = curves
+    def __init__(self, setup: Setup, curves: FloatArray, vision: Vision) -> None:
+        qe = setup.camera.qe.copy()
+        qe[list(setup.camera.modified)] = curves
         self.vision = vision
-        self.view = view
+        self.setup = setup
         self.levels = list(vision.levels.values())
-        self._views = [[view_at(view, vision, d, level) for level in self.levels] for d in vision.distances_m]
+        self._setups = [[setup_at(setup, vision, d, level) for level in self.levels] for d in vision.distances_m]
         channels = list(range(len(qe)))
-        self.qe = AngularResponse(self._views[0][0]).curves(qe, channels)
-        self.pixel: Pixel = self._views[0][0].pixel
+        self.qe = AngularResponse(self._setups[0][0]).curves(qe, channels)
+        self.pixel: Pixel = self._setups[0][0].camera.pixel
         self.table: PixelTable = pixel_table(self.pixel)
         size = vision.crop_px + 2 * MARGIN
-        rows, columns = view.mosaic.indices.shape
+        rows, columns = setup.camera.mosaic.indices.shape
         at = np.arange(-MARGIN, size - MARGIN)
-        self._channel = view.mosaic.indices[np.ix_(at % rows, at % columns)]
+        self._channel = setup.camera.mosaic.indices[np.ix_(at % rows, at % columns)]
         self._lamps: dict[int, FloatArray] = {}
         self._heads: dict[tuple[int, int], HeadElectrons] = {}
 
@@ -106,10 +106,10 @@ class HeadCamera:
         return self._heads[distance, level]
 
     def _made(self, distance: int, level: int) -> HeadElectrons:
-        view, said = self._views[distance][level], self.levels[level]
-        maps = head_maps(view, self.vision)
+        setup, said = self._setups[distance][level], self.levels[level]
+        maps = head_maps(setup, self.vision)
         time_s = said.exposure_s
-        grid, factor = view.grid, irradiance_factor(self.vision.optics)
+        grid, factor = setup.camera.grid, irradiance_factor(self.vision.optics)
         ambient = ambient_light(grid, said.light)
         radiance = said.illuminance_lx / math.pi / luminance_per_photon_radiance(grid, ambient[None])[0]
         arriving = ambient * (radiance * factor)
@@ -121,27 +121,27 @@ class HeadCamera:
         unlit += self._seen(maps, maps.lenses.sum(axis=1), (glass - housing)[None])
         return HeadElectrons(
             np.maximum(unlit, 0.0) * time_s + self.pixel.dark_e_per_s * time_s,
-            self._phantoms(maps, view, said) * time_s,
-            self._lamp_rates(distance, maps, view),
+            self._phantoms(maps, setup, said) * time_s,
+            self._lamp_rates(distance, maps, setup),
             time_s,
         )
 
-    def _phantoms(self, maps: HeadMaps, view: View, level: LightLevel) -> FloatArray:
+    def _phantoms(self, maps: HeadMaps, setup: Setup, level: LightLevel) -> FloatArray:
         """Electrons/s of sun on each lens, as its color lets it back."""
-        spectra = np.stack([phantom(view.grid, kind) for kind in self.vision.lenses])
-        per_cd = self._per_candela(view) / luminance_per_photon_radiance(view.grid, spectra)
+        spectra = np.stack([phantom(setup.camera.grid, kind) for kind in self.vision.lenses])
+        per_cd = self._per_candela(setup) / luminance_per_photon_radiance(setup.camera.grid, spectra)
         return self._of_lenses(maps, spectra * (level.phantom_cd * per_cd)[:, None])
 
-    def _per_candela(self, view: View) -> float:
+    def _per_candela(self, setup: Setup) -> float:
         """Luminance of a lens of one candela, times the irradiance for each radiance."""
-        luminance = view.scenario.luminance_cd_m2
+        luminance = setup.scene.luminance_cd_m2
         assert luminance is not None
         return luminance * irradiance_factor(self.vision.optics)
 
-    def _lamp_rates(self, distance: int, maps: HeadMaps, view: View) -> FloatArray:
+    def _lamp_rates(self, distance: int, maps: HeadMaps, setup: Setup) -> FloatArray:
         """Electrons/s of each lamp of one candela at each position; the same at all levels."""
         if distance not in self._lamps:
-            self._lamps[distance] = self._of_lenses(maps, signal_irradiance(view))
+            self._lamps[distance] = self._of_lenses(maps, signal_irradiance(setup))
         return self._lamps[distance]
 
     def _of_lenses(self, maps: HeadMaps, spectra: FloatArray) -> FloatArray:
@@ -155,14 +155,14 @@ class HeadCamera:
 
         `light`: ndarray[n, side, side, n_knots] -> ndarray[n, n_spectra, n_pixels].
         """
-        view = self.view
-        on_knots = hats(view.grid.nodes_nm, maps.knots_nm)
-        weight = np.einsum("cw,sw,kw->cks", self.qe, spectra, on_knots, optimize=True) * per_photon(view)
+        setup = self.setup
+        on_knots = hats(setup.camera.grid.nodes_nm, maps.knots_nm)
+        weight = np.einsum("cw,sw,kw->cks", self.qe, spectra, on_knots, optimize=True) * setup.camera.area_step_m2_nm
         found = np.empty((len(light), len(spectra), *self._channel.shape))
         for channel in range(len(self.qe)):
             own = self._channel == channel
             found[:, :, own] = np.moveaxis(light[:, own] @ weight[channel], 2, 1)
-        share = crosstalk_share(view)
+        share = crosstalk_share(setup)
         if share:
             flat = found.reshape(-1, *self._channel.shape)
             found = with_crosstalk(flat, share).reshape(found.shape)
@@ -171,7 +171,7 @@ class HeadCamera:
 
     def n_places(self) -> int:
         """Places of the head on the mosaic."""
-        return int(self.view.mosaic.indices.size * self.vision.places_per_pixel**2)
+        return int(self.setup.camera.mosaic.indices.size * self.vision.places_per_pixel**2)
 
     def expected(self, scenes: Scenes) -> FloatArray:
         """Expected electrons of scenes, ndarray[n, n_pixels]."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.types import FloatArray
-from ..camera.view import View
+from ..camera.setup import Setup
 from .images import HeadCamera, Numbers
 from .lamps import CHECK, TEST, TRAIN, Lamps, split_lamps
 from .observer import posteriors
@@ -47,13 +47,13 @@ class SeedReading:
     pictured: list[int]
 
 
-def read_images(view: View, curves: FloatArray, vision: Vision, seed: tuple[int, int]) -> SeedReading:
+def read_images(setup: Setup, curves: FloatArray, vision: Vision, seed: tuple[int, int]) -> SeedReading:
     """One design and one seed; `curves`: of the modified channels, ndarray[n_modified, n_wavelengths].
 
     `seed`: the study's and the number of this one, from which lamps, scenes, photons and training follow.
     """
-    camera = HeadCamera(view, curves, vision)
-    lamps = split_lamps(view.lights, vision, seed)
+    camera = HeadCamera(setup, curves, vision)
+    lamps = split_lamps(setup.lights, vision, seed)
     unseen: dict[str, Answers] = {}
     seen: dict[str, Answers] = {}
     for order in ORDERS:
@@ -70,13 +70,13 @@ def read_images(view: View, curves: FloatArray, vision: Vision, seed: tuple[int,
     return SeedReading(unseen, seen, *_pictures(camera, unseen[ORDERS[-1]], test[1]))
 
 
-def observer_error(view: View, curves: FloatArray, vision: Vision, seed: tuple[int, int]) -> float:
+def observer_error(setup: Setup, curves: FloatArray, vision: Vision, seed: tuple[int, int]) -> float:
     """What the ideal observer leaves in doubt of one seed's test images, the lenses in any order; see `read_images`.
 
     The mean of one less the probability of the most probable state: its expected error, with less scatter than a count.
     """
-    camera, order = HeadCamera(view, curves, vision), ORDERS[-1]
-    lamps = split_lamps(view.lights, vision, seed)[TEST]
+    camera, order = HeadCamera(setup, curves, vision), ORDERS[-1]
+    lamps = split_lamps(setup.lights, vision, seed)[TEST]
     scenes, images = _drawn(camera, lamps, order, vision.test_images, _key(seed, order))
     return float(np.mean(1 - posteriors(camera, scenes, images, lamps, order).max(axis=1)))
 
@@ -97,7 +97,7 @@ def planes_of(camera: HeadCamera, images: Numbers) -> FloatArray:
     Raw pixels by tile position, ndarray[n, rows / tile, columns / tile, positions], or as a study asks for it every
     channel at every pixel, ndarray[n, rows, columns, n_channels].
     """
-    pixel, mosaic = camera.pixel, camera.view.mosaic
+    pixel, mosaic = camera.pixel, camera.setup.camera.mosaic
     whole = camera.vision.input == "demosaicked"
     raw = images.astype(float)
     numbers = demosaicked(raw, mosaic) if whole else tile_planes(raw, mosaic)
@@ -134,8 +134,8 @@ def _pictures(camera: HeadCamera, answers: Answers, images: Numbers) -> tuple[Fl
     told = answers.network if answers.network.size else answers.observer
     wrong = np.flatnonzero(told.argmax(axis=1) != answers.scenes.state)[:_SHOWN]
     curves = camera.qe
-    mean_nm = curves @ camera.view.grid.nodes_nm / np.maximum(curves.sum(axis=1), 1e-300)
-    mosaic, offset = camera.view.mosaic, camera.pixel.offset_dn
+    mean_nm = curves @ camera.setup.camera.grid.nodes_nm / np.maximum(curves.sum(axis=1), 1e-300)
+    mosaic, offset = camera.setup.camera.mosaic, camera.pixel.offset_dn
     shown = [false_colors(images[at].astype(float), mosaic, mean_nm, offset) for at in wrong]
     side = camera.vision.crop_px
     return np.array(shown).reshape(-1, side, side, 3), [int(at) for at in wrong]

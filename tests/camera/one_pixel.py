@@ -7,14 +7,14 @@ from typing import Any
 
 from sweep.camera.effects import EFFECTS
 from sweep.camera.pixel import Pixel
-from sweep.camera.view import READOUT
+from sweep.camera.setup import READOUT
 
 
 def readout_bound_dn(effect: str, pixel: Pixel, brightest_e: float) -> float:
     """On what leaving out an effect of a noisy readout changes in the difference of two pixels, DN."""
     scene: Any = SimpleNamespace(noise=True)
-    view = SimpleNamespace(pixel=pixel, scenario=scene)
-    box: Any = SimpleNamespace(view=view, brightest_pixel_dn=brightest_e * pixel.dn_per_e, _sqrt_channels=1.0)
+    setup = SimpleNamespace(camera=SimpleNamespace(pixel=pixel), scene=scene)
+    box: Any = SimpleNamespace(setup=setup, brightest_pixel_dn=brightest_e * pixel.dn_per_e, _sqrt_channels=1.0)
     bound_dn = EFFECTS[effect].bound_dn
     assert bound_dn is not None
     return bound_dn(box, READOUT)

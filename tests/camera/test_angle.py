@@ -15,7 +15,7 @@ from sweep.camera.linear import linear_model
 from sweep.camera.plan import plan_scene
 from sweep.camera.scene import Scene
 from sweep.camera.sensor_field import SensorField
-from sweep.camera.view import View
+from sweep.camera.setup import Setup
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.block import edges_of
 from sweep.designs.technology import Technology
@@ -67,10 +67,10 @@ def over_pupil(wave: float, knots: np.ndarray, values: np.ndarray, half: float, 
 def test_the_mean_over_a_cone_is_that_over_the_pupil(f_number: float, cra_deg: float) -> None:
     grid = WavelengthGrid(start_nm=500, stop_nm=700, step_nm=10)
     made = scene("cone", "RYNCy", {"optics": {"f_number": f_number, "cra_deg": cra_deg}}, grid=grid, index=1.7)
-    channel, wave = made.view.modified[0], grid.nodes_nm
-    base = made.view.base_qe[0]
+    channel, wave = made.setup.camera.modified[0], grid.nodes_nm
+    base = made.setup.camera.base_qe[0]
     transmission = np.random.default_rng(3).uniform(size=wave.size)
-    seen = AngularResponse(made.view).curves((base * transmission)[None], [channel])[0] / base
+    seen = AngularResponse(made.setup).curves((base * transmission)[None], [channel])[0] / base
     half = math.asin(0.5 / f_number)
     for at in (2, 11):
         exact = over_pupil(wave[at], wave, transmission, half, math.radians(cra_deg), 1.7)
@@ -80,7 +80,7 @@ def test_the_mean_over_a_cone_is_that_over_the_pupil(f_number: float, cra_deg: f
 @pytest.mark.parametrize(("f_number", "cra_deg"), _CONES)
 def test_few_rays_stand_for_the_cone(f_number: float, cra_deg: float) -> None:
     """Moments of the squared sine, which a Gauss rule has exactly, against rays spread evenly over the pupil."""
-    cone = cone_of(scene("cone", "RYNCy", {"optics": {"f_number": f_number, "cra_deg": cra_deg}}).view.scenario)
+    cone = cone_of(scene("cone", "RYNCy", {"optics": {"f_number": f_number, "cra_deg": cra_deg}}).setup.scene)
     half, chief = cone.half_rad, cone.chief_rad
     radius, azimuth = np.meshgrid((np.arange(4000) + 0.5) / 4000, (np.arange(64) + 0.5) * math.pi / 32)
     p = math.cos(half) * math.sin(chief) + math.sin(half) * math.cos(chief) * radius * np.cos(azimuth)
@@ -105,8 +105,8 @@ def moved(given: dict[str, Any], f_number: float = 1.6, cra_deg: float = 20.0) -
     return scene("angle", "RYNCy", given | optics, {"dark_e_per_s": 50.0}, grid=FINE, index=1.8)
 
 
-def with_rays(view: View, count: int | None) -> View:
-    return replace(view, accuracy=view.accuracy.model_copy(update={"rays": count}))
+def with_rays(setup: Setup, count: int | None) -> Setup:
+    return replace(setup, accuracy=setup.accuracy.model_copy(update={"rays": count}))
 
 
 GIVEN: dict[str, dict[str, Any]] = {
@@ -120,20 +120,20 @@ GIVEN: dict[str, dict[str, Any]] = {
 def test_digital_numbers_are_means_over_rays(given: dict[str, Any], count: int) -> None:
     """Each ray's filter put in as a design that does not move: digital numbers are the weighted sum."""
     made = moved(given)
-    view = with_rays(made.view, count)
-    sine_squared, weights = gauss_rays(cone_of(view.scenario), count)
-    base, wave = view.base_qe[0], view.grid.nodes_nm
+    setup = with_rays(made.setup, count)
+    sine_squared, weights = gauss_rays(cone_of(setup.scene), count)
+    base, wave = setup.camera.base_qe[0], setup.camera.grid.nodes_nm
     filters = bare(wave, made.curves[0, 0] / base, np.arcsin(np.sqrt(sine_squared)), 1.8) * base
-    still = linear_model(replace(view, technologies=()))
+    still = linear_model(setup.with_camera(technologies=()))
     expected = np.einsum("r,rxsc->xsc", weights, still.smooth(filters[:, None]))
-    np.testing.assert_allclose(linear_model(view).smooth(made.curves)[0], expected, rtol=1e-13, atol=1e-9)
+    np.testing.assert_allclose(linear_model(setup).smooth(made.curves)[0], expected, rtol=1e-13, atol=1e-9)
 
 
 @pytest.mark.parametrize("given", GIVEN.values(), ids=GIVEN)
 def test_derivatives_see_what_the_rays_see(given: dict[str, Any]) -> None:
     """The response is affine in N: its derivative, and the weights of each wavelength, give it again."""
     made = moved(given | {"exposure": {"kind": "fixed", "exposure_s": 1e-3}})
-    model, channel = linear_model(made.view), made.view.modified[0]
+    model, channel = linear_model(made.setup), made.setup.camera.modified[0]
     zero, own = model.smooth(np.zeros_like(made.curves))[0], model.smooth(made.curves)[0]
     scale = np.abs(own).max()
     by_curve = model.gradient(made.curves[0], made.curves)[0]
@@ -144,15 +144,15 @@ def test_derivatives_see_what_the_rays_see(given: dict[str, Any]) -> None:
 
 def test_only_what_is_said_to_be_of_interference_moves() -> None:
     made = moved({})
-    pigment = replace(made.view, technologies=(Technology(),) * len(made.view.mosaic.channels))
-    unsaid, reasons = replace(made.view, technologies=()), []
-    for view in (pigment, unsaid):
+    pigment = made.setup.with_camera(technologies=(Technology(),) * len(made.setup.camera.mosaic.channels))
+    unsaid, reasons = made.setup.with_camera(technologies=()), []
+    for setup in (pigment, unsaid):
         for tolerance_dn in (1e-9, 10.0):
-            plan = plan_scene("", [replace(made.box, view=view)], tolerance_dn, view.accuracy)
+            plan = plan_scene("", [replace(made.box, setup=setup)], tolerance_dn, setup.accuracy)
             choices = {choice.effect: choice for choice in plan.choices}
             assert (choices["angle"].computed, choices["angle"].bound_dn) == (False, 0.0)
         for count in (1, 4, None):
-            found = ForwardModel(with_rays(view, count)).read(made.curves)[0]
+            found = ForwardModel(with_rays(setup, count)).read(made.curves)[0]
             np.testing.assert_array_equal(found, ForwardModel(unsaid).read(made.curves)[0])
         reasons.append(choices["angle"].reason)
     assert reasons == ["pigments do not move with the angle", "no technology is stated: filters as on axis"]
@@ -160,13 +160,15 @@ def test_only_what_is_said_to_be_of_interference_moves() -> None:
 
 def test_a_plain_curve_of_interference_moves_on_the_clear_one() -> None:
     made = moved({})
-    clear, wave = made.view.clear_qe, made.view.grid.nodes_nm
-    moving = tuple(made.view.technologies[made.view.modified[0]] for _ in made.view.mosaic.channels)
-    view = replace(made.view, technologies=moving, accuracy=made.view.accuracy.model_copy(update={"rays": 1}))
-    channel = view.fixed[0]
-    own = np.minimum(view.qe[channel], clear)
-    seen = AngularResponse(view).curves(own[None], [channel])[0]
-    sine_squared, _ = gauss_rays(cone_of(view.scenario), 1)
+    clear, wave = made.setup.camera.clear_qe, made.setup.camera.grid.nodes_nm
+    camera = made.setup.camera
+    moving = (camera.technologies[camera.modified[0]],) * len(camera.mosaic.channels)
+    one_ray = replace(made.setup, accuracy=made.setup.accuracy.model_copy(update={"rays": 1}))
+    setup = one_ray.with_camera(technologies=moving)
+    channel = setup.camera.fixed[0]
+    own = np.minimum(setup.camera.qe[channel], clear)
+    seen = AngularResponse(setup).curves(own[None], [channel])[0]
+    sine_squared, _ = gauss_rays(cone_of(setup.scene), 1)
     expected = clear * bare(wave, own / clear, np.arcsin(np.sqrt(sine_squared)), 1.8)[0]
     np.testing.assert_allclose(seen, expected, rtol=1e-12)
 
@@ -181,8 +183,8 @@ FIELDS: dict[str, dict[str, Any]] = {
 def test_a_field_is_the_worst_of_its_places(given: dict[str, Any]) -> None:
     """Chief ray angle and field angle follow one image height, and the worst place counts in every column."""
     angles = [0.0, 8.0, 20.0]
-    view = moved(given, cra_deg=0.0).view
-    field = view.scenario.model_copy(update={"field": SensorField(cra_deg=tuple(angles))})
+    setup = moved(given, cra_deg=0.0).setup
+    field = setup.scene.model_copy(update={"field": SensorField(cra_deg=tuple(angles))})
     block = edges_of(SPACE, 0, SPACE.size)
     assert block is not None
     curves = block.curves()
@@ -192,9 +194,9 @@ def test_a_field_is_the_worst_of_its_places(given: dict[str, Any]) -> None:
         own = Scene.model_validate(
             given | {"optics": {"f_number": 1.6, "cra_deg": cra_deg}, "off_axis_deg": off_axis_deg}
         )
-        each.append(evaluate(ForwardModel(replace(view, scenario=own)), curves))
-    model = ForwardModel(replace(view, scenario=field))
-    names = csd_columns(view)
+        each.append(evaluate(ForwardModel(replace(setup, scene=own)), curves))
+    model = ForwardModel(replace(setup, scene=field))
+    names = csd_columns(setup)
     for designs in (curves, block):
         found = evaluate(model, designs)
         for name in names:
@@ -206,8 +208,8 @@ def test_a_field_is_the_worst_of_its_places(given: dict[str, Any]) -> None:
 def test_derivatives_at_every_place_of_a_field() -> None:
     fixed = {"exposure": {"kind": "fixed", "exposure_s": 1e-3}, "background_cd_m2": 200.0, "off_axis_deg": 35.0}
     made = moved(fixed, cra_deg=0.0)
-    field = made.view.scenario.model_copy(update={"field": SensorField(cra_max_deg=20.0, places=3)})
-    model, channel = linear_model(replace(made.view, scenario=field)), made.view.modified[0]
+    field = made.setup.scene.model_copy(update={"field": SensorField(cra_max_deg=20.0, places=3)})
+    model, channel = linear_model(replace(made.setup, scene=field)), made.setup.camera.modified[0]
     zero, own = model.smooth(np.zeros_like(made.curves))[0], model.smooth(made.curves)[0]
     assert len(own) == 3
     scale = np.abs(own).max()
@@ -217,6 +219,6 @@ def test_derivatives_at_every_place_of_a_field() -> None:
 
 
 def test_a_field_in_which_nothing_moves_is_one_place() -> None:
-    view = replace(moved({}, cra_deg=0.0).view, technologies=())
-    field = view.scenario.model_copy(update={"field": SensorField(cra_max_deg=20.0)})
-    assert ForwardModel(replace(view, scenario=field)).n_cases == 1
+    setup = moved({}, cra_deg=0.0).setup.with_camera(technologies=())
+    field = setup.scene.model_copy(update={"field": SensorField(cra_max_deg=20.0)})
+    assert ForwardModel(replace(setup, scene=field)).n_cases == 1

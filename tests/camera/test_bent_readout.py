@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -28,8 +26,8 @@ def saturated(place: list[float] | str, readout: str, level: float) -> DesignSce
         given = {"target": light, "optics": {"f_number": 2.8}, "intensity_cd": 200}
         given["exposure"] = {"kind": "fixed", "exposure_s": exposure_s}
         found = scene("saturated", "RCCC", given, {"crosstalk": 0.1})
-        view = replace(found.view, mosaic=MOSAIC, qe=SENSOR.mosaic_qe(MOSAIC, None))
-        return DesignScene("saturated", view, found.curves, Box(view, view.qe, view.qe))
+        setup = found.setup.with_camera(mosaic=MOSAIC, qe=SENSOR.mosaic_qe(MOSAIC, None))
+        return DesignScene("saturated", setup, found.curves, Box(setup, setup.camera.qe, setup.camera.qe))
 
     brightest = made(1e-3).box.brightest_pixel_dn
     return made(1e-3 * 4095 * level / brightest)

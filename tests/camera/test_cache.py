@@ -111,12 +111,14 @@ def test_tables_of_grids_are_shared_by_threads() -> None:
 
 
 def test_imagers_are_shared_by_threads() -> None:
-    view = VIEWS["chart"]
-    views = [replace(view, pixel=view.pixel.model_copy(update={"read_noise_e": float(at)})) for at in range(20)]
+    setup = VIEWS["chart"]
+    setups = [
+        setup.with_camera(pixel=setup.camera.pixel.model_copy(update={"read_noise_e": float(at)})) for at in range(20)
+    ]
 
     def work(number: int) -> None:
         for turn in range(20):
-            mine = views[(turn * (number + 1)) % len(views)]
-            assert forward_model(mine).view.pixel.read_noise_e == mine.pixel.read_noise_e
+            mine = setups[(turn * (number + 1)) % len(setups)]
+            assert forward_model(mine).setup.camera.pixel.read_noise_e == mine.camera.pixel.read_noise_e
 
     at_once(work)

@@ -9,7 +9,7 @@ import pytest
 
 from sweep.base.types import FloatArray
 from sweep.camera import psf
-from sweep.camera.disc_image import _MEANS, covered, different, light_on_pixels
+from sweep.camera.disc_image import covered, different, light_on_pixels
 from sweep.camera.pixel import Optics, Pixel
 from sweep.camera.sampling import Window
 from sweep.camera.scene import Scene, Target
@@ -72,15 +72,6 @@ def test_few_functions_are_the_image_at_every_wavelength(radius_um: float, reach
     np.testing.assert_allclose(profile.at(r_um), exact, rtol=0, atol=_FUNCTIONS)
     assert len(profile.shares) <= _VISIBLE_UM.size
     np.testing.assert_allclose(profile.shares @ profile.shares.T, np.eye(len(profile.shares)), atol=1e-13)
-
-
-def test_sums_are_those_of_the_image() -> None:
-    rng = np.random.default_rng(1)
-    profile = psf.DiscProfile(6.0, 20.0, _VISIBLE_UM, 2.8, 0.4)
-    r_um, weights = rng.uniform(0.0, 20.0, (30, 7)), rng.uniform(-1.0, 1.0, 7)
-    r_um[0] = 0.0, 1e-9, 0.01, 0.02, 19.97, 19.99, 20.0
-    expected = np.einsum("m,nmk->nk", weights, profile.at(r_um))
-    np.testing.assert_allclose(profile.sums(r_um, weights) @ profile.shares, expected, rtol=0, atol=1e-13)
 
 
 def test_the_same_profile_is_made_once() -> None:
@@ -202,11 +193,7 @@ def test_pixels_that_are_not_wanted_are_dark_and_sums_are_weighted() -> None:
     window = window_around([(0.0, 0.0), (0.25, 0.5)], 3)
     wanted = np.hypot(window.dx, window.dy) < 2.5
     profile = psf.DiscProfile(radius_px * pitch_um, 6 * pitch_um, _VISIBLE_UM, 4.0, 0.0)
-    _MEANS.clear()
     light = light_on_pixels(window, wanted, 0.5, radius_px, profile, pitch_um)
-    again = light_on_pixels(window, wanted, 0.5, radius_px, profile, pitch_um)
-    assert len(_MEANS) == 1
-    np.testing.assert_array_equal(light.values, again.values)
     by_pixel = light.by_pixel()
     assert np.all(by_pixel[~wanted] == 0)
     assert np.all(by_pixel[wanted] > 0)
@@ -248,3 +235,18 @@ def test_an_image_that_is_too_much_is_named(
     target = Target(distance_m=distance_m, diameter_m=diameter_m, fov_deg=60.0)
     result = psf.too_much(Scene(target=target, optics=optics), Pixel())
     assert (result if place is None else result and result[0]) == place
+
+
+def test_pixels_of_a_lattice_are_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All CFAs whose tiles are of one size ask for them; those of a few phases are computed when they are asked for."""
+    calls, means = [], psf.DiscProfile.pixel_means
+    monkeypatch.setattr(psf.DiscProfile, "pixel_means", lambda *of: calls.append(1) or means(*of))  # type: ignore[func-returns-value]
+    lattice = window_around([(x / 16, y / 16) for x in range(16) for y in range(16)], 2)
+    wanted = np.hypot(lattice.dx, lattice.dy) < 2.5
+    profile = psf.DiscProfile(2.1, 15.0, _VISIBLE_UM, 4.0, 0.0)
+    first, again = (light_on_pixels(lattice, wanted, 0.5, 1.0, profile, 2.1) for _ in range(2))
+    np.testing.assert_array_equal(first.values, again.values)
+    assert len(calls) == 1
+    for _ in range(2):
+        light_on_pixels(window_around([(0.25, 0.5)], 2), wanted[:1], 0.5, 1.0, profile, 2.1)
+    assert len(calls) == 3

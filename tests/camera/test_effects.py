@@ -81,18 +81,18 @@ def test_defocus_is_the_shift_of_the_image() -> None:
 
 
 @pytest.mark.parametrize("reach_um", [0.02, 0.3, 40.0])
-def test_sums_over_a_profile_are_those_of_its_values(reach_um: float) -> None:
+def test_means_over_pixels_are_those_of_the_profiles_values(reach_um: float) -> None:
     """SciPy's own spline, radius by radius; at both ends of the table, between them and a little beyond, too."""
     rng = np.random.default_rng(3)
     profile = psf.DiscProfile(3.0, reach_um, np.linspace(0.4, 0.7, 5), 2.0, 0.0)
-    end = float(profile._spline.t[-1])
-    r_um = np.concatenate(
-        [rng.uniform(0, end, (40, 9)), rng.uniform(0, end / 50, (5, 9)), [np.linspace(0, 1.01, 9) * end]]
-    )
-    weights = rng.uniform(-1, 1, 9)
-    np.testing.assert_allclose(
-        profile.sums(r_um, weights) @ profile.shares, np.einsum("nmk,m->nk", profile.at(r_um), weights), atol=1e-12
-    )
+    end_um = float(profile._spline.t[-1])
+    half_um = min(1.05, end_um / 8)
+    places_um = np.concatenate([rng.uniform(0, end_um / 1.6, (40, 2)), [[0, 0], [end_um - half_um, 0]]])
+    nodes, weights = np.polynomial.legendre.leggauss(3 + math.ceil(4 * profile.highest_per_um * half_um))
+    x_um, y_um = (places_um[:, axis, None] + half_um * nodes for axis in (0, 1))
+    values = profile.at(np.hypot(x_um[:, :, None], y_um[:, None, :]))
+    expected = np.einsum("nijk,i,j->nk", values, weights / 2, weights / 2)
+    np.testing.assert_allclose(profile.pixel_means(places_um, half_um) @ profile.shares, expected, atol=1e-12)
 
 
 @pytest.mark.parametrize(("f_number", "w20_um"), [(1.4, 0.0), (2.0, 0.0), (8.0, 0.0), (2.0, 0.3)])
@@ -131,7 +131,7 @@ def test_covered_share_by_counting() -> None:
 
 def test_a_pixel_sees_the_mean_of_the_image_over_its_aperture() -> None:
     made = scene("far", "RGGB", {"target": FAR, "optics": F2})
-    seen = sampling.window(made.view.mosaic, np.array([[0.3, 0.8]]), 3.5)
+    seen = sampling.window(made.setup.camera.mosaic, np.array([[0.3, 0.8]]), 3.5)
     profile = psf.DiscProfile(6.2, 12.0, np.array([0.55]), 2.0, 0.0)
     light = light_on_pixels(
         seen, np.ones(seen.dx.shape, dtype=bool) & (np.hypot(seen.dx, seen.dy) < 4), 0.4, 6.2 / 2.1, profile, 2.1
@@ -185,9 +185,9 @@ def test_crosstalk_by_hand() -> None:
 
 def test_extinction_leaves_two_percent_at_the_visibility() -> None:
     for visibility in (100.0, 3000.0, 20_000.0):
-        made = scene("fog", "RGGB", {"target": target(visibility, 10), "visibility_m": visibility}).view
+        made = scene("fog", "RGGB", {"target": target(visibility, 10), "visibility_m": visibility}).setup
         wave = np.array([450.0, 550.0, 650.0])
-        spectral = irradiance.air_transmittance(made.scenario, wave)
+        spectral = irradiance.air_transmittance(made.scene, wave)
         assert spectral[1] == pytest.approx(0.02, rel=1e-12)
         assert spectral[0] <= spectral[2]  # haze takes more of the blue; dense fog of all alike
     assert irradiance.size_exponent(400.0) == 0
@@ -287,7 +287,9 @@ def test_lattices_are_nested() -> None:
 
 
 def test_a_phase_counts_within_the_tile() -> None:
-    one, other = (scene("a", "RGGB", {"target": FAR | {"phase_px": p}}).view for p in ([0.25, 1.5], [1e6 + 0.25, -0.5]))
+    one, other = (
+        scene("a", "RGGB", {"target": FAR | {"phase_px": p}}).setup for p in ([0.25, 1.5], [1e6 + 0.25, -0.5])
+    )
     np.testing.assert_allclose(scene_phases(one).center_px, scene_phases(other).center_px, atol=1e-9)
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sweep.camera.camera import Camera
 from sweep.camera.effects import Box
 from sweep.camera.forward import ForwardModel
 from sweep.camera.linear import linear_model
@@ -22,7 +23,7 @@ from sweep.camera.pixel import Optics, Pixel, irradiance_factor
 from sweep.camera.plan import plan_scene
 from sweep.camera.psf import otf as transfer_function
 from sweep.camera.scene import FixedExposure, Scene
-from sweep.camera.view import View
+from sweep.camera.setup import Setup
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
 
@@ -48,7 +49,7 @@ def pixel() -> Pixel:
     )
 
 
-def isetcam_view(mosaic: Mosaic, magnification: float, exposure_s: float, kept: np.ndarray | float = 1.0) -> View:
+def isetcam_setup(mosaic: Mosaic, magnification: float, exposure_s: float, kept: np.ndarray | float = 1.0) -> Setup:
     """The reference's patches and sensor; a lens at a finite distance has a magnification, which dims its image.
 
     `kept`: share of the light that the blur leaves, per wavelength.
@@ -66,7 +67,7 @@ def isetcam_view(mosaic: Mosaic, magnification: float, exposure_s: float, kept: 
         optics=Optics(f_number=optics.f_number, transmission=dimmed),
         exposure=FixedExposure(exposure_s=exposure_s),
     )
-    return View(WavelengthGrid(step_nm=5), mosaic, qe, (), qe[0], lights, pixel(), scenario)
+    return Setup(Camera(WavelengthGrid(step_nm=5), mosaic, qe, (), qe[0], pixel()), lights, scenario)
 
 
 def columns_of(mosaic: Mosaic) -> list[int]:
@@ -75,9 +76,9 @@ def columns_of(mosaic: Mosaic) -> list[int]:
     return [names.index({"C": "W"}.get(channel, channel)) for channel in mosaic.channels]
 
 
-def every_channel() -> View:
+def every_channel() -> Setup:
     """All channels of the reference side by side, read out with everything on."""
-    return isetcam_view(Mosaic.from_rows("all", [reference()["qe_names"]]), 0.0, 1.0)
+    return isetcam_setup(Mosaic.from_rows("all", [reference()["qe_names"]]), 0.0, 1.0)
 
 
 NOTHING = np.empty((1, 0, 61))
@@ -89,8 +90,8 @@ def electrons(cfa: str, mode: str) -> tuple[np.ndarray, dict[str, Any]]:
     ref = reference()
     run = next(r for r in ref["runs"] if r["cfa"] == cfa and r["mode"] == mode)
     every = Mosaic.from_rows("all", [ref["qe_names"]])
-    view = isetcam_view(every, ref["skip_magnification"], run["skip_exposure_s"])
-    return linear_model(view).electrons.rates(NOTHING)[0, 0] * run["skip_exposure_s"], run
+    setup = isetcam_setup(every, ref["skip_magnification"], run["skip_exposure_s"])
+    return linear_model(setup).electrons.rates(NOTHING)[0, 0] * run["skip_exposure_s"], run
 
 
 @pytest.mark.parametrize("mode", ["fixed", "auto"])
@@ -162,13 +163,13 @@ def test_a_uniform_field_agrees_through_the_whole_image_chain(cfa: str) -> None:
     mosaic = Mosaic.from_name(cfa)
     columns, constants = columns_of(mosaic), ref["constants"]
     kept = kept_at_the_center(float(constants["f_number"]))
-    view = isetcam_view(mosaic, constants["magnification"], run["exposure_s"], kept)
-    plan = plan_scene("uniform", [Box(view, view.qe, view.qe)], 0.1, view.accuracy)
+    setup = isetcam_setup(mosaic, constants["magnification"], run["exposure_s"], kept)
+    plan = plan_scene("uniform", [Box(setup, setup.camera.qe, setup.camera.qe)], 0.1, setup.accuracy)
     assert "quantization" in plan.computed
-    smooth = linear_model(view).smooth(NOTHING)[0, 0]
+    smooth = linear_model(setup).smooth(NOTHING)[0, 0]
     volts = np.array(run["uniform_volts_unclipped"], dtype=float)[:, columns]
     np.testing.assert_allclose(smooth, 4096 * volts, atol=0.1, rtol=0)
-    dn = ForwardModel(replace(view, left_out=plan.left_out)).read(NOTHING)[0][0, 0]
+    dn = ForwardModel(replace(setup, left_out=plan.left_out)).read(NOTHING)[0][0, 0]
     expected = np.minimum(np.array(run["uniform_dn"], dtype=float)[:, columns], 4095)
     near_a_step = np.abs(4096 * volts - np.floor(4096 * volts) - 0.5) < 0.1
     assert ((dn == expected) | near_a_step).all()

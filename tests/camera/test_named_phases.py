@@ -40,31 +40,33 @@ def small_light(seed: int) -> DesignScene:
 
 def allowed_dn(made: DesignScene) -> float:
     """Readouts in whole numbers without noise step between phases."""
-    return _NEVER_CHANGED_DN if made.view.scenario.noise else math.sqrt(len(made.view.mosaic.channels))
+    return _NEVER_CHANGED_DN if made.setup.scene.noise else math.sqrt(len(made.setup.camera.mosaic.channels))
 
 
 def lower_by_dn(made: DesignScene, seed: int) -> float:
     """By how much a named phase has a lower CSD than the worst of all, at most."""
-    view = replace(made.view, accuracy=STANDARD)
-    worst = evaluate(ForwardModel(view), made.curves)
-    light = view.scenario.target
+    setup = replace(made.setup, accuracy=STANDARD)
+    worst = evaluate(ForwardModel(setup), made.curves)
+    light = setup.scene.target
     assert light is not None
-    rows, columns = view.mosaic.indices.shape
+    rows, columns = setup.camera.mosaic.indices.shape
     named_px = np.random.default_rng([seed, 31]).uniform(0, (columns, rows), (NAMED, 2))
-    response = ForwardModel(view, read_at(light, named_px), once=True).read(made.curves)[0][0]
-    distances = separations(response, view.members)
-    return max(float(worst[csd_name(pair)][0] - distances[pair].min()) for pair in class_pairs(view.lights.classes))
+    response = ForwardModel(setup, read_at(light, named_px), once=True).read(made.curves)[0][0]
+    distances = separations(response, setup.members)
+    return max(float(worst[csd_name(pair)][0] - distances[pair].min()) for pair in class_pairs(setup.lights.classes))
 
 
 def test_a_named_phase_is_read_as_among_others() -> None:
     """What the test below relies on."""
     made = small_light(4)
-    light = made.view.scenario.target
+    light = made.setup.scene.target
     assert light is not None
     named = light.model_copy(update={"phase_px": (0.3, 0.85)})
-    view = replace(made.view, scenario=made.view.scenario.model_copy(update={"target": named}))
-    among = ForwardModel(made.view, read_at(light, np.array([[0.3, 0.85], [1.2, 0.4]])), once=True).read(made.curves)[0]
-    np.testing.assert_allclose(ForwardModel(view).read(made.curves)[0][:, 0], among[:, 0], rtol=1e-12)
+    setup = replace(made.setup, scene=made.setup.scene.model_copy(update={"target": named}))
+    among = ForwardModel(made.setup, read_at(light, np.array([[0.3, 0.85], [1.2, 0.4]])), once=True).read(made.curves)[
+        0
+    ]
+    np.testing.assert_allclose(ForwardModel(setup).read(made.curves)[0][:, 0], among[:, 0], rtol=1e-12)
 
 
 @pytest.mark.slow

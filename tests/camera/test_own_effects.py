@@ -26,19 +26,19 @@ def own_effect(body: str) -> OwnEffect:
 
 
 def test_effects_are_applied_in_order() -> None:
-    view = scene("lit", "RGGB", LIT).view
+    setup = scene("lit", "RGGB", LIT).setup
     halved = own_effect("return replace(irradiance, signals=irradiance.signals / 2)")
     added = own_effect("return replace(irradiance, signals=irradiance.signals + irradiance.background)")
-    seen = scene_irradiance(replace(view, own_effects=(halved, added)))
-    np.testing.assert_allclose(seen.signals, signal_irradiance(view) / 2 + background_irradiance(view), rtol=1e-14)
-    np.testing.assert_array_equal(seen.background, background_irradiance(view))
+    seen = scene_irradiance(replace(setup, own_effects=(halved, added)))
+    np.testing.assert_allclose(seen.signals, signal_irradiance(setup) / 2 + background_irradiance(setup), rtol=1e-14)
+    np.testing.assert_array_equal(seen.background, background_irradiance(setup))
 
 
 def test_an_effect_sees_its_scene() -> None:
-    view = scene("lit", "RGGB", LIT).view
+    setup = scene("lit", "RGGB", LIT).setup
     nearer = own_effect("return replace(irradiance, signals=irradiance.signals * scene.target.distance_m)")
-    seen = signal_irradiance(replace(view, own_effects=(nearer,)))
-    np.testing.assert_allclose(seen, 50 * signal_irradiance(view), rtol=1e-14)
+    seen = signal_irradiance(replace(setup, own_effects=(nearer,)))
+    np.testing.assert_allclose(seen, 50 * signal_irradiance(setup), rtol=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -53,9 +53,9 @@ def test_an_effect_sees_its_scene() -> None:
     ],
 )
 def test_what_is_no_irradiance_is_one_line(body: str, message: str) -> None:
-    view = replace(scene("lit", "RGGB", LIT).view, own_effects=(own_effect(body),))
+    setup = replace(scene("lit", "RGGB", LIT).setup, own_effects=(own_effect(body),))
     with pytest.raises(SweepError, match=message):
-        scene_irradiance(view)
+        scene_irradiance(setup)
 
 
 def test_a_failing_effect_is_refused_with_the_study(tmp_path: Path) -> None:
@@ -68,13 +68,13 @@ def test_a_failing_effect_is_refused_with_the_study(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("field_cd_m2", "mean_cd_m2"), [(None, 300.0), (5000.0, 5000.0), (0.0, 0.0)])
 def test_veiling_glare_spreads_a_share_of_the_mean_light(field_cd_m2: float | None, mean_cd_m2: float) -> None:
-    plain = scene("lit", "RGGB", LIT).view
+    plain = scene("lit", "RGGB", LIT).setup
     glare = {"share": 0.05, "field_cd_m2": field_cd_m2}
-    view = scene("glare", "RGGB", LIT | {"veiling_glare": glare}).view
+    setup = scene("glare", "RGGB", LIT | {"veiling_glare": glare}).setup
     mean = background_irradiance(plain) * mean_cd_m2 / 300
-    np.testing.assert_allclose(signal_irradiance(view), 0.95 * signal_irradiance(plain), rtol=1e-13)
+    np.testing.assert_allclose(signal_irradiance(setup), 0.95 * signal_irradiance(plain), rtol=1e-13)
     np.testing.assert_allclose(
-        background_irradiance(view), 0.95 * background_irradiance(plain) + 0.05 * mean, rtol=1e-13
+        background_irradiance(setup), 0.95 * background_irradiance(plain) + 0.05 * mean, rtol=1e-13
     )
 
 

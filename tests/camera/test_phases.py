@@ -11,8 +11,16 @@ import pytest
 
 from sweep.camera.accuracy import STANDARD
 from sweep.camera.forward import AllPhases, ForwardModel
-from sweep.camera.phases import Phases, different_phases, lattice_px, read_at, refined_minima, scene_phases
-from sweep.camera.view import READOUT, View
+from sweep.camera.phases import (
+    Phases,
+    different_phases,
+    fine_lattice,
+    lattice_px,
+    read_at,
+    refined_minima,
+    scene_phases,
+)
+from sweep.camera.setup import READOUT, Setup
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.quantity import BEST_PLACE
 from sweep.metrics.separation import csd_name, separations
@@ -42,9 +50,9 @@ def _scenes() -> list[tuple[DesignScene, str]]:
     """34 scenes, each with its readout."""
     found = []
     for made in HARD + ALONE:
-        light = made.view.scenario.target
-        if made.view.all_phases and light is not None and light.object_resolution_px < _MOST_PX:
-            found.append((made, "quantized" if made.view.scenario.noise is None else "noisy"))
+        light = made.setup.scene.target
+        if made.setup.all_phases and light is not None and light.object_resolution_px < _MOST_PX:
+            found.append((made, "quantized" if made.setup.scene.noise is None else "noisy"))
     sizes, numbers = cycle(_SIZES_PX), cycle(_F_NUMBERS)
     every = product(READOUTS, ("RGGB", "RCCC", "RYNCy", "3x3", "1x3"), ("mean", "center"))
     for at, (how, cfa, readout) in enumerate(every):
@@ -57,22 +65,22 @@ def _scenes() -> list[tuple[DesignScene, str]]:
 SCENES = _scenes()
 
 
-def view_of(made: DesignScene, how: str) -> View:
+def setup_of(made: DesignScene, how: str) -> Setup:
     left_out = READOUT if how == "linear" else frozenset()
-    return replace(made.view, left_out=left_out, accuracy=STANDARD)
+    return replace(made.setup, left_out=left_out, accuracy=STANDARD)
 
 
 def brute_force(made: DesignScene, how: str) -> dict[str, tuple[float, float]]:
     """Smallest and largest over a fine lattice of the smallest CSD over the moments."""
-    view = view_of(made, how)
-    light = view.scenario.target
+    setup = setup_of(made, how)
+    light = setup.scene.target
     assert light is not None
-    phases = read_at(light, lattice_px(view.mosaic, STEPS_PER_PX))
+    phases = read_at(light, lattice_px(setup.camera.mosaic, STEPS_PER_PX))
     if light.readout == "mean":
-        phases = different_phases(view, phases)[0]
-    response = ForwardModel(view, phases, once=True).read(made.curves)[0][0]
+        phases = different_phases(setup, phases)[0]
+    response = ForwardModel(setup, phases, once=True).read(made.curves)[0][0]
     ends = {}
-    for pair, distances in separations(response, view.members).items():
+    for pair, distances in separations(response, setup.members).items():
         each = distances.reshape(len(phases), -1).min(axis=1)
         ends[csd_name(pair)] = (float(each.min()), float(each.max()))
     return ends
@@ -80,12 +88,12 @@ def brute_force(made: DesignScene, how: str) -> dict[str, tuple[float, float]]:
 
 def allowed_dn(made: DesignScene, how: str) -> float:
     """Whole numbers without noise step between phases."""
-    return 0.05 if how in ("linear", "noisy") else math.sqrt(len(made.view.mosaic.channels))
+    return 0.05 if how in ("linear", "noisy") else math.sqrt(len(made.setup.camera.mosaic.channels))
 
 
 def missed_dn(made: DesignScene, how: str) -> tuple[float, float]:
     """By how much the smallest CSDs are above, and the largest ones below, those of all phases, at most."""
-    columns = evaluate(ForwardModel(view_of(made, how)), made.curves)
+    columns = evaluate(ForwardModel(setup_of(made, how)), made.curves)
     above = below = -math.inf
     for name, (smallest, largest) in brute_force(made, how).items():
         above = max(above, float(columns[name][0]) - smallest)
@@ -96,10 +104,11 @@ def missed_dn(made: DesignScene, how: str) -> tuple[float, float]:
 def test_scenes_are_of_each_tile_readout_and_kind() -> None:
     assert len(SCENES) == 34
     assert {how for _, how in SCENES} == {*READOUTS}
-    assert {made.view.mosaic.name for made, _ in SCENES} >= {"RGGB", "RCCC", "RYNCy", "3x3", "1x3"}
+    assert {made.setup.camera.mosaic.name for made, _ in SCENES} >= {"RGGB", "RCCC", "RYNCy", "3x3", "1x3"}
     saturated = [made for made, how in SCENES if how == "saturated"]
     assert all(
-        made.box.brightest_pixel_dn / made.view.pixel.dn_per_e > made.view.pixel.saturation_e for made in saturated
+        made.box.brightest_pixel_dn / made.setup.camera.pixel.dn_per_e > made.setup.camera.pixel.saturation_e
+        for made in saturated
     )
 
 
@@ -120,19 +129,19 @@ MIRRORED = {"RGGB": 15, "RYNCy": 25, "1x3": 36, "3x3": 78}
 def test_a_phase_reads_what_its_mirror_images_read(name: str, readout: str) -> None:
     given = {"target": FAR | {"phase_px": "any", "readout": readout}, "optics": F2, "noise": True}
     made = scene("mirrored", name, given, DARK | {"crosstalk": 0.05})
-    every = scene_phases(made.view)
-    few, which = different_phases(made.view, every)
+    every = scene_phases(made.setup)
+    few, which = different_phases(made.setup, every)
     assert len(few) == (MIRRORED[name] if readout == "mean" else len(every))
-    model = ForwardModel(made.view)
+    model = ForwardModel(made.setup)
     assert model.n_cases == len(few)
-    own, whole = (each.read_with_noise(made.curves) for each in (model, AllPhases(made.view)))
+    own, whole = (each.read_with_noise(made.curves) for each in (model, AllPhases(made.setup)))
     np.testing.assert_allclose(own.mean[:, which], whole.mean, rtol=0, atol=1e-9)
     np.testing.assert_allclose(own.variance[:, which], whole.variance, rtol=1e-9)
 
 
 @pytest.mark.parametrize("readout", ["mean", "center"])
 def test_halfway_between_pixels_a_center_is_read_at_each_of_them(readout: str) -> None:
-    light = scene("light", "RGGB", {"target": FAR | {"phase_px": "any", "readout": readout}}).view.scenario.target
+    light = scene("light", "RGGB", {"target": FAR | {"phase_px": "any", "readout": readout}}).setup.scene.target
     assert light is not None
     read = read_at(light, np.array([[0.25, 0.75], [0.5, 1.0], [1.5, 0.5]]))
     nearest = {tuple(center): set() for center in read.center_px.tolist()}
@@ -146,25 +155,24 @@ def test_halfway_between_pixels_a_center_is_read_at_each_of_them(readout: str) -
 
 
 def test_named_and_missing_lights_have_one_phase() -> None:
-    named = scene("named", "RGGB", {"target": FAR | {"phase_px": [0.5, 2.25]}}).view
+    named = scene("named", "RGGB", {"target": FAR | {"phase_px": [0.5, 2.25]}}).setup
     np.testing.assert_array_equal(scene_phases(named).center_px, [[0.5, 0.25]])
     np.testing.assert_array_equal(scene_phases(named).nearest_px, [[0, 0]])
-    assert len(scene_phases(scene("patch", "RGGB", {}).view)) == 1
+    assert len(scene_phases(scene("patch", "RGGB", {}).setup)) == 1
 
 
 @pytest.mark.parametrize("finest_phase_px", thinned([1 / 8, 1 / 16, 1 / 64], 2))
 def test_finer_steps_find_no_worse_an_extreme_of_a_smooth_function(finest_phase_px: float) -> None:
     """A function with one minimum over the tile: within the curvature times the square of a step."""
     made = scene("any", "RGGB", {"target": FAR | {"phase_px": "any", "readout": "center"}})
-    view = replace(made.view, accuracy=STANDARD.model_copy(update={"finest_phase_px": finest_phase_px}))
+    setup = replace(made.setup, accuracy=STANDARD.model_copy(update={"finest_phase_px": finest_phase_px}))
     lowest = np.array([0.83, 1.37])
 
     def value(phases: Phases) -> np.ndarray:
         off = np.mod(phases.center_px - lowest + 1, 2) - 1
-        return (off**2).sum(axis=1)[None]
+        return 1000 * (off**2).sum(axis=1)[None]
 
-    lattice = scene_phases(view)
-    found = refined_minima(view, lattice, value(lattice), value)
-    assert 0 <= found[0] <= finest_phase_px**2 / 2 * (1 + 1e-9)
-    unrefined = replace(view, accuracy=STANDARD.model_copy(update={"finest_phase_px": 0.0}))
-    assert refined_minima(unrefined, lattice, value(lattice), value)[0] == value(lattice).min() > found[0]
+    lattice, step_px = fine_lattice(setup)
+    found = refined_minima(setup, lattice, step_px, value(lattice), value)
+    assert 0 <= found[0] <= 1000 * finest_phase_px**2 / 2 * (1 + 1e-9)
+    assert found[0] <= value(lattice).min()

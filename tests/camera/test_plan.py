@@ -14,7 +14,7 @@ from sweep.camera.effects import EFFECTS, Box
 from sweep.camera.forward import ForwardModel
 from sweep.camera.pixel import Pixel
 from sweep.camera.plan import Plan, plan_scene
-from sweep.camera.view import READOUT
+from sweep.camera.setup import READOUT
 
 from ..cases import thinned
 from ..hard.random_scenes import columns as random_columns
@@ -67,7 +67,7 @@ def test_saturation_is_computed_where_noise_or_rounding_is_unless_it_is_inactive
             assert "saturation" in inactive_effects(made.box)
 
 
-@pytest.mark.parametrize("made", [made for made in HARD + ALONE if made.view.scenario.noise], ids=lambda m: m.name)
+@pytest.mark.parametrize("made", [made for made in HARD + ALONE if made.setup.scene.noise], ids=lambda m: m.name)
 def test_errors_under_noise_need_all_of_the_readout(made: DesignScene) -> None:
     assert {*planned(made, 1e6, for_noise=True).computed} >= READOUT
 
@@ -141,7 +141,7 @@ ALL_ON = scene(
     DARK | {"crosstalk": 0.02},
     index=1.8,
 )
-NO_NOISE = replace(ALL_ON.view, scenario=ALL_ON.view.scenario.model_copy(update={"noise": None}))
+NO_NOISE = replace(ALL_ON.setup, scene=ALL_ON.setup.scene.model_copy(update={"noise": None}))
 STAGES: dict[str, tuple[frozenset[str], Any, tuple[str, ...]]] = {
     "blur": (frozenset({"blur"}), psf, ("profile",)),
     "crosstalk": (frozenset({"crosstalk"}), sampling, ("with_crosstalk",)),
@@ -163,7 +163,7 @@ def raising(*_: object, **__: object) -> None:
 @pytest.mark.parametrize("name", list(STAGES))
 def test_what_is_left_out_is_not_computed(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     left_out, owner, functions = STAGES[name]
-    view = NO_NOISE if name in ("quantization", "saturation") else ALL_ON.view
+    setup = NO_NOISE if name in ("quantization", "saturation") else ALL_ON.setup
     for function in functions:
         stage: Any = property(raising) if isinstance(owner, type) else raising
         monkeypatch.setattr(owner, function, stage)
@@ -171,7 +171,7 @@ def test_what_is_left_out_is_not_computed(name: str, monkeypatch: pytest.MonkeyP
     def read(left_out: frozenset[str]) -> None:
         pixel_response._RESPONSES.clear()
         angular._MATRICES.clear()
-        ForwardModel(replace(view, left_out=left_out)).read(ALL_ON.curves)
+        ForwardModel(replace(setup, left_out=left_out)).read(ALL_ON.curves)
 
     with pytest.raises(AssertionError, match="computed"):
         read(frozenset())
@@ -197,9 +197,9 @@ def test_plans_that_compute_the_same_have_one_key() -> None:
     assert finer.key != one.key
 
 
-@pytest.mark.parametrize("made", [made for made in HARD if not made.view.all_phases], ids=lambda made: made.name)
+@pytest.mark.parametrize("made", [made for made in HARD if not made.setup.all_phases], ids=lambda made: made.name)
 def test_no_pixel_is_brighter_than_the_brightest(made: DesignScene) -> None:
-    model = ForwardModel(replace(made.view, left_out=frozenset({"quantization", "noise"})))
+    model = ForwardModel(replace(made.setup, left_out=frozenset({"quantization", "noise"})))
     electrons = model.pixel_electrons(made.curves)
     assert electrons.shape[2] == len(lights().names)
-    assert electrons.max() * made.view.pixel.dn_per_e <= made.box.brightest_pixel_dn * (1 + 1e-9)
+    assert electrons.max() * made.setup.camera.pixel.dn_per_e <= made.box.brightest_pixel_dn * (1 + 1e-9)

@@ -20,9 +20,9 @@ PHASES = Phases(CENTERS_PX, np.floor(CENTERS_PX + 0.5))
 def pixels(made: DesignScene, psf_step_nm: float | None) -> PixelResponse:
     """Response of pixels at three phases, sharp where no step of wavelengths is given."""
     if psf_step_nm is None:
-        return pixel_response(replace(made.view, left_out=frozenset({"blur"})), PHASES, by_pixel=True)
-    accuracy = made.view.accuracy.model_copy(update={"psf_step_nm": psf_step_nm})
-    return pixel_response(replace(made.view, accuracy=accuracy), PHASES, by_pixel=True)
+        return pixel_response(replace(made.setup, left_out=frozenset({"blur"})), PHASES, by_pixel=True)
+    accuracy = made.setup.accuracy.model_copy(update={"psf_step_nm": psf_step_nm})
+    return pixel_response(replace(made.setup, accuracy=accuracy), PHASES, by_pixel=True)
 
 
 @pytest.mark.parametrize("psf_step_nm", [1e-3, 10.0, None], ids=["every wavelength", "every 10 nm", "sharp"])
@@ -59,6 +59,6 @@ def test_sums_are_those_of_the_array(psf_step_nm: float | None, crosstalk: float
 def test_a_channel_is_the_mean_of_its_pixels() -> None:
     """The response of channels, made on another way, is that of the pixels, weighed as they are read out."""
     made = scene("mean", "RGGB", {"target": FAR, "optics": F2}, DARK | {"crosstalk": 0.1})
-    apart = pixels(made, made.view.accuracy.psf_step_nm)
-    whole = pixel_response(made.view, PHASES, by_pixel=False)
+    apart = pixels(made, made.setup.accuracy.psf_step_nm)
+    whole = pixel_response(made.setup, PHASES, by_pixel=False)
     np.testing.assert_allclose(np.einsum("xuv,xucw->xvcw", apart.readout, apart.light), whole.light, rtol=1e-11)

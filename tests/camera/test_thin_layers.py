@@ -6,8 +6,6 @@ the rays of the lens, as a producer would state it. Both stand on the same base 
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import tmm
@@ -68,8 +66,8 @@ def test_characteristic_matrices_transmit_what_tmm_says() -> None:
 def missed(seed: int) -> tuple[float, float, float]:
     """A stack's CSD of yellow and red by its layers and by its effective index, DN, and on axis, with parallel rays."""
     made = scene("layers", "RYNCy", {"optics": {"f_number": 1.6, "cra_deg": 20.0}}, index=1.8)
-    sine_squared, weights = gauss_rays(cone_of(made.view.scenario), 4)
-    stack, wave, base = layers(np.random.default_rng([seed, 5])), GRID.nodes_nm, made.view.base_qe[0]
+    sine_squared, weights = gauss_rays(cone_of(made.setup.scene), 4)
+    stack, wave, base = layers(np.random.default_rng([seed, 5])), GRID.nodes_nm, made.setup.camera.base_qe[0]
     fine = np.arange(GRID.start_nm, 800.0, GRID.step_nm)
     straight = transmitted(stack, 0.0, fine)
     tilted = np.array([transmitted(stack, float(np.arcsin(s**0.5)), wave) for s in sine_squared])
@@ -78,10 +76,10 @@ def missed(seed: int) -> tuple[float, float, float]:
         return np.array([np.interp(wave / np.sqrt(1 - s / index**2), fine, straight) for s in sine_squared])
 
     index = minimize_scalar(lambda n: float(((moved(n) - tilted) ** 2).sum()), bounds=(1.2, 3.0), method="bounded").x
-    still = replace(made.view, technologies=())
+    still = made.setup.with_camera(technologies=())
     curves = np.stack([weights @ tilted, weights @ moved(index), np.interp(wave, fine, straight)]) * base
     response = linear_model(still).smooth(curves[:, None])[:, 0]
-    exact, model, on_axis = separation(response, made.view.members["yellow"], made.view.members["red"])
+    exact, model, on_axis = separation(response, made.setup.members["yellow"], made.setup.members["red"])
     return float(exact), float(model), float(on_axis)
 
 

@@ -16,7 +16,7 @@ from scipy.stats import norm
 from sweep.camera.accuracy import Accuracy
 from sweep.camera.forward import ForwardModel
 from sweep.camera.linear import linear_model
-from sweep.camera.view import View
+from sweep.camera.setup import Setup
 from sweep.metrics.discrimination import error_bounds
 from sweep.metrics.evaluate import evaluate, family_quantities
 from sweep.metrics.quantity import WORST_CASE, Asked, Quantity
@@ -33,10 +33,10 @@ SPAN = np.array([30.0, 10.0, 30.0, 10.0, 0.5])
 class Made:
     """Designs of a scene, computed."""
 
-    def __init__(self, view: View, states: tuple[str, ...] = ()) -> None:
-        self.view, self.family, self.states = view, FAMILY, states
+    def __init__(self, setup: Setup, states: tuple[str, ...] = ()) -> None:
+        self.setup, self.family, self.states = setup, FAMILY, states
         self.curves = FAMILY.curves(X)
-        imager = ForwardModel(view)
+        imager = ForwardModel(setup)
         self.found = evaluate(imager, self.curves, states, probabilities=bool(states)) | family_quantities(FAMILY, X)
         self.read, self.exposure_s = imager.read(self.curves)
         self.noisy = imager.read_with_noise(self.curves) if states else None
@@ -44,43 +44,43 @@ class Made:
     def pairs(self, a: str, b: str) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
         """Of every design, the first and only case: means and variances of both types."""
         assert self.noisy is not None
-        members = self.view.members
+        members = self.setup.members
         for mean, variance in zip(self.noisy.mean[:, 0], self.noisy.variance[:, 0], strict=True):
             yield mean[members[a]], variance[members[a]], mean[members[b]], variance[members[b]]
 
 
 def csd(made: Made, quantity: Quantity) -> list[float]:
-    first, second = (made.view.members[name] for name in quantity.pair or ())
+    first, second = (made.setup.members[name] for name in quantity.pair or ())
     return [min(cdist(case[first], case[second]).min() for case in design) for design in made.read]
 
 
 def best_place(made: Made, quantity: Quantity) -> list[float]:
-    first, second = (made.view.members[name] for name in quantity.pair or ())
+    first, second = (made.setup.members[name] for name in quantity.pair or ())
     return [max(cdist(case[first], case[second]).min() for case in design) for design in made.read]
 
 
 def sensitivity(made: Made, _: Quantity) -> list[float]:
-    base = made.view.qe[made.view.modified[0]]
+    base = made.setup.camera.qe[made.setup.camera.modified[0]]
     return [curve[0].sum() / base.sum() for curve in made.curves]
 
 
 def cfa_sensitivity(made: Made, _: Quantity) -> list[float]:
-    tile = made.view.mosaic.indices.ravel()
+    tile = made.setup.camera.mosaic.indices.ravel()
     found = []
     for curve in made.curves:
-        qe = made.view.qe.copy()
-        qe[made.view.modified[0]] = curve[0]
-        found.append(np.mean([qe[channel].sum() for channel in tile]) / made.view.clear_qe.sum())
+        qe = made.setup.camera.qe.copy()
+        qe[made.setup.camera.modified[0]] = curve[0]
+        found.append(np.mean([qe[channel].sum() for channel in tile]) / made.setup.camera.clear_qe.sum())
     return found
 
 
 def slope(made: Made, _: Quantity) -> list[float]:
-    step = made.view.grid.step_nm
+    step = made.setup.camera.grid.step_nm
     return [max(abs(b - a) / step for a, b in pairwise(curve[0])) for curve in made.curves]
 
 
 def least(made: Made, _: Quantity) -> list[float]:
-    base = made.view.qe[made.view.modified[0]]
+    base = made.setup.camera.qe[made.setup.camera.modified[0]]
     return [float((curve[0][base > 0] / base[base > 0]).min()) for curve in made.curves]
 
 
@@ -161,7 +161,7 @@ def contrast_detected(made: Made, quantity: Quantity) -> list[float]:
 
         return quad(inside, max(y - 9 * w**0.5, 0), y + 9 * w**0.5, points=[y], epsabs=1e-9, limit=200)[0]
 
-    found, pedestal = [], made.view.pixel.offset_dn
+    found, pedestal = [], made.setup.camera.pixel.offset_dn
     for m, v, n, w in made.pairs(*(quantity.pair or ("", ""))):
         each = [
             max(map(of_channel, a - pedestal, s, b - pedestal, t))
@@ -199,14 +199,14 @@ NOISY = {"noise": True, "photon_radiance": 2e14, "exposure": {"kind": "fixed", "
 MADE = {
     "lattice": Made(
         replace(
-            scene("lattice", "RYNCy", {"target": target(100, 60, phase_px="any"), "optics": {"f_number": 4.0}}).view,
+            scene("lattice", "RYNCy", {"target": target(100, 60, phase_px="any"), "optics": {"f_number": 4.0}}).setup,
             accuracy=Accuracy(phases_per_px=4, finest_phase_px=0),
         )
     ),
-    "noise": Made(scene("noise", "RYNCy", NOISY).view, ("yellow", "red")),
-    "dithered": Made(scene("dithered", "RYNCy", DIM, DIM_PIXEL).view, ("yellow", "red")),
+    "noise": Made(scene("noise", "RYNCy", NOISY).setup, ("yellow", "red")),
+    "dithered": Made(scene("dithered", "RYNCy", DIM, DIM_PIXEL).setup, ("yellow", "red")),
 }
-ASKED = Asked(MADE["noise"].view.lights.classes, ("yellow", "red"), any_place=True, probabilities=True)
+ASKED = Asked(MADE["noise"].setup.lights.classes, ("yellow", "red"), any_place=True, probabilities=True)
 QUANTITIES = quantities_of(ASKED)
 NAMES = [name for name in QUANTITIES if "green" not in name and "orange" not in name]
 
@@ -236,7 +236,7 @@ def test_a_quantity_is_what_it_says(name: str) -> None:
 
 
 OF_NOISE = [name for name in NAMES if QUANTITIES[name].states]
-DITHERED = scene("dithered", "RYNCy", {"noise": True}, {"read_noise_e": 12, "offset_dn": 200, "prnu": 0.02}).view
+DITHERED = scene("dithered", "RYNCy", {"noise": True}, {"read_noise_e": 12, "offset_dn": 200, "prnu": 0.02}).setup
 """Its noise hides the steps of rounding, and no signal comes near an end: the closed form of the noise is exact."""
 
 
@@ -257,8 +257,8 @@ def test_smooth_rows_under_noise_are_the_quantity(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name in NAMES if QUANTITIES[name].smooth is not None])
 def test_smooth_rows_are_the_quantity_with_its_derivative(name: str) -> None:
-    quantity, view = QUANTITIES[name], DITHERED if name in OF_NOISE else MADE["lattice"].view
-    straight = linear_model(view)
+    quantity, setup = QUANTITIES[name], DITHERED if name in OF_NOISE else MADE["lattice"].setup
+    straight = linear_model(setup)
 
     def rows(x: np.ndarray) -> Rows:
         assert quantity.smooth is not None
@@ -266,7 +266,7 @@ def test_smooth_rows_are_the_quantity_with_its_derivative(name: str) -> None:
 
     for x in X:
         if name not in OF_NOISE:
-            found = evaluate(ForwardModel(straight.view), FAMILY.curves(x[None])) | family_quantities(FAMILY, x[None])
+            found = evaluate(ForwardModel(straight.setup), FAMILY.curves(x[None])) | family_quantities(FAMILY, x[None])
             assert quantity.value(rows(x)) == pytest.approx(found[name][0], rel=1e-12)
         for at, span in enumerate(SPAN):
             step = np.eye(5)[at] * span * 1e-5
@@ -278,7 +278,7 @@ def test_smooth_rows_are_the_quantity_with_its_derivative(name: str) -> None:
 def test_linear_rows_are_the_quantity(name: str) -> None:
     quantity, made = QUANTITIES[name], MADE["lattice"]
     assert quantity.linear is not None
-    linear = quantity.linear(made.view)
+    linear = quantity.linear(made.setup)
     for curve, value in zip(made.curves, made.found[name], strict=True):
         rows = (linear.rows @ curve[0] + linear.constant) / linear.scale
         assert (rows.max() if quantity.wanted == "less" else rows.min()) == pytest.approx(value, rel=1e-12)

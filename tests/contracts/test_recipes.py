@@ -129,13 +129,13 @@ from sweep.metrics.smooth import Rows
 NAME = "red_share"
 
 
-def _weights(view):
-    red = np.where(view.grid.nodes_nm >= 600, 1.0, 0.0)
-    return red / (red @ view.base_qe[0])
+def _weights(setup):
+    red = np.where(setup.camera.grid.nodes_nm >= 600, 1.0, 0.0)
+    return red / (red @ setup.camera.base_qe[0])
 
 
 def _rows(design):
-    weights = _weights(design.view)
+    weights = _weights(design.setup)
     return Rows(design.curves @ weights, (design.by_u @ weights).T)
 
 
@@ -154,14 +154,14 @@ class RedShare(DesignMetric):
                 goal=True,
                 needs="modified",
                 smooth=_rows,
-                linear=lambda view: LinearRows(csr_matrix(_weights(view)[None])),
+                linear=lambda setup: LinearRows(csr_matrix(_weights(setup)[None])),
             ),
         )
 
-    def of_designs(self, view, block):
-        if not view.modified:
+    def of_designs(self, setup, block):
+        if not setup.camera.modified:
             return {NAME: np.full(len(block), np.nan)}
-        return {NAME: block.curves()[:, 0] @ _weights(view)}
+        return {NAME: block.curves()[:, 0] @ _weights(setup)}
 '''
 DARKEST = '''\
 """The weakest signal of a scene."""

@@ -33,15 +33,15 @@ EPS = np.finfo(float).eps
 
 @pytest.mark.parametrize("name", list(VIEWS))
 def test_both_routes_say_the_same(name: str) -> None:
-    view = VIEWS[name]
+    setup = VIEWS[name]
     edges = edges_of(SPACE, 3, 69)
     assert edges is not None
-    dense = evaluate(ForwardModel(view), CurveBlock(edges.curves()))
-    fast = evaluate(ForwardModel(view), edges)
+    dense = evaluate(ForwardModel(setup), CurveBlock(edges.curves()))
+    fast = evaluate(ForwardModel(setup), edges)
     assert list(fast) == list(dense)
-    magnitude_dn = brightest_dn(view, edges.curves())
+    magnitude_dn = brightest_dn(setup, edges.curves())
     for column, values in dense.items():
-        assert_within_rounding(column, fast[column], values, view, magnitude_dn)
+        assert_within_rounding(column, fast[column], values, setup, magnitude_dn)
 
 
 @settings(max_examples=40, deadline=None)
@@ -70,10 +70,10 @@ def test_pairs_that_are_never_the_nearest_are_left_out() -> None:
     neighbors = replace(SPACE, axes=((600.0,), (20.0,), tuple(np.linspace(650, 660, 128)), (20.0,), (1.0,)))
     edges = edges_of(neighbors, 0, neighbors.size)
     assert edges is not None
-    view = replace(VIEWS["chart"], lights=BUILT_IN_LIGHTS["tl16"](GRID))
-    changing = ForwardModel(view).read_changing(edges)
+    setup = replace(VIEWS["chart"], lights=BUILT_IN_LIGHTS["tl16"](GRID))
+    changing = ForwardModel(setup).read_changing(edges)
     assert changing is not None
-    members = view.members
+    members = setup.members
     apart = separation.pairs_apart(np.delete(changing.fixed[0], changing.channel, axis=1), members)
     values = np.ascontiguousarray(changing.values[:, 0])
     room = np.empty((len(apart.starts) - 1, len(values))), np.zeros(len(values), dtype=bool)
@@ -123,9 +123,9 @@ def test_designs_that_set_the_exposure_take_the_dense_route() -> None:
     np.testing.assert_array_equal(changing.which, ~brighter)
     assert 0 < np.count_nonzero(brighter) < len(brighter)
     assert np.ptp(found["exposure_s"]) > 0
-    magnitude_dn = brightest_dn(imager.view, edges.curves())
+    magnitude_dn = brightest_dn(imager.setup, edges.curves())
     assert_within_rounding(
-        "csd_yellow_red", found["csd_yellow_red"], dense["csd_yellow_red"], imager.view, magnitude_dn
+        "csd_yellow_red", found["csd_yellow_red"], dense["csd_yellow_red"], imager.setup, magnitude_dn
     )
     every = imager.read_changing(edges.some(np.flatnonzero(brighter)))
     assert every is None

@@ -10,11 +10,12 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 
+from sweep.camera.camera import Camera
 from sweep.camera.forward import ForwardModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import FixedExposure, Scene
-from sweep.camera.view import View
+from sweep.camera.setup import Setup
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.families.stopband import Stopband
@@ -51,23 +52,23 @@ def made(
     pixel: dict[str, Any] | None = None,
     cfa: str = "RGGB",
     left_out: frozenset[str] = frozenset(),
-) -> View:
-    """A view whose channel N, if there is one, is modified."""
+) -> Setup:
+    """A setup whose channel N, if there is one, is modified."""
     mosaic = Mosaic.from_name(cfa)
     modified = (mosaic.channels.index("N"),) if "N" in mosaic.channels else ()
     given = Scene.model_validate(scenario or {})
     own = Pixel(**(pixel or {}))
-    return View(GRID, mosaic, qe, modified, np.full(N, 0.9), lights, own, given, left_out=left_out)
+    return Setup(Camera(GRID, mosaic, qe, modified, np.full(N, 0.9), own), lights, given, left_out=left_out)
 
 
-def beyond(view: View, **scenario: object) -> View:
-    """The view with figures of the scene that no study may have: the model itself has no limits."""
-    return replace(view, scenario=view.scenario.model_copy(update=scenario))
+def beyond(setup: Setup, **scenario: object) -> Setup:
+    """The setup with figures of the scene that no study may have: the model itself has no limits."""
+    return replace(setup, scene=setup.scene.model_copy(update=scenario))
 
 
-def plain(view: View) -> np.ndarray:
+def plain(setup: Setup) -> np.ndarray:
     """No modified channel, one design."""
-    return np.empty((1, 0, view.grid.size))
+    return np.empty((1, 0, setup.camera.grid.size))
 
 
 def electrons_per_s(qe: float, radiance: float = 2e18, f_number: float = 4.0) -> mp.mpf:
@@ -101,8 +102,8 @@ def metamers() -> Result:
     for scenario, pixel, left_out in SCENES.values():
         qe = random_qe(1, 3)
         qe[:, RED] = qe[:, YELLOW]
-        view = made(qe, lights, scenario, pixel, left_out=left_out)
-        errors += [evaluate(ForwardModel(view), plain(view))["csd_yellow_red"], smooth_csd(view, plain(view), PAIR)]
+        setup = made(qe, lights, scenario, pixel, left_out=left_out)
+        errors += [evaluate(ForwardModel(setup), plain(setup))["csd_yellow_red"], smooth_csd(setup, plain(setup), PAIR)]
     return Result(float(np.max(errors)), 0.0)
 
 
@@ -118,11 +119,11 @@ PAIR = ("yellow", "red")
 def metamers_beside_a_band() -> Result:
     qe = random_qe(2, 4)
     qe[:, RED] = qe[:, YELLOW]
-    view = made(qe, lights_of(PAIR, lines(YELLOW, RED)), cfa="RYNC")
+    setup = made(qe, lights_of(PAIR, lines(YELLOW, RED)), cfa="RYNC")
     x = np.random.default_rng(3).uniform([605, 0, 618, 0, 0], [612, 6, 626, 6, 1], (200, 5))
     curves = Stopband(WAVE, qe[2], 0.1 * qe[2]).curves(x)
     assert (curves[:, 0] != qe[2]).any()
-    found = [evaluate(ForwardModel(view), curves)["csd_yellow_red"], smooth_csd(view, curves, PAIR)]
+    found = [evaluate(ForwardModel(setup), curves)["csd_yellow_red"], smooth_csd(setup, curves, PAIR)]
     return Result(float(np.max(found)), 0.0)
 
 
@@ -143,10 +144,10 @@ def broad_metamers() -> Result:
     second = first.copy()
     second[:4] += np.array([float(mp.mpf(v) / max(map(abs, null)) / 8) for v in null])
     photons = np.stack([first, second]) / (first.sum() * GRID.step_nm)
-    view = made(qe, lights_of(PAIR, photons), {"exposure": {"kind": "fixed", "exposure_s": 1e-3}})
-    found = smooth_csd(view, plain(view), PAIR)[0]
-    response = float(smooth_response(view, plain(view)).max())
-    read = evaluate(ForwardModel(view), plain(view))["csd_yellow_red"][0]
+    setup = made(qe, lights_of(PAIR, photons), {"exposure": {"kind": "fixed", "exposure_s": 1e-3}})
+    found = smooth_csd(setup, plain(setup), PAIR)[0]
+    response = float(smooth_response(setup, plain(setup)).max())
+    read = evaluate(ForwardModel(setup), plain(setup))["csd_yellow_red"][0]
     return Result(found if read == 0 else math.inf, 64 * EPS / 2 * response * 2 * math.sqrt(3))
 
 
@@ -158,8 +159,8 @@ def broad_metamers() -> Result:
 def near_metamers() -> Result:
     qe = np.random.default_rng(5).integers(2**10, 2**14, (3, N)) / 2.0**14
     qe[:, RED] = qe[:, YELLOW] + np.array([1, -2, 3]) * 2.0**-16
-    view = made(qe, lights_of(PAIR, lines(YELLOW, RED)), FIXED)
-    found = smooth_csd(view, plain(view), PAIR)[0]
+    setup = made(qe, lights_of(PAIR, lines(YELLOW, RED)), FIXED)
+    found = smooth_csd(setup, plain(setup), PAIR)[0]
     gain = electrons_per_s(1.0) * mp.mpf(2e-3) * 4095 / 10_000
     exact = gain * mp.mpf(2) ** -16 * mp.sqrt(14)
     return Result(abs(float(found - exact)), 8 * EPS * float(gain) * math.sqrt(3))
@@ -174,12 +175,12 @@ def exposures() -> Result:
     qe, results = random_qe(6, 3), []
     lights = lights_of(PAIR, lines(YELLOW, RED))
     for exposure_s in (5e-324, 1e-310, 1e-300, 1e-160, 1e-30, 1.0, 1e150, 1e300):
-        view = beyond(made(qe, lights), exposure=FixedExposure.model_construct(exposure_s=exposure_s))
-        found = smooth_csd(view, plain(view), PAIR)[0]
+        setup = beyond(made(qe, lights), exposure=FixedExposure.model_construct(exposure_s=exposure_s))
+        found = smooth_csd(setup, plain(setup), PAIR)[0]
         gain = electrons_per_s(1.0) * mp.mpf(exposure_s) * 4095 / 10_000
         exact = gain * mp.sqrt(sum((mp.mpf(float(a)) - mp.mpf(float(b))) ** 2 for a, b in qe[:, [YELLOW, RED]]))
         allowed = 12 * EPS * float(gain) * math.sqrt(3) + 4 * 5e-324
-        read = evaluate(ForwardModel(view), plain(view))["csd_yellow_red"][0]  # all is dark, or full
+        read = evaluate(ForwardModel(setup), plain(setup))["csd_yellow_red"][0]  # all is dark, or full
         results.append((relative(found, exact), float(allowed / exact)))
         results.append((float(read), 0.0))
     return worst(results)
@@ -197,8 +198,8 @@ def radiances() -> Result:
     points = [[scale * mp.mpf(float(row[node])) for row in qe] for node in (YELLOW, RED)]
     exact = mp.sqrt(sum((a - b) ** 2 for a, b in zip(*points, strict=True)))
     for radiance in (1e-290, 1e-100, 2e18, 1e100, 1e270):
-        view = beyond(made(qe, lights_of(PAIR, lines(YELLOW, RED))), photon_radiance=radiance)
-        found = smooth_csd(view, plain(view), PAIR)[0]
+        setup = beyond(made(qe, lights_of(PAIR, lines(YELLOW, RED))), photon_radiance=radiance)
+        found = smooth_csd(setup, plain(setup), PAIR)[0]
         results.append((abs(float(found - exact)), 64 * EPS * float(max(map(max, points))) * math.sqrt(3)))
     return worst(results)
 
@@ -212,13 +213,15 @@ def no_light() -> Result:
     lights = lights_of(PAIR, lines(YELLOW, RED))
     good = True
     for qe, radiance in ((np.zeros((3, N)), 2e18), (random_qe(8, 3), 5e-324)):
-        view = beyond(made(qe, lights, FIXED), photon_radiance=radiance)
+        setup = beyond(made(qe, lights, FIXED), photon_radiance=radiance)
         good &= (
-            evaluate(ForwardModel(view), plain(view))["csd_yellow_red"][0] == 0 == smooth_csd(view, plain(view), PAIR)
+            evaluate(ForwardModel(setup), plain(setup))["csd_yellow_red"][0]
+            == 0
+            == smooth_csd(setup, plain(setup), PAIR)
         )
     with np.errstate(invalid="ignore"):
-        view = made(np.zeros((3, N)), lights)
-        dark = evaluate(ForwardModel(view), plain(view))
+        setup = made(np.zeros((3, N)), lights)
+        dark = evaluate(ForwardModel(setup), plain(setup))
     return outcome(bool(good and np.isnan(dark["csd_yellow_red"][0]) and np.isinf(dark["exposure_s"][0])))
 
 
@@ -234,8 +237,8 @@ def everything_clipped() -> Result:
     pixels = ({}, {"offset_dn": 168.0}, {"gain_dn_per_e": 0.1}, {"well_e": 3000.0, "gain_dn_per_e": 3.0}, {"bits": 24})
     for pixel in pixels:
         for more in ({}, {"target": NEAR | {"readout": "center"}}, {"drive": {"duty": 0.9, "frequency_hz": 100.0}}):
-            view = made(random_qe(9, 3), lights, bright | more, pixel)
-            found = evaluate(ForwardModel(view), plain(view))
+            setup = made(random_qe(9, 3), lights, bright | more, pixel)
+            found = evaluate(ForwardModel(setup), plain(setup))
             errors += [v for name, v in found.items() if name.startswith(("csd_", "best_place_"))]
     return Result(float(np.max(errors)), 0.0)
 
@@ -249,10 +252,10 @@ def switch_along_filters() -> Result:
     qe = np.full((4, N), 0.25)
     qe[2] = 0.5
     qe[2, 30], qe[2, RED] = 0.4375, 0.25  # N at 550 and 640 nm; the band holds 590 nm
-    view = made(qe, lights_of(("yellow", "yellow", "red"), lines(30, YELLOW, RED)), FIXED, cfa="RYNC")
+    setup = made(qe, lights_of(("yellow", "yellow", "red"), lines(30, YELLOW, RED)), FIXED, cfa="RYNC")
     depth = np.arange(1025) / 1024
     x = np.stack([np.full_like(depth, v) for v in (575.0, 0.0, 605.0, 0.0)] + [depth], axis=1)
-    found = smooth_csd(view, Stopband(WAVE, qe[2], np.zeros(N)).curves(x), PAIR)
+    found = smooth_csd(setup, Stopband(WAVE, qe[2], np.zeros(N)).curves(x), PAIR)
     gain = electrons_per_s(1.0) * mp.mpf(2e-3) * 4095 / 10_000
     exact = [gain * min(mp.mpf(3) / 16, abs(mp.mpf(1) / 4 - mp.mpf(k) / 2048)) for k in range(1025)]
     results = [(abs(float(f - e)), 8 * EPS * float(gain)) for f, e in zip(found, exact, strict=True)]
@@ -269,15 +272,16 @@ def float32_curves() -> Result:
     lights = lights_of(PAIR, np.random.default_rng(11).dirichlet(np.ones(N), 2) / GRID.step_nm)
     x = np.random.default_rng(12).uniform([560, 5, 620, 5, 0], [590, 30, 660, 30, 1], (20, 5))
     curves = Stopband(WAVE, qe[2], 0.2 * qe[2]).curves(x)
-    view = made(qe, lights, FIXED, cfa="RYNC")
-    narrow, small = replace(view, qe=qe.astype(np.float32)), curves.astype(np.float32)
+    setup = made(qe, lights, FIXED, cfa="RYNC")
+    narrow, small = setup.with_camera(qe=qe.astype(np.float32)), curves.astype(np.float32)
     found = evaluate(ForwardModel(narrow), small)
-    base, counts = narrow.qe[2], narrow.mosaic.counts
+    base, counts = narrow.camera.qe[2], narrow.camera.mosaic.counts
     results = []
     for index, curve in enumerate(small[:, 0]):
         total = math.fsum(map(float, curve))
         whole = math.fsum(
-            c * math.fsum(map(float, q)) for c, q in zip(counts, (*narrow.qe[:2], curve, narrow.qe[3]), strict=True)
+            c * math.fsum(map(float, q))
+            for c, q in zip(counts, (*narrow.camera.qe[:2], curve, narrow.camera.qe[3]), strict=True)
         )
         steps = [abs(float(b) - float(a)) for a, b in pairwise(curve)]
         exact = {
@@ -287,7 +291,7 @@ def float32_curves() -> Result:
             "min_transmission": min(float(a) / float(b) for a, b in zip(curve, base, strict=True)),
         }
         results += [(relative(found[name][index], value), 64 * EPS) for name, value in exact.items()]
-    one, other = smooth_response(narrow, small), smooth_response(view, curves)
+    one, other = smooth_response(narrow, small), smooth_response(setup, curves)
     return worst([*results, (float((np.abs(one - other) / other).max()), 2.0**-24 + 64 * EPS)])
 
 

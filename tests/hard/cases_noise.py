@@ -5,6 +5,7 @@ from __future__ import annotations
 import mpmath as mp
 import numpy as np
 
+from sweep.camera.camera import Camera
 from sweep.camera.forward import ForwardModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.noise.gaussian import rounding
@@ -12,7 +13,7 @@ from sweep.camera.noise.moments import moments
 from sweep.camera.pixel import Pixel
 from sweep.camera.readout import draws_dn
 from sweep.camera.scene import Scene
-from sweep.camera.view import View
+from sweep.camera.setup import Setup
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.metrics.evaluate import evaluate
@@ -138,7 +139,7 @@ def chain(pixel: Pixel) -> ForwardModel:
     lights = Lights("two", ("a", "b"), ("a", "b"), np.eye(4)[:2] / 100, 1.0, "", True)
     scenario = Scene.model_validate({"noise": True, "exposure": {"kind": "fixed", "exposure_s": 1.0}})
     return ForwardModel(
-        View(grid, Mosaic.from_rows("W", [["W"]]), np.ones((1, 4)), (), np.ones(4), lights, pixel, scenario)
+        Setup(Camera(grid, Mosaic.from_rows("W", [["W"]]), np.ones((1, 4)), (), np.ones(4), pixel), lights, scenario)
     )
 
 

@@ -198,8 +198,8 @@ def disc_scene(across_px: float, **target: object) -> dict[str, object]:
 
 def response_of(scenario: dict[str, object], cfa: str = "RGGB") -> np.ndarray:
     qe = random_qe(21, len(Mosaic.from_name(cfa).channels))
-    view = made(qe, lights_of(PAIR, lines(YELLOW, RED)), scenario, cfa=cfa, left_out=SHARP)
-    return smooth_response(view, plain(view))[0, 0]
+    setup = made(qe, lights_of(PAIR, lines(YELLOW, RED)), scenario, cfa=cfa, left_out=SHARP)
+    return smooth_response(setup, plain(setup))[0, 0]
 
 
 @hard_case(

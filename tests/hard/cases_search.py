@@ -39,10 +39,10 @@ FIXED_PART = float(np.sum((CURVES[[0, 1, 3], YELLOW] - CURVES[[0, 1, 3], RED]) *
 
 def depth_problem(constraints: dict[str, Bound], objective: str = "csd_yellow_red") -> Problem:
     """A wall from 602.5 to 662.5 nm over a red line, of any depth, in a flat filter of QE 1/2."""
-    view = made(CURVES, lights_of(PAIR, lines(YELLOW, RED)), FIXED, cfa="RYNC")
+    setup = made(CURVES, lights_of(PAIR, lines(YELLOW, RED)), FIXED, cfa="RYNC")
     low, high = (np.array([602.5, 0.0, 662.5, 0.0, depth]) for depth in (0.0, 1.0))
     family = Stopband(WAVE, CURVES[2], np.zeros(N))
-    return Problem(view, family, low, high, Objective(minimum={objective: 1.0}), constraints)
+    return Problem(setup, family, low, high, Objective(minimum={objective: 1.0}), constraints)
 
 
 def csd_of(depth: float) -> float:
@@ -124,7 +124,7 @@ def rise(wave: np.ndarray, center: float, width: float) -> np.ndarray:
 def edge_on_the_constraint() -> Result:
     led = np.exp(-0.5 * ((WAVE - np.array([[592.0], [637.0]])) / 9) ** 2)
     photons = led / led.sum(axis=1, keepdims=True) / GRID.step_nm
-    view = made(CURVES, lights_of(PAIR, photons), FIXED, cfa="RYNC")
+    setup = made(CURVES, lights_of(PAIR, photons), FIXED, cfa="RYNC")
     low, high = (np.array([left, 20.0, 680.0, 10.0, 1.0]) for left in (570.0, 660.0))
     family = Stopband(WAVE, CURVES[2], np.full(N, 0.05))
 
@@ -144,7 +144,7 @@ def edge_on_the_constraint() -> Result:
     exact = csd(at)
     assert max(csd(float(left)) for left in allowed_edges) <= exact  # the constraint is active
     problem = Problem(
-        view, family, low, high, Objective(minimum={"csd_yellow_red": 1.0}), {"sensitivity": Bound(min=least)}
+        setup, family, low, high, Objective(minimum={"csd_yellow_red": 1.0}), {"sensitivity": Bound(min=least)}
     )
     best = found_by(problem)
     per_nm = abs(csd(at + 1e-4) - csd(at - 1e-4)) / 2e-4

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from sweep.camera.accuracy import Accuracy
+from sweep.camera.camera import Camera
 from sweep.camera.effects import Box
 from sweep.camera.forward import ForwardModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene
-from sweep.camera.view import View
+from sweep.camera.setup import Setup
 from sweep.curves.lights import class_pairs
 from sweep.designs.families.dual import Dual
 from sweep.designs.families.stopband import MultiStopband
@@ -52,7 +53,7 @@ class RandomScene:
     """
 
     name: str
-    view: View
+    setup: Setup
     curves: tuple[np.ndarray, ...]
     box: Box
     tolerance_dn: float
@@ -60,17 +61,17 @@ class RandomScene:
     @property
     def moves(self) -> bool:
         """Whether any filter moves with the angle of the light."""
-        return bool(self.view.moving)
+        return bool(self.setup.camera.moving)
 
     @property
     def everywhere(self) -> bool:
         """Whether all places of the sensor count."""
-        return self.view.all_heights
+        return self.setup.all_heights
 
     @property
     def anywhere(self) -> bool:
         """Whether any place of the light is asked for."""
-        return self.view.all_phases
+        return self.setup.all_phases
 
 
 def random_scene(seed: int, *, moved: bool = False) -> RandomScene:
@@ -88,24 +89,23 @@ def random_scene(seed: int, *, moved: bool = False) -> RandomScene:
     mosaic = _TWO if cfa == "two" else TILES[cfa]
     modified = tuple(mosaic.channels.index(name) for name in ("N", "M") if name in mosaic.channels)
     scenario = Scene.model_validate(given)
-    view = View(
+    camera = Camera(
         grid=GRID,
         mosaic=mosaic,
         qe=SENSOR.mosaic_qe(mosaic, dict.fromkeys((mosaic.channels[i] for i in modified), "Y") if modified else None),
         modified=modified,
         clear_qe=SENSOR.qe["C"],
-        lights=lights(),
         pixel=Pixel(**pixel) if scenario.noise is None else scenario.noise.of(Pixel(**pixel)),
-        scenario=scenario,
         technologies=_technologies(seed, mosaic, moved=moved),
     )
-    low, high = view.qe.copy(), view.qe.copy()
+    setup = Setup(camera, lights(), scenario)
+    low, high = setup.camera.qe.copy(), setup.camera.qe.copy()
     curves: tuple[np.ndarray, ...] = (np.empty((1, 0, GRID.size)),)
     if modified:
         curves, lower, upper = _designs(rng, len(modified))
         low[list(modified)], high[list(modified)] = lower, upper
     tolerance = float(10 ** rng.uniform(-2, 2.5))
-    return RandomScene(f"random {seed}", view, curves, Box(view, low, high), tolerance)
+    return RandomScene(f"random {seed}", setup, curves, Box(setup, low, high), tolerance)
 
 
 def _technologies(seed: int, mosaic: Mosaic, *, moved: bool) -> tuple[Technology, ...]:
@@ -117,11 +117,11 @@ def _technologies(seed: int, mosaic: Mosaic, *, moved: bool) -> tuple[Technology
 
 def columns(made: RandomScene, left_out: frozenset[str], accuracy: Accuracy) -> dict[str, np.ndarray]:
     """Every CSD of all designs of a scene, ndarray[n_designs], as a run has them."""
-    model = ForwardModel(replace(made.view, left_out=left_out, accuracy=accuracy))
+    model = ForwardModel(replace(made.setup, left_out=left_out, accuracy=accuracy))
     cases = [evaluate(model, curves) for curves in made.curves]
-    found = {name: cases[0][name] for name in csd_columns(made.view)}
+    found = {name: cases[0][name] for name in csd_columns(made.setup)}
     if len(cases) > 1:
-        distances = [csd_name(pair) for pair in class_pairs(made.view.lights.classes)]
+        distances = [csd_name(pair) for pair in class_pairs(made.setup.lights.classes)]
         found |= {WORST + name: np.min([case[name] for case in cases], axis=0) for name in distances}
     return found
 

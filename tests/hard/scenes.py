@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from sweep.camera.accuracy import REFERENCE, Accuracy
+from sweep.camera.camera import Camera
 from sweep.camera.effects import Box
 from sweep.camera.forward import ForwardModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene
 from sweep.camera.sensor import BUILT_IN_SENSORS
-from sweep.camera.view import View
+from sweep.camera.setup import Setup
 from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
 from sweep.curves.lights import Lights
 from sweep.curves.spectrum import WavelengthGrid
@@ -62,7 +63,7 @@ class DesignScene:
     """A scene with one design, and the box of designs that the plan is for."""
 
     name: str
-    view: View
+    setup: Setup
     curves: np.ndarray
     box: Box
 
@@ -82,24 +83,23 @@ def scene(
     sensor = SENSOR if grid is GRID else BUILT_IN_SENSORS["ar0820"](grid)
     family = FAMILY if grid is GRID else Stopband(grid.nodes_nm, sensor.qe["Y"], sensor.qe["G"])
     modified = (mosaic.channels.index("N"),) if "N" in mosaic.channels else ()
-    view = View(
+    camera = Camera(
         grid,
         mosaic,
         sensor.mosaic_qe(mosaic, {"N": "Y"} if modified else None),
         modified,
         sensor.qe["C"],
-        lights(grid),
         Pixel(**(pixel or {})),
-        Scene.model_validate(scenario),
         technologies=() if index is None else moving(mosaic, index),
     )
+    setup = Setup(camera, lights(grid), Scene.model_validate(scenario))
     x = LOW + (HIGH - LOW) * np.random.default_rng(seed).uniform(size=5)
     curves = family.curves(x[None]) if modified else np.empty((1, 0, grid.size))
-    low, high = view.qe.copy(), view.qe.copy()
+    low, high = setup.camera.qe.copy(), setup.camera.qe.copy()
     if modified:
         hull = family.hull(LOW, HIGH) if wide else (curves[0], curves[0])
         low[list(modified)], high[list(modified)] = hull
-    return DesignScene(name, view, curves, Box(view, low, high))
+    return DesignScene(name, setup, curves, Box(setup, low, high))
 
 
 def target(distance_m: float, fov_deg: float, **more: Any) -> dict[str, Any]:
@@ -214,11 +214,11 @@ HARD: tuple[DesignScene, ...] = (
 
 def columns(made: DesignScene, left_out: frozenset[str] = frozenset(), accuracy: Accuracy = REFERENCE) -> np.ndarray:
     """Every CSD of the scene's design; of the best phase only where any is asked for."""
-    found = evaluate(ForwardModel(replace(made.view, left_out=left_out, accuracy=accuracy)), made.curves)
-    return np.array([found[name][0] for name in csd_columns(made.view)])
+    found = evaluate(ForwardModel(replace(made.setup, left_out=left_out, accuracy=accuracy)), made.curves)
+    return np.array([found[name][0] for name in csd_columns(made.setup)])
 
 
-def csd_columns(view: View) -> list[str]:
+def csd_columns(setup: Setup) -> list[str]:
     """Columns of CSDs, of which a plan and an accuracy bound the error."""
-    asked = Asked(view.lights.classes, any_place=view.all_phases)
+    asked = Asked(setup.lights.classes, any_place=setup.all_phases)
     return [name for name, quantity in quantities_of(asked).items() if quantity.promised]

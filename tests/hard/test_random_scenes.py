@@ -38,9 +38,9 @@ class Compared:
     @property
     def allowed_dn(self) -> np.ndarray:
         """Whole numbers without noise step, by one in each channel, where images, moments or places are sampled."""
-        view, scenario = self.made.view, self.made.view.scenario
-        sampled = scenario.target is not None or scenario.drive is not None or view.all_heights
-        more = math.sqrt(len(view.mosaic.channels)) if scenario.noise is None and sampled else 0.0
+        setup, scenario = self.made.setup, self.made.setup.scene
+        sampled = scenario.target is not None or scenario.drive is not None or setup.all_heights
+        more = math.sqrt(len(setup.camera.mosaic.channels)) if scenario.noise is None and sampled else 0.0
         return np.maximum(_WITHIN_DN, _WITHIN_SHARE * self.exact) + more
 
 
@@ -64,8 +64,8 @@ def all_compared() -> list[Compared]:
 
 
 def saturates_in_pulses(each: Compared) -> bool:
-    box, pixel = each.made.box, each.made.view.pixel
-    pulsed = each.made.view.scenario.drive is not None
+    box, pixel = each.made.box, each.made.setup.camera.pixel
+    pulsed = each.made.setup.scene.drive is not None
     return pulsed and box.brightest_pixel_dn / pixel.dn_per_e > pixel.saturation_e
 
 

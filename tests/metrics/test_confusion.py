@@ -137,14 +137,14 @@ def test_coarse_digital_numbers_are_not_told_apart_better_than_they_can_be(
     path.write_text(COARSE.format(bits=bits, well=well, level=level))
     study = load_study(path)
     space = next(iter(study.spaces))
-    imager = ForwardModel(study.view(space, "dim"))
+    imager = ForwardModel(study.setup(space, "dim"))
     curves = np.empty((1, 0, study.grid.size))
     found = {name: values[0] for name, values in evaluate(imager, curves, ["green", "yellow", "red"]).items()}
     electrons = imager.pixel_electrons(curves)[0, 0]
     own = imager.readout.few_pixels
     assert own is not None
     # The distances of means do not say which pair is worst: all of them.
-    members = imager.view.members
+    members = imager.setup.members
     worst = max(
         exact([electrons[i, c] for c in own], [electrons[j, c] for c in own], imager.readout.pixel)
         for i, j in product(members["yellow"], members["red"])
@@ -175,12 +175,12 @@ def test_a_bound_of_many_pixels_holds_where_they_are_few_too(pixels: int) -> Non
 
 def test_noise_is_not_gaussian_where_a_pixel_is_cut_or_few_steps_flicker() -> None:
     far = {"noise": True, "target": FAR, "optics": F2}
-    fine = ForwardModel(scene("fine", "RYNCy", far, DARK).view)
+    fine = ForwardModel(scene("fine", "RYNCy", far, DARK).setup)
     read = fine.read_with_noise(scene("fine", "RYNCy", far, DARK).curves)
     assert read.gaussian.all()
     for pixel in ({"bits": 8, "read_noise_e": 2.0}, {"read_noise_e": 3.0}, {"read_noise_e": 2.0, "offset_dn": 4090}):
         made = scene("coarse", "RYNCy", far, pixel)
-        assert not ForwardModel(made.view).read_with_noise(made.curves).gaussian.all()
+        assert not ForwardModel(made.setup).read_with_noise(made.curves).gaussian.all()
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -241,13 +241,13 @@ def test_where_exact_sums_are_too_many_the_noise_is_gaussian(tmp_path: Path, see
         f"pixel: {pixel}\nscenarios: {{dim: {{noise: true, exposure: {{kind: white_patch, level: 0.3}}}}}}\n"
     )
     study = load_study(path)
-    imager = ForwardModel(study.view(study.spaces[0], "dim"))
+    imager = ForwardModel(study.setup(study.spaces[0], "dim"))
     curves = np.empty((1, 0, study.grid.size))
     own = imager.readout.few_pixels
     assert own is not None
     assert not confusion.affordable(imager.readout.pixel, own)
     found = evaluate(imager, curves, ["yellow", "red"])
-    members = {name: imager.view.members[name] for name in ("yellow", "red")}
+    members = {name: imager.setup.members[name] for name in ("yellow", "red")}
     summed_up = confusion.errors(imager.pixel_electrons(curves)[:, 0], own, imager.readout.pixel, members)
     error = summed_up.error["yellow", "red"]
     assert error > 1e-9, error

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sweep.camera.camera import Camera
 from sweep.camera.forward import forward_model
 from sweep.camera.linear import linear_model
 from sweep.camera.mosaic import Mosaic
@@ -14,7 +15,7 @@ from sweep.camera.pixel import Optics, Pixel
 from sweep.camera.scene import FixedExposure, Scene, WhitePatchExposure
 from sweep.camera.sensor import BUILT_IN_SENSORS
 from sweep.camera.sensor_field import SensorField
-from sweep.camera.view import View
+from sweep.camera.setup import Setup
 from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.designs.families.stopband import Stopband
@@ -31,12 +32,12 @@ FAMILY = Stopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"])
 X = np.array([[606.6, 36.5, 645.8, 6.8, 1.0], [600.0, 20.0, 660.0, 30.0, 0.7]])
 
 
-def view(name: str = "RYNCy", scenario: Scene | None = None, base: str = "Y") -> View:
+def setup(name: str = "RYNCy", scenario: Scene | None = None, base: str = "Y") -> Setup:
     mosaic = Mosaic.from_name(name)
     replaced = {"N": base} if "N" in mosaic.channels else None
     modified = (mosaic.channels.index("N"),) if replaced else ()
     qe = SENSOR.mosaic_qe(mosaic, replaced)
-    return View(GRID, mosaic, qe, modified, SENSOR.qe["C"], LIGHTS, Pixel(), scenario or Scene())
+    return Setup(Camera(GRID, mosaic, qe, modified, SENSOR.qe["C"], Pixel()), LIGHTS, scenario or Scene())
 
 
 def by_hand(qe: dict[str, np.ndarray], level: float, ratio: float) -> np.ndarray:
@@ -50,16 +51,16 @@ def by_hand(qe: dict[str, np.ndarray], level: float, ratio: float) -> np.ndarray
 @pytest.mark.parametrize(("level", "ratio"), [(0.95, None), (0.5, 0.08)])
 def test_response_is_the_papers_exposure(level: float, ratio: float | None) -> None:
     exposure = WhitePatchExposure(level=level, photon_ratio=ratio)
-    found = smooth_response(view(scenario=Scene(exposure=exposure)), FAMILY.curves(X))[:, 0]
+    found = smooth_response(setup(scenario=Scene(exposure=exposure)), FAMILY.curves(X))[:, 0]
     for design, curve in zip(found, FAMILY.curves(X)[:, 0], strict=True):
         qe = {"R": SENSOR.qe["R"], "Y": SENSOR.qe["Y"], "N": curve, "Cy": SENSOR.qe["Cy"]}
         np.testing.assert_allclose(design, by_hand(qe, level, ratio or LIGHTS.photon_ratio), rtol=1e-12)
 
 
 def test_response_does_not_depend_on_well_pitch_or_optics() -> None:
-    usual = evaluate(forward_model(view()), FAMILY.curves(X))
+    usual = evaluate(forward_model(setup()), FAMILY.curves(X))
     scenario = Scene(photon_radiance=1e15, optics=Optics(f_number=1.6, transmission=0.7))
-    other = replace(view(scenario=scenario), pixel=Pixel(pitch_um=3.0, well_e=50_000.0))
+    other = setup(scenario=scenario).with_camera(pixel=Pixel(pitch_um=3.0, well_e=50_000.0))
     found = evaluate(forward_model(other), FAMILY.curves(X))
     for name, values in usual.items():
         if name != "exposure_s":
@@ -69,7 +70,7 @@ def test_response_does_not_depend_on_well_pitch_or_optics() -> None:
 def test_fixed_exposure_counts_photons() -> None:
     scenario = Scene(photon_radiance=1e18, exposure=FixedExposure(exposure_s=0.004))
     pixel = Pixel(pitch_um=2.0)
-    found = smooth_response(replace(view("RGGB", scenario), pixel=pixel), np.empty((1, 0, 301)))[:, 0]
+    found = smooth_response(setup("RGGB", scenario).with_camera(pixel=pixel), np.empty((1, 0, 301)))[:, 0]
     mean_qe = (LIGHTS.photons * SENSOR.qe["G"]).sum(axis=1)
     n_e = 1e18 * np.pi / 65 * mean_qe * 4e-12 * 0.004
     np.testing.assert_allclose(found[0, :, 1], n_e * 4095 / 10_000, rtol=1e-12)
@@ -77,8 +78,8 @@ def test_fixed_exposure_counts_photons() -> None:
 
 def test_csd_is_of_the_quantized_readout() -> None:
     curves = FAMILY.curves(X)
-    found = evaluate(forward_model(view()), curves)
-    points = np.floor(smooth_response(view(), curves)[:, 0] + 0.5)
+    found = evaluate(forward_model(setup()), curves)
+    points = np.floor(smooth_response(setup(), curves)[:, 0] + 0.5)
     for design in range(2):
         yellow, red = (points[design, LIGHTS.members[c]] for c in ("yellow", "red"))
         brute = min(np.linalg.norm(y - r) for y in yellow for r in red)
@@ -94,13 +95,13 @@ def test_csd_is_of_the_quantized_readout() -> None:
 
 
 def test_sensitivities_of_a_design() -> None:
-    found = evaluate(forward_model(view()), FAMILY.curves(X))
+    found = evaluate(forward_model(setup()), FAMILY.curves(X))
     n = FAMILY.curves(X)[:, 0].sum(axis=1)
     # A quotient of two sums over wavelengths; the second one's are of four channels.
     np.testing.assert_allclose(found["sensitivity"], n / SENSOR.qe["Y"].sum(), rtol=2 * gamma(301 + 1))
     total = sum(SENSOR.qe[c].sum() for c in ("R", "Y", "Cy")) + n
     np.testing.assert_allclose(found["cfa_sensitivity"], total / 4 / SENSOR.qe["C"].sum(), rtol=2 * gamma(301 + 4))
-    plain = evaluate(forward_model(view("RGGB")), np.empty((1, 0, 301)))
+    plain = evaluate(forward_model(setup("RGGB")), np.empty((1, 0, 301)))
     assert np.isnan(plain["sensitivity"][0])
     rggb = (SENSOR.qe["R"] + 2 * SENSOR.qe["G"] + SENSOR.qe["B"]).sum() / 4 / SENSOR.qe["C"].sum()
     assert plain["cfa_sensitivity"][0] == pytest.approx(rggb, rel=2 * gamma(301 + 4), abs=0)
@@ -109,9 +110,9 @@ def test_sensitivities_of_a_design() -> None:
 @pytest.mark.parametrize("kind", ["white_patch", "white_patch_set_by_n", "fixed"])
 def test_gradients_agree_with_central_differences(kind: str) -> None:
     scenario = Scene(exposure=FixedExposure(exposure_s=0.005)) if kind == "fixed" else Scene()
-    made, family = view(scenario=scenario), FAMILY
+    made, family = setup(scenario=scenario), FAMILY
     if kind == "white_patch_set_by_n":  # N over the clear pixel is the brightest channel, so it sets the exposure
-        made = view(base="C")
+        made = setup(base="C")
         family = Stopband(GRID.nodes_nm, SENSOR.qe["C"], SENSOR.qe["G"])
     x, step = X[1], 1e-4
     exact = linear_model(made).gradient(family.curves(x[None])[0], family.gradient(x))
@@ -129,7 +130,7 @@ def test_gradients_agree_with_central_differences(kind: str) -> None:
 def test_field_positions_that_differ_by_nothing_that_is_computed_are_one() -> None:
     """The light's fall-off, left out of a slightly tilted scene with pigments, is all that differs between positions."""
     scenario = Scene(off_axis_deg=0.4, field=SensorField(cra_max_deg=20.0, places="any"))
-    tilted = replace(view(scenario=scenario), left_out=frozenset({"illumination"}))
-    found, on_axis = (evaluate(forward_model(v), FAMILY.curves(X)) for v in (tilted, view()))
+    tilted = replace(setup(scenario=scenario), left_out=frozenset({"illumination"}))
+    found, on_axis = (evaluate(forward_model(v), FAMILY.curves(X)) for v in (tilted, setup()))
     for name, values in on_axis.items():
         np.testing.assert_allclose(found[name], values, rtol=1e-12, err_msg=name)

@@ -43,7 +43,7 @@ def population(name: str) -> Population:
 def worst(name: str) -> np.ndarray:
     lights = replace(STUDY.lights, population=population(name))
     curves = PROBLEM.family.curves(DESIGNS)
-    return population_imager(replace(PROBLEM.view, lights=lights)).worst(curves, [("yellow", "red")])["csd_yellow_red"]
+    return population_imager(replace(PROBLEM.setup, lights=lights)).worst(curves, [("yellow", "red")])["csd_yellow_red"]
 
 
 def responses(spectra: np.ndarray) -> np.ndarray:
@@ -143,7 +143,7 @@ def test_100_000_random_members_are_no_nearer() -> None:
 def test_the_nearest_members_are_members_and_so_far_apart(name: str) -> None:
     """What it says the nearest two are, computed from their shifts."""
     lights = replace(STUDY.lights, population=population(name))
-    seen = population_imager(replace(PROBLEM.view, lights=lights))
+    seen = population_imager(replace(PROBLEM.setup, lights=lights))
     response = seen.imager.smooth(PROBLEM.family.curves(DESIGNS))[:, 0]
     widths = POPULATIONS[name].get("width", [1.0])
     for design in range(len(DESIGNS)):

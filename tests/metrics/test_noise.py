@@ -42,15 +42,15 @@ NOISY = (
 
 @pytest.mark.parametrize("made", NOISY, ids=lambda made: made.name)
 def test_mean_and_variance_of_the_readout_agree_with_draws_of_every_pixel(made: DesignScene) -> None:
-    model = ForwardModel(made.view)
+    model = ForwardModel(made.setup)
     read = model.read_with_noise(made.curves)
     mean, variance = read.mean, read.variance
-    np.testing.assert_array_equal(mean, ForwardModel(made.view).read(made.curves)[0])
+    np.testing.assert_array_equal(mean, ForwardModel(made.setup).read(made.curves)[0])
     electrons = model.pixel_electrons(made.curves)[0]
     per_place = len(electrons) // model.n_cases
     draws, rng = 20_000, np.random.default_rng(7)
     for case in {0, len(electrons) - 1}:
-        for signal in (0, len(made.view.lights.names) - 1):
+        for signal in (0, len(made.setup.lights.names) - 1):
             pixels = draws_dn(
                 np.broadcast_to(electrons[case, signal], (draws, electrons.shape[2])), model.readout.pixel, rng
             )
@@ -65,18 +65,18 @@ def test_mean_and_variance_of_the_readout_agree_with_draws_of_every_pixel(made: 
 
 def test_a_scene_has_its_own_noise() -> None:
     own = scene("own", "RGGB", {"noise": {"read_noise_e": 50, "prnu": 0.02}}, DARK)
-    loaded = own.view.scenario.noise
+    loaded = own.setup.scene.noise
     assert loaded is not None
-    pixel = loaded.of(own.view.pixel)
+    pixel = loaded.of(own.setup.camera.pixel)
     assert (pixel.read_noise_e, pixel.prnu, pixel.offset_dn) == (50, 0.02, 64)
 
 
 def test_the_most_likely_signal_errs_as_rarely_as_its_closed_forms_say() -> None:
     made = scene("dim", "RYNCy", {"noise": True, "exposure": {"kind": "white_patch", "level": 0.02}}, DARK)
-    lights = made.view.lights
+    lights = made.setup.lights
     kept = [lights.types.index("yellow"), lights.types.index("red")]
     two = Lights("two", ("y", "r"), ("yellow", "red"), lights.photons[kept], lights.photon_ratio, "", True)
-    model, states = AllPhases(replace(made.view, lights=two)), ["yellow", "red"]
+    model, states = AllPhases(replace(made.setup, lights=two)), ["yellow", "red"]
     closed = {name: values[0] for name, values in evaluate(model, made.curves, states).items()}
     found = recognize(model, made.curves, states, 40_000, np.random.default_rng(3))
     least, most = 1 - found[f"{MOST_LIKELY}_accuracy_high"], 1 - found[f"{MOST_LIKELY}_accuracy_low"]
@@ -92,10 +92,10 @@ def test_more_noise_is_never_better() -> None:
     levels = [scene("read", "RYNCy", {"noise": {"read_noise_e": e}}, {"offset_dn": 900}) for e in (1, 10, 50, 200)]
     found = []
     for made in levels:
-        noise_of = made.view.scenario.noise
+        noise_of = made.setup.scene.noise
         assert noise_of is not None
-        view = replace(made.view, pixel=noise_of.of(made.view.pixel))
-        found.append(evaluate(ForwardModel(view), made.curves, made.view.lights.classes))
+        setup = made.setup.with_camera(pixel=noise_of.of(made.setup.camera.pixel))
+        found.append(evaluate(ForwardModel(setup), made.curves, made.setup.lights.classes))
     for name in found[0]:
         values = [float(columns[name][0]) for columns in found]
         if name.startswith((D_PRIME, "cnr_")):
@@ -107,13 +107,13 @@ def test_more_noise_is_never_better() -> None:
 @pytest.mark.parametrize("pixel", [{"offset_dn": 4090}, {"bits": 2}])
 def test_readouts_that_are_certain_and_the_same_tell_nothing(pixel: dict[str, float]) -> None:
     made = scene("patch", "RGGB", {"noise": {"read_noise_e": 3}}, pixel)
-    model = AllPhases(replace(made.view, pixel=made.view.pixel.model_copy(update={"read_noise_e": 3.0})))
+    model = AllPhases(made.setup.with_camera(pixel=made.setup.camera.pixel.model_copy(update={"read_noise_e": 3.0})))
     read = model.read_with_noise(made.curves)
     mean, variance = read.mean, read.variance
     certain = variance == 0
     assert certain.any()
     assert (mean[certain] == np.rint(mean[certain])).all()
-    states = made.view.lights.classes
+    states = made.setup.lights.classes
     found = evaluate(model, made.curves, states)
     drawn = recognize(model, made.curves, states, 200, np.random.default_rng(3))
     assert 1 - drawn[f"{MOST_LIKELY}_accuracy_worst_state"] <= found["state_error_bound"][0] + 0.05

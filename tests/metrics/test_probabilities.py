@@ -26,7 +26,7 @@ def test_what_it_does_not_see_d_prime_does() -> None:
     problem = study.problem(study.search)
     scenario = Scene.model_validate({"noise": True})
     pixel = Pixel(read_noise_e=10, prnu=0.01, offset_dn=168)
-    model = ForwardModel(replace(problem.view, scenario=scenario, pixel=pixel))
+    model = ForwardModel(replace(problem.setup, scene=scenario).with_camera(pixel=pixel))
     curves = problem.family.curves(TWO)
     assert "cdp_yellow_red" not in evaluate(model, curves, ("yellow", "red"))
     found = evaluate(model, curves, ("yellow", "red"), probabilities=True)

@@ -17,7 +17,7 @@ from scipy.spatial.distance import cdist
 from scipy.stats import norm
 
 from sweep.camera.linear import linear_model
-from sweep.camera.view import View
+from sweep.camera.setup import Setup
 from sweep.curves.builtin.task_sets import group, separation_task, shipped
 from sweep.curves.tasks import SHIPPED, Conditions, StudyTasks
 from sweep.designs.block import CurveBlock
@@ -53,7 +53,7 @@ CAMERA = "Nikon 5100 (NPL)"
 
 
 @cache
-def scene() -> tuple[View, object]:
+def scene() -> tuple[Setup, object]:
     """RYNCy with every task, and the family of its stopbands."""
     study = study_of_keys(KEYS, Path())
     space = study.spaces[-1]
@@ -62,31 +62,33 @@ def scene() -> tuple[View, object]:
         *(shipped(study.grid, name) for name in SHIPPED),
         separation_task(study.grid, "own", {"a": group(study.grid, "soil"), "b": group(study.grid, "canopy")}, ["d65"]),
     )
-    return replace(study.view(space, "chart"), tasks=StudyTasks(CONDITIONS, made)), space.filter.family
+    return replace(study.setup(space, "chart"), tasks=StudyTasks(CONDITIONS, made)), space.filter.family
 
 
 def quantities() -> dict[str, Quantity]:
-    view, _ = scene()
-    assert view.tasks is not None
-    found = quantities_of(Asked(view.lights.classes, tasks=view.tasks.keys))
+    setup, _ = scene()
+    assert setup.tasks is not None
+    found = quantities_of(Asked(setup.lights.classes, tasks=setup.tasks.keys))
     return {name: quantity for name, quantity in found.items() if quantity.metric.startswith("task_")}
 
 
 @cache
 def columns() -> dict[str, np.ndarray]:
-    view, family = scene()
-    return designed_quantities(view, family.curves(X))  # type: ignore[attr-defined]
+    setup, family = scene()
+    return designed_quantities(setup, family.curves(X))  # type: ignore[attr-defined]
 
 
 def seen(photons: np.ndarray) -> Iterator[np.ndarray]:
     """Electrons behind each design's QE, written out anew: pi L T A t / (1 + 4 N^2), ndarray[n_spectra, n_channels]."""
-    view, family = scene()
-    f_number = view.scenario.optics.f_number
+    setup, family = scene()
+    f_number = setup.scene.optics.f_number
     for curves in family.curves(X):  # type: ignore[attr-defined]
-        qe = view.qe.copy()
-        qe[list(view.modified)] = curves
+        qe = setup.camera.qe.copy()
+        qe[list(setup.camera.modified)] = curves
         light = np.pi * photons / (1 + 4 * f_number**2) * (2.1e-6) ** 2 * CONDITIONS.exposure_s
-        yield np.array([[(spectrum * channel).sum() * view.grid.step_nm for channel in qe] for spectrum in light])
+        yield np.array(
+            [[(spectrum * channel).sum() * setup.camera.grid.step_nm for channel in qe] for spectrum in light]
+        )
 
 
 def shares() -> np.ndarray:
@@ -104,9 +106,9 @@ SEPARATIONS = [
 
 @pytest.mark.parametrize(("name", "at", "case"), SEPARATIONS)
 def test_separations_are_those_of_the_nearest_pair(name: str, at: int, case: str) -> None:
-    view, _ = scene()
-    assert view.tasks is not None
-    task = view.tasks.by_name[name]
+    setup, _ = scene()
+    assert setup.tasks is not None
+    task = setup.tasks.by_name[name]
     assert task.photons is not None
     kinds, end = np.asarray(task.types), f"_{case}" if case else ""
     for number, electrons in enumerate(seen(task.photons[at] * 2e18)):
@@ -153,18 +155,20 @@ def test_lab_and_ciede2000_are_those_of_colour_science() -> None:
 @cache
 def camera() -> np.ndarray:
     """Responses of a named camera per photon on the study's grid, ndarray[3, n_wavelengths], peak 0.5."""
-    view, _ = scene()
+    setup, _ = scene()
     sensitivities = colour.MSDS_CAMERA_SENSITIVITIES[CAMERA]
-    own = [np.interp(view.grid.nodes_nm, sensitivities.wavelengths, column) for column in sensitivities.values.T]
-    per_photon = np.stack(own) / view.grid.nodes_nm
+    own = [
+        np.interp(setup.camera.grid.nodes_nm, sensitivities.wavelengths, column) for column in sensitivities.values.T
+    ]
+    per_photon = np.stack(own) / setup.camera.grid.nodes_nm
     return per_photon / per_photon.max() / 2
 
 
 def test_color_of_a_named_camera_is_that_of_colour_science() -> None:
     """Chart, XYZ, matrix and difference by colour-science and least squares, without noise."""
-    view, _ = scene()
-    assert view.tasks is not None
-    chart = view.tasks.by_name["color"].chart
+    setup, _ = scene()
+    assert setup.tasks is not None
+    chart = setup.tasks.by_name["color"].chart
     assert chart is not None
     shape = colour.SpectralShape(400, 700, 5)
     matching = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(shape)
@@ -192,8 +196,8 @@ def test_color_of_a_named_camera_is_that_of_colour_science() -> None:
 
 
 def test_the_vora_value_is_that_of_the_angles_between_both_spaces() -> None:
-    view, _ = scene()
-    nodes = view.grid.nodes_nm
+    setup, _ = scene()
+    nodes = setup.camera.grid.nodes_nm
     matching = (
         colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(colour.SpectralShape(400, 700, 5)).values
     )
@@ -206,9 +210,9 @@ def test_the_vora_value_is_that_of_the_angles_between_both_spaces() -> None:
 
 def test_the_metamerism_index_has_the_least_mean_difference() -> None:
     """By a minimization of another kind, with the differences of colour-science; the eye's own curves have 100."""
-    view, _ = scene()
-    assert view.tasks is not None
-    index = view.tasks.by_name["color"].index
+    setup, _ = scene()
+    assert setup.tasks is not None
+    index = setup.tasks.by_name["color"].index
     assert index is not None
     xyz, white = index.xyz[0], index.white[0]
     electrons = index.photons[0] @ camera().T * 1e-15
@@ -269,9 +273,9 @@ def test_luminance_snr_is_that_of_a_million_draws() -> None:
 
 def test_color_figures_are_those_of_their_chart() -> None:
     """From electrons written out anew, with the least-squares solution of stacked noise rows, and colour-science."""
-    view, _ = scene()
-    assert view.tasks is not None
-    chart = view.tasks.by_name["color"].chart
+    setup, _ = scene()
+    assert setup.tasks is not None
+    chart = setup.tasks.by_name["color"].chart
     assert chart is not None
     for at, case in enumerate(("d65", "a", "led", "hps")):
         target = colour.XYZ_to_Lab(chart.xyz[at], colour.XYZ_to_xy(chart.white[at]))
@@ -296,8 +300,8 @@ def test_color_figures_are_those_of_their_chart() -> None:
 @pytest.mark.parametrize("name", list(quantities()))
 def test_a_figure_has_the_derivative_of_its_rows(name: str) -> None:
     """Central differences of the rows with two steps, extrapolated (Richardson), to 1e-6."""
-    quantity, (view, family) = quantities()[name], scene()
-    imager = linear_model(view)
+    quantity, (setup, family) = quantities()[name], scene()
+    imager = linear_model(setup)
 
     def rows(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         assert quantity.smooth is not None
@@ -322,8 +326,8 @@ def test_a_figure_has_the_derivative_of_its_rows(name: str) -> None:
 
 def test_a_plain_cfa_has_every_figure() -> None:
     study = study_of_keys({**KEYS, "tasks": "all"}, Path())
-    view = study.view_of("RGGB", "chart", {})
-    found = designed_quantities(view, CurveBlock(np.empty((1, 0, study.grid.size))))
+    setup = study.setup_of("RGGB", "chart", {})
+    found = designed_quantities(setup, CurveBlock(np.empty((1, 0, study.grid.size))))
     wanted = [name for name, quantity in study.quantities.items() if quantity.metric.startswith("task_")]
     assert len(wanted) == 63
     assert all(np.isfinite(found[name]).all() for name in wanted)

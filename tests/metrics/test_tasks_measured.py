@@ -60,7 +60,7 @@ def scores(sensor: str) -> dict[str, np.ndarray]:
     study = study_of_keys(keys, SHARED / "data")
     first = {f"task_{figure.what}" for figures in FIGURES.values() for figure in figures if figure.first}
     nothing = CurveBlock(np.empty((1, 0, study.grid.size)))
-    found = [designed_quantities(study.view_of(name, "chart", {}), nothing) for name in CFAS]
+    found = [designed_quantities(study.setup_of(name, "chart", {}), nothing) for name in CFAS]
     wanted = [q for q in study.quantities.values() if q.metric in first and not q.name.endswith("_lps")]
     return {q.name: np.array([own[q.name][0] for own in found]) * (-1 if q.wanted == "less" else 1) for q in wanted}
 

@@ -87,12 +87,12 @@ def test_one_number_of_filters_in_terminal_picture_and_page(scenes: Output) -> N
     assert f", {designs['feasible'].sum()} feasible" in counts_line(scenes)
     assert f", {(designs['feasible'] & designs['pareto']).sum()} on the Pareto front" in counts_line(scenes)
     assert not scenes.table.loc[scenes.table["kind"] == "reference", "feasible"].any()
-    views = {(view["scenario"], view["cfa"]): view["counts"] for view in payload(scenes)["views"]}
+    setups = {(view["scenario"], view["cfa"]): view["counts"] for view in payload(scenes)["views"]}
     for scenario in scenes.scenarios:
         for cfa in traded_cfas(scenes):
             rows = designs[(designs["scenario"] == scenario) & (designs["cfa"] == cfa)]
             counts = pareto_figure(scenes, scenario, cfa).counts
-            assert counts == views[scenario, cfa]
+            assert counts == setups[scenario, cfa]
             assert counts["feasible"] == rows["feasible"].sum()
             assert counts["infeasible"] == (~rows["feasible"]).sum()
             assert counts["front"] == (rows["feasible"] & rows["pareto"]).sum()

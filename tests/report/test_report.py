@@ -189,7 +189,7 @@ def test_a_job_of_several_chunks_has_their_rows(tmp_path: Path) -> None:
     study: Study = load_study(large(tmp_path, 20))
     whole = next(job for job in jobs_of(study) if job.space.kind == "sweep")
     assert whole.stop - whole.start > CHUNK
-    view, rules = study.view(whole.space, whole.scenario), rules_of(study)
+    setup, rules = study.setup(whole.space, whole.scenario), rules_of(study)
     parts = [
         Job(
             whole.space,
@@ -201,8 +201,8 @@ def test_a_job_of_several_chunks_has_their_rows(tmp_path: Path) -> None:
         )
         for start in range(0, whole.stop, CHUNK)
     ]
-    together = run_job(whole, view, rules).to_pandas()
-    each = pd.concat([run_job(part, view, rules).to_pandas() for part in parts], ignore_index=True)
+    together = run_job(whole, setup, rules).to_pandas()
+    each = pd.concat([run_job(part, setup, rules).to_pandas() for part in parts], ignore_index=True)
     pd.testing.assert_frame_equal(together.drop(columns="pareto"), each.drop(columns="pareto"), check_categorical=False)
 
 

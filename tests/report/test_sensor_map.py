@@ -58,7 +58,7 @@ def test_a_map_is_that_of_each_place(tiny: Path) -> None:
     assert set(half["cra_deg"]) == {16.0}
     for space in study.spaces:
         curves = space.curves(space.points(0, 1), study.grid.size)
-        expected = smooth_csd(study.view(space, "named"), curves, ("yellow", "red"))[0]
+        expected = smooth_csd(study.setup(space, "named"), curves, ("yellow", "red"))[0]
         assert half.loc[few[space.name], "csd_yellow_red"] == pytest.approx(expected, rel=1e-9)
 
 

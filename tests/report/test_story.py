@@ -92,11 +92,11 @@ def test_the_light_of_a_cfa_is_that_of_its_pixels(finished: Finished) -> None:
 def test_a_level_of_the_pixel_is_a_level_of_the_cfa(finished: Finished) -> None:
     study = load_study(STUDIES / "stopband.yaml")
     assert study.search is not None
-    view = study.view(study.search.space, study.search.scenario)
+    setup = study.setup(study.search.space, study.search.scenario)
     table = whole(finished("stopband"))
     swept = table[table["kind"] == "sweep"].iloc[::5000]
     for own, light in zip(swept["sensitivity"], swept["cfa_sensitivity"], strict=True):
-        assert cfa_sensitivity_at(view, own) == pytest.approx(light, rel=1e-12)
+        assert cfa_sensitivity_at(setup, own) == pytest.approx(light, rel=1e-12)
 
 
 def test_the_limiting_lights_are_as_far_apart_as_the_csd(finished: Finished) -> None:
@@ -121,12 +121,12 @@ def test_each_swept_design_of_the_page_is_limited_by_its_nearest_lights(finished
     first = int(output.table.loc[output.table["kind"] == "sweep", "design_id"].min())
     block = edges_of(space, 0, space.size)
     assert block is not None
-    view = study.view(space, "chart")
-    read = ForwardModel(view).read_changing(block.some(output.swept_points - first))
+    setup = study.setup(space, "chart")
+    read = ForwardModel(setup).read_changing(block.some(output.swept_points - first))
     assert read is not None
-    whole_response, names = read.whole[:, 0], np.array(view.lights.names)
+    whole_response, names = read.whole[:, 0], np.array(setup.lights.names)
     for one, other in study.pairs:
-        a, b = (np.flatnonzero(np.array(view.lights.types) == kind) for kind in (one, other))
+        a, b = (np.flatnonzero(np.array(setup.lights.types) == kind) for kind in (one, other))
         for start in range(0, len(rows), 1000):
             some, dn = rows.iloc[start : start + 1000], whole_response[start : start + 1000]
             apart = np.linalg.norm(dn[:, a, None] - dn[:, None, b], axis=-1).reshape(len(some), -1)
@@ -152,12 +152,12 @@ def test_who_separates_most_names_its_lights_whatever_the_constraints(finished: 
 def test_lights_without_a_distance_limit_nothing() -> None:
     study = load_study(STUDIES / "stopband.yaml")
     space = next(space for space in study.spaces if space.filter is not None)
-    view = study.view(space, "chart")
+    setup = study.setup(space, "chart")
     nothing = np.zeros((1, 1, study.grid.size))
-    response = forward_model(view).read(nothing)[0]
-    assert set(limiting_lights(view, response)) == set(study.pairs)
-    assert all(lights[0] is not None for lights in limiting_lights(view, response).values())
-    assert all(lights[0] is None for lights in limiting_lights(view, response * np.nan).values())
+    response = forward_model(setup).read(nothing)[0]
+    assert set(limiting_lights(setup, response)) == set(study.pairs)
+    assert all(lights[0] is not None for lights in limiting_lights(setup, response).values())
+    assert all(lights[0] is None for lights in limiting_lights(setup, response * np.nan).values())
 
 
 def series(**lines: list[float]) -> SeriesFigure:

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sweep.camera.camera import Camera
 from sweep.camera.forward import ForwardModel
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene
-from sweep.camera.view import View
+from sweep.camera.setup import Setup
 from sweep.designs.block import CurveBlock, edges_of
 from sweep.designs.families.dual import Dual
 from sweep.designs.families.free_form import FreeForm
@@ -21,7 +22,7 @@ from sweep.designs.products import row_products
 from sweep.designs.space import Filter, Space
 from sweep.metrics.evaluate import evaluate, family_quantities
 
-from ..blocks import SPACE, VIEWS, view_of
+from ..blocks import SPACE, VIEWS, setup_of
 from ..cases import thinned
 from ..hard.scenes import DARK, F2, FAMILY, FAR, FIXED, GRID, SENSOR, lights
 from ..rounding import assert_within_rounding, brightest_dn, rounding
@@ -30,8 +31,8 @@ from ..rounding import assert_within_rounding, brightest_dn, rounding
 AXES = ((590.0, 603.0, 690.0), (5.0, 20.0), (410.0, 640.0, 655.0), (0.0, 6.0, 30.0), (0.5, 0.8, 1.0))
 MIXED = Space("sweep", "edges", "RYNCy", Filter(FAMILY, {"N": "Y"}, "G"), AXES)
 MORE = {
-    "noise, far": view_of({"noise": True, "target": FAR, "optics": F2}, DARK | {"prnu": 0.01}),
-    "background, pixel by pixel": view_of(
+    "noise, far": setup_of({"noise": True, "target": FAR, "optics": F2}, DARK | {"prnu": 0.01}),
+    "background, pixel by pixel": setup_of(
         {"background_cd_m2": 300, "intensity_cd": 200, "exposure": FIXED, "target": FAR, "optics": F2},
         {"crosstalk": 0.1},
     ),
@@ -39,10 +40,10 @@ MORE = {
 STATES = ("green", "yellow", "red")
 
 
-def assert_same(found: dict[str, Any], which: Any, alone: dict[str, Any], view: View, magnitude_dn: float) -> None:
+def assert_same(found: dict[str, Any], which: Any, alone: dict[str, Any], setup: Setup, magnitude_dn: float) -> None:
     assert list(found) == list(alone)
     for name, values in alone.items():
-        assert_within_rounding(name, found[name][which], values, view, magnitude_dn)
+        assert_within_rounding(name, found[name][which], values, setup, magnitude_dn)
 
 
 SOME = [*((name, True) for name in (*VIEWS, *MORE) if name not in ("pulsed", "noise")), ("chart", False)]
@@ -61,22 +62,22 @@ SOME = [*((name, True) for name in (*VIEWS, *MORE) if name not in ("pulsed", "no
     ],
 )
 def test_a_design_alone_is_the_one_of_its_block_within_rounding(name: str, separable: bool, step: int) -> None:
-    view = (VIEWS | MORE)[name]
-    states = STATES if view.computes("quantization") and view.computes("noise") else ()
-    imager = ForwardModel(view)
-    space = MIXED if view.scenario.target is None else SPACE
+    setup = (VIEWS | MORE)[name]
+    states = STATES if setup.computes("quantization") and setup.computes("noise") else ()
+    imager = ForwardModel(setup)
+    space = MIXED if setup.scene.target is None else SPACE
     block = edges_of(space, 0, space.size)
     assert block is not None
     curves = block.curves()
     whole = evaluate(imager, block if separable else curves, states)
-    magnitude_dn = brightest_dn(view, curves)
+    magnitude_dn = brightest_dn(setup, curves)
     rng = np.random.default_rng(5)
-    parts = [np.array([at]) for at in range(0, space.size, 1 if view.scenario.target is None else 5)]
+    parts = [np.array([at]) for at in range(0, space.size, 1 if setup.scene.target is None else 5)]
     parts += [np.arange(start, start + n) for n in (2, 3, 15, 16, 17, 31) for start in rng.integers(0, 40, 2)]
     for part in parts[::step]:
         some = edges_of(space, part[0], part[-1] + 1) if separable else CurveBlock(curves[part])
         assert some is not None
-        assert_same(whole, part, evaluate(imager, some, states), view, magnitude_dn)
+        assert_same(whole, part, evaluate(imager, some, states), setup, magnitude_dn)
 
 
 @pytest.mark.parametrize("separable", [True, False])
@@ -97,7 +98,7 @@ def test_a_bad_design_changes_no_other_beyond_rounding(separable: bool) -> None:
         spoiled[bad] = np.nan
     whole, found = (evaluate(imager, block) for block in (fine if separable else fine.curves(), spoiled))
     alone = {name: values[others] for name, values in whole.items()}
-    assert_same(found, others, alone, imager.view, brightest_dn(imager.view, fine.curves()))
+    assert_same(found, others, alone, imager.setup, brightest_dn(imager.setup, fine.curves()))
     assert np.isnan(found["csd_yellow_red"][bad]).all()
 
 
@@ -152,14 +153,14 @@ def test_two_modified_channels_within_rounding(scenario: dict[str, Any]) -> None
     mosaic = Mosaic.from_rows("RAACy", [["R", "Na"], ["Nb", "Cy"]])
     qe = SENSOR.mosaic_qe(mosaic, {"Na": "Y", "Nb": "Y"})
     modified = tuple(mosaic.channels.index(name) for name in ("Na", "Nb"))
-    view = View(GRID, mosaic, qe, modified, SENSOR.qe["C"], lights(), Pixel(), Scene.model_validate(scenario))
+    setup = Setup(Camera(GRID, mosaic, qe, modified, SENSOR.qe["C"], Pixel()), lights(), Scene.model_validate(scenario))
     family = Dual(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["C"])
     space = Space("sweep", "dual", "RAACy", Filter(family, {"Na": "Y", "Nb": "Y"}, "C"), AXES)
     curves = space.curves(space.points(0, 40), GRID.size)
-    imager = ForwardModel(view)
-    whole, magnitude_dn = evaluate(imager, curves), brightest_dn(view, curves)
+    imager = ForwardModel(setup)
+    whole, magnitude_dn = evaluate(imager, curves), brightest_dn(setup, curves)
     for at in range(0, 40, 3):
-        assert_same(whole, slice(at, at + 1), evaluate(imager, curves[at : at + 1]), view, magnitude_dn)
+        assert_same(whole, slice(at, at + 1), evaluate(imager, curves[at : at + 1]), setup, magnitude_dn)
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])

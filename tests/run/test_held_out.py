@@ -123,7 +123,7 @@ def test_another_light_changes_no_reading_of_a_resolved_study(folder: Path) -> N
     def read(study: object) -> np.ndarray:
         assert isinstance(study, type(more))
         space = next(space for space in study.spaces if space.name == "RGGB")
-        return forward_model(study.view(space, "chart")).read(np.empty((1, 0, study.grid.size)))[0][0, 0]
+        return forward_model(study.setup(space, "chart")).read(np.empty((1, 0, study.grid.size)))[0][0, 0]
 
     np.testing.assert_array_equal(read(more)[:3], read(one))
 

@@ -58,9 +58,9 @@ def rows_with_lights(folder: Path) -> pd.DataFrame:
 def distances(study: Study, row: dict[str, Any]) -> Iterator[tuple[str, dict[str, float]]]:
     """Of each pair of types every pair of lights with its smallest distance over the cases, from the curves alone."""
     space, curves = row_curves(study, row)
-    view = study.view(space, row["scenario"])
-    cases = forward_model(view).read(curves)[0][0]
-    lights = list(zip(view.lights.names, view.lights.types, np.moveaxis(cases, 1, 0), strict=True))
+    setup = study.setup(space, row["scenario"])
+    cases = forward_model(setup).read(curves)[0][0]
+    lights = list(zip(setup.lights.names, setup.lights.types, np.moveaxis(cases, 1, 0), strict=True))
     for one, other in study.pairs:
         found = {
             f"{a} / {b}": float(np.linalg.norm(u - v, axis=-1).min())

@@ -55,7 +55,9 @@ def test_each_scene_of_each_cfa_is_made_ready_once(folder: Path, monkeypatch: py
 
     monkeypatch.setattr(ForwardModel, "__init__", counted)
     found = ran(folder)
-    of_run = [view for view, *_ in made if view.accuracy != REFERENCE]  # the others are those of the check at its end
+    of_run = [
+        setup for setup, *_ in made if setup.accuracy != REFERENCE
+    ]  # the others are those of the check at its end
     assert len(of_run) == 2 * 2  # RGGB and the design
     assert [len(found[name]) for name in (LIMITED_BY, RECOGNITION)] == [4, 4]
 

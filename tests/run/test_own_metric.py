@@ -122,16 +122,16 @@ def test_slopes_are_those_of_the_metric(tmp_path: Path) -> None:
     made = study(tmp_path, OWN_METRIC.replace("cfas: [RGGB, RYNCy]", "cfas: [RYNCy]"))
     own = made.quantities["apart"]
     exact = made.quantities["csd_yellow_red"]
-    view, free = scene("chart", "RYNCy", {}).view, np.arange(5)
+    setup, free = scene("chart", "RYNCy", {}).setup, np.arange(5)
     design = SmoothDesign(
-        linear_model(view), FAMILY, np.array([600.0, 8, 640, 9, 0.8]), free, np.array([30.0, 10, 30, 10, 0.5])
+        linear_model(setup), FAMILY, np.array([600.0, 8, 640, 9, 0.8]), free, np.array([30.0, 10, 30, 10, 0.5])
     )
     assert own.smooth is not None
     assert exact.smooth is not None
     mine, squared = own.smooth(design), exact.smooth(design)
     np.testing.assert_allclose(mine.values**2, squared.values, rtol=1e-12)
     np.testing.assert_allclose(2 * mine.values[:, None] * mine.by_u, squared.by_u, rtol=1e-5, atol=1e-3)
-    members = view.members
+    members = setup.members
     distances = cdist(design.response[0][members["yellow"]], design.response[0][members["red"]])
     assert own.value(mine) == pytest.approx(distances.min(), rel=1e-12)
 
@@ -240,10 +240,10 @@ def test_a_design_that_the_metric_fails_on_costs_a_row(tmp_path: Path) -> None:
     made = study(tmp_path, OWN_METRIC.partition("search:")[0])
     run_study(made, tmp_path / "all", 1, lambda *_: None)
     space = next(space for space in made.spaces if space.kind == "sweep")
-    view = made.plan("chart") and made.view(space, "chart")
+    setup = made.plan("chart") and made.setup(space, "chart")
     from sweep.camera.forward import forward_model
 
-    edge = forward_model(view).read(space.curves(space.points(3, 4), made.grid.size))[0][0, 0, 0, -1]
+    edge = forward_model(setup).read(space.curves(space.points(3, 4), made.grid.size))[0][0, 0, 0, -1]
     bad = study(tmp_path, OWN_METRIC.partition("search:")[0], f"EDGE = {edge!r}\n".replace("np.float64(", "(") + code)
     run_study(bad, tmp_path / "some", 1, lambda *_: None)
     found = rows_of(tmp_path / "some")

@@ -82,7 +82,7 @@ def brute_force(study: Study, n: int, seed: int, thickness: float = 0.0) -> np.n
 
 def candidate(study: Study) -> Candidate:
     space = next(space for space in study.spaces if space.name == "mine")
-    return Candidate(study.view(space, "chart"), space, space.points(0, 1), study.tolerance)
+    return Candidate(study.setup(space, "chart"), space, space.points(0, 1), study.tolerance)
 
 
 def agree(study: Study, n: int, thickness: float = 0.0) -> None:
@@ -114,7 +114,7 @@ def test_a_worst_case_is_over_edges_and_films_together(tmp_path: Path) -> None:
     """Beside the corners of both tolerances, with the filter's edges moved by hand."""
     study = thick(tmp_path)
     design, pair = candidate(study), ("yellow", "red")
-    seen, found = population_imager(design.view), []
+    seen, found = population_imager(design.setup), []
     for edge in (-2.0, 2.0):
         for film in (0.992, 1.008):
             own = design.point * np.array([film, film, film, film, 1.0]) + np.array([edge, 0, edge, 0, 0])
@@ -162,7 +162,7 @@ def test_any_number_of_workers_gives_the_same_and_a_break_is_where_the_worst_cas
     assert plain["breaks_at"] is None
     assert 0.25 < mine["breaks_at"] < 3
     pair = ("yellow", "red")
-    rggb = Candidate(study.view(study.spaces[0], "chart"), study.spaces[0], np.empty((1, 0)), study.tolerance)
+    rggb = Candidate(study.setup(study.spaces[0], "chart"), study.spaces[0], np.empty((1, 0)), study.tolerance)
     just = mine["breaks_at"] - 0.25 / 2**6
     here, before = (
         candidate(study).worst(pair, scale)[0] - rggb.worst(pair, scale)[0] for scale in (mine["breaks_at"], just)

@@ -103,7 +103,7 @@ def fragile_job(study: Study, kind: type[MultiStopband]) -> tuple[Job, Any, Any]
     family = kind(study.grid.nodes_nm, study.sensor.qe["Y"], study.sensor.qe["G"], *bands)
     axes = ((590.0, 600.0, 610.0, 655.5), (5.0, 20.0), (640.0, 650.0, 660.0), (5.0,), (0.3, 1.0))
     space = replace(study.spaces[-1], filter=Filter(family, {"N": "Y"}, "G"), axes=axes)
-    return Job(space, "chart", 0, space.size, 0, 0), study.view(space, "chart"), rules_of(study)
+    return Job(space, "chart", 0, space.size, 0, 0), study.setup(space, "chart"), rules_of(study)
 
 
 @pytest.mark.parametrize("chunk", [CHUNK, 7])
@@ -113,7 +113,7 @@ def test_designs_beside_a_bad_one_are_those_of_a_whole_block_within_rounding(
 ) -> None:
     """A block of several chunks is taken apart: only designs of a bad one's own chunk take another route."""
     monkeypatch.setattr(routes, "CHUNK", chunk)
-    job, view, rules = fragile_job(plain, FragileEdges if separable else Fragile)
+    job, setup, rules = fragile_job(plain, FragileEdges if separable else Fragile)
     whole = Stopband if separable else MultiStopband
     fine = run_job(*fragile_job(plain, whole)).to_pandas()
     assert not detours_of(run_job(*fragile_job(plain, whole)))
@@ -126,7 +126,7 @@ def test_designs_beside_a_bad_one_are_those_of_a_whole_block_within_rounding(
             return way(self, *arguments)
 
         monkeypatch.setattr(EdgeBlock, "product", broken)
-    table = run_job(job, view, rules)
+    table = run_job(job, setup, rules)
     found = table.to_pandas()
     bad = found["left_nm"] == 600
     assert set(found.loc[bad, "status"]) == {"error: ValueError: no such filter at all"}
@@ -138,8 +138,8 @@ def test_designs_beside_a_bad_one_are_those_of_a_whole_block_within_rounding(
     same = [name for name in found.columns if name != "pareto"]
     words = {"status": str}
     both = [table.loc[~bad, same].astype(words) for table in (found, fine)]
-    magnitude_dn = brightest_dn(view, job.space.curves(job.space.points(0, 1), plain.grid.size))
-    assert_tables_within_rounding(*both, view, magnitude_dn, given=job.space.parameters)
+    magnitude_dn = brightest_dn(setup, job.space.curves(job.space.points(0, 1), plain.grid.size))
+    assert_tables_within_rounding(*both, setup, magnitude_dn, given=job.space.parameters)
 
 
 def test_a_run_says_how_many_designs_were_computed_one_by_one(plain: Study, tmp_path: Path) -> None:

@@ -88,7 +88,7 @@ def test_a_row_is_what_its_parameters_say(study: Study, output: Path) -> None:
         rows = frame[(frame["kind"] == "sweep") & (frame["scenario"] == scenario)].sample(5, random_state=3)
         for _, row in rows.iterrows():
             x = row[list(sweep.parameters)].to_numpy(dtype=float)[None]
-            found = evaluate(forward_model(study.view(sweep, scenario)), sweep.curves(x, study.grid.size))
+            found = evaluate(forward_model(study.setup(sweep, scenario)), sweep.curves(x, study.grid.size))
             for name in set(study.quantities) & set(found):
                 assert row[name] == pytest.approx(found[name][0], rel=1e-12)
             ordered = row["left_nm"] <= row["right_nm"] and (sweep.violation(x) == 0).all()
@@ -185,7 +185,7 @@ def test_a_failing_design_is_a_row(study: Study) -> None:
     axes = ((2.0, 3.0, 4.0, 5.0), (10.0,), (650.0,), (10.0,), (1.0,))
     space = Space("sweep", "fragile", "RYNCy", Filter(family, {"N": "Y"}, "G"), axes)
     rules = replace(rules_of(study), constraints={})
-    rows = run_job(Job(space, "chart", 0, 4, 0, 0), study.view(space, "chart"), rules).to_pandas()
+    rows = run_job(Job(space, "chart", 0, 4, 0, 0), study.setup(space, "chart"), rules).to_pandas()
     assert list(rows["status"]) == ["ok", "error: ValueError: no such filter", "ok", "not finite"]
     assert list(rows["feasible"]) == [True, False, True, False]
     assert list(rows["csd_yellow_red"].isna()) == [False, True, False, True]
@@ -289,7 +289,7 @@ def test_worst_cases_and_combined_objectives_are_columns(tmp_path: Path) -> None
     sweep = study.spaces[-1]
     x = np.repeat(row[list(sweep.parameters)].to_numpy(dtype=float)[None], 5, axis=0)
     x[:, [0, 2]] += np.array([-3.0, -1.5, 0, 1.5, 3.0])[:, None]
-    found = evaluate(forward_model(study.view(sweep, row["scenario"])), sweep.curves(x, study.grid.size))
+    found = evaluate(forward_model(study.setup(sweep, row["scenario"])), sweep.curves(x, study.grid.size))
     assert row["worst_csd_yellow_red"] == found["csd_yellow_red"].min()
     assert row["worst_sensitivity"] == pytest.approx(found["sensitivity"].min(), rel=1e-12)
     assert row["objective"] == min(2 * row["worst_csd_yellow_red"], 300 * row["sensitivity"])

@@ -105,7 +105,7 @@ def test_many_designs_are_made_in_blocks_and_read_out_once_for_all_pairs_within_
 ) -> None:
     loaded, search = lamps()
     points = search.space.points(0, 7)
-    drawn = LampsAndCameras(population_imager(problem().view), loaded.tolerance, 1)
+    drawn = LampsAndCameras(population_imager(problem().setup), loaded.tolerance, 1)
     pairs = [("green", "yellow"), YELLOW_RED]
     size, read, made = loaded.grid.size, list[int](), list[int]()
     monkeypatch.setattr(drawn_module, "_HELD", 3 * 101 * size)
@@ -119,8 +119,8 @@ def test_many_designs_are_made_in_blocks_and_read_out_once_for_all_pairs_within_
     found = drawn.columns(come_out, len(points), pairs)
     assert max(made) == 3
     assert sum(read) == 7 * 101
-    view = problem().view
-    allowed = rounding_of_distance(terms_of(view), view.pixel.full_scale_dn, len(view.mosaic.channels))
+    setup = problem().setup
+    allowed = rounding_of_distance(terms_of(setup), setup.camera.pixel.full_scale_dn, len(setup.camera.mosaic.channels))
     for at in range(7):
         alone = np.concatenate(
             [search.space.curves(points[at : at + 1], size, off) for off in drawn.draws(pairs[0]).offs]
@@ -138,10 +138,10 @@ def test_jobs_are_small_where_each_design_sees_many_draws(tmp_path: Path) -> Non
 def share_with(x: np.ndarray, wanted_dn: float, draws: int = 200_000) -> tuple[float, float]:
     """The 95 % interval of the share of other draws that has a distance."""
     study, search = lamps()
-    view = study.view(search.space, search.scenario)
-    assert view.lights.population is not None
-    many = replace(view.lights, population=view.lights.population.model_copy(update={"draws": draws}))
-    design = Candidate(replace(view, lights=many), search.space, x[None], study.tolerance)
+    setup = study.setup(search.space, search.scenario)
+    assert setup.lights.population is not None
+    many = replace(setup.lights, population=setup.lights.population.model_copy(update={"draws": draws}))
+    design = Candidate(replace(setup, lights=many), search.space, x[None], study.tolerance)
     return share_interval(int((drawn_dn(design, YELLOW_RED, 77) >= wanted_dn).sum()), draws)
 
 

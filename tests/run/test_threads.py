@@ -84,11 +84,11 @@ def test_parts_of_a_job_are_the_job_within_rounding(
     space, rules = plain.spaces[-1], rules_of(plain)
     size = CHUNK + 300
     for scenario in plain.scenarios:
-        view = plain.view(space, scenario)
-        magnitude_dn = brightest_dn(view, space.curves(space.points(0, 100), plain.grid.size))
-        whole = run_job(Job(space, scenario, 0, size, 0, 0), view, rules)
+        setup = plain.setup(space, scenario)
+        magnitude_dn = brightest_dn(setup, space.curves(space.points(0, 100), plain.grid.size))
+        whole = run_job(Job(space, scenario, 0, size, 0, 0), setup, rules)
         ends = [0, 1, 2, 17, 33, 1024, 2049, CHUNK, CHUNK + 1, size]
-        parts = [run_job(Job(space, scenario, a, b, a, a), view, rules) for a, b in pairwise(ends)]
+        parts = [run_job(Job(space, scenario, a, b, a, a), setup, rules) for a, b in pairwise(ends)]
         columns = [name for name in rules.schema.names if name != "pareto"]  # that of each part alone
         both = [table.select(columns).to_pandas() for table in (joined(parts), whole)]
-        assert_tables_within_rounding(*both, view, magnitude_dn, given=space.parameters)
+        assert_tables_within_rounding(*both, setup, magnitude_dn, given=space.parameters)

@@ -22,7 +22,7 @@ rules, looking = rules_of(study), Looking.of(study, [LIMITED_BY, POINTS])
 kinds = set()
 for job in jobs_of(study):
     path = Path(sys.argv[2]) / f"{job.first_id}.parquet"
-    _shards([(job, study.view(job.space, job.scenario), path)], rules, looking)
+    _shards([(job, study.setup(job.space, job.scenario), path)], rules, looking)
     kinds.add(job.space.kind)
 print(*sorted(kinds), *({"pandas", "matplotlib", "scipy.stats", "sklearn"} & sys.modules.keys()))
 """

@@ -23,8 +23,8 @@ def problem_of(name: str, read_noise_e: float, level: float, objective: Objectiv
     problem = study.problem(study.search)
     scenario = Scene.model_validate({"noise": True, "exposure": {"kind": "white_patch", "level": level}})
     pixel = Pixel(read_noise_e=read_noise_e, prnu=0.01, offset_dn=168)
-    view = replace(problem.view, scenario=scenario, pixel=pixel)
-    return replace(problem, view=view, states=STATES, objective=objective)
+    setup = replace(problem.setup, scene=scenario).with_camera(pixel=pixel)
+    return replace(problem, setup=setup, states=STATES, objective=objective)
 
 
 def searched(problem: Problem, starts: int = 2, algorithm: str = "SLSQP") -> Evaluation:

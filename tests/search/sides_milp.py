@@ -65,8 +65,8 @@ def write_study(folder: Path, step_nm: float) -> Path:
 
 def smallest(problem: Problem, curve: np.ndarray, name: str) -> float:
     """A CSD of the smooth response, the smallest over the places of the light."""
-    first, second = (problem.view.members[kind] for kind in problem.pairs[name])
-    response = smooth_response(problem.view, curve[None, None])[0]
+    first, second = (problem.setup.members[kind] for kind in problem.pairs[name])
+    response = smooth_response(problem.setup, curve[None, None])[0]
     return min(float(separation(place[None], first, second)[0]) for place in response)
 
 
@@ -74,10 +74,10 @@ def check_attained(problem: Problem, limit: Limit) -> None:
     """The filter of the limit meets everything, and reaches what is said."""
     assert limit.curve is not None
     curves = limit.curve[None, None]
-    amounts = designed_quantities(problem.view, curves)
+    amounts = designed_quantities(problem.setup, curves)
     amounts |= {n: np.array([smallest(problem, limit.curve, n)]) for n in problem.constraints if n in problem.pairs}
     assert total_violation(amounts, problem.constraints, np.zeros(1))[0] <= FEASIBLE
-    assert ((limit.curve >= 0) & (limit.curve <= problem.view.base_qe[0])).all()
+    assert ((limit.curve >= 0) & (limit.curve <= problem.setup.camera.base_qe[0])).all()
     reached = min(w * smallest(problem, limit.curve, name) for name, w in problem.objective.weights.items())
     assert reached == pytest.approx(limit.attained, rel=1e-12)
 
@@ -95,16 +95,16 @@ class Pairs:
 
 
 def pairs_of(problem: Problem) -> Pairs:
-    view, size, channel = problem.view, problem.view.grid.size, problem.view.modified[0]
-    dark = smooth_response(view, np.zeros((1, 1, size)))[0]
-    gain = smooth_response(view, np.eye(size)[:, None])[..., channel] - dark[..., channel]
+    setup, size, channel = problem.setup, problem.setup.camera.grid.size, problem.setup.camera.modified[0]
+    dark = smooth_response(setup, np.zeros((1, 1, size)))[0]
+    gain = smooth_response(setup, np.eye(size)[:, None])[..., channel] - dark[..., channel]
     found = []
     for name, kinds in problem.pairs.items():
         weight, bound = problem.objective.weights.get(name), problem.constraints.get(name)
         if weight is None and bound is None:
             continue
-        for one in view.members[kinds[0]]:
-            for other in view.members[kinds[1]]:
+        for one in setup.members[kinds[0]]:
+            for other in setup.members[kinds[1]]:
                 for place in range(len(dark)):
                     rest = np.delete(dark[place, one] - dark[place, other], channel)
                     least, rate = 0.0 if bound is None else bound.min, 0.0 if weight is None else 1 / weight
@@ -123,7 +123,7 @@ def largest(problem: Problem, t: float) -> float:
     """t and the largest margin above it, by a MILP with a binary per pair; exactly the limit where the other channels do
     not matter, and below t where no filter reaches t.
     """
-    pairs, base = pairs_of(problem), problem.view.base_qe[0]
+    pairs, base = pairs_of(problem), problem.setup.camera.base_qe[0]
     needed = np.sqrt(np.maximum(np.maximum(pairs.least, t * pairs.rate) ** 2 - pairs.squared, 0))
     asked = needed > 0
     apart, needed, rate = pairs.apart[asked], needed[asked], pairs.rate[asked, None]
@@ -132,7 +132,7 @@ def largest(problem: Problem, t: float) -> float:
     most = needed + rate[:, 0] * (t + 1)
     above, below = most - np.minimum(apart, 0) @ base, most + np.maximum(apart, 0) @ base
     step, none = np.diff(np.eye(size), axis=0), np.zeros((size - 1, n + 1))
-    slope = problem.constraints["slope_per_nm"].max * problem.view.grid.step_nm
+    slope = problem.constraints["slope_per_nm"].max * problem.setup.camera.grid.step_nm
     found = milp(
         np.append(np.zeros(size + n), -1.0),
         constraints=[
@@ -166,7 +166,7 @@ def agrees(problem: Problem) -> Limit:
 def random_problem(template: Problem, seed: int) -> Problem:
     """3 to 8 lights of each type anywhere, under a random curve; the other channels are flat, or nearly."""
     rng = np.random.default_rng(seed)
-    wave = template.view.grid.nodes_nm
+    wave = template.setup.camera.grid.nodes_nm
     counts = 3 + rng.binomial(5, 0.2, 2)
     photons = np.concatenate(
         [
@@ -174,18 +174,18 @@ def random_problem(template: Problem, seed: int) -> Problem:
             for count, ends in zip(counts, ((480, 640), (500, 680)), strict=True)
         ]
     )
-    photons /= photons.sum(axis=1, keepdims=True) * template.view.grid.step_nm
+    photons /= photons.sum(axis=1, keepdims=True) * template.setup.camera.grid.step_nm
     types = ("yellow",) * counts[0] + ("red",) * counts[1]
-    lights = replace(template.view.lights, names=tuple(map(str, range(counts.sum()))), types=types, photons=photons)
+    lights = replace(template.setup.lights, names=tuple(map(str, range(counts.sum()))), types=types, photons=photons)
     base = np.interp(wave, np.linspace(400, 700, 7), rng.uniform(0.05, 0.85, 7))
-    qe = template.view.qe.copy()
-    qe[template.view.modified[0]] = base
+    qe = template.setup.camera.qe.copy()
+    qe[template.setup.camera.modified[0]] = base
     qe[0] = 0.5 + (seed % 2) * 0.02 * np.interp(wave, [500, 680], [0, 1])
     qe[1] = 0.3
     family = FreeForm(wave, base, np.arange(400.0, 701.0, 20.0))
     return replace(
         template,
-        view=replace(template.view, lights=lights, qe=qe),
+        setup=replace(template.setup, lights=lights).with_camera(qe=qe),
         family=family,
         low=np.zeros(family.nodes_nm.size),
         high=np.ones(family.nodes_nm.size),

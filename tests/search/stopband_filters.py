@@ -16,7 +16,7 @@ PROBLEM = STUDY.problem(STUDY.search)
 
 
 def random_filters(kind: str, count: int, rng: np.random.Generator) -> np.ndarray:
-    base, green = PROBLEM.view.base_qe[0], STUDY.sensor.qe["G"]
+    base, green = PROBLEM.setup.camera.base_qe[0], STUDY.sensor.qe["G"]
     wave = STUDY.grid.nodes_nm
     if kind == "free_form":
         family = FreeForm(wave, base, np.arange(540.0, 701.0, 4.0))

@@ -11,7 +11,7 @@ import pytest
 
 from sweep.base.errors import SweepError
 from sweep.camera.scene import FixedExposure, Scene
-from sweep.camera.view import View
+from sweep.camera.setup import Setup
 from sweep.curves.lights import Lights
 from sweep.designs.families.stopband import Stopband
 from sweep.metrics.bound import FEASIBLE, Bound, total_violation
@@ -35,12 +35,12 @@ LIMIT = limit_of(PROBLEM)
 
 
 def csd(problem: Problem, curves: np.ndarray) -> np.ndarray:
-    first, second = (problem.view.members[name] for name in problem.pairs["csd_yellow_red"])
-    return separation(smooth_response(problem.view, curves)[:, 0], first, second)
+    first, second = (problem.setup.members[name] for name in problem.pairs["csd_yellow_red"])
+    return separation(smooth_response(problem.setup, curves)[:, 0], first, second)
 
 
 def feasible(problem: Problem, curves: np.ndarray) -> np.ndarray:
-    amounts = designed_quantities(problem.view, curves)
+    amounts = designed_quantities(problem.setup, curves)
     return total_violation(amounts, problem.constraints, np.zeros(len(curves))) <= FEASIBLE
 
 
@@ -48,7 +48,7 @@ def test_the_bracket_is_tight_and_attained_by_its_filter() -> None:
     assert LIMIT.curve is not None
     curve = LIMIT.curve
     assert 0 <= LIMIT.proven - LIMIT.attained <= 2e-3
-    assert ((curve >= 0) & (curve <= PROBLEM.view.base_qe[0])).all()
+    assert ((curve >= 0) & (curve <= PROBLEM.setup.camera.base_qe[0])).all()
     assert feasible(PROBLEM, curve[None, None])[0]
     assert csd(PROBLEM, curve[None, None])[0] == pytest.approx(LIMIT.attained, rel=1e-12)
 
@@ -58,11 +58,11 @@ def test_one_pair_of_signals_has_a_closed_form() -> None:
     lights = STUDY.lights
     keep = [lights.members["yellow"][3], lights.members["red"][5]]
     two = Lights("two", ("y", "r"), ("yellow", "red"), lights.photons[keep], lights.photon_ratio, "", True)
-    problem = replace(PROBLEM, view=replace(PROBLEM.view, lights=two), constraints={"sensitivity": Bound(min=0.93)})
+    problem = replace(PROBLEM, setup=replace(PROBLEM.setup, lights=two), constraints={"sensitivity": Bound(min=0.93)})
     found = limit_of(problem)
-    base = problem.view.base_qe[0]
-    response = smooth_response(problem.view, base[None, None])[0, 0]
-    channel = problem.view.modified[0]
+    base = problem.setup.camera.base_qe[0]
+    response = smooth_response(problem.setup, base[None, None])[0, 0]
+    channel = problem.setup.camera.modified[0]
     gain = response[:, channel] / (two.photons @ base)
     per_qe = gain[0] * two.photons[0] - gain[1] * two.photons[1]
     budget = 0.07 * base.sum()
@@ -82,8 +82,8 @@ def test_one_pair_of_signals_has_a_closed_form() -> None:
 def test_no_random_feasible_filter_beats_the_limit(kind: str) -> None:
     curves = random_filters(kind, 20_000, np.random.default_rng(11))
     # Scaled toward the base until the sensitivity holds, so that every filter takes part.
-    base = PROBLEM.view.base_qe
-    lost = 1 - designed_quantities(PROBLEM.view, curves)["sensitivity"]
+    base = PROBLEM.setup.camera.base_qe
+    lost = 1 - designed_quantities(PROBLEM.setup, curves)["sensitivity"]
     share = np.minimum(1.0, 0.1 / np.maximum(lost, 1e-12))[:, None, None]
     curves = base + share * (curves - base)
     ok = feasible(PROBLEM, curves)
@@ -110,7 +110,7 @@ def test_a_tighter_study_has_a_lower_limit() -> None:
     found = limit_of(tight)
     assert found.curve is not None
     assert found.proven < LIMIT.attained
-    assert (found.curve >= 0.3 * PROBLEM.view.base_qe[0] * (1 - 1e-9)).all()
+    assert (found.curve >= 0.3 * PROBLEM.setup.camera.base_qe[0] * (1 - 1e-9)).all()
     steep = replace(PROBLEM, constraints={**PROBLEM.constraints, "slope_per_nm": Bound(max=0.04)})
     assert limit_of(steep).proven <= LIMIT.proven
     nothing = replace(PROBLEM, constraints={"sensitivity": Bound(min=1.01)})
@@ -152,8 +152,8 @@ def test_the_limit_of_the_smallest_of_several_distances() -> None:
     two = replace(PROBLEM, objective=Objective(minimum={"csd_yellow_red": 1.0, "csd_orange_red": 2.0}))
     found = limit_of(two)
     assert found.curve is not None
-    members = PROBLEM.view.members
-    response = smooth_response(PROBLEM.view, found.curve[None, None])[:, 0]
+    members = PROBLEM.setup.members
+    response = smooth_response(PROBLEM.setup, found.curve[None, None])[:, 0]
     yr, orange = (separation(response, members[kind], members["red"])[0] for kind in ("yellow", "orange"))
     assert min(yr, 2 * orange) == pytest.approx(found.attained, rel=1e-12)
     assert found.proven <= LIMIT.proven + 1e-3
@@ -185,18 +185,18 @@ def test_hypervolume_of_two_steps() -> None:
 
 def test_no_limit_is_claimed_where_it_would_not_hold() -> None:
     wave, cyan, green = STUDY.grid.nodes_nm, STUDY.sensor.qe["Cy"], STUDY.sensor.qe["G"]
-    above = replace(PROBLEM, family=Stopband(wave, cyan, green), view=_with_base(cyan))
+    above = replace(PROBLEM, family=Stopband(wave, cyan, green), setup=_with_base(cyan))
     assert why_not(above) == "filters of the box may exceed the curve that they replace"
-    below = replace(PROBLEM, family=Stopband(wave, PROBLEM.view.base_qe[0], -0.1 * green))
+    below = replace(PROBLEM, family=Stopband(wave, PROBLEM.setup.camera.base_qe[0], -0.1 * green))
     assert why_not(below) == "filters of the box may be below 0"
-    scenario = replace(PROBLEM.view, scenario=Scene(exposure=FixedExposure(exposure_s=1000.0)))
-    assert why_not(replace(PROBLEM, view=scenario)) == "signals exceed the full well or the range of the ADC"
+    scenario = replace(PROBLEM.setup, scene=Scene(exposure=FixedExposure(exposure_s=1000.0)))
+    assert why_not(replace(PROBLEM, setup=scenario)) == "signals exceed the full well or the range of the ADC"
 
 
-def _with_base(curve: np.ndarray) -> View:
-    qe = PROBLEM.view.qe.copy()
-    qe[PROBLEM.view.modified[0]] = curve
-    return replace(PROBLEM.view, qe=qe)
+def _with_base(curve: np.ndarray) -> Setup:
+    qe = PROBLEM.setup.camera.qe.copy()
+    qe[PROBLEM.setup.camera.modified[0]] = curve
+    return PROBLEM.setup.with_camera(qe=qe)
 
 
 def test_words_say_what_is_proven() -> None:

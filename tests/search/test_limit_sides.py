@@ -82,11 +82,11 @@ def test_two_hundred_limits_are_those_of_a_milp(coarse: Problem) -> None:
 def test_several_csds_have_sides_of_their_own(coarse: Problem, seed: int) -> None:
     """The smallest of two weighted CSDs, and a third one that is constrained: each with pairs on either side."""
     problem = random_problem(coarse, seed)
-    lights = problem.view.lights
+    lights = problem.setup.lights
     types = tuple("orange" if i % 3 == 2 else kind for i, kind in enumerate(lights.types))
     problem = replace(
         problem,
-        view=replace(problem.view, lights=replace(lights, types=types)),
+        setup=replace(problem.setup, lights=replace(lights, types=types)),
         objective=Objective(minimum={"csd_yellow_red": 1.0, "csd_orange_red": 1.5}),
     )
     free = agrees(problem)
@@ -107,7 +107,7 @@ def test_every_place_of_a_light_has_sides_of_its_own(coarse: Problem, tmp_path: 
     assert study.search is not None
     problem = study.problem(study.search)
     limit = agrees(problem)
-    assert len(smooth_response(problem.view, problem.view.base_qe[None])[0]) > 1
+    assert len(smooth_response(problem.setup, problem.setup.camera.base_qe[None])[0]) > 1
     assert is_mixed(problem, limit.curve)
     assert limit.proven <= limit_of(coarse).proven * 1.001
 

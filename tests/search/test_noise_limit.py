@@ -37,13 +37,14 @@ def problem_in(scene: str) -> Problem:
     problem = problem_of("stopband", 5, 0.3, GOAL)
     scenario = Scene.model_validate(SCENES[scene])
     assert scenario.noise is not None
-    view = replace(problem.view, scenario=scenario, pixel=scenario.noise.of(problem.view.pixel), left_out=frozenset())
-    return replace(problem, view=view, constraints={"sensitivity": Bound(min=0.9)})
+    setup = replace(problem.setup, scene=scenario, left_out=frozenset())
+    setup = setup.with_camera(pixel=scenario.noise.of(setup.camera.pixel))
+    return replace(problem, setup=setup, constraints={"sensitivity": Bound(min=0.9)})
 
 
 def filters(problem: Problem, n: int) -> np.ndarray:
     """Random filters below the base with at least nine tenths of its sensitivity: smooth, steps, and deep bands."""
-    base, rng = problem.view.base_qe[0], np.random.default_rng(5)
+    base, rng = problem.setup.camera.base_qe[0], np.random.default_rng(5)
     found = [base]
     while len(found) < n:
         share = np.ones(base.size)
@@ -72,27 +73,31 @@ def test_of_each_error_without_a_limit_it_is_said_why() -> None:
 @pytest.mark.parametrize("scene", SCENES)
 def test_no_filter_has_less_noise_or_a_larger_d_prime(scene: str) -> None:
     problem = problem_in(scene)
-    imager, base = linear_model(problem.view), problem.view.base_qe[0]
+    imager, base = linear_model(problem.setup), problem.setup.camera.base_qe[0]
     curves = filters(problem, 200)[:, None]
-    row, channel = np.ones_like(base) / base.sum(), problem.view.modified[0]
+    row, channel = np.ones_like(base) / base.sum(), problem.setup.camera.modified[0]
     least = least_variance(imager, base, (np.zeros_like(base), base), row, 0.9)
     assert (imager.variance(curves)[..., channel] >= least).all()
     limit = limit_of(problem)
     assert limit.curve is not None
-    reached = smooth_detectability(problem.view, curves, ("yellow", "red"))
+    reached = smooth_detectability(problem.setup, curves, ("yellow", "red"))
     assert reached.max() <= limit.proven
     best = searched(problem)
     assert reached.max() < best.objective <= limit.proven
-    own = smooth_detectability(problem.view, limit.curve[None, None], ("yellow", "red"))[0]
+    own = smooth_detectability(problem.setup, limit.curve[None, None], ("yellow", "red"))[0]
     assert limit.attained == pytest.approx(own, rel=1e-12)
     assert limit.attained <= limit.proven
 
 
 def test_the_least_light_is_that_of_a_linear_program() -> None:
     problem = problem_in("chart")
-    imager, base = linear_model(problem.view), problem.view.base_qe[0]
-    row, channel, gain = np.ones_like(base) / base.sum(), problem.view.modified[0], problem.view.pixel.dn_per_e
-    no_prnu = replace(problem.view, pixel=problem.view.pixel.model_copy(update={"prnu": 0.0}))
+    imager, base = linear_model(problem.setup), problem.setup.camera.base_qe[0]
+    row, channel, gain = (
+        np.ones_like(base) / base.sum(),
+        problem.setup.camera.modified[0],
+        problem.setup.camera.pixel.dn_per_e,
+    )
+    no_prnu = problem.setup.with_camera(pixel=problem.setup.camera.pixel.model_copy(update={"prnu": 0.0}))
     least = least_variance(linear_model(no_prnu), base, (0.2 * base, base), row, 0.9)[0]
     light = imager.per_qe(0, base[None])[0, :, channel] / gain
     for signal in (0, 20, 40):

@@ -31,8 +31,8 @@ def problem(**given: float) -> Problem:
     assert STUDY.search is not None
     plain = STUDY.problem(STUDY.search)
     population = Population.model_validate({"temperature_c": [-40, 85], "self_heating_k": 20, **given})
-    view = replace(plain.view, lights=replace(plain.view.lights, population=population))
-    return replace(plain, view=view, objective=Objective(minimum={"worst_csd_yellow_red": 1.0}))
+    setup = replace(plain.setup, lights=replace(plain.setup.lights, population=population))
+    return replace(plain, setup=setup, objective=Objective(minimum={"worst_csd_yellow_red": 1.0}))
 
 
 @pytest.mark.slow
@@ -74,7 +74,7 @@ def test_the_limit_is_attained_over_all_members() -> None:
     found = limit()
     assert found.curve is not None
     assert 0 <= found.proven - found.attained <= 0.02
-    over = population_imager(problem(binning_nm=1).view).worst(found.curve[None, None])["csd_yellow_red"][0]
+    over = population_imager(problem(binning_nm=1).setup).worst(found.curve[None, None])["csd_yellow_red"][0]
     assert over == pytest.approx(found.attained, rel=1e-9)
     assert found.open_parts == 0
 
@@ -87,14 +87,14 @@ def test_a_larger_population_has_a_lower_limit() -> None:
 
 @pytest.mark.slow
 def test_no_random_filter_beats_the_limit_over_the_population() -> None:
-    view = problem(binning_nm=1).view
-    base, seen = view.base_qe, population_imager(view)
+    setup = problem(binning_nm=1).setup
+    base, seen = setup.camera.base_qe, population_imager(setup)
     rng, best = np.random.default_rng(3), 0.0
     for kind in ("stopband", "multi_stopband", "free_form"):
         curves = random_filters(kind, 3000, rng)
-        lost = 1 - designed_quantities(view, curves)["sensitivity"]
+        lost = 1 - designed_quantities(setup, curves)["sensitivity"]
         curves = base + np.minimum(1.0, 0.1 / np.maximum(lost, 1e-12))[:, None, None] * (curves - base)
-        found = designed_quantities(view, curves)
+        found = designed_quantities(setup, curves)
         curves = curves[(found["sensitivity"] >= 0.9) & (found["slope_per_nm"] <= 0.06)]
         best = max(best, float(seen.worst(curves, [("yellow", "red")])["csd_yellow_red"].max()))
     assert 0.3 * limit().proven < best <= limit().proven
@@ -111,12 +111,12 @@ def test_the_table_of_the_documentation() -> None:
     found = {}
     for at, space in enumerate(study.spaces[:4]):
         shifts = (0.0,) if space.filter is None else (-2.0, -1.0, 0.0, 1.0, 2.0)
-        point, view = space.points(0, 1), study.view(space, "f/2")
+        point, setup = space.points(0, 1), study.setup(space, "f/2")
         curves = [space.curves(point, study.grid.size, Off(shift)) for shift in shifts]
-        over = population_imager(view).worst(np.concatenate(curves))["csd_yellow_red"].min()
-        warm = population_imager(alone.view(alone.spaces[at], "f/2")).worst(space.curves(point, study.grid.size))
+        over = population_imager(setup).worst(np.concatenate(curves))["csd_yellow_red"].min()
+        warm = population_imager(alone.setup(alone.spaces[at], "f/2")).worst(space.curves(point, study.grid.size))
         values = (
-            smooth_csd(view, space.curves(point, study.grid.size), ("yellow", "red"))[0],
+            smooth_csd(setup, space.curves(point, study.grid.size), ("yellow", "red"))[0],
             warm["csd_yellow_red"][0],
             over,
         )
@@ -126,8 +126,8 @@ def test_the_table_of_the_documentation() -> None:
 
 def test_a_filter_of_ones_own_has_its_worst_case_where_no_edges_shift() -> None:
     study = load_study(STUDIES / "robust.yaml", changes={"production.edge_shift_nm": "0"})
-    view = study.view(study.spaces[3], "f/2")
-    curves = 0.9 * view.base_qe[None]
-    found = judged(study, view, curves)["worst_csd_yellow_red"]
-    assert found == population_imager(view).worst(curves)["csd_yellow_red"]
-    assert 0 < found[0] < smooth_csd(view, curves, ("yellow", "red"))[0]
+    setup = study.setup(study.spaces[3], "f/2")
+    curves = 0.9 * setup.camera.base_qe[None]
+    found = judged(study, setup, curves)["worst_csd_yellow_red"]
+    assert found == population_imager(setup).worst(curves)["csd_yellow_red"]
+    assert 0 < found[0] < smooth_csd(setup, curves, ("yellow", "red"))[0]

@@ -44,17 +44,17 @@ def limit() -> Limit:
 
 def test_a_bound_on_sensitivity_is_none_of_what_comes_out() -> None:
     """Beside a darker Y a filter of at most 0.9 leaves the exposure to others; one that production moves may not."""
-    qe = problem().view.qe.copy()
-    qe[problem().view.mosaic.channels.index("Y")] *= 0.95
-    view = replace(problem().view, qe=qe)
-    moved = replace(problem(), view=view, constraints={"sensitivity": Bound(max=0.9)})
+    qe = problem().setup.camera.qe.copy()
+    qe[problem().setup.camera.mosaic.channels.index("Y")] *= 0.95
+    setup = problem().setup.with_camera(qe=qe)
+    moved = replace(problem(), setup=setup, constraints={"sensitivity": Bound(max=0.9)})
     assert why_not(moved) == "the modified channel could set the exposure"
     assert why_not(replace(moved, objective=Objective(minimum={"csd_yellow_red": 1.0}))) is None
 
 
 def test_a_way_is_the_family_as_production_has_it() -> None:
     """Of random stopbands: the curve where it is known, and sums over it between the ends that rows have."""
-    rng, base, family = np.random.default_rng(5), problem().view.base_qe[0], problem().family
+    rng, base, family = np.random.default_rng(5), problem().setup.camera.base_qe[0], problem().family
     points = problem().from_unit(starting_points(problem(), 64, 1))
     curves = family.curves(points)[:, 0]
     apart = rng.normal(size=(7, base.size))
@@ -120,7 +120,7 @@ def test_its_filter_keeps_the_bounds_of_the_study_on_worst_cases() -> None:
     found = limit_of(asked)
     assert found.curve is not None
     came_out = np.stack([way.curve(found.curve) for way in ways_of(asked)])[:, None]
-    each = smooth_csd(asked.view, came_out, ("yellow", "red"))
+    each = smooth_csd(asked.setup, came_out, ("yellow", "red"))
     assert each.min() >= 256 * (1 - 1e-9)
     assert each[0] == pytest.approx(found.attained, rel=1e-12)
     assert 0 <= found.proven - found.attained <= 0.02
@@ -166,7 +166,7 @@ def test_free_form_filters_come_near_the_limit_over_lamps_and_edges() -> None:
     best = best_feasible(search_from(searched, 0, starting_points(searched, 1, 1)[0], "SLSQP", 100).log)
     assert best is not None
     came_out = [searched.family.produced(Off(shift)).curves(best.x[None]) for shift in SHIFTS]
-    worst = population_imager(searched.view).worst(np.concatenate(came_out))["csd_yellow_red"].min()
+    worst = population_imager(searched.setup).worst(np.concatenate(came_out))["csd_yellow_red"].min()
     assert worst == pytest.approx(best.objective, rel=1e-9)
     proven = limit_of(searched).proven
     below = f"{1 - worst / proven:.1%}".replace("%", " %")

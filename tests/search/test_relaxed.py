@@ -33,8 +33,8 @@ def share() -> Problem:
     """Half of the lamps have a distance; edges come out off."""
     assert STUDY.search is not None
     plain = STUDY.problem(STUDY.search)
-    view = replace(plain.view, lights=replace(plain.view.lights, population=Population.model_validate(HALF)))
-    return replace(plain, view=view, edge_shift_nm=2.0, constraints={"sensitivity": Bound(min=0.9)})
+    setup = replace(plain.setup, lights=replace(plain.setup.lights, population=Population.model_validate(HALF)))
+    return replace(plain, setup=setup, edge_shift_nm=2.0, constraints={"sensitivity": Bound(min=0.9)})
 
 
 def noisy() -> Problem:
@@ -69,9 +69,9 @@ def test_what_meets_a_bound_of_the_study_meets_those_of_the_limit(made: Callable
 
 def test_a_bound_on_what_a_share_has_is_left_out_of_the_limit() -> None:
     """It lies above what the nearest lights of the study have: to ask that of these would be more than the study does."""
-    lights = replace(share().view.lights, population=Population.model_validate({"wanted_yield": 0.5, "draws": 1000}))
+    lights = replace(share().setup.lights, population=Population.model_validate({"wanted_yield": 0.5, "draws": 1000}))
     asked = {"sensitivity": Bound(min=0.9), "yield_csd_yellow_red": Bound(min=285)}
-    problem = replace(share(), view=replace(share().view, lights=lights), edge_shift_nm=0.0, constraints=asked)
+    problem = replace(share(), setup=replace(share().setup, lights=lights), edge_shift_nm=0.0, constraints=asked)
     found = best_feasible(search_from(problem, 0, starting_points(problem, 1, 1)[0], "SLSQP", 60).log)
     assert found is not None
     limit = limit_of(problem)
@@ -81,7 +81,7 @@ def test_a_bound_on_what_a_share_has_is_left_out_of_the_limit() -> None:
 
 def test_no_limit_is_claimed_where_a_filter_comes_out_above_the_curve_that_it_replaces() -> None:
     """Its edges keep it from where its other curve is above that, but not when they come out elsewhere."""
-    wave, base, green = STUDY.grid.nodes_nm, share().view.base_qe[0], STUDY.sensor.qe["G"]
+    wave, base, green = STUDY.grid.nodes_nm, share().setup.camera.base_qe[0], STUDY.sensor.qe["G"]
     target = np.where((wave >= 656) & (wave <= 658), 1.1 * base, np.minimum(green, base))
     low, high = np.array([600.0, 6, 640, 6, 1]), np.array([610.0, 6, 650, 6, 1])
     objective = Objective(minimum={"worst_csd_yellow_red": 1.0})

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from sweep.camera.field import view_at
+from sweep.camera.field import setup_at
 from sweep.camera.linear import LinearModel, linear_model
 from sweep.camera.sensor_field import SensorField
-from sweep.camera.view import View
+from sweep.camera.setup import Setup
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.smooth import smooth_csd, smooth_response
 from sweep.search.limit import Limit, limit_of, why_not
@@ -36,14 +36,14 @@ YELLOW_RED = ("yellow", "red")
 def problem() -> Problem:
     assert STUDY.search is not None
     given = STUDY.problem(STUDY.search)
-    scene = given.view.scenario.model_copy(update={"field": SensorField(cra_deg=PLACES_DEG)})
-    return replace(given, view=replace(given.view, scenario=scene))
+    scene = given.setup.scene.model_copy(update={"field": SensorField(cra_deg=PLACES_DEG)})
+    return replace(given, setup=replace(given.setup, scene=scene))
 
 
-def worst_of_all_places_dn(view: View, curves: np.ndarray) -> float:
+def worst_of_all_places_dn(setup: Setup, curves: np.ndarray) -> float:
     """The smallest yellow/red distance of a filter at any of 401 image heights, ndarray[1, n_wavelengths]; DN."""
     heights = np.linspace(0, 1, 401)
-    return min(float(smooth_csd(view_at(view, float(h)), curves[None], YELLOW_RED)[0]) for h in heights)
+    return min(float(smooth_csd(setup_at(setup, float(h)), curves[None], YELLOW_RED)[0]) for h in heights)
 
 
 @cache
@@ -53,13 +53,13 @@ def limit() -> Limit:
 
 
 def test_its_filter_has_it_at_the_worst_place_and_more_at_the_others() -> None:
-    found, view = limit(), problem().view
+    found, setup = limit(), problem().setup
     assert found.curve is not None
     assert 0 <= found.proven - found.attained <= 2e-3
     each = []
     for cra_deg in PLACES_DEG:
-        optics = view.scenario.optics.model_copy(update={"cra_deg": cra_deg})
-        place = replace(view, scenario=view.scenario.model_copy(update={"field": None, "optics": optics}))
+        optics = setup.scene.optics.model_copy(update={"cra_deg": cra_deg})
+        place = replace(setup, scene=setup.scene.model_copy(update={"field": None, "optics": optics}))
         each.append(float(smooth_csd(place, found.curve[None, None], YELLOW_RED)[0]))
     assert min(each) == pytest.approx(found.attained, rel=1e-12)
 
@@ -67,19 +67,19 @@ def test_its_filter_has_it_at_the_worst_place_and_more_at_the_others() -> None:
 @pytest.mark.slow
 def test_over_all_places_it_is_a_bracket_of_the_worst_one() -> None:
     """Of 200 image heights, each a scene of its own, none is worse for its filter; named places have no lower limit."""
-    given, optics = problem(), problem().view.scenario.optics
+    given, optics = problem(), problem().setup.scene.optics
     field = SensorField(cra_max_deg=20.0, places="any")
-    scene = given.view.scenario.model_copy(update={"field": field})
-    found = limit_of(replace(given, view=replace(given.view, scenario=scene)))
+    scene = given.setup.scene.model_copy(update={"field": field})
+    found = limit_of(replace(given, setup=replace(given.setup, scene=scene)))
     assert found.curve is not None
     assert 0 <= found.proven - found.attained <= 0.02
     assert found.proven <= limit().proven + 1e-6
     least = np.inf
     for cra_deg in np.linspace(0, 20, 200):
-        own = given.view.scenario.model_copy(
+        own = given.setup.scene.model_copy(
             update={"field": None, "optics": optics.model_copy(update={"cra_deg": float(cra_deg)})}
         )
-        least = min(least, float(smooth_csd(replace(given.view, scenario=own), found.curve[None, None], YELLOW_RED)[0]))
+        least = min(least, float(smooth_csd(replace(given.setup, scene=own), found.curve[None, None], YELLOW_RED)[0]))
     assert found.attained <= least <= found.attained + 0.02
 
 
@@ -143,18 +143,18 @@ def test_a_program_of_its_own_agrees() -> None:
 
 @pytest.mark.slow
 def test_no_random_feasible_filter_beats_the_robust_limit() -> None:
-    base, tried, best = problem().view.base_qe, 0, 0.0
+    base, tried, best = problem().setup.camera.base_qe, 0, 0.0
     rng = np.random.default_rng(12)
     while tried < 100_000:
         curves = np.concatenate(
             [random_filters(kind, 4000, rng) for kind in ("stopband", "multi_stopband", "free_form")]
         )
-        lost = 1 - designed_quantities(problem().view, curves)["sensitivity"]
+        lost = 1 - designed_quantities(problem().setup, curves)["sensitivity"]
         curves = base + np.minimum(1.0, 0.1 / np.maximum(lost, 1e-12))[:, None, None] * (curves - base)
-        found = designed_quantities(problem().view, curves)
+        found = designed_quantities(problem().setup, curves)
         curves = curves[(found["sensitivity"] >= 0.9) & (found["slope_per_nm"] <= 0.06)]
         tried += len(curves)
-        best = max(best, float(smooth_csd(problem().view, curves, YELLOW_RED).max()))
+        best = max(best, float(smooth_csd(problem().setup, curves, YELLOW_RED).max()))
     assert 0.5 * limit().proven < best <= limit().proven
 
 
@@ -173,7 +173,7 @@ def agrees_over_the_sensor(template: Problem, seed: int) -> bool:
     """Whether pairs of the best filter lie on both sides; a MILP with a binary per pair and place has the same limit."""
     problem = random_problem(template, seed)
     found = agrees(problem)
-    assert len(smooth_response(problem.view, problem.view.base_qe[None])[0]) == 3
+    assert len(smooth_response(problem.setup, problem.setup.camera.base_qe[None])[0]) == 3
     if seed % 2 == 0:  # the other channels tell nothing apart, so the MILP's margin is what is left to the limit
         assert largest(problem, found.proven) == pytest.approx(found.proven, abs=1e-3)
     return is_mixed(problem, found.curve)
@@ -204,7 +204,7 @@ def test_free_form_filters_come_near_the_limit_over_the_whole_sensor() -> None:
     best = best_feasible(search_from(searched, 0, starting_points(searched, 1, 1)[0], "SLSQP", 200).log)
     assert best is not None
     curves = searched.family.curves(best.x[None])
-    worst_dn = worst_of_all_places_dn(searched.view, curves[0])
+    worst_dn = worst_of_all_places_dn(searched.setup, curves[0])
     proven = limit_of(searched).proven
     assert worst_dn <= proven
     text = " ".join((STUDIES / "README.md").read_text(encoding="utf-8").split())
@@ -216,10 +216,10 @@ def test_free_form_filters_come_near_the_limit_over_the_whole_sensor() -> None:
 def test_responses_of_filters_that_move_are_their_own() -> None:
     """Those of a still filter in the same scene are of fewer field positions."""
     (space,) = [each for each in STUDY.spaces if each.name == "robust"]
-    view, curves = STUDY.view(space, "field"), space.curves(space.points(0, 1), STUDY.grid.size)
-    still, moving = linear_model(replace(view, technologies=())), linear_model(view)
+    setup, curves = STUDY.setup(space, "field"), space.curves(space.points(0, 1), STUDY.grid.size)
+    still, moving = linear_model(setup.with_camera(technologies=())), linear_model(setup)
     assert still.n_cases == 1 < moving.n_cases
-    np.testing.assert_array_equal(moving.smooth(curves), LinearModel(moving.view).smooth(curves))
+    np.testing.assert_array_equal(moving.smooth(curves), LinearModel(moving.setup).smooth(curves))
 
 
 @pytest.mark.slow
@@ -233,13 +233,13 @@ def test_the_table_of_the_documentation() -> None:
     found = {}
     for space in STUDY.spaces:
         if space.filter is None or space.gridded:
-            views = STUDY.view(space, "field"), STUDY.view(space, "f/1.6 cra_deg=0"), STUDY.view(space, "field")
-            views = (replace(views[0], technologies=()), *views[1:])
+            setups = STUDY.setup(space, "field"), STUDY.setup(space, "f/1.6 cra_deg=0"), STUDY.setup(space, "field")
+            setups = (setups[0].with_camera(technologies=()), *setups[1:])
             curves = space.curves(space.points(0, 1), STUDY.grid.size)
-            found[space.name] = [f"{smooth_csd(view, curves, YELLOW_RED)[0]:.0f}" for view in views[:2]]
-            found[space.name].append(f"{worst_of_all_places_dn(views[2], curves[0]):.0f}")
+            found[space.name] = [f"{smooth_csd(setup, curves, YELLOW_RED)[0]:.0f}" for setup in setups[:2]]
+            found[space.name].append(f"{worst_of_all_places_dn(setups[2], curves[0]):.0f}")
     assert STUDY.search is not None
     still = STUDY.problem(STUDY.search)
-    limits = limit_of(replace(still, view=replace(still.view, technologies=()))), limit_of(still)
+    limits = limit_of(replace(still, setup=still.setup.with_camera(technologies=()))), limit_of(still)
     found["limit"] = [f"{limits[0].proven:.0f}", "", f"{limits[1].proven:.0f}"]
     assert printed == found

@@ -38,11 +38,11 @@ def test_search_beats_a_fine_grid_of_its_box(study: Study) -> None:
     rng = np.random.default_rng(7)
     x = problem.from_unit(rng.uniform(size=(20_000, problem.free.size)))
     curves = problem.family.curves(x)
-    ok = (designed_quantities(problem.view, curves)["sensitivity"] >= 0.90) & (problem.family.violation(x) <= 0).all(
+    ok = (designed_quantities(problem.setup, curves)["sensitivity"] >= 0.90) & (problem.family.violation(x) <= 0).all(
         axis=1
     )
-    members = problem.view.members
-    csd = separation(smooth_response(problem.view, curves[ok])[:, 0], members["yellow"], members["red"])
+    members = problem.setup.members
+    csd = separation(smooth_response(problem.setup, curves[ok])[:, 0], members["yellow"], members["red"])
     log = []
     for start, u in enumerate(starting_points(problem, 4, 1)):
         log += search_from(problem, start, u, "SLSQP", 125).log
@@ -68,15 +68,15 @@ def test_search_beats_a_million_designs_of_its_box(tmp_path: Path) -> None:
     space = study.search.space
     assert space.size == 1_000_000
     problem = study.problem(study.search)
-    members = problem.view.members
+    members = problem.setup.members
     best_swept = 0.0
     for start in range(0, space.size, 4000):
         x = space.points(start, start + 4000)
         curves = problem.family.curves(x)
-        amounts = designed_quantities(problem.view, curves)
+        amounts = designed_quantities(problem.setup, curves)
         ok = total_violation(amounts, problem.constraints, space.violation(x)) <= FEASIBLE
         if ok.any():
-            response = smooth_response(problem.view, curves[ok])[:, 0]
+            response = smooth_response(problem.setup, curves[ok])[:, 0]
             best_swept = max(best_swept, separation(response, members["yellow"], members["red"]).max())
     runs = [search_from(problem, i, u, "SLSQP", 125) for i, u in enumerate(starting_points(problem, 16, 1))]
     best = best_feasible([e for run in runs for e in run.log])
@@ -184,8 +184,8 @@ def test_constraint_on_another_pair_is_met(tmp_path: Path) -> None:
     ]
     best = best_feasible(log)
     assert best is not None
-    members = problem.view.members
-    response = smooth_response(problem.view, problem.family.curves(best.x[None]))[:, 0]
+    members = problem.setup.members
+    response = smooth_response(problem.setup, problem.family.curves(best.x[None]))[:, 0]
     assert separation(response, members["orange"], members["red"])[0] >= 100 * (1 - FEASIBLE)
 
 
@@ -228,8 +228,8 @@ def test_direct_algorithms_repeat(study: Study, algorithm: str) -> None:
 def test_a_filter_without_light_does_not_end_the_search(study: Study) -> None:
     assert study.search is not None
     problem = study.problem(study.search)
-    dark = replace(problem.view, qe=problem.view.qe * 0)
-    run = search_from(replace(problem, view=dark), 0, np.full(problem.free.size, 0.5), "SLSQP", 20)
+    dark = problem.setup.with_camera(qe=problem.setup.camera.qe * 0)
+    run = search_from(replace(problem, setup=dark), 0, np.full(problem.free.size, 0.5), "SLSQP", 20)
     assert best_feasible(run.log) is None
     assert run.log
 
@@ -244,12 +244,12 @@ def test_a_bound_at_the_end_of_what_can_be_is_met(study: Study, constraints: dic
     assert study.search is not None
     found = study.problem(study.search)
     wave, base = study.grid.nodes_nm, np.full(study.grid.size, 0.3)
-    qe = found.view.qe.copy()
-    qe[found.view.modified[0]] = base
+    qe = found.setup.camera.qe.copy()
+    qe[found.setup.camera.modified[0]] = base
     family = FreeForm(wave, base, np.arange(400.0, 701.0, 20.0))
     ends = np.zeros(family.nodes_nm.size), np.ones(family.nodes_nm.size)
     problem = Problem(
-        replace(found.view, qe=qe), family, *ends, Objective(minimum={"csd_yellow_red": 1.0}), constraints
+        found.setup.with_camera(qe=qe), family, *ends, Objective(minimum={"csd_yellow_red": 1.0}), constraints
     )
     log = [
         e for i, u in enumerate(starting_points(problem, 4, 1)) for e in search_from(problem, i, u, "SLSQP", 100).log
@@ -258,7 +258,7 @@ def test_a_bound_at_the_end_of_what_can_be_is_met(study: Study, constraints: dic
     assert best is not None
     name, bound = next(iter(constraints.items()))
     curves = family.curves(best.x[None])
-    assert bound.violation(designed_quantities(problem.view, curves)[name])[0] <= FEASIBLE
+    assert bound.violation(designed_quantities(problem.setup, curves)[name])[0] <= FEASIBLE
     assert np.ptp(curves) <= 1e-6  # 300 steps of what counts as no slope
     assert best.objective <= limit_of(problem).proven
 

@@ -87,13 +87,10 @@ def test_derivatives_agree_with_differences(name: str, objective: Objective) -> 
 )
 @pytest.mark.parametrize("crosstalk", [0.0, 0.05])
 def test_derivatives_hold_in_scenes(scenario: dict[str, object], crosstalk: float) -> None:
-    view = replace(
-        STOPBAND.view,
-        scenario=Scene.model_validate(scenario),
-        pixel=Pixel(crosstalk=crosstalk),
-        accuracy=Accuracy(phases_per_px=1),
-    )
-    problem = replace(STOPBAND, view=view)
+    scene = Scene.model_validate(scenario)
+    setup = replace(STOPBAND.setup, scene=scene, accuracy=Accuracy(phases_per_px=1))
+    setup = setup.with_camera(pixel=Pixel(crosstalk=crosstalk))
+    problem = replace(STOPBAND, setup=setup)
     u, step = np.full(problem.free.size, 0.4), 1e-5
     _, by_u = at(problem, u)
     scale = np.abs(by_u).max(axis=1) + 1e-9
@@ -104,11 +101,11 @@ def test_derivatives_hold_in_scenes(scenario: dict[str, object], crosstalk: floa
 
 def test_a_search_in_a_far_scene_stays_below_its_limit() -> None:
     far = {"target": {"distance_m": 250, "fov_deg": 30}, "optics": {"f_number": 2.0}}
-    view = replace(STOPBAND.view, scenario=Scene.model_validate(far))
-    problem = replace(STOPBAND, view=view)
+    setup = replace(STOPBAND.setup, scene=Scene.model_validate(far))
+    problem = replace(STOPBAND, setup=setup)
     limit = limit_of(problem)
     assert limit.curve is not None
-    assert smooth_csd(view, limit.curve[None, None], ("yellow", "red"))[0] == pytest.approx(limit.attained, rel=1e-12)
+    assert smooth_csd(setup, limit.curve[None, None], ("yellow", "red"))[0] == pytest.approx(limit.attained, rel=1e-12)
     log = [
         e for i, u in enumerate(starting_points(problem, 4, 1)) for e in search_from(problem, i, u, "SLSQP", 125).log
     ]
@@ -116,7 +113,7 @@ def test_a_search_in_a_far_scene_stays_below_its_limit() -> None:
     assert best is not None
     assert 0.7 * limit.proven < best.objective <= limit.proven
     assert limit.proven < limit_of(STOPBAND).proven  # blur takes separation away from every filter
-    mixed = replace(problem, view=replace(view, pixel=Pixel(crosstalk=0.01)))
+    mixed = replace(problem, setup=setup.with_camera(pixel=Pixel(crosstalk=0.01)))
     assert why_not(mixed) == "crosstalk mixes the modified channel into others"
 
 
@@ -129,9 +126,9 @@ def test_worst_case_is_the_smallest_over_the_shifts() -> None:
     moved = np.repeat(best.x[None], 401, axis=0)
     moved[:, [0, 2]] += np.linspace(-4, 4, 401)[:, None]
     curves = problem.family.curves(moved)
-    members = problem.view.members
-    csd = separation(smooth_response(problem.view, curves)[:, 0], members["yellow"], members["red"])
-    sensitivity = designed_quantities(problem.view, curves)["sensitivity"]
+    members = problem.setup.members
+    csd = separation(smooth_response(problem.setup, curves)[:, 0], members["yellow"], members["red"])
+    sensitivity = designed_quantities(problem.setup, curves)["sensitivity"]
     assert best.objective == pytest.approx(csd[::100].min(), rel=1e-12)
     # Between the five places that are looked at, nothing is much worse.
     assert csd.min() >= best.objective * 0.99
@@ -203,16 +200,16 @@ def test_best_reachable_is_the_extreme_of_a_quantity_alone() -> None:
     }
     problem = replace(STOPBAND, constraints=impossible)
     found = {name: best_reachable(problem, name, starts, 200) for name in impossible}
-    base = STOPBAND.view.base_qe
+    base = STOPBAND.setup.camera.base_qe
     u = np.random.default_rng(5).uniform(size=(20_000, problem.free.size))
     x = problem.from_unit(u)
     x = x[(problem.family.violation(x) <= 0).all(axis=1)]
-    tried = designed_quantities(problem.view, problem.family.curves(x))["sensitivity"]
+    tried = designed_quantities(problem.setup, problem.family.curves(x))["sensitivity"]
     assert tried.max() <= found["sensitivity"] < 1
     # No stopband is flatter than its base where it leaves it alone.
     assert found["slope_per_nm"] >= np.abs(np.diff(base[0])).max() * (1 - 1e-9)
     assert found["slope_per_nm"] < 0.06
     assert found["band_width_nm"] == pytest.approx(problem.high[2] - problem.low[0], rel=1e-6)
-    members = problem.view.members
-    response = smooth_response(problem.view, problem.family.curves(x))[:, 0]
+    members = problem.setup.members
+    response = smooth_response(problem.setup, problem.family.curves(x))[:, 0]
     assert separation(response, members["yellow"], members["red"]).max() <= found["csd_yellow_red"] < 4000

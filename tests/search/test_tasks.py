@@ -51,7 +51,7 @@ def test_the_search_is_as_good_as_the_best_of_many(name: str, objective: Any, al
     rng = np.random.default_rng(1)
     drawn = problem.from_unit(rng.random((150, problem.free.size)))
     drawn = drawn[(problem.family.violation(drawn) <= 0).all(axis=1)]
-    columns = designed_quantities(problem.view, problem.family.curves(drawn))
+    columns = designed_quantities(problem.setup, problem.family.curves(drawn))
     sign = 1 if problem.quantities[name].wanted == "more" else -1
     best = max(sign * value for value, s in zip(columns[name], columns["sensitivity"], strict=True) if s >= 0.8)
     points = starting_points(problem, study.search.starts, 1)
@@ -60,7 +60,7 @@ def test_the_search_is_as_good_as_the_best_of_many(name: str, objective: Any, al
     ]
     found = best_feasible(log)
     assert found is not None
-    told = designed_quantities(problem.view, problem.family.curves(found.x[None]))
+    told = designed_quantities(problem.setup, problem.family.curves(found.x[None]))
     assert sign * told[name][0] >= best - 1e-9 * abs(best)
     assert told["sensitivity"][0] >= 0.8 - FEASIBLE
     assert found.objective == pytest.approx(study.objective.of(told)[0], rel=1e-9)

@@ -61,8 +61,8 @@ def family_of(seed: int, n_modified: int) -> tuple[Family, np.ndarray, np.ndarra
 
 def searchable(seed: int) -> bool:
     """Whether a scene has a filter to search, and no pulses under an exposure that the filter sets (they are refused)."""
-    view = random_scene(seed).view
-    return bool(view.modified) and (view.scenario.drive is None or view.scenario.exposure.kind == "fixed")
+    setup = random_scene(seed).setup
+    return bool(setup.camera.modified) and (setup.scene.drive is None or setup.scene.exposure.kind == "fixed")
 
 
 def differences_off(seed: int) -> float:
@@ -72,10 +72,10 @@ def differences_off(seed: int) -> float:
     step: that of a mean, in units of the noise, moves d' by as much, and so d'^2 and the decades by 2 d' times that.
     """
     made = random_scene(seed)
-    family, x, span = family_of(seed, len(made.view.modified))
+    family, x, span = family_of(seed, len(made.setup.camera.modified))
     # A lattice of pixels: more places take long, and are computed alike.
-    view = replace(made.view, accuracy=Accuracy(phases_per_px=1))
-    imager, free = linear_model(view), np.arange(x.size)
+    setup = replace(made.setup, accuracy=Accuracy(phases_per_px=1))
+    imager, free = linear_model(setup), np.arange(x.size)
 
     def rows(at: np.ndarray, free: np.ndarray = free[:1]) -> list[Rows]:
         design = SmoothDesign(imager, family, at, free, span[free])
@@ -105,7 +105,7 @@ def test_derivatives_agree_with_differences_in_scenes(seed: int) -> None:
 def test_derivatives_agree_with_differences_in_200_scenes() -> None:
     seeds = [seed for seed in range(420) if searchable(seed)][:200]
     assert len(seeds) == 200
-    assert {family_of(seed, len(random_scene(seed).view.modified))[0].kind for seed in seeds} == set(REGISTERED)
+    assert {family_of(seed, len(random_scene(seed).setup.camera.modified))[0].kind for seed in seeds} == set(REGISTERED)
     assert {seed: off for seed in seeds if (off := differences_off(seed)) > 1} == {}
 
 
@@ -134,7 +134,7 @@ def test_the_objective_is_met_by_the_readout() -> None:
     """Of the design that is found: exact sums over digital numbers, as the result table has them."""
     problem = problem_of("stopband", 30, 0.3, Objective(least={"state_error": 1.0}))
     best = searched(problem)
-    imager = ForwardModel(problem.view.with_all_effects)
+    imager = ForwardModel(problem.setup.with_all_effects)
     found = evaluate(imager, problem.family.curves(best.x[None]), STATES)
     # Gaussians beside exact sums of Poisson electrons: the error itself within 5 %.
     assert problem.objective.of(found)[0] == pytest.approx(best.objective, abs=0.02)
@@ -145,7 +145,7 @@ def test_bounds_on_errors_are_kept_and_their_reach_is_told() -> None:
     problem = replace(problem_of("stopband", 30, 0.3, Objective(minimum={"cfa_sensitivity": 1.0})), constraints=bounds)
     best = searched(problem)
     curves = problem.family.curves(best.x[None])
-    found = evaluate(ForwardModel(problem.view.with_all_effects), curves, STATES)
+    found = evaluate(ForwardModel(problem.setup.with_all_effects), curves, STATES)
     assert found["dprime_yellow_red"][0] == pytest.approx(5.0, rel=2e-3)  # light is bought with distance
     assert found["error_green_red"][0] <= 1e-4
     alone = {"error_yellow_red": Bound(max=1e-12)}
@@ -186,8 +186,8 @@ def test_what_cannot_be_asked_of_errors_is_a_line(told: str, fault: str, tmp_pat
 
 def drawn_error(problem: Problem, x: np.ndarray, rng: np.random.Generator, draws: int) -> float:
     """How often the most likely of the worst two lights is the wrong one, of patches drawn pixel by pixel."""
-    imager, curves = ForwardModel(problem.view.with_all_effects), problem.family.curves(x[None])
-    read, members = imager.read_with_noise(curves), problem.view.members
+    imager, curves = ForwardModel(problem.setup.with_all_effects), problem.family.curves(x[None])
+    read, members = imager.read_with_noise(curves), problem.setup.members
     mean, variance, electrons = read.mean[0, 0], read.variance[0, 0], imager.pixel_electrons(curves)[0, 0]
     pairs = [(a, b) for a in members["yellow"] for b in members["red"]]
     worst = max(pairs, key=lambda p: pairwise_error(mean[None], variance[None], np.array([p[0]]), np.array([p[1]]))[0])

@@ -47,7 +47,7 @@ def test_the_least_error_of_the_observer_is_searched_for() -> None:
     problem = study.problem(study.search)
 
     def errors(x: np.ndarray) -> np.ndarray:
-        return image_quantities(problem.view, problem.family.curves(x), study.section.vision, 1)["vision_error"]
+        return image_quantities(problem.setup, problem.family.curves(x), study.section.vision, 1)["vision_error"]
 
     over = errors(problem.from_unit(np.linspace(0, 1, 5)[:, None]))
     assert over.max() > 1.05 * over.min() > 0

@@ -116,7 +116,7 @@ def statuses(study: Study, scenario: str) -> set[str]:
     rules, found = rules_of(planned), set()
     for space in planned.spaces:
         job = Job(space, scenario, 0, min(space.size, 2), 0, 0)
-        found |= set(run_job(job, planned.view(space, scenario), rules)["status"].to_pylist())
+        found |= set(run_job(job, planned.setup(space, scenario), rules)["status"].to_pylist())
     return found
 
 

@@ -72,7 +72,7 @@ def first_rows(study: Study, scenario: str) -> set[str]:
     planned = replace(study, plans={scenario: study.plan(scenario)}, scenarios={scenario: study.scenarios[scenario]})
     rules, found = rules_of(planned), set()
     for job in jobs(planned):
-        made = run_job(replace(job, stop=min(job.stop, job.start + 2)), planned.view(job.space, scenario), rules)
+        made = run_job(replace(job, stop=min(job.stop, job.start + 2)), planned.setup(job.space, scenario), rules)
         found |= set(made["status"].to_pylist())
     return found
 

@@ -47,7 +47,7 @@ def test_an_own_curve_takes_the_place_of_the_built_in_one_in_every_cfa(tmp_path:
     study = own(tmp_path, "R: mine, N: mine", mine=np.full(NM.size, 0.25))
     for cfa in ("RGGB", "RCCB"):
         space = next(space for space in study.spaces if space.name == cfa)
-        np.testing.assert_allclose(study.view(space, "chart").qe[0], 0.25)
+        np.testing.assert_allclose(study.setup(space, "chart").camera.qe[0], 0.25)
 
 
 @pytest.mark.parametrize(

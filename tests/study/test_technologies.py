@@ -23,13 +23,16 @@ STATED = (
 def test_each_channel_has_the_technology_of_its_curve(tmp_path: Path) -> None:
     study = load(tmp_path, STATED)
     layers, red = (Technology(interference=Interference(effective_index=n)) for n in (1.8, 1.6))
-    found = {space.name: study.view(space, "chart") for space in study.spaces}
-    of = {name: dict(zip(view.mosaic.channels, view.technologies, strict=True)) for name, view in found.items()}
+    found = {space.name: study.setup(space, "chart") for space in study.spaces}
+    of = {
+        name: dict(zip(setup.camera.mosaic.channels, setup.camera.technologies, strict=True))
+        for name, setup in found.items()
+    }
     assert of["RGGB"] == {"R": red, "G": Technology(), "B": None}
     assert of["mine"] == {"R": red, "Y": None, "N": layers, "Cy": None}
     assert of["edges"]["N"] == Technology()
     plain = load(tmp_path, BASE)
-    assert {plain.view(space, "chart").technologies for space in plain.spaces} == {()}
+    assert {plain.setup(space, "chart").camera.technologies for space in plain.spaces} == {()}
 
 
 def test_a_run_keeps_what_is_stated(tmp_path: Path) -> None:

@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from sweep.camera.camera import Camera
 from sweep.camera.mosaic import Mosaic
 from sweep.camera.pixel import Pixel
 from sweep.camera.scene import Scene
 from sweep.camera.sensor import ar0820_sensor
-from sweep.camera.view import View
+from sweep.camera.setup import Setup
 from sweep.curves.builtin.data_sets.tl16 import lights
 from sweep.curves.builtin.surrogate import surrogate_parameters
 from sweep.curves.spectrum import WavelengthGrid
@@ -28,11 +29,11 @@ def vision(**changes: Any) -> Vision:
     return Vision(**given | {"test_images": 60, "train_images": 200, "epochs": 2, "seeds": 2} | changes)
 
 
-def head_view(cfa: str = "RGGB", grid: WavelengthGrid = GRID, **pixel: Any) -> View:
+def head_setup(cfa: str = "RGGB", grid: WavelengthGrid = GRID, **pixel: Any) -> Setup:
     sensor, mosaic = ar0820_sensor(grid, surrogate_parameters()), Mosaic.from_name(cfa)
     noise = {"read_noise_e": 2.0, "offset_dn": 168.0, "prnu": 0.01, "crosstalk": 0.01} | pixel
     qe = sensor.mosaic_qe(mosaic)
-    return View(grid, mosaic, qe, (), sensor.curve("C"), lights(grid), Pixel(**noise), Scene())
+    return Setup(Camera(grid, mosaic, qe, (), sensor.curve("C"), Pixel(**noise)), lights(grid), Scene())
 
 
 NO_FILTERS = np.empty((0, GRID.size))

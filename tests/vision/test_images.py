@@ -16,12 +16,12 @@ from sweep.camera.mosaic import Mosaic
 from sweep.camera.noise import table
 from sweep.camera.readout import draws_dn
 from sweep.camera.sampling import Window, center_weights
-from sweep.camera.view import READOUT
+from sweep.camera.setup import READOUT
 from sweep.curves.builtin.spectra import shipped_groups
 from sweep.curves.color import luminance_per_photon_radiance
 from sweep.curves.spectrum import WavelengthGrid
 from sweep.vision.head import head_places_px
-from sweep.vision.images import HeadCamera, view_at
+from sweep.vision.images import HeadCamera, setup_at
 from sweep.vision.lamps import TEST, split_lamps
 from sweep.vision.materials import ambient_light, phantom, reflectance
 from sweep.vision.pixel_table import pixel_table
@@ -30,7 +30,7 @@ from sweep.vision.scenes import SHUFFLED, Scenes, draw_scenes
 from sweep.vision.section import Material, Vision
 
 from ..cases import thinned
-from .heads import NO_FILTERS, head_view, vision
+from .heads import NO_FILTERS, head_setup, vision
 
 FOUR = ["red", "orange", "yellow", "green"]
 
@@ -39,29 +39,29 @@ FOUR = ["red", "orange", "yellow", "green"]
 def test_a_lamp_is_what_the_product_reads(cfa: str, place: int) -> None:
     """The mean over the middle lens to 1e-4, and so every CSD within a tolerance of 0.1 DN, at places between pixels."""
     candelas, tolerance_dn = 200.0, 0.1
-    asked, view = vision(distances_m=[100.0]), head_view(cfa)
-    camera = HeadCamera(view, NO_FILTERS, asked)
-    center = head_places_px(asked, view.mosaic)[place]
-    there = view_at(view, asked, 100.0, camera.levels[0])
-    assert there.scenario.target is not None
-    target = there.scenario.target.model_copy(update={"phase_px": (float(center[0]), float(center[1]))})
-    scenario = there.scenario.model_copy(update={"target": target, "intensity_cd": candelas})
+    asked, setup = vision(distances_m=[100.0]), head_setup(cfa)
+    camera = HeadCamera(setup, NO_FILTERS, asked)
+    center = head_places_px(asked, setup.camera.mosaic)[place]
+    there = setup_at(setup, asked, 100.0, camera.levels[0])
+    assert there.scene.target is not None
+    target = there.scene.target.model_copy(update={"phase_px": (float(center[0]), float(center[1]))})
+    scenario = there.scene.model_copy(update={"target": target, "intensity_cd": candelas})
     wanted = (
-        ForwardModel(replace(there, left_out=READOUT, scenario=scenario)).read(NO_FILTERS[None])[0][0, 0]
-        - view.pixel.offset_dn
+        ForwardModel(replace(there, left_out=READOUT, scene=scenario)).read(NO_FILTERS[None])[0][0, 0]
+        - setup.camera.pixel.offset_dn
     )
     heads = camera.electrons(0, 0)
-    lamps = heads.lamps[place, 1] * heads.time_s * candelas * view.pixel.dn_per_e
+    lamps = heads.lamps[place, 1] * heads.time_s * candelas * setup.camera.pixel.dn_per_e
     across = np.arange(asked.crop_px)
-    tile = view.mosaic.indices[np.ix_(across % 2, across % 2)].ravel()
+    tile = setup.camera.mosaic.indices[np.ix_(across % 2, across % 2)].ravel()
     # The share of each pixel that the disc covers, from 200 x 200 points of it.
     fine = (np.arange(200) + 0.5) / 200 - 0.5
     x, y = (across[:, None] + fine - c for c in center)
     inside = y[:, None, :, None] ** 2 + x[None, :, None, :] ** 2 <= (target.object_resolution_px / 2) ** 2
-    weights = inside.mean(axis=(2, 3)).ravel() * (tile == np.arange(len(view.qe))[:, None])
+    weights = inside.mean(axis=(2, 3)).ravel() * (tile == np.arange(len(setup.camera.qe))[:, None])
     found = lamps @ (weights / weights.sum(axis=1, keepdims=True)).T
     np.testing.assert_allclose(found, wanted, rtol=1e-4)
-    for one, other in combinations(view.members.values(), 2):
+    for one, other in combinations(setup.members.values(), 2):
         assert cdist(found[one], found[other]).min() == pytest.approx(
             cdist(wanted[one], wanted[other]).min(), abs=tolerance_dn
         )
@@ -69,12 +69,12 @@ def test_a_lamp_is_what_the_product_reads(cfa: str, place: int) -> None:
 
 def brute_force(asked: Vision, scenes: Scenes, at: int) -> np.ndarray:
     """Expected electrons of a scene: radiance on a fine grid, a discrete Fourier transform, pixels, neighbors."""
-    view, tall = head_view(), 1.5 * (len(asked.lenses) - 1)
-    grid, fine, finer, size = view.grid, 8, 8, 48
+    setup, tall = head_setup(), 1.5 * (len(asked.lenses) - 1)
+    grid, fine, finer, size = setup.camera.grid, 8, 8, 48
     level = list(asked.levels.values())[scenes.level[at]]
     distance_m = asked.distances_m[scenes.distance[at]]
-    across = view_at(view, asked, distance_m, level).scenario.target.object_resolution_px  # type: ignore[union-attr]
-    center = head_places_px(asked, view.mosaic)[int(scenes.place[at] * 16)]
+    across = setup_at(setup, asked, distance_m, level).scene.target.object_resolution_px  # type: ignore[union-attr]
+    center = head_places_px(asked, setup.camera.mosaic)[int(scenes.place[at] * 16)]
     start = -(size - asked.crop_px) // 2
     points = start - 0.5 + (np.arange(size * fine * finer) + 0.5) / (fine * finer)
     x, y = points[None, :] - center[0], points[:, None] - center[1]
@@ -92,13 +92,13 @@ def brute_force(asked: Vision, scenes: Scenes, at: int) -> np.ndarray:
             sun = phantom(grid, asked.lenses[kind])
             seen += sun * level.phantom_cd / area / luminance_per_photon_radiance(grid, sun[None])[0]
         if kind == lit:
-            lamp = view.lights.photons[scenes.lamp[at]]
+            lamp = setup.lights.photons[scenes.lamp[at]]
             candelas = asked.intensities_cd[scenes.intensity[at]]
             seen += lamp * candelas / area / luminance_per_photon_radiance(grid, lamp[None])[0]
         lenses.append(seen)
     frequency = np.hypot(*np.meshgrid(*[np.fft.fftfreq(size * fine, 2.1 / fine)] * 2))
     electrons = np.zeros((size, size))
-    tile = view.mosaic.indices[np.ix_((np.arange(size) + start) % 2, (np.arange(size) + start) % 2)]
+    tile = setup.camera.mosaic.indices[np.ix_((np.arange(size) + start) % 2, (np.arange(size) + start) % 2)]
     shapes = [
         (np.abs(x) <= wide * across / 2) & (np.abs(y) <= high * across / 2)
         for wide, high in ((3.0, 3.0 + tall), (1.6, 1.6 + tall))
@@ -112,7 +112,7 @@ def brute_force(asked: Vision, scenes: Scenes, at: int) -> np.ndarray:
         otf = 2 / math.pi * (np.arccos(s) - s * np.sqrt(1 - s**2))
         image = np.fft.ifft2(np.fft.fft2(scene) * otf).real
         pixels = image.reshape(size, fine, size, fine).mean(axis=(1, 3))
-        electrons += pixels * view.qe[tile, w] * grid.step_nm * math.pi / 17 * (2.1e-6) ** 2 * level.exposure_s
+        electrons += pixels * setup.camera.qe[tile, w] * grid.step_nm * math.pi / 17 * (2.1e-6) ** 2 * level.exposure_s
     around = sum(np.roll(electrons, shift, axis) for shift in (-1, 1) for axis in (0, 1))
     mixed = 0.99 * electrons + 0.0025 * around
     inner = slice(-start, -start + asked.crop_px)
@@ -123,9 +123,9 @@ def brute_force(asked: Vision, scenes: Scenes, at: int) -> np.ndarray:
 @pytest.mark.parametrize(("lenses", "count"), [(["red", "yellow", "green"], 10), (["red", "orange"], 2), (FOUR, 3)])
 def test_scenes_are_those_of_a_brute_force_simulation(lenses: list[str], count: int) -> None:
     """Within 1 % of the brightest pixel: shapes are made of 64 points along a pixel, light of 8."""
-    asked, view = vision(lenses=lenses), head_view()
-    scenes = draw_scenes(asked, split_lamps(view.lights, asked, (1, 0))[TEST], SHUFFLED, count, (3,))
-    found = HeadCamera(view, NO_FILTERS, asked).expected(scenes)
+    asked, setup = vision(lenses=lenses), head_setup()
+    scenes = draw_scenes(asked, split_lamps(setup.lights, asked, (1, 0))[TEST], SHUFFLED, count, (3,))
+    found = HeadCamera(setup, NO_FILTERS, asked).expected(scenes)
     for at in range(count):
         wanted = brute_force(asked, scenes, at)
         np.testing.assert_allclose(found[at].reshape(wanted.shape), wanted, atol=0.01 * wanted.max())
@@ -145,7 +145,7 @@ def test_a_surface_sends_back_a_share_of_the_light(name: Material) -> None:
 
 def test_the_table_is_the_product_s_noise() -> None:
     """Mean and variance of every digital number that is read, dark, bright and saturated."""
-    pixel = head_view().pixel
+    pixel = head_setup().camera.pixel
     held, electrons = pixel_table(pixel), np.array([0.0, 3.3, 40.0, 700.0, 5000.0, 9900.0, 50000.0])
     node, share = held.at(electrons)
     below = held.below[node].astype(float) * (1 - share[:, None]) + held.below[node + 1] * share[:, None]
@@ -157,9 +157,9 @@ def test_the_table_is_the_product_s_noise() -> None:
 
 
 def test_drawn_images_are_as_noisy_as_the_product_draws_them() -> None:
-    asked, view = vision(), head_view()
-    camera = HeadCamera(view, NO_FILTERS, asked)
-    lamps = split_lamps(view.lights, asked, (1, 0))[TEST]
+    asked, setup = vision(), head_setup()
+    camera = HeadCamera(setup, NO_FILTERS, asked)
+    lamps = split_lamps(setup.lights, asked, (1, 0))[TEST]
     one = draw_scenes(asked, lamps, SHUFFLED, 1, (5,))
     many = one.some(np.zeros(2000, dtype=np.intp))
     many = replace(many, key=np.arange(2000))

@@ -24,14 +24,14 @@ from sweep.vision.scores import confusion_matrix, costs, macro_f1, mean_of, nest
 
 from ..build import BASE, faults, load
 from ..cases import thinned
-from .heads import NO_FILTERS, head_view, vision
+from .heads import NO_FILTERS, head_setup, vision
 
 THREE = ["red", "yellow", "green"]
 
 
 def test_the_likelihood_errs_as_two_gaussians_do() -> None:
     """Sixteen bright pixels of two known images: the least error is that of Gaussians apart by d'."""
-    pixel = head_view().pixel
+    pixel = head_setup().camera.pixel
     held = pixel_table(pixel)
     electrons = np.array([np.full(16, 2000.0), np.full(16, 2030.0)])
     node, share = held.at(electrons)
@@ -76,8 +76,8 @@ def test_the_network_errs_as_two_gaussians_do() -> None:
 def test_the_observer_is_as_often_wrong_as_it_says(order: str, lenses: list[str]) -> None:
     """A likelihood that left something random out, or counted it wrongly, would be too sure, or not sure enough."""
     asked = vision(distances_m=[500.0], intensities_cd=[3.0, 10.0], lenses=lenses)
-    view = head_view("RCCC")
-    camera, lamps = HeadCamera(view, NO_FILTERS, asked), split_lamps(view.lights, asked, (1, 0))[TEST]
+    setup = head_setup("RCCC")
+    camera, lamps = HeadCamera(setup, NO_FILTERS, asked), split_lamps(setup.lights, asked, (1, 0))[TEST]
     scenes = draw_scenes(asked, lamps, order, 600, (8, ORDERS.index(order)))
     found = posteriors(camera, scenes, camera.images(scenes), lamps, order)
     wrong = (found.argmax(axis=1) != scenes.state).astype(float)
@@ -91,8 +91,11 @@ def test_the_observer_is_as_often_wrong_as_it_says(order: str, lenses: list[str]
 
 def test_an_observer_of_other_lenses_is_worse() -> None:
     """It does not take the order of the lenses from the scene: in the street's order it would know the color."""
-    asked, view = vision(distances_m=[400.0], levels={"day": {"illuminance_lx": 4e4, "exposure_s": 5e-5}}), head_view()
-    camera, lamps = HeadCamera(view, NO_FILTERS, asked), split_lamps(view.lights, asked, (1, 0))[TEST]
+    asked, setup = (
+        vision(distances_m=[400.0], levels={"day": {"illuminance_lx": 4e4, "exposure_s": 5e-5}}),
+        head_setup(),
+    )
+    camera, lamps = HeadCamera(setup, NO_FILTERS, asked), split_lamps(setup.lights, asked, (1, 0))[TEST]
     scenes = draw_scenes(asked, lamps, SHUFFLED, 200, (9,))
     images = camera.images(scenes)
     right = [(posteriors(camera, scenes, images, lamps, o).argmax(axis=1) == scenes.state).mean() for o in ORDERS]
@@ -100,7 +103,7 @@ def test_an_observer_of_other_lenses_is_worse() -> None:
 
 
 def test_lamps_of_the_test_are_nowhere_else() -> None:
-    lights = head_view().lights
+    lights = head_setup().lights
     for seed in range(5):
         parts = split_lamps(lights, vision(), (1, seed))
         digests = {name: lamps.digests(lights) for name, lamps in parts.items()}
@@ -113,7 +116,7 @@ def test_lamps_of_the_test_are_nowhere_else() -> None:
 
 
 def test_lamps_of_one_spectrum_stay_together() -> None:
-    lights = head_view().lights
+    lights = head_setup().lights
     photons = lights.photons.copy()
     red = lights.members["red"]
     photons[red[1::2]] = photons[red[::2]]  # eight pairs of the same lamp
@@ -129,10 +132,10 @@ def test_scenes_are_the_same_for_all_cfas() -> None:
     asked = vision()
     seen = []
     for cfa in ("RCCB", "RCCC"):
-        view = head_view(cfa, crosstalk=0.0)
-        lamps = split_lamps(view.lights, asked, (1, 0))[TEST]
+        setup = head_setup(cfa, crosstalk=0.0)
+        lamps = split_lamps(setup.lights, asked, (1, 0))[TEST]
         scenes = draw_scenes(asked, lamps, SHUFFLED, 8, (2,))
-        seen.append(HeadCamera(view, NO_FILTERS, asked).images(scenes)[:, 0::2, 1::2])
+        seen.append(HeadCamera(setup, NO_FILTERS, asked).images(scenes)[:, 0::2, 1::2])
     np.testing.assert_array_equal(*seen)
 
 
@@ -140,13 +143,13 @@ def test_scenes_are_the_same_for_all_cfas() -> None:
 def test_a_network_reads_demosaicked_images() -> None:
     """A plane for each channel, the same scenes and photons for the observer; with some training it is no guess."""
     asked = vision(distances_m=[100.0], input="demosaicked", train_images=600, test_images=100, epochs=8, crop_px=16)
-    view = head_view("RCCC")
-    camera = HeadCamera(view, NO_FILTERS, asked)
-    lamps = split_lamps(view.lights, asked, (1, 0))[TEST]
+    setup = head_setup("RCCC")
+    camera = HeadCamera(setup, NO_FILTERS, asked)
+    lamps = split_lamps(setup.lights, asked, (1, 0))[TEST]
     images = camera.images(draw_scenes(asked, lamps, SHUFFLED, 3, (1,)))
-    assert planes_of(camera, images).shape == (3, 16, 16, len(view.qe))
-    told = read_images(view, NO_FILTERS, asked, (1, 0)).unseen[SHUFFLED]
-    raw = read_images(view, NO_FILTERS, asked.model_copy(update={"input": "raw", "network": False}), (1, 0))
+    assert planes_of(camera, images).shape == (3, 16, 16, len(setup.camera.qe))
+    told = read_images(setup, NO_FILTERS, asked, (1, 0)).unseen[SHUFFLED]
+    raw = read_images(setup, NO_FILTERS, asked.model_copy(update={"input": "raw", "network": False}), (1, 0))
     np.testing.assert_array_equal(told.observer, raw.unseen[SHUFFLED].observer)
     assert (told.network.argmax(axis=1) == told.scenes.state).mean() > 0.45
 

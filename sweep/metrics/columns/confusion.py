@@ -100,7 +100,7 @@ def _quantity(metric: str, name: str, types: tuple[str, ...]) -> Quantity:
 
 def state_errors(imager: ForwardModel, curves: FloatArray, states: Sequence[str]) -> FloatArray:
     """`STATE_ERROR` of designs, ndarray[n_designs], and nothing else; `curves`: see `designed_quantities`."""
-    members = {name: imager.view.members[name] for name in states}
+    members = {name: imager.setup.members[name] for name in states}
     exact = _exact(imager, curves, members)
     if exact is not None:
         return np.asarray(np.max([error for case in exact for error in case.error.values()], axis=0), dtype=float)

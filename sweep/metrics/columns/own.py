@@ -56,7 +56,9 @@ def _rows(design: SmoothDesign, *, metric: OwnMetric) -> Rows:
 
 
 def _parts(metric: OwnMetric, design: SmoothDesign, dn: FloatArray) -> FloatArray:
-    found = metric.parts(Readings.of_view(design.view, dn), finite=False)  # a design without light is not feasible
+    found = metric.parts(Readings.of_setup(design.setup, dn), finite=False)  # a design without light is not feasible
     if found is None:
-        raise SweepError(Fault(f"{metric.code.name} gives None for the searched CFA", value=design.view.mosaic.name))
+        raise SweepError(
+            Fault(f"{metric.code.name} gives None for the searched CFA", value=design.setup.camera.mosaic.name)
+        )
     return found

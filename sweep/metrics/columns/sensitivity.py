@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from ...base.types import FloatArray
-from ...camera.view import View
+from ...camera.setup import Setup
 from ...designs.block import Block, CurveBlock
 from ..quantity import Asked, Columns, DesignMetric, LinearRows, Quantity
 from ..separation import cfa_sensitivity
@@ -56,63 +56,65 @@ class Sensitivity(DesignMetric):
         )
         return own, whole
 
-    def of_designs(self, view: View, block: Block) -> Columns:
+    def of_designs(self, setup: Setup, block: Block) -> Columns:
         """The paper's sensitivity of N, with Y as the reference (NaN without a modified channel); see `separation`."""
-        modified, counts = list(view.modified), view.mosaic.counts
-        each = np.repeat(np.eye(len(modified)), view.grid.size, axis=0)  # the sum over wavelengths of each channel
-        totals = block.product(each, np.arange(view.grid.size)) if modified else np.empty((len(block), 0))
+        modified, counts = list(setup.camera.modified), setup.camera.mosaic.counts
+        each = np.repeat(
+            np.eye(len(modified)), setup.camera.grid.size, axis=0
+        )  # the sum over wavelengths of each channel
+        totals = block.product(each, np.arange(setup.camera.grid.size)) if modified else np.empty((len(block), 0))
         every = np.empty((len(block), len(counts)))
-        every[:] = view.qe.sum(axis=1, dtype=float)
+        every[:] = setup.camera.qe.sum(axis=1, dtype=float)
         every[:, modified] = totals
-        base_qe = np.asarray(view.base_qe, dtype=float)
+        base_qe = np.asarray(setup.camera.base_qe, dtype=float)
         own = totals.sum(axis=1) / base_qe.sum() if modified else np.full(len(block), np.nan)
-        return {SENSITIVITY: own, CFA_SENSITIVITY: cfa_sensitivity(every, counts, view.clear_qe)}
+        return {SENSITIVITY: own, CFA_SENSITIVITY: cfa_sensitivity(every, counts, setup.camera.clear_qe)}
 
 
-def sensitivities_gradient(view: View, curves_gradient: FloatArray) -> Columns:
+def sensitivities_gradient(setup: Setup, curves_gradient: FloatArray) -> Columns:
     """Exact derivatives of `sensitivity` and `cfa_sensitivity`, ndarray[n_parameters].
 
     `curves_gradient`: ndarray[n_parameters, n_modified, n_wavelengths].
     """
     total = curves_gradient.sum(axis=-1)
-    counts = view.mosaic.counts
+    counts = setup.camera.mosaic.counts
     return {
-        SENSITIVITY: total.sum(axis=1) / view.base_qe.sum(),
-        CFA_SENSITIVITY: total @ counts[list(view.modified)] / (counts.sum() * view.clear_qe.sum()),
+        SENSITIVITY: total.sum(axis=1) / setup.camera.base_qe.sum(),
+        CFA_SENSITIVITY: total @ counts[list(setup.camera.modified)] / (counts.sum() * setup.camera.clear_qe.sum()),
     }
 
 
-def cfa_sensitivity_at(view: View, sensitivity: float) -> float | None:
+def cfa_sensitivity_at(setup: Setup, sensitivity: float) -> float | None:
     """The CFA's sensitivity where that of its only modified channel is known; None where several are modified."""
-    if len(view.modified) != 1:
+    if len(setup.camera.modified) != 1:
         return None
-    whole = _whole_share(view)
-    return float(whole.rows.toarray()[0] @ view.base_qe[0] * sensitivity + whole.constant)
+    whole = _whole_share(setup)
+    return float(whole.rows.toarray()[0] @ setup.camera.base_qe[0] * sensitivity + whole.constant)
 
 
 def light_of(design: SmoothDesign) -> Columns:
     """Both sensitivities of one design, ndarray[1] each."""
     block = CurveBlock(design.curves[None])
-    return design.once("light", lambda: Sensitivity().of_designs(design.view, block))
+    return design.once("light", lambda: Sensitivity().of_designs(design.setup, block))
 
 
 def _row(design: SmoothDesign, *, name: str) -> Rows:
-    slopes = design.once("slopes of light", lambda: sensitivities_gradient(design.view, design.by_u))
+    slopes = design.once("slopes of light", lambda: sensitivities_gradient(design.setup, design.by_u))
     return Rows(light_of(design)[name], slopes[name][None])
 
 
-def _own_share(view: View) -> LinearRows:
+def _own_share(setup: Setup) -> LinearRows:
     """Of a filter in the only modified channel."""
-    base = view.base_qe[0]
+    base = setup.camera.base_qe[0]
     return _one_row(np.full(base.size, 1 / base.sum()))
 
 
-def _whole_share(view: View) -> LinearRows:
+def _whole_share(setup: Setup) -> LinearRows:
     """The same for the CFA: the other channels' part is constant."""
-    counts, modified = view.mosaic.counts, view.modified[0]
-    whole = counts.sum() * view.clear_qe.sum()
-    others = float(np.delete(view.qe.sum(axis=1) * counts, modified).sum())
-    return _one_row(np.full(view.grid.size, counts[modified] / whole), others / whole)
+    counts, modified = setup.camera.mosaic.counts, setup.camera.modified[0]
+    whole = counts.sum() * setup.camera.clear_qe.sum()
+    others = float(np.delete(setup.camera.qe.sum(axis=1) * counts, modified).sum())
+    return _one_row(np.full(setup.camera.grid.size, counts[modified] / whole), others / whole)
 
 
 def _one_row(weights: FloatArray, constant: float = 0.0) -> LinearRows:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...camera.view import View
+from ...camera.setup import Setup
 from ...designs.block import Block
 from ..quantity import Asked, Columns, DesignMetric, LinearRows, Quantity
 from ..smooth import Rows, SmoothDesign
@@ -46,17 +46,17 @@ class Shape(DesignMetric):
         )
         return slope, least
 
-    def of_designs(self, view: View, block: Block) -> Columns:
+    def of_designs(self, setup: Setup, block: Block) -> Columns:
         """The steepest slope and the smallest ratio over the wavelengths; NaN without a modified channel."""
-        if not view.modified:
+        if not setup.camera.modified:
             return dict.fromkeys((_SLOPE, _LEAST), np.full(len(block), np.nan))
-        steepest, lowest = block.shapes(np.asarray(view.base_qe, dtype=float))
-        return {_SLOPE: steepest / view.grid.step_nm, _LEAST: lowest}
+        steepest, lowest = block.shapes(np.asarray(setup.camera.base_qe, dtype=float))
+        return {_SLOPE: steepest / setup.camera.grid.step_nm, _LEAST: lowest}
 
 
 def _slopes(design: SmoothDesign) -> Rows:
     """Up and down slopes at every wavelength, 1/nm."""
-    step = design.view.grid.step_nm
+    step = design.setup.camera.grid.step_nm
     steep = np.diff(design.curves, axis=-1).ravel() / step
     by_u = np.diff(design.by_u, axis=-1).reshape(len(design.by_u), -1).T / step
     return Rows(np.concatenate([steep, -steep]), np.vstack([by_u, -by_u]))
@@ -64,16 +64,16 @@ def _slopes(design: SmoothDesign) -> Rows:
 
 def _ratios(design: SmoothDesign) -> Rows:
     """Curve over base at every wavelength where there is a base."""
-    base = design.view.base_qe.ravel()
+    base = design.setup.camera.base_qe.ravel()
     some = base > 0
     by_u = design.by_u.reshape(len(design.by_u), -1).T
     return Rows(design.curves.ravel()[some] / base[some], by_u[some] / base[some, None])
 
 
-def _steps(view: View) -> LinearRows:
+def _steps(setup: Setup) -> LinearRows:
     """Differences of neighboring wavelengths, down and up."""
     from scipy.sparse import csr_matrix, diags_array, vstack  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
-    size = view.grid.size
+    size = setup.camera.grid.size
     up = csr_matrix(diags_array([-1.0, 1.0], offsets=[0, 1], shape=(size - 1, size)))
-    return LinearRows(vstack([-up, up]).tocsr(), scale=view.grid.step_nm)
+    return LinearRows(vstack([-up, up]).tocsr(), scale=setup.camera.grid.step_nm)

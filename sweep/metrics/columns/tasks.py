@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from ...camera.view import View
+from ...camera.setup import Setup
 from ...curves.tasks import Case
 from ...designs.block import Block
 from ..quantity import Asked, Columns, DesignMetric, Quantity
@@ -47,13 +47,13 @@ class TaskFigures(DesignMetric):
             for name, figure, case in figures_of(task)
         )
 
-    def of_designs(self, view: View, block: Block) -> Columns:
+    def of_designs(self, setup: Setup, block: Block) -> Columns:
         """See `judge.task_columns`."""
-        if view.tasks is None:
+        if setup.tasks is None:
             return {}
         from ..tasks.judge import task_columns
 
-        return task_columns(view, block)
+        return task_columns(setup, block)
 
 
 def _rows(design: SmoothDesign, *, task: str, what: str, case: Case) -> Rows:
@@ -68,6 +68,6 @@ def _judged(design: SmoothDesign, task: str) -> JudgedTask:
     from ..tasks.judge import JudgedTask
     from ..tasks.looks import Looks
 
-    tasks = design.view.tasks
+    tasks = design.setup.tasks
     assert tasks is not None
-    return JudgedTask(tasks.by_name[task], Looks.along(design.view, design.curves, design.by_u), tasks.conditions)
+    return JudgedTask(tasks.by_name[task], Looks.along(design.setup, design.curves, design.by_u), tasks.conditions)

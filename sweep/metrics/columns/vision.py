@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.types import FloatArray
-from ...camera.view import View
+from ...camera.setup import Setup
 from ...vision.section import Vision
 from ..quantity import Asked, Columns, Quantity, VisionMetric
 from ..smooth import Rows, SmoothDesign
@@ -37,15 +37,15 @@ class ImageReading(VisionMetric):
         )
         return (found,) if asked.vision else ()
 
-    def of_images(self, view: View, curves: FloatArray, vision: Vision, seed: int) -> Columns:
+    def of_images(self, setup: Setup, curves: FloatArray, vision: Vision, seed: int) -> Columns:
         """The mean of what each image leaves in doubt: one less the probability of its most probable state."""
         from ...vision.readers import observer_error  # noqa: PLC0415  (only where a study asks for images)
 
-        return {VISION_ERROR: np.array([observer_error(view, each, vision, (seed, 0)) for each in curves])}
+        return {VISION_ERROR: np.array([observer_error(setup, each, vision, (seed, 0)) for each in curves])}
 
 
 def _rows(design: SmoothDesign) -> Rows:
     """Its value, of the same scenes and random numbers for all designs: it changes with whole digital numbers."""
     assert design.images is not None
-    found = ImageReading().of_images(design.view, design.curves[None], *design.images)[VISION_ERROR]
+    found = ImageReading().of_images(design.setup, design.curves[None], *design.images)[VISION_ERROR]
     return Rows(found, np.zeros((1, len(design.by_u))))

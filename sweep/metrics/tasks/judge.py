@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ...base.types import FloatArray
-from ...camera.view import View
+from ...camera.setup import Setup
 from ...curves.color import color_matching
 from ...curves.tasks import Case, Chart, Conditions, GriddedTask
 from ...designs.block import Block
@@ -63,11 +63,11 @@ class JudgedTask:
     def _signals(self, case: Case) -> Smooth:
         """Electrons of each spectrum of a separation, as many photons as the study's lights have."""
         assert self._task.photons is not None
-        photons = self._task.photons[self._at(case)] * self._looks.view.scenario.photon_radiance
+        photons = self._task.photons[self._at(case)] * self._looks.setup.scene.photon_radiance
         return self._once("signals", case, lambda: self._looks.electrons(photons, self._conditions.exposure_s))
 
     def _csd(self, case: Case) -> Smooth:
-        gain = self._looks.view.pixel.dn_per_e
+        gain = self._looks.setup.camera.pixel.dn_per_e
         return root(separations.squared_distances(self._signals(case), self._task.pairs, gain))
 
     def _detectabilities(self, case: Case) -> Smooth:
@@ -108,7 +108,7 @@ class JudgedTask:
         return found[:, None]
 
     def _vora(self, _: Case) -> Smooth:
-        grid = self._looks.view.grid
+        grid = self._looks.setup.camera.grid
         return color.vora(self._looks.qe * grid.nodes_nm, color_matching(grid))[:, None]
 
     def _metamerism(self, _: Case) -> Smooth:
@@ -132,16 +132,16 @@ def _percentile(values: Smooth, share: float) -> Smooth:
     return np.asarray(low + rest * (high - low))[:, None]
 
 
-def task_columns(view: View, block: Block) -> Columns:
-    """Every figure of a view's tasks, ndarray[n_designs] each."""
-    tasks = view.tasks
+def task_columns(setup: Setup, block: Block) -> Columns:
+    """Every figure of a setup's tasks, ndarray[n_designs] each."""
+    tasks = setup.tasks
     assert tasks is not None
     curves = block.curves()
     parts: list[dict[str, FloatArray]] = []
     pairs = max((len(task.pairs[0]) for task in tasks.tasks if task.photons is not None), default=1)
     size = max(1, min(_BLOCK, _MOST_DISTANCES // pairs))
     for start in range(0, len(curves), size):
-        looks = Looks(view, curves[start : start + size])
+        looks = Looks(setup, curves[start : start + size])
         found: dict[str, FloatArray] = {}
         for task in tasks.tasks:
             judged = JudgedTask(task, looks, tasks.conditions)
