@@ -89,7 +89,7 @@ class PixelLight:
         return values if self.shares is None else np.asarray(values @ self.shares)
 
 
-def different(window: Window, wanted: BoolArray) -> tuple[FloatArray, IndexArray, BoolArray]:
+def different(window: Window, wanted: BoolArray) -> tuple[FloatArray, IndexArray]:
     """Different places of pixels around the light's center: the image is round, so that mirrored places are one.
 
     Parameters
@@ -105,8 +105,6 @@ def different(window: Window, wanted: BoolArray) -> tuple[FloatArray, IndexArray
         Distances from the center along the rows and columns, the shorter one first, pixels.
     place : ndarray[n_wanted]
         Index of the place of each pixel that is wanted.
-    swapped : ndarray[n_wanted]
-        Whether its shorter distance is that along the columns, `dy`.
     """
     x, y = window.dx[:, 0, :], window.dy[:, :, 0]
     along = np.round(np.abs(np.concatenate([x.ravel(), y.ravel()])), 12)
@@ -114,7 +112,7 @@ def different(window: Window, wanted: BoolArray) -> tuple[FloatArray, IndexArray
     case, row, column = np.nonzero(wanted)
     of_x, of_y = which[: x.size].reshape(x.shape)[case, column], which[x.size :].reshape(y.shape)[case, row]
     pairs, place = np.unique(np.minimum(of_x, of_y) * distances.size + np.maximum(of_x, of_y), return_inverse=True)
-    return distances[np.stack(np.divmod(pairs, distances.size), axis=1)], place, of_y < of_x
+    return distances[np.stack(np.divmod(pairs, distances.size), axis=1)], place
 
 
 def light_on_pixels(
@@ -142,7 +140,7 @@ def light_on_pixels(
     PixelLight
         Means over the pixels, relative to a uniform field.
     """
-    places_px, inverse, _ = different(window, wanted)
+    places_px, inverse = different(window, wanted)
     place = np.full(wanted.shape, len(places_px))
     place[wanted] = inverse
     if profile is None:

@@ -20,11 +20,11 @@ from .setup import Setup
 MOST_PHASES = 1024
 """Phases of a lattice on a tile, at most."""
 _FINER, _MOST_FINE = 4, 1200
-"""How much finer the lattice is from which extremes are refined, and of how many different phases it is at most."""
+"""Factor by which the lattice is finer from which extremes are refined; its different phases, at most."""
 _STARTS = 2
 """Phases from which each extreme is refined at the first step, then one."""
 _FLAT_DN = 0.02
-"""A start whose neighbors differ from it by less is not refined: nothing around it is lower by more than about half."""
+"""A start whose neighbors on the lattice all differ from it by less is not refined."""
 _NEIGHBORS = np.array([[x, y] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)])
 
 
@@ -140,9 +140,9 @@ def refined_minima(
     """Smallest values over all phases, ndarray[n_values], and where, by refinement of the smallest ones of a lattice.
 
     A pattern search: from each of the best known phases, none within a step of a better one, to the best of those
-    around it at half the lattice's step, as long as it is better; then again, from the best of all that is known by
-    then, with half the step before. It finds a minimum near good phases; that no lower one lies elsewhere is not
-    proven.
+    around it at half the lattice's step; then again, from the best of all that is known by then, with half the step
+    before; at the finest step as long as it is better. It finds a minimum near good phases; that no lower one lies
+    elsewhere is not proven.
 
     Parameters
     ----------

@@ -138,9 +138,9 @@ def _refine_phases(model: ForwardModel, block: Block, columns: Columns) -> None:
     for design in np.flatnonzero(np.isfinite(columns[names[0]])):
         curves = block.some(slice(design, design + 1)).curves()
 
-        def both_ends(model: ForwardModel, curves: FloatArray = curves) -> FloatArray:
-            apart = _csds(model, curves)
-            return np.concatenate([apart, -apart])
+        def both_ends(at_phases: ForwardModel, curves: FloatArray = curves) -> FloatArray:
+            csds = _csds(at_phases, curves)
+            return np.concatenate([csds, -csds])
 
         extremes, at = refined_minima(
             setup, lattice, step_px, both_ends(on_lattice), lambda phases: both_ends(model.at(phases))

@@ -124,5 +124,5 @@ _imagers: Cache[bytes, PopulationImager] = Cache(16)
 
 
 def population_imager(setup: Setup) -> PopulationImager:
-    """That of a setup whose lights have a population; the latest ones are kept."""
+    """The members of a setup whose lights have a population; the latest ones are kept."""
     return _imagers.get(hashlib.sha256(pickle.dumps(setup)).digest(), lambda: PopulationImager(setup))

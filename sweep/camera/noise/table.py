@@ -12,8 +12,8 @@ from ..pixel import Pixel
 from . import moments
 
 _CUT = 1e-5
-_EVEN = 1e-6
-"""PRNU times the root of the electrons below which asinh is what it is taken of, to rounding."""
+_LEAST_PRNU = 1e-9
+"""A smaller PRNU spaces nodes as evenly, but for rounding."""
 
 
 class MomentTable(NamedTuple):
@@ -73,11 +73,9 @@ def tables(pixel: Pixel) -> MomentTable:
     from scipy.interpolate import CubicSpline  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
     if pixel.prnu:
-        last = np.sqrt(moments.Ends.of(pixel).last_e)
-        evenly = pixel.prnu * last < _EVEN
-        end = last if evenly else np.arcsinh(pixel.prnu * last) / pixel.prnu
-        nodes = np.arange(0, end + 2 * moments.STEP, moments.STEP)
-        nodes = nodes if evenly else np.sinh(pixel.prnu * nodes) / pixel.prnu
+        prnu = max(pixel.prnu, _LEAST_PRNU)
+        last = np.arcsinh(prnu * np.sqrt(moments.Ends.of(pixel).last_e)) / prnu
+        nodes = np.sinh(prnu * np.arange(0, last + 2 * moments.STEP, moments.STEP)) / prnu
         whole = CubicSpline(nodes, moments.moments(nodes**2, pixel), axis=1)
     else:
         whole = moments.table_without_prnu(pixel)
