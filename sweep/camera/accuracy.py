@@ -20,8 +20,9 @@ class Accuracy(Section):
     from the middle of the sensor to its corner, where all of them count; the worst are refined, too, unless
     `finest_phase_px` is 0. `rays`: of the lens's cone that an interference filter sees, null: the integral over all of
     them. `psf_step_nm`: wavelengths at which the point spread function is computed, linear in between; a grid that is
-    coarser is not refined. `pwm_moments`: moments of a pulse behind a nonlinear readout (behind a linear one its two
-    ends are the extremes). `single_precision`: of the product of filters and light.
+    coarser is not refined. `pwm_moments`: moments of a pulse behind a nonlinear readout, eight times as fine at the
+    worst phase, where the worst is refined (behind a linear readout its two ends are the extremes).
+    `single_precision`: of the product of filters and light.
     """
 
     phases_per_px: Literal[1, 4, 16, 64] = 16

@@ -31,8 +31,8 @@ from .registry import METRICS
 from .separation import csd_name, separations, separations_along, separations_by_edges
 from .whole_readout import Spent, WholeReadout, by_case, over_cases
 
-_PULSE_ROUNDS, _PULSE_STEPS = 3, 9
-"""Rounds in which the worst moment of a pulse is refined, and moments of each."""
+_FINER_MOMENTS, _PULSE_ROUNDS, _PULSE_STEPS = 8, 3, 9
+"""Factor by which moments of a pulse are finer at one phase; rounds in which the worst is refined; moments of each."""
 _CSD = [metric for metric in METRICS if isinstance(metric, ColorSeparation)]
 
 
@@ -102,7 +102,7 @@ def _over_pulse(model: ForwardModel, curves: FloatArray, pairs: Sequence[int], p
         response = model.at(phases, moments).read(curves)[0][0]
         return list(separations(response, model.setup.members).values())
 
-    first = np.linspace(0.0, 1.0, model.setup.accuracy.pwm_moments)
+    first = np.linspace(0.0, 1.0, _FINER_MOMENTS * (model.setup.accuracy.pwm_moments - 1) + 1)
     at_first = distances(first)
     smallest = np.array([at_first[pair].min() for pair in pairs])
     for number, pair in enumerate(pairs):
