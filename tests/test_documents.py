@@ -1,14 +1,16 @@
-"""The documentation: short sentences, tables as the program prints them, figures that a run reproduces."""
+"""The documentation: tables as the program prints them, figures that a run reproduces."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Callable
+from pathlib import Path
 
 import pandas as pd
 import pytest
 
+from sweep.commands.accuracy import measure_accuracy
 from sweep.metrics.share import told_share
 from sweep.study import load_study
 
@@ -16,7 +18,6 @@ from .conftest import ROOT, STUDIES, Finished
 from .printed import PRINTED, with_printed
 
 README = (ROOT / "README.md").read_text()
-MOST_LINES, MEAN_WORDS, MOST_WORDS = 120, 20, 30
 
 
 def prose(text: str) -> str:
@@ -26,27 +27,6 @@ def prose(text: str) -> str:
     text = re.sub(r"\[(.*?)\]\(.*?\)", r"\1", text)
     text = re.sub(r"^(\||#).*$", "", text, flags=re.MULTILINE)
     return text.replace("**", "")
-
-
-def sentences(text: str) -> list[str]:
-    blocks = re.split(r"\n\s*\n", prose(text))
-    lines = (" ".join(block.split()) for block in blocks)
-    return [found for line in lines for found in re.split(r"(?<=[.?!:])\s+(?=[A-Z`])", line) if found]
-
-
-def test_sentences_are_found() -> None:
-    assert sentences("# Title\n\nOne `a.b` two. Three\nfour 0.5!\n\n| a | b. |\n\n```\ncode.\n```") == [
-        "One `a.b` two.",
-        "Three four 0.5!",
-    ]
-
-
-def test_the_readme_is_short() -> None:
-    assert len(README.splitlines()) <= MOST_LINES
-    words = [len(sentence.split()) for sentence in sentences(README)]
-    assert len(words) >= 25
-    assert sum(words) / len(words) <= MEAN_WORDS
-    assert [s for s, n in zip(sentences(README), words, strict=True) if n > MOST_WORDS] == []
 
 
 @pytest.mark.parametrize("file", list(PRINTED))
@@ -91,15 +71,20 @@ FIGURES_AT_AN_ANGLE: dict[str, tuple[str, str]] = {
     "keeps 182 DN": ("robust", "keeps {:.0f} DN"),
 }
 """Figures of the README -> the filter of `make study NAME=angle` that has them at the worst of all places."""
+FIGURES_OF_ACCURACY: dict[str, tuple[str, str]] = {
+    "farther than 0.03 DN from `reference`": ("standard", "farther than {:.2f} DN from `reference`"),
+    "it is up to 2 DN": ("fast", "it is up to {:.0f} DN"),
+}
+"""Figures of the README -> the preset of `make accuracy` whose largest error of any CSD they are."""
 NO_RESULTS = ("Python 3.11", "cos^4", "EN 12368")
 """Numbers of the README's prose that are no results."""
 
 
 def test_every_figure_of_the_readme_has_its_command() -> None:
     text = " ".join(prose(README).split())
-    for known in (*FIGURES, *FIGURES_AT_AN_ANGLE):
+    for known in (*FIGURES, *FIGURES_AT_AN_ANGLE, *FIGURES_OF_ACCURACY):
         assert known in text
-    for known in (*FIGURES, *FIGURES_AT_AN_ANGLE, *NO_RESULTS):
+    for known in (*FIGURES, *FIGURES_AT_AN_ANGLE, *FIGURES_OF_ACCURACY, *NO_RESULTS):
         text = text.replace(known, "")
     assert re.findall(r"\S*\d\S*", text) == []
 
@@ -119,6 +104,18 @@ def test_the_figures_at_an_angle_are_those_of_their_command(finished: Finished) 
     worst = table[table["scenario"] == "field"].set_index("name")["csd_yellow_red"]
     assert {said: told.format(worst[name]) for said, (name, told) in FIGURES_AT_AN_ANGLE.items()} == {
         said: said for said in FIGURES_AT_AN_ANGLE
+    }
+
+
+@pytest.mark.slow
+def test_the_figures_of_accuracy_are_those_of_their_command(tmp_path: Path) -> None:
+    study = load_study(STUDIES / "accuracy.yaml")
+    measure_accuracy(study, lambda _: study, tmp_path, lambda *_: None, settings={}, presets=("fast", "standard"))
+    table = pd.read_parquet(tmp_path / "accuracy.parquet")
+    assert table["scenario"].nunique() == 8
+    errors = table.groupby("value")["error_dn"].max()
+    assert {text: form.format(errors[preset]) for text, (preset, form) in FIGURES_OF_ACCURACY.items()} == {
+        text: text for text in FIGURES_OF_ACCURACY
     }
 
 

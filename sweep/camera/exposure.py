@@ -41,8 +41,8 @@ def exposure_times(setup: Setup, modified_white: FloatArray, fixed: float | None
         return np.full(len(modified_white), exposure.exposure_s)
     brightest = np.maximum(modified_white.max(axis=1, initial=0.0), fixed_white(setup) if fixed is None else fixed)
     full_e = exposure.level * setup.camera.pixel.full_scale_dn / setup.camera.pixel.dn_per_e
-    found = np.full(len(brightest), np.inf)
-    return np.asarray(np.divide(full_e, brightest, out=found, where=brightest > 0), dtype=float)
+    with np.errstate(divide="ignore"):
+        return np.asarray(full_e / brightest, dtype=float)
 
 
 def may_set_exposure(setup: Setup, most: float = 1.0) -> bool:
@@ -58,11 +58,8 @@ def leaves_exposure(setup: Setup) -> float:
 
     The white patch is flat in photons, so sums of the curves say it, the same for equal curves.
     """
-    rates = setup.camera.qe.sum(axis=1)
-    kept, modified = (
-        rates[list(setup.camera.fixed)].max(initial=0.0),
-        rates[list(setup.camera.modified)].max(initial=0.0),
-    )
+    camera, rates = setup.camera, setup.camera.qe.sum(axis=1)
+    kept, modified = (rates[list(some)].max(initial=0.0) for some in (camera.fixed, camera.modified))
     return float(kept / modified) if modified > 0 else np.inf
 
 

@@ -51,11 +51,8 @@ def too_large(setup: Setup) -> tuple[str, str, str] | None:
     places = n_phases(setup)
     if places > MOST_PHASES:
         problem = f"a light at any place of a tile of {setup.camera.mosaic.indices.size:,} pixels has too many places"
-        return (
-            problem,
-            f"{places:,}",
-            f"at most {MOST_PHASES:,} (a tile of {MOST_PHASES // 16} pixels), or a named place",
-        )
+        allowed = f"at most {MOST_PHASES:,} (a tile of {MOST_PHASES // 16} pixels), or a named place"
+        return problem, f"{places:,}", allowed
     if (total := places * bytes_per_phase(setup, by_pixel=False)) > MOST_BYTES:
         problem = f"{places:,} places of the light, of {channels}, take too much memory"
         return problem, f"{total / 2**30:.1f} GiB", f"at most {MOST_BYTES / 2**30:g} GiB"

@@ -58,9 +58,9 @@ class OwnEffect:
             if values.shape != before.shape:
                 problem = f"{self.code.name} gives another shape of `{part}`"
                 raise SweepError(Fault(problem, value=values.shape, allowed=f"{before.shape}"))
-            if not (np.isfinite(values) & (values >= 0)).all():
+            wrong = values[~(np.isfinite(values) & (values >= 0))]
+            if wrong.size:
                 problem = f"{self.code.name} gives no irradiance in `{part}`"
-                worst = float(values[~(np.isfinite(values) & (values >= 0))][0])
-                raise SweepError(Fault(problem, value=worst, allowed="finite numbers, 0 or more"))
+                raise SweepError(Fault(problem, value=float(wrong[0]), allowed="finite numbers, 0 or more"))
             behind.append(values)
         return behind[0], behind[1]

@@ -24,22 +24,19 @@ def extremes(drive: Drive, exposure_s: FloatArray) -> tuple[FloatArray, FloatArr
 
 
 def smallest(drive: Drive, shortest_s: float, longest_s: float) -> float:
-    """The least light for any exposure from `shortest_s` to `longest_s`.
-
-    It is smallest where a dark interval has just been added: at the ends or where r = 1 - duty.
-    """
-    first = np.floor(shortest_s * drive.frequency_hz)
-    candidates = (first + np.arange(3) + 1 - drive.duty) / drive.frequency_hz
-    inside = candidates[(candidates >= shortest_s) & (candidates <= longest_s)]
-    return float(extremes(drive, np.array([shortest_s, longest_s, *inside]))[0].min())
+    """The least light for any exposure of a range: at its ends, or where a dark interval has just been added."""
+    return float(extremes(drive, _candidates(drive, shortest_s, longest_s, 1 - drive.duty))[0].min())
 
 
 def largest(drive: Drive, shortest_s: float, longest_s: float) -> float:
-    """The most light for any exposure in a range: at its ends or where one more pulse just fits, r = duty."""
-    first = np.floor(shortest_s * drive.frequency_hz)
-    candidates = (first + np.arange(3) + drive.duty) / drive.frequency_hz
-    inside = candidates[(candidates >= shortest_s) & (candidates <= longest_s)]
-    return float(extremes(drive, np.array([shortest_s, longest_s, *inside]))[1].max())
+    """The most light for any exposure of a range: at its ends, or where one more pulse just fits."""
+    return float(extremes(drive, _candidates(drive, shortest_s, longest_s, drive.duty))[1].max())
+
+
+def _candidates(drive: Drive, shortest_s: float, longest_s: float, rest: float) -> FloatArray:
+    """Ends of a range of exposures, and the first ones in it that are whole periods and a rest of one."""
+    times_s = (np.floor(shortest_s * drive.frequency_hz) + np.arange(3) + rest) / drive.frequency_hz
+    return np.array([shortest_s, longest_s, *times_s[(times_s >= shortest_s) & (times_s <= longest_s)]])
 
 
 def scales(setup: Setup, exposure_s: FloatArray, moments: FloatArray | None = None) -> FloatArray:
