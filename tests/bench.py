@@ -41,7 +41,6 @@ from sweep.designs.space import Space
 from sweep.metrics.evaluate import evaluate
 from sweep.metrics.separation import class_pairs, csd_name, separation, separations_along, separations_by_edges
 from sweep.run import run_study
-from sweep.run.worker_process import keep_freed_memory
 from sweep.study import Study, load_study
 
 ROOT = Path(__file__).parent.parent
@@ -135,7 +134,6 @@ def distances(imager: ForwardModel, block: Any) -> None:
 
 def rate_of(route: str, study: Study, seconds: float) -> float:
     """Designs per second of a route in this process, over some seconds."""
-    keep_freed_memory()
     space, setup = swept(study)
     imager, points = ForwardModel(setup), space.points(0, BLOCK)
     edges = edges_of(space, 0, BLOCK)
@@ -281,9 +279,8 @@ def exponents(study: Study, found: dict[str, Any]) -> None:
             return np.array([np.interp(grid.nodes_nm, old, curve) for curve in curves])
 
         lights = replace(setup.lights, photons=of(setup.lights.photons))
-        return setup.with_camera(
-            grid=grid, qe=of(setup.camera.qe), clear_qe=of(setup.camera.clear_qe[None])[0], lights=lights
-        )
+        qe, clear_qe = of(setup.camera.qe), of(setup.camera.clear_qe[None])[0]
+        return replace(setup.with_camera(grid=grid, qe=qe, clear_qe=clear_qe), lights=lights)
 
     def exponent(sizes: tuple[int, ...], times: list[float]) -> float:
         return float(np.polyfit(np.log(sizes), np.log(times), 1)[0])

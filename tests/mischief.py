@@ -6,17 +6,15 @@ import os
 import signal
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from sweep.designs.block import EdgeBlock
 from sweep.designs.families.stopband import MultiStopband
 from sweep.designs.space import Filter
 from sweep.results.identity import CHUNK
-from sweep.results.journal import Journal
+from sweep.results.parts import Parts
 from sweep.run import run_study
 from sweep.study import Study
 
@@ -64,7 +62,7 @@ class StoppedError(Exception):
     pass
 
 
-def half_done(study: Study, folder: Path) -> Journal:
+def half_done(study: Study, folder: Path) -> Parts:
     """A run that was broken off after two whole chunks."""
 
     def stop(phase: str, done: int, _total: int) -> None:
@@ -73,11 +71,4 @@ def half_done(study: Study, folder: Path) -> Journal:
 
     with pytest.raises(StoppedError):
         run_study(study, folder, 1, stop)
-    return Journal(folder)
-
-
-def plant(patch: pytest.MonkeyPatch) -> None:
-    def broken(*_: Any) -> Any:
-        raise KeyError("planted")
-
-    patch.setattr(EdgeBlock, "product", broken)
+    return Parts(folder)

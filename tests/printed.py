@@ -6,12 +6,21 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+from sweep.base.errors import EXIT_CODES
 from sweep.results.dictionary import columns_table, files_table
 from sweep.study.reference import study_reference
 
 ROOT = Path(__file__).parent.parent
+
+
+def exit_codes_table() -> list[str]:
+    """Exit codes of all commands as Markdown."""
+    rows = [f"| {code} | {meaning} |" for code, meaning in EXIT_CODES.items()]
+    return ["| exit code | meaning |", "| --- | --- |", *rows]
+
+
 PRINTED: dict[str, dict[str, Callable[[], list[str]]]] = {
-    "outputs/README.md": {"files": files_table, "columns": columns_table},
+    "outputs/README.md": {"files": files_table, "columns": columns_table, "exit codes": exit_codes_table},
     "studies/README.md": {"study": study_reference},
 }
 

@@ -52,8 +52,11 @@ def _mode(path: Path) -> int:
 
 def opened(path: Path, flags: int = os.O_RDONLY, mode: str = "rb", *, links: bool = False) -> IO[bytes]:
     """Open a plain file; raises OSError for folders, pipes, devices and, but for `links`, links: none is read."""
-    # Without O_NONBLOCK, opening a pipe would wait for who writes into it.
-    number = os.open(path, flags | (0 if links else os.O_NOFOLLOW) | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
+    # Without O_NONBLOCK, opening a pipe would wait for who writes into it. Windows has other flags, and no such files.
+    if not links:
+        flags |= getattr(os, "O_NOFOLLOW", 0)
+    flags |= getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
+    number = os.open(path, flags, 0o666)
     if not stat.S_ISREG(os.fstat(number).st_mode):
         os.close(number)
         raise OSError(errno.EINVAL, "not a plain file", str(path))

@@ -61,6 +61,18 @@ class Fault:
         return "".join(c if c.isprintable() else repr(c)[1:-1] for c in " ".join(text.split()))
 
 
+EXIT_CODES = {
+    0: "done",
+    2: "a fault of the input, the machine or the command line: a line says which",
+    3: "no design of the search can meet the constraints",
+    4: "a design failed, with --fail-fast",
+    5: "a result is above its own upper bound, or farther from the reference settings than the tolerance",
+    130: "interrupted by Ctrl-C or SIGTERM; finished parts are kept",
+    141: "the reader of the output has gone",
+}
+"""What commands return."""
+
+
 class SweepError(Exception):
     """Base of all errors that a user can cause or mend. `exit_code` is what the command returns.
 

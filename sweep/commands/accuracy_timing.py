@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
@@ -26,7 +25,6 @@ from ..metrics.evaluate import evaluate
 from ..metrics.quantity import BEST_PLACE
 from ..metrics.separation import csd_name
 from ..results.identity import CHUNK
-from ..run.worker_process import prepare_worker
 
 MANY = 10_000
 """Designs of a large sweep."""
@@ -88,9 +86,8 @@ def in_new_process(setup: Setup, space: Space, numbers: IndexArray, dense: Space
     seconds : float
         Time for the designs that follow the first one, s; those that do not fit in are left out.
     """
-    context, parent = get_context("spawn"), (os.getpid(),)
     try:
-        with ProcessPoolExecutor(1, mp_context=context, initializer=prepare_worker, initargs=parent) as pool:
+        with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
             return pool.submit(_measure, setup, space, numbers, dense, seconds).result()
     except BrokenProcessPool:
         raise SweepError(Fault("the process of a measurement was killed", key="accuracy")) from None

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from ..base.errors import EXIT_CODES
 from ..base.found import files_in
 from . import verbs
 from .endings import ends_in_lines
@@ -17,6 +18,7 @@ from .panels import PANELS
 app = typer.Typer(
     name="sweep",
     help="Sweeps and design-space exploration for color filter arrays that must tell traffic light colors apart.",
+    epilog="Exit codes: " + "; ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items()) + ".",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )

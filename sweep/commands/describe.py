@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -43,10 +44,11 @@ _MARK = _text_chunk("Software", "sweep describe")
 
 @dataclass(frozen=True)
 class Description:
-    """What was found: lines to print, and why studies refuse the file (empty: they take it)."""
+    """What was found: lines to print, why studies refuse the file (empty: they take it), and plain values."""
 
     lines: tuple[str, ...]
     faults: tuple[Fault, ...]
+    facts: Mapping[str, Any]
 
 
 def described(path: Path, folder: Path, quantity: LightUnit | None = None) -> Description:
@@ -62,7 +64,7 @@ def described(path: Path, folder: Path, quantity: LightUnit | None = None) -> De
     names = [curve.name for curve in facts.curves]
     lines = [f"{path}: {len(names)} curve{'' if len(names) == 1 else 's'}{': ' if names else ''}{_some(names)}."]
     if not any(curve.values.size for curve in facts.curves):
-        return Description((*lines, "Nothing in it can be drawn."), faults)
+        return Description((*lines, "Nothing in it can be drawn."), faults, {"curves": []})
     lines += [f"Read: {note}." for note in scan.notes]
     as_qe = facts.looks_like_qe and quantity is None
     lines += [_range(facts), _guess(facts, quantity)]
@@ -81,7 +83,19 @@ def described(path: Path, folder: Path, quantity: LightUnit | None = None) -> De
         warnings.filterwarnings("ignore", "Glyph")  # names in scripts that the font lacks
         content = rendered(draw(path.name, facts, colors), "png")
     write_bytes(content[:_HEADER_BYTES] + _MARK + content[_HEADER_BYTES:], picture)
-    return Description((*lines, f"Picture: {picture}"), faults)
+    known = {"kind": "qe" if as_qe else "lights", "picture": str(picture), "curves": _curves(facts, colors)}
+    return Description((*lines, f"Picture: {picture}"), faults, known)
+
+
+def _curves(facts: Facts, colors: Mapping[str, LightColor | None]) -> list[dict[str, Any]]:
+    """Largest value of each curve, where it is, and the color of a light."""
+    curves: list[dict[str, Any]] = []
+    for curve in facts.curves:
+        color = colors.get(curve.name)
+        peak = {"largest": curve.values.max(), "at_nm": curve.peak_nm} if curve.values.size else {}
+        hue = {} if color is None else {"xy": color.xy, "dominant_nm": color.dominant_nm, "region": color.region}
+        curves.append({"name": curve.name, **peak, **hue})
+    return curves
 
 
 def cleaned(path: Path, to: Path) -> list[str]:

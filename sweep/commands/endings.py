@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import os
-import resource
 import signal
 import sys
-import warnings
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from types import FrameType
@@ -14,12 +12,10 @@ from typing import Any, NoReturn
 
 import typer
 
-from ..base.errors import Fault, SweepError
+from ..base.errors import SweepError
 
 _INTERRUPTED, _BROKEN_PIPE = 130, 141
 """Exit codes of a shell for a command that SIGINT or SIGPIPE ended."""
-_LEAST_ADDRESS_SPACE = 2**30
-"""Below it libraries wait for ever for memory, or end the process, while they are loaded."""
 _UsageError = typer.BadParameter.__bases__[0]
 """Click's, wherever this version of typer has it."""
 
@@ -44,34 +40,18 @@ def ends_in_lines(command: Callable[[], object]) -> NoReturn:
         code = _INTERRUPTED
     if code == _BROKEN_PIPE or not _flushed():
         _drop_output()
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # all is said: what stops it now, stops it without a word
+    for number in (signal.SIGTERM, signal.SIGINT):  # all is said: what stops it now, stops it without a word
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, signal.SIG_DFL)
     sys.exit(code)
 
 
-def end_now(error: SweepError) -> NoReturn:
-    """Say what went wrong and leave at once, whatever other threads are at."""
-    say_lines(error.faults)
-    _flushed()
-    os._exit(error.exit_code)
-
-
 def _prepare() -> None:
-    """What holds for every command. Raises SweepError where nothing could be computed."""
-    # Libraries take file names as UTF-8, whatever the locale says: once more, with Python's own UTF-8 mode.
-    if sys.getfilesystemencoding() != "utf-8" and sys.executable and os.environ.get("PYTHONUTF8") != "1":
-        os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], {**os.environ, "PYTHONUTF8": "1"})
+    """Settings of every command."""
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # a letter that the terminal does not know is no fault
             stream.reconfigure(errors="backslashreplace")
     signal.signal(signal.SIGTERM, _interrupt)
-    # loky's tracker cleans up after a run that had to end at once; that it says so is of no use to anyone.
-    told = [os.environ.get("PYTHONWARNINGS", ""), "ignore:resource_tracker"]
-    os.environ["PYTHONWARNINGS"] = ",".join(filter(None, told))
-    warnings.filterwarnings("ignore", message=".*joblib will operate in serial mode")
-    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if limit != resource.RLIM_INFINITY and limit < _LEAST_ADDRESS_SPACE:
-        had, needed = (f"{n / 2**20:.0f} MiB" for n in (limit, _LEAST_ADDRESS_SPACE))
-        raise SweepError(Fault(f"the address space is limited to {had}", allowed=f"{needed} and more (ulimit -v)"))
 
 
 def _interrupt(_number: int, _frame: FrameType | None) -> None:

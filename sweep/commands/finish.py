@@ -4,16 +4,29 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-import typer
+from .said import say_to
 
 if TYPE_CHECKING:
     from ..base.types import Parallel
 
+_TOLD = ("filters", "designs", "failed", "duration_s", "search", "check", "warnings")
+"""What `--json` says of a run, as in its provenance."""
 
-def finish(folder: Path, began_s: float, *, mend: bool = False, parallel: Parallel | None = None) -> None:
-    """Draw figures and report of a finished run, and say what it found; `mend`: only what is missing or damaged.
+
+def finish(
+    folder: Path,
+    began_s: float,
+    *,
+    mend: bool = False,
+    parallel: Parallel | None = None,
+    as_json: bool = False,
+    quiet: bool = False,
+) -> dict[str, Any]:
+    """Draw figures and report of a finished run, and say what it found; the same as plain values.
+
+    `mend`: draw only what is missing or damaged. Raises BrokenPromiseError where the run's check failed.
 
     `began_s`: when the command began, by the monotonic clock: a user waits for the report, too. `parallel` makes the
     pictures, without it they are made one after the other.
@@ -24,8 +37,9 @@ def finish(folder: Path, began_s: float, *, mend: bool = False, parallel: Parall
 
     found = read_output(folder)
     make_report(found, mend=mend, parallel=parallel or in_turn)
-    for line in summary_lines(found, time.monotonic() - began_s):
-        typer.echo(line)
+    say_to(summary_lines(found, time.monotonic() - began_s), as_json=as_json, quiet=quiet)
     check = found.provenance.check
     if check is not None and not check.passed:
         raise BrokenPromiseError([Fault(check.sentence.removesuffix("."), key=check.scenario)])
+    facts = found.provenance.model_dump(mode="json")
+    return {"folder": str(folder), **{key: facts[key] for key in _TOLD}}

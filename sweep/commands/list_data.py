@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import asdict
+from typing import Any
 
 from ..curves.builtin.spectra import Card, cards
 from ..curves.builtin.stand_ins import surrogate_cards
@@ -14,6 +16,11 @@ def data_lines() -> list[str]:
     total = sum(sum(card.groups.values()) for card in found)
     lines = [line for card in found for line in _lines(card)]
     return [*lines, f"{total} spectra in {len(found)} sets. A study's tasks name their groups: tasks: {{own: ...}}."]
+
+
+def data_facts() -> dict[str, Any]:
+    """The same as plain values."""
+    return {"sets": [asdict(card) for card in (*cards(), *surrogate_cards())]}
 
 
 def _lines(card: Card) -> Iterator[str]:

@@ -15,8 +15,9 @@ and wait for code that is being compiled."""
 class ProgressDisplay:
     """Shows `update(phase, done, total)` calls on stderr."""
 
-    def __init__(self) -> None:
-        self._live = sys.stderr.isatty()
+    def __init__(self, *, quiet: bool = False) -> None:
+        self._quiet = quiet
+        self._live = sys.stderr.isatty() and not quiet
         self._phase = ""
         self._started = 0.0
         self._first = 0
@@ -54,7 +55,7 @@ class ProgressDisplay:
             if new:
                 self._task = self._bars.add_task(phase, total=total)
             self._bars.update(self._task, completed=done)
-        elif now - self._last_line >= _EVERY_S:
+        elif not self._quiet and now - self._last_line >= _EVERY_S:
             self._last_line = now
             print(f"{phase}: {done:,} of {total:,}, {self._pace(now, done, total)}", file=sys.stderr, flush=True)
 

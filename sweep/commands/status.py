@@ -2,65 +2,74 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..base.disk import read_facts
 from ..base.errors import OutputError
 from ..metrics.share import told_share
-from ..results.folder import held_by
 from ..results.inventory import Inventory, faults_of, no_run
-from ..results.journal import SHARDS, Entry, Journal
-from ..results.lock import holder
-from ..results.tables import PROVENANCE, RESULTS
+from ..results.lock import in_use
+from ..results.parts import ANSWER, PARTS, ROWS, Parts
+from ..results.tables import PROVENANCE, RESULTS, rows_in
 
-_RECENT, _MOST = 200, 2**53
+_MOST = 2**53
+
+
+@dataclass(frozen=True)
+class Status:
+    """State of a run: lines for people, and plain values."""
+
+    lines: Sequence[str]
+    facts: Mapping[str, Any]
 
 
 def status_lines(folder: Path, *, verify: bool = False) -> list[str]:
-    """State, progress with rate and time left, failures and files of a run.
+    """Lines of `status_of`."""
+    return list(status_of(folder, verify=verify).lines)
 
-    Of a finished run the sizes of its files are compared with its lists, and the digests of what is read; with `verify`
-    all digests. Raises OutputError where there is no run, and, naming each file, where some are missing or damaged.
+
+def status_of(folder: Path, *, verify: bool = False) -> Status:
+    """State, progress and files of a run.
+
+    Of a finished run missing files are named; with `verify` all digests are compared. Raises OutputError where there
+    is no run, and, naming each file, where some are missing or damaged.
     """
-    held, inventory = held_by(folder), Inventory(folder)
-    if held is None or not held.fingerprint:
+    inventory = Inventory(folder)
+    if not inventory.fingerprint:
         raise no_run(folder)
-    running = holder(folder)
-    finished = PROVENANCE in inventory.files and running is None
-    if finished or (verify and running is None):
-        _verify(inventory, quick=not verify)
-    verified = [_verified(inventory)] if verify and running is None else []
+    running = in_use(folder)
+    finished = PROVENANCE in inventory.files and not running
+    if finished or (verify and not running):
+        wrong = inventory.wrong(quick=not verify) | inventory.wrong([PROVENANCE] if finished else [])
+        if wrong:
+            raise OutputError(faults_of(folder, wrong))
+    verified = [f"ok: its {len(inventory.files)} files are what the run wrote."] if verify and not running else []
     if finished:
         facts = read_facts(folder / PROVENANCE)
         failed = f", {_number(facts, 'failed'):,} failed" if _number(facts, "failed") else ""
         said = f"finished: {_number(facts, 'designs'):,} designs{failed} in {_number(facts, 'duration_s'):.1f} s."
-        return [said, _files(folder), *verified]
-    entries = Journal(folder).entries.values()
-    rows = [entry for entry in entries if entry.rows]
-    done, total = sum(entry.rows for entry in rows), _number(inventory.facts, "designs")
-    faults = sum(entry.failed for entry in rows)
-    state = f"running ({running})" if running else "interrupted; the same command continues"
+        known = {key: facts.get(key) for key in ("designs", "failed", "duration_s")}
+        return Status([said, _files(folder), *verified], _facts(folder, "finished", verify=verify, **known))
+    parts = Parts(folder)
+    rows, answers = parts.paths(ROWS), parts.paths(ANSWER)
+    done, total = sum(map(rows_in, rows)), _number(inventory.facts, "designs")
+    state = "running" if running else "interrupted; the same command continues"
     share = f" ({told_share(done / total)})" if total else ""
-    lines = [f"{state}: {done:,} of {total:,} designs{share}, {faults:,} failed, {len(rows):,} chunks finished."]
-    answers = len(entries) - len(rows)
+    lines = [f"{state}: {done:,} of {total:,} designs{share}, {len(rows):,} parts finished."]
     if answers:
-        lines.append(f"The search has {answers:,} answers.")
-    rate = _rate(rows)
-    if running and rate and total:
-        lines.append(f"{rate:,.0f} designs/s, about {(total - done) / rate:,.0f} s left.")
-    return [*lines, *([_files(folder)] if rows else []), *verified]
+        lines.append(f"The search has {len(answers):,} answers.")
+    known = {"designs": total, "finished_designs": done, "parts": len(rows), "search_answers": len(answers)}
+    return Status(
+        [*lines, *([_files(folder)] if rows else []), *verified],
+        _facts(folder, "running" if running else "interrupted", verify=verify, **known),
+    )
 
 
-def _verify(inventory: Inventory, *, quick: bool) -> None:
-    """Raises OutputError with a line for each file that is not what the run wrote."""
-    wrong = inventory.wrong_lists() | inventory.wrong(quick=quick)
-    if quick and PROVENANCE in inventory.files:
-        wrong |= inventory.wrong([PROVENANCE])
-    if wrong:
-        raise OutputError(faults_of(inventory.folder, wrong))
+def _facts(folder: Path, state: str, *, verify: bool, **known: Any) -> dict[str, Any]:
+    return {"folder": str(folder), "state": state, "verified": verify, **known}
 
 
 def _number(facts: Mapping[str, Any], key: str) -> float:
@@ -69,21 +78,7 @@ def _number(facts: Mapping[str, Any], key: str) -> float:
     return found if isinstance(found, int | float) and 0 <= found < _MOST else 0
 
 
-def _verified(inventory: Inventory) -> str:
-    size = sum(held.size or 0 for held in inventory.files.values())
-    return f"ok: its {len(inventory.files) + 2} files ({size / 2**20:,.1f} MiB) are what the run wrote."
-
-
-def _rate(entries: Sequence[Entry]) -> float | None:
-    """Designs per second over the latest chunks; None before there are two, or when the clock went back."""
-    recent = entries[-_RECENT:]
-    if len(recent) < 2:
-        return None
-    span = time.time() - recent[0].at
-    return sum(entry.rows for entry in recent[1:]) / span if span > 0 else None
-
-
 def _files(folder: Path) -> str:
     if (folder / RESULTS).is_file():
         return f"Files: {folder}/: {RESULTS}, report.html."
-    return f"Finished chunks: {folder / SHARDS}/*.parquet, which pandas.read_parquet reads."
+    return f"Finished parts: {folder / PARTS}/*.parquet, which pandas.read_parquet reads."

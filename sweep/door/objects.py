@@ -119,7 +119,7 @@ class LoadedStudy:
     def _own(self, cfa: str | None, scenarios: list[str]) -> pd.DataFrame:
         """The study's plain CFAs and named designs."""
         from ..results.tables import NAMED, PLAIN
-        from ..run.routes import block_of
+        from ..run.routes import found_of
         from ..run.rows import rules_of
 
         study, request = self.study, rules_of(self.study).request
@@ -131,7 +131,7 @@ class LoadedStudy:
         rows = []
         for name in scenarios:
             for space in spaces:
-                found = block_of(space, 0, space.points(0, space.size), study.setup(space, name), request)
+                found = found_of(space, 0, space.points(0, space.size), study.setup(space, name), request)
                 for text in found.faults.values():
                     raise SweepError(Fault(f"{space.name} in {name}: {text}"))
                 own = space.violation(space.points(0, space.size))

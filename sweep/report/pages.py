@@ -23,15 +23,14 @@ def page(template: str, **values: Any) -> str:
 
 
 def library() -> Markup:
-    """Plotly's script, as the page itself carries it."""
-    from plotly.offline import get_plotlyjs  # noqa: PLC0415  (slow to import)
-
-    return Markup(get_plotlyjs().replace("</script", "<\\/script"))
+    """Plotly's script with the traces that pages draw: scatter, scattergl, parcoords."""
+    return script("plotly-gl2d.min.js")
 
 
 def script(name: str) -> Markup:
-    """A script of ours, as the page itself carries it."""
-    return Markup(resources.files("sweep.report").joinpath("templates", name).read_text(encoding="utf-8"))
+    """A script beside the templates, as the page itself carries it."""
+    text = resources.files("sweep.report").joinpath("templates", name).read_text(encoding="utf-8")
+    return Markup(text.replace("</script", "<\\/script"))
 
 
 def inlined(png: bytes) -> str:

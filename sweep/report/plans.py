@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import asdict
+from typing import Any
 
 from ..camera.plan import Plan
 from ..study import Study
@@ -17,6 +19,19 @@ def plan_lines(study: Study) -> Iterator[str]:
         yield from _lines(plans)
     settings = ", ".join(f"{name} {value}" for name, value in study.section.accuracy.model_dump().items())
     yield f"{len(study.plans)} scenes, {len(groups)} different plans. Accuracy: {settings}."
+
+
+def plan_facts(study: Study) -> dict[str, Any]:
+    """The same as plain values: accuracy, and for each scene tolerance, error bound (DN) and effects."""
+    scenes = {
+        name: {
+            "tolerance_dn": plan.tolerance_dn,
+            "error_bound_dn": plan.error_bound_dn,
+            "effects": [asdict(choice) for choice in plan.choices],
+        }
+        for name, plan in study.plans.items()
+    }
+    return {"study": study.name, "accuracy": study.section.accuracy.model_dump(), "scenarios": scenes}
 
 
 def _lines(plans: list[Plan]) -> Iterator[str]:

@@ -174,7 +174,7 @@ FILES = {
     "pareto.png": "the trade-off in one modified pixel, where there is one; also `.svg`",
     f"{FIGURES}/": "all other figures as PNG and SVG",
     "paper_comparison.csv": "published figures beside ours, where a study gives some; also `.parquet`",
-    RUN: "names and digests of these files, and how the run went",
+    RUN: "whose folder it is: the fingerprint of the study and what goes into it",
     SUMS: "the digests for `sha256sum -c SHA256SUMS`",
 }
 """Every file of a run's folder, in the order in which one asks for them."""

@@ -141,7 +141,6 @@ class Provenance(_Facts):
     trade_off: tuple[str, str]
     parameters: tuple[str, ...]
     quantities: tuple[Column, ...]
-    detours: tuple[dict[str, Any], ...]
     spent_s: tuple[float, float] = (0.0, 0.0)
     warnings: tuple[str, ...]
     search: SearchFacts | None = None

@@ -37,21 +37,18 @@ class Held:
 
 
 def held_by(folder: Path) -> Held | None:
-    """The run in a folder, or None; one of unknown origin has an empty fingerprint, as have files of others under the
-    names of a run's files.
+    """The run in a folder, or None; files of others under the names of a run's have an empty fingerprint.
 
-    A run is finished when all that its report needs is there, by the sizes of the files.
+    A run is finished when all files that its list names are there. Raises OutputError for a damaged `run.json`.
     """
     inventory = Inventory(folder)
     strangers = inventory.strangers()
     if not inventory.fingerprint and not strangers:
         return None
     known = inventory.facts.get("identity")
-    if not isinstance(known, dict):
-        known = {}
     listed = inventory.files.keys() & MADE_BY_RUN
     whole = PROVENANCE in listed and not inventory.wrong(listed, quick=True)
-    return Held(inventory.fingerprint, known, whole, strangers[0] if strangers else None)
+    return Held(inventory.fingerprint, known if isinstance(known, dict) else {}, whole, next(iter(strangers), None))
 
 
 def output_folder(base: Path, study: Study) -> tuple[Path, str | None]:
@@ -69,14 +66,15 @@ def output_folder(base: Path, study: Study) -> tuple[Path, str | None]:
     raise AssertionError
 
 
-def begin(folder: Path, study: Study, facts: Mapping[str, Any]) -> Inventory:
+def begin(folder: Path, study: Study) -> Inventory:
     """Say in the folder which run it holds; raises OutputError when it holds another one, or files of others."""
     held = held_by(folder)
     if held is not None and held.fingerprint and not held.is_of(study):
         problem = f"holds another study ({_changed(held.identity, identity(study))})"
         raise OutputError(Fault(problem, str(folder), allowed="another folder"))
     inventory = Inventory(folder)
-    inventory.begin(fingerprint(study), {"identity": identity(study), **facts})
+    if not inventory.facts:
+        inventory.begin(fingerprint(study), {"identity": identity(study), "designs": study.n_designs})
     return inventory
 
 

@@ -2,104 +2,73 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import re
-import socket
-import time
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO
 
-from ..base.disk import is_real_folder, opened, read_plain
+from filelock import FileLock, Timeout
+
+from ..base.disk import is_real_folder
 from ..base.errors import Fault, OutputError
-from .journal import SHARDS
+from .atomic import LEFT_OVER
 from .names import FIGURES
+from .parts import PARTS
 
 LOCK = ".lock"
-_ATTEMPTS, _PAUSE_S = 5, 0.02
-_SAYS = re.compile(rb"(process \d+ on [^\n]*)?")
-_MOST_SAID = 400
-_LEFT_OVER = re.compile(r"\.tmp-\d+-(SHA256SUMS|[\w.-]+\.(parquet|json|yaml|html|csv|png|svg))")
-"""Hidden names that `atomic.atomic` gives to files of a run."""
+_WAIT_S = 0.2
+"""Someone may just be looking whether the folder is in use."""
 
 
 @contextmanager
 def locked(output: Path) -> Iterator[None]:
-    """Hold the output folder for one command; raises OutputError, naming the holder, when it is in use.
+    """Hold the output folder for one command; raises OutputError when it is in use or cannot be written.
 
-    The kernel drops the lock with its process, so a lock cannot go stale. Hidden files that a killed command, or a
-    worker of this one, left behind are removed. A `.lock` that is a link, or that holds something else, is not touched.
+    The system drops the lock with its process, so that a lock cannot go stale. Hidden files that a killed command or
+    worker left behind are removed.
     """
-    lock = output / LOCK
+    lock = FileLock(output / LOCK)
     try:
         output.mkdir(parents=True, exist_ok=True)
-        if os.path.lexists(lock) and not _is_ours(lock):
-            raise OutputError(Fault("is not of this run; move it away", str(lock), allowed="another --output"))
-        handle = opened(lock, os.O_RDWR | os.O_CREAT, "r+b")
+        if os.path.lexists(output / LOCK) and not _is_lock(output / LOCK):
+            raise OutputError(Fault("is not of this run; move it away", str(output / LOCK)))
+        lock.acquire(timeout=_WAIT_S)
+    except Timeout:
+        raise OutputError(Fault("in use by another command", str(output))) from None
     except OSError as error:
         raise OutputError(Fault(f"cannot be written: {error.strerror or error}", str(output))) from None
-    with handle:
-        for attempt in range(_ATTEMPTS):
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-            except OSError:
-                if attempt == _ATTEMPTS - 1:
-                    raise OutputError(Fault(f"in use by another run ({_said(handle)})", str(output))) from None
-                time.sleep(_PAUSE_S)  # someone may just be looking who holds it
-        _say(handle, output)
+    try:
         _clear(output)
-        try:
-            yield
-        finally:
-            with suppress(OSError):
-                _clear(output)
+        yield
+    finally:
+        with suppress(OSError):
+            _clear(output)
+        lock.release()
 
 
-def holder(output: Path) -> str | None:
-    """Which command holds the folder, in words; None when none does."""
-    try:
-        handle = opened(output / LOCK)
-    except OSError:
-        return None
-    with handle:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except OSError:
-            return _said(handle)
-        return None
+def _is_lock(path: Path) -> bool:
+    """True for an empty file."""
+    status = path.lstat()
+    return stat.S_ISREG(status.st_mode) and not status.st_size
 
 
-def _is_ours(lock: Path) -> bool:
-    """Whether a file says what a lock says; one that is a link, a folder or longer does not."""
-    try:
-        return _SAYS.fullmatch(read_plain(lock, _MOST_SAID)) is not None
-    except PermissionError:
-        raise
-    except OSError:
+def in_use(output: Path) -> bool:
+    """True while a command holds the folder."""
+    if not (output / LOCK).is_file():
         return False
-
-
-def _say(handle: IO[bytes], output: Path) -> None:
-    """Write into the lock who holds it; raises OutputError when the disk refuses."""
     try:
-        os.ftruncate(handle.fileno(), 0)
-        os.pwrite(handle.fileno(), f"process {os.getpid()} on {socket.gethostname()}".encode(), 0)
-    except OSError as error:
-        raise OutputError(Fault(f"cannot be written: {error.strerror or error}", str(output))) from None
-
-
-def _said(handle: IO[bytes]) -> str:
-    handle.seek(0)
-    return handle.read(_MOST_SAID).decode("utf-8", "replace").strip() or "process ?"
+        with FileLock(output / LOCK).acquire(timeout=0):
+            return False
+    except (Timeout, OSError):
+        return True
 
 
 def _clear(output: Path) -> None:
     """Remove what killed commands and workers left half written, but not through links."""
-    own = (output / SHARDS, output / FIGURES)
+    own = (output / PARTS, output / FIGURES)
     for folder in (output, *(inner for inner in own if is_real_folder(inner))):
         for path in folder.iterdir():
-            if _LEFT_OVER.fullmatch(path.name) and not is_real_folder(path):
+            if re.fullmatch(LEFT_OVER, path.name) and not is_real_folder(path):
                 path.unlink(missing_ok=True)

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from ..base.errors import Fault, OutputError
 from ..base.types import BoolArray
-from .arrays import holds_one_of
-from .atomic import Seal, atomic, unsealed, write_text
+from .atomic import atomic, write_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -66,6 +66,7 @@ FEW = (PLAIN, NAMED, FOUND)
 """Kinds of which there are few rows."""
 ROW_GROUP = 131_072
 """Rows that are read and written at once."""
+_LEAST_GROUP = ROW_GROUP // 4
 
 
 def result_schema(parameters: Sequence[str], quantities: Sequence[str]) -> pa.Schema:
@@ -99,10 +100,29 @@ def front_schema(parameters: Sequence[str]) -> pa.Schema:
     return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION})
 
 
-def write_table(table: pa.Table, path: Path, seal: Seal = unsealed) -> None:
-    """Write one Parquet file atomically, with a checksum of each page; `seal` and errors as for `atomic`."""
-    with atomic(path, seal) as hidden:
-        _write_tables([table], hidden, ROW_GROUP)
+def write_table(table: pa.Table, path: Path) -> None:
+    """Write one Parquet file atomically, with a checksum of each page; errors as for `atomic`."""
+    write_tables([table], table.schema, path)
+
+
+def write_tables(tables: Iterable[pa.Table], schema: pa.Schema, path: Path) -> None:
+    """Write tables of one schema, as they come, to one Parquet file; errors as for `atomic`.
+
+    A row group has `ROW_GROUP` rows at most; short tables are put together. One row group and one table are in memory.
+    """
+    waiting: list[pa.Table] = []
+    with atomic(path) as hidden, pq.ParquetWriter(hidden, schema, **_how(schema)) as writer:
+
+        def put() -> None:
+            if waiting:
+                writer.write_table(pa.concat_tables(waiting).unify_dictionaries().cast(schema), ROW_GROUP)
+                waiting.clear()
+
+        for table in tables:
+            waiting.append(table.replace_schema_metadata(schema.metadata))
+            if sum(each.num_rows for each in waiting) >= _LEAST_GROUP:
+                put()
+        put()
 
 
 def write_csv(table: pd.DataFrame, path: Path) -> None:
@@ -132,22 +152,11 @@ def write_json(data: Mapping[str, Any], path: Path) -> None:
     write_text(json_of(data), path)
 
 
-def _write_tables(tables: Sequence[pa.Table], where: Any, most: int | None = None) -> None:
-    """Write a Parquet file whose pages carry checksums (CRC-32), which readers can verify.
-
-    `tables`: of one schema, a row group each, or several of `most` rows.
-    """
-    schema = tables[0].schema
-    how = {"write_page_checksum": True, "write_batch_size": _ROWS_AT_ONCE, **_encodings(schema)}
-    with pq.ParquetWriter(where, schema, **how) as writer:
-        for table in tables:
-            writer.write_table(table, most)
-
-
-def encoded(*tables: pa.Table) -> bytes:
-    """Tables of one schema as the bytes of a Parquet file, a row group each."""
+def encoded(table: pa.Table) -> bytes:
+    """A table as the bytes of a Parquet file."""
     sink = pa.BufferOutputStream()
-    _write_tables(tables, sink)
+    with pq.ParquetWriter(sink, table.schema, **_how(table.schema)) as writer:
+        writer.write_table(table)
     return bytes(sink.getvalue().to_pybytes())
 
 
@@ -161,24 +170,23 @@ def decoded(content: bytes, schema: pa.Schema, rows: int) -> pa.Table | None:
         if file.metadata.num_rows != rows or not file.schema_arrow.equals(schema):
             return None
         table = file.read()
-        # What the file says of its rows besides, such as their detours, stays.
+        # What the file says of its rows besides, stays.
         return table.replace_schema_metadata({**(table.schema.metadata or {}), **(schema.metadata or {})})
     except (OSError, pa.ArrowException):
         return None
 
 
-def _encodings(schema: pa.Schema) -> dict[str, Any]:
-    """How columns of a result table are stored, which may have many rows: words as numbers, ids as steps, values as is.
+def _how(schema: pa.Schema) -> dict[str, Any]:
+    """How a table is stored: pages carry checksums (CRC-32), which readers verify.
 
-    Dictionaries of measured values, which hardly repeat, take long to make; parameters are compressed as they are.
+    A result table may have many rows: words as numbers, ids as steps, values as is. Dictionaries of measured values,
+    which hardly repeat, take long to make.
     """
-    if _PARAMETERS.encode() not in (schema.metadata or {}):
-        return {}
-    words = [field.name for field in schema if pa.types.is_dictionary(field.type)]
-    return {
-        "use_dictionary": words,
-        "column_encoding": dict.fromkeys(("design_id", "filter_id"), "DELTA_BINARY_PACKED"),
-    }
+    how: dict[str, Any] = {"write_page_checksum": True, "write_batch_size": _ROWS_AT_ONCE}
+    if _PARAMETERS.encode() in (schema.metadata or {}):
+        how["use_dictionary"] = [field.name for field in schema if pa.types.is_dictionary(field.type)]
+        how["column_encoding"] = dict.fromkeys(("design_id", "filter_id"), "DELTA_BINARY_PACKED")
+    return how
 
 
 def batches(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
@@ -192,23 +200,17 @@ def batches(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Tab
         raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
 
 
-def sliced(path: Path, sizes: Iterable[int]) -> Iterator[pa.Table]:
-    """The rows of a Parquet file in tables of these sizes, a row group in memory; raises OutputError when damaged."""
-    groups = batches(path)
-    rest = None
-    for size in sizes:
-        while rest is None or rest.num_rows < size:
-            more = next(groups, None)
-            if more is None:
-                raise OutputError(Fault("has too few rows", str(path)))
-            rest = more if rest is None else pa.concat_tables([rest, more])
-        yield rest.slice(0, size)
-        rest = rest.slice(size)
+def rows_in(path: Path) -> int:
+    """Rows of a Parquet file; 0 where it is missing or damaged."""
+    try:
+        return int(pq.read_metadata(path).num_rows)
+    except (OSError, pa.ArrowException):
+        return 0
 
 
 def holds(table: pa.Table, column: str, *words: str) -> BoolArray:
     """Where a column of words (dictionary-encoded) holds one of `words`, ndarray[n_rows]."""
-    return np.concatenate([np.zeros(0, dtype=bool), *(holds_one_of(chunk, words) for chunk in table[column].chunks)])
+    return np.asarray(pc.is_in(table[column].cast(pa.string()), pa.array(words)).to_numpy(), dtype=bool)
 
 
 def release_memory() -> None:

@@ -16,7 +16,6 @@ import pyarrow.parquet as pq
 from ..base.errors import Fault, OutputError
 from ..base.types import BoolArray, IndexArray
 from ..metrics.columns.exposure import EXPOSURE
-from .arrays import places, values_of
 from .tables import PLAIN, SWEPT, batches, holds, release_memory
 
 if TYPE_CHECKING:
@@ -159,17 +158,17 @@ def best_at(table: pa.Table, order: Sequence[str], most: int, among: BoolArray |
     """
     at = np.arange(table.num_rows) if among is None else np.flatnonzero(among)
     if len(at) > most:
-        first = values_of(table[order[0]])[at]
+        first = table[order[0]].to_numpy()[at]
         first = np.where(np.isnan(first), -np.inf, first)
         at = at[first >= np.partition(first, -most)[-most]]
     keys = [*((name, "descending") for name in dict.fromkeys(order)), ("design_id", "ascending")]
-    few = table.select([name for name, _ in keys]).take(places(at))
-    return np.asarray(at[values_of(pc.sort_indices(few, sort_keys=keys)[:most])])
+    few = table.select([name for name, _ in keys]).take(at)
+    return np.asarray(at[pc.sort_indices(few, sort_keys=keys)[:most].to_numpy()])
 
 
 def best_rows(table: pa.Table, order: Sequence[str], most: int) -> pa.Table:
     """The rows of `best_at`."""
-    return table.take(places(best_at(table, order, most))).combine_chunks()
+    return table.take(best_at(table, order, most)).combine_chunks()
 
 
 def leading_at(table: pa.Table, separation: str, among: BoolArray | None = None) -> IndexArray:
@@ -178,11 +177,11 @@ def leading_at(table: pa.Table, separation: str, among: BoolArray | None = None)
     Of equal ones the smallest `design_id`; `among`: rows to look at, ndarray[n_rows]; all without it.
     """
     seen = np.ones(table.num_rows, dtype=bool) if among is None else among
-    apart, ids = values_of(table[separation]), values_of(table["design_id"])
+    apart, ids = table[separation].to_numpy(), table["design_id"].to_numpy()
     with np.errstate(divide="ignore", invalid="ignore"):
         measures = [
             np.nan_to_num(v, nan=-np.inf, posinf=np.inf, neginf=-np.inf)
-            for v in (apart, apart / values_of(table[EXPOSURE]))
+            for v in (apart, apart / table[EXPOSURE].to_numpy())
         ]
     found = []
     for scenario in table["scenario"].unique().to_pylist():
@@ -195,7 +194,7 @@ def leading_at(table: pa.Table, separation: str, among: BoolArray | None = None)
 
 def leading(table: pa.Table, separation: str) -> pa.Table:
     """The rows of `leading_at`."""
-    return table.take(places(leading_at(table, separation)))
+    return table.take(leading_at(table, separation))
 
 
 def _best_of_each(table: pa.Table, order: Sequence[str]) -> pa.Table:

@@ -10,31 +10,28 @@ from ..base.later import loaded_later
 if TYPE_CHECKING:
     from ..results.folder import output_folder
     from .dry_run import to_do, to_do_lines
-    from .stop import stop_on_signals
-    from .whole import run_study
-    from .wishes import Wishes
-    from .workers import BACKENDS, usable_backend
+    from .runner import run_study
+    from .sweep import RunOptions
+    from .workers import BACKENDS, stopped_by_signals
 
 __all__ = [
     "BACKENDS",
-    "Wishes",
+    "RunOptions",
     "output_folder",
     "run_study",
-    "stop_on_signals",
+    "stopped_by_signals",
     "to_do",
     "to_do_lines",
-    "usable_backend",
 ]
 __getattr__ = loaded_later(
     globals(),
     {
         "BACKENDS": ".workers",
-        "Wishes": ".wishes",
+        "RunOptions": ".sweep",
         "output_folder": "..results.folder",
-        "run_study": ".whole",
-        "stop_on_signals": ".stop",
+        "run_study": ".runner",
+        "stopped_by_signals": ".workers",
         "to_do": ".dry_run",
         "to_do_lines": ".dry_run",
-        "usable_backend": ".workers",
     },
 )

@@ -1,9 +1,8 @@
-"""Answers of a search that survive a kill: each is kept as JSON as soon as it is finished."""
+"""Answers of a search that survive a kill: each is a part, as JSON, as soon as it is finished."""
 
 from __future__ import annotations
 
 import hashlib
-import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, get_type_hints
@@ -11,7 +10,7 @@ from typing import Any, get_type_hints
 import numpy as np
 
 from ..base.types import Call
-from ..results.journal import Journal
+from ..results.parts import ANSWER, Parts
 from ..results.records import from_json, to_json
 from ..search.limit import Limit
 from ..search.problem import Problem, SearchRun
@@ -19,49 +18,47 @@ from .workers import Workers
 
 
 @dataclass
-class Kept:
-    """Runs calls as the crew does, and keeps each answer: what a killed search has finished is not searched again.
+class KeptAnswers:
+    """Calls as the workers run them, each answer kept: what a killed search has finished is not searched again.
 
     What a call returns follows from the annotation of its function. A kept answer that is not of this type, or does not
     fit the call's problem, is not used.
     """
 
     crew: Workers
-    journal: Journal
+    parts: Parts
     fingerprint: str
     _round: int = 0
     _limits: list[str] = field(default_factory=list)
 
     def __call__(self, calls: Iterable[Call]) -> Iterator[Any]:
-        """Answers of delayed calls in their order; errors as for `Workers` and `Journal.keep`."""
+        """Answers of calls in their order; errors as for `Workers` and `Parts.save`."""
         self._round += 1
         waiting = list(calls)
         keys = [
             hashlib.sha256(f"{self.fingerprint} answer {self._round}, {at}".encode()).hexdigest()
             for at in range(len(waiting))
         ]
-        read = (self._answer(key, call) for key, call in zip(keys, waiting, strict=True))
-        known = {at: answer for at, answer in enumerate(read) if answer is not None}
+        known = {at: self._answer(key, call) for at, (key, call) in enumerate(zip(keys, waiting, strict=True))}
+        known = {at: answer for at, answer in known.items() if answer is not None}
         missing = [at for at in range(len(waiting)) if at not in known]
-        started = time.monotonic()
-
-        def keep(number: int, answer: Any) -> None:
-            self.journal.keep(keys[missing[number]], to_json(answer), time.monotonic() - started)
-
-        fresh = self.crew((waiting[at] for at in missing), finished=keep)
+        fresh = self.crew.unordered(waiting[at] for at in missing)
         for at, key in enumerate(keys):
-            answer = known[at] if at in known else next(fresh)
-            self._limits += [key] * isinstance(answer, Limit)
-            yield answer
+            while at not in known:
+                number, answer = next(fresh)
+                known[missing[number]] = answer
+                self.parts.save(keys[missing[number]], ANSWER, to_json(answer))
+            self._limits += [key] * isinstance(known[at], Limit)
+            yield known.pop(at)
 
     def drop_limits(self) -> None:
         """Limits that cannot be right are not kept: the same command looks for them again."""
         while self._limits:
-            self.journal.drop(self._limits.pop())
+            self.parts.forget(self._limits.pop())
 
     def _answer(self, key: str, call: Call) -> Any:
         """The answer of an earlier, interrupted run to this call, or None."""
-        content = self.journal.content(key)
+        content = self.parts.read(key)
         if content is None:
             return None
         try:
@@ -72,7 +69,7 @@ class Kept:
 
 
 def _fits(answer: Any, call: Call) -> bool:
-    """Whether an answer can be one to a call: its designs lie in the problem's box, its curve on the study's grid."""
+    """True where an answer can be one to a call: its designs lie in the problem's box, its curve on the grid."""
     problem = next((argument for argument in call[1] if isinstance(argument, Problem)), None)
     if problem is None:
         return True

@@ -8,13 +8,12 @@ from pathlib import Path
 
 from ..results.folder import held_by
 from ..results.inventory import Inventory
-from ..results.journal import Journal
+from ..results.parts import Parts
 from ..results.tables import PLAIN, RESULTS
 from ..search.trade_off import most_searches
 from ..study import Search, Study
 from .held_out import most_evaluations_left_out
 from .rows import rules_of
-from .stop import Stop
 from .sweep import Sweep
 from .workers import Workers
 
@@ -36,14 +35,11 @@ def to_do(study: Study, output: Path, n_jobs: int) -> ToDo:
     """Plan, and look at what is kept; neither compute designs nor write anything."""
     held = held_by(output)
     whole = held is not None and held.is_of(study) and not Inventory(output).wrong([RESULTS], quick=True)
-    crew = Workers(n_jobs, Stop())
     study = study.with_plans()
     if whole:
         return ToDo(study, study.n_designs, 0, searches=False)
-    journal = Journal(output)
-    journal.check()
-    sweep = Sweep(study, rules_of(study), journal, crew)
-    todo = [job for job, key in zip(sweep.jobs, sweep.keys, strict=True) if key not in journal.entries]
+    sweep = Sweep(study, rules_of(study), Parts(output), Workers(n_jobs))
+    todo = [sweep.jobs[index] for index in sweep.todo]
     rows = sum(job.stop - job.start for job in todo)
     return ToDo(study, study.n_designs - rows, len(todo), searches=study.search is not None)
 

@@ -9,8 +9,6 @@ import pyarrow as pa
 
 from ..base.types import BoolArray, FloatArray, IndexArray
 from ..metrics.pareto import non_dominated
-from ..results.arrays import places, texts_of, values_of
-from ..results.joined import Late
 from ..results.tables import FEW, SWEPT, holds
 from ..results.thinning import best_at, best_rows, leading, leading_at
 from .rows import Rules
@@ -56,11 +54,6 @@ class Front:
         """The two quantities of a front's rows, ndarray[n, 2], each pair once."""
         return self._groups.get((cfa, scenario), np.empty((0, 2)))
 
-    @property
-    def late(self) -> Late:
-        """The column `pareto` of a whole table."""
-        return Late("pareto", ["pareto", "kind", "cfa", "scenario", *self._axes], self.holds)
-
     def holds(self, table: pa.Table) -> BoolArray:
         """Which rows of a table are on the whole front, which is finished, ndarray[n_rows]."""
         local, values, groups = self._candidates(table)
@@ -80,7 +73,7 @@ class Front:
         local = np.flatnonzero(wanted)
         few = table.select([*self._axes, "cfa", "scenario"]).take(pa.array(local))
         values = np.stack([few[name].to_numpy() for name in self._axes], axis=1)
-        return local, values, list(zip(texts_of(few["cfa"]), texts_of(few["scenario"]), strict=True))
+        return local, values, list(zip(few["cfa"].to_pylist(), few["scenario"].to_pylist(), strict=True))
 
     def _by_group(self, table: pa.Table) -> dict[tuple[str, str], FloatArray]:
         _, values, groups = self._candidates(table)
@@ -181,8 +174,8 @@ class Gathered:
 
 def few_of(table: pa.Table, rules: Rules) -> pa.Table:
     """The rows of a chunk that `Gathered` may keep: its front, those that are no sweep, its best designs, who leads."""
-    wanted = values_of(table["pareto"]) | holds(table, "kind", *FEW)
-    best = best_at(table, rules.order, BEST_PER_CFA, values_of(table["feasible"]) & ~wanted)
+    wanted = table["pareto"].to_numpy() | holds(table, "kind", *FEW)
+    best = best_at(table, rules.order, BEST_PER_CFA, table["feasible"].to_numpy() & ~wanted)
     leaders = leading_at(table, rules.front[0], ~wanted)
     found = dict.fromkeys([*np.flatnonzero(wanted).tolist(), *best.tolist(), *leaders.tolist()])
-    return table.take(places(np.array([*found], dtype=np.intp))).combine_chunks()
+    return table.take(np.array([*found], dtype=np.int64)).combine_chunks()

@@ -1,12 +1,8 @@
-"""What tables show of a design besides its row, all of it read from one image chain of its scene.
-
-The worker that computes the rows of a plain CFA or named design looks at it, too: it has the scene's kernels at hand.
-"""
+"""What tables show of a design besides its row, all of it read from one forward model of its scene."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
@@ -20,13 +16,11 @@ from ..curves.lights import Pair
 from ..metrics.limiting import limiting_lights
 from ..metrics.recognition import recognize
 from ..results.designs import computed_rows, row_curves
-from ..results.tables import FEW, FOUND, LIMITED_BY, POINTS, RECOGNITION, holds
+from ..results.tables import FEW, FOUND, LIMITED_BY, POINTS, RECOGNITION
 from ..study import Study
-from .rows import Job
 
 if TYPE_CHECKING:
     import pandas as pd
-    import pyarrow as pa
 
 _AT_ONCE = 64
 _Row = Mapping[Hashable, Any]
@@ -93,38 +87,21 @@ class Looking:
             recognized = recognize(imager, curves, self.states, self.patches, rng)
         return Look(limited_by, dn, recognized)
 
-    def beside_rows(self, job: Job, setup: Setup, table: pa.Table) -> dict[int, Look]:
-        """Looks at the designs of a job, where all are shown, by their ids.
-
-        One that cannot be looked at is left out: `looks_of` looks again, once all rows are kept, and tells why not.
-        """
-        found: dict[int, Look] = {}
-        wanted = self.wanted(job.space.kind, job.scenario)
-        if not wanted or job.space.kind not in FEW:
-            return found
-        for index in np.flatnonzero(holds(table, "status", "ok")):
-            curves = job.space.curves(job.space.points(job.start, job.stop)[index : index + 1], setup.camera.grid.size)
-            with suppress(Exception):
-                design_id = job.first_id + int(index)
-                found[design_id] = self.at(setup, (design_id, curves, wanted))
-        return found
-
 
 def looks_of(
     study: Study,
     looking: Looking,
     rows: pd.DataFrame,
     on_front: pd.DataFrame,
-    known: Mapping[int, Look],
     parallel: Parallel,
     progress: Progress,
 ) -> dict[int, Look]:
-    """Looks at the designs to draw and those on the front by their ids; `known`: those that are there already."""
-    found = dict(known)
+    """Looks at the designs to draw and those on the front, by their ids."""
+    found: dict[int, Look] = {}
     groups: dict[tuple[str, ...], list[_Seen]] = {}
     setups: dict[tuple[str, ...], Setup] = {}
     for row, wanted in _shown(looking, rows, on_front):
-        if wanted and int(row["design_id"]) not in found:
+        if wanted:
             space, curves = row_curves(study, row)
             key = (str(row["scenario"]), space.cfa, *(() if space.filter is None else space.filter.channels))
             setups.setdefault(key, study.setup(space, key[0]))
@@ -141,7 +118,7 @@ def looks_of(
         calls += [scene] if sum(len(designs) for _, designs in scene) <= _AT_ONCE else [[part] for part in scene]
     for looks in parallel(delayed(_looked, looking, call) for call in calls):
         found |= looks
-        progress("lights and patches", len(found), len(known) + sum(len(own) for own in groups.values()))
+        progress("lights and patches", len(found), sum(map(len, groups.values())))
     return found
 
 

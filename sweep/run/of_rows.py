@@ -41,14 +41,14 @@ class Shown:
     """Rows that a report can show, and those `on_front` of them; `limit`: of a search.
 
     `looks`: at them, by their ids; `points`: ids of the swept designs that figures show as points, ndarray[n_points];
-    `kept`: calls whose results a journal keeps under a name.
+    `kept`: calls whose results are kept as parts under a name.
     """
 
     study: Study
     rows: pd.DataFrame
     on_front: pd.DataFrame
     looks: Mapping[int, Look]
-    points: Callable[[], IndexArray]
+    points: IndexArray
     limit: Callable[[], Limit | None]
     parallel: Parallel
     kept: Callable[[str], Parallel]
@@ -104,7 +104,7 @@ def _has_colors(study: Study) -> bool:
 ROW_TABLES = {
     CURVES: RowTable(_always, _curves),
     POINTS: RowTable(_always, lambda s: points_table(s.study, s.rows, s.on_front, s.looks)),
-    LIMITED_BY: RowTable(_always, lambda s: limited_by_table(s.study, s.looks, s.points(), s.parallel, s.progress)),
+    LIMITED_BY: RowTable(_always, lambda s: limited_by_table(s.study, s.looks, s.points, s.parallel, s.progress)),
     VALIDATED: RowTable(
         lambda study: study.held_out is not None,
         lambda s: held_out_table(s.study, s.rows, s.on_front, s.parallel, s.progress),

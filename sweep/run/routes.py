@@ -1,11 +1,7 @@
-"""The routes from a block of designs to its quantities: the fast one, the ordinary one, and design by design.
-
-Where a route fails the next one is taken, and how many designs took it is handed on: nothing is replaced in silence.
-"""
+"""Quantities of designs, a block of them at a time; where a block fails, design by design, so that one is a row."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -14,7 +10,7 @@ import numpy as np
 from ..base.types import FloatArray
 from ..camera.forward import AllPhases, ForwardModel, forward_model
 from ..camera.setup import Setup
-from ..designs.block import Block, CurveBlock, EdgeBlock, edges_of
+from ..designs.block import CurveBlock, edges_of
 from ..designs.space import Space
 from ..designs.tolerance import AS_DESIGNED, Tolerance
 from ..metrics.evaluate import evaluate, family_quantities, image_quantities
@@ -26,13 +22,9 @@ from ..results.identity import CHUNK
 from ..results.tables import FEW
 from ..vision.section import Vision
 
-BY_CURVES = "computed from their curves, since the fast way by their edges failed"
-ALONE = "computed one by one, since their block failed"
 _MOST_LETTERS = 200
 _CHUNKS_BY_EDGES = 4
 """In a block of designs that are seen by their edges alone: these take little memory."""
-Detours = Counter[tuple[str, str]]
-"""How many designs took another route than their block's own: (BY_CURVES or ALONE, the fault of the own route)."""
 
 
 @dataclass(frozen=True)
@@ -66,63 +58,41 @@ class Request:
 
 @dataclass(frozen=True)
 class Found:
-    """Quantities of a block, ndarray[n_designs] each; what is wrong with which design; detours that were taken.
+    """Quantities of designs, ndarray[n_designs] each; what is wrong with which design.
 
     `spent_s`: see `whole_readout.Spent`.
     """
 
     columns: Columns
     faults: dict[int, str]
-    detours: Detours
     spent_s: float = 0.0
 
 
 def found_of(space: Space, start: int, points: FloatArray, setup: Setup, request: Request) -> Found:
-    """Designs of a space from `start` on, a block at a time, which stays in the cache; see `block_of`.
+    """Quantities of designs of a space from `start` on, of which these are the `points`.
 
-    More than a chunk of them are seen by their edges.
+    They are computed in blocks that stay in the cache: by their edges where the family is separable, else from their
+    curves. A block that fails is halved, down to the design that does, whose fault it is, as is a number that is not
+    finite.
     """
-    return _in_blocks(CHUNK * (1 if request.needs_curves else _CHUNKS_BY_EDGES), space, start, points, setup, request)
-
-
-def _in_blocks(size: int, space: Space, start: int, points: FloatArray, setup: Setup, request: Request) -> Found:
-    parts: list[Found] = []
     faults: dict[int, str] = {}
-    for begin in range(0, len(points), size):
-        part = block_of(space, start + begin, points[begin : begin + size], setup, request)
-        parts.append(part)
-        faults |= {begin + index: text for index, text in part.faults.items()}
-    names = request.quantities.keys() & parts[0].columns.keys()
-    columns = {name: np.concatenate([part.columns[name] for part in parts]) for name in names}
-    spent_s = sum(part.spent_s for part in parts)
-    return Found(columns, faults, sum((part.detours for part in parts), Counter()), spent_s)
-
-
-def block_of(space: Space, start: int, points: FloatArray, setup: Setup, request: Request) -> Found:
-    """Designs of a space from `start` on, of which these are the `points`.
-
-    By their edges where the family is separable, else from their curves. Where the fast way fails, in chunks; in that
-    where it fails again all from their curves, whose numbers are the same up to rounding; where that fails, too, one by
-    one, which gives the very numbers of a whole block, and what is wrong with a design is its fault. A number that is
-    not finite is a fault.
-    """
-    detours: Detours = Counter()
-    faults: dict[int, str] = {}
-    fast: EdgeBlock | None = None
     spent = Spent()
-    try:
-        fast = edges_of(space, start, start + len(points))
-        columns = _columns(space, setup, points, request, spent, fast)
-    except Exception as error:  # one design must not take the others with it
-        if len(points) > CHUNK:
-            return _in_blocks(CHUNK, space, start, points, setup, request)
-        own = text_of(error)
+
+    def computed(begin: int, end: int) -> list[Columns]:
         try:
-            columns = _columns(space, setup, points, request, spent)
-            detours[BY_CURVES, own] = len(points)
-        except Exception:
-            columns, faults, detours = _one_by_one(space, start, setup, points, request, spent, own)
-    return Found(columns, _not_finite(columns, setup, request) | faults, detours, spent.seconds)
+            return [_columns(space, start + begin, setup, points[begin:end], request, spent)]
+        except Exception as error:  # one design must not take the others with it
+            if end - begin > 1:
+                middle = (begin + end) // 2
+                return computed(begin, middle) + computed(middle, end)
+            faults[begin] = f"error: {text_of(error)}"
+            return [dict.fromkeys(request.quantities, np.array([np.nan]))]
+
+    size = CHUNK * (1 if request.needs_curves else _CHUNKS_BY_EDGES)
+    parts = [part for begin in range(0, len(points), size) for part in computed(begin, min(begin + size, len(points)))]
+    names = request.quantities.keys() & set.intersection(*map(set, parts))
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in names}
+    return Found(columns, _not_finite(columns, setup, request) | faults, spent.seconds)
 
 
 def text_of(error: Exception) -> str:
@@ -130,13 +100,12 @@ def text_of(error: Exception) -> str:
     return " ".join(f"{type(error).__name__}: {error}".split())[:_MOST_LETTERS]
 
 
-def _columns(
-    space: Space, setup: Setup, points: FloatArray, request: Request, spent: Spent, block: Block | None = None
-) -> Columns:
-    """Every quantity of a block of designs, ndarray[n_designs] each; `block`: these very designs, if a faster one."""
+def _columns(space: Space, start: int, setup: Setup, points: FloatArray, request: Request, spent: Spent) -> Columns:
+    """Every quantity of a block of designs, ndarray[n_designs] each."""
     size = setup.camera.grid.size
     imager = request.imager(space.kind, setup)
-    designs = CurveBlock(space.curves(points, size)) if block is None else block
+    edges = edges_of(space, start, start + len(points))
+    designs = CurveBlock(space.curves(points, size)) if edges is None else edges
     asked = request.asked
     columns = evaluate(imager, designs, asked.states, probabilities=asked.probabilities, own=asked.own, spent=spent)
     columns |= family_quantities(None if space.filter is None else space.filter.family, points)
@@ -191,30 +160,6 @@ def of_a_share(space: Space, setup: Setup, points: FloatArray, request: Request)
     return {YIELD + name: values for name, values in found.items()}
 
 
-def _one_by_one(
-    space: Space, start: int, setup: Setup, points: FloatArray, request: Request, spent: Spent, own: str
-) -> tuple[Columns, dict[int, str], Detours]:
-    """Each design by its own route, else from its curves; `own`: the fault of the whole block."""
-    found: list[Columns | None] = []
-    faults: dict[int, str] = {}
-    detours: Detours = Counter()
-    for index, point in enumerate(points):
-        at = start + index
-        try:
-            found.append(_columns(space, setup, point[None], request, spent, edges_of(space, at, at + 1)))
-            detours[ALONE, own] += 1
-        except Exception as error:
-            try:
-                found.append(_columns(space, setup, point[None], request, spent))
-                detours[BY_CURVES, text_of(error)] += 1
-            except Exception as last:  # the row says what happened
-                found.append(None)
-                faults[index] = f"error: {text_of(last)}"
-    nothing = np.array([np.nan])
-    columns = {n: np.concatenate([nothing if c is None else c[n] for c in found]) for n in request.quantities}
-    return columns, faults, detours
-
-
 def _not_finite(columns: Columns, setup: Setup, request: Request) -> dict[int, str]:
     """Designs with a quantity that is no finite number, though each of them has it."""
     lacking = _may_lack(setup, request)
@@ -235,20 +180,6 @@ def _may_lack(setup: Setup, request: Request) -> set[str]:
     if lacking & set(request.objective.weights):
         lacking.add(COMBINED)
     return lacking
-
-
-def detours_in_words(detours: Detours) -> list[str]:
-    """A line for each kind of detour: how many designs took it, and why."""
-    lines = []
-    for kind in (BY_CURVES, ALONE):
-        why = Counter({fault: n for (which, fault), n in detours.items() if which == kind})
-        if why:
-            n, others = why.total(), len(why) - 1
-            more = f", and {others:,} more" if others else ""
-            lines.append(
-                f"{n:,} {'design was' if n == 1 else 'designs were'} {kind} ({why.most_common(1)[0][0]}{more})"
-            )
-    return lines
 
 
 def spent_in_words(names: Sequence[str], spent_s: float, rows_s: float) -> list[str]:

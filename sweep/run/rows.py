@@ -4,34 +4,31 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
-from ..base.types import BoolArray, FloatArray
+from ..base.types import BoolArray, FloatArray, IndexArray
 from ..camera.plan import Plan
 from ..camera.setup import Setup
 from ..designs.block import by_edges
 from ..designs.space import Space
 from ..metrics.bound import FEASIBLE, Bound, total_violation
 from ..metrics.pareto import non_dominated
-from ..results.arrays import flags, numbers, places, words
 from ..results.dictionary import described
 from ..results.identity import CHUNK
-from ..results.tables import holds, result_schema
+from ..results.tables import result_schema
 from ..study import Study
-from .routes import Detours, Request, found_of
+from .routes import Request, found_of
 
 _WORDS = pa.dictionary(pa.int32(), pa.string())
-_ARRAYS: dict[pa.DataType, Callable[[Any], pa.Array]] = {pa.float64(): numbers, pa.bool_(): flags, pa.int64(): places}
 _MOST_CHUNKS, _LEAST_JOBS = 16, 64
 _DRAWN_DESIGNS = 32
 """Of a job where each design is seen by many random lamps and cameras."""
-_DETOURS, _SPENT = b"cfa_sweep_detours", b"cfa_sweep_spent_s"
+_SPENT = b"cfa_sweep_spent_s"
 
 
 @dataclass(frozen=True)
@@ -98,8 +95,8 @@ def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
     """Evaluate a job; a design that fails is a row with its status, and the others are kept.
 
     `pareto` marks the non-dominated designs of this job alone, among those that meet every constraint but those on the
-    front's axes; `front.Front` finds those of the whole table. `detours_of` the table says which designs took
-    another route than their block's own, `spent_on` it what metrics of the whole readout took.
+    front's axes; `front.Front` finds those of the whole table. `spent_on`
+    the table says what metrics of the whole readout took.
     """
     points = job.space.points(job.start, job.stop)
     found = found_of(job.space, job.start, points, setup, rules.request)
@@ -120,27 +117,13 @@ def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
         "pareto": _local_front(columns, ok, own, rules),
         "status": _status(faults, len(points)),
     }
-    return _annotated(_table(values, len(points), rules.schema), found.detours, found.spent_s)
+    return _annotated(_table(values, len(points), rules.schema), found.spent_s)
 
 
 def _local_front(columns: Mapping[str, FloatArray], ok: BoolArray, own: FloatArray, rules: Rules) -> BoolArray:
     """The non-dominated designs of a chunk among those that meet every constraint but those on the front's axes."""
     eligible = ok & (total_violation(columns, rules.constraints, own, leave_out=rules.front) <= FEASIBLE)
     return non_dominated(np.stack([columns[name] for name in rules.front], axis=1), eligible)
-
-
-def with_local_front(table: pa.Table, job: Job, rules: Rules) -> pa.Table:
-    """A job's rows from a finished table, `pareto` again as `run_job` marks it, with the words alone that they use."""
-    names = {*rules.front, *rules.constraints}
-    columns = {name: table[name].to_numpy() for name in names}
-    marked = _local_front(
-        columns, holds(table, "status", "ok"), job.space.violation(job.space.points(job.start, job.stop)), rules
-    )
-    found = [
-        flags(marked) if f.name == "pareto" else table[f.name].cast(pa.string() if f.type == _WORDS else f.type)
-        for f in rules.schema
-    ]
-    return pa.table(found, names=rules.schema.names).cast(rules.schema)
 
 
 def job_key(job: Job, fingerprint: str, plan: Plan | None) -> str:
@@ -171,15 +154,8 @@ def rules_of(study: Study) -> Rules:
 
 
 def joined(tables: Sequence[pa.Table]) -> pa.Table:
-    """The rows of several tables of jobs, with the detours and seconds of all."""
-    detours = sum((detours_of(table) for table in tables), Counter())
-    return _annotated(pa.concat_tables(tables).unify_dictionaries(), detours, sum(map(spent_on, tables)))
-
-
-def detours_of(table: pa.Table) -> Detours:
-    """How many designs of a job took another route than their block's own, and why."""
-    kept = (table.schema.metadata or {}).get(_DETOURS)
-    return Counter({(kind, fault): n for kind, fault, n in json.loads(kept)} if kept else {})
+    """The rows of several tables of jobs, with the seconds of all."""
+    return _annotated(pa.concat_tables(tables).unify_dictionaries(), sum(map(spent_on, tables)))
 
 
 def spent_on(table: pa.Table) -> float:
@@ -187,19 +163,19 @@ def spent_on(table: pa.Table) -> float:
     return float((table.schema.metadata or {}).get(_SPENT, 0.0))
 
 
-def _annotated(table: pa.Table, detours: Detours, spent_s: float) -> pa.Table:
-    """The table with its detours and seconds in its metadata, which go where its rows go, but into no whole table."""
-    metadata = dict(table.schema.metadata or {})
-    if detours:
-        metadata[_DETOURS] = json.dumps([(kind, fault, n) for (kind, fault), n in detours.items()]).encode()
-    if spent_s:
-        metadata[_SPENT] = str(spent_s).encode()
-    return table.replace_schema_metadata(metadata)
+def _annotated(table: pa.Table, spent_s: float) -> pa.Table:
+    """The table with its seconds in its metadata, which go where its rows go, but into no whole table."""
+    return table.replace_schema_metadata({**(table.schema.metadata or {}), _SPENT: str(spent_s).encode()})
 
 
 def _word(text: str | None, n: int) -> pa.Array:
     """The same word, or none, in n rows."""
-    return pa.nulls(n, _WORDS) if text is None else words([text], np.zeros(n, dtype=np.intp))
+    return pa.nulls(n, _WORDS) if text is None else _words([text], np.zeros(n, dtype=np.intp))
+
+
+def _words(texts: Sequence[str], which: IndexArray) -> pa.Array:
+    """Words by their places in a list, dictionary-encoded."""
+    return pa.DictionaryArray.from_arrays(pa.array(which, pa.int32()), pa.array(texts, pa.string()))
 
 
 def _status(faults: Mapping[int, str], n: int) -> pa.Array:
@@ -208,7 +184,7 @@ def _status(faults: Mapping[int, str], n: int) -> pa.Array:
         return _word("ok", n)
     texts = [faults.get(index, "ok") for index in range(n)]
     numbered = {text: at for at, text in enumerate(dict.fromkeys(texts))}
-    return words([*numbered], np.array([numbered[text] for text in texts]))
+    return _words([*numbered], np.array([numbered[text] for text in texts]))
 
 
 def _labels(job: Job) -> dict[str, Any]:
@@ -237,6 +213,6 @@ def _table(values: Mapping[str, pa.Array | FloatArray | BoolArray], n: int, sche
         made = values.get(field.name)
         if made is None:
             return pa.nulls(n, field.type)
-        return made if isinstance(made, pa.Array) else _ARRAYS[field.type](made)
+        return made if isinstance(made, pa.Array) else pa.array(made, field.type, from_pandas=True)
 
     return pa.Table.from_arrays([column(field) for field in schema], schema=schema)

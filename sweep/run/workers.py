@@ -1,41 +1,28 @@
-"""Calls over worker processes, threads or a cluster: results in order, whatever becomes of the workers."""
+"""Calls over worker processes, threads or a cluster, by joblib; what a worker's death costs; how a run is stopped."""
 
 from __future__ import annotations
 
 import os
-import sys
-import time
+import signal
+import threading
 import warnings
-from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, ExitStack, contextmanager
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
-from importlib import import_module
-from itertools import islice
-from multiprocessing import get_context
-from typing import TYPE_CHECKING, Any
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from typing import Any
 
 import joblib
-from joblib.externals.loky import ProcessPoolExecutor
-from threadpoolctl import ThreadpoolController
+import psutil
+from threadpoolctl import threadpool_limits
 
-from ..base.errors import SweepError
+from ..base.errors import InterruptedRunError, SweepError
 from ..base.types import Call
-from .cluster import client_of
-from .stop import Stop, without_interrupts
-from .worker_process import give_back_freed_memory, keep_freed_memory, preparing
 
-if TYPE_CHECKING:
-    from ..study import Study
-
-_LEAST_WINDOW, _WINDOW_PER_WORKER = 64, 16
-_HANDED_OUT_S = 0.1
-"""Seconds for a pool's thread to hand on what it was given; it needs far less, unless the machine stands still."""
-_CALLED, _SEARCHING = ("sweep.run.sweep", "sweep.metrics.nearest"), "sweep.search.solver"
 BACKENDS = ("loky", "threading", "dask")
-_Numbered = tuple[int, Call]
+_stop = threading.Event()
+"""A stop was asked for. Compiled libraries may swallow the exception by which the signal's handler says so."""
+_STOPPED = "interrupted; finished parts are kept, the same command continues"
 
 
 class WorkerKilledError(SweepError):
@@ -44,240 +31,173 @@ class WorkerKilledError(SweepError):
 
 @dataclass(frozen=True)
 class Workers:
-    """How many workers of which kind; never more than the cores, each with one thread for its libraries.
+    """Workers of a backend, each with one thread for its libraries.
 
-    `scheduler`: address of a Dask scheduler, whose workers are used as they are.
+    Attributes
+    ----------
+    n_jobs : int
+        Workers on this machine, at most one for each core; those of a cluster are used as they are.
+    backend : {'loky', 'threading', 'dask'}
+        Processes, threads, or a cluster.
     """
 
     n_jobs: int
-    stop: Stop
     backend: str = "loky"
-    scheduler: str | None = None
-    _starting: list[Generator[Any]] = field(default_factory=list, init=False, repr=False, compare=False)
-
-    def begin(self, modules: Iterable[str]) -> None:
-        """Start worker processes, which load some modules of the package while this process does something else.
-
-        Their first call waits for them, as it would without it.
-        """
-        if self.backend == "loky" and self.count > 1:
-            names = tuple(modules)
-            parallel = joblib.Parallel(self.count, return_as="generator_unordered", batch_size=1)
-            with self.stop.held(), without_interrupts():
-                self._starting.append(parallel((_loaded, (names,), {}) for _ in range(self.count)))
-
-    def begun(self) -> None:
-        """Wait for processes that were started; one that died meanwhile is started again when it is needed."""
-        try:
-            while self._starting:
-                for _ in self._gracefully(self._starting[-1]):
-                    pass
-                self._starting.pop()
-        except Exception as error:
-            if not _is_death(error):
-                raise
-            self._starting.clear()
-
-    def not_awaited(self) -> None:
-        """End what was started and is not awaited, as after an error or a stop."""
-        for started in self._starting:
-            _left(started)
-        self._starting.clear()
 
     @property
     def count(self) -> int:
         """Workers on this machine."""
         return max(1, min(self.n_jobs, os.cpu_count() or 1))
 
-    def __call__(
-        self,
-        calls: Iterable[Call],
-        killed: Callable[[Call], Any] | None = None,
-        finished: Callable[[int, Any], None] | None = None,
-    ) -> Generator[Any]:
-        """Results of delayed calls in their order; `finished` gets each with its number as soon as it is there.
-
-        When a worker dies, the calls under way run again, each in a process of its own. One that dies again goes to
-        `killed`, whose answer counts as its result; without it, WorkerKilledError is raised. Raises
-        InterruptedRunError after a stop was asked for and what came within its grace has been handed out. A result
-        that was handed out may be kept in peace: the stop waits until the next one is asked for.
-        """
-        self.begun()
-        rest = enumerate(calls)
+    def __call__(self, calls: Iterable[Call], killed: Callable[[Call], Any] | None = None) -> Iterator[Any]:
+        """Results of calls in their order; see `unordered`."""
         early: dict[int, Any] = {}
         turn = 0
-        # joblib goes on computing while results wait to be taken; a window bounds how many can wait.
-        window = max(_LEAST_WINDOW, _WINDOW_PER_WORKER * joblib.effective_n_jobs(self._n_jobs))
-        while not self.stop.requested and (some := list(islice(rest, window))):
-            for at, result in self._window(deque(some), killed):
-                with self.stop.held():
-                    if finished is not None:
-                        finished(at, result)
-                    early[at] = result
-                    while turn in early:
-                        yield early.pop(turn)
-                        turn += 1
-        self.stop.check()
+        for at, result in self.unordered(calls, killed):
+            early[at] = result
+            while turn in early:
+                yield early.pop(turn)
+                turn += 1
 
-    def _window(self, waiting: deque[_Numbered], killed: Callable[[Call], Any] | None) -> Iterator[tuple[int, Any]]:
-        """Results of a few calls with their numbers, as they come; those that a stop leaves behind are left out."""
-        flying: dict[int, Call] = {}
+    def unordered(
+        self, calls: Iterable[Call], killed: Callable[[Call], Any] | None = None
+    ) -> Iterator[tuple[int, Any]]:
+        """Numbers and results of calls, as they come.
 
-        def taken() -> Iterator[Call]:
-            while waiting and not self.stop.requested:
-                at, call = waiting.popleft()
-                flying[at] = call
-                yield (_numbered, (at, call), {})
+        Where a worker dies, the calls that were under way run again, one at a time. One that kills again goes to
+        `killed`, whose answer counts as its result; raises WorkerKilledError without it.
+        """
+        waiting = dict(enumerate(calls))
+        while waiting:
+            begun: dict[int, Call] = {}
 
-        while waiting and not self.stop.requested:
-            results: Generator[Any] | None = None
+            def dispatched(begun: dict[int, Call] = begun) -> Iterator[Call]:
+                for at, call in list(waiting.items()):
+                    begun[at] = call
+                    yield (_numbered, (at, call), {})
+
             try:
-                parallel = joblib.Parallel(self._n_jobs, return_as="generator_unordered", pre_dispatch="3*n_jobs")
-                with self.stop.held(), without_interrupts():
-                    results = parallel(taken())
-                for at, result in self._gracefully(results):
-                    del flying[at]
+                for at, result in self._parallel(dispatched()):
+                    del waiting[at], begun[at]
                     yield at, result
+                    if _stop.is_set():
+                        raise KeyboardInterrupt
             except Exception as error:
                 if not _is_death(error):
                     raise
-            except BaseException:  # whoever took the results left, or was broken off
-                waiting.clear()
-                if flying and results is not None:
-                    _left(results)
-                raise
-            suspects = list(flying.items())
-            flying.clear()
-            for at, call in suspects:
-                if self.stop.requested:  # it may have ended the workers, too
-                    return
-                with self.stop.grace():
-                    result = self._again(call, killed)
-                yield at, result
+                for at, call in begun.items():
+                    yield at, self._again(call, killed)
+                    del waiting[at]
 
-    def _gracefully(self, results: Iterator[Any]) -> Iterator[Any]:
-        """The same results; each is waited for as long as a stop allows."""
-        while True:
-            with self.stop.grace():
-                result = next(results, None)
-            if result is None:
-                return
-            yield result
+    def _parallel(self, calls: Iterable[Call]) -> Generator[Any]:
+        n_jobs = -1 if self.backend == "dask" else self.count
+        parallel = joblib.Parallel(n_jobs, return_as="generator_unordered", batch_size=1, pre_dispatch="2*n_jobs")
+        results: Generator[Any] = parallel(calls)
+        return results
 
-    @property
-    def _n_jobs(self) -> int:
-        return -1 if self.backend == "dask" else self.count
-
-    @staticmethod
-    def _again(call: Call, killed: Callable[[Call], Any] | None) -> Any:
+    def _again(self, call: Call, killed: Callable[[Call], Any] | None) -> Any:
+        """The result of a call that may have killed its worker."""
         try:
-            return alone(call)
+            return self.alone(call)
         except WorkerKilledError:
             if killed is None:
                 raise
             return killed(call)
 
-
-def called_by(study: Study) -> tuple[str, ...]:
-    """Modules whose functions a run of the study calls in its workers."""
-    return _CALLED if study.search is None else (*_CALLED, _SEARCHING)
-
-
-def usable_backend(backend: str) -> str:
-    """The backend; threads, where this machine has no semaphores for worker processes (no or a read-only /dev/shm)."""
-    if backend != "loky":
-        return backend
-    try:
-        get_context("fork").Semaphore()
-    except (ImportError, OSError):
-        return "threading"
-    return backend
+    def alone(self, call: Call) -> Any:
+        """The result of a call with no other under way; raises WorkerKilledError where its worker dies."""
+        try:
+            ((_, result),) = joblib.Parallel(max(2, self.count))([(_numbered, (0, call), {})])
+        except Exception as error:
+            if not _is_death(error):
+                raise
+            raise WorkerKilledError("a worker died twice at the same work: out of memory, or killed") from None
+        return result
 
 
 @contextmanager
-def workers(how: Workers) -> Iterator[Workers]:
-    """Start the backend and give the workers for as long as the block stands.
+def workers(n_jobs: int, backend: str = "loky", scheduler: str | None = None) -> Iterator[Workers]:
+    """Start the backend and give its workers for as long as the block stands.
 
-    Raises SweepError when Dask is not installed or its scheduler does not answer.
+    Raises SweepError where Dask is not installed or its scheduler does not answer.
     """
-    how = replace(how, backend=usable_backend(how.backend))
     settings: dict[str, Any] = {}
-    keep_freed_memory()  # with one worker, and with threads, the work is done in this process
     with ExitStack() as stack:
         stack.enter_context(warnings.catch_warnings())
-        # A run that ends early cancels what it has no use for.
         warnings.filterwarnings("ignore", message=".*have been cancelled", category=UserWarning)
-        # loky starts a worker anew whose caches have grown, and hands it the calls again.
         warnings.filterwarnings("ignore", message="A worker stopped while some jobs", category=UserWarning)
-        if how.backend == "dask":
-            stack.enter_context(client_of(how.scheduler))
-        elif how.backend == "loky":
-            settings = {"inner_max_num_threads": 1, "initializer": preparing(os.getpid())}
-        # This process computes, too; and a thread that ends gives back what it found, also to those beside it.
-        stack.enter_context(one_thread())
-        stack.enter_context(joblib.parallel_config(how.backend, **settings))
-        stack.callback(how.not_awaited)
-        yield how
-        how.begun()
+        if backend == "dask":
+            stack.enter_context(_client(scheduler))
+        elif backend == "loky":
+            settings = {"inner_max_num_threads": 1, "initializer": _begin_worker, "initargs": (os.getpid(),)}
+        stack.enter_context(threadpool_limits(limits=1))  # with one worker, and with threads, this process computes
+        stack.enter_context(joblib.parallel_config(backend, **settings))
+        yield Workers(n_jobs, backend)
 
 
-def alone(call: Call) -> Any:
-    """Result of a call in a process of its own; raises WorkerKilledError when that dies."""
-    process = ProcessPoolExecutor(max_workers=1, initializer=preparing(os.getpid()))
-    ended = False
+@contextmanager
+def stopped_by_signals() -> Iterator[None]:
+    """SIGTERM stops a run as Ctrl-C does; raises InterruptedRunError then.
+
+    joblib ends its workers when the exception reaches it. Parts are on the disk as soon as they are finished. Python
+    takes signals in the main thread alone; elsewhere nothing is changed.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    _stop.clear()
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    for number, handler in before.items():
+        if handler is not signal.SIG_IGN:  # as a shell has it for what runs in the background
+            signal.signal(number, _ask_to_stop)
     try:
-        with without_interrupts():
-            coming = process.submit(_one_threaded, *call)
-        result = coming.result()
-        ended = True
-        return result
-    except BrokenProcessPool:
-        raise WorkerKilledError("a worker died twice at the same work: out of memory, or killed") from None
+        yield
+    except KeyboardInterrupt:
+        raise InterruptedRunError(_STOPPED) from None
     finally:
-        process.shutdown(kill_workers=not ended)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
-@lru_cache(maxsize=1)
-def _libraries(_n_modules: int) -> ThreadpoolController:
-    """Libraries of this process that have threads. They are looked for again where modules were imported since."""
-    return ThreadpoolController()
+def _ask_to_stop(*_: object) -> None:
+    _stop.set()
+    raise KeyboardInterrupt
 
 
-def one_thread() -> AbstractContextManager[Any]:
-    """While this is open, libraries use one thread."""
-    limits: AbstractContextManager[Any] = _libraries(len(sys.modules)).limit(limits=1)
-    return limits
+def _begin_worker(parent: int) -> None:
+    """In a worker: leave Ctrl-C, which reaches all processes of a terminal, to the parent, and end with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
 
 
-def _one_threaded(function: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
-    """A call whose libraries use one thread: the same sums in the same order with any number of workers."""
-    with one_thread():
-        return function(*arguments, **named)
-
-
-def _loaded(modules: tuple[str, ...]) -> bool:
-    """Load modules of the package, for other work than before."""
-    give_back_freed_memory()
-    for name in modules:
-        import_module(name)
-    return True
+def _end_with(parent: int) -> None:
+    """End this process with its parent: loky's workers would wait for work from one that was killed for ever."""
+    with suppress(psutil.NoSuchProcess):
+        psutil.Process(parent).wait()
+    signal.raise_signal(signal.SIGTERM)
 
 
 def _numbered(at: int, call: Call) -> tuple[int, Any]:
-    """The result of a call, and its number."""
-    return at, _one_threaded(*call)
-
-
-def _left(results: Generator[Any]) -> None:
-    """End calls whose results nobody waits for, and whose workers get no more.
-
-    The pool's thread hands calls out within moments. A call that it has not handed out yet when its workers are ended
-    is lost to it: a KeyError in that thread, and semaphores that nobody frees.
-    """
-    time.sleep(_HANDED_OUT_S)
-    results.close()
+    """The number and the result of a call whose libraries use one thread: the same sums with any number of workers."""
+    function, arguments, named = call
+    with threadpool_limits(limits=1):
+        return at, function(*arguments, **named)
 
 
 def _is_death(error: Exception) -> bool:
-    """Whether a worker died, as the backends say it: loky's broken pool, or Dask's KilledWorker."""
+    """True where a worker died: loky's broken pool, or Dask's KilledWorker, whose package is an extra."""
     return isinstance(error, BrokenProcessPool) or type(error).__name__ == "KilledWorker"
+
+
+def _client(scheduler: str | None) -> Any:
+    """A client of a Dask scheduler."""
+    if scheduler is None:
+        raise SweepError("--backend dask needs --scheduler tcp://HOST:PORT")
+    try:
+        from distributed import Client  # noqa: PLC0415  (an extra)
+    except ImportError:
+        raise SweepError("--backend dask needs Dask: pip install 'cfa-sweep[dask]'") from None
+    try:
+        return Client(scheduler, timeout="10s", set_as_default=True)  # type: ignore[no-untyped-call]
+    except (OSError, ValueError) as error:
+        raise SweepError(f"--scheduler {scheduler}: {str(error).splitlines()[0]}") from None

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import resource
 import shlex
-import signal
 import subprocess
 import sys
 import time
@@ -62,7 +61,7 @@ start()
 
 def test_a_stop_while_the_command_is_loaded_ends_it_without_a_word() -> None:
     done = subprocess.run([sys.executable, "-c", EARLY], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
 
 
 @pytest.mark.slow
@@ -177,8 +176,7 @@ def run_within(megabytes: int, output: Path) -> subprocess.CompletedProcess[str]
 def test_too_little_memory_to_start_is_one_line(tmp_path: Path, megabytes: int) -> None:
     done = run_within(megabytes, tmp_path)
     assert done.returncode == 2
-    limits = f"limited to {megabytes} MiB; allowed: 1024 MiB and more (ulimit -v)"
-    assert done.stderr == f"sweep: the address space is {limits}\n"
+    assert done.stderr == "sweep: out of memory; fewer workers (--jobs) need less\n"
 
 
 @pytest.mark.slow

@@ -204,6 +204,5 @@ def test_what_an_answer_does_not_need_is_not_loaded(own: Path, tmp_path: Path) -
         "sklearn",
         "joblib",
         "jinja2",
-        "plotly",
         "moocore",
     }

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from sweep.base.errors import DataError, OutputError, StudyError
-from sweep.commands.list_studies import list_lines
+from sweep.commands.list_studies import list_lines, studies_of
 from sweep.commands.new import new_study
 from sweep.commands.new.template import scalar
 from sweep.door.channels import channel_of, layout_of
@@ -228,7 +228,7 @@ def test_measured_files_lead_to_a_report_without_editing(tmp_path: Path) -> None
     code, out, said = commanded("run", path, "--output", tmp_path / "out", "--jobs", 1)
     assert code == 0, said
     assert "RGBN" in out.splitlines()[0]
-    assert "finished, search found" in list_lines(path.parent, tmp_path / "out")[0]
+    assert "finished, search found" in list_lines(path.parent, studies_of(path.parent, tmp_path / "out"))[0]
     assert np.all([(tmp_path / "out" / "mine" / name).is_file() for name in ("report.html", "pareto.png")])
 
 

@@ -64,7 +64,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 def compared(folders: Sequence[Path], to: Path) -> tuple[str, str]:
     """What is printed, and the page."""
-    return "\n".join(compare_runs(folders, to)), (to / "compare.html").read_text(encoding="utf-8")
+    return "\n".join(compare_runs(folders, to).lines), (to / "compare.html").read_text(encoding="utf-8")
 
 
 def test_a_hypervolume_is_the_area_by_hand() -> None:

@@ -1,142 +1,173 @@
-"""Damaged files in the folder of a run: named in a line, and mended by the same command."""
+"""Damaged, foreign and hostile files in the folder of a run: never taken for results, and mended by the same command."""
 
 from __future__ import annotations
 
+import hashlib
+import os
+import pickle
 import shutil
+import subprocess
 from collections.abc import Callable
-from dataclasses import replace
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
-import pyarrow.parquet as pq
 import pytest
 
 from sweep.base.errors import OutputError
 from sweep.commands.status import status_lines
-from sweep.report import read_output
-from sweep.results.journal import SHARDS, Journal
-from sweep.run import output_folder
-from sweep.run.rows import rules_of
-from sweep.run.stop import Stop
-from sweep.run.sweep import Sweep
-from sweep.run.workers import Workers
-from sweep.study import Study
+from sweep.report import make_report, read_output
+from sweep.results.inventory import Inventory
+from sweep.results.names import RUN, SUMS
+from sweep.results.parts import PARTS, Parts
+from sweep.run import output_folder, run_study
+from sweep.search.problem import SearchRun
+from sweep.study import Study, load_study
 
-from ..build import ran
-from ..mischief import half_done, rows
-from ..tampering import listed_anew
+from ..build import ran, stopband_study, study_file
+from ..commanded import commanded
+from ..conftest import draw_nothing
+from ..mischief import StoppedError, half_done, rows
+from ..tampering import hostile, listed_anew
+
+EVERY_TABLE = stopband_study(
+    "small",
+    "{left_nm: [590, 600, 610], left_width_nm: 5, right_nm: {min: 640, max: 690, count: 51}, right_width_nm: 5}",
+    before="scenarios:\n  chart: {exposure: {kind: white_patch}, noise: true}\npixel: {read_noise_e: 2}\n",
+    after="""\
+constraints: {sensitivity: {min: 0.9}}
+search: {starts: 1, max_evaluations: 20, front: {min: 0.8, max: 0.9, count: 2}}
+recognition: {states: [green, yellow, red], patches: 20}
+published: {Table 2: {RGGB: {csd_yellow_red: 138}}}
+""",
+)
+TABLES = ("results", "search", "front", "curves", "points", "recognition")
+FILES = (
+    *(f"{name}.parquet" for name in (*TABLES, "audit", "paper_comparison")),
+    *("study.resolved.yaml", "provenance.json", "report.html", "pareto.png", "figures/sensor.svg", SUMS),
+)
+DRAWN = ("report.html", "pareto.png", "figures/sensor.svg", "paper_comparison.parquet")
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def flipped(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[len(content) // 3] ^= 1
+    path.write_bytes(content)
+
+
+def emptied(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+DAMAGES = (cut, flipped, emptied)
+FEW = {("results.parquet", flipped), ("points.parquet", cut), ("report.html", emptied)}
 
 
 @pytest.fixture(scope="module")
-def finished(plain: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("finished")
-    ran(plain, folder, 1)
-    return folder
+def whole_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a study of every table, and its finished and audited run in `outputs/small`."""
+    base = tmp_path_factory.mktemp("whole")
+    (base / "small.yaml").write_text(EVERY_TABLE)
+    with pytest.MonkeyPatch.context() as patch:
+        draw_nothing(patch)
+        assert commanded("run", base / "small.yaml", "--output", base / "outputs", "--jobs", 1)[0] == 0
+        assert commanded("audit", base / "outputs" / "small")[0] == 0
+    assert {*FILES, RUN} <= {*Inventory(base / "outputs" / "small").files, SUMS}
+    return base
 
 
-def cut(content: bytes) -> bytes:
-    return content[: len(content) // 2]
+def same_tables(folder: Path, other: Path) -> bool:
+    return all((folder / f"{name}.parquet").read_bytes() == (other / f"{name}.parquet").read_bytes() for name in TABLES)
 
 
-def without_trade_off(content: bytes) -> bytes:
-    return content.replace(b"trade_off", b"trade_of")
-
-
+@pytest.mark.usefixtures("plain_pictures")
 @pytest.mark.parametrize(
-    ("file", "damage", "computed"),
+    ("file", "damage"),
     [
-        ("results.parquet", cut, True),
-        pytest.param("curves.parquet", cut, False, marks=pytest.mark.slow),
-        pytest.param("points.parquet", None, False, marks=pytest.mark.slow),
-        pytest.param("provenance.json", cut, False, marks=pytest.mark.slow),
-        pytest.param("provenance.json", without_trade_off, False, marks=pytest.mark.slow),
-        pytest.param("study.resolved.yaml", None, False, marks=pytest.mark.slow),
+        pytest.param(file, damage, marks=() if (file, damage) in FEW else pytest.mark.slow)
+        for file in FILES
+        for damage in DAMAGES
     ],
 )
-def test_a_damaged_result_is_one_line_and_the_same_command_mends_it(
-    plain: Study,
-    whole: pd.DataFrame,
-    finished: Path,
-    tmp_path: Path,
-    file: str,
-    damage: Callable[[bytes], bytes] | None,
-    computed: bool,
+def test_a_damaged_file_is_never_served_and_the_same_command_makes_it_again(
+    whole_folder: Path, tmp_path: Path, file: str, damage: Callable[[Path], None]
 ) -> None:
-    folder = tmp_path / "out"
-    shutil.copytree(finished, folder)
-    if damage is None:
-        (folder / file).unlink()
-    else:
-        (folder / file).write_bytes(damage((folder / file).read_bytes()))
-    for look in (status_lines, read_output):
-        with pytest.raises(OutputError, match=file):
-            look(folder)
-    seen = ran(plain, folder, 1)
-    assert any(phase == "designs" for phase, *_ in seen) == computed  # what stands in the table is not computed again
-    pd.testing.assert_frame_equal(rows(folder), whole)
-    read_output(folder)
-    assert status_lines(folder)[0].startswith("finished")
+    shutil.copytree(whole_folder, tmp_path, dirs_exist_ok=True)
+    folder = tmp_path / "outputs" / "small"
+    damage(folder / file)
+    code, _, said = commanded("status", folder, "--verify")
+    assert code == 2
+    if file != SUMS:
+        assert [line.split(": ")[1] for line in said.splitlines()] == [str(folder / file)]
+    if file not in (*DRAWN, SUMS):
+        for command in ("report", folder), ("export", folder, "--design", "best"), ("compare", folder, folder):
+            if file != "audit.parquet" or command[0] == "report":
+                code, out, said = commanded(*command)
+                assert (code, out) == (2, ""), command
+                assert file in said
+    assert commanded("run", tmp_path / "small.yaml", "--output", folder.parent, "--jobs", 1)[0] == 0
+    assert same_tables(folder, whole_folder / "outputs" / "small")
+    assert commanded("status", folder, "--verify")[0] == 0
+    assert not (folder / PARTS).exists()
 
 
-def test_a_cut_study_says_how_to_mend_it(plain: Study, finished: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "out"
-    shutil.copytree(finished, folder)
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_with_a_damaged_run_json_nothing_is_known_of_the_folder_and_nothing_touched(
+    whole_folder: Path, tmp_path: Path, damage: Callable[[Path], None]
+) -> None:
+    shutil.copytree(whole_folder, tmp_path, dirs_exist_ok=True)
+    folder = tmp_path / "outputs" / "small"
+    damage(folder / RUN)
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    for command in ("status", folder), ("run", tmp_path / "small.yaml", "--output", folder.parent):
+        code, _, said = commanded(*command)
+        assert (code, said.count("\n")) == (2, 1)
+        assert "run.json: is damaged" in said
+    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+
+
+def test_the_list_of_digests_is_in_the_form_of_sha256sum(whole_folder: Path) -> None:
+    folder = whole_folder / "outputs" / "small"
+    done = subprocess.run(["sha256sum", "--strict", "-c", SUMS], cwd=folder, capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert len(done.stdout.splitlines()) == len(Inventory(folder).files) > 15
+
+
+@pytest.mark.usefixtures("plain_pictures")
+def test_an_intact_run_is_not_touched_again(whole_folder: Path, tmp_path: Path) -> None:
+    shutil.copytree(whole_folder, tmp_path, dirs_exist_ok=True)
+    folder = tmp_path / "outputs" / "small"
+    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file() and path.name != ".lock"}
+    code, _, said = commanded("run", tmp_path / "small.yaml", "--output", folder.parent, "--jobs", 1)
+    assert (code, "nothing was computed" in said) == (0, True)
+    assert {p: p.stat().st_mtime_ns for p in folder.rglob("*") if p.is_file() and p.name != ".lock"} == before
+
+
+def test_a_cut_study_says_how_to_mend_it(whole_folder: Path, tmp_path: Path) -> None:
+    shutil.copytree(whole_folder, tmp_path, dirs_exist_ok=True)
+    folder = tmp_path / "outputs" / "small"
     path = folder / "study.resolved.yaml"
     path.write_text(path.read_text().split("objective:")[0])
     listed_anew(folder)
     with pytest.raises(OutputError, match="lacks objective; delete it, and `sweep run` of the study makes it again"):
         read_output(folder)
-    path.unlink()
-    ran(plain, folder, 1)
-    read_output(folder)
 
 
-def test_a_finished_run_gives_its_chunks_back(plain: Study, tmp_path: Path) -> None:
-    named = next(space for space in plain.spaces if space.kind == "design")
-    best = replace(named, axes=((606.0,), (5.0,), (690.0,), (5.0,), (1.0,)))  # dominates swept designs
-    study = replace(plain, spaces=tuple(best if space is named else space for space in plain.spaces))
-    journal = half_done(study, tmp_path)
-    kept = {entry.key: pq.read_table(tmp_path / SHARDS / entry.file) for entry in journal.entries.values()}
-    ran(study, tmp_path, 1)
-    study, journal = study.with_plans(), Journal(tmp_path)
-    sweep = Sweep(study, rules_of(study), journal, Workers(1, Stop()))
-    sweep.refill(tmp_path / "results.parquet")
-    whole = pq.read_table(tmp_path / "results.parquet")
-    fewer = 0
-    for key, table in kept.items():
-        again = journal.table(key, table.schema, table.num_rows)
-        assert again is not None
-        assert again.equals(table)
-        ids = table["design_id"].to_pylist()
-        fewer += sum(table["pareto"].to_pylist()) - sum(whole["pareto"].to_pylist()[ids[0] : ids[-1] + 1])
-    assert fewer > 0
-
-
-def test_damaged_shards_are_computed_again_and_named(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
-    journal = half_done(plain, tmp_path)
-    large = [tmp_path / SHARDS / entry.file for entry in journal.entries.values() if entry.rows > 1000]
-    content = bytearray(large[0].read_bytes())
-    content[len(content) // 2] ^= 0xFF
-    large[0].write_bytes(content)
-    large[1].write_bytes(large[1].read_bytes()[:-7])
-    (tmp_path / SHARDS / ".tmp-1-00000007-0123456789abcdef.parquet").write_bytes(b"x")
+def test_damaged_parts_are_computed_again_and_named(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
+    parts = half_done(plain, tmp_path)
+    large = [path for path in parts.paths("parquet") if path.stat().st_size > 10_000]
+    flipped(large[0])
+    cut(large[1])
+    (tmp_path / PARTS / ".tmp-1-0123456789abcdef.parquet").write_bytes(b"x")
     ran(plain, tmp_path, 1)
     pd.testing.assert_frame_equal(rows(tmp_path), whole)
-    said = (tmp_path / "provenance.json").read_text()
-    assert said.count("was damaged on the disk and is computed again") == 1  # the torn one was missed from the start
-    assert not (tmp_path / SHARDS).exists()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("cut", [1, 20, 200])
-def test_a_torn_journal_costs_its_last_line_alone(plain: Study, whole: pd.DataFrame, tmp_path: Path, cut: int) -> None:
-    known = len(half_done(plain, tmp_path).entries)
-    path = tmp_path / SHARDS / "_journal.jsonl"
-    path.write_bytes(path.read_bytes()[:-cut])
-    left = len(Journal(tmp_path).entries)
-    assert left == (known if cut == 1 else known - 1)
-    ran(plain, tmp_path, 1)
-    pd.testing.assert_frame_equal(rows(tmp_path), whole)
+    assert (tmp_path / "provenance.json").read_text().count("was damaged on the disk and is computed again") == 2
+    assert not (tmp_path / PARTS).exists()
 
 
 def test_an_output_that_cannot_be_written_is_one_line(plain: Study, tmp_path: Path) -> None:
@@ -147,9 +178,132 @@ def test_an_output_that_cannot_be_written_is_one_line(plain: Study, tmp_path: Pa
             ran(plain, folder, 1)
 
 
-@pytest.mark.slow
-def test_other_folders_beside_the_chunks_stay(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
-    (tmp_path / SHARDS / ".ipynb_checkpoints").mkdir(parents=True)
-    ran(plain, tmp_path, 1)
-    pd.testing.assert_frame_equal(rows(tmp_path), whole)
-    assert [path.name for path in (tmp_path / SHARDS).iterdir()] == [".ipynb_checkpoints"]
+def test_without_run_json_files_of_a_run_s_names_are_others(whole_folder: Path, tmp_path: Path) -> None:
+    shutil.copytree(whole_folder, tmp_path, dirs_exist_ok=True)
+    folder = tmp_path / "outputs" / "small"
+    for name in (RUN, SUMS):
+        (folder / name).unlink()
+    study = load_study(tmp_path / "small.yaml")
+    assert output_folder(folder, study)[0] == folder.with_name("small-2")
+    with pytest.raises(OutputError, match="is not of this run"):
+        run_study(study, folder, 1, lambda *_: pytest.fail("something was computed"))
+    assert commanded("status", folder)[0] == 2
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    path = study_file(tmp_path_factory.mktemp("study"), 2)
+    text = path.read_text().replace("count: 51", "count: 2").replace("max_evaluations: 200", "max_evaluations: 12")
+    path.write_text(text.replace("  dim: {exposure: {kind: fixed, exposure_s: 0.002}}\n", ""))
+    return load_study(path)
+
+
+@pytest.fixture(scope="module")
+def expected(small: Study, tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
+    folder = tmp_path_factory.mktemp("expected")
+    ran(small, folder, 1)
+    return rows(folder)
+
+
+def interrupted(study: Study, folder: Path) -> list[Path]:
+    """Parts of a run that was broken off: rows and answers of the search."""
+
+    def stop(phase: str, done: int, _: int) -> None:
+        if phase == "designs" and done >= 3:
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        run_study(study, folder, 1, stop)
+    parts = sorted((folder / PARTS).iterdir())
+    assert {path.suffix for path in parts} == {".json", ".parquet"}
+    return parts
+
+
+def planted(path: Path, content: bytes) -> None:
+    """Other content under a part's key, with its right digest."""
+    path.unlink()
+    digest = hashlib.sha256(content).hexdigest()[:32]
+    path.with_name(f"{path.name.split('-')[0]}-{digest}{path.suffix}").write_bytes(content)
+
+
+class Bomb:
+    def __reduce__(self) -> tuple[Any, ...]:
+        return os.system, ("touch ran-something",)
+
+
+def pickles(path: Path, _: Path, __: int) -> None:
+    planted(path, pickle.dumps(Bomb()))
+
+
+def other_content(path: Path, _: Path, at: int) -> None:
+    contents = hostile()
+    planted(path, contents[at % len(contents)])
+
+
+def links(path: Path, outside: Path, _: int) -> None:
+    path.unlink()
+    path.symlink_to(outside)
+
+
+def pipes(path: Path, _: Path, __: int) -> None:
+    path.unlink()
+    os.mkfifo(path)
+
+
+def terabytes(path: Path, _: Path, __: int) -> None:
+    with suppress(OSError):  # a disk that has no holes in files
+        os.truncate(path, 2**40)
+
+
+@pytest.mark.parametrize("attack", [pickles, other_content, links, pipes, terabytes])
+def test_hostile_parts_run_nothing_and_give_the_right_rows(
+    small: Study,
+    expected: pd.DataFrame,
+    tmp_path: Path,
+    attack: Callable[[Path, Path, int], None],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    outside, folder = tmp_path / "outside", tmp_path / "out"
+    outside.write_text("precious")
+    for at, part in enumerate(interrupted(small, folder)):
+        attack(part, outside, at)
+    ran(small, folder, 1)
+    pd.testing.assert_frame_equal(rows(folder), expected)
+    assert outside.read_text() == "precious"
+    assert not (tmp_path / "ran-something").exists()
+
+
+def test_answers_that_are_none_are_not_used(small: Study, expected: pd.DataFrame, tmp_path: Path) -> None:
+    from sweep.results.records import to_json
+
+    for part in interrupted(small, tmp_path):
+        if part.suffix == ".json":
+            planted(part, to_json(SearchRun(0)))
+    ran(small, tmp_path, 1)
+    pd.testing.assert_frame_equal(rows(tmp_path), expected)
+
+
+def test_names_in_the_list_that_lead_out_of_the_folder_are_not_followed(small: Study, tmp_path: Path) -> None:
+    outside, folder = tmp_path / "outside", tmp_path / "out"
+    outside.write_text("precious")
+    ran(small, folder, 1)
+    digest = hashlib.sha256(b"precious").hexdigest()
+    with (folder / SUMS).open("a") as sums:
+        sums.write(f"{digest}  ../outside\n{digest}  {outside}\n{digest}  figures/../../outside\n\xff")
+    assert not [name for name in Inventory(folder).files if "outside" in name]
+    make_report(read_output(folder))
+    assert outside.read_text() == "precious"
+    assert status_lines(folder, verify=True)[-1].startswith("ok")
+
+
+def test_a_link_for_the_folder_of_parts_is_refused(small: Study, tmp_path: Path) -> None:
+    folder, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
+    folder.mkdir()
+    elsewhere.mkdir()
+    (folder / PARTS).symlink_to(elsewhere)
+    with pytest.raises(OutputError, match=f"{PARTS}: is no folder of this run"):
+        Parts(folder)
+    with pytest.raises(OutputError, match=f"{PARTS}: is no folder of this run"):
+        ran(small, folder, 1)
+    assert list(elsewhere.iterdir()) == []

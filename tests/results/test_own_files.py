@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 
 from sweep.base.errors import OutputError
@@ -16,19 +17,19 @@ from sweep.commands.audit import audit_output
 from sweep.commands.status import status_lines
 from sweep.report import make_report, read_output
 from sweep.results.inventory import Inventory
-from sweep.results.journal import SHARDS, Journal
 from sweep.results.lock import LOCK, locked
-from sweep.results.names import is_drawn, is_own
+from sweep.results.names import RUN, is_drawn, is_own
+from sweep.results.parts import PARTS, ROWS, Parts
 from sweep.run import output_folder, run_study
 from sweep.study import Study, load_study
 
 from ..build import ran, study_file
 from ..cases import thinned
 from ..conftest import Finished
-from ..mischief import StoppedError, half_done, rows
+from ..mischief import rows
 
 NAMES = (
-    *("results.parquet", "curves.parquet", "provenance.json", "run.json", "SHA256SUMS", "study.resolved.yaml"),
+    *("results.parquet", "curves.parquet", "provenance.json", "SHA256SUMS", "study.resolved.yaml"),
     *("report.html", "pareto.png", "figures/sensor.svg", "audit.parquet", "paper_comparison.csv", "search.parquet"),
 )
 
@@ -69,48 +70,14 @@ def test_a_file_that_was_there_before_is_told_and_stays(few: Study, tmp_path: Pa
     assert (base / name).read_text() == "mine"
 
 
-def test_a_file_put_there_while_a_run_is_interrupted_is_told(
-    few: Study, expected: pd.DataFrame, tmp_path: Path
-) -> None:
-    def stop(phase: str, *_: object) -> None:
-        if phase == "designs":
-            raise StoppedError
-
-    with pytest.raises(StoppedError):
-        run_study(few, tmp_path, 1, stop)
-    (tmp_path / "figures").mkdir()
-    for name in ("report.html", "figures/chart.png", "curves.parquet"):
-        (tmp_path / name).write_text("mine")
-        with pytest.raises(OutputError, match=f"{name}: is not of this run"):
-            ran(few, tmp_path, 1)
-        assert (tmp_path / name).read_text() == "mine"
-        (tmp_path / name).unlink()
-    ran(few, tmp_path, 1)
-    pd.testing.assert_frame_equal(rows(tmp_path), expected)
-
-
-@pytest.mark.usefixtures("plain_pictures")
-@pytest.mark.parametrize("name", thinned(["report.html", "pareto.svg", "figures/sensor.png"], 3))
-def test_a_file_put_there_before_the_report_is_told(few: Study, tmp_path: Path, name: str) -> None:
-    ran(few, tmp_path, 1)
-    (tmp_path / "figures").mkdir()
-    (tmp_path / name).write_text("mine")
-    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file() and path.name != LOCK}
-    with pytest.raises(OutputError, match=f"{name}: is not of this run"):
-        make_report(read_output(tmp_path))
-    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file() and path.name != LOCK} == before
-
-
 @pytest.mark.slow
 @pytest.mark.usefixtures("plain_pictures")
 def test_other_files_of_the_folder_stay(few: Study, tmp_path: Path) -> None:
     mine = (
         "notes.md",
-        "shards/mine.txt",
-        "shards/data.parquet",
+        "parts/mine.txt",
+        "parts/data.parquet",
         "figures/mine.png",
-        ".tmp-1-mine",
-        "shards/.tmp-7-x.y",
     )
     for name in mine:
         (tmp_path / name).parent.mkdir(exist_ok=True)
@@ -129,13 +96,19 @@ def outside(tmp_path: Path) -> Path:
     return target
 
 
-@pytest.mark.parametrize("name", [LOCK, SHARDS, "figures"])
+@pytest.mark.usefixtures("plain_pictures")
+@pytest.mark.parametrize("name", [LOCK, PARTS, "figures"])
 def test_a_link_in_the_place_of_an_own_folder_is_told(few: Study, tmp_path: Path, name: str) -> None:
     target, folder = outside(tmp_path), tmp_path / "out"
     folder.mkdir()
     (folder / name).symlink_to(target / "precious.txt" if name == LOCK else target)
-    with pytest.raises(OutputError, match=f"{name}: is "):
+
+    def reported() -> None:
         ran(few, folder, 1)
+        make_report(read_output(folder))
+
+    with pytest.raises(OutputError, match=f"{name}: is "):
+        reported()
     assert [path.name for path in target.iterdir()] == ["precious.txt"]
     assert (target / "precious.txt").read_text() == "precious"
 
@@ -160,7 +133,7 @@ def test_links_in_the_place_of_files_are_replaced_not_followed(
     target, folder = outside(tmp_path), tmp_path / "out"
     ran(few, folder, 1)
     make_report(read_output(folder))
-    for name in ("results.parquet", "run.json", "report.html", "figures/chart.png"):
+    for name in ("results.parquet", "report.html", "figures/chart.png"):
         (folder / name).unlink()
         (folder / name).symlink_to(target / "precious.txt")
     ran(few, folder, 1)
@@ -178,18 +151,6 @@ def test_the_folder_itself_may_be_a_link(few: Study, expected: pd.DataFrame, tmp
     pd.testing.assert_frame_equal(rows(tmp_path / "disk"), expected)
 
 
-@pytest.mark.slow
-def test_a_journal_that_is_a_link_is_not_written_through(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
-    target, folder = outside(tmp_path), tmp_path / "out"
-    half_done(plain, folder)
-    journal = folder / SHARDS / "_journal.jsonl"
-    journal.unlink()
-    journal.symlink_to(target / "precious.txt")
-    ran(plain, folder, 1)
-    assert (target / "precious.txt").read_text() == "precious"
-    pd.testing.assert_frame_equal(rows(folder), whole)
-
-
 @pytest.mark.parametrize("study", ["stopband", pytest.param("fog", marks=pytest.mark.slow)])
 def test_names_that_reports_give_are_known(finished: Finished, study: str) -> None:
     """A picture of a new name is to be added to the names of a run's files."""
@@ -197,7 +158,7 @@ def test_names_that_reports_give_are_known(finished: Finished, study: str) -> No
     drawn = [path for path in folder.rglob("*") if path.suffix in (".png", ".svg", ".html")]
     assert len(drawn) > 10
     assert all(is_drawn(path.relative_to(folder).as_posix()) for path in drawn)
-    assert all(map(is_own, Inventory(folder).files))
+    assert all(map(is_own, Inventory(folder).files.keys() - {RUN}))
 
 
 @pytest.mark.usefixtures("plain_pictures")
@@ -206,7 +167,7 @@ def test_a_report_in_use_is_one_line(few: Study, tmp_path: Path) -> None:
     output = read_output(tmp_path)
     with locked(tmp_path):
         for write in (lambda: make_report(output), lambda: audit_output(tmp_path, None)):
-            with pytest.raises(OutputError, match=f"in use by another run .process {os.getpid()}"):
+            with pytest.raises(OutputError, match="in use by another command"):
                 write()
 
 
@@ -243,11 +204,11 @@ def test_wherever_the_disk_refuses_nothing_finished_is_lost(
                 ran(study, folder, 1)
         assert len(caught.value.faults) == 1
         assert not list(folder.rglob(".tmp-*"))
-        kept = Journal(folder).entries
+        kept = sum(pq.read_metadata(path).num_rows for path in Parts(folder).paths(ROWS))
         seen = ran(study, folder, 1)
         counts = [done for phase, done, _ in seen if phase == "designs"]
-        assert counts[:1] in ([], [sum(entry.rows for entry in kept.values())])
-        assert not (folder / SHARDS).exists()
+        assert counts[:1] in ([], [kept])
+        assert not (folder / PARTS).exists()
         pd.testing.assert_frame_equal(rows(folder), rows(tmp_path / "expected"))
         assert status_lines(folder, verify=True)[-1].startswith("ok")
 

@@ -18,7 +18,7 @@ from sweep.results import thinning
 from sweep.results.designs import row_curves
 from sweep.results.tables import LIMITED_BY
 from sweep.results.thinning import even, swept_points
-from sweep.run.files import files_of
+from sweep.run.runner import files_of
 from sweep.study import Study, load_study
 
 from ..build import ran

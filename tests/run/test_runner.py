@@ -14,23 +14,21 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
 from sweep.base.errors import OutputError, StudyError
 from sweep.camera.forward import forward_model
-from sweep.designs.families.stopband import Stopband
+from sweep.designs.families.stopband import MultiStopband
 from sweep.designs.space import Filter, Space
 from sweep.metrics.evaluate import evaluate
 from sweep.report import make_report, read_output
 from sweep.results.identity import CHUNK
-from sweep.results.journal import Journal
 from sweep.results.lock import locked
+from sweep.results.parts import PARTS, ROWS, Parts
 from sweep.run import run_study
 from sweep.run.rows import Job, jobs_of, rules_of, run_job
-from sweep.run.sweep import Sweep, _InOrder
-from sweep.run.workers import Workers
+from sweep.run.sweep import Sweep
 from sweep.study import Study, load_study
 from sweep.study.axes import series_of
 
@@ -47,19 +45,6 @@ def output(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("out")
     ran(study, folder, 1)
     return folder
-
-
-def test_workers_load_what_comes_next_while_the_table_is_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    study, table = load_study(study_file(tmp_path, 3)), tmp_path / "out" / "results.parquet"
-    begun: list[tuple[bool, bool]] = []
-    monkeypatch.setattr(Workers, "begin", lambda _, names: begun.append((names == ("json",), table.exists())))
-    run_study(study, table.parent, 1, lambda *_: None, then_load=("json",))
-    assert [exists for asked, exists in begun if asked] == [False]
-    assert table.exists()
-    run_study(study, table.parent, 1, lambda *_: None, then_load=("json",))
-    assert sum(asked for asked, _ in begun) == 1  # nothing was left to do
 
 
 def test_rows_stand_in_order_with_their_columns(output: Path) -> None:
@@ -121,35 +106,20 @@ def test_two_workers_give_the_same_rows(study: Study, output: Path, tmp_path: Pa
     ran(study, tmp_path, 2)
     for name in ("results.parquet", "search.parquet", "curves.parquet"):
         assert pq.read_table(tmp_path / name).equals(pq.read_table(output / name)), name
-    assert not (tmp_path / "shards").exists()
+    assert not (tmp_path / PARTS).exists()
 
 
 def test_rows_stand_in_order_whenever_their_scene_is_computed(
     study: Study, output: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The last scene first, and each chunk as a row group of its own."""
     heavier = {name: float(at) for at, name in enumerate(study.scenarios)}
     assert len(heavier) > 1
-    order: list[int] = []
-    join = _InOrder.found
-
-    def found(self: _InOrder, index: int, few: pa.Table, *, waits: bool = False) -> None:
-        order.append(index)
-        join(self, index, few, waits=waits)
-
     monkeypatch.setattr(Sweep, "_light_px", lambda _, scenario: heavier[scenario])
-    monkeypatch.setattr(_InOrder, "found", found)
-    monkeypatch.setattr("sweep.results.joined._AS_THEY_ARE", 1)
     ran(study, tmp_path, 1)
-    assert order != sorted(order)
-    assert sorted(order) == list(range(len(order)))
-    pd.testing.assert_frame_equal(
-        pd.read_parquet(tmp_path / "results.parquet"), pd.read_parquet(output / "results.parquet")
-    )
-    assert pq.read_metadata(tmp_path / "results.parquet").num_row_groups == len(order) + 1  # and the answer
+    assert pq.read_table(tmp_path / "results.parquet").equals(pq.read_table(output / "results.parquet"))
 
 
-def test_finished_chunks_are_not_computed_again(study: Study, output: Path, tmp_path: Path) -> None:
+def test_finished_parts_are_not_computed_again(study: Study, output: Path, tmp_path: Path) -> None:
     class StoppedError(Exception):
         pass
 
@@ -159,11 +129,12 @@ def test_finished_chunks_are_not_computed_again(study: Study, output: Path, tmp_
 
     with pytest.raises(StoppedError):
         run_study(study, tmp_path, 1, stop_after_a_chunk)
-    shards = sorted((tmp_path / "shards").glob("*.parquet"))
+    shards = sorted((tmp_path / PARTS).glob("*.parquet"))
     kept = sum(pq.read_metadata(shard).num_rows for shard in shards)
     assert kept > CHUNK
+    torn = pq.read_metadata(shards[0]).num_rows
     shards[0].write_bytes(shards[0].read_bytes()[:-40])  # a torn file is computed again, not trusted
-    kept -= 1
+    kept -= torn
     assert not (tmp_path / "results.parquet").exists()
     seen = ran(study, tmp_path, 1)
     assert next(call for call in seen if call[0] == "designs") == ("designs", kept, study.n_designs)
@@ -171,9 +142,7 @@ def test_finished_chunks_are_not_computed_again(study: Study, output: Path, tmp_
 
 
 def test_a_failing_design_is_a_row(study: Study) -> None:
-    class Fragile(Stopband):
-        separable = None  # its curves are asked for
-
+    class Fragile(MultiStopband):
         def curves(self, x: np.ndarray) -> np.ndarray:
             if (x[:, 0] == 3).any():
                 raise ValueError("no such filter")
@@ -181,7 +150,7 @@ def test_a_failing_design_is_a_row(study: Study) -> None:
             made[x[:, 0] == 5] = np.nan
             return made
 
-    family = Fragile(study.grid.nodes_nm, study.sensor.qe["Y"], study.sensor.qe["G"])
+    family = Fragile(study.grid.nodes_nm, study.sensor.qe["Y"], study.sensor.qe["G"], 1)
     axes = ((2.0, 3.0, 4.0, 5.0), (10.0,), (650.0,), (10.0,), (1.0,))
     space = Space("sweep", "fragile", "RYNCy", Filter(family, {"N": "Y"}, "G"), axes)
     rules = replace(rules_of(study), constraints={})
@@ -201,7 +170,7 @@ def test_jobs_cover_every_design_once(study: Study) -> None:
 
 
 def test_two_runs_at_once_are_refused(study: Study, tmp_path: Path) -> None:
-    with locked(tmp_path), pytest.raises(OutputError, match=f"in use by another run .process {os.getpid()}"):
+    with locked(tmp_path), pytest.raises(OutputError, match="in use by another command"):
         ran(study, tmp_path, 1)
     ran(study, tmp_path, 1)
 
@@ -218,7 +187,7 @@ def started(folder: Path, output: Path, *extra: str, count: int = MANY, **option
 
 def chunks(folder: Path) -> int:
     """Finished chunks of the sweep in a folder."""
-    return sum(entry.rows > 0 for entry in Journal(folder).entries.values())
+    return len(Parts(folder).paths(ROWS))
 
 
 @pytest.mark.parametrize(
@@ -240,7 +209,7 @@ def test_a_killed_run_is_continued(tmp_path: Path, number: signal.Signals) -> No
     if number != signal.SIGKILL:
         assert (
             tmp_path / "said"
-        ).read_text() == "sweep: interrupted; finished chunks are kept, the same command continues\n"
+        ).read_text() == "sweep: interrupted; finished parts are kept, the same command continues\n"
     assert not (output / "tiny" / "results.parquet").exists()
     study = load_study(study_file(tmp_path, MANY))
     seen = ran(study, output / "tiny", 1)
@@ -265,10 +234,10 @@ def test_a_full_disk_is_one_line_and_loses_nothing(study: Study, output: Path, t
     assert "cannot be written" in said
     assert "File too large" in said
     assert not list(folder.rglob(".tmp-*"))
-    kept = Journal(folder).entries
+    kept = sum(pq.read_metadata(path).num_rows for path in Parts(folder).paths(ROWS))
     assert kept
     seen = ran(study, folder, 1)  # the disk has room again
-    assert next(call for call in seen if call[0] == "designs")[1] == sum(entry.rows for entry in kept.values())
+    assert next(call for call in seen if call[0] == "designs")[1] == kept
     assert pq.read_table(folder / "results.parquet").equals(pq.read_table(output / "results.parquet"))
 
 

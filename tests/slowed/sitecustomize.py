@@ -1,28 +1,27 @@
-"""In every process of a run: one call of a function, named by SWEEP_SLOW_AT, is for a minute in a library.
+"""In every process of a run: one call of a function, named by SWEEP_SLOW_AT, takes a minute.
 
 SWEEP_SLOW_AT is MODULE:NAME; SWEEP_SLOW_CALL the number of that call, counted in the file SWEEP_SLOW_FILE.
 """
 
 from __future__ import annotations
 
-import ctypes
 import functools
 import importlib.abc
 import importlib.util
 import os
+import signal
 import sys
 import time
 from pathlib import Path
 from typing import Any
 
 
-def in_a_library() -> None:
-    """For a minute, without a byte code, and without work for a core: a lock is waited for whatever signals come."""
-    library, lock = ctypes.CDLL(None), ctypes.create_string_buffer(64)
-    until = (ctypes.c_long * 2)(int(time.time()) + 60, 0)
-    library.pthread_mutex_init(lock, None)
-    library.pthread_mutex_lock(lock)
-    library.pthread_mutex_timedlock(lock, until)
+def for_a_minute() -> None:
+    """In calls of a second each, in which a process takes no signal but hears of it after them."""
+    for _ in range(60):
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+        time.sleep(1)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
 
 
 def slowed(function: Any) -> Any:
@@ -33,7 +32,7 @@ def slowed(function: Any) -> Any:
             handle.write("called\n")
         if len(calls.read_text().splitlines()) == int(os.environ["SWEEP_SLOW_CALL"]):
             calls.with_suffix(".busy").touch()
-            in_a_library()
+            for_a_minute()
         return function(*arguments, **named)
 
     return wrapped

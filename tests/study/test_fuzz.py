@@ -78,11 +78,10 @@ def first_rows(study: Study, scenario: str) -> set[str]:
 
 
 def jobs(study: Study) -> list[Any]:
-    from sweep.results.journal import Journal
-    from sweep.run.stop import Stop
+    from sweep.results.parts import Parts
     from sweep.run.workers import Workers
 
-    every = Sweep(study, rules_of(study), Journal(Path("absent")), Workers(1, Stop())).jobs
+    every = Sweep(study, rules_of(study), Parts(Path("absent")), Workers(1)).jobs
     return list({(job.space.kind, job.space.name): job for job in reversed(every)}.values())
 
 

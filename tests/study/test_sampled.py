@@ -10,8 +10,9 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.stats import qmc
 
+from sweep.base.errors import InterruptedRunError
 from sweep.report import read_output
-from sweep.results.journal import Journal
+from sweep.results.parts import ROWS, Parts
 from sweep.run import run_study
 from sweep.study import load_study
 
@@ -96,9 +97,9 @@ def test_a_run_of_drawn_designs_that_is_broken_off_is_continued(tmp_path: Path, 
         if what == "designs" and 4096 <= done < of:
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(InterruptedRunError):
         run_study(study, tmp_path / "out", 1, broken_off)
-    kept = len(Journal(tmp_path / "out").entries)
+    kept = len(Parts(tmp_path / "out").paths(ROWS))
     assert kept > 0
     seen = ran(study, tmp_path / "out", 2)
     assert next(call for call in seen if call[0] == "designs")[1] >= 4096  # what was finished is not computed again

@@ -14,7 +14,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from sweep.base.errors import MOST_FAULTS, Fault, StudyError, SweepError, nearest
-from sweep.commands.list_studies import list_lines
+from sweep.commands.list_studies import list_lines, studies_of
 from sweep.curves.scan import MOST_BYTES, MOST_CURVES, MOST_SAMPLES, MOST_VALUES
 from sweep.results.tables import RESOLVED
 from sweep.study import load_study
@@ -280,10 +280,10 @@ def test_a_list_of_studies_goes_on_after_one_that_cannot_be_read(tmp_path: Path)
     os.mkfifo(tmp_path / "b.yaml")
     (tmp_path / "c.yaml").write_text(SMALL)
     with within(HANG_S):
-        lines = list_lines(tmp_path, tmp_path / "out")
+        lines = list_lines(tmp_path, studies_of(tmp_path, tmp_path / "out"))
     assert ["cannot be loaded" in line for line in lines] == [True, True, False, False]
     with pytest.raises(StudyError, match="no such folder"):
-        list_lines(tmp_path / ("n" * 300), tmp_path)
+        list_lines(tmp_path / ("n" * 300), studies_of(tmp_path / ("n" * 300), tmp_path))
 
 
 def test_a_data_folder_that_cannot_be_is_one_line(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import typer
 
 from ..completion import run_folders
 from ..panels import OF_RESULTS
+from ..said import Json, Quiet, records, say
 
 PANEL = OF_RESULTS
 
@@ -21,9 +22,14 @@ def compare(
     output: Annotated[
         Path | None, typer.Option(help="Folder for the comparison.", show_default="outputs/compare-A-B")
     ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
     """Compare finished runs: what their studies ask, best designs, fronts, versions."""
     from ...report.compare import compare_runs
 
-    for line in compare_runs(folders, output):
-        typer.echo(line)
+    compared = compare_runs(folders, output)
+    facts = {name: records(table) for name, table in compared.tables.items()} if as_json else {}
+    say(
+        compared.lines, {"folder": str(compared.folder), **facts, "notes": compared.notes}, as_json=as_json, quiet=quiet
+    )

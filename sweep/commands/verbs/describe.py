@@ -10,6 +10,7 @@ import typer
 from ...base.errors import DataError
 from ...curves.light_unit import LightUnit
 from ..panels import OF_CURVES
+from ..said import Json, Quiet, say
 
 PANEL = OF_CURVES
 
@@ -25,22 +26,24 @@ def describe(
         Path | None,
         typer.Option(help="Write clean CSV here; it says what was changed.", show_default=False),
     ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
     """Plot and check a file of curves: what it holds, what is wrong with it, which colors its lights have."""
     if file.suffix.casefold() == ".xml" and clean is None and quantity is None:
         from ..emva1288 import pixel_lines
 
-        for line in pixel_lines(file):
-            typer.echo(line)
+        lines = list(pixel_lines(file))
+        say(lines, {"file": str(file), "lines": lines}, as_json=as_json, quiet=quiet)
         return
     from ..describe import cleaned, described
 
     if clean is not None:
-        for line in cleaned(file, clean):
-            typer.echo(line)
+        lines = cleaned(file, clean)
+        say(lines, {"file": str(file), "clean": str(clean), "lines": lines}, as_json=as_json, quiet=quiet)
         return
     found = described(file, output, quantity)
-    for line in found.lines:
-        typer.echo(line)
+    facts = {"file": str(file), **found.facts, "faults": [str(fault) for fault in found.faults]}
+    say(found.lines, facts, as_json=as_json, quiet=quiet)
     if found.faults:
         raise DataError(found.faults)

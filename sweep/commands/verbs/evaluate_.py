@@ -10,6 +10,7 @@ import typer
 from ...curves.light_unit import LightUnit
 from ..options import AllowCode, DataFolder
 from ..panels import OF_CURVES
+from ..said import Json, Quiet, records, say
 
 PANEL = OF_CURVES
 
@@ -47,6 +48,8 @@ def evaluate_(
     design: Annotated[str | None, typer.Option(help="Of a run: design_id, name or best.", show_default="best")] = None,
     data: DataFolder = None,
     allow_code: AllowCode = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
     """Judge a filter of your own, or of a run: its CSDs and its light beside RGGB's, and its gap to the limit."""
     from ...door.asked import verdict_on
@@ -66,4 +69,14 @@ def evaluate_(
         data=data,
         allow_code=allow_code,
     )
-    typer.echo(str(found))
+    facts = {
+        "source": str(source),
+        "rows": records(found.table) if as_json else [],
+        "limit_of": found.goal.name,
+        "limit_dn": found.limit,
+        "before_quantization_dn": found.smooth,
+        "gap": found.gap,
+        "no_limit": found.no_limit,
+        "notes": found.notes,
+    }
+    say([str(found)], facts, as_json=as_json, quiet=quiet)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -12,6 +12,7 @@ from ...base.errors import InterruptedRunError, SweepError
 from ..endings import say_lines
 from ..options import AllowCode, Changes, DataFolder, Outputs, StudyPaths, changes_of
 from ..panels import OF_STUDIES
+from ..said import Json, Quiet, say
 
 PANEL = OF_STUDIES
 
@@ -30,28 +31,47 @@ def run(
     changes: Changes = None,
     allow_code: AllowCode = False,
     opens: Annotated[bool, typer.Option("--open", help="Open the report in the browser.")] = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
 ) -> int:
     """Run studies one after the other: results, figures and report go to OUTPUT/<study>. The same command continues an
-    interrupted run, and makes again what is missing or damaged. Files that are not its own stay (run.json lists those
+    interrupted run, and makes again what is missing or damaged. Files that are not its own stay (SHA256SUMS lists those
     that are). Of several studies, one that cannot be run does not stop the others.
     """
-    from ...run import Wishes
-    from ..runs import Manner, run_one
+    from ...run import RunOptions
+    from ..runs import RunCommand, run_one
 
-    wishes = Wishes(fail_fast, retry_failed)
-    changed = changes_of(changes)
-    manner = Manner(data, output, jobs, backend, scheduler, dry_run, wishes, changed, allow_code, opens)
-    if len(studies) == 1:
-        run_one(studies[0], manner, context.find_root().obj)
-        return 0
-    code = 0
+    options = RunOptions(fail_fast, retry_failed)
+    command = RunCommand(
+        data,
+        output,
+        jobs,
+        backend,
+        scheduler,
+        dry_run,
+        options,
+        changes_of(changes),
+        allow_code,
+        opens,
+        as_json,
+        quiet,
+    )
+    began_s, code = context.find_root().obj, 0
+    runs: list[dict[str, Any]] = []
     for path in studies:
-        typer.echo(f"== {path} ==")
+        if len(studies) > 1 and not quiet:
+            typer.echo(f"== {path} ==", err=as_json)
         try:
-            run_one(path, manner, time.monotonic())
+            facts = run_one(path, command, began_s)
         except InterruptedRunError:
             raise
         except SweepError as error:  # the others are run all the same
             say_lines(error.faults)
             code = max(code, error.exit_code)
+            runs.append({"study": str(path), "exit_code": error.exit_code, "faults": [str(f) for f in error.faults]})
+        else:
+            runs.append({"study": str(path), "exit_code": 0, **facts})
+        began_s = time.monotonic()
+    if as_json:
+        say((), {"runs": runs}, as_json=True)
     return code

@@ -62,7 +62,17 @@ class Fronts:
     notes: Sequence[str]
 
 
-def compare_runs(folders: Sequence[Path], to: Path | None) -> list[str]:
+@dataclass(frozen=True)
+class Comparison:
+    """What was found: lines for people; the same as tables by their names; the folder of the files."""
+
+    folder: Path
+    lines: Sequence[str]
+    tables: Mapping[str, pd.DataFrame]
+    notes: Sequence[str]
+
+
+def compare_runs(folders: Sequence[Path], to: Path | None) -> Comparison:
     """Compare finished runs, write `compare.html`, `compare.csv`, `fronts.png`, `fronts.svg`, and say what was found.
 
     `to`: default outputs/compare-<a>-<b>. Raises SweepError unless there are 2 to 26; OutputError for a folder without
@@ -115,7 +125,11 @@ def compare_runs(folders: Sequence[Path], to: Path | None) -> list[str]:
         lines.append(f"({len(compared.areas) - _MOST_SCENARIOS} more scenarios in {PAGE}.)")
     lines += ["", *answer, *(f"Note: {note}" for note in notes)]
     names = [PAGE, TABLE, *(f"{PICTURE}.{kind}" for kind in drawn)]
-    return [*lines, f"Files: {target}/: {', '.join(names)}."]
+    areas_of_all = [areas.table.assign(scenario=areas.scenario) for areas in compared.areas]
+    tables = {"best": best, "plain": plain, "studies": studies, "origins": origins}
+    tables["hypervolumes"] = pd.concat(areas_of_all, ignore_index=True) if areas_of_all else pd.DataFrame()
+    lines.append(f"Files: {target}/: {', '.join(names)}.")
+    return Comparison(target, lines, tables, notes)
 
 
 def compare_fronts(runs: Mapping[str, Output]) -> Fronts:

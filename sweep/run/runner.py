@@ -1,0 +1,330 @@
+"""A whole run: search, sweep, the tables that a report draws from, and provenance."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from ..base.disk import read_facts
+from ..base.errors import BrokenProofError, Fault, InfeasibleError, StudyError
+from ..base.types import Progress
+from ..metrics.bound import FEASIBLE
+from ..metrics.pareto import hypervolume
+from ..metrics.whole_readout import whole_readout_metrics
+from ..results.dictionary import described
+from ..results.facts import Provenance, lacking
+from ..results.folder import begin
+from ..results.inventory import Inventory
+from ..results.lock import LOCK, locked
+from ..results.parts import Parts
+from ..results.tables import (
+    FRONT,
+    LEFT_OUT,
+    PROVENANCE,
+    RESOLVED,
+    RESULTS,
+    SEARCH_LOG,
+    VISION_TABLES,
+    batches,
+    json_of,
+    write_tables,
+)
+from ..results.thinning import swept_points
+from ..search.limit import Limit
+from ..study import Study
+from ..study.reach import out_of_reach
+from ..vision.installed import require_network
+from .answers import KeptAnswers
+from .check import check_run
+from .front import Gathered, few_of
+from .held_out import left_out_table
+from .looks import Looking, looks_of
+from .of_rows import ROW_TABLES, Shown
+from .provenance import plan_facts, provenance, resolved_yaml
+from .routes import spent_in_words
+from .rows import rules_of
+from .search import SearchAnswer, answer_row, front_table, limit_alone, run_search, search_facts, search_log
+from .sweep import RunOptions, Sweep
+from .workers import Workers, stopped_by_signals, workers
+
+_CHECK_S, _CHECK_SHARE = 1.0, 0.1
+"""Time of the check at the end of a run: seconds, or a share of the run, whichever is longer."""
+
+
+def files_of(study: Study) -> set[str]:
+    """Names of the files that a run of the study makes."""
+    return {RESULTS, RESOLVED, PROVENANCE, *_search_tables(study), *_row_tables(study), *_vision_tables(study)}
+
+
+def _search_tables(study: Study) -> set[str]:
+    if study.search is None:
+        return set()
+    names = {SEARCH_LOG, FRONT} if study.search.levels else {SEARCH_LOG}
+    return names | ({LEFT_OUT} if study.leaves_one_out else set())
+
+
+def _row_tables(study: Study) -> set[str]:
+    return {name for name, table in ROW_TABLES.items() if table.asked(study)}
+
+
+def _vision_tables(study: Study) -> set[str]:
+    return set() if study.section.vision is None else {*VISION_TABLES}
+
+
+def run_study(
+    study: Study,
+    output: Path,
+    n_jobs: int,
+    progress: Progress,
+    command: Sequence[str] = (),
+    *,
+    backend: str = "loky",
+    scheduler: str | None = None,
+    options: RunOptions = RunOptions(),  # noqa: B008  (a frozen value)
+) -> tuple[str, ...]:
+    """Run a study into a folder, or continue a run that was stopped; a finished one is only made whole.
+
+    A table of the report that is missing or damaged is made again from the rows. Where the rows, the search's tables or
+    provenance are, the whole run is.
+
+    Parameters
+    ----------
+    study : Study
+        A checked study.
+    output : Path
+        The folder of the results.
+    n_jobs : int
+        Workers.
+    progress : callable
+        Called with a phase, how much of it is done, and how much there is.
+    command : sequence of str
+        The command line, for provenance.
+    backend, scheduler : str
+        See `workers`.
+    options : RunOptions
+        What to do about designs that fail.
+
+    Returns
+    -------
+    tuple of str
+        Names of the files that were made; none when nothing was left to do.
+
+    Raises
+    ------
+    OutputError
+        The folder is in use, holds another study or files of others, or cannot be written.
+    InfeasibleError
+        The search finds no feasible design; nothing is left behind.
+    FailedDesignError
+        A design failed, with `fail_fast`.
+    InterruptedRunError
+        SIGINT or SIGTERM came; finished parts are kept.
+    """
+    started = time.monotonic()
+    if study.search is not None and (beyond := out_of_reach(study, study.search.space, study.search.scenario)):
+        raise InfeasibleError([Fault(f"{study.name}: no design can be feasible"), *beyond])
+    if study.section.vision is not None and study.section.vision.network:
+        require_network()
+    with stopped_by_signals(), locked(output):
+        inventory = begin(output, study)
+        inventory.remove(inventory.unlisted())  # nothing is known of them
+        wrong = set(inventory.wrong(sorted(files_of(study))))
+        facts = read_facts(inventory.path(PROVENANCE))
+        if lacking(Provenance, facts) or (options.retry_failed and facts["failed"]):
+            wrong.add(PROVENANCE)
+        if not wrong:
+            return ()
+        with workers(n_jobs, backend, scheduler) as crew:
+            how = {"command": list(command), "workers": crew.count, "backend": backend, "scheduler": scheduler}
+            run = _Run(study.with_plans(), inventory, crew, progress, options, started, how)
+            try:
+                return run.make(wrong)
+            except (StudyError, InfeasibleError):
+                _discard(inventory)
+                raise
+
+
+@dataclass
+class _Run:
+    """One run of a study whose scenes are planned, in a folder that it holds.
+
+    `started`: by the monotonic clock, seconds; `how`: command, workers, backend and scheduler, for provenance.
+    """
+
+    study: Study
+    inventory: Inventory
+    crew: Workers
+    progress: Progress
+    options: RunOptions
+    started: float
+    how: dict[str, Any]
+    warnings: list[str] = field(default_factory=list)
+
+    def make(self, wrong: set[str]) -> tuple[str, ...]:
+        """Make these files, and what depends on them; provenance comes last: without it a run is not finished."""
+        study, whole = self.study, {RESULTS, PROVENANCE, *_search_tables(self.study)}
+        if wrong & whole:
+            wrong = files_of(study)
+            self.inventory.remove([PROVENANCE])
+            self.inventory.outdate()
+            self._search_and_sweep()
+        else:
+            self._read_rows()
+        if wrong & _row_tables(study):
+            self._write_row_tables(wrong)
+        if wrong & _vision_tables(study):
+            self._write_vision()
+        self.inventory.write({RESOLVED: resolved_yaml(study).encode("utf-8")})
+        if PROVENANCE in wrong:
+            facts = self._provenance().model_dump(mode="json")
+            self.inventory.write({PROVENANCE: json_of(facts).encode("utf-8")})
+        self.parts.remove()
+        return tuple(sorted(wrong))
+
+    @cached_property
+    def rules(self) -> Any:
+        """What turns designs into rows."""
+        return rules_of(self.study)
+
+    @cached_property
+    def parts(self) -> Parts:
+        """What an interrupted run has kept."""
+        return Parts(self.inventory.folder)
+
+    @cached_property
+    def sweep(self) -> Sweep:
+        """The jobs of the study."""
+        return Sweep(self.study, self.rules, self.parts, self.crew)
+
+    @cached_property
+    def gathered(self) -> Gathered:
+        """What a report draws of the rows."""
+        return Gathered(self.rules, next(iter(self.study.scenarios)))
+
+    @cached_property
+    def answer(self) -> SearchAnswer | None:
+        """The search's answer; None of a study that does not search."""
+        if self.study.search is None:
+            return None
+        kept = self._kept("search")
+        try:
+            return run_search(self.study, self.study.search, kept, self.progress)
+        except BrokenProofError:
+            kept.drop_limits()
+            raise
+
+    def _kept(self, what: str) -> KeptAnswers:
+        """Calls whose answers are parts."""
+        return KeptAnswers(self.crew, self.parts, f"{self.sweep.fingerprint} {what}")
+
+    def _search_and_sweep(self) -> None:
+        """Search, which ends a study that no design meets; sweep; write the result table and those of the search."""
+        answer, sweep, gathered = self.answer, self.sweep, self.gathered
+        sweep.run(gathered, self.progress, self.options)
+        answered = [] if answer is None else [answer_row(self.study, answer, self.rules, self.crew)]
+        for row in answered:
+            gathered.add(row)
+        gathered.finish()
+        marked = map(gathered.front.marked, chain(sweep.tables(), answered))
+        write_tables(marked, self.rules.schema, self.inventory.path(RESULTS))
+        self.inventory.adopt(RESULTS)
+        if answer is not None:
+            self._write(SEARCH_LOG, search_log(answer))
+            if answer.search.levels:
+                self._write(FRONT, front_table(self.study, answer))
+            if self.study.leaves_one_out:
+                kept = self._kept("left out")
+                self._write(LEFT_OUT, left_out_table(self.study, answer.search, answer.best, kept, self.progress))
+
+    def _read_rows(self) -> None:
+        """Gather what a report draws out of the result table."""
+        for table in batches(self.inventory.path(RESULTS)):
+            self.gathered.add(few_of(table, self.rules))
+        self.gathered.finish()
+
+    def _write_row_tables(self, names: set[str]) -> None:
+        rows, on_front = self.gathered.frame(), self.gathered.front_frame()
+        looks = looks_of(self.study, Looking.of(self.study, names), rows, on_front, self.crew, self.progress)
+        points = swept_points(self.inventory.path(RESULTS))
+        shown = Shown(self.study, rows, on_front, looks, points, self._limit, self.crew, self._kept, self.progress)
+        for name, table in ROW_TABLES.items():
+            if name in names:
+                self._write(name, table.made(shown))
+
+    def _write_vision(self) -> None:
+        from .vision import vision_tables  # noqa: PLC0415  (only where a study asks for images)
+
+        tables = vision_tables(self.study, self.gathered.frame(), self._kept("vision"), self.progress)
+        for name, table in tables.items():
+            self._write(name, table)
+
+    def _write(self, name: str, table: pa.Table) -> None:
+        """Write a table with the filter's number beside each design's, and with units and meanings."""
+        if "design_id" in table.column_names and "filter_id" not in table.column_names:
+            ids = table["design_id"].to_numpy(zero_copy_only=False)
+            filters = np.where(ids == self.study.n_designs, self.study.n_filters, ids % max(1, self.study.n_filters))
+            at = table.column_names.index("design_id") + 1
+            table = table.add_column(at, "filter_id", pa.array(filters, pa.int64(), from_pandas=True))
+        self.inventory.write_table(name, table.cast(described(table.schema, self.study.quantities)))
+
+    def _limit(self) -> Limit | None:
+        """The search's upper bound, found alone where the search itself need not be repeated."""
+        if "answer" in self.__dict__ or self.study.search is None:
+            return None if self.answer is None else self.answer.limit
+        return limit_alone(self.study, self.study.search)
+
+    def _provenance(self) -> Provenance:
+        study, sweep, answer = self.study, self.sweep, self.answer
+        facts: dict[str, Any] = {
+            "filters": study.n_filters + (answer is not None),
+            "designs": study.n_designs + (answer is not None),
+            "failed": sweep.failed,
+            "plans": plan_facts(study),
+            "trade_off": study.trade_off,
+            "parameters": study.parameters,
+            "quantities": [quantity.column for quantity in study.quantities.values()],
+            "spent_s": (sweep.spent_s, sweep.seconds),
+        }
+        warnings = [*study.warnings, *sweep.warnings]
+        warnings += spent_in_words(whole_readout_metrics(study.asked), sweep.spent_s, sweep.seconds)
+        if answer is not None:
+            facts["search"] = search_facts(study, answer)
+            if "saturation" in study.plans[answer.search.scenario].computed:
+                warnings.append("pixels may saturate: the search sees them before clipping, its row after")
+            if answer.front:
+                facts["hypervolume"] = _hypervolumes(answer, self.gathered)
+                facts["hypervolume_least_sensitivity"] = answer.search.levels[0]
+        duration_s = round(time.monotonic() - self.started, 3)
+        seconds = max(_CHECK_S, _CHECK_SHARE * duration_s)
+        facts["check"], unchecked = check_run(study, self.inventory.path(RESULTS), seconds, self.crew)
+        how = self.how | {"duration_s": duration_s}
+        return Provenance(**provenance(study, how), **facts, warnings=(*warnings, *unchecked))
+
+
+def _hypervolumes(answer: SearchAnswer, gathered: Gathered) -> dict[str, float]:
+    """Area that the designs of sweep and search dominate above no separation and the lowest level of sensitivity."""
+    reference = np.array([0.0, answer.search.levels[0] - 1e-6])
+    runs = (*answer.runs, *(run for point in answer.front for run in point.runs))
+    points = [[e.objective, e.sensitivity] for run in runs for e in run.log if e.violation <= FEASIBLE]
+    return {
+        "sweep": hypervolume(gathered.swept.points(answer.search.space.cfa, answer.search.scenario), reference),
+        "search": hypervolume(np.array(points).reshape(-1, 2), reference),
+    }
+
+
+def _discard(inventory: Inventory) -> None:
+    """Leave nothing of a run that has no result; what others have in the folder stays."""
+    Parts(inventory.folder).remove()
+    inventory.discard()
+    with suppress(OSError):
+        (inventory.folder / LOCK).unlink()
+        inventory.folder.rmdir()
