@@ -92,7 +92,7 @@ def test_fields_of_every_kind_come_back() -> None:
     assert math.isnan(again.words["a"][1])
 
 
-@pytest.mark.parametrize("value", [object(), np.array([object()]), {1: 2}, {3}, b"bytes", lambda: None])
+@pytest.mark.parametrize("value", [object(), np.array([object()]), {3}, b"bytes", lambda: None])
 def test_what_is_no_data_is_not_kept(value: object) -> None:
     with pytest.raises(TypeError, match="cannot be kept"):
         to_json(value)
