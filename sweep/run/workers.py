@@ -122,6 +122,8 @@ def workers(n_jobs: int, backend: str = "loky", scheduler: str | None = None) ->
     Raises SweepError where Dask is not installed or its scheduler does not answer.
     """
     settings: dict[str, Any] = {}
+    if backend == "loky" and joblib.effective_n_jobs(2) == 1:  # no semaphores here, as joblib has warned
+        backend = "threading"
     with ExitStack() as stack:
         stack.enter_context(warnings.catch_warnings())
         warnings.filterwarnings("ignore", message=".*have been cancelled", category=UserWarning)

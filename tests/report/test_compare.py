@@ -277,7 +277,7 @@ def test_by_default_a_folder_of_both_names(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     said = compare_runs([runs["chart"], runs["plain"]], None)
-    assert "outputs/compare-chart-plain/" in said[-1]
+    assert "outputs/compare-chart-plain/" in said.lines[-1]
     assert (tmp_path / "outputs" / "compare-chart-plain" / "compare.html").is_file()
     compare_runs([runs["chart"]] * 26, None)
     assert max(len(path.name) for path in (tmp_path / "outputs").iterdir()) == 100
