@@ -10,7 +10,7 @@ for name in (
     "sweep.commands.audit",
     "sweep.commands.finish",
     "sweep.commands.runs",
-    "sweep.report.overview",
+    "sweep.report.trade_off",
     "sweep.run.sweep",
     "sweep.search.solver",
 ):

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ..base.types import FloatArray
-from ..results.thinning import even
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -37,48 +36,15 @@ CURVE_COLORS = {
     "C": "#555555",
     "W": "#999999",
 }
-TRACED_NAME, BOUND_FILTER_NAME = "found by the search", "filter at the upper bound"
-"""Legend entries: optima of the search at levels of sensitivity; the curve of the filter that attains its bound."""
+BOUND_FILTER_NAME = "filter at the upper bound"
+"""Legend entry: the curve of the filter that attains the bound of the search."""
 TYPE_COLORS = {"green": "#009e73", "yellow": "#c9a800", "orange": "#e66100", "red": "#b2182b"}
 CURVE_CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
-_LABEL_BOX = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.0}
-_DRAWN_POINTS = 10_000
 _DPI = 160
 _PACKED = 3
 """How hard zlib tries on a PNG: at its usual 6 a file is a tenth smaller and takes twice as long."""
 Drawing = Callable[[], "Figure"]
 """A drawing that is put off: a process that draws nothing need not load what draws."""
-
-
-@dataclass(frozen=True)
-class Points:
-    """A named group of designs: x and y, each ndarray[n], and labels of single points (empty: none)."""
-
-    x: FloatArray
-    y: FloatArray
-    labels: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class ParetoFigure:
-    """CSD against the sensitivity of the modified channel.
-
-    `levels`: CFAs without a modified channel, name -> CSD. `traced`: what the search found at each level of
-    sensitivity; `limit`: the upper bound there, `limit_name`: which filters it bounds. `counts`: of the groups, in the
-    whole table.
-    """
-
-    title: str
-    x_label: str
-    y_label: str
-    groups: Mapping[str, Points]
-    traced: Points | None
-    limit: Points | None
-    levels: Mapping[str, float]
-    bound: float | None
-    bound_text: str = ""
-    limit_name: str = ""
-    counts: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -96,83 +62,6 @@ class CurvesFigure:
     dashed: Sequence[str] = ()
     colors: Mapping[str, str] = field(default_factory=dict)
     shades: Mapping[str, FloatArray] = field(default_factory=dict)
-
-
-def thin(points: Points, most: int = _DRAWN_POINTS) -> Points:
-    """At most `most` of the points, spread evenly and not in step with a grid; labeled points are all kept."""
-    if points.labels or points.x.size <= most:
-        return points
-    kept = even(points.x.size, most)
-    return Points(points.x[kept], points.y[kept])
-
-
-def draw_pareto(figure: ParetoFigure) -> Figure:
-    """Draw the trade-off; infeasible and feasible designs, front, best and named designs each have their marker."""
-    figure_, axes = canvas(8.0, 5.0)
-    styles: dict[str, dict[str, Any]] = {
-        "infeasible": {"marker": "x", "s": 9, "alpha": 0.45, "linewidths": 0.6, "zorder": 1},
-        "feasible": {"marker": "o", "s": 6, "alpha": 0.5, "linewidths": 0, "zorder": 2},
-        "front": {"marker": "o", "s": 14, "zorder": 3},
-        "best": {"marker": "*", "s": 220, "edgecolors": "black", "linewidths": 0.8, "zorder": 6},
-        "named": {"marker": "D", "s": 42, "zorder": 5},
-    }
-    for group, points in figure.groups.items():
-        if points.x.size:
-            shown = thin(points)
-            axes.scatter(
-                shown.x,
-                shown.y,
-                color=COLORS[group],
-                label=_group_label(figure, group),
-                rasterized=True,
-                **styles[group],
-            )
-            for x, y, label in zip(points.x, points.y, points.labels, strict=False):
-                axes.annotate(label, (x, y), textcoords="offset points", xytext=(7, 5), fontsize=9, zorder=7)
-    if figure.traced is not None:
-        axes.plot(
-            figure.traced.x, figure.traced.y, "+", color=COLORS["best"], markersize=8, label=TRACED_NAME, zorder=4
-        )
-    if figure.limit is not None:
-        style: dict[str, Any] = {"color": COLORS["limit"], "linestyle": "--", "linewidth": 1.5, "zorder": 4}
-        axes.plot(figure.limit.x, figure.limit.y, label=figure.limit_name, drawstyle="steps-post", **style)
-    low, high = axes.get_xlim()
-    heights = sorted(figure.levels.items(), key=lambda item: item[1])
-    for _, level in heights:
-        axes.axhline(level, color=COLORS["reference"], linestyle=":", linewidth=1.1, zorder=0)
-    for text, level in _level_labels(heights, axes.get_ylim()):
-        axes.text(low + 0.01 * (high - low), level, text, fontsize=8, va="bottom", zorder=8, bbox=_LABEL_BOX)
-    if figure.bound is not None:
-        axes.axvline(figure.bound, color="black", linestyle="--", linewidth=1.0, label=figure.bound_text)
-    axes.set_xlim(low, high)
-    axes.set_xlabel(figure.x_label)
-    axes.set_ylabel(figure.y_label)
-    axes.set_title(figure.title)
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0, frameon=False)
-    return figure_
-
-
-def _group_label(figure: ParetoFigure, group: str) -> str:
-    text = {
-        "infeasible": "does not meet the constraints",
-        "feasible": "feasible",
-        "front": "Pareto front",
-        "best": "best of the search",
-        "named": "named designs",
-    }[group]
-    return f"{text} ({figure.counts[group]:,})" if group in figure.counts else text
-
-
-def _level_labels(heights: Sequence[tuple[str, float]], limits: tuple[float, float]) -> list[tuple[str, float]]:
-    """One label for levels that lie too close for two."""
-    merged: list[tuple[list[str], float]] = []
-    for name, level in heights:
-        if merged and level - merged[-1][1] < 0.03 * (limits[1] - limits[0]):
-            merged[-1][0].append(f"{name} {level:.0f}")
-        else:
-            merged.append(([f"{name} {level:.0f}"], level))
-    return [(", ".join(names), level) for names, level in merged]
 
 
 def draw_curves(figure: CurvesFigure) -> Figure:
@@ -196,8 +85,15 @@ def draw_curves(figure: CurvesFigure) -> Figure:
     axes.set_ylim(bottom=0)
     axes.margins(x=0)
     axes.set_title(figure.title)
-    axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0, frameon=False)
+    legend_beside(axes)
     return figure_
+
+
+def legend_beside(axes: Axes, title: str | None = None) -> None:
+    """Put a legend to the right of the axes, where there is anything in it."""
+    if axes.get_legend_handles_labels()[0]:
+        place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0}
+        axes.legend(title=title, fontsize=8, title_fontsize=8, frameon=False, **place)
 
 
 def canvas(width_in: float, height_in: float) -> tuple[Figure, Axes]:

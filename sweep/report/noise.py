@@ -1,10 +1,9 @@
-"""What noise does to the states of a study: figures, the level up to which each design is usable, recognition."""
+"""Effects of noise on the states of a study: figures, the level up to which each design is usable, recognition."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
@@ -34,86 +33,56 @@ _COUNTED = (
 _RULE_NAMES = {MOST_LIKELY: "most likely signal", "nearest_centroid": "nearest centroid", "lda": "LDA"}
 
 
-def _allowed(output: Output) -> float | None:
-    """The largest error at which a design is usable; None in a study that does not ask."""
-    asked = output.study.recognition
-    return None if asked is None else asked.error_max
-
-
 def all_series(output: Output) -> list[SeriesFigure]:
     """Every figure of a quantity over scenarios: errors and accuracies, if asked for, then separations."""
-    return [*noise_figures(output), *series_figures(output)]
-
-
-def noise_figures(output: Output) -> list[SeriesFigure]:
-    """For each series of scenarios the error of the worst pair of states, and accuracies of classifiers on patches."""
-    return output.once("noise over series", lambda: list(_noise_figures(output)))
+    return [*output.once("noise over series", lambda: list(_noise_figures(output))), *series_figures(output)]
 
 
 def _noise_figures(output: Output) -> Iterator[SeriesFigure]:
-    allowed = _allowed(output)
-    if allowed is None:
+    """For each series of scenarios the error of the worst pair of states, and accuracies of classifiers on patches."""
+    if output.study.recognition is None:
         return
-    rows = output.few
     for (base, key), scenarios in series_of(output.scenarios).items():
-        x = np.array(list(scenarios.values()))
+        draw = partial(SeriesFigure, key=key, x=np.array(list(scenarios.values())), band="")
         where = f"{output.study.study}, {base}"
+        passes = _crossings(output, base, key)
         errors = {
-            n: Line(np.maximum(y, _LEAST), None, _crossing(output, base, key, n))
-            for n, y in over_series(rows, scenarios, STATE_ERROR).items()
+            name: Line(np.maximum(error, _LEAST), None, passes.get(name))
+            for name, error in over_series(output.few, scenarios, STATE_ERROR).items()
         }
-        label = f"{_ERROR} ({_LEAST:g}: or less)"
-        title = f"{where}: {_ERROR}"
-        yield SeriesFigure(title, key, label, x, errors, "", log_y=True, level=allowed, note=_COMPUTED)
-        for rule in CLASSIFIERS if output.recognition is not None else ():
-            lines = {n: Line(y, None) for n, y in _accuracies(output, scenarios, rule).items()}
-            label = f"accuracy of {_RULE_NAMES[rule]} on raw patches"
-            yield SeriesFigure(
-                f"{where}: {label}",
-                key,
-                label,
-                x,
-                lines,
-                "",
-                from_zero=False,
-                note=_COUNTED,
-            )
-
-
-def _accuracies(output: Output, scenarios: dict[str, float], rule: str) -> dict[str, FloatArray]:
-    assert output.recognition is not None
-    return over_series(output.recognition, scenarios, f"{rule}_accuracy")
+        allowed = output.study.recognition.error_max
+        y_label = f"{_ERROR} ({_LEAST:g}: or less)"
+        yield draw(f"{where}: {_ERROR}", y_label=y_label, lines=errors, log_y=True, level=allowed, note=_COMPUTED)
+        if output.recognition is not None:
+            for rule in CLASSIFIERS:
+                accuracies = over_series(output.recognition, scenarios, f"{rule}_accuracy")
+                lines = {name: Line(accuracy, None) for name, accuracy in accuracies.items()}
+                y_label = f"accuracy of {_RULE_NAMES[rule]} on raw patches"
+                yield draw(f"{where}: {y_label}", y_label=y_label, lines=lines, from_zero=False, note=_COUNTED)
 
 
 def usable_lines(output: Output) -> Iterator[str]:
     """For each series of scenarios, the numbers at which each design is usable; designs with the same ones together."""
-    allowed = _allowed(output)
-    if allowed is None:
+    if output.study.recognition is None:
         return
-    rows = output.few
+    allowed = output.study.recognition.error_max
     for (base, key), scenarios in series_of(output.scenarios).items():
         name, unit = quantity_of(key)
-        x = np.array(list(scenarios.values()))
+        x, passes = np.array(list(scenarios.values())), _crossings(output, base, key)
         ranges: dict[str, list[str]] = {}
-        for design, errors in over_series(rows, scenarios, STATE_ERROR).items():
-            crossing = _crossing(output, base, key, design)
-            where = _range(x, errors <= allowed, unit, None if crossing is None else crossing[0])
+        for design, errors in over_series(output.few, scenarios, STATE_ERROR).items():
+            where = _range(x, errors <= allowed, unit, passes.get(design))
             ranges.setdefault(where, []).append(design)
-        found = [f"{_listed(designs)} {where}" for where, designs in ranges.items()]
-        if found:
-            what = f"noise confuses the worst two states at most {allowed:g} of the time"
-            yield f"Over {name}, {what}: {'; '.join(found)}."
+        if ranges:
+            usable = "; ".join(f"{', '.join(designs)} {where}" for where, designs in ranges.items())
+            yield f"Over {name}, noise confuses the worst two states at most {allowed:g} of the time: {usable}."
 
 
-def _listed(names: Sequence[str]) -> str:
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
-
-
-def _range(x: FloatArray, usable: BoolArray, unit: str, crossing: float | None) -> str:
+def _range(x: FloatArray, usable: BoolArray, unit: str, passes: tuple[float, float] | None) -> str:
     """Where among the numbers `x` (ascending) a design is usable, in words.
 
-    Where that ends once, by the computed `crossing`, rounded to the side where it is usable; without one, by the two
-    numbers between which it ends.
+    Where that ends once, by the computed end, rounded to the side where it is usable; without one, by the two numbers
+    between which it ends.
     """
     if usable.all():
         return "everywhere"
@@ -123,11 +92,11 @@ def _range(x: FloatArray, usable: BoolArray, unit: str, crossing: float | None) 
     of = f" of {unit}" if " " in unit else f" {unit}".rstrip()
     if len(ends) > 1:
         return f"at {' '.join(f'{v:g}' for v in x[usable])}{of}"
-    low, high = x[ends[0] : ends[0] + 2]
     word = "up to" if usable[0] else "from"
-    if crossing is None:
+    if passes is None:
+        low, high = x[ends[0] : ends[0] + 2]
         return f"{word} a number between {low:g} and {high:g}{of}"
-    return f"{word} {_rounded(crossing, up=not usable[0])}{of}"
+    return f"{word} {_rounded(passes[0], up=not usable[0])}{of}"
 
 
 def _rounded(value: float, *, up: bool) -> str:
@@ -138,58 +107,18 @@ def _rounded(value: float, *, up: bool) -> str:
     return f"{float(text):g}" if "e" in text else text
 
 
-def _crossing(output: Output, series: str, key: str, design: str) -> tuple[float, float] | None:
-    """The number at which a design's error is what is allowed, and its error there, as the run has computed them."""
-    return output.once("crossings", partial(_crossings, output)).get((series, key, design))
-
-
-def _crossings(output: Output) -> dict[tuple[str, str, str], tuple[float, float]]:
-    """The same of each series, key and design."""
+def _crossings(output: Output, series: str, key: str) -> dict[str, tuple[float, float]]:
+    """Design -> the number at which its error is what is allowed, and that error, as the run has computed them."""
     if output.crossings is None:
         return {}
     known = output.crossings.dropna(subset=["at", "error"])
-    return {(row["series"], row["key"], row["name"]): (row["at"], row["error"]) for row in known.to_dict("records")}
-
-
-@dataclass(frozen=True)
-class UsableEnds:
-    """Where designs reach the largest error that is allowed over one number of the scenarios; the best one first.
-
-    `name`, `unit`: of the number. `more`: the best one bears the largest number, else it needs the smallest.
-    """
-
-    name: str
-    unit: str
-    error_max: float
-    more: bool
-    at: dict[str, float]
-
-    def told(self, design: str) -> str:
-        """Where a design stops being usable, rounded to the side where it is usable; without its unit."""
-        return _rounded(self.at[design], up=not self.more)
-
-
-def usable_ends(output: Output) -> Iterator[UsableEnds]:
-    """For each series of scenarios where designs stop being usable.
-
-    None where one is usable everywhere, or somewhere with an end that is not known: it may be the best one.
-    """
-    allowed = _allowed(output)
-    for series in noise_figures(output):
-        usable = {} if allowed is None else {n: line for n, line in series.lines.items() if (line.y <= allowed).any()}
-        ends = {name: line.passes[0] for name, line in usable.items() if line.passes is not None}
-        if allowed is None or not ends or len(ends) < len(usable):
-            continue
-        sides = {bool(series.lines[name].y[0] <= allowed) for name in ends}
-        if len(sides) == 1:
-            more = sides.pop()
-            ordered = sorted(ends, key=lambda name: -ends[name] if more else ends[name])
-            yield UsableEnds(*series.quantity, allowed, more, {name: ends[name] for name in ordered})
+    known = known[(known["series"] == series) & (known["key"] == key)]
+    return dict(zip(known["name"], zip(known["at"], known["error"], strict=True), strict=True))
 
 
 def told_apart_table(output: Output) -> pd.DataFrame:
     """Errors in closed form and accuracies on drawn patches, a row per design and scenario."""
-    if _allowed(output) is None:
+    if output.study.recognition is None:
         return pd.DataFrame()
     rows = output.few
     dprime = [name for name, column in output.columns.items() if column.metric == D_PRIME]
@@ -197,11 +126,10 @@ def told_apart_table(output: Output) -> pd.DataFrame:
     shown["smallest d'"] = rows[dprime].min(axis=1).map("{:.2f}".format)
     for column, label in ((STATE_ERROR, _ERROR), (STATE_ERROR_BOUND, "bound of the error")):
         shown[label] = rows[column].map("{:.2g}".format)
-    drawn = output.recognition
-    if drawn is not None:
-        by_id = drawn.set_index("design_id").reindex(rows["design_id"])
+    if output.recognition is not None:
+        by_id = output.recognition.set_index("design_id").reindex(rows["design_id"])
         for rule in (MOST_LIKELY, *CLASSIFIERS):
-            low, high = by_id[f"{rule}_accuracy_low"], by_id[f"{rule}_accuracy_high"]
-            values = zip(by_id[f"{rule}_accuracy"], low, high, strict=True)
-            shown[f"accuracy, {_RULE_NAMES[rule]}"] = [f"{v:.4f} ({a:.4f} to {b:.4f})" for v, a, b in values]
+            columns = by_id[[f"{rule}_accuracy{end}" for end in ("", "_low", "_high")]]
+            texts = [f"{v:.4f} ({a:.4f} to {b:.4f})" for v, a, b in columns.itertuples(index=False)]
+            shown[f"accuracy, {_RULE_NAMES[rule]}"] = texts
     return shown

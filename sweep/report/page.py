@@ -24,12 +24,10 @@ from . import values as content
 from .allowed_lamps import lamp_drawings, lamp_table
 from .answer import answer_sentences
 from .colors import color_drawings
-from .figures import Drawing, draw_curves, draw_pareto, pictures_of
-from .filter_figures import filters_figure
+from .figures import Drawing, draw_curves, pictures_of
 from .large_numbers import large_numbers
 from .leaders import leaders_of
 from .noise import all_series, told_apart_table
-from .overview import draw_overview, overview_figure
 from .page_data import payload
 from .pages import inlined, library, page, rows, script
 from .published import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
@@ -37,10 +35,18 @@ from .scenes import effect_table, scene_groups, scene_table
 from .scorecard import draw_scorecard, score_cells, scorecard
 from .sensor_map import map_drawings
 from .series import draw_series
-from .signal_figures import draw_chart, draw_clouds
+from .signal_figures import (
+    chart_patches,
+    clouds,
+    draw_chart,
+    draw_clouds,
+    draw_tiles,
+    first_mosaics,
+    replaced_channels,
+)
 from .summary import counts_line, summary_lines
 from .terms import constraints_told, terms_of
-from .tiles import draw_tiles, tiles_figure
+from .trade_off import draw_trade_off, overview_figure, pareto_figure, traded_cfas
 
 if TYPE_CHECKING:
     pass
@@ -115,7 +121,7 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
         "folder": output.folder.as_posix(),
         "quoted": shlex.quote(output.folder.as_posix()),
         "objective": _objective(output),
-        "numbers_in": "" if len(output.scenarios) == 1 or output.best.empty else f"in {leaders_of(output).scenario}",
+        "numbers_in": "" if len(output.scenarios) == 1 else f"in {leaders_of(output).scenario}",
         "series_first": series_first,
         "terms_first": series_first and drawn["series"][0]["y_label"] == output.trade_off[0].axis,
         "objective_words": output.goal.words,
@@ -185,18 +191,18 @@ def _drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
         ("clouds-cfas", "Signals in the channels of the plain CFAs", (PLAIN,)),
         ("clouds-designs", "Signals in the channels of the named and the found designs", (NAMED, FOUND)),
     ):
-        found = content.clouds(output, *kinds)
+        found = clouds(output, *kinds)
         if found:
             top_dn = max(1.0, 1.05 * float(output.points["dn"].max()))
             yield name, caption, partial(draw_clouds, found, caption, top_dn)
     scenario = output.scenarios[0]
     cfas = list(dict.fromkeys(m.cfa for m in content.modifications(output)))
-    yield "cfas", "All CFAs", partial(draw_overview, overview_figure(output, scenario))
-    for number, cfa in enumerate(content.traded_cfas(output)):
-        figure = partial(draw_pareto, content.pareto_figure(output, scenario, cfa))
+    yield "cfas", "All CFAs", partial(draw_trade_off, overview_figure(output, scenario))
+    for number, cfa in enumerate(traded_cfas(output)):
+        figure = partial(draw_trade_off, pareto_figure(output, scenario, cfa))
         yield ("pareto" if number == 0 else f"pareto-{number + 1}"), f"Trade-off of {cfa}", figure
     for number, cfa in enumerate(cfas):
-        yield f"filters-{number + 1}", f"Filters of {cfa}", partial(draw_curves, filters_figure(output, cfa))
+        yield f"filters-{number + 1}", f"Filters of {cfa}", partial(draw_curves, content.filters_figure(output, cfa))
     for number, series in enumerate(all_series(output)):
         yield f"series-{number + 1}", series.title, partial(draw_series, series)
     card = scorecard(output)
@@ -205,7 +211,11 @@ def _drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
     yield from map_drawings(output)
     yield from color_drawings(output)
     yield from lamp_drawings(output)
-    yield "tiles", "Tiles of the CFAs; a hatched pixel is modified", partial(draw_tiles, tiles_figure(output))
+    yield (
+        "tiles",
+        "Tiles of the CFAs; a hatched pixel is modified",
+        partial(draw_tiles, first_mosaics(output), replaced_channels(output)),
+    )
     yield "sensor", "Quantum efficiency of the sensor", partial(draw_curves, content.sensor_figure(output))
     yield "signals", "Spectra of the signals", partial(draw_curves, content.lights_figure(output))
-    yield "chart", "The color checker chart", partial(draw_chart, content.chart_figure(output))
+    yield "chart", "The color checker chart", partial(draw_chart, chart_patches(output))

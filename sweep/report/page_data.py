@@ -10,20 +10,22 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.columns.color_separation import CSD
 from ..metrics.limiting import limited_by_name
-from ..metrics.pareto import knee
+from ..metrics.pareto import hypervolume, knee
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
 from . import values as content
-from .figures import COLORS, CURVE_COLORS, TYPE_COLORS, ParetoFigure
-from .filter_figures import end_curves
-from .history import history_of
+from .figures import COLORS, CURVE_COLORS, TYPE_COLORS
 from .noise import all_series
-from .overview import OverviewFigure, around_designs
 from .series import SeriesFigure
+from .signal_figures import nearest_lights, signals_of
+from .trade_off import TradeOff, around_designs, pareto_figure, traded_cfas
 
 _OF_PARAMETERS, _OF_OTHERS = 2, 4
+"""Digits of columns that are no quantities."""
+_PLACES = 80
 GROUPS = ("infeasible", "feasible", "front", "named", "best", "plain")
 _PUBLISHED = "RYN_4Cy"
 _PUBLISHED_LABEL = "our counterpart of the paper's N_4"
@@ -54,7 +56,7 @@ def payload(output: Output) -> dict[str, Any]:
         "limited": _limited(output, rows),
         "nearest": _nearest(output, rows),
         "profiles": _profiles(output),
-        "history": _history(output),
+        "history": history_of(output),
         "front": _front(output, rows),
         "series": [_series(series) for series in all_series(output)],
         "swept": bool((rows["kind"] == SWEPT).any()),
@@ -121,8 +123,8 @@ def _columns(output: Output, rows: pd.DataFrame) -> dict[str, dict[str, Any]]:
 def _views(output: Output, rows: pd.DataFrame) -> Iterator[dict[str, Any]]:
     """What is drawn around the points of each scenario and CFA: lines, levels of plain CFAs, bound, knee."""
     for scenario in output.scenarios:
-        for cfa in content.traded_cfas(output):
-            figure = content.pareto_figure(output, scenario, cfa)
+        for cfa in traded_cfas(output):
+            figure = pareto_figure(output, scenario, cfa)
             yield {
                 "scenario": scenario,
                 "cfa": cfa,
@@ -138,7 +140,7 @@ def _views(output: Output, rows: pd.DataFrame) -> Iterator[dict[str, Any]]:
             }
 
 
-def _lines(figure: ParetoFigure | OverviewFigure) -> dict[str, Any]:
+def _lines(figure: TradeOff) -> dict[str, Any]:
     """What the search found and the limit, as lists of x and y."""
     both = {"traced": figure.traced, "limit": figure.limit}
     lines = {name: None if p is None else [p.x.tolist(), p.y.tolist()] for name, p in both.items()}
@@ -165,11 +167,11 @@ def _limited(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
 def _nearest(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
     """design_id -> the two lights that limit the trade-off's CSD, of the designs whose signals are drawn."""
     drawn = rows["design_id"].isin(output.points["design_id"])
-    found = {str(row["design_id"]): content.nearest_lights(output, row) for _, row in _records(rows, drawn)}
+    found = {str(row["design_id"]): nearest_lights(output, row) for _, row in _records(rows, drawn)}
     return {design: lights for design, lights in found.items() if lights is not None}
 
 
-def _knee(figure: ParetoFigure, output: Output, rows: pd.DataFrame) -> int | None:
+def _knee(figure: TradeOff, output: Output, rows: pd.DataFrame) -> int | None:
     """Row of the front's knee."""
     front = figure.groups["front"]
     order = np.argsort(front.x, kind="stable")
@@ -194,23 +196,21 @@ def _curves(output: Output) -> dict[str, Any]:
         },
         "shades": {kind: _packed(shade, "f4") for kind, shade in content.light_shades(output).items()},
         "plain": {cfa: content.channel_curves(output, cfa) for cfa in output.study.cfas},
-        "ends": {cfa: end_curves(output, cfa) for cfa in dict.fromkeys(output.table["cfa"].astype(str))},
+        "ends": {cfa: content.end_curves(output, cfa) for cfa in dict.fromkeys(output.table["cfa"].astype(str))},
     }
 
 
 def _clouds(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
     """Signals' digital numbers of the kept designs: [n_channels x n_signals] each, channel by channel."""
-    points = output.points[output.points["design_id"].isin(rows["design_id"])]
-    found: dict[str, Any] = {"designs": {}, "channels": {}, "types": [], "names": []}
-    for design, own in points.groupby("design_id", sort=False):
-        channels = list(dict.fromkeys(own["channel"]))
-        dn = own["dn"].to_numpy(dtype=float).reshape(-1, len(channels))
-        found["types"] = found["types"] or list(own["signal_type"].to_numpy().reshape(-1, len(channels))[:, 0])
-        found["names"] = found["names"] or list(own["signal"].to_numpy().reshape(-1, len(channels))[:, 0])
-        cfa = str(rows.loc[rows["design_id"] == design, "cfa"].iloc[0])
-        found["channels"][cfa] = channels
-        found["designs"][str(design)] = _packed(dn.T, "f4")
-    return found
+    kept: dict[str, Any] = {"designs": {}, "channels": {}, "types": [], "names": []}
+    cfas = dict(zip(rows["design_id"], rows["cfa"].astype(str), strict=True))
+    for design in output.points["design_id"].unique():
+        if design in cfas:
+            channels, signals, dn = signals_of(output, design)
+            kept["types"], kept["names"] = [kind for kind, _ in signals], [name for _, name in signals]
+            kept["channels"][cfas[design]] = channels
+            kept["designs"][str(design)] = _packed(dn, "f4")
+    return kept
 
 
 def _profiles(output: Output) -> dict[str, Any]:
@@ -229,18 +229,39 @@ def _profiles(output: Output) -> dict[str, Any]:
     }
 
 
-def _history(output: Output) -> dict[str, Any] | None:
-    history = history_of(output)
-    if history is None:
+def history_of(output: Output) -> dict[str, Any] | None:
+    """Best feasible objective of each start of a search and of all, and hypervolume, over the evaluations.
+
+    The best one is over the designs that meet the study's own constraints; the hypervolume is above an objective of 0
+    and `least_sensitivity`, and there is none for an objective that is no CSD.
+    """
+    log = output.searched
+    if log is None or log.empty:
         return None
+    feasible = log["violation"].to_numpy() <= FEASIBLE
+    bound = output.constraints.get("sensitivity", Bound.model_construct(min=None, max=None))
+    met = feasible & (bound.violation(log["sensitivity"].to_numpy()) <= FEASIBLE)
+    starts = log["objective"].where(feasible)[log["sensitivity_min"].isna()].groupby(log["start"])
+    at = np.unique(np.geomspace(1, len(log), min(_PLACES, len(log))).round().astype(np.intp))
+    levels = log["sensitivity_min"].dropna()
+    least = float(levels.min()) if len(levels) else bound.min or 0.0
+    best, volume = _so_far(log["objective"].where(met)), None
+    if output.goal.role == "separation":
+        pairs, reference = log[["objective", "sensitivity"]].to_numpy(dtype=float), np.array([0.0, least - 1e-6])
+        # It cannot shrink as designs are added; the last bit of a sum in another order can.
+        volume = np.maximum.accumulate([hypervolume(pairs[:n][feasible[:n]], reference) for n in at]).tolist()
     return {
-        "starts": [{"number": start.number, "best": _finite(start.best)} for start in history.starts],
-        "evaluations": history.evaluations.tolist(),
-        "best": _finite(history.best),
-        "volume": None if history.volume is None else history.volume.tolist(),
-        "least_sensitivity": history.least_sensitivity,
+        "starts": [{"number": int(str(number)), "best": _so_far(own)} for number, own in starts],
+        "evaluations": at.tolist(),
+        "best": [best[n - 1] for n in at],
+        "volume": volume,
+        "least_sensitivity": least,
         "label": output.goal.words,
     }
+
+
+def _so_far(objective: pd.Series) -> list[float | None]:
+    return _finite(np.fmax.accumulate(objective.to_numpy(dtype=float)))
 
 
 def _finite(values: np.ndarray) -> list[float | None]:

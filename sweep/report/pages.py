@@ -1,4 +1,4 @@
-"""HTML pages from templates: one self-contained file each."""
+"""HTML pages from templates, one self-contained file each, and tables as text."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from markupsafe import Markup
 
 
 def page(template: str, **values: Any) -> str:
-    """A template filled in; every value is escaped."""
+    """Fill in a template; every value is escaped."""
     loader = PackageLoader("sweep.report", "templates")
     templates = Environment(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
@@ -39,7 +39,7 @@ def inlined(png: bytes) -> str:
 
 
 def rows(table: pd.DataFrame) -> list[list[str]]:
-    """Header and cells as text; what does not exist is a dash."""
+    """Header and cells as text; a missing value is a dash."""
     if table.empty:
         return []
     body = [[_cell(value) for value in row] for row in table.itertuples(index=False)]
@@ -52,3 +52,10 @@ def _cell(value: object) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def aligned(table: pd.DataFrame) -> list[str]:
+    """A table as lines of text."""
+    cells = rows(table)
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    return ["  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip() for line in cells]

@@ -1,4 +1,4 @@
-"""What a worst case over lamps costs in the nominal one, what breaks an answer, and which share of lamps it keeps."""
+"""Cost of a worst case over lamps in the nominal one, changes that break an answer, and the share of lamps it keeps."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def over_population(output: Output) -> bool:
 
 
 def worst_over(output: Output) -> str:
-    """What a worst case is over, in words."""
+    """The range of a worst case in words."""
     over = ["production"] if output.study.production.tolerance else []
     return " and ".join(over + (["all lamps"] if over_population(output) else []))
 
@@ -37,17 +37,22 @@ def robustness_lines(output: Output, best: Row | None) -> Iterator[str]:
     few: list[Row] = list(output.few[output.few["scenario"] == scenario].to_dict("records"))
     if best is not None and over_population(output):
         yield from _price(output, best, [row for row in few if row["kind"] == NAMED])
+    plain = [row for row in few if row["kind"] == PLAIN]
     for row in few:
         if row["kind"] in (NAMED, FOUND) and np.isfinite(row.get("breaks_at", np.nan)):
-            yield _breaks(output, row, few)
-    held = [row for row in few if row["kind"] == FOUND and not np.isfinite(row.get("breaks_at", np.nan))]
-    for row in held if any(each["kind"] == PLAIN for each in few) else ():
-        yield f"{_named(row)} stays above the plain CFAs up to 3 times the stated range of lamps and edges."
-    kept = [(row, row.get("yield", np.nan)) for row in few]
-    each = ", ".join(f"{_name(row)} {_share(row)}" for row, share in kept if np.isfinite(share))
-    if each:
+            yield _breaks(output, row, plain)
+        elif row["kind"] == FOUND and plain:
+            who = capital(full_name(row))
+            yield f"{who} stays above the plain CFAs up to 3 times the stated range of lamps and edges."
+    shares = []
+    for row in few:
+        if np.isfinite(row.get("yield", np.nan)):
+            share, low, high = (told_share(row[name], 2) for name in ("yield", "yield_low", "yield_high"))
+            name = "the search's answer" if row["kind"] == FOUND else row["name"]
+            shares.append(f"{name} {share} ({low} to {high})")
+    if shares:
         wanted = output.trade_off[0].told(output.study.population.wanted_dn or 0.0)
-        yield f"At least {wanted} have, of random lamps and cameras: {each} (with 95 % intervals)."
+        yield f"At least {wanted} have, of random lamps and cameras: {', '.join(shares)} (with 95 % intervals)."
 
 
 def _price(output: Output, best: Row, named: list[Row]) -> Iterator[str]:
@@ -55,49 +60,33 @@ def _price(output: Output, best: Row, named: list[Row]) -> Iterator[str]:
     worst = output.trade_off[0]
     nominal = output.columns[worst.of]
     rivals = [row for row in named if row[nominal.name] > best[nominal.name] and row[worst.name] > 0]
-    if not rivals:
-        return
-    rival = max(rivals, key=lambda row: float(row[nominal.name]))
-    lost, gained = 1 - best[nominal.name] / rival[nominal.name], best[worst.name] / rival[worst.name]
-    yield (
-        f"Its worst case costs {lost:.1%} of the nominal separation: {nominal.told(best[nominal.name])} against "
-        f"{nominal.told(rival[nominal.name])} of {rival['name']}, which has {worst.told(rival[worst.name])} in the "
-        f"worst case; {worst.told(best[worst.name])} are {gained:.2f} times that."
-    )
+    if rivals:
+        rival = max(rivals, key=lambda row: float(row[nominal.name]))
+        lost, gained = 1 - best[nominal.name] / rival[nominal.name], best[worst.name] / rival[worst.name]
+        yield (
+            f"Its worst case costs {lost:.1%} of the nominal separation: {nominal.told(best[nominal.name])} against "
+            f"{nominal.told(rival[nominal.name])} of {rival['name']}, which has {worst.told(rival[worst.name])} in the "
+            f"worst case; {worst.told(best[worst.name])} are {gained:.2f} times that."
+        )
 
 
-def _breaks(output: Output, row: Row, few: list[Row]) -> str:
+def _breaks(output: Output, row: Row, plain: list[Row]) -> str:
     """Where a design falls below the best plain CFA, by which lights, at which temperature."""
-    separation = output.trade_off[0]
+    separation, who = output.trade_off[0], capital(full_name(row))
     worst = WORST + (separation.of or separation.name)
-    plain = max((each for each in few if each["kind"] == PLAIN), key=lambda each: float(each[worst]))
+    rival = max(plain, key=lambda other: float(other[worst]))
     if row["breaks_at"] == 0:
-        return f"{_named(row)} is below {plain['name']} with the study's own lights."
-    each = [f"{row[f'breaks_{side}']} ({row[f'breaks_{side}_nm']:+.1f} nm)" for side in ("first", "second")]
+        return f"{who} is below {rival['name']} with the study's own lights."
+    causes = [f"{row[f'breaks_{side}']} ({row[f'breaks_{side}_nm']:+.1f} nm)" for side in ("first", "second")]
+    text = " and ".join(causes)
     low, high = row["breaks_low_c"], row["breaks_high_c"]
-    warm = "" if not np.isfinite(low) else f", junctions at {_span(low, high)} degrees"
-    edges = f", edges {row['breaks_edge_nm']:+.1f} nm" if row["breaks_edge_nm"] else ""
-    edges += f", films {row['breaks_thickness']:+.2%}" if row["breaks_thickness"] else ""
+    if np.isfinite(low):
+        text += f", junctions at {' to '.join(dict.fromkeys((f'{low:.0f}', f'{high:.0f}')))} degrees"
+    if row["breaks_edge_nm"]:
+        text += f", edges {row['breaks_edge_nm']:+.1f} nm"
+    if row["breaks_thickness"]:
+        text += f", films {row['breaks_thickness']:+.2%}"
     return (
-        f"{_named(row)} falls below {plain['name']} at {row['breaks_at']:.2f} times the stated range of lamps and "
-        f"production: {' and '.join(each)}{warm}{edges}, {separation.told(row['breaks_dn'])}."
+        f"{who} falls below {rival['name']} at {row['breaks_at']:.2f} times the stated range of lamps and "
+        f"production: {text}, {separation.told(row['breaks_dn'])}."
     )
-
-
-def _span(low: float, high: float) -> str:
-    one, other = f"{low:.0f}", f"{high:.0f}"
-    return one if one == other else f"{one} to {other}"
-
-
-def _name(row: Row) -> str:
-    return "the search's answer" if row["kind"] == FOUND else str(row["name"])
-
-
-def _named(row: Row) -> str:
-    return capital(full_name(row))
-
-
-def _share(row: Row) -> str:
-    """A share with its interval, percent."""
-    low, high = (told_share(row[end], 2) for end in ("yield_low", "yield_high"))
-    return f"{told_share(row['yield'], 2)} ({low} to {high})"

@@ -10,7 +10,8 @@ import numpy as np
 
 from ..base.types import FloatArray
 from ..metrics.quantity import DN
-from .figures import CURVE_CYCLE, canvas
+from .figures import CURVE_CYCLE, canvas, legend_beside
+from .names import capital
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,7 +44,7 @@ class Line:
     passes: tuple[float, float] | None = None
 
     def over(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What is drawn: its values over the numbers `x` (ascending), and where it passes the level among them."""
+        """Numbers and values as drawn, with the point where it passes the level among them; `x`: ascending."""
         if self.passes is None:
             return x, self.y
         at = np.searchsorted(x, self.passes[0])
@@ -54,7 +55,7 @@ class Line:
 class SeriesFigure:
     """A line per design over `x` (ndarray[n]), the number `key` of the scenarios; `level` is marked.
 
-    `among`: which scenarios they are, where there are others over the same number. `note`: what the values are.
+    `among`: the scenarios, where there are others over the same number. `note`: the meaning of the values.
     """
 
     title: str
@@ -71,7 +72,7 @@ class SeriesFigure:
 
     @property
     def x_label(self) -> str:
-        """What the scenarios' number is, with its unit."""
+        """The scenarios' number with its unit."""
         return _LABELS.get(self.key, self.key)
 
     @property
@@ -84,6 +85,15 @@ class SeriesFigure:
         """Whether the numbers span more than a decade."""
         return bool(self.x.min() > 0 and self.x.max() / self.x.min() > _WIDE)
 
+    def at(self, place: int) -> str:
+        """A number of the scenarios with its unit."""
+        return f"{self.x[place]:g} {self.quantity[1]}".rstrip()
+
+    @property
+    def values(self) -> dict[str, FloatArray]:
+        """Values of each design; unknown ones are the least."""
+        return {design: np.nan_to_num(line.y, nan=-np.inf) for design, line in self.lines.items()}
+
 
 def quantity_of(key: str) -> tuple[str, str]:
     """Name and unit of the number that scenarios differ in by its key; the unit may be empty."""
@@ -92,63 +102,55 @@ def quantity_of(key: str) -> tuple[str, str]:
 
 
 def lead_sentence(series: SeriesFigure) -> str:
-    """Which design leads from where to where, with its value and its rival's where that ends."""
-    name, unit = series.quantity
-    what, _, dn = series.y_label.partition(" / ")
-    values = {design: np.nan_to_num(line.y, nan=-np.inf) for design, line in series.lines.items()}
-    leads = leads_of(series)
+    """The leading design of each range, with its value and its rival's where that ends."""
+    what, _, unit = series.y_label.partition(" / ")
+    values, leads = series.values, leads_of(series)
 
-    def at(place: int) -> str:
-        return f"{series.x[place]:g} {unit}".rstrip()
+    def told(design: str, place: int) -> str:
+        value = values[design][place]
+        return f"{value:.{0 if abs(value) >= 10 else 1}f} {unit}".rstrip()
 
     parts = []
     for number, (leader, start, stop) in enumerate(leads):
         first, last = start == 0, stop == len(series.x) - 1
-        span = f"at {at(start)}" if start == stop else f"from {at(start)}{' on' if last else f' to {at(stop)}'}"
-        span = ("everywhere" if last else f"up to {at(stop)}") if first and start != stop else span
+        if start == stop:
+            span = f"at {series.at(start)}"
+        elif first:
+            span = "everywhere" if last else f"up to {series.at(stop)}"
+        else:
+            span = f"from {series.at(start)}{' on' if last else f' to {series.at(stop)}'}"
         if leader is None:
-            parts.append(f"nobody has {_LEAST_LEAD:g} {dn} {span}")
+            parts.append(f"nobody has {_LEAST_LEAD:g} {unit} {span}")
             continue
-        following = None if last else leads[number + 1][0]
-        rival = following or _second(values, leader, stop)
-        parts.append(
-            f"{leader} leads {span} ({_told(values[leader][stop], dn)}{'' if start == stop else f' at {at(stop)}'}"
-        )
-        parts[-1] += f", {rival} {_told(values[rival][stop], dn)})" if rival else ")"
-    return f"{what[:1].upper()}{what[1:]} over {name}{f', {series.among}' if series.among else ''}: {'; '.join(parts)}."
-
-
-def _told(value: float, unit: str) -> str:
-    return f"{value:.{0 if abs(value) >= 10 else 1}f} {unit}".rstrip()
-
-
-def _second(values: Mapping[str, FloatArray], leader: str | None, place: int) -> str | None:
-    others = {design: own[place] for design, own in values.items() if design != leader}
-    return max(others, key=lambda design: others[design]) if others and leader is not None else None
+        others = sorted((d for d in values if d != leader), key=lambda d: -values[d][stop])
+        rival = (None if last else leads[number + 1][0]) or next(iter(others), None)
+        where = "" if start == stop else f" at {series.at(stop)}"
+        beside = f", {rival} {told(rival, stop)}" if rival else ""
+        parts.append(f"{leader} leads {span} ({told(leader, stop)}{where}{beside})")
+    among = f", {series.among}" if series.among else ""
+    return f"{capital(what)} over {series.quantity[0]}{among}: {'; '.join(parts)}."
 
 
 def leads_of(series: SeriesFigure) -> list[tuple[str | None, int, int]]:
     """(leader, its first place, its last place) in order; None where nobody has a DN.
 
-    Who led at the last place leads as long as nobody has more.
+    A leader stays one as long as nobody has more.
     """
-    values = {design: np.nan_to_num(line.y, nan=-np.inf) for design, line in series.lines.items()}
+    values = series.values
     least = _LEAST_LEAD if series.y_label.endswith(f" / {DN}") else 0.0
-    found: list[tuple[str | None, int, int]] = []
-    for place in range(len(next(iter(values.values())))):
-        most = max(own[place] for own in values.values())
-        before = found[-1][0] if found else None
-        if not most >= least or most == -np.inf:
-            leader = None
-        elif before is not None and values[before][place] == most:
-            leader = before
+    leads: list[tuple[str | None, int, int]] = []
+    for place in range(len(series.x)):
+        most = max(y[place] for y in values.values())
+        before = leads[-1][0] if leads else None
+        leader: str | None = None
+        if most >= least:
+            ties = [design for design, y in values.items() if y[place] == most]
+            leader = before if before in ties else ties[0]
+        if leads and before == leader:
+            leads[-1] = (leader, leads[-1][1], place)
         else:
-            leader = next(design for design, own in values.items() if own[place] == most)
-        if found and found[-1][0] == leader:
-            found[-1] = (leader, found[-1][1], place)
-        else:
-            found.append((leader, place, place))
-    return found
+            leads.append((leader, place, place))
+    return leads
 
 
 def draw_series(series: SeriesFigure) -> Figure:
@@ -164,15 +166,12 @@ def draw_series(series: SeriesFigure) -> Figure:
             axes.fill_between(series.x, line.y, line.upper, color=color, alpha=0.2, linewidth=0)
     if series.log_x:
         axes.set_xscale("log")
-    axes.set_xlabel(series.x_label)
-    axes.set_ylabel(series.y_label)
     if series.log_y:
         axes.set_yscale("log")
     elif series.from_zero:
         axes.set_ylim(bottom=0)
     if series.level is not None:
         axes.axhline(series.level, color="#666666", linestyle="--", linewidth=1.0)
-    axes.set_title(series.title)
-    legend = f"band: {series.band}" if series.band else None
-    axes.legend(title=legend, fontsize=8, title_fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False)
+    axes.set(xlabel=series.x_label, ylabel=series.y_label, title=series.title)
+    legend_beside(axes, f"band: {series.band}" if series.band else None)
     return figure

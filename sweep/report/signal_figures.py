@@ -1,88 +1,156 @@
-"""Figures of the signals: point clouds in the channels of a CFA, and the color checker chart."""
+"""Figures of signals and pixels: point clouds in the channels of a CFA, the color checker chart, and CFA tiles."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..base.types import FloatArray
-from .figures import TYPE_COLORS, decorate, empty_figure
+from ..camera.mosaic import Mosaic
+from ..curves.color import display_colors
+from ..metrics.limiting import BETWEEN, limited_by_name
+from ..results.output import Output
+from .figures import CURVE_COLORS, TYPE_COLORS, decorate, empty_figure
+from .names import label
+from .values import modifications
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from matplotlib.patches import Rectangle
+
+Nearest = tuple[tuple[str, str], tuple[str, str], str]
+"""(type, name) of two lights, and their distance in words."""
+Cloud = tuple[str, list[str], list[tuple[str, str]], FloatArray, Nearest | None]
+"""Name, channels, (type, name) of the signals, DN (ndarray[n_channels, n_signals]) and nearest lights of a design."""
+_CLEAR = "#eeeeee"
+_MOST_TILES, _WIDE = 24, 8
 
 
-@dataclass(frozen=True)
-class Cloud:
-    """Signals of one design in the plane of two channels: signal type -> x and y, DN, each ndarray[n].
-
-    `nearest`: x and y of the two signals that limit the separation, ndarray[2] each, and their distance in words.
-    """
-
-    title: str
-    x_label: str
-    y_label: str
-    types: Mapping[str, tuple[FloatArray, FloatArray]]
-    nearest: tuple[FloatArray, FloatArray, str] | None = None
+def signals_of(output: Output, design_id: object) -> tuple[list[str], list[tuple[str, str]], FloatArray]:
+    """Channels, (type, name) of the signals, and their DN, ndarray[n_channels, n_signals], of a design."""
+    points = output.points[output.points["design_id"] == design_id]
+    channels = list(dict.fromkeys(points["channel"]))
+    first = points.iloc[:: max(1, len(channels))]
+    dn = points["dn"].to_numpy(dtype=float).reshape(-1, max(1, len(channels))).T
+    return channels, list(zip(first["signal_type"], first["signal"], strict=True)), dn
 
 
-@dataclass(frozen=True)
-class ChartFigure:
-    """The color checker chart: signal type -> sRGB colors of its patches, ndarray[n, 3]."""
+def clouds(output: Output, *kinds: str) -> list[Cloud]:
+    """Signals of the designs of some kinds in the first scenario; a CFA of one channel has none."""
+    rows = output.kind(*kinds)
+    rows = rows[(rows["scenario"] == output.scenarios[0]) & (rows["status"] == "ok")]
+    designs = []
+    for row in rows.to_dict("records"):
+        channels, signals, dn = signals_of(output, row["design_id"])
+        if len(channels) > 1:
+            designs.append((label(row), channels, signals, dn, nearest_lights(output, row)))
+    return designs
 
-    title: str
-    patches: Mapping[str, FloatArray]
+
+def nearest_lights(output: Output, row: Mapping[Any, Any]) -> Nearest | None:
+    """(type, name) of the two lights that limit a row's separation, and their distance in words."""
+    separation = output.trade_off[0]
+    if separation.pair is None:
+        return None
+    one, other = separation.pair
+    text = row.get(limited_by_name(separation.pair))
+    ones, others = ([name for kind, name in output.curves.lights if kind == wanted] for wanted in separation.pair)
+    named = {f"{a}{BETWEEN}{b}": (a, b) for a in ones for b in others}
+    if text not in named:
+        return None
+    a, b = named[str(text)]
+    return (one, a), (other, b), separation.told(row[separation.of or separation.name])
 
 
-def draw_clouds(rows: Sequence[Sequence[Cloud]], title: str, top_dn: float) -> Figure:
-    """A row of panels per design, all with the same axes up to `top_dn`, so that distances compare by eye."""
-    most = max(len(row) for row in rows)
-    figure = empty_figure(3.1 * most + 1.0, 2.9 * len(rows) + 0.6)
-    panels = figure.subplots(len(rows), most, squeeze=False)
-    for line, row in zip(panels, rows, strict=True):
-        for axes in line[len(row) :]:
+def draw_clouds(designs: Sequence[Cloud], title: str, top_dn: float) -> Figure:
+    """A row of panels per design, its first channel against the others, all up to `top_dn` to compare distances."""
+    most = max(len(channels) for _, channels, *_ in designs) - 1
+    figure = empty_figure(3.1 * most + 1.0, 2.9 * len(designs) + 0.6)
+    panels = figure.subplots(len(designs), most, squeeze=False)
+    for line, (name, channels, signals, dn, nearest) in zip(panels, designs, strict=True):
+        kinds = np.array([kind for kind, _ in signals])
+        for axes in line[len(channels) - 1 :]:
             axes.set_axis_off()
-        for axes, cloud in zip(line, row, strict=False):
+        for axes, channel, y in zip(line, channels[1:], dn[1:], strict=False):
             decorate(axes)
-            for (name, (x, y)), marker in zip(cloud.types.items(), itertools.cycle("osD^vP")):
-                axes.scatter(x, y, s=13, marker=marker, color=TYPE_COLORS.get(name), label=name, linewidths=0)
-            if cloud.nearest is not None:
-                x, y, text = cloud.nearest
-                axes.plot(x, y, "-", color="black", linewidth=1.2, label=text)
-                axes.annotate(text, (x.mean(), y.mean()), (6, -10), textcoords="offset points", fontsize=7)
-            axes.set(xlim=(0, top_dn), ylim=(0, top_dn), aspect="equal", xlabel=cloud.x_label, ylabel=cloud.y_label)
-            axes.set_title(cloud.title, fontsize=9)
+            for kind, marker in zip(dict.fromkeys(kinds), itertools.cycle("osD^vP")):
+                own = kinds == kind
+                color = TYPE_COLORS.get(str(kind))
+                axes.scatter(dn[0, own], y[own], s=13, marker=marker, color=color, label=kind, linewidths=0)
+            if nearest is not None:
+                at = [signals.index(light) for light in nearest[:2]]
+                axes.plot(dn[0, at], y[at], "-", color="black", linewidth=1.2, label=nearest[2])
+                middle = dn[0, at].mean(), y[at].mean()
+                axes.annotate(nearest[2], middle, (6, -10), textcoords="offset points", fontsize=7)
+            axes.set(xlim=(0, top_dn), ylim=(0, top_dn), aspect="equal")
+            axes.set(xlabel=f"{channels[0]} / DN", ylabel=f"{channel} / DN")
+            axes.set_title(f"{name}: {channels[0]}, {channel}", fontsize=9)
     panels[0][0].legend(fontsize=7, frameon=False, loc="upper right")
     figure.suptitle(title)
     return figure
 
 
-def draw_chart(chart: ChartFigure) -> Figure:
+def chart_patches(output: Output) -> dict[str, FloatArray]:
+    """The color checker chart that the signals make: signal type -> sRGB colors, ndarray[n, 3]."""
+    grid = output.study.wavelengths
+    return {kind: display_colors(grid, photons) for kind, photons in output.curves.bundles.items()}
+
+
+def draw_chart(patches: Mapping[str, FloatArray]) -> Figure:
     """Draw the patches, a row per signal type, and the gray reference steps."""
-    figure = empty_figure(8.0, 0.55 * (len(chart.patches) + 1) + 0.8)
+    from matplotlib.patches import Rectangle  # noqa: PLC0415  (slow to import)
+
+    figure = empty_figure(8.0, 0.55 * (len(patches) + 1) + 0.8)
     axes = figure.add_subplot()
-    steps = np.linspace(1.0, 0.1, 6)
-    rows = [*chart.patches.items(), ("gray reference", np.repeat(steps[:, None], 3, axis=1))]
-    for height, (_, colors) in enumerate(rows):
+    rows = {**patches, "gray reference": np.repeat(np.linspace(1.0, 0.1, 6)[:, None], 3, axis=1)}
+    for height, colors in enumerate(rows.values()):
         for place, color in enumerate(colors):
-            axes.add_patch(_rectangle(place, -height, color))
-    axes.set_xlim(-0.1, max(len(colors) for _, colors in rows))
-    axes.set_ylim(-len(rows) + 0.9, 1.0)
-    axes.set_yticks([0.45 - height for height in range(len(rows))], [name for name, _ in rows])
-    axes.set_xticks([])
-    axes.set_aspect("equal")
-    for side in axes.spines.values():
-        side.set_visible(False)
-    axes.set_title(chart.title)
+            axes.add_patch(Rectangle((place, -height), 0.9, 0.9, facecolor=tuple(color)))
+    axes.set_yticks([0.45 - height for height in range(len(rows))], list(rows))
+    most = max(map(len, rows.values()))
+    axes.set(xlim=(-0.1, most), ylim=(-len(rows) + 0.9, 1.0), xticks=[], aspect="equal", frame_on=False)
+    axes.set_title("Color checker chart: a patch per signal, as near as sRGB comes")
     return figure
 
 
-def _rectangle(x: float, y: float, color: FloatArray) -> Rectangle:
+def replaced_channels(output: Output) -> dict[str, dict[str, str]]:
+    """CFA -> its channels that a filter of the study replaces -> their base."""
+    replaced: dict[str, dict[str, str]] = {}
+    for entry in modifications(output):
+        if entry.base is not None:
+            replaced.setdefault(entry.cfa, {}).update(dict.fromkeys(entry.channel, str(entry.base)))
+    return replaced
+
+
+def first_mosaics(output: Output) -> dict[str, Mosaic]:
+    """The tiles of the first CFAs of a study."""
+    return {name: output.mosaic(name) for name in list(output.study.cfas)[:_MOST_TILES]}
+
+
+def draw_tiles(mosaics: Mapping[str, Mosaic], replaced: Mapping[str, Mapping[str, str]]) -> Figure:
+    """Draw the tiles side by side, the channel's name in each pixel; a replaced one is hatched in its base's color."""
     from matplotlib.patches import Rectangle  # noqa: PLC0415  (slow to import)
 
-    return Rectangle((x, y), 0.9, 0.9, facecolor=tuple(color))
+    wide = min(_WIDE, len(mosaics))
+    rows = -(-len(mosaics) // wide)
+    figure = empty_figure(1.5 * wide, 1.8 * rows)
+    panels = figure.subplots(rows, wide, squeeze=False).ravel()
+    for axes in panels:
+        axes.set_axis_off()
+    for axes, (name, mosaic) in zip(panels, mosaics.items(), strict=False):
+        bases = replaced.get(name, {})
+        for (row, column), index in np.ndenumerate(mosaic.indices):
+            channel = mosaic.channels[index]
+            curve = bases.get(channel, channel)
+            color = _CLEAR if curve in ("C", "W") else CURVE_COLORS.get(curve, _CLEAR)
+            hatch = "//" if channel in bases else None
+            axes.add_patch(
+                Rectangle((column, -row), 1, 1, facecolor=color, edgecolor="white", linewidth=2, hatch=hatch)
+            )
+            if mosaic.indices.size <= 64:
+                axes.text(column + 0.5, 0.5 - row, channel, ha="center", va="center", fontsize=11)
+        axes.set(xlim=(0, mosaic.indices.shape[1]), ylim=(1 - len(mosaic.indices), 1), aspect="equal")
+        axes.set_title(name, fontsize=11)
+    return figure

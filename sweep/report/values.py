@@ -2,116 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..curves.color import display_colors
-from ..metrics.limiting import BETWEEN, limited_by_name
-from ..metrics.quantity import Column
 from ..results.facts import Origin
 from ..results.output import Output
-from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
+from ..results.tables import SWEPT
 from ..study.axes import series_of
 from ..study.schema import Modification
-from .figures import TYPE_COLORS, CurvesFigure, ParetoFigure, Points
+from .figures import BOUND_FILTER_NAME, TYPE_COLORS, CurvesFigure
 from .names import label
 from .series import Line, SeriesFigure
-from .signal_figures import ChartFigure, Cloud
-from .upper_bound import bounds_figure, limit_name
 
 if TYPE_CHECKING:
     import pandas as pd
 
-Nearest = tuple[tuple[str, str], tuple[str, str], str]
-"""(type, name) of two lights, and their distance in words."""
-_LEAST_RANGE = 1e-3
-"""Designs whose sensitivities differ by less do not trade it for anything."""
-
-
-def pareto_figure(output: Output, scenario: str, cfa: str) -> ParetoFigure:
-    """CSD against sensitivity in a scenario, for the designs of one CFA."""
-    table = output.table[(output.table["scenario"] == scenario) & (output.table["status"] == "ok")]
-    designs = table[table["cfa"] == cfa]
-    swept, named, found = (designs[designs["kind"] == kind] for kind in (SWEPT, NAMED, FOUND))
-    references = table[table["kind"] == PLAIN]
-    separation, sensitivity = output.trade_off
-    front = swept["pareto"] & swept["feasible"]
-    groups = {
-        "infeasible": _points(output, swept[~swept["feasible"]]),
-        "feasible": _points(output, swept[swept["feasible"] & ~front]),
-        "front": _points(output, swept[front]),
-        "named": _points(output, named, list(named["name"])),
-        "best": _points(output, found, [separation.told(v) for v in found[separation.name]]),
-    }
-    bound = output.constraints.get(sensitivity.name)
-    least = None if bound is None else bound.min
-    traced, limit = _trade_offs(output, scenario, cfa)
-    return ParetoFigure(
-        title=f"{output.study.study}, {cfa}: what separation costs in sensitivity",
-        x_label=_whole_words(output, sensitivity),
-        y_label=separation.axis,
-        groups=groups,
-        traced=traced,
-        limit=limit,
-        levels=dict(zip(references["cfa"], references[separation.name], strict=True)),
-        bound=least,
-        bound_text="" if least is None else f"{sensitivity.words} at least {least:g}",
-        limit_name=limit_name(output),
-        counts={
-            "infeasible": output.counts.feasible(scenario, cfa, met=False),
-            "feasible": output.counts.feasible(scenario, cfa),
-            "front": output.counts.front(scenario, cfa),
-        },
-    )
-
-
-def _whole_words(output: Output, column: Column) -> str:
-    """What a column means; of a worst case that of the quantity itself."""
-    plain = output.columns[column.of] if column.extreme else column
-    return column.words.removesuffix(plain.words) + plain.meaning
-
-
-def _trade_offs(output: Output, scenario: str, cfa: str) -> tuple[Points | None, Points | None]:
-    """What the search traced, and the limit, where the search is of this CFA and scenario."""
-    search = output.provenance.search
-    if output.front is None or search is None or (search.scenario, search.cfa) != (scenario, cfa):
-        return None, None
-    traced = output.front.dropna(subset=["objective"])
-    bounded = output.front.dropna(subset=["limit"]) if bounds_figure(output, scenario, cfa) else output.front[:0]
-    limit = Points(bounded["sensitivity_min"].to_numpy(), bounded["limit"].to_numpy()) if len(bounded) else None
-    return Points(traced["sensitivity"].to_numpy(), traced["objective"].to_numpy()), limit
-
-
-def trades_off(output: Output, cfa: str) -> bool:
-    """Whether designs of a CFA give sensitivity for separation: swept ones, or what a search traced."""
-    rows = output.kind(SWEPT)
-    own = rows[(rows["cfa"] == cfa) & (rows["status"] == "ok")]["sensitivity"].to_numpy(dtype=float)
-    traced = _trade_offs(output, output.scenarios[0], cfa)[0]
-    both = np.concatenate([own, np.empty(0) if traced is None else traced.x])
-    both = both[np.isfinite(both)]
-    return bool(both.size and np.ptp(both) > _LEAST_RANGE)
-
-
-def _points(output: Output, rows: pd.DataFrame, labels: Sequence[str] = ()) -> Points:
-    separation, sensitivity = output.trade_off
-    x = rows[sensitivity.name].to_numpy(dtype=float)
-    return Points(x, rows[separation.name].to_numpy(dtype=float), tuple(map(str, labels)))
-
 
 def over_series(rows: pd.DataFrame, scenarios: Mapping[str, float], column: str) -> dict[str, np.ndarray]:
     """Values of a column over a series' numbers for every design that has them all, ndarray[n_scenarios] each."""
-    found: dict[str, dict[str, float]] = {}
-    for name, scenario, value in zip(rows["name"], rows["scenario"], rows[column].to_numpy(dtype=float), strict=True):
-        if scenario in scenarios and isinstance(name, str):
-            found.setdefault(name, {})[scenario] = value
-    return {
-        name: np.array([own[scenario] for scenario in scenarios])
-        for name, own in found.items()
-        if len(own) == len(scenarios)
-    }
+    named = rows[rows["scenario"].isin(list(scenarios))].dropna(subset=["name"])
+    values: dict[str, dict[str, float]] = {}
+    for name, scenario, value in zip(named["name"], named["scenario"], named[column].astype(float), strict=True):
+        values.setdefault(str(name), {})[scenario] = value
+    whole = {name: own for name, own in values.items() if len(own) == len(scenarios)}
+    return {name: np.array([own[scenario] for scenario in scenarios]) for name, own in whole.items()}
 
 
 def series_figures(output: Output) -> list[SeriesFigure]:
@@ -163,67 +80,11 @@ def light_shades(output: Output) -> dict[str, np.ndarray]:
     }
 
 
-def chart_figure(output: Output) -> ChartFigure:
-    """The color checker chart that the signals make."""
-    grid = output.study.wavelengths
-    patches = {kind: display_colors(grid, photons) for kind, photons in output.curves.bundles.items()}
-    return ChartFigure("Color checker chart: a patch per signal, as near as sRGB comes", patches)
-
-
-def clouds(output: Output, *kinds: str) -> list[list[Cloud]]:
-    """Point clouds of the designs of some kinds: a row per design, the first channel against each other one.
-
-    A CFA of one channel has none.
-    """
-    rows = output.kind(*kinds)
-    rows = rows[(rows["scenario"] == output.scenarios[0]) & (rows["status"] == "ok")]
-    found = []
-    for row in rows.to_dict("records"):
-        points = output.points[output.points["design_id"] == row["design_id"]]
-        first, *others = dict.fromkeys(points["channel"])
-        if others:
-            near = nearest_lights(output, row)
-            found.append([_cloud(points, f"{label(row)}: {first}, {other}", first, other, near) for other in others])
-    return found
-
-
-def nearest_lights(output: Output, row: Mapping[Any, Any]) -> Nearest | None:
-    """(type, name) of the two lights that limit a row's separation, and their distance in words."""
-    separation = output.trade_off[0]
-    if separation.pair is None:
-        return None
-    one, other = separation.pair
-    text = row.get(limited_by_name(separation.pair))
-    ones, others = ([name for kind, name in output.curves.lights if kind == each] for each in separation.pair)
-    named = {f"{a}{BETWEEN}{b}": (a, b) for a in ones for b in others}
-    if text not in named:
-        return None
-    a, b = named[str(text)]
-    return (one, a), (other, b), separation.told(row[separation.of or separation.name])
-
-
-def _cloud(points: pd.DataFrame, title: str, first: str, other: str, near: Nearest | None) -> Cloud:
-    both = [points[points["channel"] == channel] for channel in (first, other)]
-    x, y = (own["dn"].to_numpy() for own in both)
-    kinds, names = (both[0][column].to_numpy() for column in ("signal_type", "signal"))
-    types = {str(kind): (x[kinds == kind], y[kinds == kind]) for kind in dict.fromkeys(kinds)}
-    nearest = None
-    if near is not None:
-        at = [int(np.flatnonzero((kinds == kind) & (names == name))[0]) for kind, name in near[:2]]
-        nearest = (x[at], y[at], near[2])
-    return Cloud(title, f"{first} / DN", f"{other} / DN", types, nearest)
-
-
 def channel_curves(output: Output, cfa: str) -> list[str]:
     """Names of the sensor's curves that a CFA's channels have; a modified channel has none."""
     renamed = output.study.cfas[cfa].curves
     names = (renamed.get(channel, channel) for channel in output.mosaic(cfa).channels)
     return [name for name in dict.fromkeys(names) if name in output.curves.sensor]
-
-
-def traded_cfas(output: Output) -> list[str]:
-    """CFAs with designs that trade sensitivity for separation."""
-    return [cfa for cfa in dict.fromkeys(m.cfa for m in modifications(output)) if trades_off(output, cfa)]
 
 
 def modifications(output: Output) -> list[Modification]:
@@ -241,9 +102,34 @@ def drawn_rows(output: Output) -> pd.DataFrame:
     return table[(table["kind"] != SWEPT) | table["design_id"].isin(shown)].reset_index(drop=True)
 
 
-def drawn(output: Output) -> pd.DataFrame:
-    """Rows whose filter's curve was kept: named designs, the search's answer, the best of each sweep."""
-    return output.table[output.table["design_id"].isin(output.curves.drawn)]
+def filters_figure(output: Output, cfa: str) -> CurvesFigure:
+    """Modified channels of the named designs and the best ones of a CFA, beside the green and yellow pixels' curves and
+    the ends that they go between.
+    """
+    rows = output.table[output.table["design_id"].isin(output.curves.drawn) & (output.table["cfa"] == cfa)]
+    ends = end_curves(output, cfa)
+    curves = {name: values for name, values in output.curves.sensor.items() if name in ends}
+    for row in rows.to_dict("records"):
+        made = output.curves.drawn[row["design_id"]]
+        curves |= {label(row) + (f", {channel}" if len(made) > 1 else ""): qe for channel, qe in made.items()}
+    if cfa in output.curves.limits:
+        curves[BOUND_FILTER_NAME] = output.curves.limits[cfa]
+    return CurvesFigure(
+        f"{cfa}: modified channel",
+        "QE",
+        output.curves.wavelength_nm,
+        curves,
+        dashed=(*ends, BOUND_FILTER_NAME),
+        colors={BOUND_FILTER_NAME: "#000000"},
+        shades=light_shades(output),
+    )
+
+
+def end_curves(output: Output, cfa: str) -> list[str]:
+    """Names of the sensor's curves that a CFA's filters go between, and those of the green and the yellow pixel."""
+    entries = [entry for entry in modifications(output) if entry.cfa == cfa]
+    ends = {end for entry in entries for end in (entry.base, entry.to) if isinstance(end, str)} | {"G", "Y"}
+    return [name for name in output.curves.sensor if name in ends]
 
 
 def _name(origin: Origin) -> str:

@@ -16,9 +16,8 @@ import pytest
 from sweep.base.errors import OutputError, SweepError
 from sweep.report import read_output
 from sweep.report.compare import compare_runs
-from sweep.report.compare.differences import study_differences
-from sweep.report.compare.drawing import FrontLine, FrontsFigure, Mark, draw_fronts, pictures
-from sweep.report.compare.fronts import ComparedFront, box_of, hypervolumes
+from sweep.report.compare.fronts import ComparedFront, box_of, draw_fronts, hypervolumes
+from sweep.report.compare.tables import study_differences
 from sweep.study import load_study
 
 from ..build import STUDY, ran
@@ -33,7 +32,7 @@ PLAIN = CHART.split("designs:")[0].replace(", RYNCy]", "]")
 @pytest.fixture
 def plain_fronts(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures that take no time, for tests that do not look at them."""
-    monkeypatch.setattr("sweep.report.compare.make.pictures", lambda _: {"png": b"fronts", "svg": b"fronts"})
+    monkeypatch.setattr("sweep.report.compare.make.pictures_of", lambda *_: {"png": b"fronts", "svg": b"fronts"})
 
 
 @pytest.fixture(scope="module")
@@ -68,22 +67,21 @@ def compared(folders: Sequence[Path], to: Path) -> tuple[str, str]:
 
 
 def test_a_hypervolume_is_the_area_by_hand() -> None:
-    first = ComparedFront("A", "X", "s", False, np.array([[100.0, 0.905], [40.0, 0.95]]))
-    second = ComparedFront("B", "X", "s", True, np.array([[60.0, 1.0]]))
-    box = box_of([first, second])
-    np.testing.assert_allclose(box.reference, [0.0, 0.90], atol=1e-12)
-    np.testing.assert_array_equal(box.top, [100.0, 1.0])
-    table = hypervolumes([first, second], box)
+    first = ComparedFront("A", "X", False, np.array([[100.0, 0.905], [40.0, 0.95]]))
+    second = ComparedFront("B", "X", True, np.array([[60.0, 1.0]]))
+    reference, top = box_of([first, second])
+    np.testing.assert_allclose(reference, [0.0, 0.90], atol=1e-12)
+    np.testing.assert_array_equal(top, [100.0, 1.0])
+    _, table = hypervolumes([first, second])
     # 100 DN up to 0.905, then 40 DN up to 0.95; 60 DN up to 1
     np.testing.assert_allclose(table["hypervolume"], [100 * 0.005 + 40 * 0.045, 60 * 0.1], rtol=1e-9)
     assert list(table["of the box"]) == ["23.0%", "60.0%"]
 
 
 def test_a_point_on_a_hundredth_counts() -> None:
-    front = ComparedFront("A", "X", "s", False, np.array([[50.0, 0.9]]))
-    box = box_of([front])
-    np.testing.assert_allclose(box.reference, [0.0, 0.89], atol=1e-12)
-    assert hypervolumes([front], box)["hypervolume"][0] == pytest.approx(0.5, rel=1e-9)
+    front = ComparedFront("A", "X", False, np.array([[50.0, 0.9]]))
+    np.testing.assert_allclose(box_of([front])[0], [0.0, 0.89], atol=1e-12)
+    assert hypervolumes([front])[1]["hypervolume"][0] == pytest.approx(0.5, rel=1e-9)
 
 
 @pytest.mark.slow
@@ -189,9 +187,7 @@ def test_dn_of_other_meaning_are_not_ranked(runs: dict[str, Path], tmp_path: Pat
     assert "Best yellow/red CSD in DN of 20 bits under the constraints: B deep with" in said
     assert "These are DN of different meaning, which are not ranked" in said
     assert "so none are compared" in said
-    assert "Note: pixel differs: bits 12 / 20 (A chart, B deep)." in said
-    said, _ = compared([runs["chart"], runs["brighter"]], tmp_path)
-    assert "Note: scenario chart differs: exposure.level 0.95 / 0.8 (A chart, B brighter)." in said
+    assert ["pixel.bits", "12", "20"] in [line.split() for line in said.splitlines()]
 
 
 @pytest.mark.parametrize("name", ["compare.html", "compare.csv", "fronts.png", "fronts.svg"])
@@ -251,10 +247,8 @@ def test_differences_are_shown_where_they_begin(runs: dict[str, Path]) -> None:
     assert "50.0" in first
     assert "77.0" in second
     assert len(first) < 80
-    assert rows({"x": {"y": 1}}, {}) == [["x", '{"y": 1}', "-"]]
+    assert rows({"x": {"y": 1}}, {}) == [["x.y", "1", "-"]]
     assert rows({"x": {"y": 1}}, {"x": {"y": None}}, {"x": {}}) == [["x.y", "1", "null", "-"]]
-    a, b, c = rows({"x": long}, {"x": other}, {"x": [1, *long]})[0][1:]
-    assert len({a, b, c}) == 3
 
 
 @pytest.mark.usefixtures("plain_fronts")
@@ -276,8 +270,8 @@ def test_by_default_a_folder_of_both_names(
     runs: dict[str, Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    said = compare_runs([runs["chart"], runs["plain"]], None)
-    assert "outputs/compare-chart-plain/" in said.lines[-1]
+    said = compare_runs([runs["chart"], runs["plain"]], None).lines
+    assert "outputs/compare-chart-plain/" in said[-1]
     assert (tmp_path / "outputs" / "compare-chart-plain" / "compare.html").is_file()
     compare_runs([runs["chart"]] * 26, None)
     assert max(len(path.name) for path in (tmp_path / "outputs").iterdir()) == 100
@@ -285,12 +279,15 @@ def test_by_default_a_folder_of_both_names(
 
 def test_every_front_has_its_own_mark_and_runs_their_dash() -> None:
     x = np.linspace(0.8, 1.0, 40)
-    lines = [FrontLine(f"run {run} $", run, x, x * (run + 1), traced) for run in range(3) for traced in (False, True)]
-    figure = FrontsFigure("a $ title", "x", "y", lines, [Mark("A", 0, 0.9, 1.0)])
-    (axes,) = draw_fronts(figure).axes
+    order = [f"run {run} $" for run in range(3)]
+    fronts = [
+        ComparedFront(run, "X", traced, np.stack([x * (at + 1), x], axis=1))
+        for at, run in enumerate(order)
+        for traced in (False, True)
+    ]
+    (axes,) = draw_fronts("a $ title", ("x", "y"), order, fronts, [(order[0], 0.9, 1.0)]).axes
     drawn = axes.get_lines()
-    assert len({line.get_marker() for line in drawn}) == len(lines)
+    assert len({line.get_marker() for line in drawn}) == len(fronts)
     assert len({str(line._unscaled_dash_pattern) for line in drawn}) == 3  # type: ignore[attr-defined]
     assert len({line.get_color() for line in drawn}) == 3
     assert [line.get_markerfacecolor() == "white" for line in drawn] == [False, True] * 3
-    assert pictures(figure) == pictures(figure)

@@ -17,9 +17,8 @@ import pytest
 from sweep.base.errors import OutputError
 from sweep.metrics.pareto import knee
 from sweep.report import read_output, summary_lines
-from sweep.report.history import history_of
 from sweep.report.page import _drawings, _parts
-from sweep.report.page_data import payload
+from sweep.report.page_data import history_of, payload
 from sweep.report.published import comparison_with_published
 from sweep.report.scenes import scene_groups
 from sweep.results.facts import CheckFacts
@@ -139,18 +138,20 @@ def test_the_history_ends_at_the_answer(finished: Finished) -> None:
     assert history is not None
     facts = json.loads((folder / "provenance.json").read_text())
     log = pd.read_parquet(folder / "search.parquet")
-    assert history.evaluations[-1] == len(log) == facts["search"]["evaluations"] + facts["search"]["front_evaluations"]
-    assert np.nanmax([start.best[-1] for start in history.starts]) == facts["search"]["best_smooth_objective"]
-    assert history.best[-1] == pytest.approx(facts["search"]["best_smooth_objective"], rel=1e-6)
-    assert (np.diff(history.volume) >= 0).all()
+    assert (
+        history["evaluations"][-1] == len(log) == facts["search"]["evaluations"] + facts["search"]["front_evaluations"]
+    )
+    assert np.nanmax([start["best"][-1] for start in history["starts"]]) == facts["search"]["best_smooth_objective"]
+    assert history["best"][-1] == pytest.approx(facts["search"]["best_smooth_objective"], rel=1e-6)
+    assert (np.diff(history["volume"]) >= 0).all()
     # The area below a staircase, by hand: everything feasible, above no separation and the lowest level.
     feasible = log[log["violation"] <= 1e-6].sort_values("sensitivity", ascending=False)
     area, reached = 0.0, 0.0
     for row in feasible.itertuples():
         if row.objective > reached:
-            area += (row.objective - reached) * (row.sensitivity - history.least_sensitivity + 1e-6)
+            area += (row.objective - reached) * (row.sensitivity - history["least_sensitivity"] + 1e-6)
             reached = row.objective
-    assert history.volume[-1] == pytest.approx(area, rel=1e-6)
+    assert history["volume"][-1] == pytest.approx(area, rel=1e-6)
 
 
 @pytest.mark.parametrize("made", ["sweep.report.values._series_figures", "sweep.report.noise._noise_figures"])

@@ -74,10 +74,13 @@ def test_the_large_numbers_compare_with_the_plain_cfa_that_separates_most(finish
     best = table[table["kind"] == "search"].iloc[0]
     plain = table[table["kind"] == "reference"].sort_values("csd_yellow_red").iloc[-1]
     numbers = large_numbers(read_output(folder))
-    assert [n.value for n in numbers[:2]] == [f"{best['csd_yellow_red']:.0f} DN", f"{best['cfa_sensitivity']:.3f}"]
-    for number, column in zip(numbers, ("csd_yellow_red", "cfa_sensitivity"), strict=False):
-        assert number.comparison.startswith(f"{best[column] / plain[column]:.2f} times {plain['name']}")
-    assert numbers[2].value == f"{best['limit'] - best['csd_yellow_red']:.0f} DN"
+    assert [value for value, *_ in numbers[:2]] == [
+        f"{best['csd_yellow_red']:.0f} DN",
+        f"{best['cfa_sensitivity']:.3f}",
+    ]
+    for (*_, comparison), column in zip(numbers, ("csd_yellow_red", "cfa_sensitivity"), strict=False):
+        assert comparison.startswith(f"{best[column] / plain[column]:.2f} times {plain['name']}")
+    assert numbers[2][0] == f"{best['limit'] - best['csd_yellow_red']:.0f} DN"
 
 
 def test_the_light_of_a_cfa_is_that_of_its_pixels(finished: Finished) -> None:

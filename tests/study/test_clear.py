@@ -10,10 +10,10 @@ import pytest
 import sweep
 from sweep.camera.sensor import make_sensor
 from sweep.report.answer import answer_sentences
-from sweep.report.compare.differences import curve_notes
+from sweep.report.compare.tables import curve_notes
 from sweep.report.large_numbers import large_numbers
-from sweep.report.overview import around_designs
 from sweep.report.summary import summary_lines
+from sweep.report.trade_off import around_designs
 from sweep.results.output import Output, read_output
 from sweep.run import run_study
 from sweep.study import load_study
@@ -51,7 +51,7 @@ def texts_of(output: Output) -> list[str]:
     return [
         *answer_sentences(output)[:1],
         next(line for line in summary_lines(output) if "and their share" in line),
-        large_numbers(output)[1].name,
+        large_numbers(output)[1][1],
         around_designs(output, "chart").x_label,
         output.columns["cfa_sensitivity"].meaning,
     ]

@@ -1,10 +1,12 @@
-"""Fronts of several runs on the same axes, and what each dominates."""
+"""Fronts of several runs on the same axes, their hypervolumes, and their plot."""
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -16,14 +18,21 @@ from ...metrics.quantity import DN, WORST_CASE
 from ...metrics.share import told_share
 from ...results.tables import FOUND
 from .. import Output
+from ..figures import CURVE_CYCLE, canvas, legend_beside
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _STEP = 0.01
 _BELOW = 1e-9
+_MARKERS = "osD^vPX<>hp"
+_DASHES = ("-", (0, (6, 2)), (0, (1, 1.5)), (0, (6, 2, 1, 2)))
+_MARKS_PER_LINE = 12
 
 
 @dataclass(frozen=True)
 class ComparedFront:
-    """The trade-off of a CFA in a scenario of a run.
+    """The trade-off of a CFA in a run.
 
     `traced`: by the search, before quantization; else designs of the result table. `points`: ndarray[n, 2],
     separation and sensitivity, by rising sensitivity.
@@ -31,27 +40,8 @@ class ComparedFront:
 
     run: str
     cfa: str
-    scenario: str
     traced: bool
     points: FloatArray
-
-    @property
-    def name(self) -> str:
-        """What a legend calls it."""
-        return f"{self.run}, {self.cfa}{', traced by the search' if self.traced else ''}"
-
-
-@dataclass(frozen=True)
-class Region:
-    """Where hypervolumes are taken: above `reference`, ndarray[2]; `top`: the largest that any front reaches."""
-
-    reference: FloatArray
-    top: FloatArray
-
-    @property
-    def area(self) -> float:
-        """Separation x sensitivity."""
-        return float(np.prod(self.top - self.reference))
 
 
 def on_the_same_axes(runs: Mapping[str, Output]) -> tuple[dict[str, Output], list[str]]:
@@ -62,20 +52,20 @@ def on_the_same_axes(runs: Mapping[str, Output]) -> tuple[dict[str, Output], lis
     if len(groups) == 1:
         return dict(runs), []
     chosen = max(groups.values(), key=len)
-    each = "; ".join(f"{', '.join(group)}: {' / '.join(axes)}" for axes, group in groups.items())
+    axes = "; ".join(f"{', '.join(group)}: {' / '.join(meaning)}" for meaning, group in groups.items())
     if len(chosen) == 1:
-        return {}, [f"The fronts have different axes ({each}), so none are compared."]
-    return chosen, [f"The fronts have different axes ({each}); compared are those of {' and '.join(chosen)}."]
+        return {}, [f"The fronts have different axes ({axes}), so none are compared."]
+    return chosen, [f"The fronts have different axes ({axes}); compared are those of {' and '.join(chosen)}."]
 
 
 def dn_of(output: Output) -> str:
-    """What a DN of a run is: only of the same full scale and pedestal do they compare."""
+    """Full scale and pedestal of a run, without which its DN cannot be compared."""
     pixel = output.study.pixel
     return f"DN of {pixel.bits} bits" + (f", pedestal {pixel.offset_dn:g} DN" if pixel.offset_dn else "")
 
 
 def _meaning(output: Output) -> tuple[str, ...]:
-    """What the two axes are; of a combined objective, of a worst case, of DN with all that it depends on."""
+    """Both axes in words, with all that a combined objective, a worst case and DN depend on."""
     production, population = output.study.production, output.study.population
     over = [f"edges {production.edge_shift_nm:g} nm off"] if production.edge_shift_nm else []
     over += [f"films {production.thickness:.2%} off"] if production.thickness else []
@@ -91,28 +81,20 @@ def _meaning(output: Output) -> tuple[str, ...]:
     return tuple(words)
 
 
-def common_scenarios(runs: Mapping[str, Output]) -> list[str]:
-    """Scenarios of this name in every run, in the order of the first."""
-    (first, *others) = runs.values()
-    return [name for name in first.scenarios if all(name in other.scenarios for other in others)]
-
-
-def fronts(runs: Mapping[str, Output], scenario: str) -> list[ComparedFront]:
+def fronts_in(runs: Mapping[str, Output], scenario: str) -> list[ComparedFront]:
     """All fronts of a scenario: of designs, which meet every constraint but those on the axes, and of the search."""
-    found = []
+    fronts = []
     for label, output in runs.items():
-        table = output.table
-        rows = table[table["pareto"] & (table["scenario"] == scenario)]
-        for cfa, own in rows.groupby("cfa", observed=True, sort=False):
-            found.append(
-                ComparedFront(label, str(cfa), scenario, False, _sorted(own[list(output.provenance.trade_off)]))
-            )
+        rows = output.table[output.table["pareto"] & (output.table["scenario"] == scenario)]
+        for cfa, designs in rows.groupby("cfa", observed=True, sort=False):
+            points = _sorted(designs[list(output.provenance.trade_off)])
+            fronts.append(ComparedFront(label, str(cfa), False, points))
         search = output.provenance.search
         if output.front is not None and search and search.scenario == scenario:
             traced = _sorted(output.front[["objective", "sensitivity"]].dropna())
             if len(traced):
-                found.append(ComparedFront(label, str(output.kind(FOUND)["cfa"].iloc[0]), scenario, True, traced))
-    return found
+                fronts.append(ComparedFront(label, str(output.kind(FOUND)["cfa"].iloc[0]), True, traced))
+    return fronts
 
 
 def _sorted(values: pd.DataFrame) -> FloatArray:
@@ -120,21 +102,21 @@ def _sorted(values: pd.DataFrame) -> FloatArray:
     return points[np.argsort(points[:, 1], kind="stable")]
 
 
-def box_of(found: list[ComparedFront]) -> Region:
-    """The box of all fronts: from no separation, and the hundredth below the lowest sensitivity of any."""
-    points = np.concatenate([front.points for front in found])
+def box_of(fronts: Sequence[ComparedFront]) -> tuple[FloatArray, FloatArray]:
+    """Corners of the box of all fronts: no separation and the hundredth below the lowest sensitivity, and the top."""
+    points = np.concatenate([front.points for front in fronts])
     lowest = math.floor((points[:, 1].min() - _BELOW) / _STEP) * _STEP
-    return Region(np.array([min(0.0, points[:, 0].min()), round(lowest, 2)]), points.max(axis=0))
+    return np.array([min(0.0, points[:, 0].min()), round(lowest, 2)]), points.max(axis=0)
 
 
-def hypervolumes(found: list[ComparedFront], box: Region) -> pd.DataFrame:
-    """A row per front: its ends, the area that it dominates in the box, and that as a share of the box."""
+def hypervolumes(fronts: Sequence[ComparedFront]) -> tuple[str, pd.DataFrame]:
+    """The box in words; a row per front: its ends, the area that it dominates in the box, and its share of the box."""
+    reference, top = box_of(fronts)
+    whole = float(np.prod(top - reference))
     rows = []
-    for front in found:
-        area, (low, high) = (
-            hypervolume(front.points, box.reference),
-            (front.points.min(axis=0), front.points.max(axis=0)),
-        )
+    for front in fronts:
+        area = hypervolume(front.points, reference)
+        low, high = front.points.min(axis=0), front.points.max(axis=0)
         rows.append(
             {
                 "run": front.run,
@@ -144,7 +126,52 @@ def hypervolumes(found: list[ComparedFront], box: Region) -> pd.DataFrame:
                 "separation / DN": f"{low[0]:.1f} to {high[0]:.1f}",
                 "sensitivity": f"{low[1]:.4f} to {high[1]:.4f}",
                 "hypervolume": area,
-                "of the box": told_share(area / box.area) if box.area > 0 else "-",
+                "of the box": told_share(area / whole) if whole > 0 else "-",
             }
         )
-    return pd.DataFrame(rows)
+    words = (
+        f"whatever the constraints ask of the two axes; hypervolume (DN x sensitivity) above the reference of "
+        f"{reference[0]:g} DN at a sensitivity of {reference[1]:g}, in the box up to {top[0]:.1f} DN at {top[1]:.4f} "
+        f"({whole:.4g}):"
+    )
+    return words, pd.DataFrame(rows)
+
+
+def draw_fronts(
+    title: str,
+    labels: tuple[str, str],
+    order: Sequence[str],
+    fronts: Sequence[ComparedFront],
+    best: Sequence[tuple[str, float, float]],
+) -> Figure:
+    """Draw the fronts: a color and a dash per run, a mark per front, so that they differ in gray, too.
+
+    `labels`: of the axes; `order`: all runs; `best`: run and place of best designs. A front of designs is a staircase:
+    between two of them there is none. Between the levels of the search, nothing is known.
+    """
+    drawn, axes = canvas(9.0, 5.0)
+    for front, marker in zip(fronts, itertools.cycle(_MARKERS)):
+        run = order.index(front.run)
+        color = CURVE_CYCLE[run % len(CURVE_CYCLE)]
+        marked = np.unique(np.linspace(0, len(front.points) - 1, _MARKS_PER_LINE).round()).astype(int)
+        axes.plot(
+            front.points[:, 1],
+            front.points[:, 0],
+            color=color,
+            linestyle="none" if front.traced else _DASHES[run % len(_DASHES)],
+            linewidth=1.4,
+            marker=marker,
+            markersize=6,
+            markerfacecolor="white" if front.traced else color,
+            markevery=1 if front.traced else marked.tolist(),
+            drawstyle="steps-pre",
+            label=f"{front.run}, {front.cfa}{', traced by the search' if front.traced else ''}",
+        )
+    style: dict[str, Any] = {"marker": "*", "s": 220, "edgecolors": "black", "linewidths": 0.8, "zorder": 6}
+    for name, x, y in best:
+        axes.scatter([x], [y], color=CURVE_CYCLE[order.index(name) % len(CURVE_CYCLE)], **style)
+        letter = name.partition(" ")[0]
+        axes.annotate(letter, (x, y), textcoords="offset points", xytext=(8, 6), fontsize=9, zorder=7)
+    axes.set(xlabel=labels[0], ylabel=labels[1], title=title)
+    legend_beside(axes, "stars: best design of each run")
+    return drawn

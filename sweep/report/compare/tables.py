@@ -1,0 +1,212 @@
+"""Tables of a comparison: best designs, plain CFAs, and the differences between studies and how they were computed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ...metrics.objective import COMBINED
+from ...metrics.quantity import DN, Column
+from ...results.curves import KeptCurves
+from ...results.tables import FOUND, SWEPT
+from .. import Output
+from ..names import label, of_reference
+from .fronts import dn_of
+
+_SAME = 1e-9
+"""Relative; CSDs of one study that were computed on two machines differ by less."""
+_MOST_PARAMETERS = 12
+_SHOWN = 48
+_BEFORE = 20
+"""Characters of a long value that are shown before the difference."""
+
+
+def best_of_runs(runs: Mapping[str, Output]) -> pd.DataFrame:
+    """A row per run: its best feasible design with parameters, CSDs and sensitivities; without one, the run alone."""
+    rows = []
+    for name, output in runs.items():
+        row: dict[str, Any] = {
+            "run": name,
+            "study": output.study.study,
+            "folder": str(output.folder),
+            "maximizes": _maximized(output)[0],
+        }
+        if not output.best.empty:
+            best = output.best.iloc[0].to_dict()
+            row |= {"quantity": output.goal.name, "value": best[output.goal.name], "design": label(best)}
+            shown = (*output.distances, *output.light, *output.further, *output.parameters)
+            row |= {key: best[key] for key in ("design_id", "kind", "cfa", "family", "scenario", *shown)}
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def side_by_side(best: pd.DataFrame, runs: Mapping[str, Output]) -> tuple[pd.DataFrame, int]:
+    """The best designs as a column each, in words; and how many of their parameters were left out."""
+    columns = {name: column for output in runs.values() for name, column in output.columns.items()}
+    parameters = dict.fromkeys(name for output in runs.values() for name in output.parameters)
+    left_out = [n for n in parameters if n in best and best[n].notna().any()][_MOST_PARAMETERS:]
+    skipped = {"run", "study", "folder", "quantity", *left_out}
+    shown = [str(name) for name in best.dropna(axis="columns", how="all") if name not in skipped]
+    table = {
+        columns[name].words if name in columns else name: [_cell(name, row, columns) for row in best.to_dict("records")]
+        for name in shown
+    }
+    return pd.DataFrame.from_dict(table, orient="index", columns=list(runs)).reset_index(names=""), len(left_out)
+
+
+def _cell(name: str, row: Mapping[Any, Any], columns: Mapping[str, Column]) -> str:
+    value = row[name]
+    if isinstance(value, str):
+        return " ".join(value.split())
+    if value is None or not np.isfinite(value):
+        return "-"
+    if name == "design_id":
+        return f"{value:.0f}"
+    column = columns.get(row["quantity"] if name == "value" else name)
+    return f"{value:.2f}" if column is None else column.amount(value)
+
+
+def plain_differences(runs: Mapping[str, Output]) -> tuple[pd.DataFrame, str]:
+    """CSDs of plain CFAs and named designs that differ between runs that have them; and the rest in a sentence."""
+    parts = []
+    for run, output in runs.items():
+        named = output.named[["name", "scenario", *output.distances]].astype({"name": str, "scenario": str})
+        words = named.rename(columns=output.words)
+        parts.append(
+            words.melt(["name", "scenario"], var_name="CSD", value_name=run).set_index(["name", "scenario", "CSD"])
+        )
+    table = pd.concat(parts, axis="columns")
+    shared = table[table.notna().sum(axis="columns") > 1]
+    differing = shared[~np.isclose(shared.min(axis="columns"), shared.max(axis="columns"), rtol=_SAME, atol=0.0)]
+    names, of_shared, of_differing = (part.index.unique("name") for part in (table, shared, differing))
+    same, single = [n for n in of_shared if n not in of_differing], [n for n in names if n not in of_shared]
+    sentences = [f"Equal in every CSD: {', '.join(same)}."] if same else []
+    sentences += [f"In one run only: {', '.join(single)}."] if single else []
+    shown = differing.map(lambda value: "-" if np.isnan(value) else f"{value:.1f} DN")
+    return shown.reset_index(), " ".join(sentences)
+
+
+def ranking(runs: Mapping[str, Output]) -> list[str]:
+    """The best run and its lead, among runs that maximize the same in the same DN; and runs without a best design."""
+    lines, groups = [], dict[tuple[str, str], dict[str, float]]()
+    for run, output in runs.items():
+        if output.best.empty:
+            asked = len(output.kind(SWEPT, FOUND)) > 0
+            lines.append(f"{run} has no {'feasible design' if asked else 'design that was swept or searched'}.")
+        else:
+            groups.setdefault(_maximized(output), {})[run] = float(output.best.iloc[0][output.goal.name])
+    ranked = []
+    several = len({dn for _, dn in groups}) > 1
+    for (objective, dn), values in groups.items():
+        (first, most), *others = sorted(values.items(), key=lambda item: -item[1])
+        column = runs[first].goal
+        scenes = {run: " ".join(str(runs[run].best.iloc[0]["scenario"]).split()) for run in values}
+        place = {run: f" in {scene}" if len(set(scenes.values())) > 1 else "" for run, scene in scenes.items()}
+        under = " under the constraints" if any(runs[run].constraints for run in values) else ""
+        text = f"Best {objective}{f' in {dn}' if several and dn else ''}{under}: {first}"
+        text += f" with {column.amount(most)}{place[first]}"
+        for run, value in others:
+            if most - value <= _SAME * abs(most):
+                text += f"; {run} is equal{place[run]}"
+            else:
+                text += f"; {run} has {column.amount(value)}{place[run]}, {column.amount(most - value)}"
+                text += f" ({(most - value) / most:.1%}) less" if most > 0 else " less"
+        ranked.append(f"{text}.")
+    if len(groups) > 1:
+        what = "different objectives" if len({objective for objective, _ in groups}) > 1 else "DN of different meaning"
+        ranked.append(f"These are {what}, which are not ranked against each other.")
+    return ranked + lines
+
+
+def _maximized(output: Output) -> tuple[str, str]:
+    """The objective in words, and the meaning of its DN, where it has any."""
+    text = str(output.objective) if output.goal.name == COMBINED else output.goal.words
+    return text, dn_of(output) if any(output.columns[name].unit == DN for name in output.objective.weights) else ""
+
+
+def study_differences(runs: Mapping[str, Output]) -> pd.DataFrame:
+    """Columns `key` and a run each, a row for every key of the resolved studies that is not the same in all."""
+    return _differences({run: output.resolved for run, output in runs.items()})
+
+
+def origin_differences(runs: Mapping[str, Output]) -> pd.DataFrame:
+    """The same of what made the results: sensor, lights, files, versions, and how each scene was simulated."""
+    trees = {}
+    for run, output in runs.items():
+        kept = {"sensor", "lights", "model_version", "data_sha256", "versions", "designs"}
+        simulated = {
+            name: {"tolerance_dn": plan.tolerance_dn}
+            | {choice.effect: "computed" if choice.computed else "left out" for choice in plan.effects}
+            for name, plan in output.provenance.plans.items()
+        }
+        trees[run] = output.provenance.model_dump(mode="json", include=kept) | {"simulated": simulated}
+    return _differences(trees)
+
+
+def _differences(trees: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
+    leaves = {run: dict(_leaves("", tree)) for run, tree in trees.items()}
+    rows = []
+    for key in dict.fromkeys(key for values in leaves.values() for key in values):
+        texts = [values.get(key, "-") for values in leaves.values()]
+        if len(set(texts)) > 1:
+            rows.append([key, *_cut(texts)])
+    return pd.DataFrame(rows, columns=["key", *trees])
+
+
+def _leaves(path: str, tree: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Dotted keys and values in words."""
+    for key, value in tree.items():
+        where = f"{path}.{key}" if path else str(key)
+        if isinstance(value, Mapping):
+            yield from _leaves(where, value)
+        else:
+            plain = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False, default=str)
+            yield where, " ".join(plain.split())
+
+
+def _cut(texts: list[str]) -> list[str]:
+    """Differing values; of long ones the part where they begin to differ."""
+    there = [text for text in texts if text != "-"]
+    if max(map(len, there)) <= _SHOWN:
+        return texts
+    shortest = min(map(len, there))
+    alike = next((i for i in range(shortest) if len({text[i] for text in there}) > 1), shortest)
+    start = max(0, alike - _BEFORE) if len(set(there)) > 1 else 0
+    stop = start + _SHOWN
+    return [
+        "-" if text == "-" else f"{'...' * bool(start)}{text[start:stop]}{'...' * (len(text) > stop)}" for text in texts
+    ]
+
+
+def curve_notes(runs: Mapping[str, Output]) -> list[str]:
+    """A sentence for each run that used other curves than the first, which makes its CSDs another scale."""
+    (first, reference), *others = runs.items()
+    notes = []
+    for name, output in others:
+        what = _other_curves(reference.curves, output.curves)
+        if what:
+            notes.append(f"{first} and {name} used other curves ({what}): their results do not compare one to one.")
+        if of_reference(output) != of_reference(reference):
+            shares = f"{of_reference(reference)} in {first}, {of_reference(output)} in {name}"
+            notes.append(f"The CFA sensitivities do not compare: they are shares {shares}.")
+    return notes
+
+
+def _other_curves(first: KeptCurves, second: KeptCurves) -> str:
+    if not np.array_equal(first.wavelength_nm, second.wavelength_nm):
+        return "on another wavelength grid"
+    parts = []
+    common = [name for name in first.sensor if name in second.sensor]
+    differing = [name for name in common if not np.array_equal(first.sensor[name], second.sensor[name])]
+    if differing or not common:
+        parts.append(f"sensor: {', '.join(differing)}" if differing else "sensor")
+    lights = {**first.lights, **second.lights}
+    pairs = [(first.lights.get(name), second.lights.get(name)) for name in lights]
+    other = sum(a is None or b is None or not np.array_equal(a, b) for a, b in pairs)
+    if other:
+        parts.append(f"lights: {other} of {len(lights)}")
+    return "; ".join(parts)
