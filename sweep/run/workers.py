@@ -147,7 +147,6 @@ def stopped_by_signals() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    _stop.clear()
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     for number, handler in before.items():
         if handler is not signal.SIG_IGN:  # as a shell has it for what runs in the background
@@ -157,6 +156,7 @@ def stopped_by_signals() -> Iterator[None]:
     except KeyboardInterrupt:
         raise InterruptedRunError(_STOPPED) from None
     finally:
+        _stop.clear()
         for number, handler in before.items():
             signal.signal(number, handler)
 
