@@ -55,9 +55,8 @@ def _made(kind: Any, data: Any) -> Any:
         return np.frombuffer(content, data["dtype"]).reshape(data["shape"]).astype(get_args(kinds[1])[0])
     if origin in (list, tuple, Sequence):
         return _sequence(origin, kinds, data)
-    return (
-        _checked(kind, data) if origin is not Mapping else {key: _made(kinds[1], inner) for key, inner in data.items()}
-    )
+    mapping = isinstance(origin, type) and issubclass(origin, Mapping)
+    return {key: _made(kinds[1], inner) for key, inner in data.items()} if mapping else _checked(kind, data)
 
 
 def _checked(kind: Any, data: Any) -> Any:

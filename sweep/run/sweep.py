@@ -22,7 +22,7 @@ from ..results.tables import decoded, encoded, holds
 from ..study import Study
 from .front import Gathered, few_of
 from .rows import Job, Rules, failed_rows, job_key, jobs_of, joined, run_job, spent_on
-from .workers import WorkerKilledError, Workers
+from .workers import WorkerKilledError, Workers, heed_stop
 
 _SCENES_PER_WORKER, _FEW = 2, 64
 """From how many scenes for each worker on, and up to how many designs, one worker computes all jobs of a scene."""
@@ -197,6 +197,7 @@ def _compute(asked: Sequence[_Asked], rules: Rules, folder: Path | None) -> list
 def _finished(key: str, folder: Path | None, rules: Rules, compute: Callable[[], pa.Table]) -> Finished:
     started = time.monotonic()
     table = compute()
+    heed_stop()
     failed = int(np.count_nonzero(~holds(table, "status", "ok")))
     seconds = round(time.monotonic() - started, 4)
     facts = json.dumps({"failed": failed, "seconds": seconds}).encode()

@@ -21,7 +21,8 @@ from ..base.types import Call
 
 BACKENDS = ("loky", "threading", "dask")
 _stop = threading.Event()
-"""A stop was asked for. Compiled libraries may swallow the exception by which the signal's handler says so."""
+"""A stop was asked for. Compiled libraries may swallow the exception by which the signal's handler says so, or raise
+another one in its place, as if a design had failed."""
 _STOPPED = "interrupted; finished parts are kept, the same command continues"
 
 
@@ -78,10 +79,9 @@ class Workers:
 
             try:
                 for at, result in self._parallel(dispatched()):
+                    heed_stop()
                     del waiting[at], begun[at]
                     yield at, result
-                    if _stop.is_set():
-                        raise KeyboardInterrupt
             except Exception as error:
                 if not _is_death(error):
                     raise
@@ -159,6 +159,12 @@ def stopped_by_signals() -> Iterator[None]:
         _stop.clear()
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def heed_stop() -> None:
+    """Raise KeyboardInterrupt where a stop was asked for, before a result that it may have spoiled is kept."""
+    if _stop.is_set():
+        raise KeyboardInterrupt
 
 
 def _ask_to_stop(*_: object) -> None:

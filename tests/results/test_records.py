@@ -77,6 +77,7 @@ def test_a_limit_comes_back_whatever_its_fields() -> None:
 class Sample:
     pair: tuple[int, str]
     words: Mapping[str, tuple[float, ...]]
+    named: dict[str, float]
     where: IndexArray | None
     side: Literal["left", "right"] | None
     grid: FloatArray
@@ -84,10 +85,13 @@ class Sample:
 
 
 def test_fields_of_every_kind_come_back() -> None:
-    sample = Sample((3, "x"), {"a": (1.5, np.nan)}, np.arange(6).reshape(2, 3), "left", np.ones((2, 0)), SearchRun(1))
+    sample = Sample(
+        (3, "x"), {"a": (1.5, np.nan)}, {"b": 0.1}, np.arange(6).reshape(2, 3), "left", np.ones((2, 0)), SearchRun(1)
+    )
     again = from_json(Sample, to_json(sample))
     assert (again.pair, again.side, again.inner, again.grid.shape) == ((3, "x"), "left", SearchRun(1), (2, 0))
     assert again.where.tolist() == [[0, 1, 2], [3, 4, 5]]
+    assert again.named == {"b": 0.1}
     assert again.words["a"][0] == 1.5
     assert math.isnan(again.words["a"][1])
 
