@@ -16,7 +16,7 @@ from sweep.search.problem import Evaluation, SearchRun
 def listed_anew(folder: Path) -> None:
     """List the files of a run as they are now."""
     inventory = Inventory(folder)
-    inventory.files = {name: digest_of(folder / name).sha256 for name in inventory.files}
+    inventory.files = {name: digest_of(folder / name) for name in inventory.files}
     inventory._save()
 
 

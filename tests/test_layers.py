@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import ast
 import re
+import tomllib
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
 import pytest
+
+from sweep.run.provenance import _PACKAGES
 
 PACKAGE = Path(__file__).parent.parent / "sweep"
 
@@ -232,3 +235,9 @@ def test_a_circle_is_found(tmp_path: Path, there: str, back: str) -> None:
     (tmp_path / folder / "__init__.py").write_text("from .b import x")
     (tmp_path / "camera" / "__init__.py").write_text("from .effects.b import x")
     assert len(circles(tmp_path)) == 1
+
+
+def test_packages_whose_versions_a_run_keeps_are_installed_with_the_package() -> None:
+    project = tomllib.loads((PACKAGE.parent / "pyproject.toml").read_text())["project"]
+    required = {re.split(r"[<>=\[]", text)[0] for text in project["dependencies"]}
+    assert {*_PACKAGES} <= required | {project["name"]}

@@ -12,25 +12,16 @@ import hashlib
 import json
 import os
 import stat
-from dataclasses import dataclass
+from io import BufferedReader
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from .errors import Fault, SweepError
 
 MOST_FACTS = 64 * 2**20
 """Bytes of a JSON file that is read at once."""
-_BLOCK = 2**20
 NO_UTF_16 = "UTF-8; UTF-16? save as UTF-8"
 """What to allow where a text seems to be UTF-16."""
-
-
-@dataclass(frozen=True)
-class Digest:
-    """What a file holds: SHA-256 of its bytes in hexadecimal, and how many there are (None: not known)."""
-
-    sha256: str
-    size: int | None
 
 
 def is_link(path: Path) -> bool:
@@ -50,17 +41,16 @@ def _mode(path: Path) -> int:
         return 0
 
 
-def opened(path: Path, flags: int = os.O_RDONLY, mode: str = "rb", *, links: bool = False) -> IO[bytes]:
+def opened(path: Path, *, links: bool = False) -> BufferedReader:
     """Open a plain file; raises OSError for folders, pipes, devices and, but for `links`, links: none is read."""
     # Without O_NONBLOCK, opening a pipe would wait for who writes into it. Windows has other flags, and no such files.
-    if not links:
-        flags |= getattr(os, "O_NOFOLLOW", 0)
+    flags = os.O_RDONLY | (0 if links else getattr(os, "O_NOFOLLOW", 0))
     flags |= getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
-    number = os.open(path, flags, 0o666)
+    number = os.open(path, flags)
     if not stat.S_ISREG(os.fstat(number).st_mode):
         os.close(number)
         raise OSError(errno.EINVAL, "not a plain file", str(path))
-    return os.fdopen(number, mode)
+    return os.fdopen(number, "rb")
 
 
 def read_plain(path: Path, most: int) -> bytes:
@@ -72,14 +62,10 @@ def read_plain(path: Path, most: int) -> bytes:
     return content
 
 
-def digest_of(path: Path) -> Digest:
-    """What a plain file holds; raises OSError when it is none or cannot be read."""
-    digest, size = hashlib.sha256(), 0
+def digest_of(path: Path) -> str:
+    """SHA-256 of a plain file in hexadecimal; raises OSError when it is none or cannot be read."""
     with opened(path) as file:
-        while block := file.read(_BLOCK):
-            digest.update(block)
-            size += len(block)
-    return Digest(digest.hexdigest(), size)
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def read_facts(path: Path) -> dict[str, Any]:

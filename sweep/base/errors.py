@@ -70,7 +70,7 @@ EXIT_CODES = {
     130: "interrupted by Ctrl-C or SIGTERM; finished parts are kept",
     141: "the reader of the output has gone",
 }
-"""What commands return."""
+"""Meaning of the exit codes of all commands."""
 
 
 class SweepError(Exception):

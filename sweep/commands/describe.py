@@ -44,7 +44,7 @@ _MARK = _text_chunk("Software", "sweep describe")
 
 @dataclass(frozen=True)
 class Description:
-    """What was found: lines to print, why studies refuse the file (empty: they take it), and plain values."""
+    """A described file: lines to print, faults for which studies refuse it, and the same as plain values."""
 
     lines: tuple[str, ...]
     faults: tuple[Fault, ...]

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from ..base.types import Parallel
 
 _TOLD = ("filters", "designs", "failed", "duration_s", "search", "check", "warnings")
-"""What `--json` says of a run, as in its provenance."""
+"""Keys of provenance that `--json` repeats."""
 
 
 def finish(

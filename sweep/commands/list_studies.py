@@ -28,7 +28,7 @@ class Listed:
 
     @property
     def counted(self) -> str:
-        """How many designs it has, in words."""
+        """Number of designs, in words."""
         return "" if self.designs is None else f"{self.designs:,} designs"
 
 

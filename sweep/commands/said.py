@@ -1,16 +1,13 @@
-"""What a command says: lines for people, or one JSON object for programs."""
+"""Output of commands: lines for people, or one JSON object for programs."""
 
 from __future__ import annotations
 
 import json
 import math
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Json = Annotated[bool, typer.Option("--json", help="Say one JSON object on stdout, and everything else on stderr.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Say nothing but faults, and with --json the object.")]
@@ -28,11 +25,6 @@ def say_to(lines: Iterable[str], *, as_json: bool, quiet: bool) -> None:
     if not quiet:
         for line in lines:
             typer.echo(line, err=as_json)
-
-
-def records(table: pd.DataFrame) -> list[dict[str, Any]]:
-    """Rows of a table as mappings of plain values."""
-    return [{str(name): value for name, value in row.items()} for row in table.astype(object).to_dict("records")]
 
 
 def _plain(value: Any) -> Any:

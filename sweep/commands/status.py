@@ -26,11 +26,6 @@ class Status:
     facts: Mapping[str, Any]
 
 
-def status_lines(folder: Path, *, verify: bool = False) -> list[str]:
-    """Lines of `status_of`."""
-    return list(status_of(folder, verify=verify).lines)
-
-
 def status_of(folder: Path, *, verify: bool = False) -> Status:
     """State, progress and files of a run.
 

@@ -94,7 +94,7 @@ class Inventory:
         if quick:
             return None
         try:
-            return None if digest_of(path).sha256 == self.files[name] else DAMAGED
+            return None if digest_of(path) == self.files[name] else DAMAGED
         except OSError:
             return DAMAGED
 
@@ -139,7 +139,7 @@ class Inventory:
 
     def adopt(self, name: str) -> None:
         """List a file that was written; raises OutputError when the disk refuses."""
-        self.files[name] = digest_of(self.path(name)).sha256
+        self.files[name] = digest_of(self.path(name))
         self._save()
 
     def remove(self, names: Iterable[str]) -> None:

@@ -1,4 +1,4 @@
-"""Finished work of a run that is not whole yet: part files, which are the run's journal.
+"""Finished work of a run that is not whole yet: part files.
 
 A part is written under a hidden name, synced and renamed, by the worker that computed it where that is on this machine.
 Its name has the key of the work and the SHA-256 of its bytes: what is missing or damaged is computed again.

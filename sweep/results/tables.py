@@ -147,11 +147,6 @@ def json_of(data: Mapping[str, Any]) -> str:
     return json.dumps(data, indent=2, sort_keys=True, allow_nan=False) + "\n"
 
 
-def write_json(data: Mapping[str, Any], path: Path) -> None:
-    """Write one JSON file atomically; errors as for `atomic`."""
-    write_text(json_of(data), path)
-
-
 def encoded(table: pa.Table) -> bytes:
     """A table as the bytes of a Parquet file."""
     sink = pa.BufferOutputStream()
@@ -177,7 +172,7 @@ def decoded(content: bytes, schema: pa.Schema, rows: int) -> pa.Table | None:
 
 
 def _how(schema: pa.Schema) -> dict[str, Any]:
-    """How a table is stored: pages carry checksums (CRC-32), which readers verify.
+    """Settings of the Parquet writer: pages carry checksums (CRC-32), which readers verify.
 
     A result table may have many rows: words as numbers, ids as steps, values as is. Dictionaries of measured values,
     which hardly repeat, take long to make.

@@ -1,4 +1,4 @@
-"""What tables show of a design besides its row, all of it read from one forward model of its scene."""
+"""Looks at designs for the tables of the report, all read from one forward model of the scene."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from ..results.identity import MODEL_VERSION, fingerprint
 from ..study import Study
 from ..study.yaml_tree import yaml_text
 
-_PACKAGES = ("cfa-sweep", "numpy", "scipy", "numba", "scikit-learn", "pandas", "pyarrow", "joblib", "nlopt", "moocore")
+_PACKAGES = ("cfa-sweep", "numpy", "scipy", "numba", "pandas", "pyarrow", "joblib", "nlopt", "moocore")
 
 
 def _packages(study: Study) -> tuple[str, ...]:

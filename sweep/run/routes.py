@@ -1,4 +1,4 @@
-"""Quantities of designs, a block of them at a time; where a block fails, design by design, so that one is a row."""
+"""Quantities of designs, a block at a time; a block that fails is halved down to the design that does."""
 
 from __future__ import annotations
 

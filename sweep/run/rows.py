@@ -95,8 +95,8 @@ def run_job(job: Job, setup: Setup, rules: Rules) -> pa.Table:
     """Evaluate a job; a design that fails is a row with its status, and the others are kept.
 
     `pareto` marks the non-dominated designs of this job alone, among those that meet every constraint but those on the
-    front's axes; `front.Front` finds those of the whole table. `spent_on`
-    the table says what metrics of the whole readout took.
+    front's axes; `front.Front` finds those of the whole table, and `spent_on` gives the time of metrics of
+    the whole readout.
     """
     points = job.space.points(job.start, job.stop)
     found = found_of(job.space, job.start, points, setup, rules.request)

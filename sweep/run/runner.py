@@ -192,12 +192,12 @@ class _Run:
 
     @cached_property
     def rules(self) -> Any:
-        """What turns designs into rows."""
+        """Rules by which designs become rows."""
         return rules_of(self.study)
 
     @cached_property
     def parts(self) -> Parts:
-        """What an interrupted run has kept."""
+        """Finished work of an interrupted run."""
         return Parts(self.inventory.folder)
 
     @cached_property
@@ -207,7 +207,7 @@ class _Run:
 
     @cached_property
     def gathered(self) -> Gathered:
-        """What a report draws of the rows."""
+        """Rows that the report draws, and the front."""
         return Gathered(self.rules, next(iter(self.study.scenarios)))
 
     @cached_property

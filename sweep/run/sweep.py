@@ -46,7 +46,7 @@ class Finished:
 
 @dataclass(frozen=True)
 class RunOptions:
-    """What a run does about designs that fail.
+    """Settings for designs that fail.
 
     `fail_fast`: stop at the first one; `retry_failed`: compute a finished run again in which some failed.
     """

@@ -16,7 +16,7 @@ import pandas as pd
 import pytest
 
 from sweep.base.errors import OutputError
-from sweep.commands.status import status_lines
+from sweep.commands.status import status_of
 from sweep.report import make_report, read_output
 from sweep.results.inventory import Inventory
 from sweep.results.names import RUN, SUMS
@@ -294,7 +294,7 @@ def test_names_in_the_list_that_lead_out_of_the_folder_are_not_followed(small: S
     assert not [name for name in Inventory(folder).files if "outside" in name]
     make_report(read_output(folder))
     assert outside.read_text() == "precious"
-    assert status_lines(folder, verify=True)[-1].startswith("ok")
+    assert status_of(folder, verify=True).lines[-1].startswith("ok")
 
 
 def test_a_link_for_the_folder_of_parts_is_refused(small: Study, tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ import pytest
 
 from sweep.base.errors import OutputError
 from sweep.commands.audit import audit_output
-from sweep.commands.status import status_lines
+from sweep.commands.status import status_of
 from sweep.report import make_report, read_output
 from sweep.results.inventory import Inventory
 from sweep.results.lock import LOCK, locked
@@ -141,7 +141,7 @@ def test_links_in_the_place_of_files_are_replaced_not_followed(
     assert (target / "precious.txt").read_text() == "precious"
     assert not any(path.is_symlink() for path in folder.rglob("*"))
     pd.testing.assert_frame_equal(rows(folder), expected)
-    assert status_lines(folder, verify=True)[-1].startswith("ok")
+    assert status_of(folder, verify=True).lines[-1].startswith("ok")
 
 
 def test_the_folder_itself_may_be_a_link(few: Study, expected: pd.DataFrame, tmp_path: Path) -> None:
@@ -210,7 +210,7 @@ def test_wherever_the_disk_refuses_nothing_finished_is_lost(
         assert counts[:1] in ([], [kept])
         assert not (folder / PARTS).exists()
         pd.testing.assert_frame_equal(rows(folder), rows(tmp_path / "expected"))
-        assert status_lines(folder, verify=True)[-1].startswith("ok")
+        assert status_of(folder, verify=True).lines[-1].startswith("ok")
 
 
 @pytest.mark.slow
@@ -231,6 +231,6 @@ def test_a_report_that_the_disk_refuses_loses_no_result(
             make_report(read_output(tmp_path), mend=True)
     pd.testing.assert_frame_equal(rows(tmp_path), expected)
     with pytest.raises(OutputError, match=r"report\.html: is missing"):
-        status_lines(tmp_path)
+        status_of(tmp_path)
     make_report(read_output(tmp_path), mend=True)
-    assert status_lines(tmp_path, verify=True)[-1].startswith("ok")
+    assert status_of(tmp_path, verify=True).lines[-1].startswith("ok")

@@ -16,7 +16,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from sweep.base.errors import FailedDesignError, OutputError, SweepError
-from sweep.commands.status import status_lines
+from sweep.commands.status import status_of
 from sweep.report import make_report, read_output
 from sweep.results.identity import CHUNK
 from sweep.results.lock import locked
@@ -132,23 +132,23 @@ def test_a_clock_that_goes_back_changes_nothing(
     monkeypatch.setattr(time, "time", lambda: float(next(now)))
     half_done(plain, tmp_path)
     with locked(tmp_path):
-        assert len(status_lines(tmp_path)) >= 2
+        assert len(status_of(tmp_path).lines) >= 2
     ran(plain, tmp_path, 1)
     pd.testing.assert_frame_equal(rows(tmp_path), whole)
 
 
 def test_status_of_a_run(plain: Study, tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="no run here"):
-        status_lines(tmp_path)
+        status_of(tmp_path)
     done = kept_rows(half_done(plain, tmp_path))
-    lines = status_lines(tmp_path)
+    lines = status_of(tmp_path).lines
     assert lines[0].startswith(f"interrupted; the same command continues: {done:,} of {plain.n_designs:,} designs")
     assert len(pd.read_parquet(tmp_path / PARTS)) == done  # readable while it runs
     with locked(tmp_path):
-        lines = status_lines(tmp_path)
+        lines = status_of(tmp_path).lines
         assert lines[0].startswith("running")
     ran(plain, tmp_path, 1)
-    assert status_lines(tmp_path)[0].startswith(f"finished: {plain.n_designs:,} designs in ")
+    assert status_of(tmp_path).lines[0].startswith(f"finished: {plain.n_designs:,} designs in ")
 
 
 def test_dry_run_counts_what_is_finished(plain: Study, tmp_path: Path) -> None:

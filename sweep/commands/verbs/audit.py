@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...base.errors import BrokenPromiseError
 from ..options import AllowCode, DataFolder, RunFolder
 from ..panels import OF_RESULTS
-from ..said import Json, Quiet, records, say
+from ..said import Json, Quiet, say
 
 PANEL = OF_RESULTS
 
@@ -27,7 +27,7 @@ def audit(
 
     with ProgressDisplay(quiet=quiet) as display:
         found = audit_output(folder, data, display.update, allow_code=allow_code)
-    facts = {"folder": str(folder), "designs": found.n_designs, "rows": records(found.rows) if as_json else []}
+    facts = {"folder": str(folder), "designs": found.n_designs, "rows": found.rows.to_dict("records")}
     say([*found.lines, f"Files: {folder}/: {AUDIT}."], facts, as_json=as_json, quiet=quiet)
     if found.faults:
         raise BrokenPromiseError(found.faults)

@@ -9,7 +9,7 @@ import typer
 
 from ..completion import run_folders
 from ..panels import OF_RESULTS
-from ..said import Json, Quiet, records, say
+from ..said import Json, Quiet, say
 
 PANEL = OF_RESULTS
 
@@ -29,7 +29,7 @@ def compare(
     from ...report.compare import compare_runs
 
     compared = compare_runs(folders, output)
-    facts = {name: records(table) for name, table in compared.tables.items()} if as_json else {}
+    facts = {name: table.to_dict("records") for name, table in compared.tables.items()} if as_json else {}
     say(
         compared.lines, {"folder": str(compared.folder), **facts, "notes": compared.notes}, as_json=as_json, quiet=quiet
     )

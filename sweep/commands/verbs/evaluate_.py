@@ -10,7 +10,7 @@ import typer
 from ...curves.light_unit import LightUnit
 from ..options import AllowCode, DataFolder
 from ..panels import OF_CURVES
-from ..said import Json, Quiet, records, say
+from ..said import Json, Quiet, say
 
 PANEL = OF_CURVES
 
@@ -71,7 +71,7 @@ def evaluate_(
     )
     facts = {
         "source": str(source),
-        "rows": records(found.table) if as_json else [],
+        "rows": found.table.to_dict("records") if as_json else [],
         "limit_of": found.goal.name,
         "limit_dn": found.limit,
         "before_quantization_dn": found.smooth,

@@ -47,7 +47,7 @@ _MOST_SCENARIOS = 4
 
 @dataclass(frozen=True)
 class Comparison:
-    """What was found: lines for people; the same as tables by their names; the folder of the files."""
+    """Result of a comparison: folder of its files, lines for people, the same as tables, and notes."""
 
     folder: Path
     lines: Sequence[str]
