@@ -39,7 +39,7 @@ from sweep.designs.block import CurveBlock, edges_of
 from sweep.designs.edge import SPAN_PER_WIDTH
 from sweep.designs.space import Space
 from sweep.metrics.evaluate import evaluate
-from sweep.metrics.separation import class_pairs, csd_name, separation, separations_along, separations_by_edges
+from sweep.metrics.separation import class_pairs, csd_name, separation, separations_along
 from sweep.run import run_study
 from sweep.study import Study, load_study
 
@@ -128,8 +128,7 @@ def distances(imager: ForwardModel, block: Any) -> None:
     changing = imager.read_changing(block)
     assert changing is not None
     members = imager.setup.members
-    if separations_by_edges(changing, members) is None:
-        separations_along(changing.fixed[0], changing.channel, changing.values[:, 0], members)
+    separations_along(changing.fixed[0], changing.channel, changing.values[:, 0], members)
 
 
 def rate_of(route: str, study: Study, seconds: float) -> float:

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from sweep.base.errors import EXIT_CODES
 from sweep.results.dictionary import columns_table, files_table
-from sweep.study.reference import study_reference
+
+from .study_reference import study_reference
 
 ROOT = Path(__file__).parent.parent
 

@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
 from ..base.types import BoolArray, FloatArray
-from ..designs.block import Block, EdgeBlock, EdgeSums
+from ..designs.block import Block
 from ..designs.products import row_products
 from .exposure import SceneLight, exposure_times
 from .irradiance import background_irradiance, way_of_light
@@ -27,28 +26,13 @@ _MANY = 50_000
 """Values from which on a compiled pass saves more time than it takes to load."""
 
 
-class ByEdges(NamedTuple):
-    """What a channel's electrons/s are sums of, in one case: base + depth (left - right) + fixed + uniform.
-
-    `sums`: of base and edges, for each signal; `block`: which edges each design has; `fixed`: ndarray[n_signals],
-    `uniform`: ndarray[n_designs]. `line`: how they are read, see `Readout.line`.
-    """
-
-    sums: EdgeSums
-    block: EdgeBlock
-    fixed: FloatArray
-    uniform: FloatArray
-    line: tuple[float, float, float, float] | None = None
-
-
 @dataclass(frozen=True)
 class Changing:
     """Those designs of a block that differ in one channel alone: electrons, or the digital numbers read from them.
 
     `fixed`: ndarray[n_cases, n_signals, n_channels], what they share (that channel's values mean nothing); `make`
     gives those of `channel` for a part of them, ndarray[n, n_cases, n_signals]; `exposure_s`: that of each. `which`:
-    ndarray[n_designs], the n designs. `by_edges`: what the channel's values are sums of, where designs are told by
-    their edges.
+    ndarray[n_designs], the n designs.
     """
 
     fixed: FloatArray
@@ -56,7 +40,6 @@ class Changing:
     make: Callable[[slice], FloatArray]
     exposure_s: float
     which: BoolArray
-    by_edges: ByEdges | None = None
 
     @cached_property
     def values(self) -> FloatArray:
@@ -263,7 +246,4 @@ class Electrons:
             _expose(values, fixed, uniform[part], float(time_s[0]))
             return values
 
-        by_edges = None
-        if isinstance(some, EdgeBlock) and len(fixed) == 1 and kept.dtype == float and len(some) * kept.size > _MANY:
-            by_edges = ByEdges(some.tables.product(kept, everywhere), some, fixed[0], uniform[:, 0])
-        return Changing(rest * time_s[0], unit, make, float(time_s[0]), which, by_edges)
+        return Changing(rest * time_s[0], unit, make, float(time_s[0]), which)

@@ -132,15 +132,12 @@ class ForwardModel:
         electrons = self.electrons.changing(block)
         if electrons is None:
             return None
-        transfer, by_edges = self.readout.transfer, electrons.by_edges
-        if by_edges is not None:
-            line = self.readout.line()
-            by_edges = None if line is None else by_edges._replace(line=line)
+        transfer = self.readout.transfer
 
         def make(part: slice) -> FloatArray:
             return transfer(electrons.make(part))
 
-        return replace(electrons, fixed=transfer(electrons.fixed), make=make, by_edges=by_edges)
+        return replace(electrons, fixed=transfer(electrons.fixed), make=make)
 
     def read(self, curves: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The readout, DN, ndarray[n_designs, n_cases, n_signals, n_channels], and exposure, s, ndarray[n_designs]."""

@@ -127,19 +127,10 @@ class Readout:
 
         many = np.ascontiguousarray(electrons)
         found = np.empty_like(many)
-        whole_numbers(many.reshape(-1), *self._line(clips), found.reshape(-1))
-        return found
-
-    def _line(self, clips: bool) -> tuple[float, float, float, float]:
-        """Electrons from which nothing more is read, DN per electron, pedestal and full scale, DN."""
         top_e = self.pixel.saturation_e if clips else math.inf
-        return top_e, self.pixel.dn_per_e, self.pixel.offset_dn, float(self.pixel.full_scale_dn)
-
-    def line(self) -> tuple[float, float, float, float] | None:
-        """`_line` for whoever reads values by himself; None where a readout is more than whole numbers."""
-        if not self.setup.computes("quantization") or self.setup.scene.noise is not None:
-            return None
-        return self._line(self.setup.computes("saturation"))
+        line = top_e, self.pixel.dn_per_e, self.pixel.offset_dn, float(self.pixel.full_scale_dn)
+        whole_numbers(many.reshape(-1), *line, found.reshape(-1))
+        return found
 
     def variance_dn(self, electrons: FloatArray) -> FloatArray:
         """Variance of the elements' digital numbers, DN^2, with their rounding."""

@@ -9,13 +9,16 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
+from xml.parsers import expat
 
 from pydantic import ValidationError
 
+from ..base.disk import read_input
 from ..base.errors import DataError, Fault
 from ..camera.pixel import Pixel
-from ..curves.instrument_files import read_xml
+from ..curves.scan import MOST_BYTES
 
 _WHAT = "EMVA 1288 results"
 
@@ -63,7 +66,7 @@ def pixel_figures(path: Path) -> PixelFigures:
 
     Raises DataError for a file without such results, a result of another unit, and a figure that no pixel has.
     """
-    root, file = read_xml(path, _WHAT), str(path)
+    root, file = read_xml(path), str(path)
     found: dict[str, float] = {}
     missing = []
     for result in _RESULTS:
@@ -83,6 +86,22 @@ def pixel_figures(path: Path) -> PixelFigures:
             Fault("not a pixel's figure", file, key=key, value=first["input"], allowed=first["msg"])
         ) from None
     return PixelFigures(found, (*missing, "bits", "offset_dn", "pitch_um"))
+
+
+def read_xml(path: Path) -> ElementTree.Element:
+    """Return the root of an XML file; raises DataError for no XML, or XML with entities of its own."""
+    file, content = str(path), read_input(path, MOST_BYTES, DataError)
+
+    def refused(*_: object) -> None:
+        raise DataError(Fault(f"not {_WHAT}", file, allowed="XML without entities of its own"))
+
+    parser = expat.ParserCreate()
+    parser.StartDoctypeDeclHandler = refused  # entities, which make a small file a large one, are declared there
+    try:
+        parser.Parse(content, True)
+        return ElementTree.fromstring(content)
+    except (expat.ExpatError, ElementTree.ParseError, ValueError, LookupError) as error:
+        raise DataError(Fault(f"not readable XML: {error}", file)) from None
 
 
 def _value(file: str, elements: list[Element], result: _Result) -> float | None:

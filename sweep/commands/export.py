@@ -12,7 +12,7 @@ import numpy as np
 from ..base.errors import Fault, OutputError
 from ..base.types import FloatArray
 from ..camera.mosaic import Mosaic
-from ..curves.isetcam import color_hints, csv_text, filter_names, isetcam_mat, unique_names
+from ..curves.filter_files import color_hints, csv_text, filter_names, isetcam_mat, unique_names
 from ..report import Output, check_kept, read_output, study_of
 from ..results.atomic import write_bytes
 from ..results.chosen import find_row

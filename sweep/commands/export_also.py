@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from ..base.types import FloatArray
-from ..curves.isetcam import unique_names
+from ..curves.filter_files import speos_text, unique_names
 from ..curves.rgb_weights import RgbWeights, rgb_weights
-from ..curves.speos import speos_text
 from ..study import Study, folder_name
 from .options import Also
 

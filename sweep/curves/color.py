@@ -60,11 +60,11 @@ def color_matching(grid: WavelengthGrid) -> FloatArray:
 VISIBLE_NM = (360.0, 830.0)
 """Where V(lambda) and the color-matching functions are defined (ISO/CIE 11664-1, CIE 018)."""
 LUMINOUS_EFFICACY_LM_W = 683.002
-"""Of monochromatic light at 540 THz, which defines the candela."""
+"""Luminous efficacy of monochromatic light at 540 THz, which defines the candela."""
 
 
 _XYZ_TO_RGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.204, 1.057]])
-"""Of sRGB (IEC 61966-2-1)."""
+"""Matrix of sRGB (IEC 61966-2-1)."""
 
 
 def luminance_per_photon_radiance(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:

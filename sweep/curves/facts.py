@@ -10,7 +10,7 @@ import numpy as np
 from ..base.errors import Fault
 from ..base.types import FloatArray
 from .light_unit import LightUnit
-from .scan import Scan, distinct
+from .scan import Scan, distinct, unit_by_size
 from .signal_color import VISIBLE, LightColor, light_color
 from .spectrum import WavelengthGrid, photons_from_energy, resample
 
@@ -89,17 +89,18 @@ class Facts:
 
     def colors(self, quantity: LightUnit) -> Mapping[str, LightColor | None]:
         """The color of each curve read as a light."""
-        found = {}
+        colors = {}
         for curve in self.curves:
             values = curve.on(VISIBLE)
             energy = quantity == "energy"
-            found[curve.name] = light_color(photons_from_energy(VISIBLE.nodes_nm, values) if energy else values)
-        return found
+            colors[curve.name] = light_color(photons_from_energy(VISIBLE.nodes_nm, values) if energy else values)
+        return colors
 
 
 def facts_of(scan: Scan) -> Facts:
     """The curves of a file with what can be used of them: finite samples, sorted, each wavelength once."""
-    factor, read_as = _unit(scan.wavelength_nm)
+    factor = unit_by_size(scan.wavelength_nm)
+    read_as = {1e9: "read as m", 1e3: "read as um"}.get(factor, "")
     usable = np.isfinite(scan.wavelength_nm)
     curves = []
     # Nothing that steers a terminal or fills it; two names that then look the same stay two.
@@ -112,46 +113,36 @@ def facts_of(scan: Scan) -> Facts:
     return Facts(tuple(curves), read_as)
 
 
-def _unit(wave: FloatArray) -> tuple[float, str]:
-    """What brings the wavelengths to nm: they look like um or m where they are that small."""
-    largest = float(np.nanmax(wave)) if np.isfinite(wave).any() else 0.0
-    if 0 < largest < 1e-4:
-        return 1e9, "read as m"
-    if 0 < largest < 20:
-        return 1e3, "read as um"
-    return 1.0, ""
-
-
 def notes(facts: Facts, *, as_qe: bool) -> list[str]:
-    """What a user should know of curves that can be read."""
-    found = []
+    """Notes on curves that can be read."""
+    lines = []
     wave = facts.samples_nm
     if wave.size and (wave[0] > _NEEDED.start_nm or wave[-1] < _NEEDED.stop_nm):
-        found.append(
+        lines.append(
             f"the wavelengths do not cover {_NEEDED.start_nm:g} to {_NEEDED.stop_nm:g} nm, a study's usual range: "
             + ("give the study `wavelengths:` of its own" if as_qe else "`outside: zero` takes 0 there")
         )
     gap = float(np.diff(wave).max(initial=0.0))
     if gap > _COARSE_NM:
-        found.append(f"sparse samples: up to {gap:g} nm apart; between them the curves are taken as straight lines")
+        lines.append(f"sparse samples: up to {gap:g} nm apart; between them the curves are taken as straight lines")
     few = [c for c in facts.curves if c.peak > 0 and c.samples_in_peak < _FEWEST_IN_PEAK]
     if few:
         worst = min(few, key=lambda curve: curve.samples_in_peak)
         samples = "1 sample" if worst.samples_in_peak == 1 else f"{worst.samples_in_peak} samples"
         place = f"only {samples} of half its height or more around its peak at {worst.peak_nm:g} nm"
-        found.append(f"{worst.name} has {place}" + (f", and {len(few) - 1} more curves likewise" if few[1:] else ""))
+        lines.append(f"{worst.name} has {place}" + (f", and {len(few) - 1} more curves likewise" if few[1:] else ""))
     dark = [curve.name for curve in facts.curves if not curve.peak > 0]
     if dark:
-        found.append(f"no value is above 0: {', '.join(dark)}")
+        lines.append(f"no value is above 0: {', '.join(dark)}")
     if as_qe:
         top = max(curve.peak for curve in facts.curves)
         if top > 1 + _NEARLY:
             scale = qe_scale(top)
             reason = "percent" if scale == 1 / _PERCENT else "a relative scale"
-            found.append(f"values up to {top:.6g} are above 1, so no QE: {reason}? Then set `scale: {scale:.4g}`")
+            lines.append(f"values up to {top:.6g} are above 1, so no QE: {reason}? Then set `scale: {scale:.4g}`")
         elif looks_normalized(top):
-            found.append(NORMALIZED)
-    return found
+            lines.append(NORMALIZED)
+    return lines
 
 
 def looks_normalized(top: float) -> bool:
@@ -160,7 +151,7 @@ def looks_normalized(top: float) -> bool:
 
 
 def qe_scale(top: float) -> float:
-    """What brings QE curves whose largest value is `top` into 0..1: 0.01 for percent."""
+    """Factor that brings QE curves whose largest value is `top` into 0..1: 0.01 for percent."""
     if top <= 1:
         return 1.0
     return 1 / _PERCENT if 2 < top <= _PERCENT else float(f"{1 / top * (1 - 5e-4):.4g}")

@@ -1,8 +1,11 @@
-"""Read files of curves: tables of text, ISETCam's `.mat`, IES TM-27's `.spdx`, rawtoaces' JSON, Speos' `.spectrum`."""
+"""Read files of curves: tables of text and ISETCam's `.mat`."""
 
 from __future__ import annotations
 
 import hashlib
+import io
+import math
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,18 +13,16 @@ import numpy as np
 
 from ..base.disk import read_input
 from ..base.errors import DataError, Fault, nearest
-from .instrument_files import scan_json, scan_spdx
-from .mat_files import DamagedError, read_variables
-from .scan import MOST_BYTES, Scan, check_size
+from .scan import MOST_BYTES, MOST_VALUES, Scan, check_size
 from .spectrum import Curves, sample_faults
-from .speos import scan_speos
 from .text_tables import scan_text
 
 _MAT_VARIABLES = ("wavelength", "data", "filterNames")
+_MAT_NUMBERS = ("double", "single", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)))
 
 
 def is_curve_file(name: str) -> bool:
-    """Whether a name ends like one of a file of curves."""
+    """Return whether a name ends like one of a file of curves."""
     return Path(name).suffix.casefold() in _KINDS
 
 
@@ -55,36 +56,50 @@ def scan_curves(path: Path) -> Scan:
 def _scan_mat(path: Path) -> Scan:
     """ISETCam color filters and spectra: `wavelength`, `data` (a column per curve), `filterNames` if there.
 
-    Version 5 files are read by SciPy as plain arrays; nothing in them is executed.
+    SciPy reads plain arrays; nothing in them is executed.
     """
-    file = str(path)
+    from scipy.io import loadmat, whosmat  # noqa: PLC0415  (slow to import, seldom needed)
+
+    file, content = str(path), read_input(path, MOST_BYTES, DataError)
     try:
-        fields, names = read_variables(read_input(path, MOST_BYTES, DataError), _MAT_VARIABLES, MOST_BYTES)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # it only warns of a variable that it cannot read
+            _check_mat(file, whosmat(io.BytesIO(content)))
+            fields = loadmat(io.BytesIO(content), variable_names=_MAT_VARIABLES)
+        wave, data = fields["wavelength"].ravel(), np.atleast_2d(fields["data"])
+    except DataError:
+        raise
     except NotImplementedError:
         raise DataError(
             Fault("a version 7.3 (HDF5) .mat file", file, allowed="version 5: save with -v6 or -v7")
         ) from None
-    except DamagedError as error:
-        raise DataError(Fault(f"not a readable .mat file: {error}", file)) from None
-    for needed in ("wavelength", "data"):
-        if needed not in names:
-            raise DataError(Fault(f"no variable `{needed}`", file, value=names, nearest=nearest(needed, names)))
-    if "filterNames" in names and "filterNames" not in fields:
-        raise DataError(Fault("`filterNames` must be texts", file))
-    try:
-        if any(np.iscomplexobj(fields[needed]) for needed in ("wavelength", "data")):
-            raise TypeError
-        wave = np.asarray(fields["wavelength"], dtype=float).ravel()
-        data = np.atleast_2d(np.asarray(fields["data"], dtype=float)) + 0.0
-    except (TypeError, ValueError, KeyError):
-        raise DataError(Fault("`wavelength` and `data` must be real numbers", file)) from None
+    except Exception as error:  # of damaged bytes SciPy's decoders raise whatever they meet first
+        raise DataError(Fault(f"not a readable .mat file: {error or type(error).__name__}", file)) from None
+    if np.iscomplexobj(wave) or np.iscomplexobj(data):
+        raise DataError(Fault("`wavelength` and `data` must be real numbers", file))
     if data.shape[0] != wave.size and data.shape[-1] == wave.size:
         data = data.T
     if data.ndim != 2 or data.shape[0] != wave.size or not data.size:
         raise DataError(Fault("`data` does not fit `wavelength`", file, value=data.shape, allowed=f"({wave.size}, n)"))
     check_size(file, None, *data.shape)
+    wave, data = wave.astype(float), data.astype(float) + 0.0
     columns = _mat_names(fields.get("filterNames"), data.shape[1])
     return Scan(wave, columns, data, tuple(map(tuple, sample_faults(file, wave, columns, data))))
+
+
+def _check_mat(file: str, variables: list[tuple[str, tuple[int, ...], str]]) -> None:
+    """Refuse a .mat file by the names, shapes and kinds of its variables, before their values are read."""
+    kinds = {name: kind for name, _, kind in variables}
+    for needed in ("wavelength", "data"):
+        if needed not in kinds:
+            raise DataError(Fault(f"no variable `{needed}`", file, value=[*kinds], nearest=nearest(needed, kinds)))
+        if kinds[needed] not in _MAT_NUMBERS:
+            raise DataError(Fault("`wavelength` and `data` must be real numbers", file))
+    if kinds.get("filterNames", "cell") not in ("cell", "char"):
+        raise DataError(Fault("`filterNames` must be texts", file))
+    for name, shape, _ in variables:
+        if name in _MAT_VARIABLES and (min(shape, default=0) < 0 or math.prod(shape) > MOST_VALUES):
+            raise DataError(Fault("not a size of curves", file, None, name, shape, f"at most {MOST_VALUES:,} values"))
 
 
 def _mat_names(raw: object, count: int) -> tuple[str, ...]:
@@ -98,8 +113,5 @@ def _mat_names(raw: object, count: int) -> tuple[str, ...]:
 _KINDS: dict[str, Callable[[Path], Scan]] = {
     **dict.fromkeys((".csv", ".tsv", ".txt", ".dat"), scan_text),
     ".mat": _scan_mat,
-    ".spdx": scan_spdx,
-    ".json": scan_json,
-    ".spectrum": scan_speos,
 }
 """Readers by the ending of a file's name."""

@@ -10,9 +10,7 @@ import numpy as np
 
 from ..base.errors import DataError, Fault
 from ..base.types import FloatArray
-from .cells import TableCells
-from .table_steps import TextTable, evenly
-from .text_tables import text_table
+from .text_tables import TextTable, lens_table, table_numbers
 
 _FIRST = "height_mm"
 _ALLOWED = "`height_mm`, `height_percent` or `height_relative`, and `cra_deg`"
@@ -23,7 +21,7 @@ _UNITS = {
 }
 _CRA = re.compile(r"\bcra\b|\bchief")
 _ANGLE = re.compile(r"\bcra\b|\bchief|\bdeg|°|\bangle|\brad\b|radian")
-"""What a lone column is called."""
+"""Heads of the only column beside the heights."""
 _STEEPEST_DEG = 60.0
 _MOST_ROWS = 1000
 
@@ -43,42 +41,35 @@ def read_chief_rays(path: Path, corner_mm: float | None = None) -> ChiefRays:
     Heights are in mm, percent or relative, as the head of their column says; the corner is the last row, or at
     `corner_mm`. Raises DataError (file, line, column, value) on anything that is not clean.
     """
-    table = evenly(text_table(path, _FIRST))
+    table = lens_table(path, _FIRST)
     if table.faults:
         raise DataError(table.faults[0])
     unit, column = _columns(table)
     names = [_FIRST.replace("mm", unit), table.header[column]]
-    odd = next(((line, row) for line, row in table.rows if len(row) != len(table.header)), None)
-    if odd is not None:
-        raise DataError(Fault("wrong number of columns", table.file, odd[0], None, len(odd[1]), str(len(table.header))))
+    if len(table.rows) > _MOST_ROWS:
+        raise DataError(Fault("too many rows", table.file, None, None, len(table.rows), f"at most {_MOST_ROWS}"))
+    for line, row in table.rows:
+        if len(row) != len(table.header):
+            raise DataError(Fault("wrong number of columns", table.file, line, None, len(row), str(len(table.header))))
     rows = [(line, [row[0], row[column]]) for line, row in table.rows]
-    if len(rows) > _MOST_ROWS:
-        raise DataError(Fault("too many rows", table.file, rows[-1][0], None, len(rows), f"at most {_MOST_ROWS}"))
-    values, faults = TableCells(table.file, names, table.decimal, first=names[0], noun="image height").read(rows)
+    values, faults = table_numbers(table.file, names, rows, table.decimal, noun="image height")
     if faults:
         raise DataError(faults[0])
     return _to_corner(table, unit, values, names, corner_mm)
 
 
-def _plain(cell: str) -> str:
-    """A head in words: `Image_Height(mm)` as `image height(mm)`."""
-    return re.sub(r"[\s_.,/]+", " ", cell).casefold().strip()
-
-
 def _columns(table: TextTable) -> tuple[str, int]:
-    """The unit of the heights, and which column has the angles."""
+    """The unit of the heights, and the index of the column of angles."""
     file, line, header = table.file, table.line, table.header
     if table.unit == 0:
         raise DataError(Fault("there is no header", file, line, None, None, _ALLOWED))
-    plain = [_plain(cell) for cell in header]
+    plain = [re.sub(r"[\s_.,/]+", " ", cell).casefold().strip() for cell in header]
     units = [unit for unit, pattern in _UNITS.items() if pattern.search(plain[0])]
     if len(units) != 1:
-        raise DataError(
-            Fault("the first column does not say the unit of image heights", file, line, header[0], None, _ALLOWED)
-        )
-    angles = [at for at in range(1, len(header)) if _CRA.search(plain[at])]
-    if len(header) == 2 and _ANGLE.search(plain[1]):
-        angles = [1]
+        problem = "the first column does not say the unit of image heights"
+        raise DataError(Fault(problem, file, line, header[0], None, _ALLOWED))
+    pattern = _ANGLE if len(header) == 2 else _CRA
+    angles = [at for at in range(1, len(header)) if pattern.search(plain[at])]
     if len(angles) != 1:
         raise DataError(Fault("which column has chief ray angles?", file, line, None, ", ".join(header), _ALLOWED))
     if re.search(r"\brad\b|radian", plain[angles[0]]):
@@ -88,31 +79,25 @@ def _columns(table: TextTable) -> tuple[str, int]:
 
 def _to_corner(table: TextTable, unit: str, values: FloatArray, names: list[str], corner_mm: float | None) -> ChiefRays:
     """From the middle of the sensor to its corner."""
-    (heights, cra_deg), file, notes = values.T, table.file, list(table.notes)
-    last_line = table.rows[-1][0]
+
+    def check(passes: bool, problem: str, row: int, column: int, allowed: str | None = None) -> None:
+        if not passes:
+            line, value = table.rows[row][0], values[row, column].item()
+            raise DataError(Fault(problem, table.file, line, names[column], value, allowed))
+
+    heights, cra_deg = values.T
     if heights.size < 2:
-        raise DataError(Fault("a lens needs two rows or more", file, last_line, None, heights.size))
-    if heights[0] != 0:
-        line = table.rows[0][0]
-        raise DataError(
-            Fault("image heights begin in the middle of the sensor", file, line, names[0], heights[0].item(), "0")
-        )
-    steep = np.flatnonzero(cra_deg > _STEEPEST_DEG)
-    if steep.size:
-        line, value = table.rows[int(steep[0])][0], float(cra_deg[steep[0]])
-        raise DataError(Fault("too steep a chief ray", file, line, names[1], value, f"0 to {_STEEPEST_DEG:g} degrees"))
+        raise DataError(Fault("a lens needs two rows or more", table.file, table.rows[-1][0], None, heights.size))
+    steep = int(np.argmax(cra_deg > _STEEPEST_DEG))
     whole = {"percent": 100.0, "relative": 1.0}.get(unit)
     if whole is not None and corner_mm is not None:
-        raise DataError(Fault(f"`corner_mm` needs heights in mm, not {unit}", file, table.line, names[0]))
-    if whole is not None and heights[-1] != whole:
-        raise DataError(
-            Fault("the last row is not the corner", file, last_line, names[0], heights[-1].item(), f"{whole:g}")
-        )
+        raise DataError(Fault(f"`corner_mm` needs heights in mm, not {unit}", table.file, table.line, names[0]))
     corner = float(heights[-1]) if corner_mm is None else corner_mm
-    if corner > heights[-1]:
-        raise DataError(
-            Fault("the table ends before the corner", file, last_line, names[0], heights[-1].item(), f"{corner:g} mm")
-        )
+    check(heights[0] == 0, "image heights begin in the middle of the sensor", 0, 0, "0")
+    check(cra_deg[steep] <= _STEEPEST_DEG, "too steep a chief ray", steep, 1, f"0 to {_STEEPEST_DEG:g} degrees")
+    check(whole is None or heights[-1] == whole, "the last row is not the corner", -1, 0, f"{whole or 0:g}")
+    check(corner <= heights[-1], "the table ends before the corner", -1, 0, f"{corner:g} mm")
+    notes = list(table.notes)
     if unit == "mm" and corner_mm is None:
         notes.append(f"the last row, {corner:g} mm, was taken for the corner of the sensor")
     inside = heights < corner

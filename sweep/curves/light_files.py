@@ -20,7 +20,7 @@ from .spectrum import WavelengthGrid
 _SIGNAL_COLORS = ("green", "yellow", "orange", "red")
 """Signal types in the order of a study."""
 MOST_LETTERS = 100
-"""Of a name that comes from a file's."""
+"""Longest name that is made of a file's."""
 _USUAL = WavelengthGrid()
 
 
@@ -39,7 +39,7 @@ class LightsFile:
     fine: bool
 
     def keys(self, file: str) -> dict[str, Any]:
-        """What a study says of them."""
+        """Keys of a study for them."""
         entry: dict[str, Any] = {"file": file, "quantity": self.quantity}
         entry["signals"] = {kind: list(columns) for kind, columns in self.types.items()}
         entry |= {"outside": "zero"} if self.ends_early else {}
@@ -72,9 +72,9 @@ def lights_file(path: Path, quantity: LightUnit, start_nm: float = 400, stop_nm:
         elif signals[name] is None:
             left_out[name] = f"xy {color.xy[0]:.3f} {color.xy[1]:.3f} is near no signal color"
     if len(used) < 2:
-        found = "; ".join(f"{kind}: {', '.join(columns)}" for kind, columns in used.items()) or "none"
+        listed = "; ".join(f"{kind}: {', '.join(columns)}" for kind, columns in used.items()) or "none"
         problem = f"lights of one signal color or none (`sweep describe {path}` shows where they lie)"
-        raise DataError(Fault(problem, str(path), None, None, found, "two of green, yellow, orange, red, or more"))
+        raise DataError(Fault(problem, str(path), None, None, listed, "two of green, yellow, orange, red, or more"))
     wave = next(iter(curves.values())).wavelength_nm
     ends_early = bool(wave[0] > start_nm or wave[-1] < stop_nm)
     fine = bool(np.diff(wave).min() < _USUAL.step_nm)

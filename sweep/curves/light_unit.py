@@ -1,4 +1,4 @@
-"""What the numbers of a light's spectrum are."""
+"""Quantities of a light's spectrum."""
 
 from typing import Literal
 

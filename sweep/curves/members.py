@@ -58,17 +58,17 @@ class Members:
         photons = [stretched(grid, spectrum, factor) for spectrum in lights.photons for factor in widths]
         steps = range(self._first, self._first + self.n_steps)
         made = np.stack([moved(spectrum, step) for spectrum in photons for step in steps])
-        each = len(widths) * self.n_steps
-        names = tuple(name for name in lights.names for _ in range(each))
-        types = tuple(kind for kind in lights.types for _ in range(each))
+        n_spectra = len(widths) * self.n_steps
+        names = tuple(name for name in lights.names for _ in range(n_spectra))
+        types = tuple(kind for kind in lights.types for _ in range(n_spectra))
         self.lights = replace(lights, names=names, types=types, photons=made, population=None)
         self._regions: dict[tuple[float, ...], ShiftRegion] = {}
 
     @cached_property
     def rows(self) -> dict[str, IndexArray]:
         """Signal type -> where the spectra of each of its signals and widths begin in `lights`."""
-        own = {name: rows[:: self.n_steps] for name, rows in self.lights.members.items()}
-        return {name: np.asarray(rows, dtype=np.intp) for name, rows in own.items()}
+        starts = {name: rows[:: self.n_steps] for name, rows in self.lights.members.items()}
+        return {name: np.asarray(rows, dtype=np.intp) for name, rows in starts.items()}
 
     def signal(self, row: int) -> int:
         """The signal whose spectra begin at a row."""
@@ -90,16 +90,16 @@ class Members:
         """The different regions of two types, and that of each two signals and widths, ndarray[n_first, n_second]."""
         first, second = (self.rows[name] for name in pair)
         known: dict[int, int] = {}
-        found: list[ShiftRegion] = []
+        regions: list[ShiftRegion] = []
         which = np.empty((first.size, second.size), dtype=np.intp)
         for one, row in enumerate(first):
             for other, column in enumerate(second):
                 region = self.region(self.signal(int(row)), self.signal(int(column)))
                 if id(region) not in known:
-                    known[id(region)] = len(found)
-                    found.append(region)
+                    known[id(region)] = len(regions)
+                    regions.append(region)
                 which[one, other] = known[id(region)]
-        return found, which
+        return regions, which
 
     def region(self, one: int, other: int) -> ShiftRegion:
         """The shifts of two signals that occur together."""
@@ -115,12 +115,12 @@ class Members:
 
 def spans_nm(lights: Lights, population: Population) -> list[tuple[float, float]]:
     """From and to where each signal is shifted."""
-    found = []
+    spans = []
     for signal in range(len(lights.names)):
         drift, (low, high) = _drift_and_own(lights, population, signal)
         ends = [drift * warmer for warmer in population.warmer_k]
-        found.append((min(ends) + low, max(ends) + high))
-    return found
+        spans.append((min(ends) + low, max(ends) + high))
+    return spans
 
 
 def _drift_and_own(lights: Lights, population: Population, signal: int) -> tuple[float, tuple[float, float]]:
@@ -133,11 +133,11 @@ def _drift_and_own(lights: Lights, population: Population, signal: int) -> tuple
 
 def moved(photons: FloatArray, steps: int) -> FloatArray:
     """A spectrum shifted by whole steps toward the red, ndarray[n_wavelengths]."""
-    found = np.zeros_like(photons)
+    shifted = np.zeros_like(photons)
     size = photons.size
     if abs(steps) < size:
-        found[max(steps, 0) : size + min(steps, 0)] = photons[max(-steps, 0) : size - max(steps, 0)]
-    return found
+        shifted[max(steps, 0) : size + min(steps, 0)] = photons[max(-steps, 0) : size - max(steps, 0)]
+    return shifted
 
 
 def stretched(grid: WavelengthGrid, photons: FloatArray, factor: float) -> FloatArray:
@@ -146,8 +146,8 @@ def stretched(grid: WavelengthGrid, photons: FloatArray, factor: float) -> Float
         return photons
     wave = grid.nodes_nm
     middle = float((wave * photons).sum() / photons.sum())
-    found = np.interp(middle + (wave - middle) / factor, wave, photons, left=0.0, right=0.0)
-    return np.asarray(found * (photons.sum() / found.sum()), dtype=float)
+    wider = np.interp(middle + (wave - middle) / factor, wave, photons, left=0.0, right=0.0)
+    return np.asarray(wider * (photons.sum() / wider.sum()), dtype=float)
 
 
 def _corners(
@@ -155,10 +155,10 @@ def _corners(
 ) -> list[_Point]:
     """Points whose hull is the region of two lights, nm."""
     (a, b), (x, y) = drifts, own
-    both = [(warmer, warmer) for warmer in population.warmer_k]
+    warmings = [(warmer, warmer) for warmer in population.warmer_k]
     if population.temperatures == "independent":
-        both = [(one, other) for one in population.warmer_k for other in population.warmer_k]
-    return [(a * one + u, b * other + v) for one, other in both for u in x for v in y]
+        warmings = [(one, other) for one in population.warmer_k for other in population.warmer_k]
+    return [(a * one + u, b * other + v) for one, other in warmings for u in x for v in y]
 
 
 def _hull(points: list[_Point]) -> list[_Point]:

@@ -1,14 +1,15 @@
-"""What needs a decision in a file of curves, decided: small negatives, single missing samples, repeated rows."""
+"""Decide what needs a decision in a file of curves: small negatives, single missing samples, repeated rows."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
 from ..base.errors import Fault
 from ..base.types import FloatArray
-from .isetcam import csv_text
+from .filter_files import csv_text
 from .scan import Scan
 from .spectrum import sample_faults
 
@@ -28,9 +29,9 @@ class Mended:
 
     def text(self, file: str, notes: tuple[str, ...]) -> str:
         """A clean CSV that says what was changed in its first lines."""
-        said = [f"# from {file}", *(f"# read: {note}" for note in notes), *(f"# changed: {c}" for c in self.changes)]
-        lines = [" ".join(line.split()) for line in said]
-        return "\n".join(lines) + "\n" + csv_text(self.wavelength_nm, dict(zip(self.names, self.values.T, strict=True)))
+        lines = [f"from {file}", *(f"read: {note}" for note in notes), *(f"changed: {c}" for c in self.changes)]
+        head = "".join(f"# {' '.join(line.split())}\n" for line in lines)
+        return head + csv_text(self.wavelength_nm, dict(zip(self.names, self.values.T, strict=True)))
 
 
 def mended(scan: Scan) -> Mended:
@@ -38,41 +39,33 @@ def mended(scan: Scan) -> Mended:
     straight line, and rows that say the same twice said once. Everything else stays, and is a fault.
     """
     changes: list[str] = []
-    wave, values = scan.wavelength_nm, scan.values.copy()
-    kept = np.isfinite(wave)
-    if not kept.all():
-        changes.append(f"{np.count_nonzero(~kept)} rows without a wavelength were left out")
-    wave, values = wave[kept], values[kept]
-    order = np.argsort(wave, kind="stable")
-    if (order != np.arange(order.size)).any():
+    order = np.argsort(scan.wavelength_nm, kind="stable")  # puts NaN last
+    kept = order[np.isfinite(scan.wavelength_nm[order])]
+    if kept.size < order.size:
+        changes.append(f"{order.size - kept.size} rows without a wavelength were left out")
+    if (np.diff(kept) < 0).any():
         changes.append("rows were sorted by wavelength")
-    wave, values = _once(wave[order], values[order], changes)
-    for at, name in enumerate(scan.names):
-        _mend(wave, values[:, at], name, changes)
+    wave, values = scan.wavelength_nm[kept], scan.values[kept]
+    again = np.zeros(wave.size, dtype=bool)
+    again[1:] = (wave[1:] == wave[:-1]) & (values[1:] == values[:-1]).all(axis=1)
+    if again.any():
+        changes.append(f"{np.count_nonzero(again)} rows that repeat another were left out")
+    wave, values = wave[~again], values[~again]
+    for name, column in zip(scan.names, values.T, strict=True):
+        changes += _mend(wave, column, name)
     groups = sample_faults("", wave, scan.names, values) if wave.size > 1 else [[Fault("fewer than two samples")]]
-    return Mended(wave, scan.names, values, tuple(changes), tuple(fault for group in groups for fault in group))
+    return Mended(wave, scan.names, values, tuple(changes), tuple(chain.from_iterable(groups)))
 
 
-def _once(wave: FloatArray, values: FloatArray, changes: list[str]) -> tuple[FloatArray, FloatArray]:
-    """Without rows that repeat the one before."""
-    same = np.zeros(wave.size, dtype=bool)
-    same[1:] = (wave[1:] == wave[:-1]) & (values[1:] == values[:-1]).all(axis=1)
-    if same.any():
-        changes.append(f"{np.count_nonzero(same)} rows that repeat another were left out")
-    return wave[~same], values[~same]
-
-
-def _mend(wave: FloatArray, column: FloatArray, name: str, changes: list[str]) -> None:
-    """Change a curve in place."""
+def _mend(wave: FloatArray, column: FloatArray, name: str) -> list[str]:
+    """Change a curve in place, and say how."""
+    changes = []
     finite = np.isfinite(column)
-    top = float(column[finite].max(initial=0.0))
-    low = finite & (column < 0) & (column >= -_SMALL * top)
+    low = finite & (column < 0) & (column >= -_SMALL * column[finite].max(initial=0.0))
     if low.any():
         changes.append(f"{name}: {np.count_nonzero(low)} negatives down to {column[low].min():.3g} were set to 0")
         column[low] = 0.0
-    inside = np.flatnonzero(~finite[1:-1]) + 1
-    for at in inside:
-        if finite[at - 1] and finite[at + 1]:
-            column[at] = np.interp(wave[at], wave[[at - 1, at + 1]], column[[at - 1, at + 1]])
-            place = f"the missing value at {wave[at]:g} nm"
-            changes.append(f"{name}: {place} is {column[at]:.6g}, by a straight line")
+    for at in np.flatnonzero(~finite[1:-1] & finite[:-2] & finite[2:]) + 1:
+        column[at] = np.interp(wave[at], wave[[at - 1, at + 1]], column[[at - 1, at + 1]])
+        changes.append(f"{name}: the missing value at {wave[at]:g} nm is {column[at]:.6g}, by a straight line")
+    return changes

@@ -46,7 +46,7 @@ def _by_name(value: Any) -> Any:
 
 def _spans_by_name(value: Any) -> Any:
     """Two numbers alone hold for every signal."""
-    return {name: from_to(each) for name, each in _by_name(value).items()}
+    return {name: from_to(span) for name, span in _by_name(value).items()}
 
 
 class Population(Section):
@@ -92,8 +92,8 @@ class Population(Section):
             raise ValueError(f"temperature_c: {self.temperature_c[0]:g} must not be above {self.temperature_c[1]:g}")
         for name, (low, high) in self.ageing_nm.items():
             if not low <= 0 <= high:
-                told = name or "a lamp"
-                raise ValueError(f"ageing_nm: {told} begins as new, so from 0 or less to 0 or more")
+                lamp = name or "a lamp"
+                raise ValueError(f"ageing_nm: {lamp} begins as new, so from 0 or less to 0 or more")
         if self.wanted_yield is not None and self.draws * (1 - self.wanted_yield) + _ROUNDING < _LEAST_BELOW:
             least = math.ceil(_LEAST_BELOW / (1 - self.wanted_yield) - _ROUNDING)
             raise ValueError(f"wanted_yield {self.wanted_yield:g} needs at least {least:,} `draws`, not {self.draws:,}")
@@ -108,7 +108,7 @@ class Population(Section):
 
     @property
     def told(self) -> str:
-        """What differs from a single lamp in it, in words."""
+        """Differences from a single lamp, in words."""
         given = self.model_dump(mode="json", exclude_defaults=True)
         return f"lamps of {given}"
 

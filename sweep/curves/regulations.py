@@ -30,7 +30,7 @@ SIGNAL_REGIONS: Mapping[str, Mapping[str, ColorRegion]] = {
     },
     "un_r48": {"yellow": LAMP_REGIONS["amber"], "red": LAMP_REGIONS["red"]},
 }
-"""What yellow and red lights a norm allows, between these bounds and the spectral locus, with corners (x, y).
+"""Yellow and red lights that a norm allows, between these bounds and the spectral locus, with corners (x, y).
 
 EN 12368: yellow (0.593, 0.387), (0.536, 0.444), red (0.660, 0.320), (0.690, 0.290). ITE: yellow 0.411 <= y <= 0.452,
 y >= 0.995 - x: (0.584, 0.411), (0.543, 0.452), red y <= 0.308, y >= 0.998 - x: (0.690, 0.308). ITE's supplement for

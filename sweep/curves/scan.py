@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..base.errors import DataError, Fault
 from ..base.types import FloatArray
 
+WAVELENGTH = "wavelength_nm"
+"""Name of the first column of the package's own files."""
 MOST_BYTES = 40_000_000
 MOST_CURVES = 2_000
 MOST_SAMPLES = 100_000
@@ -42,12 +46,18 @@ def check_size(file: str, line: int | None, n_samples: int, n_curves: int) -> No
             raise DataError(Fault(f"too many {what} in one file", file, line, None, count, f"at most {most:,}"))
 
 
+def unit_by_size(wave: FloatArray) -> float:
+    """Factor that brings wavelengths to nm: light between 100 nm and 20 um in nm, um or m."""
+    largest = float(np.nanmax(wave)) if np.isfinite(wave).any() else 0.0
+    return 1e9 if 0 < largest < 1e-4 else 1e3 if 0 < largest < 20 else 1.0
+
+
 def distinct(names: Sequence[str]) -> tuple[str, ...]:
     """Column names, numbered where one is empty or occurs twice."""
-    found: dict[str, None] = {}
+    unique: dict[str, None] = {}
     for index, name in enumerate(names):
-        own = name or f"column ({index + 2})"
-        while own in found:
-            own = f"{own} ({index + 2})"
-        found[own] = None
-    return tuple(found)
+        candidate = name or f"column ({index + 2})"
+        while candidate in unique:
+            candidate = f"{candidate} ({index + 2})"
+        unique[candidate] = None
+    return tuple(unique)

@@ -1,4 +1,4 @@
-"""What color a light has, and which traffic signal that is: chromaticity, dominant wavelength, EN 12368's regions."""
+"""The color of a light, and the traffic signal that it is: chromaticity, dominant wavelength, EN 12368's regions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .color import REGIONS, VISIBLE_NM, chromaticity
 from .spectrum import WavelengthGrid
 
 VISIBLE = WavelengthGrid(start_nm=VISIBLE_NM[0], stop_nm=VISIBLE_NM[1], step_nm=1.0)
-"""What the CIE 1931 color-matching functions cover."""
+"""Range of the CIE 1931 color-matching functions."""
 EQUAL_ENERGY = (1 / 3, 1 / 3)
 """White that dominant wavelength and purity are counted from: CIE illuminant E."""
 NEAR_NM = 30.0

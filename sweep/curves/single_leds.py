@@ -84,7 +84,7 @@ class SingleLeds:
         return equal_photons(grid, self._shapes(grid))
 
     def allowed(self, norm: Norm, kind: str) -> SingleLeds:
-        """Those whose color is inside a norm's region of a signal type."""
+        """The LEDs whose color is inside a norm's region of a signal type."""
         inside = SIGNAL_REGIONS[norm][kind].violation(chromaticity(VISIBLE, self._shapes(VISIBLE))) <= 0
         return SingleLeds(self.peak_nm[inside], self.fwhm_nm[inside])
 
@@ -92,8 +92,8 @@ class SingleLeds:
         """Photon spectra with a peak of 1, ndarray[n, n_wavelengths]."""
         decays = self.fwhm_nm / _FWHM
         nodes = grid.nodes_nm
-        each = [led_photons(nodes, peak, a, a) for peak, a in zip(self.peak_nm, decays, strict=True)]
-        return np.asarray(each, dtype=float).reshape(-1, grid.size)
+        shapes = [led_photons(nodes, peak, a, a) for peak, a in zip(self.peak_nm, decays, strict=True)]
+        return np.asarray(shapes, dtype=float).reshape(-1, grid.size)
 
 
 def every_led(asked: RegionMap) -> SingleLeds:

@@ -24,9 +24,9 @@ PLANCK_J_S = 6.62607015e-34
 LIGHT_M_S = 299792458.0
 """Speed of light in vacuum, exact in the SI."""
 LARGEST = 1e100
-"""Of a curve's values, in any unit. Products of what is larger leave the range of floats."""
+"""Limit of a curve's values, in any unit. Products of what is larger leave the range of floats."""
 LEAST_PEAK = 1e-100
-"""Of a curve that is not 0; its other values may be as small as they like."""
+"""Least peak of a curve that is not 0; its other values may be as small as they like."""
 _GRID_SLACK = 1e-9
 _MOST_STEPS = 20_000
 
@@ -145,14 +145,14 @@ def check_samples(wavelength_nm: ArrayLike, values: ArrayLike) -> tuple[FloatArr
 
 
 def sample_faults(file: str, wave: FloatArray, names: Sequence[str], data: FloatArray) -> list[list[Fault]]:
-    """What `check_samples` refuses of the curves of a file, ndarray[n_samples, n_curves], a group for each curve."""
-    found = []
+    """Faults by `check_samples` of the curves of a file, ndarray[n_samples, n_curves], a group for each curve."""
+    groups = []
     for index, name in enumerate(names):
         try:
             check_samples(wave, data[:, index])
         except DataError as error:
-            found.append([Fault(f.problem, file, None, name, f.value, f.allowed) for f in error.faults])
-    return found
+            groups.append([Fault(f.problem, file, None, name, f.value, f.allowed) for f in error.faults])
+    return groups
 
 
 def resample(
@@ -181,11 +181,11 @@ def resample(
             )
         )
     if method == "linear":
-        found = np.interp(nodes, wave, data, left=0.0, right=0.0)
+        gridded = np.interp(nodes, wave, data, left=0.0, right=0.0)
         # A node that misses the first or last sample by rounding alone still takes that sample.
-        found[np.abs(nodes - wave[0]) <= slack] = data[0]
-        found[np.abs(nodes - wave[-1]) <= slack] = data[-1]
-        return found
+        gridded[np.abs(nodes - wave[0]) <= slack] = data[0]
+        gridded[np.abs(nodes - wave[-1]) <= slack] = data[-1]
+        return gridded
     low = np.clip(nodes - grid.step_nm / 2, wave[0], wave[-1])
     high = np.clip(nodes + grid.step_nm / 2, wave[0], wave[-1])
     width = high - low
@@ -226,3 +226,18 @@ def equal_photons(grid: WavelengthGrid, photons: FloatArray) -> FloatArray:
             )
         )
     return photons / total[..., None]
+
+
+def hats(at: FloatArray, knots: FloatArray) -> FloatArray:
+    """Weights of values at ascending `knots` in the lines between them, ndarray[n_knots, n_at]; flat beyond the ends.
+
+    Any f, ndarray[..., n_knots], is f @ hats at the points `at`.
+    """
+    if knots.size == 1:
+        return np.ones((1, at.size))
+    left = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, knots.size - 2)
+    share = np.clip(1 / np.diff(knots)[left] * (at - knots[left]), 0.0, 1.0)
+    share[at >= knots[-1]] = 1.0
+    weights, points = np.zeros((knots.size, at.size)), np.arange(at.size)
+    weights[left, points], weights[left + 1, points] = 1 - share, share
+    return weights

@@ -1,4 +1,4 @@
-"""What else a camera must see: tasks as spectra on the wavelength grid, with what their columns are called by."""
+"""Tasks beside traffic lights, as spectra on the wavelength grid, and the names of their columns."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ high and low pressure."""
 
 @dataclass(frozen=True)
 class TaskName:
-    """What names a task's columns: its metric, and its lights."""
+    """Names of a task's columns: its metric, and its lights."""
 
     name: str
     metric: Measure
@@ -111,7 +111,7 @@ class StudyTasks:
 
     @property
     def keys(self) -> tuple[TaskName, ...]:
-        """What names their columns."""
+        """Names of their columns."""
         return tuple(task.key for task in self.tasks)
 
     @property

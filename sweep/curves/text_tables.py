@@ -1,13 +1,14 @@
-"""Tables of text as instruments and spreadsheets write them: what can be meant in one way only is read, and told."""
+"""Tables of text as instruments and spreadsheets write them: what can be meant in one way only is read, and noted."""
 
 from __future__ import annotations
 
 import codecs
 import csv
 import io
+import math
 import re
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -15,117 +16,138 @@ import numpy as np
 from ..base.disk import read_input
 from ..base.errors import DataError, Fault
 from ..base.types import FloatArray
-from .cells import TableCells, number_of
-from .scan import MOST_BYTES, Scan, check_size, distinct
-from .spectrum import sample_faults
-from .table_steps import TextRow, TextTable, plainly
-from .wavelength_names import WAVELENGTH, unit_words, wavelength_unit
+from .scan import MOST_BYTES, WAVELENGTH, Scan, check_size, distinct, unit_by_size
+from .spectrum import LARGEST, sample_faults
 
 _COMMENTS = ("#", "%", "//")
 _BEGIN = re.compile(r">{3,}begin.*<{3,}|\[data\]", re.IGNORECASE)
 _END = re.compile(r">{3,}end.*<{3,}|\[endoffile\]|\[end.*\]", re.IGNORECASE)
-"""Of spectrometers: `>>>>>Begin Spectral Data<<<<<` (Ocean), `[Data]` (Thorlabs)."""
+"""Marks of spectrometers: `>>>>>Begin Spectral Data<<<<<` (Ocean), `[Data]` (Thorlabs)."""
 _MARKS = {"\t": "tabs", ";": "semicolons", ",": "", " ": "blanks"}
 _RELEVANT = 50
 """Lines that say how a table is laid out."""
 _UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
-_BEGINNINGS = {
-    b"PK\x03\x04": "a ZIP archive or a spreadsheet (.xlsx)",
-    b"\xd0\xcf\x11\xe0": "an old spreadsheet (.xls)",
-    b"\x1f\x8b": "a gzip archive",
-    b"\x89PNG": "a PNG picture",
-    b"\xff\xd8\xff": "a JPEG picture",
-    b"%PDF-": "a PDF document",
-    b"\x7fELF": "a program",
-}
-"""Files that are no text, by their first bytes."""
 _CONTROLS = re.compile(rb"[\x01-\x08\x0e-\x19\x1c-\x1f]")
-"""Control bytes that no text has, UTF-16 and stray NULs included."""
+"""Control bytes: spreadsheets, archives and pictures have them, and NULs, within the first few bytes."""
 _BEGINNING_BYTES = 4096
+_WORDS = (
+    *("wavelength", "wavelengths", "wave length", "wave", "wvl", "wl", "lambda", "\u03bb"),
+    *("wellenl\u00e4nge", "wellenlaenge", "longueur d'onde", "longitud de onda", "lunghezza d'onda"),
+    "comprimento de onda",
+)
+_UNITS_NM = {
+    **dict.fromkeys(("nm", "nanometer", "nanometers", "nanometre", "nanometres"), 1.0),
+    **dict.fromkeys(("um", "\u00b5m", "\u03bcm", "micron", "microns", "micrometer", "micrometers"), 1e3),
+    **dict.fromkeys(("\u00e5", "angstrom", "angstroms"), 0.1),
+    "m": 1e9,
+}
+_UNIT_WORDS = {1.0: "nm", 1e3: "um", 0.1: "angstrom", 1e9: "m"}
+_MOST_CELL_FAULTS = 10_000
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+_DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+_NAME_AND_UNIT = re.compile(r"(.*?)[\s_/,.\-]*[\[(]?\s*([^\W\d_]+)\s*[\])]?")
+
+
+@dataclass
+class TextTable:
+    """A table of texts: its head, its rows with their line numbers, and how it was read.
+
+    `unit` brings its wavelengths to nm (0: its head says none), `factor` its values to plain numbers.
+    """
+
+    file: str
+    line: int
+    header: list[str]
+    rows: list[tuple[int, list[str]]]
+    notes: list[str]
+    decimal: str = "."
+    unit: float = 1.0
+    factor: float = 1.0
+    faults: list[Fault] = field(default_factory=list)
 
 
 def scan_text(path: Path) -> Scan:
-    """Read a table of text as far as possible; its delimiter, decimal mark, head, unit and order are found out.
+    """Read a table of curves as far as possible; its delimiter, decimal mark, head, unit and order are recognized.
 
     What is not as `wavelength_nm,...` with points is in `notes`. What two readers could read in two ways is a fault.
     Raises DataError where there is no table at all.
     """
-    return _numbers(plainly(text_table(path)))
+    table = text_table(path)
+    _read_unit_row(table)
+    _put_wavelength_first(table)
+    _strip_percent(table)
+    _find_decimal(table)
+    return _numbers(table)
 
 
 def text_table(path: Path, first: str = WAVELENGTH) -> TextTable:
-    """Head and rows of a file, as texts; `first`: what its first column is to be called.
+    """Head and rows of a file, as texts; `first`: name of its first column in messages.
 
     Raises DataError where there is no table at all.
     """
-    text, notes, faults = _decoded(path)
-    table = _laid_out(str(path), text, first)
-    return replace(table, notes=(*notes, *table.notes), faults=(*faults, *table.faults))
-
-
-def _decoded(path: Path) -> tuple[str, list[str], list[Fault]]:
-    """A file's text; how it was decoded, and the fault of one with NULs. Raises DataError where it is no text."""
-    content = read_input(path, MOST_BYTES, DataError)
-    kind = _kind_of(content[:_BEGINNING_BYTES])
-    if kind is not None:
-        raise DataError(Fault(f"not a text table: {kind}", str(path), allowed="text; save it as CSV"))
-    notes: list[str] = []
-    try:
-        if content[:2] in _UTF_16 and content[:4] != codecs.BOM_UTF32_LE:
-            text = content.decode("utf-16")
-            notes.append("the text is UTF-16")
-        else:
-            text = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = content.decode("latin-1")
-        notes.append("the text is not UTF-8, and was read as Latin-1")
+    text, notes = _decoded(path)
+    table = _laid_out(str(path), text.replace("\0", ""), first, notes)
     if "\0" in text:
-        fault = Fault("NUL characters in the text", str(path), allowed="UTF-8; UTF-16? save as UTF-8")
-        return text.replace("\0", ""), notes, [fault]
-    return text, notes, []
+        table.faults.append(Fault("NUL characters in the text", str(path), allowed="UTF-8; UTF-16? save as UTF-8"))
+    _drop_empty_column(table)
+    return table
 
 
-def _kind_of(beginning: bytes) -> str | None:
-    """Name what a file is that is no text; it would take long to find a fault in each of its lines."""
-    known = next((kind for first, kind in _BEGINNINGS.items() if beginning.startswith(first)), None)
-    binary = beginning[:2] not in _UTF_16 and b"\0" in beginning and _CONTROLS.search(beginning)
-    return known or ("binary data" if binary else None)
+def lens_table(path: Path, first: str) -> TextTable:
+    """Head and rows of a file of no wavelengths, with the mark of its decimals."""
+    table = text_table(path, first)
+    _find_decimal(table)
+    return table
 
 
-def _laid_out(file: str, text: str, first: str) -> TextTable:
+def _decoded(path: Path) -> tuple[str, list[str]]:
+    """A file's text and how it was decoded. Raises DataError where it is no text."""
+    content = read_input(path, MOST_BYTES, DataError)
+    wide = content[:2] in _UTF_16 and content[:4] != codecs.BOM_UTF32_LE
+    beginning = content[:_BEGINNING_BYTES]
+    if content[:2] not in _UTF_16 and b"\0" in beginning and _CONTROLS.search(beginning):
+        raise DataError(Fault("not a text table", str(path), allowed="text; save a spreadsheet as CSV"))
+    try:
+        return content.decode("utf-16" if wide else "utf-8-sig"), ["the text is UTF-16"] if wide else []
+    except UnicodeDecodeError:
+        return content.decode("latin-1"), ["the text is not UTF-8, and was read as Latin-1"]
+
+
+def _laid_out(file: str, text: str, first: str, notes: list[str]) -> TextTable:
     """Head and rows of a text: the head is the line above the first numbers, or the first that names wavelengths."""
     lines = io.StringIO(text, newline=None).read().split("\n")
     kept = [(n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.startswith(_COMMENTS)]
     begin = next((i for i, (_, line) in enumerate(kept) if _BEGIN.fullmatch(line.strip())), None)
-    notes = [] if begin is None else [f"{kept[begin][0]} lines of a spectrometer's head were left out"]
-    kept = kept if begin is None else kept[begin + 1 :]
+    if begin is not None:
+        notes.append(f"{kept[begin][0]} lines of a spectrometer's head were left out")
+        kept = kept[begin + 1 :]
     if kept and _END.fullmatch(kept[-1][1].strip()):
-        kept = kept[:-1]
+        kept.pop()
+    empty = Fault("the file is empty", file, allowed=f"a header `{first},...` and rows of numbers")
     if not kept:
-        raise DataError(Fault("the file is empty", file, allowed=f"a header `{first},...` and rows of numbers"))
+        raise DataError(empty)
     mark = _mark([line for _, line in kept[:_RELEVANT]])
-    count = kept[0][1].count(mark) if mark else 0
-    check_size(file, None, len(kept) - 1, count)
+    check_size(file, None, len(kept) - 1, kept[0][1].count(mark))
     at = _head(kept, mark) if begin is None else None
     if at:
         notes.append(f"{at} title {'line was' if at == 1 else 'lines were'} left out")
-    if mark and _MARKS[mark]:
+    if _MARKS[mark]:
         notes.append(f"columns are separated by {_MARKS[mark]}")
     rows = _rows(file, kept[at or 0 :], mark)
     if not rows:
-        raise DataError(Fault("the file is empty", file, allowed=f"a header `{first},...` and rows of numbers"))
+        raise DataError(empty)
     line, header = rows[0]
     if at is None:
         columns = len(header)
         header = [WAVELENGTH, *(["values"] if columns == 2 else [f"curve_{i}" for i in range(1, columns)])]
         notes.append("there is no header: the first column was taken for wavelengths")
-        return TextTable(file, line, header, rows, mark, unit=0.0, notes=tuple(notes))
+        return TextTable(file, line, header, rows, notes, unit=0.0)
     check_size(file, line, len(rows) - 1, len(header) - 1)
-    return TextTable(file, line, [cell.strip() for cell in header], rows[1:], mark, notes=tuple(notes))
+    return TextTable(file, line, [cell.strip() for cell in header], rows[1:], notes)
 
 
 def _mark(lines: Sequence[str]) -> str:
-    """What separates the columns: the first of tabs, semicolons, commas and blanks that most lines have equally often.
+    """The separator of the columns: the first of tabs, semicolons and commas that most lines have equally often.
 
     In a text with semicolons or tabs, a comma is a decimal one.
     """
@@ -135,45 +157,127 @@ def _mark(lines: Sequence[str]) -> str:
         if 2 * len(some) > len(lines) and some.count(max(set(some), key=some.count)) * 2 > len(some):
             return mark
     first = next((mark for mark in (",", ";", "\t") if mark in lines[0]), "")
-    split = [line.split() for line in lines]
-    if not first and all(len(cells) > 1 for cells in split[-1:]) and all(_numeric(c) for c in split[-1]):
-        return " "
-    return first or ","
+    last = lines[-1].split()
+    return first or (" " if len(last) > 1 and all(map(_numeric, last)) else ",")
 
 
 def _head(kept: Sequence[tuple[int, str]], mark: str) -> int | None:
-    """Which of the lines is the head; None where the first line has numbers alone, and there is none."""
-    split = [_cells(line, mark) for _, line in kept[:_RELEVANT]]
-    named = next((i for i, cells in enumerate(split) if any(wavelength_unit(c) is not None for c in cells)), None)
+    """Index of the head among the lines; None where the first line has numbers alone, and there is none."""
+    split = [line.split() if mark == " " else line.split(mark) for _, line in kept[:_RELEVANT]]
+    named = next((i for i, cells in enumerate(split) if any(_wavelength_unit(c) is not None for c in cells)), None)
     if named is not None and len(split[named]) > 1:
         return named
-    if len(split[0]) > 1 and all(_numeric(cell) for cell in split[0]) and len(split) > 1:
+    numbers = next((i for i, cells in enumerate(split) if len(cells) > 1 and all(map(_numeric, cells))), None)
+    if numbers == 0 and len(split) > 1:
         return None
-    numbers = next((i for i, cells in enumerate(split) if len(cells) > 1 and all(map(_numeric, cells))), 0)
-    return max(0, numbers - 1) if numbers and len(split[numbers - 1]) == len(split[numbers]) else 0
-
-
-def _cells(line: str, mark: str) -> list[str]:
-    return line.split() if mark == " " else line.split(mark)
+    return numbers - 1 if numbers and len(split[numbers - 1]) == len(split[numbers]) else 0
 
 
 def _numeric(cell: str) -> bool:
     return number_of(cell.strip().strip('"').replace(",", ".")) is not None
 
 
-def _rows(file: str, kept: Sequence[tuple[int, str]], mark: str) -> list[TextRow]:
+def _rows(file: str, kept: Sequence[tuple[int, str]], mark: str) -> list[tuple[int, list[str]]]:
     """The cells of each line; quotes may hold a separator, and no line."""
     if mark == " ":
         return [(n, line.split()) for n, line in kept]
-    found = []
+    rows = []
     for n, line in kept:
         try:
             (cells,) = csv.reader([line], delimiter=mark, strict=line.count('"') % 2 == 1)
         except (csv.Error, ValueError) as error:
             raise DataError(Fault(f"not a readable CSV: {error}", file, n)) from None
         if any(cell.strip() for cell in cells):
-            found.append((n, cells))
-    return found
+            rows.append((n, cells))
+    return rows
+
+
+def _wavelength_unit(cell: str) -> float | None:
+    """Factor that brings a column with this head to nm: 1 for `nm`, `Wavelength (nm)`; 0 where it has no unit.
+
+    None for a head that is none of wavelengths.
+    """
+    text = " ".join(cell.replace("\u212b", "\u00e5").split()).casefold()
+    if text in _WORDS:
+        return 0.0
+    match = _NAME_AND_UNIT.fullmatch(text)
+    if match is None or match[2] not in _UNITS_NM:
+        return None
+    return _UNITS_NM[match[2]] if not match[1] or match[1].strip() in _WORDS else None
+
+
+def _drop_empty_column(table: TextTable) -> None:
+    """Drop a last column that is empty in every row, as trailing separators make it."""
+    width, lengths = len(table.header), {len(row) for _, row in table.rows}
+    unnamed = lengths == {width} and not table.header[-1]
+    if (unnamed or lengths == {width + 1}) and not any(row[-1].strip() for _, row in table.rows):
+        table.header = table.header[: width - unnamed]
+        table.rows = [(n, row[:-1]) for n, row in table.rows]
+        table.notes.append("an empty last column was left out")
+
+
+def _read_unit_row(table: TextTable) -> None:
+    """Take a second head for units: `nm`, and for the values `%` or nothing."""
+    if not table.rows or _wavelength_unit(table.header[0]) != 0:
+        return
+    first, *units = [cell.strip().strip("[]()") for cell in table.rows[0][1]]
+    if first.casefold() not in _UNITS_NM or len(units) != len(table.header) - 1 or set(units) - {"", "%", "-", "1"}:
+        return
+    table.header[0] = f"wavelength ({first})"
+    table.rows = table.rows[1:]
+    percent = set(units) == {"%"}
+    table.factor = 0.01 if percent else 1.0
+    table.notes.append("a row of units was read" + (", values are in percent" if percent else ""))
+
+
+def _put_wavelength_first(table: TextTable) -> None:
+    """Make the wavelengths the first column, and read their unit."""
+    header = table.header
+    if table.unit == 0:  # there is no head
+        return
+    units = [_wavelength_unit(cell) for cell in header]
+    at = [i for i, unit in enumerate(units) if unit is not None]
+    if len(at) != 1 and units[0] is None:
+        allowed = f"`{WAVELENGTH}` as the first column"
+        table.faults.append(Fault("no column wavelength", table.file, table.line, header[0], header[0], allowed))
+        return
+    place = at[0]
+    table.unit = units[place] or 0.0
+    if header[place] != WAVELENGTH or place:
+        table.notes.append(f"wavelengths are column {header[place]!r}")
+    if table.unit not in (0.0, 1.0):
+        table.notes.append(f"wavelengths in {_UNIT_WORDS[table.unit]} were brought to nm")
+    index = [i for i in range(place) if _counts(table, i)]
+    if index:
+        table.notes.append("a column that counts the rows was left out")
+    order = [place, *(i for i in range(len(header)) if i != place and i not in index)]
+    width = len(header)
+    table.header = [WAVELENGTH, *(header[i] for i in order[1:])]
+    if order != list(range(width)):
+        table.rows = [(n, [row[i] for i in order] if len(row) == width else row) for n, row in table.rows]
+
+
+def _counts(table: TextTable, column: int) -> bool:
+    """Return whether a column without a name holds the numbers of the rows."""
+    cells = [row[column].strip() for _, row in table.rows if len(row) == len(table.header)]
+    return not table.header[column] and cells in ([str(i + start) for i in range(len(cells))] for start in (0, 1))
+
+
+def _strip_percent(table: TextTable) -> None:
+    """Strip the percent signs where every value has one."""
+    values = [cell for _, row in table.rows for cell in row[1:]]
+    if values and all(cell.rstrip().endswith("%") for cell in values):
+        table.rows = [(n, [row[0], *(cell.rstrip()[:-1].rstrip() for cell in row[1:])]) for n, row in table.rows]
+        table.factor = 0.01
+        table.notes.append("values have percent signs, and were divided by 100")
+
+
+def _find_decimal(table: TextTable) -> None:
+    """Find the decimal mark: a comma where there are some and no point, in a text that has other separators."""
+    text = "".join(cell for _, row in table.rows for cell in row)
+    if "," in text and "." not in text and "separated" in str(table.notes):
+        table.decimal = ","
+        table.notes.append("numbers have decimal commas")
 
 
 def _numbers(table: TextTable) -> Scan:
@@ -182,34 +286,31 @@ def _numbers(table: TextTable) -> Scan:
     waves = [number_of(row[0].replace(table.decimal, ".")) for _, row in table.rows if row]
     known = [wave for wave in waves if wave is not None]
     falling = len(known) > 1 and known == sorted(known, reverse=True) and known[0] > known[-1]
-    values, cells = TableCells(table.file, table.header, table.decimal, falling).read(table.rows)
-    notes = list(table.notes)
+    values, cells = table_numbers(table.file, table.header, table.rows, table.decimal, falling=falling)
     if falling:
         values = values[::-1]
-        notes.append("falling wavelengths were turned round")
-    unit = table.unit or _unit_by_size(values[:, 0], notes)
+        table.notes.append("falling wavelengths were turned round")
+    unit = table.unit
+    if not unit:
+        unit = unit_by_size(values[:, 0])
+        table.notes.append(f"wavelengths have no unit, and were taken for {_UNIT_WORDS[unit]} by their size")
     wave = values[:, 0] if unit == 1 else np.round(values[:, 0] * unit, 6)
     curves = values[:, 1:] if table.factor == 1 else values[:, 1:] * table.factor
     names = distinct(table.header[1:])
-    clean = not layout and not cells
-    samples = sample_faults(table.file, wave, names, curves) if clean else _unit_faults(table.file, wave)
-    return Scan(wave, names, curves, tuple(tuple(group) for group in (layout, cells, *samples) if group), tuple(notes))
-
-
-def _unit_by_size(wave: FloatArray, notes: list[str]) -> float:
-    """The unit of wavelengths whose head says none: by their size, light between 100 nm and 20 um."""
-    largest = float(np.nanmax(wave)) if np.isfinite(wave).any() else 0.0
-    unit = 1e9 if 0 < largest < 1e-4 else 1e3 if 0 < largest < 20 else 1.0
-    notes.append(f"wavelengths have no unit, and were taken for {unit_words(unit)} by their size")
-    return unit
+    if layout or cells:  # what is wrong with the wavelengths beside faults that have a line of their own
+        sorted_nm = np.unique(wave[np.isfinite(wave)])
+        samples = sample_faults(table.file, sorted_nm, [WAVELENGTH], np.zeros((sorted_nm.size, 1)))
+    else:
+        samples = sample_faults(table.file, wave, names, curves)
+    groups = tuple(tuple(group) for group in (layout, cells, *samples) if group)
+    return Scan(wave, names, curves, groups, tuple(table.notes))
 
 
 def _header_faults(table: TextTable) -> list[Fault]:
     header, file, line = table.header, table.file, table.line
     if header[0] != WAVELENGTH:
-        return []  # told already
-    seen: set[str] = set()
-    twice = [name for name in header if name in seen or seen.add(name)]  # type: ignore[func-returns-value]
+        return []  # has its fault already
+    twice = [name for index, name in enumerate(header) if name in header[:index]]
     faults = [Fault("column occurs twice", file, line, name) for name in twice]
     if "" in header:
         faults.append(Fault("a column has no name", file, line, value=header))
@@ -218,7 +319,50 @@ def _header_faults(table: TextTable) -> list[Fault]:
     return faults
 
 
-def _unit_faults(file: str, wave: FloatArray) -> list[list[Fault]]:
-    """What is wrong with the wavelengths beside faults that have a line of their own."""
-    sorted_nm = np.unique(wave[np.isfinite(wave)])
-    return sample_faults(file, sorted_nm, [WAVELENGTH], np.zeros((sorted_nm.size, 1)))
+def table_numbers(
+    file: str,
+    header: list[str],
+    rows: list[tuple[int, list[str]]],
+    decimal: str,
+    *,
+    falling: bool = False,
+    noun: str = "wavelength",
+) -> tuple[FloatArray, list[Fault]]:
+    """ndarray[n_samples, n_columns], NaN where a cell is no number; and the faults, row by row.
+
+    `falling`: the first column falls from row to row; `noun`: what it holds.
+    """
+    values = np.full((len(rows), len(header)), np.nan)
+    faults: list[Fault] = []
+    order = "strictly decreasing" if falling else "strictly increasing"
+    for index, (line, row) in enumerate(rows):
+        if len(faults) >= _MOST_CELL_FAULTS:
+            faults.append(Fault("too many faults; what follows was not read", file, line))
+            break
+        if len(row) != len(header):
+            faults.append(Fault("wrong number of columns", file, line, None, len(row), str(len(header))))
+            continue
+        for column, text in enumerate(row):
+            cell = text.replace(decimal, ".").strip()
+            number = number_of(cell)
+            if number is None:
+                comma = "; a decimal comma? use a point" if _DECIMAL_COMMA.fullmatch(cell) else ""
+                faults.append(Fault("not a usable number", file, line, header[column], cell, f"finite, >= 0{comma}"))
+                continue
+            if number < 0 and column:
+                faults.append(Fault("negative value", file, line, header[column], cell, "finite, >= 0"))
+            if number > LARGEST:
+                faults.append(Fault("value too large", file, line, header[column], cell, f"0 to {LARGEST:g}"))
+            values[index, column] = number
+        now, before = values[index, 0].item(), values[index - 1, 0].item() if index else math.nan
+        if now == before:
+            faults.append(Fault(f"{noun} occurs twice", file, line, header[0], now, order))
+        elif (now > before) if falling else (now < before):
+            faults.append(Fault(f"{noun}s are not sorted", file, line, header[0], now, order))
+    return values, faults
+
+
+def number_of(cell: str) -> float | None:
+    """A finite number as tables have it; Python's own underscores and other scripts' digits are none."""
+    number = float(cell) if _NUMBER.fullmatch(cell.strip()) else math.nan
+    return number + 0.0 if math.isfinite(number) else None

@@ -95,16 +95,6 @@ class EdgeSums:
     left: FloatArray
     right: FloatArray
 
-    @cached_property
-    def across(self) -> FloatArray:
-        """`right` with the edges side by side, ndarray[n, n_edges]."""
-        return np.ascontiguousarray(self.right.T)
-
-    @cached_property
-    def largest(self) -> float:
-        """The largest of all; NaN where one is."""
-        return float(np.max([np.abs(part).max() for part in (self.base, self.left, self.right)]))
-
 
 class KnownShapes(NamedTuple):
     """What `compiled.shapes_of_edges` knows of a grid before it sees a design."""

@@ -17,8 +17,7 @@ from ..curves.files import read_curves
 from ..curves.light_unit import LightUnit
 from ..curves.lights import Lights
 from ..curves.spectrum import Curves
-from .channels import NEW, Layout, layout_of
-from .files import sensor_file
+from .channels import NEW, Layout, layout_of, sensor_file
 from .opening import Given, made_study, own_lights, sensor_given
 from .verdicts import OWN, PLAIN_TILE, Judged, Verdict, judge, opposite, with_base
 

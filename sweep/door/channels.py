@@ -1,15 +1,20 @@
-"""Which channel a column of QE is, and which CFAs and filter the channels allow."""
+"""Channels of a user's file of QE, by its columns, and the CFAs and the filter that these allow."""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from ..curves.facts import Curve
-from ..curves.isetcam import HINTS
+from ..base.errors import DataError, Fault
+from ..curves.facts import Curve, qe_scale
+from ..curves.filter_files import HINTS
+from ..curves.light_files import MOST_LETTERS, clean_curves
 
 _WORDS = {
     "red": "R",
@@ -31,6 +36,8 @@ _CLEAR_NM = 180.0
 """Equivalent width from which on a curve is rather that of a clear pixel."""
 _RATIO = "_over_"
 """In the name of a filter's transmission over another curve, as `sweep export` writes it."""
+_NEEDED_NM = (450.0, 680.0)
+"""What a sensor's curves must cover, so that every signal color is seen."""
 NEW = "N"
 """The channel that a study designs."""
 
@@ -146,3 +153,40 @@ def layout_of(channels: Mapping[str, float]) -> Layout:
     changed = [*tile[:at], NEW, *tile[at + 1 :]]
     to = "G" if "G" in channels and base != "G" else "0.1"
     return Layout(tuple("".join(tile) for _, tile in fitting), "".join(changed), base, to)
+
+
+@dataclass(frozen=True)
+class SensorFile:
+    """`totals`: channel -> sum of its curve. `range_nm`: where a grid in whole nm can begin and end."""
+
+    name: str
+    channels: Channels
+    totals: Mapping[str, float]
+    scale: float
+    range_nm: tuple[int, int]
+
+    def keys(self, file: str) -> dict[str, Any]:
+        """What a study says of it."""
+        entry = {"file": file, "columns": dict(self.channels.columns), "scale": self.scale}
+        return {"name": self.name, "files": [entry]}
+
+
+def sensor_file(path: Path) -> SensorFile:
+    """The channels of a file of QE curves; raises DataError for one that no study can use."""
+    curves = clean_curves(path)
+    channels = channels_of(curves)
+    if not channels.columns:
+        raise DataError(Fault("no curve that could be QE", str(path), allowed="values above 0 between 400 and 700 nm"))
+    wave = next(iter(curves.values())).wavelength_nm
+    if wave[0] > _NEEDED_NM[0] or wave[-1] < _NEEDED_NM[1]:
+        allowed = f"{_NEEDED_NM[0]:g} to {_NEEDED_NM[1]:g} nm or more"
+        raise DataError(
+            Fault("QE of too few wavelengths", str(path), None, None, f"{wave[0]:g} to {wave[-1]:g} nm", allowed)
+        )
+    return SensorFile(
+        name=path.stem[:MOST_LETTERS],
+        channels=channels,
+        totals={channel: float(curves[column].values.sum()) for channel, column in channels.columns.items()},
+        scale=qe_scale(max(curves[column].peak for column in channels.columns.values())),
+        range_nm=(max(400, math.ceil(wave[0])), min(700, math.floor(wave[-1]))),
+    )

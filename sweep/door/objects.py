@@ -17,8 +17,17 @@ from ..metrics.quantity import Column, Quantity
 from ..search.limit import Limit
 from ..study import Study, folder_name
 from .given import CurveLike, on_grid, over_nm
-from .limits import any_filter, at_least, limit_or_reason
-from .own_filters import bases_of, cfa_with, judged, setup_with, table_of, with_units
+from .own_filters import (
+    any_filter,
+    at_least,
+    bases_of,
+    cfa_with,
+    judged,
+    limit_or_reason,
+    setup_with,
+    table_of,
+    with_units,
+)
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -17,7 +17,7 @@ from ..curves.light_unit import LightUnit
 from ..curves.spectrum import Curves
 from ..study import load_study, study_of_keys
 from ..study.shipped import shipped_names, study_path
-from .files import sensor_file
+from .channels import sensor_file
 from .given import CurveLike, as_curves, curves_of_table
 from .objects import FinishedRun, LoadedStudy
 

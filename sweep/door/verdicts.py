@@ -21,9 +21,8 @@ from ..metrics.separation import csd_name
 from ..metrics.smooth import smooth_csd
 from ..search.limit import gap_between
 from ..study import Study
-from .limits import any_filter, as_exposed, at_least, limit_or_reason
 from .opening import Given, made_study
-from .own_filters import judged, table_of
+from .own_filters import any_filter, as_exposed, at_least, judged, limit_or_reason, table_of
 
 if TYPE_CHECKING:
     import pandas as pd

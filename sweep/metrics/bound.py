@@ -52,10 +52,7 @@ class Bound(Section):
 
 
 def total_violation(
-    columns: Mapping[str, FloatArray],
-    constraints: Mapping[str, Bound],
-    own: FloatArray,
-    leave_out: Iterable[str] = (),
+    columns: Mapping[str, FloatArray], constraints: Mapping[str, Bound], own: FloatArray, leave_out: Iterable[str] = ()
 ) -> FloatArray:
     """Largest violation of each design, relative to the bound for a study's constraints: ndarray[n_designs].
 

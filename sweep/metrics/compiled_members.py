@@ -135,22 +135,3 @@ def nearest_members(
                         where[i, j, p, k] = 0.0
                         for corner in range(3):
                             where[i, j, p, k] += weights[corner] * shares[triangle, corner, k]
-
-
-@njit(cache=True, nogil=True)
-def drawn_distances(
-    response: FloatArray, cases: IndexArray, below: IndexArray, shares: FloatArray, out: FloatArray
-) -> None:
-    """Distances of draws of two shifted lights, ndarray[n], into `out`.
-
-    `response`: ndarray[n_cases, n_spectra, n_channels]; `cases`: ndarray[n]; `below`, `shares`: ndarray[n, 2], the
-    spectrum below each shift, and how far above it.
-    """
-    for k in range(out.size):
-        case, one, other = cases[k], below[k, 0], below[k, 1]
-        squared = 0.0
-        for c in range(response.shape[2]):
-            x = response[case, one, c] + shares[k, 0] * (response[case, one + 1, c] - response[case, one, c])
-            y = response[case, other, c] + shares[k, 1] * (response[case, other + 1, c] - response[case, other, c])
-            squared += (x - y) ** 2
-        out[k] = np.sqrt(squared)

@@ -41,45 +41,13 @@ class Errors:
     state_bound: FloatArray
 
 
-@dataclass(frozen=True)
-class _Numbers:
-    """A channel's digital numbers: of each distinct signal the first bin, where its roots begin, and roots of shares.
+def _bins(pixel: Pixel) -> tuple[int, float, int]:
+    """How many digital numbers a bin holds, the read noise in bins, and how many bins there are.
 
-    `rows`: the distinct one that a design's signal has, ndarray[n_designs, n_signals].
+    A bin is a quarter of the noise that every count has, or of an electron.
     """
-
-    firsts: IndexArray
-    starts: IndexArray
-    roots: FloatArray
-    rows: IndexArray
-
-    @classmethod
-    def joined(cls, channels: Sequence[_Numbers]) -> _Numbers:
-        """Of all channels: `rows` gets an axis for them, in front."""
-        before = np.cumsum([0, *(len(each.firsts) for each in channels)])
-        sizes = np.cumsum([0, *(each.roots.size for each in channels)])
-        starts = [each.starts[:-1] + size for each, size in zip(channels, sizes, strict=False)]
-        return cls(
-            np.concatenate([each.firsts for each in channels]),
-            np.append(np.concatenate(starts), sizes[-1]),
-            np.concatenate([each.roots for each in channels]),
-            np.stack([each.rows + first for each, first in zip(channels, before, strict=False)]),
-        )
-
-
-@dataclass(frozen=True)
-class _Grid:
-    """How a pixel's digital numbers are taken together: in bins of `wide` numbers."""
-
-    wide: int
-    sigma: float
-    n_bins: int
-
-    @classmethod
-    def of(cls, pixel: Pixel) -> _Grid:
-        """Bins of a quarter of the noise that every count has, or of an electron."""
-        wide = max(1, int(max(pixel.read_noise_e, 1.0) * min(pixel.dn_per_e, pixel.full_scale_dn) / 4))
-        return cls(wide, pixel.read_noise_e * pixel.dn_per_e / wide, pixel.full_scale_dn // wide + 1)
+    wide = max(1, int(max(pixel.read_noise_e, 1.0) * min(pixel.dn_per_e, pixel.full_scale_dn) / 4))
+    return wide, pixel.read_noise_e * pixel.dn_per_e / wide, pixel.full_scale_dn // wide + 1
 
 
 def affordable(pixel: Pixel, channels: Sequence[IndexArray]) -> bool:
@@ -87,32 +55,42 @@ def affordable(pixel: Pixel, channels: Sequence[IndexArray]) -> bool:
 
     Counted for the brightest signal whose numbers differ: more electrons fill the well for certain.
     """
-    grid, prnu = _Grid.of(pixel), pixel.prnu
+    (wide, sigma, n_bins), prnu = _bins(pixel), pixel.prnu
     most = math.ceil(pixel.well_e)
     electrons = min(most / max(1 - _FAR * prnu, 0.01), 100 * pixel.well_e + 1e5)
     each = 2 * _FAR * math.sqrt(electrons) + 125  # counts of one gain
     gains = 2 * _FAR * 1.3 * math.sqrt(1 + prnu**2 * electrons) + 3 if prnu else 1
     counts = min(most, 2 * _FAR * prnu * electrons + each) + 1
-    reach = 2 * _FAR * grid.sigma + 3
-    bins = min(grid.n_bins, counts * pixel.dn_per_e / grid.wide + reach)
+    reach = 2 * _FAR * sigma + 3
+    bins = min(n_bins, counts * pixel.dn_per_e / wide + reach)
     pixels = max(len(own) for own in channels)
-    sums = 10 * gains * each + counts * reach + (64 / grid.sigma * reach if grid.sigma > _LEAST_BINS else 0)
+    sums = 10 * gains * each + counts * reach + (64 / sigma * reach if sigma > _LEAST_BINS else 0)
     return bins * pixels <= _MOST_BINS and sums + (bins * (pixels - 1)) ** 2 <= _MOST_SUMS
 
 
-def _numbers(electrons: FloatArray, pixel: Pixel) -> _Numbers:
-    """Of a channel whose pixels expect `electrons`, ndarray[n_designs, n_signals, n_pixels]."""
-    from . import compiled as kernels  # noqa: PLC0415  (compiled: kept off the start-up path)
+def _numbers(
+    electrons: FloatArray, channels: Sequence[IndexArray], pixel: Pixel
+) -> tuple[IndexArray, IndexArray, FloatArray, IndexArray]:
+    """First bin of each distinct signal of a channel, where its roots of shares begin, and these roots.
 
-    flat = np.ascontiguousarray(np.sort(electrons, axis=-1).reshape(-1, electrons.shape[-1]))
-    distinct, rows = np.unique(flat, axis=0, return_inverse=True)
-    grid = _Grid.of(pixel)
-    table = kernels.bin_shares(grid.sigma) if grid.sigma > _LEAST_BINS else np.empty((0, 0))
-    line = pixel.dn_per_e / grid.wide, (pixel.offset_dn + 0.5) / grid.wide
-    firsts, starts, shares = kernels.channel_numbers(
-        distinct, math.ceil(pixel.well_e), pixel.well_e, pixel.prnu, pixel.read_noise_e, line, grid.n_bins, table
-    )
-    return _Numbers(firsts, starts, np.sqrt(shares), rows.reshape(electrons.shape[:2]).astype(np.intp))
+    Last, which of these each design's signal has, ndarray[n_channels, n_designs, n_signals].
+    """
+    from .compiled import bin_shares, channel_numbers  # noqa: PLC0415  (compiled: kept off the start-up path)
+
+    wide, sigma, n_bins = _bins(pixel)
+    table = bin_shares(sigma) if sigma > _LEAST_BINS else np.empty((0, 0))
+    line = pixel.dn_per_e / wide, (pixel.offset_dn + 0.5) / wide
+    read = math.ceil(pixel.well_e), pixel.well_e, pixel.prnu, pixel.read_noise_e, line, n_bins, table
+    firsts, starts, shares, rows = list[IndexArray](), [np.zeros(1, np.intp)], list[FloatArray](), list[IndexArray]()
+    for own in channels:
+        flat = np.ascontiguousarray(np.sort(electrons[..., own], axis=-1).reshape(-1, len(own)))
+        distinct, which = np.unique(flat, axis=0, return_inverse=True)
+        first, start, share = channel_numbers(distinct, *read)
+        rows.append(which.reshape(electrons.shape[:2]) + sum(first.size for first in firsts))
+        starts.append(start[1:] + starts[-1][-1])
+        firsts.append(first)
+        shares.append(share)
+    return np.concatenate(firsts), np.concatenate(starts), np.sqrt(np.concatenate(shares)), np.stack(rows)
 
 
 def errors(
@@ -124,7 +102,7 @@ def errors(
     of both probabilities over all readouts. The bound is the sum over the signals of other types of their
     Bhattacharyya coefficients, for the signal that errs most often.
     """
-    from . import compiled_errors as kernels  # noqa: PLC0415  (compiled: kept off the start-up path)
+    from . import compiled as kernels  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     n_designs, n_signals = electrons.shape[:2]
     unknown = np.asarray(np.isnan(electrons).any(axis=(1, 2)))
@@ -136,12 +114,12 @@ def errors(
     step = _NATS / len(channels)
     for start in range(0, n_designs, max(1, _AT_ONCE // n_signals)):
         block = electrons[start : start + max(1, _AT_ONCE // n_signals)]
-        numbers = _Numbers.joined([_numbers(block[..., own], pixel) for own in channels])
-        parts = numbers.firsts, numbers.starts, numbers.roots
+        firsts, starts, roots, all_rows = _numbers(block, channels, pixel)
+        parts = firsts, starts, roots
         with np.errstate(divide="ignore"):
-            logs = np.log(numbers.roots)
+            logs = np.log(roots)
         for d in range(len(block)):
-            rows = np.ascontiguousarray(numbers.rows[:, d])
+            rows = np.ascontiguousarray(all_rows[:, d])
             overlap = kernels.overlaps(*parts, rows)
             sums = np.zeros(n_signals)
             for pair in pairs:

@@ -13,10 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.types import BoolArray, FloatArray, IndexArray
 from ..camera.noise.gaussian import share_below
@@ -24,6 +22,7 @@ from ..camera.readout import NoisyReadout
 from ..curves.lights import Pair, class_pairs
 from .separation import pair_blocks
 
+_Both = tuple[IndexArray, IndexArray]
 _LEAST_VARIANCE = 2e-9
 """Variance, DN^2, that a channel may have although it counts as certain."""
 _LEFT_OUT = 1e-12
@@ -37,7 +36,7 @@ def contrast_to_noise(mean: FloatArray, variance: FloatArray, first: IndexArray,
     exactly the same distance, the one with the most noise counts. 0 for coincident points.
     """
     found = np.empty(len(mean))
-    for block, difference, ours, theirs in _pairs(mean, variance, first, second):
+    for block, _, difference, ours, theirs in _pairs(mean, variance, first, second):
         distance = _length(difference)
         nearest = distance == distance.min(axis=1, keepdims=True)
         along = np.divide(difference, distance[..., None], out=np.zeros_like(difference), where=distance[..., None] > 0)
@@ -54,7 +53,7 @@ def detectability(mean: FloatArray, variance: FloatArray, first: IndexArray, sec
     This is d_a of signal detection theory for unequal variances (Simpson and Fitter, 1973), in several channels.
     """
     found = np.empty(len(mean))
-    for block, difference, ours, theirs in _pairs(mean, variance, first, second):
+    for block, _, difference, ours, theirs in _pairs(mean, variance, first, second):
         z = _ratio(difference, np.sqrt((ours + theirs) / 2))
         found[block] = _length(z).min(axis=1)
     return found
@@ -70,8 +69,8 @@ def pairwise_error(
     "Introduction to Statistical Pattern Recognition", linear classifiers). 0.5 for coincident points.
     """
     found = np.empty((len(mean), len(first) * len(second)))
-    for block, difference, ours, theirs in _pairs(mean, variance, first, second):
-        seen = difference if shape is None else shape.seen(block, difference, first, second)
+    for block, both, difference, ours, theirs in _pairs(mean, variance, first, second):
+        seen = difference if shape is None else shape.seen(block, both, difference)
         total = ours + theirs
         z = _ratio(seen, np.sqrt(total))
         shares = [np.divide(v, total, out=np.full_like(total, 0.5), where=total > 0) for v in (ours, theirs)]
@@ -82,7 +81,7 @@ def pairwise_error(
         error = share_below(-np.where(some, whole * _ratio(whole, spread), np.inf))
         if shape is not None:
             error = np.maximum(error, _LEFT_OUT)
-            error = np.minimum(error, shape.bound(block, difference, ours, theirs, first, second))
+            error = np.minimum(error, shape.bound(block, both, difference, total))
         found[block] = error
     return np.asarray(found.max(axis=1), dtype=float)
 
@@ -101,20 +100,12 @@ class NoiseShape:
         noise = cls(read.gaussian.reshape(shape), read.reach_dn.reshape(shape))
         return read.mean.reshape(shape), read.variance.reshape(shape), noise
 
-    def seen(self, block: slice, difference: FloatArray, first: IndexArray, second: IndexArray) -> FloatArray:
+    def seen(self, block: slice, both: _Both, difference: FloatArray) -> FloatArray:
         """Differences in the channels in which both points have Gaussian noise, 0 in the others."""
-        ours, theirs = _both(self.gaussian[block], first, second)
-        return np.where(ours & theirs, difference, 0.0)
+        gaussian = self.gaussian[block]
+        return np.where(gaussian[:, both[0]] & gaussian[:, both[1]], difference, 0.0)
 
-    def bound(
-        self,
-        block: slice,
-        difference: FloatArray,
-        ours: FloatArray,
-        theirs: FloatArray,
-        first: IndexArray,
-        second: IndexArray,
-    ) -> FloatArray:
+    def bound(self, block: slice, both: _Both, difference: FloatArray, total: FloatArray) -> FloatArray:
         """Bound of the error on either side of a plane, for independent pixels of any distribution.
 
         Chernoff's bound exp((L_a(s) + L_b(-s)) / 2) for some s > 0, with the normal S^-1 D, and Bennett's inequality
@@ -127,8 +118,9 @@ class NoiseShape:
         if not some.any():
             return found
         difference = difference[some]
-        reach = np.maximum(*_both(self.reach_dn[block][some], first, second))
-        total = np.maximum(ours[some] + theirs[some], _LEAST_VARIANCE)
+        reach = self.reach_dn[block][some]
+        reach = np.maximum(reach[:, both[0]], reach[:, both[1]])
+        total = np.maximum(total[some], _LEAST_VARIANCE)
         normal = difference / np.maximum(total, reach**2 / 50)  # a plane that suits terms as rare as Bennett allows
         apart = (normal * difference).sum(axis=-1)
         least = np.zeros(apart.shape)
@@ -154,14 +146,14 @@ def error_bounds(
     for pair in class_pairs(list(members)):
         first, second = (members[name] for name in pair)
         sums = np.zeros(mean.shape[:2])
-        for block, difference, ours, theirs in _pairs(mean, variance, first, second):
+        for block, both, difference, ours, theirs in _pairs(mean, variance, first, second):
             if noise is None:
                 overlap = np.exp(-_distance(difference, ours, theirs))
             else:
-                seen = noise.seen(block, difference, first, second)
+                seen = noise.seen(block, both, difference)
                 alike = np.broadcast_to(ours, seen.shape)
                 gaussian = np.exp(-_distance(seen, alike, np.where(seen > 0, theirs, alike))) + _LEFT_OUT
-                sides = noise.bound(block, difference, ours, theirs, first, second)
+                sides = noise.bound(block, both, difference, ours + theirs)
                 overlap = np.minimum(gaussian, np.where(sides < 0.5, sides, 1.0))
             overlap = overlap.reshape(len(difference), len(first), len(second))
             sums[block, first] += overlap.sum(axis=2)
@@ -203,13 +195,11 @@ def _length(vectors: FloatArray) -> FloatArray:
 
 def _pairs(
     mean: FloatArray, variance: FloatArray, first: IndexArray, second: IndexArray
-) -> Iterator[tuple[slice, FloatArray, FloatArray, FloatArray]]:
-    """Blocks of designs: their slice, absolute differences and both variances, ndarray[n, n_pairs, n_channels] each."""
+) -> Iterator[tuple[slice, _Both, FloatArray, FloatArray, FloatArray]]:
+    """Blocks of designs: their slice, both signals of every pair, and of these the difference and both variances.
+
+    The last three are ndarray[n, n_pairs, n_channels].
+    """
     for block, one, other in pair_blocks(mean.shape, first, second):
         ours, theirs = variance[block][:, one], variance[block][:, other]
-        yield block, np.abs(mean[block][:, one] - mean[block][:, other]), ours, theirs
-
-
-def _both(values: NDArray[Any], first: IndexArray, second: IndexArray) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Of both points of every pair; `values`: ndarray[n_designs, n_signals, n_channels]."""
-    return np.repeat(values[:, first], len(second), axis=1), np.tile(values[:, second], (1, len(first), 1))
+        yield block, (one, other), np.abs(mean[block][:, one] - mean[block][:, other]), ours, theirs

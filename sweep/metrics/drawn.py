@@ -51,28 +51,18 @@ class Draws:
         """How many there are."""
         return int(self.place.size)
 
-    def of(self, off: int) -> slice:
-        """Those whose filter comes out in one of the ways."""
-        return slice(int(self.starts[off]), int(self.starts[off + 1]))
-
-    def cases(self, some: slice | IndexArray, n_cases: int) -> IndexArray:
-        """The place of the field of some draws."""
-        return np.minimum((self.place[some] * n_cases).astype(np.intp), n_cases - 1)
-
     def distances(self, off: int, response: FloatArray, out: FloatArray) -> None:
         """Puts the distances of those whose filter comes out in one of the ways into `out`, DN, ndarray[n].
 
         `response`: of that filter to every spectrum, ndarray[n_cases, n_spectra, n_channels].
         """
-        from .compiled_members import drawn_distances  # noqa: PLC0415  (compiled: kept off the start-up path)
+        own = slice(int(self.starts[off]), int(self.starts[off + 1]))
+        out[own] = np.sqrt((self.apart(own, response) ** 2).sum(axis=-1))
 
-        own = self.of(off)
-        cases = self.cases(own, len(response))
-        drawn_distances(np.ascontiguousarray(response), cases, self.below[own], self.share[own], out[own])
-
-    def apart(self, some: IndexArray, response: FloatArray) -> FloatArray:
+    def apart(self, some: slice | IndexArray, response: FloatArray) -> FloatArray:
         """First minus second light of some draws: ndarray[..., n_cases, n_spectra, n] -> ndarray[..., n_some, n]."""
-        case, below, share = self.cases(some, response.shape[-3]), self.below[some], self.share[some]
+        n_cases, below, share = response.shape[-3], self.below[some], self.share[some]
+        case = np.minimum((self.place[some] * n_cases).astype(np.intp), n_cases - 1)
         low, high = (response[..., case[:, None], below + step, :] for step in (0, 1))
         both = low + share[..., None] * (high - low)
         return np.asarray(both[..., 0, :] - both[..., 1, :], dtype=float)

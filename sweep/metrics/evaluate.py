@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from ..base.types import BoolArray, FloatArray
+from ..base.types import BoolArray, FloatArray, IndexArray
 from ..camera.electrons import Changing
 from ..camera.field import field_heights, refined_heights, setup_at
 from ..camera.forward import ForwardModel, forward_model
@@ -18,21 +21,23 @@ from ..designs.family import Family
 from ..vision.section import Vision
 from .columns.color_separation import ColorSeparation
 from .columns.exposure import EXPOSURE
-from .own import OwnMetric
-from .quantity import (
-    BEST_PLACE,
-    Columns,
-    DesignMetric,
-    FamilyMetric,
-    NoiseMetric,
-    VisionMetric,
-)
-from .registry import METRICS
-from .separation import csd_name, separations, separations_along, separations_by_edges
-from .whole_readout import Spent, WholeReadout, by_case, over_cases
+from .own import OwnMetric, own_quantities
+from .quantity import BEST_PLACE, Asked, Columns, DesignMetric, FamilyMetric, NoiseMetric, ReadoutMetric, VisionMetric
+from .registry import METRICS, quantities_of
+from .separation import csd_name, separations, separations_along
 
 _FINER_MOMENTS, _PULSE_ROUNDS, _PULSE_STEPS = 8, 3, 9
 """Factor by which moments of a pulse are finer at one phase; rounds in which the worst is refined; moments of each."""
+_AT_ONCE = 1024
+"""Designs that differ in one channel alone and are read at once, so that what they read stays in the cache."""
+OTHERS = [metric for metric in METRICS if isinstance(metric, ReadoutMetric) and not isinstance(metric, ColorSeparation)]
+"""Metrics that need the whole readout of every design."""
+_COMPARED_AT_ONCE = 1024
+"""Readouts of a design in a case that are compared at once."""
+_READ_AT_ONCE = 2**19
+"""Digital numbers that other metrics are given at once: 4 MiB, so that they stay in the cache."""
+_Extra = Callable[[int, Callable[[slice], FloatArray]], Columns]
+"""Columns of n designs from the whole readout of parts of them."""
 _CSD = [metric for metric in METRICS if isinstance(metric, ColorSeparation)]
 
 
@@ -69,12 +74,16 @@ def _joined(parts: Sequence[Columns]) -> Columns:
     return {name: values for part in parts for name, values in part.items()}
 
 
+def _csd_names(setup: Setup) -> list[str]:
+    return [csd_name(pair) for pair in class_pairs(setup.lights.classes)]
+
+
 def _by_phase(model: ForwardModel, cases: Columns, n_places: int) -> FloatArray:
     """CSDs at each phase or field position, the smallest over the moments, ndarray[n_designs, n_pairs, n_places].
 
     `cases`: ndarray[n_cases x n_moments, n_designs] by column.
     """
-    names = [csd_name(pair) for pair in class_pairs(model.setup.lights.classes)]
+    names = _csd_names(model.setup)
     distances = np.stack([cases[name] for name in names])  # [n_pairs, n_cases x n_moments, n_designs]
     return np.moveaxis(distances.reshape(len(names), n_places, -1, distances.shape[-1]).min(axis=2), -1, 0)
 
@@ -119,7 +128,7 @@ def _over_pulse(model: ForwardModel, curves: FloatArray, pairs: Sequence[int], p
 
 def _refine_moments(model: ForwardModel, block: Block, columns: Columns) -> None:
     """Put the smallest distances over all moments of a pulse into the columns; of a light at one phase."""
-    names = [csd_name(pair) for pair in class_pairs(model.setup.lights.classes)]
+    names = _csd_names(model.setup)
     for design in np.flatnonzero(np.isfinite(columns[names[0]])):
         curves = block.some(slice(design, design + 1)).curves()
         for name, least in zip(names, _over_pulse(model, curves, range(len(names)), model.phases), strict=True):
@@ -132,7 +141,7 @@ def _refine_phases(model: ForwardModel, block: Block, columns: Columns) -> None:
     setup = model.setup
     if not setup.accuracy.finest_phase_px:
         return
-    names = [csd_name(pair) for pair in class_pairs(setup.lights.classes)]
+    names = _csd_names(setup)
     lattice, step_px = fine_lattice(setup)
     on_lattice = model.at(lattice)
     for design in np.flatnonzero(np.isfinite(columns[names[0]])):
@@ -158,7 +167,7 @@ def _refine_phases(model: ForwardModel, block: Block, columns: Columns) -> None:
 def _refine_heights(model: ForwardModel, block: Block, cases: Columns, columns: Columns) -> None:
     """Put the smallest distances over all places of the sensor into the columns, which hold those of some heights."""
     setup = model.setup
-    names, heights = [csd_name(pair) for pair in class_pairs(setup.lights.classes)], field_heights(setup)
+    names, heights = _csd_names(setup), field_heights(setup)
     if not setup.accuracy.finest_phase_px:
         return
     at_heights = _by_phase(model, cases, len(heights))
@@ -171,6 +180,77 @@ def _refine_heights(model: ForwardModel, block: Block, cases: Columns, columns: 
         smallest, _ = refined_heights(heights, at_heights[design], at_height)
         for name, least in zip(names, smallest, strict=True):
             columns[name][design] = least
+
+
+@dataclass
+class Spent:
+    """Seconds that metrics of the whole readout took, with the readouts that are made for them alone."""
+
+    seconds: float = 0.0
+
+
+def whole_readout_metrics(asked: Asked) -> list[str]:
+    """Columns of a study that need the whole readout of every design: those of own metrics, and more that are found."""
+    names = [quantity.name for metric in OTHERS for quantity in metric.quantities(asked)]
+    return [*names, *(metric.name for metric in asked.own)]
+
+
+def _whole_readout(
+    model: ForwardModel, own: Sequence[OwnMetric], spent: Spent, n: int, whole: Callable[[slice], FloatArray]
+) -> Columns:
+    """Columns of n designs by own metrics and those of `OTHERS`; `whole`: the readout of a part of the designs."""
+    if not (own or OTHERS):
+        return {}
+    started, setup = time.perf_counter(), model.setup
+    # A CFA of which an own metric says nothing says so of one design, and no more are read for it.
+    first = own_quantities(own, setup, whole(slice(0, 1))) if own else {}
+    columns = {name: np.full(n, values[0]) for name, values in first.items()}
+    present = [metric for metric in own if np.isfinite(first[metric.name][0])]
+    if present or OTHERS:
+        values_per_design = model.n_cases * len(setup.lights.names) * len(setup.camera.mosaic.channels)
+        step, parts = max(1, _READ_AT_ONCE // values_per_design), []
+        for start in range(0, n, step):
+            response = whole(slice(start, start + step))
+            others = over_cases(model, by_case(response, setup.members, OTHERS)) if OTHERS else {}
+            parts.append(others | own_quantities(present, setup, response))
+        columns |= {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    spent.seconds += time.perf_counter() - started
+    return columns
+
+
+def by_case(response: FloatArray, members: Mapping[str, IndexArray], metrics: Sequence[ReadoutMetric]) -> Columns:
+    """Evaluate metrics of the readout in each case, ndarray[n_cases, n_designs]; as many at once as a cache holds.
+
+    `response`: ndarray[n_designs, n_cases, n_signals, n_channels].
+    """
+    n_designs, n_cases = response.shape[:2]
+    step, parts = max(1, _COMPARED_AT_ONCE // max(1, n_designs)), []
+    for start in range(0, n_cases, step):
+        cases = np.swapaxes(response[:, start : start + step], 0, 1)
+        readouts, columns = cases.reshape(-1, *cases.shape[2:]), Columns()
+        for metric in metrics:
+            columns |= metric.of_readout(readouts, members)
+        parts.append(columns)
+    return {name: np.concatenate([part[name] for part in parts]).reshape(n_cases, n_designs) for name in parts[0]}
+
+
+def over_cases(imager: ForwardModel, cases: Columns) -> Columns:
+    """The worst of all cases, and of CSDs the largest over the places of the smallest over the moments.
+
+    `cases`: ndarray[n_cases, n_designs] each.
+    """
+    quantities = quantities_of(Asked(imager.setup.lights.classes, any_place=True))
+    best = {quantity.of: name for name, quantity in quantities.items() if quantity.extreme == "best place"}
+    found: Columns = {}
+    for name, each in cases.items():
+        if len(each) == 1:
+            found |= {own: each[0].copy() for own in (name, best.get(name)) if own is not None}
+            continue
+        moments = quantities[name].worse(np.swapaxes(each.reshape(imager.n_cases, -1, each.shape[1]), 0, 1))
+        found[name] = quantities[name].worse(moments)
+        if name in best:
+            found[best[name]] = moments.max(axis=0)
+    return found
 
 
 def evaluate(
@@ -191,7 +271,7 @@ def evaluate(
     over the moments. Where all phases or all places of the sensor count, the CSDs are refined between those of the
     lattice; other metrics are the worst over the lattice.
     """
-    block, extra, setup = _block(designs), WholeReadout(model, own, spent or Spent()), model.setup
+    block, extra, setup = _block(designs), partial(_whole_readout, model, own, spent or Spent()), model.setup
     changing = None if states else model.read_changing(block)
     if changing is None:
         cases, columns = _read(model, block, extra, states, probabilities=probabilities)
@@ -222,25 +302,23 @@ def _merged(which: BoolArray, some: FloatArray, others: FloatArray) -> FloatArra
     return merged
 
 
-def _distances_along(model: ForwardModel, changing: Changing, extra: WholeReadout) -> tuple[Columns, Columns]:
+def _distances_along(model: ForwardModel, changing: Changing, extra: _Extra) -> tuple[Columns, Columns]:
     """CSDs in each case, and the columns, of designs that differ in one channel alone."""
-    by_edges = separations_by_edges(changing, model.setup.members)
-    distances = (
-        [by_edges]
-        if by_edges is not None
-        else [
-            separations_along(fixed, changing.channel, changing.values[:, case], model.setup.members)
-            for case, fixed in enumerate(changing.fixed)
-        ]
-    )
-    cases = {csd_name(pair): np.stack([case[pair] for case in distances]) for pair in distances[0]}
-    n = int(changing.which.sum())
+    n, names = int(changing.which.sum()), _csd_names(model.setup)
+    cases = {name: np.empty((len(changing.fixed), n)) for name in names}
+    for start in range(0, n, _AT_ONCE):
+        some = slice(start, start + _AT_ONCE)
+        values = changing.make(some)
+        for case, fixed in enumerate(changing.fixed):
+            along = separations_along(fixed, changing.channel, values[:, case], model.setup.members)
+            for pair, distance in along.items():
+                cases[csd_name(pair)][case, some] = distance
     columns = over_cases(model, cases) | {EXPOSURE: np.full(n, changing.exposure_s)}
-    return cases, columns | extra.of(n, changing.whole_of)
+    return cases, columns | extra(n, changing.whole_of)
 
 
 def _read(
-    model: ForwardModel, block: Block, extra: WholeReadout, states: Sequence[str] = (), *, probabilities: bool = False
+    model: ForwardModel, block: Block, extra: _Extra, states: Sequence[str] = (), *, probabilities: bool = False
 ) -> tuple[Columns, Columns]:
     """CSDs in each case, and the columns, of any designs; with `states`, what noise does to them, too."""
     curves, members, apart = block.curves(), model.setup.members, Columns()
@@ -252,6 +330,6 @@ def _read(
         apart = _joined([metric.of_noise(model, curves, read, confused) for metric in noisy])
     else:
         response, exposure_s = model.read(curves)
-    apart |= extra.of(len(curves), response.__getitem__)
+    apart |= extra(len(curves), response.__getitem__)
     cases = by_case(response, members, _CSD)
     return cases, over_cases(model, cases) | apart | {EXPOSURE: exposure_s}

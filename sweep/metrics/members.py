@@ -11,8 +11,10 @@ import pickle
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.cache import Cache
 from ..base.types import FloatArray, IndexArray
@@ -47,19 +49,6 @@ class NearestMembers:
         return np.asarray(values[..., rows, :] * (1 - share) + values[..., rows + 1, :] * share, dtype=float)
 
 
-@dataclass(frozen=True)
-class _Table:
-    """The regions of two types, as `nearest_members` takes them."""
-
-    first: IndexArray
-    second: IndexArray
-    which: IndexArray
-    starts: IndexArray
-    cells: IndexArray
-    shares: FloatArray
-    along: FloatArray
-
-
 class PopulationImager:
     """A scene whose lights are all members of their population.
 
@@ -72,7 +61,7 @@ class PopulationImager:
         """Everything is on, whatever the plan of `setup` leaves out: plans promise nothing of other members."""
         self.members = Members(setup.lights, setup.camera.grid)
         self.setup = replace(setup.with_all_effects, lights=self.members.lights)
-        self._tables: dict[Pair, _Table] = {}
+        self._tables: dict[Pair, tuple[NDArray[Any], ...]] = {}
 
     @cached_property
     def imager(self) -> LinearModel:
@@ -100,23 +89,21 @@ class PopulationImager:
         """The nearest members of two types; `response`: ndarray[n_spectra, n_channels]; `alone`: of all, only."""
         from .compiled_members import nearest_members  # noqa: PLC0415  (compiled: kept off the start-up path)
 
-        table = self._table(pair)
-        part = np.minimum((table.along * parts).astype(np.intp), parts - 1)
-        shape = (table.first.size, table.second.size, parts)
+        first, second, which, starts, cells, spans, along = self._table(pair)
+        shape = (first.size, second.size, parts)
         squared, steps, shares = np.empty(shape), np.zeros((*shape, 2), dtype=np.intp), np.zeros((*shape, 2))
-        own = (table.first, table.second, table.which, table.starts, table.cells, table.shares)
-        nearest_members(np.ascontiguousarray(response), *own, part, alone, squared, steps, shares)
-        return NearestMembers(squared, steps, shares, table.first, table.second)
+        part = np.minimum((along * parts).astype(np.intp), parts - 1)
+        region = which, starts, cells, spans, part
+        nearest_members(np.ascontiguousarray(response), first, second, *region, alone, squared, steps, shares)
+        return NearestMembers(squared, steps, shares, first, second)
 
-    def _table(self, pair: Pair) -> _Table:
+    def _table(self, pair: Pair) -> tuple[NDArray[Any], ...]:
+        """The regions of two types, as `nearest_members` takes them, and where their triangles are along them."""
         if pair not in self._tables:
             regions, which = self.members.regions(pair)
-            first, second = (self.members.rows[name] for name in pair)
             starts = np.cumsum([0, *(len(region.cells) for region in regions)])
-            cells, shares, along = (
-                np.concatenate([getattr(region, name) for region in regions]) for name in ("cells", "shares", "along")
-            )
-            self._tables[pair] = _Table(first, second, which, starts, cells, shares, along)
+            joined = [np.concatenate([getattr(of, name) for of in regions]) for name in ("cells", "shares", "along")]
+            self._tables[pair] = (*(self.members.rows[name] for name in pair), which, starts, *joined)
         return self._tables[pair]
 
 

@@ -7,23 +7,16 @@ that results are those of the same sums in NumPy.
 
 from __future__ import annotations
 
-import math
-from typing import Any
-
 import numpy as np
 
 from ..base.machine_code import njit
-from ..base.types import BoolArray, FloatArray, IndexArray
-from ..designs.vectorized import larger, smaller
+from ..base.types import FloatArray, IndexArray
+from ..designs.vectorized import smaller
 
 _NUMBERS = {"nnan", "nsz"}
-"""Lets the compiler take the smaller of several numbers at once; callers hand in no NaN."""
-_LEAST_SQUARE, _MOST_SQUARE = 1e-280, 1e280
-"""Squared distances below and above are those of differences whose squares a float does not hold well."""
-Floats = np.ndarray[tuple[int, ...], np.dtype[Any]]
-"""Float64, or float32 where that is exact."""
-LANES = 64
-"""Designs that `nearest_along_squared` takes side by side."""
+"""Lets the compiler take the smaller of several numbers at once; what NaN gives means nothing."""
+_LANES, _AT_ONCE = 64, 16
+"""Designs side by side, and pairs between two looks at whether the rest may be left out."""
 
 
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
@@ -65,161 +58,43 @@ def nearest_pairs(response: FloatArray, order: IndexArray, bounds: IndexArray, o
         pair = 0
         for a in range(bounds.size - 1):
             for b in range(a + 1, bounds.size - 1):
-                first, second = order[bounds[a] : bounds[a + 1]], order[bounds[b] : bounds[b + 1]]
-                squared = _nearest_pair(response[d], first, second, False, out[d, pair])
-                if not _LEAST_SQUARE < squared < _MOST_SQUARE:
-                    farthest = _nearest_pair(response[d], first, second, True, out[d, pair])
-                    if not farthest < np.inf:
-                        out[d, pair] = -1
+                best, odd = np.inf, 0.0
+                for case in range(response.shape[1]):
+                    for i in order[bounds[a] : bounds[a + 1]]:
+                        for j in order[bounds[b] : bounds[b + 1]]:
+                            total = 0.0
+                            for c in range(response.shape[3]):
+                                apart = response[d, case, i, c] - response[d, case, j, c]
+                                total += apart * apart
+                            if total < best:
+                                best = total
+                                out[d, pair, 0], out[d, pair, 1] = i, j
+                            odd += 0.0 * total
+                if not best + odd < np.inf:
+                    out[d, pair] = -1
                 pair += 1
 
 
-@njit(cache=True, nogil=True)
-def _nearest_pair(cases: FloatArray, first: IndexArray, second: IndexArray, legs: bool, out: IndexArray) -> float:
-    """Put the two nearest signals into `out`; returns their squared distance, NaN or infinite where one of all is.
-
-    `legs`: distances instead, without squares. `cases`: ndarray[n_cases, n_signals, n_channels].
-    """
-    best, odd = np.inf, 0.0
-    for case in range(cases.shape[0]):
-        for i in first:
-            for j in second:
-                total = 0.0
-                for c in range(cases.shape[2]):
-                    apart = cases[case, i, c] - cases[case, j, c]
-                    total = math.hypot(total, apart) if legs else total + apart * apart
-                if total < best:
-                    best, out[0], out[1] = total, i, j
-                odd += 0.0 * total
-    return best + odd
-
-
-@njit(cache=True, nogil=True)
-def _lanes(
-    values: FloatArray, order: IndexArray, first: int, lanes: FloatArray, doubt: FloatArray, bad: BoolArray
-) -> None:
-    """Put the designs from `first` on side by side, ndarray[n_signals, LANES].
-
-    Lanes that are left over repeat the first. Values of a design that are not all finite become 0; `bad` says where.
-    `doubt`: ndarray[LANES], room to work in.
-    """
-    n = min(LANES, values.shape[0] - first)
-    doubt[:] = 0.0
-    for s in range(order.size):
-        signal = order[s]
-        for lane in range(n):
-            lanes[s, lane] = values[first + lane, signal]
-        for lane in range(n, LANES):
-            lanes[s, lane] = values[first, signal]
-        for lane in range(LANES):
-            doubt[lane] += 0.0 * lanes[s, lane]
-    for lane in range(LANES):
-        if doubt[lane] != 0.0:  # NaN: one of its values is not finite
-            lanes[:, lane] = 0.0
-            if lane < n:
-                bad[first + lane] = True
-
-
 @njit(cache=True, nogil=True, fastmath=_NUMBERS)
-def _ranges(lanes: FloatArray, low: FloatArray, high: FloatArray) -> None:
-    """Smallest and largest value of each signal over the lanes."""
-    for s in range(lanes.shape[0]):
-        least, most = lanes[s, 0], lanes[s, 0]
-        for lane in range(LANES):
-            least = smaller(least, lanes[s, lane])
-            most = larger(most, lanes[s, lane])
-        low[s], high[s] = least, most
-
-
-@njit(cache=True, nogil=True, fastmath=_NUMBERS)
-def bounds_of_pairs(
-    fixed: FloatArray, first: IndexArray, second: IndexArray, low: Floats, high: Floats, bound: FloatArray
-) -> tuple[int, int]:
-    """Lower bound of each pair's squared distance in any lane, for as many as may be the nearest, and their number.
-
-    Second, the pair whose upper bound is smallest. `fixed` is sorted.
-    """
-    lead, least = 0, np.inf
-    for k in range(fixed.size):
-        if fixed[k] >= least:
-            return k, lead
-        i, j = first[k], second[k]
-        below, above = low[i] - high[j], low[j] - high[i]
-        gap, most = larger(larger(below, above), 0.0), -smaller(below, above)
-        bound[k] = fixed[k] + gap * gap
-        far = fixed[k] + most * most
-        if far < least:
-            least, lead = far, k
-    return fixed.size, lead
-
-
-@njit(cache=True, nogil=True, fastmath=_NUMBERS)
-def nearest_in_lanes(
-    lanes: Floats, fixed: Floats, first: IndexArray, second: IndexArray, some: IndexArray, best: Floats
-) -> None:
-    """Take `some` pairs into account, four at a time; their number is a multiple of four."""
-    for at in range(0, some.size, 4):
-        a, b, c, d = some[at], some[at + 1], some[at + 2], some[at + 3]
-        fixed_a, fixed_b, fixed_c, fixed_d = fixed[a], fixed[b], fixed[c], fixed[d]
-        a1, b1, c1, d1 = first[a], first[b], first[c], first[d]
-        a2, b2, c2, d2 = second[a], second[b], second[c], second[d]
-        for lane in range(LANES):
-            x = lanes[a1, lane] - lanes[a2, lane]
-            y = lanes[b1, lane] - lanes[b2, lane]
-            z = lanes[c1, lane] - lanes[c2, lane]
-            w = lanes[d1, lane] - lanes[d2, lane]
-            x = fixed_a + x * x
-            y = fixed_b + y * y
-            z = fixed_c + z * z
-            w = fixed_d + w * w
-            best[lane] = smaller(smaller(smaller(x, y), smaller(z, w)), best[lane])
-
-
-@njit(cache=True, nogil=True)
 def nearest_along_squared(
-    values: FloatArray,
-    order: IndexArray,
-    fixed: FloatArray,
-    first: IndexArray,
-    second: IndexArray,
-    starts: IndexArray,
-    out: FloatArray,
-    bad: BoolArray,
-) -> int:
-    """The same for designs that differ in one channel alone; how many distances were computed for all LANES designs.
+    values: FloatArray, fixed: FloatArray, first: IndexArray, second: IndexArray, starts: IndexArray, out: FloatArray
+) -> None:
+    """Smallest squared distance of each pair of classes for designs that differ in one channel alone.
 
-    `values`: ndarray[n_designs, n_signals], that channel; `order`: its signals, one class after the other. `fixed`:
-    squared distances in the other channels, sorted within each pair of classes; `first`, `second`: the signals of each,
-    unsigned places in `order`; `starts`: where each pair of classes begins. `out`: ndarray[n_pairs, n_designs]; `bad`:
-    ndarray[n_designs], set where a value is not finite: what `out` says of such a design means nothing.
-    Designs are taken side by side, so that one instruction serves several; pairs that are the nearest in none of these
-    designs, by the ranges of their values, are left out.
+    `values`: C-ordered ndarray[n_designs, n_signals], that channel; `fixed`: squared distances in the other channels,
+    sorted within each pair of classes; `first`, `second`: the signals of each; `starts`: where each pair of classes
+    begins, and the end. `out`: ndarray[n_pairs, n_designs], which means nothing for values that are not finite.
     """
-    lanes, best, doubt = np.zeros((order.size, LANES)), np.empty(LANES), np.empty(LANES)
-    low, high = np.empty(order.size), np.empty(order.size)
-    most = 0
-    for pair in range(starts.size - 1):
-        most = max(most, starts[pair + 1] - starts[pair])
-    bound, some = np.empty(most), np.empty(most + 3, np.intp)
-    computed = 0
-    for begin in range(0, values.shape[0], LANES):
-        _lanes(values, order, begin, lanes, doubt, bad)
-        _ranges(lanes, low, high)
+    for begin in range(0, len(values), _LANES):  # designs side by side, so that one instruction serves several
+        block = np.ascontiguousarray(values[begin : begin + _LANES].T)
         for pair in range(starts.size - 1):
-            own = slice(starts[pair], starts[pair + 1])
-            count, lead = bounds_of_pairs(fixed[own], first[own], second[own], low, high, bound)
-            best[:] = np.inf
-            some[:4] = lead
-            nearest_in_lanes(lanes, fixed[own], first[own], second[own], some[:4], best)
-            enough, left = best[0], 0
-            for lane in range(1, LANES):
-                enough = larger(enough, best[lane])
-            for k in range(count):
-                some[left] = k
-                left += bound[k] < enough
-            some[left : left + 3] = lead  # to a multiple of four
-            nearest_in_lanes(lanes, fixed[own], first[own], second[own], some[: (left + 3) & ~3], best)
-            computed += 4 + ((left + 3) & ~3)
-            for lane in range(min(LANES, values.shape[0] - begin)):
-                out[pair, begin + lane] = best[lane]
-    return computed
+            best = np.full(block.shape[1], np.inf)
+            for start in range(starts[pair], starts[pair + 1], _AT_ONCE):
+                if fixed[start] >= best.max():
+                    break
+                for k in range(start, min(start + _AT_ONCE, starts[pair + 1])):
+                    apart, one, other = fixed[k], block[first[k]], block[second[k]]
+                    for d in range(best.size):
+                        x = one[d] - other[d]
+                        best[d] = smaller(best[d], apart + x * x)
+            out[pair, begin : begin + _LANES] = best

@@ -17,7 +17,7 @@ from . import rules
 from .quantity import DECADES, Asked, Quantity
 from .registry import quantities_of
 from .rule import Rule
-from .rules.minimum import Minimum
+from .rules.standard import Minimum
 
 Weight = Annotated[float, Field(ge=1e-6, le=1e6)]
 

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.types import BoolArray, FloatArray, IndexArray
-
-_MANY, _BINS = 4096, 256
-"""Rows from which on it pays to leave those out that coarse bins show to be dominated, and how many bins."""
+from ..base.types import BoolArray, FloatArray
 
 
 def hypervolume(values: FloatArray, reference: FloatArray) -> float:
@@ -47,25 +44,6 @@ def non_dominated(values: FloatArray, eligible: BoolArray | None = None) -> Bool
     if eligible is not None:
         keep &= eligible
     front = np.zeros(len(values), dtype=bool)
-    some = np.flatnonzero(keep)
-    if some.size > _MANY and values.shape[1] == 2:
-        some = some[_undecided(values[some])]
-    if some.size:
-        front[some] = moocore.is_nondominated(values[some], maximise=True, keep_weakly=True)
+    if keep.any():
+        front[keep] = moocore.is_nondominated(values[keep], maximise=True, keep_weakly=True)
     return front
-
-
-def _undecided(values: FloatArray) -> IndexArray:
-    """Which rows of ndarray[n, 2], finite, may not be dominated: the others have less of both than a row in a bin
-    beyond theirs.
-    """
-    first, second = np.ascontiguousarray(values.T)
-    with np.errstate(over="ignore", divide="ignore"):
-        per_unit = (_BINS - 1) / np.ptp(first)
-    if not 0 < per_unit < np.inf:
-        return np.arange(len(values))
-    at = ((first - first.min()) * per_unit).astype(np.intp)
-    best = np.full(_BINS + 1, -np.inf)
-    np.maximum.at(best, at, second)
-    from_here_on = np.maximum.accumulate(best[::-1])[::-1]
-    return np.flatnonzero(second >= from_here_on[at + 1])

@@ -2,15 +2,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
 from ..base.types import FloatArray, IndexArray
 from ..camera.forward import AllPhases
 from ..camera.readout import draws_dn
-from .classifiers import CLASSIFIERS
 from .share import share_interval
+
+
+def _nearest_centroid(train: FloatArray, truth: IndexArray, test: FloatArray) -> IndexArray:
+    """The state whose mean patch is nearest."""
+    from scipy.spatial.distance import cdist  # noqa: PLC0415  (few studies need it)
+
+    centers = np.stack([train[truth == state].mean(axis=0, dtype=float) for state in range(truth.max() + 1)])
+    return np.asarray(cdist(test, centers).argmin(axis=1))
+
+
+def _lda(train: FloatArray, truth: IndexArray, test: FloatArray) -> IndexArray:
+    """Fisher's linear discriminant with equal priors; shrinkage keeps it stable with more pixels than patches."""
+    groups = [train[truth == state].astype(float) for state in range(int(truth.max()) + 1)]
+    means = np.stack([group.mean(axis=0) for group in groups])
+    covariance = np.mean([_shrunk_covariance(group) for group in groups], axis=0)
+    weights = np.linalg.lstsq(covariance, means.T, rcond=None)[0]
+    scores = test @ weights - np.einsum("sp,ps->s", means, weights) / 2
+    return np.asarray(scores.argmax(axis=1))
+
+
+def _shrunk_covariance(patches: FloatArray) -> FloatArray:
+    """Covariance of patches, ndarray[n, n_pixels], of unit variance shrunk towards a sphere, and scaled back.
+
+    Source: Ledoit and Wolf, J. Multivariate Analysis 88, 365 (2004), lemma 3.3.
+    """
+    n, n_pixels = patches.shape
+    scale = patches.std(axis=0)
+    scale[scale == 0] = 1.0
+    x = (patches - patches.mean(axis=0)) / scale
+    sample = x.T @ x / n
+    mean_variance = np.trace(sample) / n_pixels
+    distance = ((sample - mean_variance * np.eye(n_pixels)) ** 2).sum()
+    noise = min((((x**2).T @ x**2).sum() / n - (sample**2).sum()) / n, distance)
+    share = noise / distance if noise > 0 else 0.0
+    shrunk = (1 - share) * sample + share * mean_variance * np.eye(n_pixels)
+    return np.asarray(scale[:, None] * shrunk * scale, dtype=float)
+
+
+CLASSIFIERS: Mapping[str, Callable[[FloatArray, IndexArray, FloatArray], IndexArray]] = {
+    "nearest_centroid": _nearest_centroid,
+    "lda": _lda,
+}
+"""What patches, ndarray[n, n_pixels], are taken for by rules that are trained on others: numbers of states."""
 
 MOST_LIKELY = "most_likely"
 """Name of the rule that knows mean and variance of every signal's channels."""
@@ -51,12 +93,17 @@ def recognize(
     seen = np.sort(rng.permutation(n_pixels)[:_MOST_PIXELS])
     drawn = np.empty((*place.shape, seen.size), dtype=np.float32)  # [patches, n_signals, pixels that are seen]
     said = np.empty(place.shape, dtype=state.dtype)
-    rule = _MostLikely(imager, curves, signals)
+    read = imager.read_with_noise(curves)
+    mean = read.mean[0][:, signals]  # [n_places, n_signals, n_channels]
+    variance = np.maximum(read.variance[0][:, signals], _LEAST_VARIANCE)
     step = max(1, _AT_ONCE // (len(signals) * n_pixels))
     for block in (slice(start, start + step) for start in range(0, patches, step)):
         whole = draws_dn(electrons[place[block], signals], imager.readout.pixel, rng)
         drawn[block] = whole[..., seen]
-        said[block] = state[rule.of(whole, place[block])]
+        for at in np.unique(place[block]):
+            here = place[block] == at
+            values = imager.channels_of(whole[here], int(at) * imager.n_cases // len(mean))  # [n, n_channels]
+            said[block][here] = state[_likeliest(values, mean[at], variance[at])]
     found = dict(_accuracy(MOST_LIKELY, truth, said))
     half = patches // 2
     train, test = (part.reshape(-1, part.shape[-1]) for part in (drawn[:half], drawn[half:]))
@@ -69,29 +116,12 @@ def recognize(
     return found
 
 
-class _MostLikely:
-    """The most likely of `signals` for drawn patches of one design."""
-
-    def __init__(self, imager: AllPhases, curves: FloatArray, signals: IndexArray) -> None:
-        read = imager.read_with_noise(curves)
-        self._model = imager
-        mean, variance = (np.moveaxis(of[0][:, signals], 2, 1) for of in (read.mean, read.variance))
-        self._mean = np.ascontiguousarray(mean)  # [n_places, n_channels, n_signals]
-        self._variance = np.ascontiguousarray(np.maximum(variance, _LEAST_VARIANCE))
-
-    def of(self, drawn: FloatArray, place: IndexArray) -> IndexArray:
-        """Its index for each patch, ndarray[n_patches, n_signals]; `drawn` has an axis more, of the pixels."""
-        from .compiled_errors import likeliest  # noqa: PLC0415  (compiled: kept off the start-up path)
-
-        best = np.empty(place.shape, dtype=np.intp)
-        for at in np.unique(place):
-            here = place == at
-            kernel = int(at) * self._model.n_cases // len(self._mean)
-            values = self._model.channels_of(drawn[here], kernel)  # [n, n_channels]
-            found = np.empty(len(values), dtype=np.intp)
-            likeliest(values, self._mean[at], self._variance[at], found)
-            best[here] = found
-        return best
+def _likeliest(values: FloatArray, mean: FloatArray, variance: FloatArray) -> IndexArray:
+    """The signal with the largest Gaussian likelihood at readouts, ndarray[n, n_channels]; of several the first."""
+    unlike = np.zeros((len(values), len(mean)))
+    for c in range(values.shape[1]):
+        unlike += (values[:, None, c] - mean[:, c]) ** 2 / variance[:, c] + np.log(variance[:, c])
+    return np.asarray(unlike.argmin(axis=1))
 
 
 def _accuracy(rule: str, truth: IndexArray, said: IndexArray) -> Iterator[tuple[str, float]]:

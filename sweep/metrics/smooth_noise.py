@@ -2,14 +2,14 @@
 
 Every row is a closed form of the means and variances of two signals in the smooth response, whose noise is Gaussian
 (`camera/linear.py`); `discrimination.py` has the same forms for the digital numbers. Differences D of the means and
-variances a and b of the two signals are ndarray[n_pairs, n_channels], DN and DN^2.
+variances a and b of the two signals are ndarray[..., n_pairs, n_channels], DN and DN^2, real or complex with a
+derivative, see `tasks.colorimetry`; a function of them is ndarray[..., n_pairs].
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,77 +19,56 @@ from ..camera.setup import Setup
 from ..curves.lights import Pair, class_pairs
 from .discrimination import detectability
 from .smooth import Rows, SmoothDesign
+from .tasks.colorimetry import COMPLEX_STEP, Smooth, root
 
 _LN10 = math.log(10)
 
 
-@dataclass(frozen=True)
-class Slopes:
-    """A function of pairs, ndarray[n_pairs], and its derivatives by D, a and b, ndarray[n_pairs, n_channels] each."""
-
-    values: FloatArray
-    by_difference: FloatArray
-    by_first: FloatArray
-    by_second: FloatArray
+_OfPairs = Callable[[Smooth, Smooth, Smooth], Smooth]
 
 
-_OfPairs = Callable[[FloatArray, FloatArray, FloatArray], Slopes]
-
-
-def squared_detectability(difference: FloatArray, first: FloatArray, second: FloatArray) -> Slopes:
+def squared_detectability(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
     """d'^2 = D' S^-1 D for the mean S of both variances."""
-    s = (first + second) / 2
-    by_variance = -((difference / s) ** 2) / 2
-    return Slopes((difference**2 / s).sum(axis=-1), 2 * difference / s, by_variance, by_variance)
+    return np.asarray((difference**2 / ((first + second) / 2)).sum(axis=-1))
 
 
-def squared_contrast(difference: FloatArray, first: FloatArray, second: FloatArray) -> Slopes:
+def squared_contrast(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
     """Squared distance over the variance along the line of the two points: (D'D)^2 / (D' S D); 0 where they meet."""
-    s = (first + second) / 2
-    length = (difference**2).sum(axis=-1, keepdims=True)
-    along = (difference**2 * s).sum(axis=-1, keepdims=True)
-    ratio = np.divide(length, along, out=np.zeros_like(length), where=along > 0)
-    by_difference = 4 * ratio * difference - 2 * ratio**2 * difference * s
-    by_variance = -(ratio**2) * difference**2 / 2
-    return Slopes((length * ratio)[:, 0], by_difference, by_variance, by_variance)
+    length = (difference**2).sum(axis=-1)
+    return np.asarray(length * _ratio(length, (difference**2 * ((first + second) / 2)).sum(axis=-1)))
 
 
-def error_decades(difference: FloatArray, first: FloatArray, second: FloatArray) -> Slopes:
-    """-log10 of the error Q(z) on either side of the plane of `discrimination.pairwise_error`, z = w / (p + q).
+def margin(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
+    """Standard deviations from both points to the plane of `discrimination.pairwise_error`: D' S^-1 D / (p + q).
 
-    w = D' S^-1 D; p and q are the deviations of both signals along the normal S^-1 D.
+    p and q are the deviations of both signals along the normal S^-1 D. 0 where the points meet.
     """
+    normal = difference / (first + second)
+    p, q = (root((normal**2 * variance).sum(axis=-1)) for variance in (first, second))
+    return _ratio((normal * difference).sum(axis=-1), p + q)
+
+
+def error_decades(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
+    """-log10 of the error Q(z) on either side of the plane, z being the `margin`."""
     from scipy.special import log_ndtr  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
-    s = (first + second) / 2
-    normal = difference / s
-    w = squared_detectability(difference, first, second)
-    p, q = (np.sqrt((normal**2 * v).sum(axis=-1, keepdims=True)) for v in (first, second))
-    both = p + q
-    apart = both > 0
-    z = np.divide(w.values[:, None], both, out=np.zeros_like(both), where=apart)
-    # The derivative of z is that of w less z times that of p + q, over p + q.
-    per_p, per_q = (np.divide(z, 2 * v, out=np.zeros_like(z), where=v > 0) for v in (p, q))
-    weighed = per_p * first + per_q * second
-    by_s = weighed * normal**2 / s
-    parts = (
-        w.by_difference - 2 * weighed * normal / s,
-        w.by_first - per_p * normal**2 + by_s,
-        w.by_second - per_q * normal**2 + by_s,
-    )
-    tail = log_ndtr(-z)
-    per_z = np.exp(-(z**2) / 2 - tail) / (math.sqrt(2 * math.pi) * _LN10)
-    per_part = np.divide(per_z, both, out=np.zeros_like(both), where=apart)
-    return Slopes(-tail[:, 0] / _LN10, *(per_part * part for part in parts))
+    z = margin(difference, first, second)
+    tail = log_ndtr(-z.real)
+    if not np.iscomplexobj(z):
+        return np.asarray(-tail / _LN10)
+    by_z = np.exp(-(z.real**2) / 2 - tail) / (math.sqrt(2 * math.pi) * _LN10)
+    return np.asarray(-tail / _LN10 + 1j * by_z * z.imag)
 
 
-def overlap(difference: FloatArray, first: FloatArray, second: FloatArray) -> Slopes:
+def overlap(difference: Smooth, first: Smooth, second: Smooth) -> Smooth:
     """Bhattacharyya distance of two Gaussians: D' S^-1 D / 8 + ln(S / sqrt(a b)) / 2, summed over the channels."""
     total = first + second
     form = difference**2 / (4 * total) + np.log(total / (2 * np.sqrt(first * second))) / 2
-    by_total = -(difference**2) / (4 * total**2) + 1 / (2 * total)
-    by_variances = (by_total - 1 / (4 * first), by_total - 1 / (4 * second))
-    return Slopes(form.sum(axis=-1), difference / (2 * total), *by_variances)
+    return np.asarray(form.sum(axis=-1))
+
+
+def _ratio(over: Smooth, under: Smooth) -> Smooth:
+    return np.divide(over, under, out=np.zeros_like(over), where=under.real > 0)
 
 
 def pair_rows(design: SmoothDesign, *, of: _OfPairs, pairs: Sequence[Pair]) -> Rows:
@@ -133,7 +112,7 @@ def _of_signals(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:
     members = design.setup.members
     one, other = (members[name] for name in pair)
 
-    def of_both(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def of_both(values: Smooth) -> tuple[Smooth, Smooth]:
         """Of the first and of the second signal of every pair; the axes but signals and channels come first."""
         shape = (*values.shape[:-2], len(one), len(other), values.shape[-1])
         first = np.broadcast_to(values[..., one, None, :], shape)
@@ -141,15 +120,16 @@ def _of_signals(design: SmoothDesign, pair: Pair, of: _OfPairs) -> Rows:
         flat = (*values.shape[:-3], -1, values.shape[-1])
         return first.reshape(flat), second.reshape(flat)
 
-    mean, variance = of_both(design.response), of_both(design.variance)
-    mean_by_u, variance_by_u = of_both(design.response_by_u), of_both(design.variance_by_u)
-    found = of(mean[0] - mean[1], *variance)
-    by_u = (
-        (found.by_difference * (mean_by_u[0] - mean_by_u[1])).sum(axis=-1)
-        + (found.by_first * variance_by_u[0]).sum(axis=-1)
-        + (found.by_second * variance_by_u[1]).sum(axis=-1)
+    def found(mean: Smooth, variance: Smooth) -> Smooth:
+        first, second = of_both(mean)
+        return of(first - second, *of_both(variance))
+
+    along = found(
+        design.response + 1j * COMPLEX_STEP * design.response_by_u,
+        design.variance + 1j * COMPLEX_STEP * design.variance_by_u,
     )
-    return Rows(found.values, by_u.T)
+    shape = len(along), -1
+    return Rows(found(design.response, design.variance), along.imag.reshape(shape).T / COMPLEX_STEP)
 
 
 def smooth_detectability(setup: Setup, curves: FloatArray, pair: Pair) -> FloatArray:

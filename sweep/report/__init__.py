@@ -1,4 +1,4 @@
-"""What a person sees of a finished run: summary lines, figures, the HTML reports.
+"""Results of a finished run for a person: summary lines, figures, the HTML reports.
 
 Names are loaded when they are first used: a worker that draws needs few of them.
 """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from .figures import CURVE_CYCLE, canvas_grid
+from .figures import CURVE_CYCLE, decorate, legend_beside, panel_grid
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,31 +32,23 @@ _TOGETHER = (0.8, 0.7)
 def draw_accuracy(table: pd.DataFrame, name: str) -> Figure:
     """Draw the error of presets and single settings against the time of the study's designs.
 
-    Presets are stars with their names; the values of a single setting are joined by a line.
-
-    Parameters
-    ----------
-    table : DataFrame
-        Columns scenario, setting, value, designs, error_dn (DN), total_s (s). Errors below 1e-6 DN are drawn there.
-    name : str
-        Name of the study.
+    Presets are stars with their names; the values of a single setting are joined by a line. `table`: columns scenario,
+    setting, value, designs, error_dn (DN), total_s (s); errors below 1e-6 DN are drawn there. `name`: of the study.
     """
     counts = sorted(table["designs"].unique())
     designs = counts[min(1, len(counts) - 1)]
     drawn = table[table["designs"] == designs]
     scenes = list(drawn.groupby("scenario", sort=False))
     columns = min(_COLUMNS, len(scenes))
-    lines = math.ceil(len(scenes) / columns)
-    figure, panels = canvas_grid(lines, columns, 3.4 * columns + 1.4, 3.1 * lines + 0.6)
+    figure, panels = panel_grid(len(scenes), columns, (3.4, 3.1), (1.4, 0.6))
     settings = [setting for setting in drawn["setting"].unique() if setting != PRESET]
-    for at, (axes, (scenario, rows)) in enumerate(zip(panels, scenes, strict=False)):
+    for at, (axes, (scenario, rows)) in enumerate(zip(panels, scenes, strict=True)):
+        decorate(axes)
         for number, setting in enumerate(settings):
             values = rows[rows["setting"] == setting]
-            errors = values["error_dn"].clip(lower=_LEAST_DN)
-            axes.plot(values["total_s"], errors, alpha=0.85, **_style(number))
+            axes.plot(values["total_s"], values["error_dn"].clip(lower=_LEAST_DN), alpha=0.85, **_style(number))
         _mark_presets(axes, rows[rows["setting"] == PRESET])
-        axes.set_xscale("log")
-        axes.set_yscale("log")
+        axes.set(xscale="log", yscale="log")
         axes.set_ylim(_LEAST_DN / 3, max(10.0, 30 * drawn["error_dn"].max()))
         axes.set_xlim(drawn["total_s"].min() / 2, drawn["total_s"].max() * 2)  # the same in all panels
         axes.set_title(str(scenario), fontsize=9)
@@ -65,9 +57,11 @@ def draw_accuracy(table: pd.DataFrame, name: str) -> Figure:
         if at % columns == 0:
             axes.set_ylabel("error of a CSD / DN", fontsize=8)
         axes.tick_params(labelsize=7)
-    for axes in panels[len(scenes) :]:
-        axes.set_visible(False)
-    _add_legend(panels[columns - 1], settings)
+    corner = panels[columns - 1]
+    corner.plot([], [], label="preset", **_STAR)
+    for number, setting in enumerate(settings):
+        corner.plot([], [], label=setting, **_style(number))
+    legend_beside(corner)
     figure.suptitle(
         f"{name}: what accuracy costs in time (errors below {_LEAST_DN:g} DN lie at the bottom)", fontsize=11
     )
@@ -106,11 +100,3 @@ def _mark_presets(axes: Axes, presets: pd.DataFrame) -> None:
             linespacing=1.0,
             bbox={"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 0.5},
         )
-
-
-def _add_legend(axes: Axes, settings: list[str]) -> None:
-    """Legend of the markers, beside the last panel of the first row."""
-    axes.plot([], [], label="preset", **_STAR)
-    for number, setting in enumerate(settings):
-        axes.plot([], [], label=setting, **_style(number))
-    axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0, frameon=False)

@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from ..base.types import FloatArray
 from ..metrics.columns.confusion import CNR, D_PRIME
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.limiting import limited_by_name
-from ..metrics.quantity import DECADES, OF_A_SHARE, WORST_CASE
+from ..metrics.quantity import DECADES, HELD_OUT, OF_A_SHARE, WORST_CASE
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
 from ..results.thinning import per_exposure
 from ..study.axes import series_of
 from .allowed_lamps import lamp_lines
-from .assumed import assumed, moves_with_light, technology_of
 from .leaders import Leaders, Row, leaders_of
 from .names import capital, full_name, label, of_reference, rate_told
 from .noise import usable_lines
 from .robustness import over_population, robustness_lines, worst_over
 from .series import lead_sentence, leads_of
-from .terms import constraints_told, missed_told, unknown_lines
-from .unseen import unseen_lines, unseen_told
+from .terms import assumed, constraints_told, missed_told, moves_with_light, technology_of, unknown_lines
 from .upper_bound import upper_bound_beside
 from .values import series_figures
 
@@ -33,12 +32,11 @@ _BY_NOISE = (D_PRIME, CNR)
 
 
 def answer_sentences(output: Output) -> list[str]:
-    """What images say first; then over scenarios that differ in one number who leads where, else who is best."""
+    """Results on images first; then over scenarios that differ in one number the leaders, else the best design."""
     return output.once("answer", lambda: [*_of_images(output), *_of_designs(output)])
 
 
 def _of_images(output: Output) -> Iterator[str]:
-    """What the benchmark of vision says, where a study asks for one."""
     if output.study.vision is not None:
         from .vision_tables import vision_sentences  # noqa: PLC0415  (only where a study asks for images)
 
@@ -46,18 +44,14 @@ def _of_images(output: Output) -> Iterator[str]:
 
 
 def _of_designs(output: Output) -> list[str]:
-    """Over scenarios that differ in one number who leads where; else who is best, and what limits it."""
     searched = output.kind(SWEPT, FOUND)
     if len(searched) and output.best.empty:
         failed = searched[searched["status"] != "ok"]
         if len(failed) == len(searched):
             return [f"Every design failed: {failed['status'].iloc[0]}."]
         under = constraints_told(output)
-        return [
-            f"No design meets every constraint{f': {under}' if under else ''}.",
-            *unknown_lines(output),
-            *who_else(output),
-        ]
+        none = f"No design meets every constraint{f': {under}' if under else ''}."
+        return [none, *unknown_lines(output), *who_else(output)]
     usable = list(usable_lines(output))
     # Where the question is of noise, separations matter where another CFA begins to lead.
     series = usable + [lead_sentence(s) for s in series_figures(output) if not usable or len(leads_of(s)) > 1]
@@ -69,58 +63,80 @@ def _of_designs(output: Output) -> list[str]:
     return [*_best(output, leaders), *others, *lamps, *lamp_lines(output), *who_else(output), *series]
 
 
-def said_separation(output: Output, row: Row) -> str:
-    """How far a row separates the pair of signal types of the trade-off, and at which light."""
+def _said_separation(output: Output, row: Row) -> str:
+    """The separation of a row for the pair of signal types of the trade-off, and its light."""
     separation = output.trade_off[0]
-    told = separation.told(row[separation.name])
+    amount = separation.told(row[separation.name])
     light = f"at {row[CFA_SENSITIVITY]:.3f} {of_reference(output)}"
     if separation.pair is None or separation.metric in _BY_NOISE:
-        return f"reaches {separation.words} {told} {light}"
+        return f"reaches {separation.words} {amount} {light}"
     worst = f" in the worst case of {worst_over(output)}" if separation.extreme == WORST_CASE else ""
     if separation.extreme == OF_A_SHARE:
         worst = separation.words.removeprefix(output.columns[separation.of].words).replace(" of ", " for ", 1)
-    return f"separates {' from '.join(separation.pair)} by {told}{worst} {light}"
+    return f"separates {' from '.join(separation.pair)} by {amount}{worst} {light}"
+
+
+def _in(output: Output, scenario: str) -> str:
+    """A scenario behind a sentence, where there are several."""
+    return f" in {scenario}" if len(output.scenarios) > 1 else ""
 
 
 def _best(output: Output, leaders: Leaders) -> Iterator[str]:
-    """Who is best under the constraints, beside the plain CFA that separates most; then what limits it, and others."""
+    """The best design under the constraints, beside the plain CFA that separates most; its limits, and others."""
     best, plain, separation = leaders.chosen, leaders.plain, output.trade_off[0]
     if best is None:
         if len(output.scenarios) > 1:
             yield f"In {leaders.scenario}, no design meets every constraint."
         return
-    under = constraints_told(output)
-    who = full_name(best) + technology_of(output, best)
+    under, stated = constraints_told(output), technology_of(output, best)
+    who = full_name(best) + ("" if stated is None else f" ({stated.told})")
     if best["kind"] in (PLAIN, NAMED):
         who = f"the best {'CFA' if best['kind'] == PLAIN else 'design'} of this study, {who},"
     text = f"With {under}, {who}" if under else capital(who)
     if output.goal.name not in (separation.name, separation.of):
         text += f" has the best {output.goal.words}, {output.goal.amount(best[output.goal.name])}, and"
-    text += f" {said_separation(output, best)}{unseen_told(output, best)}"
-    if len(output.scenarios) > 1:
-        text += f" in {leaders.scenario}"
-    if plain is not None:
-        text += _times(output, best, plain)
-    yield f"{text}."
-    yield from _of_least(output, best, plain)
+    text += f" {_said_separation(output, best)}"
+    held_out = float(best.get(HELD_OUT + (separation.of or separation.name), np.nan))
+    if np.isfinite(held_out):
+        text += f" ({separation.told(held_out)} on lights that it has not seen)"
+    yield f"{text}{_in(output, leaders.scenario)}{_times(output, best, plain)}."
+    if output.objective.rule.wanted != "more":  # decades of what is to be the least, in its own unit
+        for name in output.objective.weights:
+            rows = [row for row in (best, plain) if row is not None]
+            values = [f"{float(row[name]):.3g} {output.columns[name].unit}".rstrip() for row in rows]
+            beside = f" ({plain['name']} {values[1]})" if plain is not None else ""
+            yield f"Its {output.words(name)} is {values[0]}{beside}."
     if filter_told := assumed(output, best):
         yield filter_told
-    parts = _band(best)
+    if limits := _limits(output, best):
+        yield limits
+    yield from unseen_lines(output)
+    for row in leaders.others:
+        name = f"the {label(row)} of {row['cfa']}"
+        if row["kind"] != FOUND:
+            same = " that meets the same" if output.constraints else ""
+            name = f"the best of {row['cfa']}{same}, {label(row)},"
+        yield f"{capital(name)} {_said_separation(output, row)}{_limited_told(output, row)}."
+
+
+def _limits(output: Output, best: Row) -> str:
+    """Edges of the best filter, the lights that limit it, and the upper bound for any filter."""
+    parts = []
+    left_nm, right_nm = (best.get(name, np.nan) for name in ("left_nm", "right_nm"))
+    if best["kind"] in (SWEPT, FOUND) and np.isfinite([left_nm, right_nm]).all():
+        parts.append(f"Its edges are at {left_nm:.0f} and {right_nm:.0f} nm.")
     if lights := _limited(output, best):
         parts.append(f"The two lights that limit it are {lights}.")
-    bound = upper_bound_beside(output, best)
-    if bound is not None:
-        where = f" in {bound.scenario}" if len(output.scenarios) > 1 else ""
+    bound, search = upper_bound_beside(output, best), output.provenance.search
+    if bound is not None and search is not None:
         alike = " that moves like it" if moves_with_light(output, best) else ""
         same = "the same constraints" if output.constraints else "no constraint"
         parts.append(
-            f"Upper bound for any filter{alike} in {bound.channel} of {bound.cfa} under {same}{where}: "
-            f"{separation.told_bound(bound.value)} (proven, before quantization)."
+            f"Upper bound for any filter{alike} in {search.channel} of {search.cfa} under {same}"
+            f"{_in(output, search.scenario)}: {output.trade_off[0].told_bound(bound)} "
+            "(proven, before quantization)."
         )
-    if parts:
-        yield " ".join(parts)
-    yield from unseen_lines(output)
-    yield from (_best_of_other(output, row) for row in leaders.others)
+    return " ".join(parts)
 
 
 def _best_of_other_scenarios(output: Output) -> Iterator[str]:
@@ -129,12 +145,12 @@ def _best_of_other_scenarios(output: Output) -> Iterator[str]:
     others = [name for name in output.scenarios if name not in inner and name != output.scenario]
     for scenario in others[:_MOST_SCENARIOS]:
         leaders = leaders_of(output, scenario)
-        if leaders.chosen is None:
+        best = leaders.chosen
+        if best is None:
             yield f"In {scenario}, no design meets every constraint."
-            continue
-        best = f"{full_name(leaders.chosen)} {said_separation(output, leaders.chosen)}"
-        against = "" if leaders.plain is None else _times(output, leaders.chosen, leaders.plain)
-        yield f"In {scenario}, {best}{against}."
+        else:
+            against = _times(output, best, leaders.plain)
+            yield f"In {scenario}, {full_name(best)} {_said_separation(output, best)}{against}."
     if left := len(output.scenarios) - 1 - len(others[:_MOST_SCENARIOS]):
         yield f"Of {left} more scenario{'s' if left > 1 else ''}, the report's tables have the best designs."
 
@@ -148,50 +164,19 @@ def _limited(output: Output, row: Row) -> str:
 
 
 def _limited_told(output: Output, row: Row) -> str:
-    """The same behind a figure."""
     lights = _limited(output, row)
     return f" (limited by {lights})" if lights else ""
 
 
-def _of_least(output: Output, best: Row, plain: Row | None) -> Iterator[str]:
-    """What is to be the least, in its own unit, where the objective says it in decades."""
-    if output.objective.rule.wanted == "more":
-        return
-    for name in output.objective.weights:
-        told = [
-            f"{float(row[name]):.3g} {output.columns[name].unit}".rstrip() for row in (best, plain) if row is not None
-        ]
-        beside = f" ({plain['name']} {told[1]})" if plain is not None else ""
-        yield f"Its {output.words(name)} is {told[0]}{beside}."
-
-
-def _best_of_other(output: Output, row: Row) -> str:
-    """What the best design of another CFA than that of the best one has."""
-    same = " that meets the same" if output.constraints else ""
-    name = label(row) if row["kind"] == FOUND else f"{label(row)},"
-    who = f"the {name} of {row['cfa']}" if row["kind"] == FOUND else f"the best of {row['cfa']}{same}, {name}"
-    return f"{capital(who)} {said_separation(output, row)}{_limited_told(output, row)}."
-
-
-def _band(row: Row) -> list[str]:
-    """Where the band of a found filter lies, between the middles of its edges; nothing of other filters."""
-    ends = [row.get(name, np.nan) for name in ("left_nm", "right_nm")]
-    found = _made(row) and np.isfinite(ends).all()
-    return [f"Its edges are at {ends[0]:.0f} and {ends[1]:.0f} nm."] if found else []
-
-
-def _made(row: Row) -> bool:
-    """Whether the study swept or searched a design."""
-    return row["kind"] in (SWEPT, FOUND)
-
-
-def _times(output: Output, best: Row, plain: Row) -> str:
+def _times(output: Output, best: Row, plain: Row | None) -> str:
     """The separation and the light of a row as multiples of those of a plain CFA."""
+    if plain is None:
+        return ""
     separation = output.trade_off[0]
-    of, light = float(plain[separation.name]), float(plain[CFA_SENSITIVITY])
+    of, light, name = float(plain[separation.name]), float(plain[CFA_SENSITIVITY]), plain["name"]
     if not of > 0:
-        return f" ({plain['name']} by {separation.told(of)} at {light:.3f})"
-    times, name = f"{best[CFA_SENSITIVITY] / light:.2f} times its light ({light:.3f})", plain["name"]
+        return f" ({name} by {separation.told(of)} at {light:.3f})"
+    times = f"{best[CFA_SENSITIVITY] / light:.2f} times its light ({light:.3f})"
     if separation.unit == DECADES:  # a ratio of logarithms says nothing
         more = separation.told(best[separation.name] - of)
         return f": {more} beyond {name} ({separation.told(of)}), and {times}"
@@ -200,45 +185,107 @@ def _times(output: Output, best: Row, plain: Row) -> str:
 
 
 def who_else(output: Output) -> list[str]:
-    """Who separates most, and most for its exposure, where that is not the best one under the constraints."""
-    found = " ".join(_others(output, leaders_of(output)))
-    return [found] if found else []
+    """The largest separation, and the largest for its exposure, where that is not the best under the constraints."""
+    sentences = " ".join(_others(output, leaders_of(output)))
+    return [sentences] if sentences else []
 
 
 def _others(output: Output, leaders: Leaders) -> Iterator[str]:
-    """Who separates most and who does so for its exposure, where that is somebody else."""
     best, most, rate = leaders.chosen, leaders.separates, leaders.per_exposure
-    separation = output.trade_off[0]
+    separation, where = output.trade_off[0], _in(output, leaders.scenario)
     per_time = separation.unit != DECADES and separation.metric not in _BY_NOISE
-    where = f" in {leaders.scenario}" if len(output.scenarios) > 1 else ""
-    if most is not None and best is not None and most["design_id"] == best["design_id"] and _made(best):
+    leads = best is not None and most is not None and most["design_id"] == best["design_id"]
+    if leads and best is not None and best["kind"] in (SWEPT, FOUND):
         yield f"Nothing else in this run {'separates' if per_time else 'has'} more{where}."
     more = most is not None and (best is None or most[separation.name] > best[separation.name])
     if most is not None and more:
         verb = "separates most" if per_time else "has the most"
-        yield f"{capital(full_name(most))} {verb} of all{where}: {_figures(output, most)}{_missed(output, most)}."
+        figures = f"{separation.told(most[separation.name])} at {most[CFA_SENSITIVITY]:.3f} {of_reference(output)}"
+        figures += _limited_told(output, most)
+        yield f"{capital(full_name(most))} {verb} of all{where}: {figures}{_missed(output, most)}."
     if rate is None or not per_time:
         return
     measure = per_exposure(separation.name)
     same = more and most is not None and most["design_id"] == rate["design_id"]
-    told = rate_told(rate[measure])
+    most_rate = rate_told(rate[measure])
     rivals = [r for r in (best, leaders.plain) if r is not None and r["design_id"] != rate["design_id"]]
     others = {full_name(r): rate_told(r[measure]) for r in rivals}
-    tied = [name for name, value in others.items() if value == told]
+    tied = [name for name, value in others.items() if value == most_rate]
     who = " and ".join(["it" if same else full_name(rate), *tied])
     text = f"{capital(who)} separate{' most for their' if tied else 's most for its'} exposure{where}"
-    text += f"{', too' if same else ''}: {told} {separation.unit} per ms of exposure"
+    text += f"{', too' if same else ''}: {most_rate} {separation.unit} per ms of exposure"
     against = ", ".join(f"{name} {value}" for name, value in others.items() if name not in tied)
     yield text + (f" ({against})" if against else "") + ("" if same else _missed(output, rate)) + "."
-
-
-def _figures(output: Output, row: Row) -> str:
-    separation = output.trade_off[0]
-    light = f"{row[CFA_SENSITIVITY]:.3f} {of_reference(output)}"
-    return f"{separation.told(row[separation.name])} at {light}{_limited_told(output, row)}"
 
 
 def _missed(output: Output, row: Row) -> str:
     """Constraints that a row does not meet, in words; of a plain CFA none are asked."""
     missed = missed_told(output, row)
     return f", but {missed}" if missed and row["kind"] != PLAIN else ""
+
+
+_RESAMPLES = 10_000
+
+
+def unseen_lines(output: Output) -> Iterator[str]:
+    """Loss of the search on lights that are left out of it."""
+    if output.left_out is None:
+        return
+    several = output.left_out["objective"].nunique() > 1
+    for objective, rows in output.left_out[output.left_out["fall"].notna()].groupby("objective", sort=False):
+        quantity = output.columns[str(objective)]
+        of = f" of the {quantity.words}" if several else ""
+        worst = rows.nlargest(1, "fall").iloc[0]
+        yield f"Left out of the search, {worst['signal']} costs its optimum{of} most: {quantity.told(worst['fall'])}."
+        falls = rows["fall"].to_numpy()
+        if falls.size > 1:
+            mean, low, high = generalization_gap(falls, output.study.seed)
+            ends = f"95 % interval {quantity.told(low)} to {quantity.told(high)}"
+            yield f"A light that the search{of} has not seen costs {quantity.told(mean)} on average ({ends})."
+
+
+def generalization_gap(falls: FloatArray, seed: int) -> tuple[float, float, float]:
+    """The mean fall of an optimum on a light that was left out, with its 95 % interval by a bootstrap over the lights.
+
+    `falls`: DN, ndarray[n_lights]. The interval is of lights like these, drawn at random (Efron and Tibshirani, An
+    Introduction to the Bootstrap, 1993, chapter 13).
+    """
+    rng = np.random.default_rng([seed, 2])
+    means = falls[rng.integers(falls.size, size=(_RESAMPLES, falls.size))].mean(axis=1)
+    low, high = np.quantile(means, (0.025, 0.975))
+    return float(falls.mean()), float(low), float(high)
+
+
+def large_numbers(output: Output) -> list[tuple[str, str, str]]:
+    """(value, name, comparison) of separation, light and distance to the upper bound of the best design.
+
+    Without a bound, its separation per exposure. Without a best design there are none.
+    """
+    leaders = leaders_of(output)
+    best, plain, separation = leaders.chosen, leaders.plain, output.trade_off[0]
+    if best is None:
+        return []
+
+    def beside(column: str, told: Callable[[float], str]) -> str:
+        """A value as a multiple of that of a plain CFA."""
+        if plain is None or not float(plain[column]) > 0:
+            return ""
+        if column == separation.name and separation.unit == DECADES:  # a ratio of logarithms says nothing
+            return f"{plain['name']} {told(float(plain[column]))}"
+        return f"{best[column] / plain[column]:.2f} times {plain['name']} ({told(float(plain[column]))})"
+
+    value, measure = float(best[separation.name]), per_exposure(separation.name)
+    light = beside(CFA_SENSITIVITY, "{:.3f}".format)
+    numbers = [
+        (separation.told(value), separation.words, beside(separation.name, separation.told)),
+        (f"{best[CFA_SENSITIVITY]:.3f}", of_reference(output), light),
+    ]
+    bound, search = upper_bound_beside(output, best), output.provenance.search
+    if bound is not None and search is not None:
+        shown = f"{separation.told_bound(bound)}: proven under the same constraints, before quantization"
+        name = f"below the upper bound for any filter in {search.channel} of {search.cfa}"
+        numbers.append((separation.told(bound - value), name, shown))
+    elif best[measure] == best[measure] and separation.unit != DECADES and separation.metric not in (D_PRIME, CNR):
+        rate = f"{rate_told(float(best[measure]))} {separation.unit}"
+        numbers.append((rate, "per ms of exposure", beside(measure, rate_told)))
+    return numbers

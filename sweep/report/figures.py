@@ -42,7 +42,7 @@ TYPE_COLORS = {"green": "#009e73", "yellow": "#c9a800", "orange": "#e66100", "re
 CURVE_CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 _DPI = 160
 _PACKED = 3
-"""How hard zlib tries on a PNG: at its usual 6 a file is a tenth smaller and takes twice as long."""
+"""Compression level of a PNG: at its usual 6 a file is a tenth smaller and takes twice as long."""
 Drawing = Callable[[], "Figure"]
 """A drawing that is put off: a process that draws nothing need not load what draws."""
 
@@ -98,9 +98,7 @@ def legend_beside(axes: Axes, title: str | None = None) -> None:
 
 def canvas(width_in: float, height_in: float) -> tuple[Figure, Axes]:
     """An empty figure with one pair of axes, sizes in inches."""
-    figure = empty_figure(width_in, height_in)
-    axes = figure.add_subplot()
-    decorate(axes)
+    figure, (axes,) = canvas_grid(1, 1, width_in, height_in)
     return figure, axes
 
 
@@ -111,6 +109,16 @@ def canvas_grid(rows: int, columns: int, width_in: float, height_in: float) -> t
     for axes in panels:
         decorate(axes)
     return figure, panels
+
+
+def panel_grid(
+    count: int, most_columns: int, panel_in: tuple[float, float], around_in: tuple[float, float]
+) -> tuple[Figure, list[Axes]]:
+    """An empty figure with as many undecorated axes as asked for, row by row, sizes in inches."""
+    columns = min(most_columns, count)
+    rows = -(-count // columns)
+    figure = empty_figure(panel_in[0] * columns + around_in[0], panel_in[1] * rows + around_in[1])
+    return figure, [figure.add_subplot(rows, columns, at + 1) for at in range(count)]
 
 
 def empty_figure(width_in: float, height_in: float) -> Figure:
@@ -132,7 +140,7 @@ def decorate(axes: Axes) -> None:
 
 
 def pictures_of(draw: Drawing, kinds: Sequence[str]) -> dict[str, bytes]:
-    """What `draw` draws as files of some kinds: kind -> what the file holds."""
+    """A drawing as files of some kinds: kind -> contents."""
     import matplotlib as mpl  # noqa: PLC0415  (slow to import)
 
     # Nothing stands above any axes: where a title goes need not be found out, which takes a sixth of a picture's time.

@@ -1,8 +1,8 @@
-"""Who leads in a scenario: under the constraints, in separation, and for its exposure."""
+"""Leaders of a scenario: under the constraints, in separation, and for their exposure."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -22,8 +22,8 @@ class Leaders:
     """Rows of a scenario.
 
     `chosen`: the best design that the study swept or searched and that meets all constraints; without such designs the
-    CFA or named design that does and separates most; None where none does. `separates`, `per_exposure`: who
-    separates most of all rows, and most for each millisecond of exposure, whatever the constraints. `plain`: the other
+    CFA or named design that does and separates most; None where none does. `separates`, `per_exposure`: the largest
+    separation of all rows, and for each millisecond of exposure, whatever the constraints. `plain`: the other
     plain CFA that separates most, with which the chosen one is compared. `others`: the best design of each other CFA
     whose designs the study swept or searched.
     """
@@ -37,34 +37,24 @@ class Leaders:
 
 
 def leaders_of(output: Output, scenario: str | None = None) -> Leaders:
-    """Return who leads in a scenario, by default in that of the search, or in the first one."""
+    """Return the leaders of a scenario, by default in that of the search, or in the first one."""
     scenario = output.scenario if scenario is None else scenario
     return output.once(("leaders", scenario), partial(_leaders, output, scenario))
 
 
 def _leaders(output: Output, scenario: str) -> Leaders:
     separation = output.trade_off[0].name
-    best = output.best
     rows = output.table[(output.table["scenario"] == scenario) & (output.table["status"] == "ok")]
-    made = rows["kind"].isin([SWEPT, FOUND])
-    own = best[best["scenario"] == scenario]
-    chosen = _first(own) if made.any() else _most(rows[rows["feasible"]], separation)
-    others = rows if chosen is None else rows[rows["design_id"] != chosen["design_id"]]
-    return Leaders(
-        scenario,
-        chosen,
-        _most(rows, separation),
-        _most(rows, per_exposure(separation)),
-        _most(others[others["kind"] == PLAIN], separation),
-        () if chosen is None else tuple(_best_of_others(own, str(chosen["cfa"]))),
-    )
-
-
-def _best_of_others(best: pd.DataFrame, cfa: str) -> Iterator[Row]:
-    """The first row of each CFA but `cfa`."""
-    for name, rows in best[best["cfa"].astype(str) != cfa].groupby("cfa", sort=False, observed=True):
-        del name
-        yield rows.iloc[0].to_dict()
+    best = output.best[output.best["scenario"] == scenario]
+    made = rows["kind"].isin([SWEPT, FOUND]).any()
+    chosen = _first(best) if made else _most(rows[rows["feasible"]], separation)
+    plain = rows[rows["kind"] == PLAIN]
+    others: tuple[Row, ...] = ()
+    if chosen is not None:
+        plain = plain[plain["design_id"] != chosen["design_id"]]
+        others = tuple(best[best["cfa"] != chosen["cfa"]].drop_duplicates("cfa").to_dict("records"))
+    rate = _most(rows, per_exposure(separation))
+    return Leaders(scenario, chosen, _most(rows, separation), rate, _most(plain, separation), others)
 
 
 def _first(rows: pd.DataFrame) -> Row | None:

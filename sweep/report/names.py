@@ -1,4 +1,4 @@
-"""How designs are called where people read them."""
+"""Names of designs in sentences and tables."""
 
 from __future__ import annotations
 

@@ -10,9 +10,8 @@ import numpy as np
 import pandas as pd
 
 from ..base.types import BoolArray, FloatArray
-from ..metrics.classifiers import CLASSIFIERS
 from ..metrics.columns.confusion import D_PRIME, STATE_ERROR, STATE_ERROR_BOUND
-from ..metrics.recognition import MOST_LIKELY
+from ..metrics.recognition import CLASSIFIERS, MOST_LIKELY
 from ..results.output import Output
 from ..study.axes import series_of
 from .series import Line, SeriesFigure, quantity_of

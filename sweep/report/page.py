@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from functools import partial
 from itertools import chain, islice
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pandas as pd
 import pyarrow as pa
@@ -19,46 +18,36 @@ from ..results.names import FIGURES, REPORT, VISION_FIGURES, is_drawn
 from ..results.output import Output
 from ..results.profiles import profile_table
 from ..results.tables import FOUND, NAMED, PLAIN, csv_of, encoded
+from . import signal_figures as signals
 from . import tables
 from . import values as content
 from .allowed_lamps import lamp_drawings, lamp_table
-from .answer import answer_sentences
+from .answer import answer_sentences, large_numbers
 from .colors import color_drawings
 from .figures import Drawing, draw_curves, pictures_of
-from .large_numbers import large_numbers
 from .leaders import leaders_of
 from .noise import all_series, told_apart_table
 from .page_data import payload
 from .pages import inlined, library, page, rows, script
-from .published import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
 from .scenes import effect_table, scene_groups, scene_table
-from .scorecard import draw_scorecard, score_cells, scorecard
+from .scorecard import draw_scorecard, scorecard
 from .sensor_map import map_drawings
 from .series import draw_series
-from .signal_figures import (
-    chart_patches,
-    clouds,
-    draw_chart,
-    draw_clouds,
-    draw_tiles,
-    first_mosaics,
-    replaced_channels,
-)
 from .summary import counts_line, summary_lines
+from .tables import PUBLISHED_CSV, PUBLISHED_PARQUET, comparison_with_published
 from .terms import constraints_told, terms_of
 from .trade_off import draw_trade_off, overview_figure, pareto_figure, traded_cfas
 
-if TYPE_CHECKING:
-    pass
-
-
 _FIRST_LINES, _FIRST_LEADS = 1, 2
-"""Of the answer, above the first plot, also where that says who leads where; the others stand below it."""
-_PICTURES = ("tiles", "sensor", "signals", "chart")
-"""Figures that the page shows as pictures; it draws all others itself, but for those of tasks."""
-_MAPS = "places-"
-_OF_TASKS = ("scorecard", "color-noise", "rendered")
-_OF_REGIONS = "regions"
+"""Lines of the answer above the first plot, and where that says who leads where; the others stand below it."""
+_SHOWN = {
+    "images": ("tiles", "sensor", "signals", "chart"),
+    "lamp_images": ("regions",),
+    "vision_images": (VISION_FIGURES,),
+    "score_images": ("scorecard", "color-noise", "rendered"),
+    "map_images": ("places-",),
+}
+"""Places of the page -> how the names of the pictures there begin; the page draws all other figures itself."""
 
 
 def make_report(output: Output, *, mend: bool = False, parallel: Parallel = in_turn) -> None:
@@ -81,7 +70,8 @@ def make_report(output: Output, *, mend: bool = False, parallel: Parallel = in_t
 
 def _contents(output: Output, some: Iterable[str] | None, parallel: Parallel) -> dict[str, bytes]:
     """The files of the report -> what they hold; `some` of them, or all, since the page has every picture in it."""
-    images, contents, wanted = [], dict[str, bytes](), []
+    contents, wanted = dict[str, bytes](), []
+    images: dict[str, list[tuple[str, str]]] = {place: [] for place in _SHOWN}
     for name, caption, figure in (*_drawings(output), *_vision_drawings(output)):
         where = name if name.startswith(("cfas", "pareto")) else f"{FIGURES}/{name}"
         if some is None or {f"{where}.png", f"{where}.svg"} & {*some}:
@@ -92,61 +82,44 @@ def _contents(output: Output, some: Iterable[str] | None, parallel: Parallel) ->
     parts = _parts(output, published) if some is None else {}
     for (name, caption, where, _), made in zip(wanted, chain(begun, pictures), strict=True):
         contents |= {f"{where}.{kind}": content for kind, content in made.items()}
-        if some is None and name.startswith((*_PICTURES, *_OF_TASKS, _OF_REGIONS, _MAPS, VISION_FIGURES)):
-            images.append((name, caption, inlined(made["png"])))
+        for place, names in _SHOWN.items():
+            if name.startswith(names):
+                images[place].append((caption, inlined(made["png"])))
     if len(published):
         contents[PUBLISHED_CSV] = csv_of(published).encode("utf-8")
         contents[PUBLISHED_PARQUET] = encoded(pa.Table.from_pandas(published, preserve_index=False))
     if some is None:
-        contents[REPORT] = page("report.html.j2", **parts, **_images(images)).encode("utf-8")
+        contents[REPORT] = page("report.html.j2", **parts, **images).encode("utf-8")
     return contents
 
 
-def _images(images: Sequence[tuple[str, str, str]]) -> dict[str, list[tuple[str, str]]]:
-    """Pictures by where the page has them: caption and address; `images`: their files' names, too."""
-    wheres: dict[str, str | tuple[str, ...]] = {
-        "images": _PICTURES,
-        "lamp_images": _OF_REGIONS,
-    }
-    wheres |= {"vision_images": VISION_FIGURES, "score_images": _OF_TASKS, "map_images": _MAPS}
-    return {where: [(told, uri) for name, told, uri in images if name.startswith(own)] for where, own in wheres.items()}
-
-
 def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
-    """What the page says, but for its pictures."""
-    drawn, card = payload(output), scorecard(output)
-    groups, series_first = scene_groups(output), bool(drawn["series"]) and output.best.empty
+    """Contents of the page, but for its pictures."""
+    drawn, groups = payload(output), scene_groups(output)
+    series_first = bool(drawn["series"]) and output.best.empty
     return {
+        "output": output,
         "study": output.study,
-        "folder": output.folder.as_posix(),
-        "quoted": shlex.quote(output.folder.as_posix()),
+        "card": scorecard(output),
+        "groups": [(group, rows(effect_table(group.effects))) for group in groups],
         "objective": _objective(output),
         "numbers_in": "" if len(output.scenarios) == 1 else f"in {leaders_of(output).scenario}",
         "series_first": series_first,
         "terms_first": series_first and drawn["series"][0]["y_label"] == output.trade_off[0].axis,
-        "objective_words": output.goal.words,
         "answer": answer_sentences(output),
         "first_lines": _FIRST_LEADS if series_first and output.study.recognition is None else _FIRST_LINES,
         "numbers": large_numbers(output),
         "counts": counts_line(output),
         "interactive": drawn,
-        "profiles": {cfa: rows(profile_table(found)) for cfa, found in output.profiles.items()},
-        "history": drawn["history"],
+        "profiles": {cfa: rows(profile_table(profiles)) for cfa, profiles in output.profiles.items()},
         "plotly": library(),
         "script": script("report.js"),
-        "groups": groups,
         "scenes": rows(scene_table(groups)),
-        "group_rows": [rows(effect_table(group)) for group in groups],
-        "audited": output.audited is not None,
-        "checked": "" if output.provenance.check is None else output.provenance.check.sentence,
         "lamps": rows(lamp_table(output)),
         "vision": _vision(output),
         "comparison": rows(tables.comparison_table(output)),
         "best": rows(tables.best_table(output)),
         "recognition": rows(told_apart_table(output)),
-        "score_names": () if card is None else card.names,
-        "score_rows": [] if card is None else score_cells(card),
-        "conditions": output.study.tasks,
         "left_out": rows(tables.worst_left_out(output)),
         "geometry": rows(tables.geometry_table(output)),
         "published": rows(published),
@@ -154,7 +127,6 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
         "terms": terms_of(output),
         "summary": summary_lines(output),
         "provenance": output.provenance.model_dump(mode="json"),
-        "limited": output.provenance.search is not None and output.provenance.search.limit_proven is not None,
     }
 
 
@@ -178,44 +150,39 @@ def _vision_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
 
 
 def _objective(output: Output) -> str:
-    """What the study maximizes, in words, and where it is one column, how files call it."""
+    """The objective in words, and where it is one column, its name in the files."""
     name = output.goal.name
     words = str(output.objective) if output.goal.words == name else f"the {output.goal.words}"
     return words if name in (words, COMBINED) else f"{words} ({name} in the files)"
 
 
 def _drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
-    """(file name, caption, drawing) of everything that is drawn."""
-    # What takes longest comes first, so that no core waits for it in the end.
+    """(file name, caption, drawing) of everything that is drawn, the slowest first, so that no core waits for it."""
     for name, caption, kinds in (
         ("clouds-cfas", "Signals in the channels of the plain CFAs", (PLAIN,)),
         ("clouds-designs", "Signals in the channels of the named and the found designs", (NAMED, FOUND)),
     ):
-        found = clouds(output, *kinds)
-        if found:
+        designs = signals.clouds(output, *kinds)
+        if designs:
             top_dn = max(1.0, 1.05 * float(output.points["dn"].max()))
-            yield name, caption, partial(draw_clouds, found, caption, top_dn)
+            yield name, caption, partial(signals.draw_clouds, designs, caption, top_dn)
     scenario = output.scenarios[0]
-    cfas = list(dict.fromkeys(m.cfa for m in content.modifications(output)))
     yield "cfas", "All CFAs", partial(draw_trade_off, overview_figure(output, scenario))
-    for number, cfa in enumerate(traded_cfas(output)):
+    for number, cfa in enumerate(traded_cfas(output), 1):
         figure = partial(draw_trade_off, pareto_figure(output, scenario, cfa))
-        yield ("pareto" if number == 0 else f"pareto-{number + 1}"), f"Trade-off of {cfa}", figure
-    for number, cfa in enumerate(cfas):
-        yield f"filters-{number + 1}", f"Filters of {cfa}", partial(draw_curves, content.filters_figure(output, cfa))
-    for number, series in enumerate(all_series(output)):
-        yield f"series-{number + 1}", series.title, partial(draw_series, series)
+        yield ("pareto" if number == 1 else f"pareto-{number}"), f"Trade-off of {cfa}", figure
+    for number, cfa in enumerate(dict.fromkeys(m.cfa for m in content.modifications(output)), 1):
+        yield f"filters-{number}", f"Filters of {cfa}", partial(draw_curves, content.filters_figure(output, cfa))
+    for number, series in enumerate(all_series(output), 1):
+        yield f"series-{number}", series.title, partial(draw_series, series)
     card = scorecard(output)
     if card is not None:
         yield "scorecard", f"Every figure relative to {card.names[card.reference]}", partial(draw_scorecard, card)
     yield from map_drawings(output)
     yield from color_drawings(output)
     yield from lamp_drawings(output)
-    yield (
-        "tiles",
-        "Tiles of the CFAs; a hatched pixel is modified",
-        partial(draw_tiles, first_mosaics(output), replaced_channels(output)),
-    )
+    tiles = partial(signals.draw_tiles, signals.first_mosaics(output), signals.replaced_channels(output))
+    yield "tiles", "Tiles of the CFAs; a hatched pixel is modified", tiles
     yield "sensor", "Quantum efficiency of the sensor", partial(draw_curves, content.sensor_figure(output))
     yield "signals", "Spectra of the signals", partial(draw_curves, content.lights_figure(output))
-    yield "chart", "The color checker chart", partial(draw_chart, chart_patches(output))
+    yield "chart", "The color checker chart", partial(signals.draw_chart, signals.chart_patches(output))

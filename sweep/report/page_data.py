@@ -1,10 +1,10 @@
-"""What the report's page draws by itself: the data of its script, as plain values and packed numbers."""
+"""Data of the script of the report's page, as plain values and packed numbers."""
 
 from __future__ import annotations
 
 import base64
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -34,7 +34,7 @@ _PUBLISHED_LABEL = "our counterpart of the paper's N_4"
 def payload(output: Output) -> dict[str, Any]:
     """Everything that the page's script needs, ready for JSON; no NaN but inside packed numbers."""
     rows = content.drawn_rows(output)
-    columns = _columns(output, rows)
+    columns, named = _columns(output, rows), rows[rows["name"].notna()]
     return {
         "study": output.study.study,
         "axes": {"x": output.trade_off[1].name, "y": output.trade_off[0].name},
@@ -47,15 +47,20 @@ def payload(output: Output) -> dict[str, Any]:
         "filter_id": _packed(rows["filter_id"], "f8"),
         "scenario": _words(rows["scenario"]),
         "cfa": _words(rows["cfa"]),
-        "names": {str(at): _names(output, row) for at, row in _records(rows, rows["name"].notna())},
-        "overviews": [_overview(output, scenario) for scenario in output.scenarios],
+        "names": {str(at): _names(output, row) for at, row in named.to_dict("index").items()},
+        "overviews": [
+            {"scenario": scenario, **_around(around_designs(output, scenario))} for scenario in output.scenarios
+        ],
         "views": list(_views(output, rows)),
         "curves": _curves(output),
         "clouds": _clouds(output, rows),
         "cloud_scenario": output.scenarios[0],
         "limited": _limited(output, rows),
         "nearest": _nearest(output, rows),
-        "profiles": _profiles(output),
+        "profiles": {
+            cfa: [{"parameter": p.parameter, "values": p.values.tolist(), "best": p.best.tolist()} for p in profiles]
+            for cfa, profiles in output.profiles.items()
+        },
         "history": history_of(output),
         "front": _front(output, rows),
         "series": [_series(series) for series in all_series(output)],
@@ -83,55 +88,37 @@ def _groups(rows: pd.DataFrame) -> np.ndarray:
     return np.select([*kinds, front, rows["feasible"]], [5, 4, 3, 2, 1], default=0)
 
 
-def _records(rows: pd.DataFrame, wanted: pd.Series) -> Iterator[tuple[int, dict[Any, Any]]]:
-    """The number and the values of each row that is wanted."""
-    some = rows[wanted.to_numpy(dtype=bool)]
-    yield from zip(map(int, some.index), some.to_dict("records"), strict=True)
-
-
 def _names(output: Output, row: Mapping[Any, Any]) -> dict[str, str]:
     """A design's name, to write beside its point and in full; the published one says so."""
     name = str(row["name"])
     entry = output.study.designs.get(name)
-    return {
-        "short": name,
-        "long": f"{name} ({_PUBLISHED_LABEL})" if entry is not None and entry.at == _PUBLISHED else name,
-    }
+    published = f" ({_PUBLISHED_LABEL})" if entry is not None and entry.at == _PUBLISHED else ""
+    return {"short": name, "long": name + published}
 
 
 def _columns(output: Output, rows: pd.DataFrame) -> dict[str, dict[str, Any]]:
     """Column -> label, digits and values of everything that says something about a design."""
     axes = [axis.name for axis in output.trade_off]
-    wanted = (
-        *axes,
-        *output.parameters,
-        *output.distances,
-        *output.light,
-        *output.further,
-        "violation",
-    )
-    found = {}
+    wanted = (*axes, *output.parameters, *output.distances, *output.light, *output.further, "violation")
+    columns = {}
     for name in dict.fromkeys(wanted):
         values = rows[name].to_numpy(dtype=float)
         if np.isfinite(values).any() or name in axes:
-            own = output.columns.get(name)
-            digits = own.digits if own is not None else _OF_PARAMETERS if name in output.parameters else _OF_OTHERS
-            found[name] = {"label": output.words(name), "digits": digits, "values": _packed(values, "f4")}
-    return found
+            quantity, digits = output.columns.get(name), _OF_PARAMETERS if name in output.parameters else _OF_OTHERS
+            digits = digits if quantity is None else quantity.digits
+            columns[name] = {"label": output.words(name), "digits": digits, "values": _packed(values, "f4")}
+    return columns
 
 
 def _views(output: Output, rows: pd.DataFrame) -> Iterator[dict[str, Any]]:
-    """What is drawn around the points of each scenario and CFA: lines, levels of plain CFAs, bound, knee."""
+    """Lines, levels of plain CFAs, bound and knee around the points of each scenario and CFA."""
     for scenario in output.scenarios:
         for cfa in traded_cfas(output):
             figure = pareto_figure(output, scenario, cfa)
             yield {
                 "scenario": scenario,
                 "cfa": cfa,
-                "title": figure.title,
-                "x_label": figure.x_label,
-                "y_label": figure.y_label,
-                **_lines(figure),
+                **_around(figure),
                 "levels": {name: float(level) for name, level in figure.levels.items() if np.isfinite(level)},
                 "counts": dict(figure.counts),
                 "bound": figure.bound,
@@ -140,18 +127,13 @@ def _views(output: Output, rows: pd.DataFrame) -> Iterator[dict[str, Any]]:
             }
 
 
-def _lines(figure: TradeOff) -> dict[str, Any]:
-    """What the search found and the limit, as lists of x and y."""
-    both = {"traced": figure.traced, "limit": figure.limit}
-    lines = {name: None if p is None else [p.x.tolist(), p.y.tolist()] for name, p in both.items()}
-    return {**lines, "limit_name": figure.limit_name}
-
-
-def _overview(output: Output, scenario: str) -> dict[str, Any]:
-    """What is drawn around the points of all CFAs of a scenario."""
-    figure = around_designs(output, scenario)
-    words = {"title": figure.title, "x_label": figure.x_label, "y_label": figure.y_label}
-    return {"scenario": scenario, **words, **_lines(figure)}
+def _around(figure: TradeOff) -> dict[str, Any]:
+    """Words of a trade-off, and optima of the search and limit as lists of x and y."""
+    lines = {"traced": figure.traced, "limit": figure.limit}
+    return {
+        **{name: getattr(figure, name) for name in ("title", "x_label", "y_label", "limit_name")},
+        **{name: None if points is None else [points.x.tolist(), points.y.tolist()] for name, points in lines.items()},
+    }
 
 
 def _limited(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
@@ -166,22 +148,20 @@ def _limited(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
 
 def _nearest(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
     """design_id -> the two lights that limit the trade-off's CSD, of the designs whose signals are drawn."""
-    drawn = rows["design_id"].isin(output.points["design_id"])
-    found = {str(row["design_id"]): nearest_lights(output, row) for _, row in _records(rows, drawn)}
-    return {design: lights for design, lights in found.items() if lights is not None}
+    drawn = rows[rows["design_id"].isin(output.points["design_id"])]
+    nearest = {str(row["design_id"]): nearest_lights(output, row) for row in drawn.to_dict("records")}
+    return {design: lights for design, lights in nearest.items() if lights is not None}
 
 
 def _knee(figure: TradeOff, output: Output, rows: pd.DataFrame) -> int | None:
     """Row of the front's knee."""
     front = figure.groups["front"]
     order = np.argsort(front.x, kind="stable")
-    values = np.stack([front.x[order], front.y[order]], axis=1)
-    found = knee(values)
-    if found is None:
+    at = knee(np.stack([front.x[order], front.y[order]], axis=1))
+    if at is None:
         return None
-    x, y = values[found]
-    same = rows[(rows[output.trade_off[1].name] == x) & (rows[output.trade_off[0].name] == y)]
-    return int(same.index[0])
+    separation, sensitivity = (rows[axis.name] for axis in output.trade_off)
+    return int(rows.index[(sensitivity == front.x[order][at]) & (separation == front.y[order][at])][0])
 
 
 def _curves(output: Output) -> dict[str, Any]:
@@ -213,22 +193,6 @@ def _clouds(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
     return kept
 
 
-def _profiles(output: Output) -> dict[str, Any]:
-    return {
-        cfa: [
-            {
-                "parameter": p.parameter,
-                "values": p.values.tolist(),
-                "best": p.best.tolist(),
-                "drop": p.drop,
-                "keeps": list(p.keeps),
-            }
-            for p in found
-        ]
-        for cfa, found in output.profiles.items()
-    }
-
-
 def history_of(output: Output) -> dict[str, Any] | None:
     """Best feasible objective of each start of a search and of all, and hypervolume, over the evaluations.
 
@@ -245,15 +209,15 @@ def history_of(output: Output) -> dict[str, Any] | None:
     at = np.unique(np.geomspace(1, len(log), min(_PLACES, len(log))).round().astype(np.intp))
     levels = log["sensitivity_min"].dropna()
     least = float(levels.min()) if len(levels) else bound.min or 0.0
-    best, volume = _so_far(log["objective"].where(met)), None
+    best_of_all, volume = _so_far(log["objective"].where(met)), None
     if output.goal.role == "separation":
         pairs, reference = log[["objective", "sensitivity"]].to_numpy(dtype=float), np.array([0.0, least - 1e-6])
         # It cannot shrink as designs are added; the last bit of a sum in another order can.
         volume = np.maximum.accumulate([hypervolume(pairs[:n][feasible[:n]], reference) for n in at]).tolist()
     return {
-        "starts": [{"number": int(str(number)), "best": _so_far(own)} for number, own in starts],
+        "starts": [{"number": int(str(number)), "best": _so_far(best)} for number, best in starts],
         "evaluations": at.tolist(),
-        "best": [best[n - 1] for n in at],
+        "best": [best_of_all[n - 1] for n in at],
         "volume": volume,
         "least_sensitivity": least,
         "label": output.goal.words,
@@ -286,14 +250,14 @@ def _series(series: SeriesFigure) -> dict[str, Any]:
 
 def _front(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
     """The feasible front, every digit of it, for its file."""
-    own = rows[rows["feasible"] & rows["pareto"] & (rows["kind"] == SWEPT)]
-    names = ["design_id", "filter_id", "scenario", "cfa", *_used(own, output.parameters), *output.distances]
+    front = rows[rows["feasible"] & rows["pareto"] & (rows["kind"] == SWEPT)]
+    used = [name for name in output.parameters if front[name].notna().any()]
+    names = ["design_id", "filter_id", "scenario", "cfa", *used, *output.distances]
     names += [name for name in dict.fromkeys((*output.light, *output.further)) if name not in names]
-    return {"columns": names, "rows": [[_plain(value) for value in row] for row in own[names].itertuples(index=False)]}
-
-
-def _used(rows: pd.DataFrame, names: Sequence[str]) -> list[str]:
-    return [name for name in names if rows[name].notna().any()]
+    return {
+        "columns": names,
+        "rows": [[_plain(value) for value in row] for row in front[names].itertuples(index=False)],
+    }
 
 
 def _plain(value: Any) -> Any:

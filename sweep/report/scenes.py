@@ -2,92 +2,124 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import pandas as pd
 
+from ..camera.plan import Choice, Plan
 from ..results.facts import EffectFacts
 from ..results.output import Output
+from ..study import Study
+from .pages import aligned
 
 
 @dataclass(frozen=True)
 class SceneGroup:
     """Scenes of which the same effects were computed.
 
-    `realized_dn`: the largest error that an audit found, None without one.
+    `realized_dn`: the largest error that an audit found, NaN without one.
     """
 
     scenarios: tuple[str, ...]
     effects: tuple[EffectFacts, ...]
     error_bound_dn: float
-    realized_dn: float | None
+    realized_dn: float
     tolerance_dn: float
 
     @property
     def title(self) -> str:
         """The scenes in a few words."""
-        first, last = self.scenarios[0], self.scenarios[-1]
-        return first if first == last else f"{first} ... {last} ({len(self.scenarios)} scenes)"
+        return scenes_told(self.scenarios)
 
     @property
     def computed(self) -> str:
         """Effects that were computed."""
-        return ", ".join(each.effect for each in self.effects if each.computed)
+        return ", ".join(effect.effect for effect in self.effects if effect.computed)
+
+
+def scenes_told(names: Sequence[str]) -> str:
+    """Scenes in a few words."""
+    return names[0] if len(names) == 1 else f"{names[0]} ... {names[-1]} ({len(names)} scenes)"
 
 
 def scene_groups(output: Output) -> list[SceneGroup]:
     """All scenes, those with the same effects together, each effect with its largest bound among them."""
-    plans = output.provenance.plans
     groups: dict[tuple[str, ...], list[str]] = {}
-    for name, plan in plans.items():
+    for name, plan in output.provenance.plans.items():
         groups.setdefault(tuple(plan.computed), []).append(name)
     result = []
     for names in groups.values():
-        alike = [plans[name] for name in names]
+        plans = [output.provenance.plans[name] for name in names]
         effects = (
-            max(choices, key=lambda each: each.bound_dn or 0.0)
-            for choices in zip(*(plan.effects for plan in alike), strict=True)
+            max(choices, key=lambda choice: choice.bound_dn or 0.0)
+            for choices in zip(*(plan.effects for plan in plans), strict=True)
         )
-        bound_dn = max(plan.error_bound_dn for plan in alike)
-        realized_dn, tolerance_dn = _realized(output, names), alike[0].tolerance_dn
-        result.append(SceneGroup(tuple(names), tuple(effects), bound_dn, realized_dn, tolerance_dn))
+        bound_dn, realized_dn = max(plan.error_bound_dn for plan in plans), math.nan
+        if output.audited is not None:
+            realized_dn = float(output.audited.loc[output.audited["scenario"].isin(names), "realized_dn"].max())
+        result.append(SceneGroup(tuple(names), tuple(effects), bound_dn, realized_dn, plans[0].tolerance_dn))
     return result
-
-
-def _realized(output: Output, names: list[str]) -> float | None:
-    if output.audited is None:
-        return None
-    audited = output.audited[output.audited["scenario"].isin(names)]
-    return float(audited["realized_dn"].max()) if len(audited) else None
 
 
 def scene_table(groups: Sequence[SceneGroup]) -> pd.DataFrame:
     """Effects of each group of scenes, the bound on the others, and the error that an audit found."""
-    return pd.DataFrame(
-        [
-            {
-                "scenes": group.title,
-                "computed": group.computed,
-                "bound on what is left out / DN": f"{group.error_bound_dn:.2g}",
-                "error / DN": "not audited" if group.realized_dn is None else f"{group.realized_dn:.2g}",
-                "tolerance / DN": f"{group.tolerance_dn:g}",
-            }
-            for group in groups
-        ]
-    )
+    rows = [
+        {
+            "scenes": group.title,
+            "computed": group.computed,
+            "bound on what is left out / DN": f"{group.error_bound_dn:.2g}",
+            "error / DN": "not audited" if math.isnan(group.realized_dn) else f"{group.realized_dn:.2g}",
+            "tolerance / DN": f"{group.tolerance_dn:g}",
+        }
+        for group in groups
+    ]
+    return pd.DataFrame(rows)
 
 
-def effect_table(group: SceneGroup) -> pd.DataFrame:
+def effect_table(effects: Sequence[EffectFacts | Choice]) -> pd.DataFrame:
     """Every effect, whether it is computed, its bound and reason."""
-    return pd.DataFrame(
-        [
-            {
-                "effect": each.effect,
-                "computed": "computed" if each.computed else "left out",
-                "bound / DN": "none" if each.bound_dn is None else f"{each.bound_dn:.2g}",
-                "reason": each.reason,
-            }
-            for each in group.effects
-        ]
-    )
+    rows = [
+        {
+            "effect": effect.effect,
+            "computed": "computed" if effect.computed else "left out",
+            "bound / DN": "none" if effect.bound_dn is None else f"{effect.bound_dn:.2g}",
+            "reason": effect.reason,
+        }
+        for effect in effects
+    ]
+    return pd.DataFrame(rows)
+
+
+def plan_lines(study: Study) -> Iterator[str]:
+    """Effects of every scene: computed or left out, bound and reason; scenes of one plan together."""
+    groups: dict[str, list[Plan]] = {}
+    for plan in study.plans.values():
+        groups.setdefault(plan.key, []).append(plan)
+    for plans in groups.values():
+        left_out_dn = max(plan.error_bound_dn for plan in plans)
+        yield (
+            f"{scenes_told([plan.scenario for plan in plans])}: what is left out changes a CSD by at most "
+            f"{left_out_dn:.2g} DN (tolerance {plans[0].tolerance_dn:g} DN)"
+        )
+        effects = zip(*(plan.choices for plan in plans), strict=True)
+        largest = [max(choices, key=lambda choice: choice.bound_dn or 0.0) for choices in effects]
+        yield from (f"  {line}" for line in aligned(effect_table(largest)))
+        yield ""
+    settings = ", ".join(f"{name} {value}" for name, value in study.section.accuracy.model_dump().items())
+    yield f"{len(study.plans)} scenes, {len(groups)} different plans. Accuracy: {settings}."
+
+
+def plan_facts(study: Study) -> dict[str, Any]:
+    """The same as plain values: accuracy, and for each scene tolerance, error bound (DN) and effects."""
+    scenes = {
+        name: {
+            "tolerance_dn": plan.tolerance_dn,
+            "error_bound_dn": plan.error_bound_dn,
+            "effects": [asdict(choice) for choice in plan.choices],
+        }
+        for name, plan in study.plans.items()
+    }
+    return {"study": study.name, "accuracy": study.section.accuracy.model_dump(), "scenarios": scenes}

@@ -1,8 +1,7 @@
-"""What designs gain and lose elsewhere: the tasks of a study in one table, and as factors in one plot."""
+"""Gains and losses of designs elsewhere: the tasks of a study in one table, and as factors in one plot."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
@@ -14,7 +13,7 @@ from ..metrics.columns.tasks import PREFIX
 from ..metrics.quantity import Column
 from ..results.output import Output
 from ..results.tables import PLAIN
-from .figures import CURVE_CYCLE, canvas
+from .figures import CURVE_CYCLE, canvas, legend_beside
 from .names import label
 
 if TYPE_CHECKING:
@@ -42,15 +41,15 @@ class ScoreRow:
     def cells(self) -> list[tuple[str, str]]:
         """(text, mark) of each design: `best`, `worst` or nothing."""
         return [
-            ("-" if np.isnan(value) else f"{value:.{self.column.digits}f}", self._mark(at))
+            (
+                "-" if np.isnan(value) else f"{value:.{self.column.digits}f}",
+                "best" if at in self.best else "worst" if at in self.worst else "",
+            )
             for at, value in enumerate(self.values)
         ]
 
-    def _mark(self, at: int) -> str:
-        return "best" if at in self.best else "worst" if at in self.worst else ""
-
     def factors(self, reference: int) -> FloatArray:
-        """How many times better each design is than one of them, ndarray[n_designs]; NaN where that means nothing."""
+        """Factors by which designs are better than one of them, ndarray[n_designs]; NaN where that means nothing."""
         of = self.values[reference]
         ratio = np.full(self.values.shape, np.nan)
         some = (self.values > 0) & (of > 0) & bool(self.best)
@@ -68,29 +67,24 @@ class Scorecard:
 
 
 def scorecard(output: Output) -> Scorecard | None:
-    """Of the plain CFAs, named designs and the search's answer in the first scenario; None without tasks."""
+    """Scores of the plain CFAs, named designs and the search's answer in the first scenario; None without tasks."""
     return output.once("scorecard", partial(_scorecard, output))
 
 
 def _scorecard(output: Output) -> Scorecard | None:
-    columns = list(_shown(output.columns))
+    columns = [c for c in output.columns.values() if c.metric.startswith(PREFIX) and not c.extreme]
+    if columns:
+        from ..metrics.tasks.figures import FIGURES  # noqa: PLC0415  (few studies have tasks)
+
+        first = {PREFIX + figure.what for figures in FIGURES.values() for figure in figures if figure.first}
+        columns = [column for column in columns if column.metric in first]
     rows = output.few[(output.few["scenario"] == output.scenarios[0]) & (output.few["status"] == "ok")]
     if not columns or rows.empty:
         return None
     names = tuple(label(row) for row in rows.to_dict("records"))
-    found = tuple(_row(column, rows[column.name].to_numpy(dtype=float)) for column in columns)
+    scores = tuple(_row(column, rows[column.name].to_numpy(dtype=float)) for column in columns)
     plain = np.flatnonzero(rows["kind"] == PLAIN)
-    return Scorecard(names, found, int(plain[0]) if plain.size else 0)
-
-
-def _shown(columns: Mapping[str, Column]) -> Iterator[Column]:
-    """The columns of tasks that a scorecard shows."""
-    own = [column for column in columns.values() if column.metric.startswith(PREFIX) and not column.extreme]
-    if own:
-        from ..metrics.tasks.figures import FIGURES  # noqa: PLC0415  (few studies have tasks)
-
-        first = {PREFIX + figure.what for figures in FIGURES.values() for figure in figures if figure.first}
-        yield from (column for column in own if column.metric in first)
+    return Scorecard(names, scores, int(plain[0]) if plain.size else 0)
 
 
 def _row(column: Column, values: FloatArray) -> ScoreRow:
@@ -103,7 +97,7 @@ def _row(column: Column, values: FloatArray) -> ScoreRow:
 
 
 def score_lines(card: Scorecard | None) -> list[str]:
-    """How often each design is the best and the worst, in one line."""
+    """Counts of best and worst figures of each design, in one line."""
     if card is None:
         return []
     marked = [row for row in card.rows if row.best]
@@ -112,11 +106,6 @@ def score_lines(card: Scorecard | None) -> list[str]:
         for at, name in enumerate(card.names)
     ]
     return [f"Elsewhere, over {len(marked)} figures of tasks: {'; '.join(counts)}."]
-
-
-def score_cells(card: Scorecard) -> list[tuple[str, Sequence[tuple[str, str]]]]:
-    """(name of the figure with its unit, cells of the designs) of each row."""
-    return [(row.column.axis, row.cells) for row in card.rows]
 
 
 def draw_scorecard(card: Scorecard) -> Figure:
@@ -135,5 +124,5 @@ def draw_scorecard(card: Scorecard) -> Figure:
     axes.invert_yaxis()
     axes.grid(axis="y", color="#eeeeee")
     axes.set_xlabel(f"times better than {card.names[card.reference]} (beyond {_MOST_FACTOR:g} times: at the edge)")
-    axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False)
+    legend_beside(axes)
     return figure

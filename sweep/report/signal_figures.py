@@ -76,9 +76,9 @@ def draw_clouds(designs: Sequence[Cloud], title: str, top_dn: float) -> Figure:
         for axes, channel, y in zip(line, channels[1:], dn[1:], strict=False):
             decorate(axes)
             for kind, marker in zip(dict.fromkeys(kinds), itertools.cycle("osD^vP")):
-                own = kinds == kind
+                those = kinds == kind
                 color = TYPE_COLORS.get(str(kind))
-                axes.scatter(dn[0, own], y[own], s=13, marker=marker, color=color, label=kind, linewidths=0)
+                axes.scatter(dn[0, those], y[those], s=13, marker=marker, color=color, label=kind, linewidths=0)
             if nearest is not None:
                 at = [signals.index(light) for light in nearest[:2]]
                 axes.plot(dn[0, at], y[at], "-", color="black", linewidth=1.2, label=nearest[2])

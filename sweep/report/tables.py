@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pandas as pd
 
+from ..camera.scene import OBJECT_RESOLUTION
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
 from ..metrics.limiting import limited_by_name
 from ..metrics.quantity import HELD_OUT
 from ..results.output import Output
+from .pages import aligned
 
 _MOST_PARAMETERS = 7
 _DIGITS = 4
-"""Of columns that are no quantities."""
+"""Digits of columns that are no quantities."""
 
 
 def comparison_table(output: Output) -> pd.DataFrame:
     """Plain CFAs, named designs and the search's answer with all CSDs, sensitivities and the lights that limit them."""
-    columns = ["name", "scenario", *_first(output), *_held_out(output), *_rest(output), "feasible", *_limits(output)]
-    return _shown(output, output.few, columns)
+    rest = [*output.light, *output.further, *output.distances]
+    return _shown(output, output.few, ["name", "scenario"], [*rest, "feasible"])
 
 
 def best_table(output: Output, most: int = 12) -> pd.DataFrame:
@@ -27,39 +28,27 @@ def best_table(output: Output, most: int = 12) -> pd.DataFrame:
     if len(output.scenarios) > 1:
         ranked = output.best.groupby(["scenario", "cfa"], sort=False, observed=True).head(1)
     used = [name for name in output.parameters if ranked[name].nunique() > 1 or len(ranked) == 1]
-    keys = ["filter_id", "kind", "cfa", "scenario"]
-    asked = [name for name in (*output.light, *output.further) if name not in _first(output)]
-    columns = [
-        *keys,
-        *_first(output),
-        *_held_out(output),
-        *used[:_MOST_PARAMETERS],
-        *asked,
-        "pareto",
-        *_limits(output),
-    ]
-    return _shown(output, ranked, columns)
+    rest = [*used[:_MOST_PARAMETERS], *output.light, *output.further, "pareto"]
+    return _shown(output, ranked, ["filter_id", "kind", "cfa", "scenario"], rest)
 
 
-def _first(output: Output) -> list[str]:
-    """The separation of the trade-off and the light of the CFA."""
-    return [output.trade_off[0].name, CFA_SENSITIVITY]
-
-
-def _rest(output: Output) -> list[str]:
-    """All other CSDs and sensitivities, and what constraints and objective name."""
-    return [n for n in (*output.light, *output.further, *output.distances) if n not in _first(output)]
-
-
-def _limits(output: Output) -> list[str]:
-    """The column of the two lights that limit the separation of the trade-off."""
-    pair = output.trade_off[0].pair
-    return [] if pair is None else [limited_by_name(pair)]
-
-
-def _held_out(output: Output) -> list[str]:
-    """Columns of the CSDs of other lights, of those that the study asks for."""
-    return [name for each in output.distances if (name := HELD_OUT + each) in output.table]
+def _shown(output: Output, rows: pd.DataFrame, keys: list[str], rest: list[str]) -> pd.DataFrame:
+    """Keys, separation and light of the trade-off, CSDs of other lights, the rest, and the limiting lights."""
+    separation = output.trade_off[0]
+    first = [separation.name, CFA_SENSITIVITY]
+    held_out = [name for distance in output.distances if (name := HELD_OUT + distance) in output.table]
+    limits = [] if separation.pair is None else [limited_by_name(separation.pair)]
+    columns = [*keys, *first, *held_out, *(name for name in rest if name not in first), *limits]
+    shown = rows[columns].copy()
+    for column in shown.select_dtypes("float64"):
+        quantity = output.columns.get(str(column))
+        shown[column] = shown[column].round(_DIGITS if quantity is None else quantity.digits)
+    if rows["scenario"].nunique() <= 1:
+        shown = shown.drop(columns="scenario")
+    words = {name: output.words(name).replace("_", " ") for name in columns}
+    words |= dict.fromkeys(limits, f"{separation.words} limited by")
+    words |= {name: f"{output.words(name.removeprefix(HELD_OUT))}, other lights" for name in held_out}
+    return shown.rename(columns=words)
 
 
 def worst_left_out(output: Output, most: int = 10) -> pd.DataFrame:
@@ -84,16 +73,38 @@ def geometry_table(output: Output) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _shown(output: Output, rows: pd.DataFrame, columns: list[str]) -> pd.DataFrame:
-    shown = rows[columns].copy()
-    for column in columns:
-        if shown[column].dtype == np.float64:
-            own = output.columns.get(column)
-            shown[column] = shown[column].round(_DIGITS if own is None else own.digits)
-    several = rows["scenario"].nunique() > 1
-    shown = shown if several else shown.drop(columns="scenario")
-    words = {name: output.words(name).replace("_", " ") for name in columns}
-    separation = output.trade_off[0]
-    words |= dict.fromkeys(_limits(output), f"{separation.words} limited by")
-    words |= {name: f"{output.words(name.removeprefix(HELD_OUT))}, other lights" for name in _held_out(output)}
-    return shown.rename(columns=words)
+PUBLISHED_CSV, PUBLISHED_PARQUET = "paper_comparison.csv", "paper_comparison.parquet"
+
+
+def comparison_with_published(output: Output) -> pd.DataFrame:
+    """One row per published figure: table, cfa (or geometry), quantity, paper, ours, error, relative_error, ours_exact.
+
+    `ours` is rounded to the digits that are printed, and `error` is its difference; `ours_exact` is not rounded. Ours
+    is of the study's first scenario. Empty when the study publishes nothing.
+    """
+    named = output.named[output.named["scenario"] == output.scenarios[0]].set_index("name")
+    rows = []
+    for table, entries in output.study.published.items():
+        for name, values in entries.items():
+            for quantity, paper in values.items():
+                if quantity == OBJECT_RESOLUTION:
+                    exact = output.study.geometry[name].object_resolution_px
+                else:
+                    exact = float(named[quantity][name])
+                printed = len(f"{paper:g}".partition(".")[2])
+                ours = round(exact, printed)
+                error = round(ours - paper, 12)
+                rows.append((table, name, quantity, paper, ours, error, error / paper if paper else None, exact))
+    columns = ["table", "cfa", "quantity", "paper", "ours", "error", "relative_error", "ours_exact"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def comparison_lines(comparison: pd.DataFrame) -> list[str]:
+    """The comparison as tables of text: ours, and in brackets the printed figure."""
+    lines = []
+    for name, rows in comparison.groupby("table", sort=False):
+        cells = rows["ours"].map("{:g}".format) + rows["paper"].map(" ({:g})".format)
+        wide = rows.assign(cells=cells).pivot(index="quantity", columns="cfa", values="cells").fillna("")
+        wide = wide.loc[rows["quantity"].unique(), rows["cfa"].unique()].reset_index()
+        lines += [f"{name}, ours (printed):", *aligned(wide)]
+    return lines

@@ -1,37 +1,40 @@
-"""Words that a newcomer needs: constraints as people say them, and what the terms of the first screen mean."""
+"""Constraints as people say them, and the meaning of the terms of the first screen."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 
+from ..camera.scene import Scene
+from ..designs.technology import Technology
 from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.quantity import DN, Column
 from ..results.output import Output
-from ..results.tables import FOUND, NAMED, SWEPT
+from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
 from .leaders import Row
 from .names import capital
 from .values import modifications
 
 
 def constraint_told(output: Output, name: str, bound: Bound) -> str:
-    """What a constraint asks for: `slope at most 0.06 per nm`."""
+    """A constraint in words: `slope at most 0.06 per nm`."""
     words, column = output.words(name), output.columns.get(name)
-    if bound.min is None or bound.max is None:
-        least, end = ("least", bound.min) if bound.max is None else ("most", bound.max)
-        return f"{words} at {least} {_amount(column, end)}"
+    if bound.max is None:
+        return f"{words} at least {_amount(column, bound.min)}"
+    if bound.min is None:
+        return f"{words} at most {_amount(column, bound.max)}"
     if bound.min == bound.max:
         return f"{words} of {_amount(column, bound.min)}"
     return f"{words} from {bound.min:g} to {_amount(column, bound.max)}"
 
 
 def constraints_told(output: Output) -> str:
-    """What all constraints ask for; empty where there are none."""
+    """All constraints in words; empty where there are none."""
     return " and ".join(constraint_told(output, name, bound) for name, bound in output.constraints.items())
 
 
 def missed_told(output: Output, row: Row) -> str:
-    """Which constraints a row does not meet: `its sensitivity is below 0.9`; empty where it meets all."""
+    """Constraints that a row does not meet: `its sensitivity is below 0.9`; empty where it meets all."""
     parts = list[str]()
     for name, bound in output.constraints.items():
         value = float(row[name])
@@ -62,25 +65,76 @@ def _amount(column: Column | None, value: float | None) -> str:
 
 
 def terms_of(output: Output) -> list[str]:
-    """What the separation of the first screen is and what the constraints bound, and which pixels have a filter of the
-    study.
-    """
+    """Meaning of the separation and of the bounded quantities, and the pixels that have a filter of the study."""
     asked = (output.trade_off[0].name, *output.constraints)
     columns = [output.columns[name] for name in asked if name in output.columns]
-    plain = {each.of if each.extreme else each.name: None for each in columns}
-    return [*(_meaning(output.columns[name]) for name in plain), *_changed(output)]
-
-
-def _meaning(column: Column) -> str:
-    unit = ", in digital numbers (DN)" if column.unit == DN else ""
-    return f"{capital(column.words)}: {column.meaning}{unit}."
-
-
-def _changed(output: Output) -> Iterator[str]:
-    """Which letters of a CFA's name stand for pixels with a filter of the study."""
-    changed = {(each.cfa, *each.channel): each.base for each in modifications(output) if each.channel and each.base}
+    lines = []
+    for name in dict.fromkeys(column.of if column.extreme else column.name for column in columns):
+        column = output.columns[name]
+        unit = ", in digital numbers (DN)" if column.unit == DN else ""
+        lines.append(f"{capital(column.words)}: {column.meaning}{unit}.")
+    changed = {(entry.cfa, *entry.channel): entry.base for entry in modifications(output) if entry.channel}
     for (cfa, *channels), base in changed.items():
-        what = f"is a {base} pixel whose filter changes"
-        if len(channels) > 1:
-            what = f"are {base} pixels whose filters change"
-        yield f"In {cfa}, {' and '.join(channels)} {what}."
+        if base:
+            several = f"are {base} pixels whose filters change"
+            what = several if len(channels) > 1 else f"is a {base} pixel whose filter changes"
+            lines.append(f"In {cfa}, {' and '.join(channels)} {what}.")
+    return lines
+
+
+_NOT_STATED = "No technology is stated of the filters: they are taken as on axis, in parallel rays."
+
+
+def technologies_of(output: Output, row: Row) -> list[Technology | None]:
+    """Technology that the study states of the filter of a row: one, or of a sweep's design each that it may be of."""
+    study, search = output.study, output.provenance.search
+    if row["kind"] == PLAIN:
+        return []
+    if row["kind"] == NAMED:
+        return [study.designs[row["name"]].technology]
+    if row["kind"] == FOUND and search is not None:
+        return [(study.sweeps | study.boxes)[search.space].technology]
+    return list({repr(made.technology): made.technology for made in study.sweeps.values()}.values())
+
+
+def technology_of(output: Output, row: Row) -> Technology | None:
+    """Technology of a row's filter; None if not stated, or not the same for all that it may be."""
+    stated = technologies_of(output, row)
+    return stated[0] if len(stated) == 1 else None
+
+
+def assumed(output: Output, row: Row) -> str:
+    """Whether a row's filter moves with the angle of the light, and in which light it then is; empty if not stated."""
+    stated = technology_of(output, row)
+    if stated is None:
+        return ""
+    if stated.interference is None:
+        return "A pigment does not move with the angle of the light."
+    rays = _told_light(output.study.scenarios[row["scenario"]])
+    return f"Such a filter moves with the angle of the light; the figures are {rays}."
+
+
+def moves_with_light(output: Output, row: Row) -> bool:
+    """Whether a row's filter is said to move with the angle of the light."""
+    return any(t is not None and t.interference is not None for t in technologies_of(output, row))
+
+
+def _told_light(scene: Scene) -> str:
+    """The rays of a scene in words."""
+    lens = f"behind f/{scene.optics.f_number:g}"
+    if scene.field is None:
+        return f"{lens} at a chief ray angle of {scene.optics.cra_deg:g} degrees"
+    angles = scene.field.knots[1]
+    ends = f"{min(angles):g} to {max(angles):g}"
+    places = "all" if scene.field.everywhere else f"{len(scene.field.seen_heights)}"
+    return f"{lens} at chief ray angles of {ends} degrees, the worst of {places} places of the sensor"
+
+
+def assumed_line(output: Output) -> str:
+    """A note of what is not as measured or stated: surrogate curves, filters without a technology; else empty."""
+    notes = []
+    if output.provenance.sensor.surrogate or output.provenance.lights.surrogate:
+        notes.append("Built-in curves are surrogates, modeled from stated parameters, not measured.")
+    if any(modification.technology is None for modification in modifications(output)):
+        notes.append(_NOT_STATED)
+    return f"Note: {' '.join(notes)}" if notes else ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -219,8 +219,7 @@ def draw_trade_off(figure: TradeOff) -> Figure:
         axes.text(low + 0.01 * (high - low), level, text, fontsize=8, va="bottom", zorder=8, bbox=_LABEL_BOX)
     if figure.bound is not None:
         axes.axvline(figure.bound, color="black", linestyle="--", linewidth=1.0, label=figure.bound_text)
-    for points in figure.groups.values():
-        _annotate(axes, points)
+    _annotate(axes, figure.groups.values())
     axes.set(xlabel=figure.x_label, ylabel=figure.y_label, title=figure.title)
     legend_beside(axes)
     return drawn
@@ -237,11 +236,11 @@ def _level_labels(heights: Sequence[tuple[str, float]], limits: tuple[float, flo
     return [(", ".join(names), level) for names, level in merged]
 
 
-def _annotate(axes: Axes, points: Points) -> None:
+def _annotate(axes: Axes, groups: Iterable[Points]) -> None:
     """Names beside points; one that would lie on another goes above it."""
-    placed: list[tuple[float, float]] = []
-    (left, right), top = axes.get_xlim(), axes.get_ylim()[1]
-    for x, y, text in sorted(zip(points.x, points.y, points.labels, strict=False)):
-        near = sum(abs(x - u) < 0.15 * (right - left) and abs(y - v) < 0.05 * top for u, v in placed)
+    labeled = sorted(item for points in groups for item in zip(points.x, points.y, points.labels, strict=False))
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    for number, (x, y, text) in enumerate(labeled):
+        placed = [(u, v) for u, v, _ in labeled[:number]]
+        near = sum(abs(x - u) < 0.15 * (right - left) and abs(y - v) < 0.05 * (top - bottom) for u, v in placed)
         axes.annotate(text, (x, y), textcoords="offset points", xytext=(7, 4 + 11 * near), fontsize=9, zorder=7)
-        placed.append((x, y))

@@ -1,4 +1,4 @@
-"""What the figures of the report show, as plain values."""
+"""Data of the report's figures, as plain values."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def over_series(rows: pd.DataFrame, scenarios: Mapping[str, float], column: str)
     values: dict[str, dict[str, float]] = {}
     for name, scenario, value in zip(named["name"], named["scenario"], named[column].astype(float), strict=True):
         values.setdefault(str(name), {})[scenario] = value
-    whole = {name: own for name, own in values.items() if len(own) == len(scenarios)}
-    return {name: np.array([own[scenario] for scenario in scenarios]) for name, own in whole.items()}
+    whole = {name: known for name, known in values.items() if len(known) == len(scenarios)}
+    return {name: np.array([known[scenario] for scenario in scenarios]) for name, known in whole.items()}
 
 
 def series_figures(output: Output) -> list[SeriesFigure]:
@@ -37,14 +37,12 @@ def series_figures(output: Output) -> list[SeriesFigure]:
 
 
 def _series_figures(output: Output) -> list[SeriesFigure]:
-    rows, separation = output.few, output.trade_off[0]
-    best_place = next(
-        (c.name for c in output.columns.values() if (c.extreme, c.of) == ("best place", separation.name)), ""
-    )
+    rows, separation, columns = output.few, output.trade_off[0], output.columns.values()
+    best_place = [c.name for c in columns if (c.extreme, c.of) == ("best place", separation.name) and c.name in rows]
     figures, series = [], series_of(output.scenarios)
     for (base, key), scenarios in series.items():
-        upper = over_series(rows, scenarios, best_place) if best_place in rows else {}
         worst = over_series(rows, scenarios, separation.name)
+        upper = over_series(rows, scenarios, best_place[0]) if best_place else {}
         upper = {n: y for n, y in upper.items() if np.isfinite(y).all() and not np.array_equal(y, worst[n])}
         lines = {name: Line(y, upper.get(name)) for name, y in worst.items()}
         if lines:

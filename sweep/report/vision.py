@@ -44,7 +44,7 @@ class Benchmark:
 
     @cached_property
     def readers(self) -> list[str]:
-        """Who has read the images."""
+        """Readers of the images."""
         return [reader for reader in READER_NAMES if self.images[reader].notna().any()]
 
     @property
@@ -52,18 +52,20 @@ class Benchmark:
         """By whom designs are compared: the network, or without one the observer."""
         return NETWORK if NETWORK in self.readers else OBSERVER
 
+    def _answers(self, order: str, lamps: str = UNSEEN) -> pd.DataFrame:
+        return self.images[(self.images["order"] == order) & (self.images["lamps"] == lamps)]
+
     @lru_cache  # noqa: B019  (a benchmark lives as long as its report)
     def wrong(self, reader: str, order: str, lamps: str = UNSEEN) -> pd.DataFrame:
         """1 where an image was read wrongly, a row for each scene (seed, image), a column for each design."""
-        rows = self.images[(self.images["order"] == order) & (self.images["lamps"] == lamps)]
+        rows = self._answers(order, lamps)
         rows = rows.assign(wrong=(rows[reader] != rows["state"]).astype(float))
         return rows.pivot(index=["seed", "image"], columns="name", values="wrong")[self.designs]
 
     @lru_cache  # noqa: B019
     def weights(self, order: str, lamps: str = UNSEEN) -> FloatArray:
         """Bootstrap weights of the scenes of `wrong`, the same for all designs and readers."""
-        rows = self.images[(self.images["order"] == order) & (self.images["lamps"] == lamps)]
-        seeds = rows[rows["name"] == self.designs[0]].sort_values(["seed", "image"])["seed"].to_numpy()
+        seeds = self.scenes(order, lamps)["seed"].to_numpy()
         return nested_weights(seeds, np.random.default_rng((self.seed, 99)))
 
     def error(self, design: str, reader: str, order: str, lamps: str = UNSEEN) -> Interval:
@@ -75,20 +77,19 @@ class Benchmark:
         wrong = self.wrong(self.judge, order)
         return mean_of((wrong[design] - wrong[self.reference]).to_numpy(), self.weights(order))
 
-    def scenes(self, order: str) -> pd.DataFrame:
-        """What the scenes of `wrong` show, in the same order."""
-        images = self.images
-        rows = images[(images["order"] == order) & (images["lamps"] == UNSEEN) & (images["name"] == self.designs[0])]
-        return rows.sort_values(["seed", "image"])
+    def scenes(self, order: str, lamps: str = UNSEEN) -> pd.DataFrame:
+        """Contents of the scenes of `wrong`, in the same order."""
+        rows = self._answers(order, lamps)
+        return rows[rows["name"] == self.designs[0]].sort_values(["seed", "image"])
 
     def said(self, design: str, reader: str, order: str) -> pd.DataFrame:
         """Answers on unseen lamps: columns state, said, p."""
-        images = self.images
-        rows = images[(images["order"] == order) & (images["lamps"] == UNSEEN) & (images["name"] == design)]
+        rows = self._answers(order)
+        rows = rows[rows["name"] == design]
         return rows[["state", reader, f"{reader}_p"]].set_axis(["state", "said", "p"], axis=1)
 
     def confusion(self, design: str, reader: str, order: str) -> pd.DataFrame:
-        """How often each state (row) was said to be each (column)."""
+        """Counts of each state (row) said to be each (column)."""
         states, rows = list(states_of(self.vision)), self.said(design, reader, order)
         truth, said = (np.array([states.index(value) for value in rows[column]]) for column in ("state", "said"))
         return pd.DataFrame(confusion_matrix(truth, said, len(states)), states, states)

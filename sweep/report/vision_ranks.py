@@ -1,4 +1,4 @@
-"""What predicts the errors of the benchmark of vision: rank correlations, with intervals."""
+"""Predictors of the errors of the benchmark of vision: rank correlations, with intervals."""
 
 from __future__ import annotations
 
@@ -21,18 +21,7 @@ PREDICTORS = {
     OBSERVER: "ideal observer's error",
 }
 _FALLS = ("csd", "dprime")
-"""Of these more is better; of the others less."""
-
-
-@dataclass(frozen=True)
-class Condition:
-    """A design at a distance and a level of light: its predictors and what was measured there."""
-
-    design: str
-    distance_m: float
-    level: str
-    predictors: dict[str, float]
-    error: float
+"""Predictors of which more is better."""
 
 
 @dataclass(frozen=True)
@@ -40,17 +29,17 @@ class Ranks:
     """Rank correlations with how rarely the network errs, of each of `PREDICTORS`: 1 predicts every order.
 
     `everywhere`: over all designs, distances and levels; `between`: between designs at one distance and level, the
-    mean over these.
+    mean over these. `conditions`: a row per design, distance and level, with all predictors and the measured `error`.
     """
 
     everywhere: dict[str, Interval]
     between: dict[str, Interval]
-    conditions: list[Condition]
+    conditions: pd.DataFrame
 
 
 @lru_cache(maxsize=4)
 def ranks_of(benchmark: Benchmark) -> Ranks:
-    """What predicts the network's errors, lenses in any order; intervals by the bootstrap of scenes nested in seeds."""
+    """Predictors of the network's errors, lenses in any order; intervals by the bootstrap of scenes nested in seeds."""
     scenes, weights = benchmark.scenes(SHUFFLED), benchmark.weights(SHUFFLED)
     weights = np.vstack([np.full(weights.shape[1], 1 / weights.shape[1]), weights])
     where = list(dict.fromkeys(zip(benchmark.conditions["distance_m"], benchmark.conditions["level"], strict=True)))
@@ -69,45 +58,33 @@ def ranks_of(benchmark: Benchmark) -> Ranks:
         sign = -1.0 if name in _FALLS else 1.0
         flat = _spearman(sign * given.reshape(len(given), -1), judged.reshape(len(judged), -1))
         everywhere[name] = interval_around(float(flat[0]), flat[1:])
-        each = np.stack([_spearman(sign * given[:, :, at], judged[:, :, at]) for at in range(len(where))])
-        mean = _mean_of_known(each)
+        at_each = np.stack([_spearman(sign * given[:, :, at], judged[:, :, at]) for at in range(len(where))])
+        mean = np.ma.masked_invalid(at_each).mean(axis=0).filled(np.nan)
         between[name] = interval_around(float(mean[0]), mean[1:])
-    conditions = [
-        Condition(
-            design,
-            *at,
-            {n: float(errors[n][0, i, j] if n in errors else known[n][i, j]) for n in everywhere},
-            float(judged[0, i, j]),
-        )
-        for i, design in enumerate(benchmark.designs)
-        for j, at in enumerate(where)
-    ]
+    conditions = pd.DataFrame(
+        [{"design": d, "distance_m": m, "level": level} for d in benchmark.designs for m, level in where]
+    )
+    for name in everywhere:
+        conditions[name] = (errors[name][0] if name in errors else known[name]).ravel()
+    conditions["error"] = judged[0].ravel()
     return Ranks(everywhere, between, conditions)
 
 
 def _by_condition(wrong: pd.DataFrame, here: BoolArray, weights: FloatArray) -> FloatArray:
     """Errors, ndarray[draws, designs, conditions]; NaN where a draw has no scene of a condition."""
     values = wrong.to_numpy(dtype=float)
-    found = np.full((len(weights), values.shape[1], len(here)), np.nan)
-    for at, own in enumerate(here):
-        total = weights[:, own].sum(axis=1, keepdims=True)
-        sums = weights[:, own] @ values[own]
-        found[:, :, at] = np.divide(sums, total, out=np.full_like(sums, np.nan), where=total > 0)
-    return found
+    errors = np.full((len(weights), values.shape[1], len(here)), np.nan)
+    for at, scenes in enumerate(here):
+        total = weights[:, scenes].sum(axis=1, keepdims=True)
+        sums = weights[:, scenes] @ values[scenes]
+        errors[:, :, at] = np.divide(sums, total, out=np.full_like(sums, np.nan), where=total > 0)
+    return errors
 
 
 def _spearman(x: FloatArray, y: FloatArray) -> FloatArray:
     """Rank correlation along the last axis, ndarray[draws]; NaN where one side is the same everywhere."""
-    a, b = (rankdata(each, axis=1) for each in (x, y))
-    a, b = (each - each.mean(axis=1, keepdims=True) for each in (a, b))
+    a, b = (rankdata(values, axis=1) for values in (x, y))
+    a, b = (ranks - ranks.mean(axis=1, keepdims=True) for ranks in (a, b))
     scale = np.sqrt((a**2).sum(axis=1) * (b**2).sum(axis=1))
-    found = np.full(len(a), np.nan)
-    return np.asarray(np.divide((a * b).sum(axis=1), scale, out=found, where=scale > 0), dtype=float)
-
-
-def _mean_of_known(values: FloatArray) -> FloatArray:
-    """The mean over the first axis of what is finite."""
-    known = np.isfinite(values)
-    total = np.where(known, values, 0.0).sum(axis=0)
-    count = known.sum(axis=0)
-    return np.asarray(np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0), dtype=float)
+    out = np.full(len(a), np.nan)
+    return np.asarray(np.divide((a * b).sum(axis=1), scale, out=out, where=scale > 0), dtype=float)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import pandas as pd
 
@@ -18,7 +18,7 @@ _WELL = 0.5
 
 
 def vision_sentences(output: Output) -> Iterator[str]:
-    """What predicts the errors, who errs less than the reference, and how far the network is from the best reader."""
+    """Predictors of the errors, who errs less than the reference, and how far the network is from the best reader."""
     benchmark = benchmark_of(output)
     ranks = ranks_of(benchmark)
     csd = ranks.between.get("csd")
@@ -44,18 +44,17 @@ def vision_sentences(output: Output) -> Iterator[str]:
 
 
 def _against_reference(benchmark: Benchmark) -> Iterator[str]:
-    less: list[str] = []
-    more: list[str] = []
-    same: list[str] = []
+    groups: dict[str, list[str]] = {"less often with ": [], "more often with ": [], "not told apart from it: ": []}
+    less, more, same = groups.values()
     for design in benchmark.designs:
-        if design == benchmark.reference:
-            continue
-        found = benchmark.difference(design, SHUFFLED)
-        group = same if not found.excludes_zero else less if found.value < 0 else more
-        group.append(f"{design} {100 * found.value:+.1f}" if group is not same else design)
+        if design != benchmark.reference:
+            difference = benchmark.difference(design, SHUFFLED)
+            if difference.excludes_zero:
+                (less if difference.value < 0 else more).append(f"{design} {100 * difference.value:+.1f}")
+            else:
+                same.append(design)
+    parts = [f"{words}{', '.join(designs)}" for words, designs in groups.items() if designs]
     who = READER_NAMES[benchmark.judge]
-    parts = [f"less often with {', '.join(less)}"] * bool(less) + [f"more often with {', '.join(more)}"] * bool(more)
-    parts += [f"not told apart from it: {', '.join(same)}"] * bool(same)
     yield f"Beside {benchmark.reference}, the {who} errs (percent of the images) {'; '.join(parts)}."
 
 
@@ -74,9 +73,9 @@ def vision_table(benchmark: Benchmark) -> pd.DataFrame:
         if design == benchmark.reference:
             row[f"less that of {benchmark.reference} %"] = "-"
         else:
-            found = benchmark.difference(design, SHUFFLED)
-            told = "" if found.excludes_zero else ", not told apart"
-            row[f"less that of {benchmark.reference} %"] = said_percent(found) + told
+            difference = benchmark.difference(design, SHUFFLED)
+            note = "" if difference.excludes_zero else ", not told apart"
+            row[f"less that of {benchmark.reference} %"] = said_percent(difference) + note
         row["F1"] = f"{macro_f1(benchmark.confusion(design, benchmark.judge, SHUFFLED).to_numpy()):.3f}"
         for reader in benchmark.readers[:2]:
             row[f"cost with unknown (share): {READER_NAMES[reader]}"] = _unknown(benchmark, design, reader)
@@ -88,35 +87,28 @@ def _unknown(benchmark: Benchmark, design: str, reader: str) -> str:
     """Mean cost of an answer where "unknown" is allowed, and how often it is given."""
     rows, cost = benchmark.said(design, reader, SHUFFLED), benchmark.vision.unknown_cost
     wrong = (rows["said"] != rows["state"]).to_numpy(dtype=bool)
-    each, unknown = costs(wrong, rows["p"].to_numpy(dtype=float), cost)
-    return f"{each.mean():.3f} ({told_share(float(unknown.mean()), 0)})"
+    cost_of, unknown = costs(wrong, rows["p"].to_numpy(dtype=float), cost)
+    return f"{cost_of.mean():.3f} ({told_share(float(unknown.mean()), 0)})"
 
 
 def vision_conditions_table(benchmark: Benchmark, ranks: Ranks) -> pd.DataFrame:
     """A row per level and distance: percent read wrongly with each design, and in brackets by the ideal observer."""
-    rows = []
-    for level in benchmark.vision.levels:
-        for distance_m in benchmark.vision.distances_m:
-            lux = benchmark.vision.levels[level].illuminance_lx
-            row = {"light": f"{level} ({lux:g} lx)", "distance / m": f"{distance_m:g}"}
-            for each in ranks.conditions:
-                if (each.level, each.distance_m) == (level, distance_m):
-                    ideal = each.predictors.get(OBSERVER)
-                    row[each.design] = f"{100 * each.error:.1f}" + ("" if ideal is None else f" ({100 * ideal:.1f})")
-            rows.append(row)
-    return pd.DataFrame(rows)
+    rows = ranks.conditions
+    levels = {name: f"{name} ({level.illuminance_lx:g} lx)" for name, level in benchmark.vision.levels.items()}
+    text = (100 * rows["error"]).map("{:.1f}".format)
+    if OBSERVER in rows:
+        text += (100 * rows[OBSERVER]).map(" ({:.1f})".format)
+    keys = {"light": rows["level"].map(levels), "distance / m": rows["distance_m"].map("{:g}".format)}
+    long = rows.assign(text=text, **keys).set_index([*keys, "design"])["text"]
+    table = long.unstack().reindex(pd.MultiIndex.from_frame(pd.DataFrame(keys).drop_duplicates()))
+    return table[benchmark.designs].reset_index().rename_axis(columns=None)
 
 
 def confusion_table(benchmark: Benchmark) -> pd.DataFrame:
-    """How often the judge takes each state for each, a row per design and state, lenses in any order."""
-    parts = []
-    for design in benchmark.designs:
-        found = benchmark.confusion(design, benchmark.judge, SHUFFLED)
-        shown = found.rename(columns=lambda name: f"said {name}").reset_index(names="state")
-        parts.append(shown.assign(design=design))
-    table = pd.concat(parts, ignore_index=True)
-    columns: Sequence[str] = ["design", *(c for c in table.columns if c != "design")]
-    return table[list(columns)]
+    """Counts of states as the judge takes them, a row per design and state, lenses in any order."""
+    parts = {design: benchmark.confusion(design, benchmark.judge, SHUFFLED) for design in benchmark.designs}
+    table = pd.concat(parts, names=["design", "state"])
+    return table.rename(columns=lambda name: f"said {name}").reset_index()
 
 
 def ranks_table(ranks: Ranks) -> pd.DataFrame:

@@ -31,7 +31,7 @@ _RENDERED = pa.schema(
 
 def _shown(study: Study, highlights: pd.DataFrame) -> Iterator[tuple[dict[str, Any], Any]]:
     """What a row is called by, and what its design sees: plain CFAs, named designs and the search's answer."""
-    from ..metrics.tasks.looks import Looks  # noqa: PLC0415  (few studies have tasks)
+    from ..metrics.tasks.color import Looks  # noqa: PLC0415  (few studies have tasks)
 
     rows = highlights[highlights["kind"].isin(FEW) & (highlights["status"] == "ok")]
     for row in rows.to_dict("records"):
@@ -47,7 +47,7 @@ def _chart_of(tasks: StudyTasks) -> tuple[tuple[str, ...], Chart]:
 
 def traded_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
     """A row per design, light and regularization of the color matrix."""
-    from ..metrics.tasks.palette import REGULARIZATIONS, traded  # noqa: PLC0415  (few studies have tasks)
+    from ..metrics.tasks.judge import REGULARIZATIONS, traded  # noqa: PLC0415  (few studies have tasks)
 
     assert study.tasks is not None
     cases, chart = _chart_of(study.tasks)
@@ -69,7 +69,7 @@ def rendered_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
     from ..curves.builtin.task_sets import NIGHT_LIGHT, NIGHT_LX, night_scene  # noqa: PLC0415  (few studies have tasks)
     from ..curves.color import color_matching  # noqa: PLC0415
     from ..curves.spectrum import energy_from_photons  # noqa: PLC0415
-    from ..metrics.tasks.palette import rendered_areas  # noqa: PLC0415
+    from ..metrics.tasks.judge import rendered_areas  # noqa: PLC0415
 
     tasks = study.tasks
     assert tasks is not None

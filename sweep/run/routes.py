@@ -13,11 +13,10 @@ from ..camera.setup import Setup
 from ..designs.block import CurveBlock, edges_of
 from ..designs.space import Space
 from ..designs.tolerance import AS_DESIGNED, Tolerance
-from ..metrics.evaluate import evaluate, family_quantities, image_quantities
+from ..metrics.evaluate import Spent, evaluate, family_quantities, image_quantities
 from ..metrics.objective import COMBINED, Objective, columns_of
 from ..metrics.own import OwnMetric
 from ..metrics.quantity import OF_A_SHARE, WORST_CASE, YIELD, Asked, Columns, Quantity
-from ..metrics.whole_readout import Spent
 from ..results.identity import CHUNK
 from ..results.tables import FEW
 from ..vision.section import Vision
@@ -60,7 +59,7 @@ class Request:
 class Found:
     """Quantities of designs, ndarray[n_designs] each; what is wrong with which design.
 
-    `spent_s`: see `whole_readout.Spent`.
+    `spent_s`: see `metrics.evaluate.Spent`.
     """
 
     columns: Columns

@@ -18,8 +18,8 @@ from ..base.disk import read_facts
 from ..base.errors import BrokenProofError, Fault, InfeasibleError, StudyError
 from ..base.types import Progress
 from ..metrics.bound import FEASIBLE
+from ..metrics.evaluate import whole_readout_metrics
 from ..metrics.pareto import hypervolume
-from ..metrics.whole_readout import whole_readout_metrics
 from ..results.dictionary import described
 from ..results.facts import Provenance, lacking
 from ..results.folder import begin

@@ -70,7 +70,7 @@ Span = Annotated[Axis, BeforeValidator(_span, json_schema_input_type=float | lis
 
 _MOST_SCENARIOS = 2000
 _MOST_KEYS = 500_000
-"""Of all scenarios that `each` makes."""
+"""Most keys of all scenarios that `each` makes."""
 
 
 class ScenarioTemplate(Scene):

@@ -19,11 +19,11 @@ _MOST = (500_000, 50_000)
 """Bytes of a study file, and keys and values in it."""
 _RESOLVED = ".resolved.yaml"
 _MOST_RESOLVED = (8_000_000, 400_000)
-"""Of a file of that name, as a run writes it: with every default, and each of up to 2000 scenarios."""
+"""Limits of a file of that name, as a run writes it: with every default, and each of up to 2000 scenarios."""
 _MEANT = {"yes": "true", "on": "true", "y": "true", "no": "false", "off": "false", "n": "false"}
 """Booleans of YAML 1.1, which are texts in YAML 1.2."""
 _MOST_LOOKED_AT = 2 * MOST_FAULTS
-"""Of the faults that the schema finds; of a value that may have several types there is one for each."""
+"""Most faults of the schema that are looked at; of a value that may have several types there is one for each."""
 
 
 class Document:
@@ -39,14 +39,8 @@ class Document:
         text = _text(source, most_bytes) if isinstance(source, Path) else yaml_text(source)
         self._tree = Tree(text, self.file, most_values)
         if not isinstance(self._tree.root, dict):
-            raise StudyError(
-                Fault(
-                    "a study file is a mapping of keys",
-                    self.file,
-                    1,
-                    allowed="`study: name` and further keys",
-                )
-            )
+            allowed = "`study: name` and further keys"
+            raise StudyError(Fault("a study file is a mapping of keys", self.file, 1, allowed=allowed))
         self.data: dict[str, Any] = self._tree.root
 
     def change(self, key: str, text: str) -> None:
@@ -118,19 +112,19 @@ class Document:
 
     def faults(self, error: ValidationError, model: type[BaseModel]) -> list[tuple[tuple[Key, ...], Fault]]:
         """Pydantic's errors as faults of this file, with their paths."""
-        found: dict[tuple[tuple[Key, ...], str], Fault] = {}
+        made: dict[tuple[tuple[Key, ...], str], Fault] = {}
         meant = set()
         items = error.errors(include_url=False)
         for item in islice(items, _MOST_LOOKED_AT):
             path = self._known_path(item["loc"])
             fault = self._fault(path, item, model)
-            found.setdefault((path, fault.problem), fault)
+            made.setdefault((path, fault.problem), fault)
             if item["type"] == "extra_forbidden":
                 meant.add((*path[:-1], fault.nearest))
         # A misspelled key is one fault, not a second one because the right key is missing.
-        told = [(path, fault) for (path, problem), fault in found.items() if problem != "missing" or path not in meant]
+        kept = [(path, fault) for (path, problem), fault in made.items() if problem != "missing" or path not in meant]
         more = len(items) - _MOST_LOOKED_AT
-        return [*told, ((), Fault(f"and about {more:,} more faults", self.file))] if more > 0 else told
+        return [*kept, ((), Fault(f"and about {more:,} more faults", self.file))] if more > 0 else kept
 
     def _known_path(self, loc: Sequence[Key]) -> tuple[Key, ...]:
         """`loc` without the tags that pydantic adds for unions, and with a missing last key kept."""
@@ -192,9 +186,7 @@ def field_names(model: type[BaseModel], path: Sequence[Key], data: Any) -> list[
 
 
 def _has(node: Any, key: Key) -> bool:
-    return (isinstance(node, dict) and key in node) or (
-        isinstance(node, list) and isinstance(key, int) and key < len(node)
-    )
+    return key in node if isinstance(node, dict) else isinstance(node, list) and key in range(len(node))
 
 
 def _written(node: Any, key: Key) -> Key:

@@ -18,8 +18,8 @@ def with_light_files(section: StudySection, sources: Sources) -> StudySection:
     changed: dict[str, object] = {"lights": _read(section.lights, ("lights",), section, sources)}
     asked = section.validation
     if asked is not None and asked.lights is not None:
-        own = _read(asked.lights, ("validate", "lights"), section, sources)
-        changed["validation"] = asked.model_copy(update={"lights": own})
+        read = _read(asked.lights, ("validate", "lights"), section, sources)
+        changed["validation"] = asked.model_copy(update={"lights": read})
     if len(sources.faults) > before:
         raise StudyError(sources.faults)
     return section.model_copy(update=changed)
@@ -29,17 +29,17 @@ def _read(lights: LightsSection, path: tuple[Key, ...], section: StudySection, s
     name = lights.builtin
     if name is None or name in BUILT_IN_LIGHTS or not is_curve_file(name):
         return lights
-    found = sources.file(path, name)
-    if found is None:
+    place = sources.file(path, name)
+    if place is None:
         return lights
     try:
-        taken = lights_file(found, "energy", section.wavelengths.start_nm, section.wavelengths.stop_nm)
+        taken = lights_file(place, "energy", section.wavelengths.start_nm, section.wavelengths.stop_nm)
     except DataError as error:
         sources.faults.extend(error.faults)
         return lights
     sources.warnings.append(f"{name}: read as energy; {_said(taken)}")
-    own = lights.model_dump(exclude_unset=True, exclude={"builtin", "files"})
-    return LightsSection.model_validate(taken.keys(name) | own)
+    stated = lights.model_dump(exclude_unset=True, exclude={"builtin", "files"})
+    return LightsSection.model_validate(taken.keys(name) | stated)
 
 
 def _said(taken: LightsFile) -> str:

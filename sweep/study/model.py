@@ -78,7 +78,7 @@ class Study:
 
     @property
     def leaves_one_out(self) -> bool:
-        """Whether each light is left out of a search in turn."""
+        """Return whether each light is left out of a search in turn."""
         asked = self.section.validation
         return asked is not None and asked.leave_one_out and self.search is not None
 
@@ -99,33 +99,18 @@ class Study:
 
     @property
     def asked(self) -> Asked:
-        """What the study asks for of its designs."""
-        recognition = self.section.recognition
-        return Asked(
-            self.lights.classes,
-            self.states,
-            self.any_place,
-            edge_shift=bool(self.tolerance),
-            probabilities=recognition is not None and recognition.probabilities,
-            population=self.section.population is not None,
-            wanted_yield=self.section.wanted_yield,
-            tasks=() if self.tasks is None else self.tasks.keys,
-            vision=self.section.vision is not None,
-            own=self.own,
-            brightest=self.sensor.brightest,
-        )
+        """Quantities that the study asks for of its designs."""
+        made = asked_of(self.section, self.lights, self.tasks, self.own)
+        return replace(made, any_place=self.any_place, brightest=self.sensor.brightest)
 
     @property
     def states(self) -> tuple[str, ...]:
         """Signal types that noise may confuse; none where the study does not ask."""
-        asked = self.section.recognition
-        if asked is None:
-            return ()
-        return self.lights.classes if asked.states is None else tuple(asked.states)
+        return _states(self.section, self.lights)
 
     @property
     def any_place(self) -> bool:
-        """Whether a scenario asks for the worst of all places of the light on the mosaic."""
+        """Return whether a scenario asks for the worst of all places of the light on the mosaic."""
         targets = [scenario.target for scenario in self.scenarios.values()]
         return any(target is not None and target.phase_px == "any" for target in targets)
 
@@ -159,7 +144,7 @@ class Study:
         return self.n_filters * len(self.scenarios)
 
     def setup(self, space: Space, scenario: str) -> Setup:
-        """What the designs of `space` share in a scenario."""
+        """Setup that the designs of `space` share in a scenario."""
         bases = {} if space.filter is None else space.filter.bases
         technology = None if space.filter is None else space.filter.technology
         return self.setup_of(space.cfa, scenario, bases, technology)
@@ -167,7 +152,7 @@ class Study:
     def setup_of(
         self, cfa: str, scenario: str, bases: Mapping[str, str], technology: Technology | None = None
     ) -> Setup:
-        """What designs of a CFA share in a scenario; `bases`: modified channel -> the curve that it replaces.
+        """Setup that designs of a CFA share in a scenario; `bases`: modified channel -> the curve that it replaces.
 
         `technology`: that of the modified channels' filters.
         """
@@ -254,6 +239,27 @@ class Study:
         """The benchmark of vision, where the study asks for one."""
         vision = self.section.vision
         return None if vision is None else SeededVision(vision, self.section.seed)
+
+
+def asked_of(section: StudySection, lights: Lights, tasks: StudyTasks | None, own: tuple[OwnMetric, ...]) -> Asked:
+    """Quantities that a study asks for, as far as it is known without its scenes and its sensor."""
+    recognition = section.recognition
+    return Asked(
+        lights.classes,
+        _states(section, lights),
+        edge_shift=bool(section.production.tolerance),
+        probabilities=recognition is not None and recognition.probabilities,
+        population=section.population is not None,
+        wanted_yield=section.wanted_yield,
+        tasks=() if tasks is None else tasks.keys,
+        vision=section.vision is not None,
+        own=own,
+    )
+
+
+def _states(section: StudySection, lights: Lights) -> tuple[str, ...]:
+    recognition = section.recognition
+    return () if recognition is None else tuple(recognition.states or lights.classes)
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""What a study names that is not the package's: allowed or refused, found, read and digested."""
+"""Code that a study names and that is not the package's: allowed or refused, located, read and digested."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _Curves = TypeVar("_Curves", SensorSection, LightsSection)
 
 
 def is_from_outside(name: str, group: Offered, known: Iterable[str]) -> bool:
-    """Whether a name is that of code that is not the package's, whose own names come first."""
+    """Return whether a name is that of code that is not the package's, whose own names come first."""
     return is_in_file(name) or (name not in known and name in offers(group))
 
 
 def allowed(sources: Sources, path: tuple[Key, ...], name: str) -> bool:
-    """Whether code may run; else adds a fault."""
+    """Return whether code may run; else adds a fault."""
     if not sources.allow_code:
         whose = "a Python file" if is_in_file(name) else "what an installed package offers"
         problem = f"the study names {whose}, whose code would run"
@@ -41,11 +41,11 @@ def code_of(sources: Sources, name: str, group: Offered) -> OwnCode:
         _digested(sources, f"{CODE_OF}{offer.told} ({group}: {name})", digest)
         return OwnCode(name, None, group, digest)
     file = file_of(name)
-    found = next((folder / file for folder in sources.folders if is_file(folder / file)), None)
-    if found is None:
+    place = next((folder / file for folder in sources.folders if is_file(folder / file)), None)
+    if place is None:
         searched = ", ".join(str(folder) for folder in sources.folders)
         raise SweepError(Fault("no such file", value=file, allowed=f"a path relative to {searched}"))
-    source, digest = read_code(found)
+    source, digest = read_code(place)
     _digested(sources, file, digest)
     return OwnCode(name, source)
 
@@ -82,13 +82,13 @@ def offered_curves(
         sources.told(at, error)
         raise StudyError(sources.faults) from None
     sources.folders = [*([] if offer is None else offer.folders), *sources.folders]
-    own = {key: getattr(section, key) for key in section.model_fields_set - {"builtin", "files"}}
+    stated = {key: getattr(section, key) for key in section.model_fields_set - {"builtin", "files"}}
     files = {"files": [*made.files, *section.files]}
-    return made.model_copy(update={"name": made.name or name, **files, **own})
+    return made.model_copy(update={"name": made.name or name, **files, **stated})
 
 
 def _said(code: OwnCode) -> dict[str, object]:
-    """What a package says of curves. Raises SweepError where it says nothing."""
+    """Curves as a package states them. Raises SweepError where it says nothing."""
     loaded = code.loaded
     said = code.called(loaded) if callable(loaded) else loaded
     if not isinstance(said, Mapping) or said.get("builtin") == code.name:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
 from ..base.errors import StudyError, SweepError
 from ..camera import psf
+from ..camera.memory import too_large
 from ..camera.mosaic import Mosaic
 from ..camera.scene import OBJECT_RESOLUTION
 from ..camera.sensor import BUILT_IN_SENSORS, SensorCurves
@@ -19,29 +21,23 @@ from ..designs.space import Space
 from ..metrics.own import OwnMetric
 from ..metrics.quantity import Asked, Quantity
 from ..metrics.registry import listed, quantities_of
-from .allowed_lamps import check_regions
 from .checked import Checked
 from .document import Document
-from .goals import check_goals
+from .goals import check_goals, check_searched, search_of
+from .light_checks import check_luminances, check_range, check_regions, with_population
 from .light_files import with_light_files
-from .luminances import check_luminances
-from .model import Search, Study
+from .model import Search, Study, asked_of
 from .own_codes import offered_curves
-from .own_effects import own_effects, try_effects
-from .own_metrics import check_names, own_metrics, try_metrics
-from .populations import check_range, with_population
+from .own_models import check_names, own_effects, own_metrics, try_effects, try_metrics
 from .schema import CfaSection, StudySection
 from .schema_curves import LightsSection
-from .searches import check_searched, search_of
 from .seen_images import check_vision
-from .sensor_fields import with_chief_rays
-from .sensors import sensor_of
-from .sizes import check_count, check_memory
+from .sensors import check_lenses, sensor_of, with_chief_rays, with_technologies
 from .sources import KeptSources, Sources
 from .spaces import SpaceBuilder, check_cfas
-from .technologies import check_lenses, with_technologies
 
 _Made = TypeVar("_Made")
+_MOST_DESIGNS = 10**9
 
 
 class _Resolver:
@@ -111,13 +107,13 @@ class _Resolver:
             own=self.own,
             own_effects=effects or (),
         )
-        check_memory(study, self.sources)
+        _check_memory(study, self.sources)
         try_effects(study, self.sources)
         try_metrics(study, self.sources)
         check_range(study, self.sources)
         if self.faults:
             raise StudyError(self.faults)
-        check_count(study, self.sources)
+        _check_count(study, self.sources)
         return study
 
     def had(self, make: Callable[[], _Made]) -> _Made | None:
@@ -182,27 +178,14 @@ class _Resolver:
 
             self.tasks = tasks_of(self.section.tasks, self.sources)
 
-    def asked(self, lights: Lights, *, edge_shift: bool | None = None) -> Asked:
-        """What an objective or a constraint can name; `edge_shift`: as if worst cases were asked for, or not."""
-        recognition = self.section.recognition
-        states = () if recognition is None else tuple(recognition.states or lights.classes)
-        shifts = bool(self.section.production.tolerance) if edge_shift is None else edge_shift
-        return Asked(
-            lights.classes,
-            states,
-            edge_shift=shifts,
-            probabilities=recognition is not None and recognition.probabilities,
-            population=self.section.population is not None,
-            wanted_yield=self.section.wanted_yield,
-            tasks=() if self.tasks is None else self.tasks.keys,
-            vision=self.section.vision is not None,
-            own=self.own,
-        )
+    def asked(self, lights: Lights) -> Asked:
+        """Quantities that an objective or a constraint can name."""
+        return asked_of(self.section, lights, self.tasks, self.own)
 
     def check_columns(self, lights: Lights) -> None:
         """Every pair of signal types has columns of its own."""
         seen: dict[str, Quantity] = {}
-        for quantity in listed(self.asked(lights, edge_shift=False)):
+        for quantity in listed(replace(self.asked(lights), edge_shift=False)):
             other = seen.setdefault(quantity.name, quantity)
             if other.pair != quantity.pair and other.pair is not None and quantity.pair is not None:
                 pairs = f"{'/'.join(other.pair)} and {'/'.join(quantity.pair)}"
@@ -256,6 +239,26 @@ class _Resolver:
                     names = [OBJECT_RESOLUTION] if row in section.geometry else columns
                     if row in known and quantity not in names:
                         self.unknown((*path, quantity), "quantity", quantity, names)
+
+
+def _check_memory(study: Study, sources: Sources) -> None:
+    """The kernels of every scene and CFA fit into memory. Raises StudyError."""
+    for name in study.scenarios:
+        for space in study.spaces:
+            if (refused := too_large(study.setup(space, name))) is not None:
+                problem, value, allowed = refused
+                sources.add(("scenarios", name, "target"), f"{problem} (CFA {space.cfa})", value, allowed)
+                raise StudyError(sources.faults)
+
+
+def _check_count(study: Study, sources: Sources) -> None:
+    """There are designs, and not too many. Raises StudyError."""
+    if not study.n_designs and study.search is None:
+        sources.add(("cfas",), "no designs", None, "a CFA with a curve for each channel, a design, a sweep or a search")
+        raise StudyError(sources.faults)
+    if study.n_designs > _MOST_DESIGNS:
+        sources.add(("sweeps",), "too many designs", f"{study.n_designs:,}", f"at most {_MOST_DESIGNS:,}")
+        raise StudyError(sources.faults)
 
 
 def resolve(

@@ -119,7 +119,7 @@ class SweepSection(Modification):
 
     @property
     def drawn(self) -> bool:
-        """Whether its designs are drawn from a box."""
+        """Return whether its designs are drawn from a box."""
         return self.sobol is not None or self.lhs is not None
 
 

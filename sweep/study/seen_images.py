@@ -1,4 +1,4 @@
-"""What a benchmark of vision needs of the rest of the study."""
+"""Checks of what a benchmark of vision needs of the rest of the study."""
 
 from __future__ import annotations
 

@@ -1,17 +1,25 @@
-"""The sensor of a study: built in, from files, or own curves beside built-in ones."""
+"""The sensor of a study: its curves, how its filters work, and the angles of its lenses."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from ..base.errors import DataError
 from ..base.types import FloatArray
+from ..camera.angular import too_steep
 from ..camera.sensor import BUILT_IN_SENSORS, SensorCurves, make_sensor
+from ..camera.sensor_field import PLACES, SensorField
 from ..curves.facts import NORMALIZED, looks_normalized
+from ..designs.space import Space
+from .schema import StudySection
 from .schema_curves import CurveFile, SensorSection
 from .sources import Sources
 from .yaml_tree import Key
+
+_ROUNDING = 1e-9
 
 
 def sensor_of(sources: Sources, section: SensorSection) -> SensorCurves | None:
@@ -57,10 +65,10 @@ def _curves_of_files(
     sources: Sources, section: SensorSection, known: Mapping[str, FloatArray]
 ) -> dict[str, FloatArray]:
     """QE of every curve of the files, those that are relative to others last; `known`: built-in curves."""
-    found: dict[str, FloatArray] = {}
+    curves: dict[str, FloatArray] = {}
     every = list(enumerate(section.files))
     for entries in ([e for e in every if e[1].relative_to is None], [e for e in every if e[1].relative_to is not None]):
-        whole = {**known, **found}
+        whole = {**known, **curves}
         for index, entry in entries:
             path: tuple[Key, ...] = ("sensor", "files", index)
             if entry.relative_to is not None and entry.relative_to not in whole:
@@ -68,10 +76,10 @@ def _curves_of_files(
                 continue
             factor = entry.scale if entry.relative_to is None else entry.scale * whole[entry.relative_to]
             for name, values in _columns(sources, path, entry, factor).items():
-                if name in found:
+                if name in curves:
                     sources.add((*path, "columns", name), "the curve is defined twice", name)
-                found[name] = values
-    return found
+                curves[name] = values
+    return curves
 
 
 def _columns(
@@ -83,7 +91,7 @@ def _columns(
         top = max((float(curves.values[c].max()) for c in entry.columns.values() if c in curves.values), default=0.0)
         if looks_normalized(entry.scale * top):
             sources.warnings.append(f"{entry.file}: {NORMALIZED}")
-    found = {}
+    scaled = {}
     for name, column in entry.columns.items():
         place = (*path, "columns", name)
         if sources.kept is not None:
@@ -92,11 +100,83 @@ def _columns(
             values = sources.column(place, curves, column, entry)
             values = None if values is None else values * factor
         if values is not None:
-            found[name] = values
-    return found
+            scaled[name] = values
+    return scaled
 
 
 def _place(section: SensorSection, curve: str) -> tuple[Key, ...]:
     """Where the study names a curve."""
     index = next((i for i, entry in enumerate(section.files) if curve in entry.columns), None)
     return ("sensor",) if index is None else ("sensor", "files", index, "columns", curve)
+
+
+def with_chief_rays(section: StudySection, sources: Sources) -> StudySection:
+    """The study with the rows of lenses' files in the place of their names; what does not fit adds a fault."""
+    scenarios = dict(section.scenarios)
+    read: dict[tuple[str, float | None], SensorField] = {}
+    for name, scenario in section.scenarios.items():
+        field = scenario.field
+        if field is None or field.file is None:
+            continue
+        key = (field.file, field.corner_mm)
+        if key not in read:
+            rays = sources.chief_rays(("scenarios", name, "field", "profile"), *key)
+            # Without a file that can be read, a field without angles lets the other faults be found.
+            read[key] = (
+                SensorField(cra_max_deg=0.0)
+                if rays is None
+                else SensorField(heights=tuple(rays.heights.tolist()), cra_deg=tuple(rays.cra_deg.tolist()))
+            )
+        made = read[key].model_copy(update={"places": field.places or PLACES})
+        scenarios[name] = scenario.model_copy(update={"field": made})
+    return section.model_copy(update={"scenarios": scenarios})
+
+
+def _moves(sensor: SensorCurves, curve: str) -> bool:
+    """Return whether a curve of the sensor moves with the angle of the light."""
+    technology = sensor.technologies.get(curve)
+    return technology is not None and technology.interference is not None
+
+
+def with_technologies(sensor: SensorCurves, section: StudySection, sources: Sources) -> SensorCurves:
+    """The sensor with what is stated of its curves; what does not fit adds a fault."""
+    clear = sensor.curve(sensor.clear)
+    kind = "clear" if sensor.has_clear else "brightest"
+    stated = replace(sensor, technologies=section.sensor.technology)
+    for curve in section.sensor.technology:
+        path: tuple[Key, ...] = ("sensor", "technology", curve)
+        if curve not in sensor.qe:
+            sources.unknown(path, "curve", curve, list(sensor.qe))
+        elif _moves(stated, curve) and (sensor.qe[curve] > clear * (1 + _ROUNDING)).any():
+            problem = f"an interference filter lets through a share of the {kind} curve, {sensor.clear}"
+            sources.add(path, problem, f"{curve} is above it", "pigment")
+    return stated
+
+
+def check_filter(space: Space, path: tuple[Key, ...], sensor: SensorCurves, sources: Sources) -> None:
+    """Check that a filter can be told from its base: that is no interference filter, nor exceeded by one."""
+    made = space.filter
+    assert made is not None
+    for base in dict.fromkeys(made.bases.values()):
+        if _moves(sensor, base):
+            problem = f"the base curve {base} is an interference filter itself"
+            sources.add((*path, "base"), problem, base, "a base of pigment")
+    if made.technology is None or made.technology.interference is None:
+        return
+    low, high = (np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max))
+    bases = np.stack([sensor.curve(base) for base in made.bases.values()])
+    if (made.family.upper(low, high) > bases * (1 + _ROUNDING)).any():
+        problem = "an interference filter lets through a share of its base"
+        exceeded = f"filters that exceed {' and '.join(dict.fromkeys(made.bases.values()))}"
+        sources.add((*path, "technology"), problem, exceeded, "a filter below it, or pigment")
+
+
+def check_lenses(section: StudySection, sensor: SensorCurves, spaces: Sequence[Space], sources: Sources) -> None:
+    """Where filters move, no ray of any scene grazes them."""
+    filters = [space.filter.technology for space in spaces if space.filter is not None]
+    if all(t is None or t.interference is None for t in (*filters, *sensor.technologies.values())):
+        return
+    for name, scenario in section.scenarios.items():
+        if (refused := too_steep(scenario)) is not None:
+            key, problem, value, allowed = refused
+            sources.add(("scenarios", name, *key), problem, value, allowed)

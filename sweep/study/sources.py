@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -25,8 +25,9 @@ from .schema_curves import CurveFile, LightFile, LightsSection, TaskFile
 from .yaml_tree import Key
 
 _Made = TypeVar("_Made", SensorCurves, Lights)
+_Content = TypeVar("_Content", Curves, ChiefRays)
 _MOST_VALUES = 10_000_000
-"""Of the curves of a sensor, or of lights, on the grid: 80 MB."""
+"""Most values of the curves of a sensor, or of lights, on the grid: 80 MB."""
 _CUT_OFF = 0.01
 """Share of a light's photons outside the grid from which on the user is told."""
 
@@ -70,14 +71,10 @@ class Sources:
         self, path: tuple[Key, ...], what: str, value: str, known: list[str], others: Iterable[str] = ()
     ) -> None:
         """Add the fault of a name that is not among the known ones, with the nearest of them and of `others`."""
-        told = len(self.faults) < MOST_FAULTS
-        self.add(
-            path, f"unknown {what}", value, ", ".join(known) if told else None, self._near(value, [*known, *others])
-        )
-
-    def _near(self, value: str, known: Iterable[str]) -> str | None:
-        """The nearest known name, as long as somebody is told of it."""
-        return nearest(value, known) if len(self.faults) < MOST_FAULTS else None
+        if len(self.faults) < MOST_FAULTS:
+            self.add(path, f"unknown {what}", value, ", ".join(known), nearest(value, [*known, *others]))
+        else:  # nobody reads it
+            self.add(path, f"unknown {what}", value)
 
     def held_out(self, section: LightsSection, own: Lights) -> Lights | None:
         """Lights that the study does not optimize for, as bright as its own, or None after adding faults.
@@ -135,7 +132,7 @@ class Sources:
         return make_lights(self.grid, section.name or "lights", signals, source, photon_ratio=section.photon_ratio)
 
     def fits(self, path: tuple[Key, ...], what: str, count: int) -> bool:
-        """Whether so many curves on the grid fit into memory; else adds a fault."""
+        """Return whether so many curves on the grid fit into memory; else adds a fault."""
         most = _MOST_VALUES // self.grid.size
         if count > most:
             self.add(path, f"too many {what} for a grid of {self.grid.size:,} wavelengths", count, f"at most {most:,}")
@@ -146,13 +143,8 @@ class Sources:
     ) -> _Made | None:
         """A sensor or lights of the package on the grid, or None after adding faults."""
         if name not in known:
-            self.add(
-                at,
-                f"unknown built-in {at[-1]}",
-                name,
-                f"{', '.join(known)}, or a mapping with `files`",
-                nearest(name, known),
-            )
+            allowed = f"{', '.join(known)}, or a mapping with `files`"
+            self.add(at, f"unknown built-in {at[-1]}", name, allowed, nearest(name, known))
             return None
         low, high = BUILT_IN_RANGE_NM
         if not low <= self.grid.start_nm < self.grid.stop_nm <= high:
@@ -192,8 +184,7 @@ class Sources:
         if curves is None:
             return None
         if column not in curves.values:
-            known = list(curves.values)
-            self.add(path, f"{entry.file} has no such column", column, ", ".join(known), self._near(column, known))
+            self.unknown(path, f"column of {entry.file}", column, list(curves.values))
             return None
         try:
             return curves.on(self.grid, column, entry.resampling, entry.outside)
@@ -215,43 +206,44 @@ class Sources:
         if entry.file in self._read:
             return self._read[entry.file]
         if entry.file in self.given:
-            self._read[entry.file] = self.given[entry.file]
-            self.digests[entry.file] = _digest_of(self.given[entry.file])
-            return self._read[entry.file]
-        self._read[entry.file] = None
-        found = self.file((*path, "file"), entry.file)
-        if found is None:
-            return None
-        try:
-            read = self._read[entry.file] = read_curves(found)
-            self.warnings += [f"{entry.file}: {note}" for note in read.notes]
-            self.digests[entry.file] = digest(found)
-        except DataError as error:
-            self.faults.extend(error.faults)
+            curves = self._read[entry.file] = self.given[entry.file]
+            content = hashlib.sha256(curves.wavelength_nm.tobytes())
+            for name, values in curves.values.items():
+                content.update(name.encode() + values.tobytes())
+            self.digests[entry.file] = content.hexdigest()
+            return curves
+        self._read[entry.file] = self._noted((*path, "file"), entry.file, read_curves)
         return self._read[entry.file]
 
     def chief_rays(self, path: tuple[Key, ...], file: str, corner_mm: float | None) -> ChiefRays | None:
         """A lens's chief ray angles from a file that the study names at `path`, or None after adding faults."""
-        found = self.file(path, file)
-        if found is None:
+        return self._noted(path, file, lambda place: read_chief_rays(place, corner_mm))
+
+    def _noted(self, path: tuple[Key, ...], file: str, read: Callable[[Path], _Content]) -> _Content | None:
+        """Content of a file, with its notes and its digest kept; None after adding faults."""
+        place = self.file(path, file)
+        if place is None:
             return None
         try:
-            read = read_chief_rays(found, corner_mm)
-            self.warnings += [f"{file}: {note}" for note in read.notes]
-            self.digests[file] = digest(found)
+            content = read(place)
+            self.digests[file] = digest(place)
         except DataError as error:
             self.faults.extend(error.faults)
             return None
-        return read
+        self.warnings += [f"{file}: {note}" for note in content.notes]
+        return content
 
     def file(self, path: tuple[Key, ...], file: str) -> Path | None:
         """Where a file lies that the study names at `path`, or None after adding a fault."""
-        found = next((folder / file for folder in self.folders if is_file(folder / file)), None)
-        if found is None:
+        place = next((folder / file for folder in self.folders if is_file(folder / file)), None)
+        if place is None:
             searched = ", ".join(str(folder) for folder in self.folders)
-            near = self._near(file, _names(self.folders))
-            self.add(path, "no such file", file, f"a path relative to {searched}", near)
-        return found
+            names: list[str] = []
+            for folder in self.folders:
+                with suppress(OSError):
+                    names += [item.name for item in folder.iterdir()]
+            self.add(path, "no such file", file, f"a path relative to {searched}", nearest(file, names))
+        return place
 
     def add(
         self,
@@ -269,18 +261,3 @@ class Sources:
         for fault in error.faults:
             problem = f"{fault.file}: {fault.problem}" if fault.file else fault.problem
             self.add(path, problem, fault.value, fault.allowed, fault.nearest)
-
-
-def _digest_of(curves: Curves) -> str:
-    """SHA-256 of curves that have no file, hexadecimal."""
-    found = hashlib.sha256(curves.wavelength_nm.tobytes())
-    for name, values in curves.values.items():
-        found.update(name.encode() + values.tobytes())
-    return found.hexdigest()
-
-
-def _names(folders: Iterable[Path]) -> Iterator[str]:
-    """Names of what lies in folders, as far as they can be read."""
-    for folder in folders:
-        with suppress(OSError):
-            yield from (item.name for item in folder.iterdir())

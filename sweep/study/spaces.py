@@ -17,12 +17,11 @@ from ..designs.plugin import PluginFamily
 from ..designs.registry import FAMILIES, build_family
 from ..designs.space import Filter, Kind, Space
 from ..designs.technology import PIGMENT
-from ..designs.ungridded import Ungridded
+from ..designs.ungridded import Drawn, Method, Paired, Ungridded
 from .own_codes import allowed, code_of, is_from_outside
-from .schema import DesignSection, Modification, StudySection
+from .schema import DesignSection, Modification, StudySection, SweepSection
+from .sensors import check_filter
 from .sources import Sources
-from .sweep_axes import sweep_axes
-from .technologies import check_filter
 from .yaml_tree import Key
 
 _MOST_POINTS = 2_000_000
@@ -79,7 +78,7 @@ class SpaceBuilder:
             axes: dict[str, tuple[float, ...]] = {key: (value,) for key, value in self._built_in(name, design).items()}
             spaces += self._filtered("design", name, design, axes, ("designs", name, "at"))
         for name, sweep in section.sweeps.items():
-            way, axes, rows = sweep_axes(sweep, section.seed)
+            way, axes, rows = _sweep_axes(sweep, section.seed)
             spaces += self._filtered("sweep", name, sweep, axes, ("sweeps", name, way), rows)
         for name, box in section.boxes.items():
             axes = {key: axis.points() for key, axis in box.box.items()}
@@ -87,10 +86,10 @@ class SpaceBuilder:
         return spaces
 
     def _fits(self) -> bool:
-        """Whether the axes of all grids and boxes can be written out; else adds a fault."""
+        """Return whether the axes of all grids and boxes can be written out; else adds a fault."""
         sweeps, boxes = self.section.sweeps.values(), self.section.boxes.values()
-        told = [*(sweep.grid or sweep.box or sweep.paired or {} for sweep in sweeps), *(box.box for box in boxes)]
-        total = sum(axis.size for axes in told for axis in axes.values())
+        stated = [*(sweep.grid or sweep.box or sweep.paired or {} for sweep in sweeps), *(box.box for box in boxes)]
+        total = sum(axis.size for axes in stated for axis in axes.values())
         if total > _MOST_POINTS:
             allowed = f"at most {_MOST_POINTS:,} in all axes together"
             self.sources.add(("sweeps",), "too many values of parameters", f"{total:,}", allowed)
@@ -132,7 +131,7 @@ class SpaceBuilder:
 
     @staticmethod
     def _is_own(entry: Modification) -> bool:
-        """Whether a family is not the package's."""
+        """Return whether a family is not the package's."""
         return is_from_outside(entry.family, _FAMILIES, FAMILIES)
 
     def _filtered(
@@ -223,3 +222,18 @@ class SpaceBuilder:
                     break
             ordered.append(values)
         return ordered
+
+
+def _sweep_axes(sweep: SweepSection, seed: int) -> tuple[str, dict[str, tuple[float, ...]], Ungridded | None]:
+    """Key that the parameters of a sweep stand under, their values, and its designs where they are no grid."""
+    if sweep.grid is not None:
+        return "grid", {name: axis.points() for name, axis in sweep.grid.items()}, None
+    if sweep.box is not None:
+        method: Method = "sobol" if sweep.sobol is not None else "lhs"
+        drawn = Drawn(method, sweep.sobol or sweep.lhs or 0, seed)
+        return "box", {name: axis.points() for name, axis in sweep.box.items()}, drawn
+    if sweep.paired is not None:
+        columns = {name: axis.points() for name, axis in sweep.paired.items()}
+        return "zip", columns, Paired(max(map(len, columns.values())))
+    designs = sweep.listed or []
+    return "list", {name: tuple(design[name] for design in designs) for name in designs[0]}, Paired(len(designs))

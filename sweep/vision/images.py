@@ -16,7 +16,7 @@ from ..camera.sampling import crosstalk_share, with_crosstalk
 from ..camera.scene import FixedExposure, Noise, Scene
 from ..camera.setup import Setup
 from ..curves.color import luminance_per_photon_radiance
-from ..curves.hats import hats
+from ..curves.spectrum import hats
 from .compiled_images import draw_numbers
 from .head import MARGIN, HeadMaps, head_maps
 from .materials import ambient_light, phantom, reflectance

@@ -157,16 +157,17 @@ def test_machine_code_of_another_user_is_not_run(folder: Path) -> None:
 @pytest.mark.long
 def test_a_run_whose_machine_code_is_damaged_or_of_others_ends_in_lines(tmp_path: Path) -> None:
     """In the process of the command and in its workers; a kernel for each kind of damage."""
-    kept = machine_code._kept_in("")
+    study, kept = study_file(tmp_path, 2), machine_code._kept_in("")
     folder = tmp_path / "kept" / kept.name
-    shutil.copytree(kept, folder)
-    study = study_file(tmp_path, 2)
 
-    def run(name: str) -> subprocess.CompletedProcess[str]:
+    def run(name: str, cache: Path = folder.parent) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-c", UNDRAWN, "run", str(study), "--output", str(tmp_path / name), "--jobs", "2"]
-        own = {**os.environ, "NUMBA_CACHE_DIR": str(folder.parent)}
+        own = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
         return subprocess.run(command, capture_output=True, text=True, check=False, env=own)
 
+    done = run("compiled", kept.parent)
+    assert done.returncode == 0, done.stderr
+    shutil.copytree(kept, folder)
     names = ["through_edges-*.nbc", "spans-*.nbc", "outside-*.nbc", "ranges_of-*.nbc", "edge_shapes-*.nbi"]
     files = [next(folder.rglob(f"compiled.{name}")) for name in names]
     for file, damage in zip(files, [*DAMAGES.values(), DAMAGES["empty"]], strict=True):

@@ -22,8 +22,7 @@ from sweep.camera.pixel import Pixel
 from sweep.camera.readout import draws_dn
 from sweep.camera.scene import Drive, FixedExposure, Scene, Target
 from sweep.curves.color import luminance_per_photon_radiance
-from sweep.curves.hats import hats
-from sweep.curves.spectrum import LIGHT_M_S, PLANCK_J_S, WavelengthGrid
+from sweep.curves.spectrum import LIGHT_M_S, PLANCK_J_S, WavelengthGrid, hats
 
 from ..hard.scenes import F2, FAR, NEAR, TILES, scene, target
 

@@ -119,9 +119,10 @@ def test_plan_says_what_a_scene_calls_for(tmp_path: Path) -> None:
         "road distance_m=280 ... road distance_m=300 (2 scenes): what is left out changes a CSD "
     )
     assert lines[0].endswith(" (tolerance 50 DN)")
+    assert lines[1].split() == ["effect", "computed", "bound", "/", "DN", "reason"]
     for effect in ("noise", "blur", "sampling", "phase", "extinction"):
         assert sum(line.strip().startswith(f"{effect} ") for line in lines) == 1
-    assert ["extinction", "left", "out", "0", "DN", "clear", "air"] in [line.split() for line in lines]
+    assert ["extinction", "left", "out", "0", "clear", "air"] in [line.split() for line in lines]
     assert any(line.split()[:2] == ["blur", "computed"] for line in lines)
     assert "2 scenes" in lines[-1]
 

@@ -172,13 +172,6 @@ def run_within(megabytes: int, output: Path) -> subprocess.CompletedProcess[str]
     return subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, check=False, preexec_fn=limit)
 
 
-@pytest.mark.parametrize("megabytes", [300, 976])
-def test_too_little_memory_to_start_is_one_line(tmp_path: Path, megabytes: int) -> None:
-    done = run_within(megabytes, tmp_path)
-    assert done.returncode == 2
-    assert done.stderr == "sweep: out of memory; fewer workers (--jobs) need less\n"
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("megabytes", [1100, 1300])
 def test_little_memory_is_enough_or_one_line(tmp_path: Path, megabytes: int) -> None:

@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from sweep.base.errors import DataError
-from sweep.curves.hats import hats
 from sweep.curves.spectrum import (
     WavelengthGrid,
     check_samples,
     energy_from_photons,
     equal_photons,
+    hats,
     photons_from_energy,
     resample,
 )

@@ -13,7 +13,6 @@ from scipy.spatial.distance import cdist
 
 from sweep.camera import electrons
 from sweep.camera.forward import ForwardModel
-from sweep.curves.builtin.registry import BUILT_IN_LIGHTS
 from sweep.designs import block as blocks
 from sweep.designs.block import CurveBlock, edges_of
 from sweep.designs.families.free_form import FreeForm
@@ -21,7 +20,6 @@ from sweep.designs.families.stopband import MultiStopband, Stopband
 from sweep.designs.space import Filter, Space
 from sweep.metrics import separation
 from sweep.metrics.evaluate import evaluate
-from sweep.metrics.nearest import LANES, nearest_along_squared
 from sweep.metrics.separation import class_pairs, separations, separations_along
 
 from ..blocks import AXES, SPACE, VIEWS
@@ -64,22 +62,6 @@ def test_shapes_of_edges_are_those_of_their_curves(
     np.testing.assert_allclose(steepest, np.abs(np.diff(curves)).max(axis=1), rtol=0, atol=4 * EPS)
     kept = base[0] > 0
     np.testing.assert_allclose(lowest, (curves[:, kept] / base[0, kept]).min(axis=1), rtol=1e-12, atol=4 * EPS)
-
-
-def test_pairs_that_are_never_the_nearest_are_left_out() -> None:
-    neighbors = replace(SPACE, axes=((600.0,), (20.0,), tuple(np.linspace(650, 660, 128)), (20.0,), (1.0,)))
-    edges = edges_of(neighbors, 0, neighbors.size)
-    assert edges is not None
-    setup = replace(VIEWS["chart"], lights=BUILT_IN_LIGHTS["tl16"](GRID))
-    changing = ForwardModel(setup).read_changing(edges)
-    assert changing is not None
-    members = setup.members
-    apart = separation.pairs_apart(np.delete(changing.fixed[0], changing.channel, axis=1), members)
-    values = np.ascontiguousarray(changing.values[:, 0])
-    room = np.empty((len(apart.starts) - 1, len(values))), np.zeros(len(values), dtype=bool)
-    computed = nearest_along_squared(values, *apart, *room)
-    every = len(apart.fixed) * -(-len(values) // LANES)
-    assert 0 < computed < every / 4
 
 
 @pytest.mark.parametrize("name", list(VIEWS))

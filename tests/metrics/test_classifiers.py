@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from sweep.metrics.classifiers import CLASSIFIERS
+from sweep.metrics.recognition import CLASSIFIERS
 
 
 @pytest.mark.parametrize(("n_patches", "n_pixels"), [(12, 40), (200, 16), (60, 4), (3, 9)])

@@ -26,6 +26,7 @@ from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.quantity import Asked, Quantity
 from sweep.metrics.registry import quantities_of
 from sweep.metrics.smooth import SmoothDesign
+from sweep.metrics.smooth_noise import margin
 from sweep.metrics.tasks.color import (
     ChannelNoise,
     color_matrix,
@@ -35,7 +36,7 @@ from sweep.metrics.tasks.color import (
     vora,
 )
 from sweep.metrics.tasks.colorimetry import delta_e_2000, lab
-from sweep.metrics.tasks.separations import margins, pair_errors
+from sweep.metrics.tasks.judge import pair_errors
 from sweep.study.load import study_of_keys
 
 KEYS = {
@@ -130,7 +131,7 @@ def test_an_error_is_that_of_draws() -> None:
     """Of the plane between two points, with a million Gaussian draws of each."""
     a, b = np.array([900.0, 500.0, 300.0]), np.array([905.0, 490.0, 306.0])
     noise = ChannelNoise(np.array([0.25, 0.5, 0.25]), 2.0)
-    told = float(pair_errors(margins(np.stack([a, b])[None], (np.array([0]), np.array([1])), noise))[0, 0])
+    told = float(pair_errors(margin(a - b, noise.of(a), noise.of(b))))
     rng = np.random.default_rng(1)
     normal = (a - b) / (noise.of(a) + noise.of(b))
     spread = [np.sqrt(normal**2 @ noise.of(p)) for p in (a, b)]

@@ -14,11 +14,10 @@ from sweep.camera.accuracy import Accuracy
 from sweep.camera.forward import ForwardModel
 from sweep.designs.block import CurveBlock, EdgeBlock, edges_of
 from sweep.metrics import evaluate as route
-from sweep.metrics import registry, whole_readout
-from sweep.metrics.evaluate import evaluate
+from sweep.metrics import registry
+from sweep.metrics.evaluate import Spent, evaluate, whole_readout_metrics
 from sweep.metrics.own import OwnMetric
 from sweep.metrics.quantity import Asked, Columns, Quantity, ReadoutMetric
-from sweep.metrics.whole_readout import Spent, whole_readout_metrics
 
 from ..blocks import SPACE, VIEWS
 
@@ -59,7 +58,7 @@ class Darkest(ReadoutMetric):
 def darkest(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """One more registered metric."""
     monkeypatch.setattr(registry, "METRICS", (*registry.METRICS, Darkest()))
-    monkeypatch.setattr(whole_readout, "OTHERS", [Darkest()])
+    monkeypatch.setattr(route, "OTHERS", [Darkest()])
     registry.quantities_of.cache_clear()
     yield
     registry.quantities_of.cache_clear()
@@ -91,11 +90,11 @@ def by_hand(name: str, block: EdgeBlock) -> dict[str, np.ndarray]:
 def test_csds_are_those_without_other_metrics_and_these_are_of_the_whole_readout(
     name: str, at_once: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(whole_readout, "_READ_AT_ONCE", at_once)
+    monkeypatch.setattr(route, "_READ_AT_ONCE", at_once)
     block, spent = edges_of(SPACE, 3, 9 if name == "refined" else 69), Spent()
     assert block is not None
     columns = evaluate(ForwardModel(SCENES[name]), block, own=[BRIGHTEST], spent=spent)
-    monkeypatch.setattr(whole_readout, "OTHERS", [])
+    monkeypatch.setattr(route, "OTHERS", [])
     alone = evaluate(ForwardModel(SCENES[name]), block)
     assert {*columns} == {*alone, "darkest_dn", "brightest"}
     for column, values in alone.items():
@@ -107,7 +106,7 @@ def test_csds_are_those_without_other_metrics_and_these_are_of_the_whole_readout
 
 @pytest.mark.usefixtures("darkest")
 @pytest.mark.parametrize(
-    ("name", "way", "n"), [("rounded", "separations_by_edges", SPACE.size), ("refined", "_refine_phases", 3)]
+    ("name", "way", "n"), [("rounded", "separations_along", SPACE.size), ("refined", "_refine_phases", 3)]
 )
 def test_other_metrics_switch_no_fast_route_off(name: str, way: str, n: int, monkeypatch: pytest.MonkeyPatch) -> None:
     fast, slow = counted(monkeypatch, way), counted(monkeypatch, "_read")

@@ -19,8 +19,8 @@ from sweep.metrics.pareto import knee
 from sweep.report import read_output, summary_lines
 from sweep.report.page import _drawings, _parts
 from sweep.report.page_data import history_of, payload
-from sweep.report.published import comparison_with_published
 from sweep.report.scenes import scene_groups
+from sweep.report.tables import comparison_with_published
 from sweep.results.facts import CheckFacts
 from sweep.results.identity import CHUNK
 from sweep.results.output import Output
@@ -181,7 +181,7 @@ def test_every_scene_is_told_once_with_its_largest_bound(finished: Finished) -> 
     for group in groups:
         plans = [output.provenance.plans[name] for name in group.scenarios]
         assert group.error_bound_dn == max(plan.error_bound_dn for plan in plans)
-        assert group.realized_dn is None
+        assert np.isnan(group.realized_dn)
     rows = pd.DataFrame({"scenario": [groups[0].scenarios[0]] * 2, "realized_dn": [0.01, 0.03]})
     assert scene_groups(replace(output, audited=rows))[0].realized_dn == 0.03
 

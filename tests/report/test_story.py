@@ -14,8 +14,7 @@ from sweep.designs.block import edges_of
 from sweep.metrics.columns.sensitivity import cfa_sensitivity_at
 from sweep.metrics.limiting import limiting_lights
 from sweep.report import make_report, read_output
-from sweep.report.answer import answer_sentences
-from sweep.report.large_numbers import large_numbers
+from sweep.report.answer import answer_sentences, large_numbers
 from sweep.report.leaders import leaders_of
 from sweep.report.series import Line, SeriesFigure, lead_sentence
 from sweep.results.names import REPORT

@@ -11,8 +11,7 @@ import pytest
 
 from sweep.base.errors import BrokenProofError
 from sweep.report import read_output, summary_lines
-from sweep.report.answer import answer_sentences
-from sweep.report.large_numbers import large_numbers
+from sweep.report.answer import answer_sentences, large_numbers
 from sweep.report.leaders import leaders_of
 from sweep.report.page_data import payload
 from sweep.report.upper_bound import upper_bound_beside

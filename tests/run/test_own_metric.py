@@ -21,7 +21,7 @@ from sweep.report import make_report, read_output, summary_lines
 from sweep.results.dictionary import KEYS
 from sweep.run import run_study
 from sweep.study import Study, load_study
-from sweep.study.own_metrics import RESERVED
+from sweep.study.own_models import RESERVED
 
 from ..build import one_line, ran
 from ..cases import thinned

@@ -9,9 +9,8 @@ import pytest
 
 import sweep
 from sweep.camera.sensor import make_sensor
-from sweep.report.answer import answer_sentences
+from sweep.report.answer import answer_sentences, large_numbers
 from sweep.report.compare.tables import curve_notes
-from sweep.report.large_numbers import large_numbers
 from sweep.report.summary import summary_lines
 from sweep.report.trade_off import around_designs
 from sweep.results.output import Output, read_output

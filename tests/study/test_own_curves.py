@@ -56,7 +56,7 @@ def test_an_own_curve_takes_the_place_of_the_built_in_one_in_every_cfa(tmp_path:
         ("N: mine", ", relative_to: Yy", "relative_to: unknown curve (got 'Yy')"),
         ("N: mine", ", relative_to: N", "relative_to: unknown curve (got 'N')"),
         ("N: mine", "", "QE above 1 (looks like percent: set `scale: 0.01`)"),
-        ("N: other", "", "own.csv has no such column"),
+        ("N: other", "", "unknown column of own.csv"),
     ],
 )
 def test_faults_name_the_place(tmp_path: Path, columns: str, rest: str, said: str) -> None:

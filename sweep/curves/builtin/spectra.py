@@ -31,7 +31,7 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class Card:
-    """What is known of a set of spectra: where it comes from, who may use it, whom to thank, its range and digest.
+    """Facts of a set of spectra: where it comes from, who may use it, whom to thank, its range and digest.
 
     `groups`: the parts of the set that a task may name, with the number of spectra of each. `surrogate`: modeled by
     us from stated numbers, not measured.
@@ -55,44 +55,42 @@ def _read() -> tuple[dict[str, dict[str, str]], dict[str, dict[str, tuple[Spectr
     from pyarrow import parquet  # noqa: PLC0415  (few studies need it)
 
     table = parquet.read_table(str(files(__package__).joinpath(_FILE)))
-    told = json.loads(table.schema.metadata[b"cards"])
-    found: dict[str, dict[str, list[Spectrum]]] = {}
+    about = json.loads(table.schema.metadata[b"cards"])
+    sets: dict[str, dict[str, list[Spectrum]]] = {}
     for row in table.to_pylist():
         wave, value = (np.asarray(row[key], dtype=float) for key in ("wavelength_nm", "value"))
         spectrum = Spectrum(row["name"], row["kind"], wave, value)
-        found.setdefault(row["set"], {}).setdefault(row["group"], []).append(spectrum)
-    groups = {name: {group: tuple(own) for group, own in parts.items()} for name, parts in found.items()}
-    return told, groups
+        sets.setdefault(row["set"], {}).setdefault(row["group"], []).append(spectrum)
+    groups = {name: {group: tuple(members) for group, members in parts.items()} for name, parts in sets.items()}
+    return about, groups
 
 
 def shipped_groups() -> dict[str, tuple[Spectrum, ...]]:
     """Group -> its spectra, over all sets."""
-    return {group: own for parts in _read()[1].values() for group, own in parts.items()}
+    return {group: members for parts in _read()[1].values() for group, members in parts.items()}
 
 
 def numbers_digest(spectra: tuple[Spectrum, ...]) -> str:
     """SHA-256 of names and numbers (32-bit floats, wavelengths first), hexadecimal."""
-    found = hashlib.sha256()
-    for each in spectra:
-        wave, value = each.wavelength_nm.astype(np.float32), each.value.astype(np.float32)
-        found.update(each.name.encode() + wave.tobytes() + value.tobytes())
-    return found.hexdigest()
+    content = hashlib.sha256()
+    for spectrum in spectra:
+        wave, value = spectrum.wavelength_nm.astype(np.float32), spectrum.value.astype(np.float32)
+        content.update(spectrum.name.encode() + wave.tobytes() + value.tobytes())
+    return content.hexdigest()
 
 
 def cards() -> list[Card]:
     """The card of each set of the file; its range and digest are those of the numbers that are there."""
-    told, parts = _read()
-    found = []
-    for name, own in parts.items():
-        every = tuple(spectrum for group in own.values() for spectrum in group)
-        sizes = {group: len(spectra) for group, spectra in own.items()}
+    about, parts = _read()
+    made = []
+    for name, groups_of_set in parts.items():
+        every = tuple(spectrum for group in groups_of_set.values() for spectrum in group)
+        sizes = {group: len(spectra) for group, spectra in groups_of_set.items()}
         first, last = min(s.wavelength_nm[0] for s in every), max(s.wavelength_nm[-1] for s in every)
-        source, license_, credit = (told[name][key] for key in ("source", "license", "credit"))
+        source, license_, credit = (about[name][key] for key in ("source", "license", "credit"))
         kind = every[0].kind
-        found.append(
-            Card(name, source, license_, credit, kind, sizes, float(first), float(last), numbers_digest(every))
-        )
-    return found
+        made.append(Card(name, source, license_, credit, kind, sizes, float(first), float(last), numbers_digest(every)))
+    return made
 
 
 def spectrum_of(group: str, name: str) -> Spectrum:

@@ -113,13 +113,13 @@ def region(group: str) -> ColorRegion:
 
 
 def is_sheeting(group: str) -> bool:
-    """Whether a group is of surfaces, not of lamps."""
+    """Return whether a group is of surfaces, not of lamps."""
     return group.endswith("sheeting")
 
 
 def surrogate_cards() -> list[Card]:
     """The cards of lamps and sheeting; their digest is of the stated numbers."""
-    found = []
+    cards = []
     for name, kind, source in (
         (
             "lamp_surrogates",
@@ -128,9 +128,11 @@ def surrogate_cards() -> list[Card]:
         ),
         ("sheeting_surrogates", "reflectance", "modeled: a band or an edge, inside the color region of 23 CFR 655"),
     ):
-        own = {group: shapes for group, shapes in STAND_INS.items() if is_sheeting(group) == (kind == "reflectance")}
-        sizes = {group: len(shapes) for group, shapes in own.items()}
-        stated = hashlib.sha256(repr(own).encode()).hexdigest()
+        of_kind = {
+            group: shapes for group, shapes in STAND_INS.items() if is_sheeting(group) == (kind == "reflectance")
+        }
+        sizes = {group: len(shapes) for group, shapes in of_kind.items()}
+        stated = hashlib.sha256(repr(of_kind).encode()).hexdigest()
         thanks = "the authors of sweep"
-        found.append(Card(name, source, "MIT", thanks, kind, sizes, *BUILT_IN_RANGE_NM, stated, surrogate=True))
-    return found
+        cards.append(Card(name, source, "MIT", thanks, kind, sizes, *BUILT_IN_RANGE_NM, stated, surrogate=True))
+    return cards

@@ -11,8 +11,7 @@ from ..color import color_matching, luminance_per_photon_radiance
 from ..spectrum import WavelengthGrid, energy_from_photons, equal_photons
 from ..tasks import ILLUMINANTS, Chart, GriddedTask, TaskName
 from . import spectra, stand_ins
-from .surrogate import surrogate_parameters
-from .tl16 import tl16
+from .data_sets.tl16 import lights
 
 _WHITE_LED = [f"LED-{kind}" for kind in ("B1", "B2", "B3", "B4", "B5", "BH1", "V1", "V2")]
 _HID = ["HP4", "HP5"]
@@ -29,12 +28,12 @@ def illuminant(grid: WavelengthGrid, name: str) -> FloatArray:
 
 def task_groups() -> dict[str, int]:
     """Every group that a task may name as a class, and how many spectra it has."""
-    shipped = {name: len(own) for name, own in spectra.shipped_groups().items()}
+    shipped = {name: len(members) for name, members in spectra.shipped_groups().items()}
     return shipped | {name: len(shapes) for name, shapes in stand_ins.STAND_INS.items()}
 
 
 def is_surface(group: str) -> bool:
-    """Whether a group is of surfaces, not of lamps."""
+    """Return whether a group is of surfaces, not of lamps."""
     if group in stand_ins.STAND_INS:
         return stand_ins.is_sheeting(group)
     return spectra.shipped_groups()[group][0].kind == "reflectance"
@@ -44,10 +43,10 @@ def group(grid: WavelengthGrid, name: str, most: int | None = None) -> FloatArra
     """The spectra of a group, ndarray[n, n_wavelengths]; `most`: so many of them, evenly spaced in their order."""
     if name in stand_ins.STAND_INS:
         return np.stack([shape.on(grid) for shape in stand_ins.STAND_INS[name]])
-    own = spectra.shipped_groups()[name]
-    count = len(own) if most is None else min(most, len(own))
-    chosen = np.unique(np.linspace(0, len(own) - 1, count).round().astype(int))
-    return np.stack([spectra.gridded(grid, own[at]) for at in chosen])
+    members = spectra.shipped_groups()[name]
+    count = len(members) if most is None else min(most, len(members))
+    chosen = np.unique(np.linspace(0, len(members) - 1, count).round().astype(int))
+    return np.stack([spectra.gridded(grid, members[at]) for at in chosen])
 
 
 def chart(grid: WavelengthGrid, reflectances: FloatArray, lights: Sequence[str]) -> Chart:
@@ -58,11 +57,11 @@ def chart(grid: WavelengthGrid, reflectances: FloatArray, lights: Sequence[str])
         light = equal_photons(grid, illuminant(grid, name)[None])[0]
         of_white = light / (np.pi * luminance_per_photon_radiance(grid, light[None])[0])  # 1 lx: a luminance of 1 / pi
         seen = np.concatenate([reflectances, np.ones((1, grid.size))]) * of_white
-        found = energy_from_photons(grid.nodes_nm, seen) @ matching.T
+        seen_xyz = energy_from_photons(grid.nodes_nm, seen) @ matching.T
         photons.append(seen[:-1])
         gray.append(_GRAY * of_white)
-        xyz.append(found[:-1] / found[-1, 1])
-        white.append(found[-1] / found[-1, 1])
+        xyz.append(seen_xyz[:-1] / seen_xyz[-1, 1])
+        white.append(seen_xyz[-1] / seen_xyz[-1, 1])
     return Chart(np.stack(photons), np.stack(gray), np.stack(xyz), np.stack(white))
 
 
@@ -72,8 +71,8 @@ def separation_task(
     """A task of classes of spectra, ndarray[n, n_wavelengths] each: lamps, or reflectances under each of `lights`."""
     stacked = np.concatenate(list(classes.values()))
     lit = [stacked * illuminant(grid, light) for light in lights] or [stacked]
-    types = tuple(kind for kind, own in classes.items() for _ in own)
-    photons = np.stack([equal_photons(grid, own) for own in lit])
+    types = tuple(kind for kind, spectra_of_class in classes.items() for _ in spectra_of_class)
+    photons = np.stack([equal_photons(grid, spectra_of_class) for spectra_of_class in lit])
     return GriddedTask(TaskName(name, "separation", tuple(lights) or ("",)), types, photons)
 
 
@@ -111,9 +110,9 @@ def _traffic_signs(grid: WavelengthGrid, name: str) -> GriddedTask:
 
 
 def _vegetation(grid: WavelengthGrid, name: str) -> GriddedTask:
-    lights = tl16(grid, surrogate_parameters())
+    signals = lights(grid)
     leaves = group(grid, "canopy", _MOST) * illuminant(grid, "d65")
-    return separation_task(grid, name, {"vegetation": leaves, "green": lights.photons[lights.members["green"]]})
+    return separation_task(grid, name, {"vegetation": leaves, "green": signals.photons[signals.members["green"]]})
 
 
 def _unseen_lamps(grid: WavelengthGrid, name: str) -> GriddedTask:
@@ -154,13 +153,13 @@ def night_scene(grid: WavelengthGrid) -> dict[str, FloatArray]:
     """
     light = equal_photons(grid, illuminant(grid, NIGHT_LIGHT)[None])[0]
     white = light * (NIGHT_LX / np.pi / luminance_per_photon_radiance(grid, light[None])[0])
-    found = {"sky": 0.01 * white}
-    found |= {area: group(grid, name).mean(axis=0) * white for area, name in _NIGHT_SURFACES.items()}
+    radiance = {"sky": 0.01 * white}
+    radiance |= {area: group(grid, name).mean(axis=0) * white for area, name in _NIGHT_SURFACES.items()}
     of_white = energy_from_photons(grid.nodes_nm, white) @ color_matching(grid).T
     for area, name in _NIGHT_LAMPS.items():
-        own = group(grid, name)[0]
-        found[area] = own / (energy_from_photons(grid.nodes_nm, own) @ color_matching(grid).T / of_white).max()
-    return found
+        lamp = group(grid, name)[0]
+        radiance[area] = lamp / (energy_from_photons(grid.nodes_nm, lamp) @ color_matching(grid).T / of_white).max()
+    return radiance
 
 
 def _named(grid: WavelengthGrid, names: Sequence[str]) -> list[FloatArray]:

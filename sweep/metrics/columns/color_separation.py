@@ -10,7 +10,7 @@ from ...base.types import FloatArray, IndexArray
 from ...curves.lights import class_pairs
 from ..quantity import BEST_PLACE, DN, Asked, Columns, Quantity, ReadoutMetric
 from ..separation import csd_name, separations
-from ..smooth import Rows, SmoothDesign
+from ..smooth import SmoothDesign
 
 CSD = "csd"
 """Metric of the separations, without those at the best place."""
@@ -22,7 +22,6 @@ class ColorSeparation(ReadoutMetric):
     order = 0
 
     def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
-        """`csd_<a>_<b>`, and `best_place_csd_<a>_<b>` where a scene asks for any place."""
         nearest = [
             Quantity(
                 name=csd_name(pair),
@@ -40,9 +39,9 @@ class ColorSeparation(ReadoutMetric):
                 pair=pair,
                 rows="squares",
                 apart="DN",
-                smooth=partial(_squared, pair=pair),
-                smooth_members=partial(_squared_of_members, pair=pair),
-                smooth_drawn=partial(_of_a_share, pair=pair),
+                smooth=partial(SmoothDesign.squared_distances, pair=pair),
+                smooth_members=partial(SmoothDesign.squared_distances_of_members, pair=pair),
+                smooth_drawn=partial(SmoothDesign.distance_of_a_share, pair=pair),
             )
             for pair in class_pairs(asked.classes)
         ]
@@ -72,15 +71,3 @@ class ColorSeparation(ReadoutMetric):
     def of_readout(self, response: FloatArray, members: Mapping[str, IndexArray]) -> Columns:
         """See `separation.separations`."""
         return {csd_name(pair): distances for pair, distances in separations(response, members).items()}
-
-
-def _squared(design: SmoothDesign, *, pair: tuple[str, str]) -> Rows:
-    return design.squared_distances(pair)
-
-
-def _squared_of_members(design: SmoothDesign, *, pair: tuple[str, str]) -> Rows:
-    return design.squared_distances_of_members(pair)
-
-
-def _of_a_share(design: SmoothDesign, *, pair: tuple[str, str]) -> Rows:
-    return design.distance_of_a_share(pair)

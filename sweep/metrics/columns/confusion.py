@@ -12,13 +12,7 @@ from ...camera.forward import ForwardModel
 from ...camera.readout import NoisyReadout
 from ...curves.lights import Pair, class_pairs, pair_name
 from .. import confusion
-from ..discrimination import (
-    NoiseShape,
-    contrast_to_noise,
-    detectability,
-    error_bounds,
-    pairwise_error,
-)
+from ..discrimination import NoiseShape, contrast_to_noise, detectability, error_bounds, pairwise_error
 from ..quantity import Asked, Columns, NoiseMetric, Quantity
 from ..smooth_noise import bound_rows, error_decades, pair_rows, squared_contrast, squared_detectability
 
@@ -44,7 +38,6 @@ class Confusion(NoiseMetric):
     order = 5
 
     def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
-        """Four columns for each pair of states, and two for all."""
         if not asked.states:
             return ()
         each = [

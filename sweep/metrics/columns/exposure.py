@@ -13,6 +13,4 @@ class Exposure(Metric):
     order = 3
 
     def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
-        """`exposure_s`."""
-        del asked
         return (Quantity(EXPOSURE, EXPOSURE, "exposure time, the same for all channels", unit="s", digits=6),)

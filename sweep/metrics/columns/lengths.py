@@ -24,8 +24,6 @@ class Lengths(FamilyMetric):
     order = 4
 
     def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
-        """A column for each length."""
-        del asked
         return tuple(
             Quantity(
                 name=name,

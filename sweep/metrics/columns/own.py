@@ -22,7 +22,6 @@ class OwnColumns(Metric):
     order = 9
 
     def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
-        """A column for each of them."""
         return tuple(
             Quantity(
                 name=metric.name,

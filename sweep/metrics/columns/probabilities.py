@@ -39,7 +39,6 @@ class Probabilities(NoiseMetric):
     extra = True
 
     def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
-        """A column for each pair of states, where a study asks for them."""
         if not asked.probabilities:
             return ()
         return tuple(
@@ -59,7 +58,6 @@ class Probabilities(NoiseMetric):
         self, imager: ForwardModel, curves: FloatArray, read: NoisyReadout, members: Mapping[str, IndexArray]
     ) -> Columns:
         """From mean and variance of the digital numbers."""
-        del curves
         found: Columns = {}
         mean, variance, _ = NoiseShape.of_cases(read)
         for pair in class_pairs(list(members)):

@@ -28,7 +28,6 @@ class Sensitivity(DesignMetric):
     order = 1
 
     def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
-        """`sensitivity` and `cfa_sensitivity`."""
         own = Quantity(
             name=SENSITIVITY,
             metric=SENSITIVITY,

@@ -18,8 +18,6 @@ class Shape(DesignMetric):
     order = 2
 
     def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
-        """`slope_per_nm` and `min_transmission`."""
-        del asked
         slope = Quantity(
             name=_SLOPE,
             metric=_SLOPE,

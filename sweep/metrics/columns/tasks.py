@@ -24,7 +24,6 @@ class TaskFigures(DesignMetric):
     order = 6
 
     def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
-        """Every figure of each task, under each of its lights."""
         if not asked.tasks:
             return ()
         from ..tasks.figures import figures_of
@@ -58,15 +57,15 @@ class TaskFigures(DesignMetric):
 
 def _rows(design: SmoothDesign, *, task: str, what: str, case: Case) -> Rows:
     """A figure's rows with their derivatives; the figures of a task share what they need."""
-    from ..tasks.looks import COMPLEX_STEP
+    from ..tasks.colorimetry import COMPLEX_STEP
 
     rows = design.once(task, partial(_judged, design, task)).rows(what, case)
     return Rows(rows.real[0], rows.imag.T / COMPLEX_STEP)
 
 
 def _judged(design: SmoothDesign, task: str) -> JudgedTask:
+    from ..tasks.color import Looks
     from ..tasks.judge import JudgedTask
-    from ..tasks.looks import Looks
 
     tasks = design.setup.tasks
     assert tasks is not None

@@ -19,7 +19,6 @@ class ImageReading(VisionMetric):
     order = 8
 
     def quantities(self, asked: Asked) -> tuple[Quantity, ...]:
-        """One column, where a benchmark of vision is asked for."""
         meaning = (
             "expected share of images of signal heads that the ideal observer reads wrongly, where a study has "
             "`vision`: over all its distances and levels, the lenses in any order, unseen lamps of the first seed"

@@ -11,7 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.types import FloatArray
-from .colorimetry import Smooth, delta_e, lab, lab_slope
+from ...camera.pixel import irradiance_factor
+from ...camera.setup import Setup
+from .colorimetry import COMPLEX_STEP, Smooth, delta_e, lab, lab_slope
 
 PIXELS = 4.0
 """ChannelNoise is that of so many pixels, shared among the channels as in the tile: of a tile of 2 x 2, all of it."""
@@ -44,9 +46,51 @@ class ChannelNoise:
         return np.asarray(self.read_noise_e**2 / (PIXELS * self.shares), dtype=float)
 
 
-def lightness_weights(xyz: FloatArray) -> FloatArray:
-    """Weight of each patch: the square of how much its CIE lightness changes with its luminance, ndarray[n_patches]."""
-    return np.asarray((116 / 3 * np.maximum(xyz[:, 1], _LEAST) ** (-2 / 3)) ** 2, dtype=float)
+@dataclass(frozen=True)
+class Looks:
+    """Designs before patches that fill the field, on axis, in clear air.
+
+    `modified`: QE of the modified channels, ndarray[n, n_modified, n_wavelengths], complex where it has a derivative.
+    """
+
+    setup: Setup
+    modified: Smooth
+
+    @classmethod
+    def along(cls, setup: Setup, curves: FloatArray, by_u: FloatArray) -> Looks:
+        """One design, once for each free parameter, with its derivative by that; see `SmoothDesign`.
+
+        `curves`: ndarray[n_modified, n_wavelengths]; `by_u`: ndarray[n_free, n_modified, n_wavelengths].
+        """
+        return cls(setup, curves + 1j * COMPLEX_STEP * by_u)
+
+    def electrons(self, photons: FloatArray, exposure_s: float) -> Smooth:
+        """Expected electrons of a pixel of each channel, ndarray[n, ..., n_channels].
+
+        `photons`: radiance, photons/s/sr/m^2/nm, ndarray[..., n_wavelengths].
+        """
+        setup = self.setup
+        factor = irradiance_factor(setup.scene.optics) * setup.camera.area_step_m2_nm * exposure_s
+        shape = (len(self.modified), *photons.shape[:-1], len(setup.camera.qe))
+        found = np.empty(shape, dtype=self.modified.dtype)
+        found[...] = photons @ setup.camera.qe.T * factor
+        flat = photons.reshape(-1, photons.shape[-1])
+        for at, channel in enumerate(setup.camera.modified):
+            found[..., channel] = (self.modified[:, at] @ flat.T).reshape(shape[:-1]) * factor
+        return found
+
+    @property
+    def qe(self) -> Smooth:
+        """QE of all channels, ndarray[n, n_channels, n_wavelengths]."""
+        found = np.empty((len(self.modified), *self.setup.camera.qe.shape), dtype=self.modified.dtype)
+        found[:] = self.setup.camera.qe
+        found[:, list(self.setup.camera.modified)] = self.modified
+        return found
+
+    def noise(self, read_noise_e: float) -> ChannelNoise:
+        """Of four pixels of the CFA."""
+        counts = self.setup.camera.mosaic.counts
+        return ChannelNoise(np.asarray(counts / counts.sum(), dtype=float), read_noise_e)
 
 
 def color_matrix(
@@ -54,11 +98,12 @@ def color_matrix(
 ) -> Smooth:
     """The matrix from electrons to XYZ over its white that errs least, ndarray[n, n_channels, 3].
 
-    It minimizes the expected sum, over the patches, of `lightness_weights` times |M (n + noise) - XYZ / white|^2; the
-    noise's part counts `regularization` times: 1 is the noise-optimal matrix, less trusts noisy channels more.
-    `xyz`: ndarray[n_patches, 3], `white`: ndarray[3].
+    It minimizes the expected sum, over the patches, of weights times |M (n + noise) - XYZ / white|^2. A weight is the
+    square of how much a patch's CIE lightness changes with its luminance. The noise's part counts `regularization`
+    times: 1 is the noise-optimal matrix, less trusts noisy channels more. `xyz`: ndarray[n_patches, 3], `white`:
+    ndarray[3].
     """
-    weights = lightness_weights(xyz)
+    weights = (116 / 3 * np.maximum(xyz[:, 1], _LEAST) ** (-2 / 3)) ** 2
     left = np.einsum("npc,p,npd->ncd", electrons, weights, electrons)
     variance = np.einsum("npc,p->nc", noise.of(electrons), weights)
     left = left + regularization * variance[..., None] * np.eye(electrons.shape[-1])

@@ -5,23 +5,28 @@ A figure is the smallest of its rows where more of it is wanted, else the larges
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 
 from ...base.types import FloatArray
+from ...camera.noise.gaussian import share_below
 from ...camera.setup import Setup
 from ...curves.color import color_matching
 from ...curves.tasks import Case, Chart, Conditions, GriddedTask
 from ...designs.block import Block
 from ..quantity import Columns
-from . import color, separations
+from ..smooth_noise import margin, squared_detectability
+from . import color
+from .color import Looks
 from .colorimetry import Smooth, delta_e_2000, lab, root
 from .figures import CSD, D_PRIME, ERROR, LUX, MEAN, MOST, MOST_95, SMI, SNR, SNR_AT_1_LX, VORA, figures_of
-from .looks import Looks
 
 LUMINANCE_RATIO = 10.0
 """The luminance SNR that low light is judged by."""
+REGULARIZATIONS = np.geomspace(1e-3, 1e4, 29)
+"""How much the noise counts in a color matrix; 1 is the noise-optimal one."""
 _BLOCK = 128
 _MOST_DISTANCES = 2_000_000
 """Designs that are judged at once, and their pairs of spectra, so that arrays stay small."""
@@ -36,8 +41,8 @@ class JudgedTask:
         self._made: dict[tuple[str, Case], Smooth] = {}
         self._rows: dict[str, Callable[[Case], Smooth]] = {
             CSD: self._csd,
-            D_PRIME: self._detectabilities,
-            ERROR: self._errors,
+            D_PRIME: lambda case: root(squared_detectability(*self._apart(case))),
+            ERROR: lambda case: pair_errors(margin(*self._apart(case))),
             MEAN: lambda case: self._color_errors(case).mean(axis=1, keepdims=True),
             MOST_95: lambda case: _percentile(self._color_errors(case), 0.95),
             MOST: self._color_errors,
@@ -66,15 +71,14 @@ class JudgedTask:
         photons = self._task.photons[self._at(case)] * self._looks.setup.scene.photon_radiance
         return self._once("signals", case, lambda: self._looks.electrons(photons, self._conditions.exposure_s))
 
+    def _apart(self, case: Case) -> tuple[Smooth, Smooth, Smooth]:
+        """Differences of the pairs of spectra of two classes, and both variances, ndarray[n, n_pairs, n_channels]."""
+        signals, (one, other) = self._signals(case), self._task.pairs
+        variance = self._noise.of(signals)
+        return signals[:, one] - signals[:, other], variance[:, one], variance[:, other]
+
     def _csd(self, case: Case) -> Smooth:
-        gain = self._looks.setup.camera.pixel.dn_per_e
-        return root(separations.squared_distances(self._signals(case), self._task.pairs, gain))
-
-    def _detectabilities(self, case: Case) -> Smooth:
-        return root(separations.squared_detectabilities(self._signals(case), self._task.pairs, self._noise))
-
-    def _errors(self, case: Case) -> Smooth:
-        return separations.pair_errors(separations.margins(self._signals(case), self._task.pairs, self._noise))
+        return root(((self._looks.setup.camera.pixel.dn_per_e * self._apart(case)[0]) ** 2).sum(axis=-1))
 
     @property
     def _chart(self) -> Chart:
@@ -118,6 +122,14 @@ class JudgedTask:
         return color.metamerism_index(electrons, chart.xyz[0], chart.white[0])[:, None]
 
 
+def pair_errors(z: Smooth) -> Smooth:
+    """Probability that Gaussian noise goes beyond a plane at this `margin`, with its derivative."""
+    error = share_below(-z.real)
+    if not np.iscomplexobj(z):
+        return np.asarray(error)
+    return np.asarray(error - 1j * np.exp(-(z.real**2) / 2) / math.sqrt(2 * math.pi) * z.imag)
+
+
 def color_errors(electrons: Smooth, matrix: Smooth, chart: Chart, case: int) -> Smooth:
     """CIEDE2000 of each patch of a chart after a color matrix, ndarray[n, n_patches]."""
     target = lab(chart.xyz[case], chart.white[case])
@@ -150,3 +162,35 @@ def task_columns(setup: Setup, block: Block) -> Columns:
                 found[name] = rows.max(axis=1) if figure.wanted == "less" else rows.min(axis=1)
         parts.append(found)
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def traded(looks: Looks, chart: Chart, case: int, conditions: Conditions) -> tuple[FloatArray, FloatArray]:
+    """Color error against noise of one design under one light of a chart, for each of `REGULARIZATIONS`.
+
+    Mean CIEDE2000 of the chart, and luminance SNR of 18 % gray, ndarray[n] each.
+    """
+    noise = looks.noise(conditions.read_noise_e)
+    patches = looks.electrons(chart.photons[case] * conditions.illuminance_lx, conditions.exposure_s)
+    gray = looks.electrons(chart.gray[case] * conditions.illuminance_lx, conditions.exposure_s)
+    found = []
+    for regularization in REGULARIZATIONS:
+        matrix = color.color_matrix(patches, chart.xyz[case], chart.white[case], noise, float(regularization))
+        errors = color_errors(patches, matrix, chart, case)
+        found.append((float(errors.mean()), float(color.luminance_noise(matrix, gray, noise)[0])))
+    delta_e, snr = np.array(found).T
+    return delta_e, snr
+
+
+def rendered_areas(
+    looks: Looks, chart: Chart, case: int, photons: FloatArray, conditions: Conditions
+) -> tuple[FloatArray, FloatArray]:
+    """Areas of a picture through the noise-optimal matrix for a chart under a light, with the noise of four pixels.
+
+    `photons`: ndarray[n_areas, n_wavelengths]. XYZ over its white, ndarray[n_areas, 3], and covariances, ndarray[
+    n_areas, 3, 3].
+    """
+    noise = looks.noise(conditions.read_noise_e)
+    patches = looks.electrons(chart.photons[case] * conditions.illuminance_lx, conditions.exposure_s)
+    matrix = color.color_matrix(patches, chart.xyz[case], chart.white[case], noise)[0]
+    electrons = looks.electrons(photons, conditions.exposure_s)[0]
+    return electrons @ matrix, np.einsum("ck,ac,cj->akj", matrix, noise.of(electrons), matrix)

@@ -1,13 +1,38 @@
-"""The paper's 16 traffic lights: a surrogate, modeled from stated parameters."""
+"""A surrogate of the paper's 16 traffic lights, made from stated parameters; not measured.
+
+11 lamps in California and 5 in Munich, each green, yellow and red; 3 of the US ones show an orange "don't walk", too:
+16 + 16 + 16 + 3 = 51 signals.
+"""
 
 from __future__ import annotations
 
-from ...lights import Lights
+import numpy as np
+
+from ...lights import Lights, make_lights
 from ...spectrum import WavelengthGrid
-from ..surrogate import surrogate_parameters
-from ..tl16 import tl16
+from ..led import led_photons
+from ..surrogate import SurrogateParameters, surrogate_parameters
+
+LAMPS = {"us": 11, "germany": 5}
+ORANGE_LAMPS = {"us": 3}
+SIGNAL_TYPES = ("green", "yellow", "orange", "red")
+
+
+def tl16(grid: WavelengthGrid, parameters: SurrogateParameters) -> Lights:
+    """The 51 signals on the grid; the lamps of a region spread evenly over peak +- spread of each color."""
+    wave = grid.nodes_nm
+    signals = []
+    for color in SIGNAL_TYPES:
+        for region, lamps in (ORANGE_LAMPS if color == "orange" else LAMPS).items():
+            led = parameters.lights[region][color]
+            for lamp, place in enumerate(np.linspace(-1.0, 1.0, lamps)):
+                spectrum = led_photons(wave, led.peak_nm + place * led.spread_nm, led.blue_nm, led.red_nm)
+                signals.append((f"{region}_{lamp + 1:02d}_{color}", color, spectrum))
+    return make_lights(
+        grid, "tl16", signals, "built-in surrogate tl16", photon_ratio=parameters.photon_ratio, surrogate=True
+    )
 
 
 def lights(grid: WavelengthGrid) -> Lights:
-    """See `tl16`, with the parameters that the package ships."""
+    """The signals of `tl16` with the parameters that the package ships."""
     return tl16(grid, surrogate_parameters())

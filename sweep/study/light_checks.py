@@ -1,4 +1,4 @@
-"""The population of a study's lights: what it names, and in which scenes worst cases over it are exact."""
+"""Checks of what a study asks of its lights beside their spectra: a population, a norm's color regions, candelas."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from ..base.errors import StudyError
 from ..camera.pixel import unquantized
+from ..curves.color import VISIBLE_NM
 from ..curves.lights import Lights
 from ..curves.population import DRIFT_NM_PER_K, Population
 from .model import Study
@@ -17,6 +18,8 @@ from .yaml_tree import Key
 
 _MOST_SPECTRA = 20_000
 _AT: tuple[Key, ...] = ("population",)
+_LEAST_VISIBLE = 1e-6
+"""Share of a light's photons that the eye must see where its luminous intensity is given."""
 
 
 def with_population(lights: Lights, section: StudySection, sources: Sources) -> Lights:
@@ -79,3 +82,47 @@ def check_range(study: Study, sources: Sources) -> None:
                 problem = f"lights of the population exceed the full well or the range of the ADC (CFA {space.cfa})"
                 sources.add(("scenarios", name), problem, f"{brightest_dn:,.0f} DN", f"up to {top_dn:,.0f} DN")
                 raise StudyError(sources.faults)
+
+
+def check_luminances(section: StudySection, lights: Lights, sources: Sources) -> None:
+    """Candelas are given of lights, and of a background, that the eye sees; else adds a fault."""
+    nodes = section.wavelengths.nodes_nm
+    visible = (nodes >= VISIBLE_NM[0]) & (nodes <= VISIBLE_NM[1])
+    share = section.wavelengths.integrate(lights.photons * visible)
+    dark = [name for name, part in zip(lights.names, share, strict=True) if not part >= _LEAST_VISIBLE]
+    allowed = f"photons between {VISIBLE_NM[0]:g} and {VISIBLE_NM[1]:g} nm"
+    for name, scenario in section.scenarios.items():
+        if scenario.intensity_cd is not None and dark:
+            problem = f"a light that the eye does not see has no luminous intensity: {dark[0]}"
+            sources.add(("scenarios", name, "intensity_cd"), problem, scenario.intensity_cd, allowed)
+        if scenario.background_cd_m2 and not visible.any():
+            problem = "a background on wavelengths that the eye does not see has no luminance"
+            sources.add(("scenarios", name, "background_cd_m2"), problem, scenario.background_cd_m2, allowed)
+
+
+def check_regions(section: StudySection, sources: Sources) -> None:
+    """LEDs lie on the study's wavelengths and at a named place of the mosaic, and some of each norm are allowed."""
+    asked = section.regions
+    if asked is None:
+        return
+    grid, (low, high) = section.wavelengths, asked.peak_nm
+    if not grid.start_nm <= low <= high <= grid.stop_nm:
+        allowed = f"{grid.start_nm:g} to {grid.stop_nm:g} nm"
+        sources.add(("regions", "peak_nm"), "peaks outside the study's wavelengths", [low, high], allowed)
+    if grid.step_nm > asked.fwhm_nm[0]:
+        problem = "an LED is narrower than a step of the study's wavelengths"
+        sources.add(("regions", "fwhm_nm"), problem, list(asked.fwhm_nm), f"{grid.step_nm:g} nm or more")
+    for name, scenario in section.scenarios.items():
+        if scenario.target is not None and scenario.target.phase_px == "any":
+            problem = "`regions` needs a light at a named place of the mosaic"
+            sources.add(("scenarios", name, "target", "phase_px"), problem, "any", "[column, row]")
+    if sources.faults:
+        return
+    from ..curves.single_leds import every_led  # noqa: PLC0415  (few studies ask for it)
+
+    leds = every_led(asked)
+    for norm in asked.norms:
+        for kind in ("yellow", "red"):
+            if not leds.allowed(norm, kind).peak_nm.size:
+                problem = f"none of the {leds.peak_nm.size:,} LEDs is {kind} as {norm} allows it"
+                sources.add(("regions",), problem, None, "other ends or smaller steps of `peak_nm` and `fwhm_nm`")

@@ -1,4 +1,4 @@
-"""Write the filters of a CFA: CSV, and `.mat` files that ISETCam reads as color filters."""
+"""Write the filters of a CFA: CSV, ISETCam's `.mat` color filters, and Speos' `.spectrum`."""
 
 from __future__ import annotations
 
@@ -9,28 +9,29 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from ..base.types import FloatArray, IndexArray
-from .wavelength_names import WAVELENGTH
+from .scan import WAVELENGTH
 
 HINTS = "rgbcymwiuxzok"
 """First letters of filter names that ISETCam has a color for (its `sensorColorOrder`)."""
 _FREE = "oxuzim"
-"""Those that are spent first where a filter's own letter is taken: hints that mean no usual filter."""
+"""Hints that are spent first where a filter's own letter is taken: they mean no usual filter."""
 _CLEAR = ("c", "clear")
 _HEADER = b"MATLAB 5.0 MAT-file, written by sweep"
 _HEADER_BYTES = 116
+_SPEOS_TITLE = "OPTIS - Spectrum file v1.0"
 
 
 def unique_names(names: Iterable[str]) -> list[str]:
     """The names on one line each, without blanks around them; one that occurs again gets a number."""
-    found: list[str] = []
+    unique: list[str] = []
     for name in names:
         plain = " ".join(name.split()) or "_"
         candidate, number = plain, 1
-        while candidate in (*found, WAVELENGTH):
+        while candidate in (*unique, WAVELENGTH):
             number += 1
             candidate = f"{plain}_{number}"
-        found.append(candidate)
-    return found
+        unique.append(candidate)
+    return unique
 
 
 def csv_text(wavelength_nm: FloatArray, curves: Mapping[str, FloatArray]) -> str:
@@ -48,12 +49,12 @@ def color_hints(channels: Sequence[str], bases: Mapping[str, str]) -> list[str]:
     `bases`: modified channel -> curve that it replaces, whose color it takes where that is free. `C` is the clear
     pixel here, ISETCam's `w`; its `c` is cyan, `Cy` here.
     """
-    found: dict[str, str] = {}
+    hints: dict[str, str] = {}
     for channel in sorted(channels, key=lambda channel: channel in bases):  # a plain channel keeps its own letter
-        own = _own_hint(bases.get(channel, channel))
-        free = [hint for hint in (*own, *_FREE, *HINTS) if hint not in found.values()]
-        found[channel] = free[0] if free else "k"
-    return [found[channel] for channel in channels]
+        hint_of_name = _own_hint(bases.get(channel, channel))
+        free = [hint for hint in (*hint_of_name, *_FREE, *HINTS) if hint not in hints.values()]
+        hints[channel] = free[0] if free else "k"
+    return [hints[channel] for channel in channels]
 
 
 def _own_hint(name: str) -> str:
@@ -96,3 +97,15 @@ def isetcam_mat(
     )
     # SciPy's header holds the time.
     return _HEADER.ljust(_HEADER_BYTES) + content.getvalue()[_HEADER_BYTES:]
+
+
+def speos_text(wavelength_nm: FloatArray, values: FloatArray, about: str) -> str:
+    """A curve, ndarray[n_wavelengths], 0..1, as Speos reads it; `about` describes it in ASCII, on one line.
+
+    The form: a title, the description, the number of samples, then a line of wavelength (nm) and percent each. Source:
+    Ansys Optics, "Create spectrum file from graph".
+    """
+    plain = " ".join(about.split()).encode("ascii", "replace").decode("ascii")
+    head = [_SPEOS_TITLE, plain, str(wavelength_nm.size)]
+    rows = [f"{float(nm)!r}\t{float(share)!r}" for nm, share in zip(wavelength_nm, 100.0 * values, strict=True)]
+    return "\n".join([*head, *rows, ""])

@@ -1,14 +1,17 @@
-"""Metrics of a user's own: read, named, and tried on plain CFAs before any work."""
+"""Metrics and effects of a user's own: read, named, and tried before any work."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
 from ..base.errors import Fault, StudyError, SweepError
 from ..base.own_code import Offered, is_in_file, offers
+from ..camera.irradiance import scene_irradiance
+from ..camera.own_effects import OwnEffect
 from ..camera.scene import Scene
 from ..camera.setup import Setup
 from ..designs.space import Space
@@ -22,7 +25,9 @@ from .schema import StudySection
 from .sources import Sources
 from .yaml_tree import Key
 
-_GROUP: Offered = "sweep.metrics"
+_METRICS: Offered = "sweep.metrics"
+_EFFECTS: Offered = "sweep.effects"
+_Made = TypeVar("_Made")
 _OTHERS = ("design_id", "filter_id", "kind", "name", "space", "cfa", "family", "scenario", "objective")
 _VERDICTS = ("limit", "gap", "feasible", "violation", "pareto", "plan", "promised_dn", "status")
 RESERVED = (*_OTHERS, *_VERDICTS)
@@ -31,37 +36,63 @@ _SAME = 1e-9
 
 
 def own_metrics(section: StudySection, sources: Sources) -> tuple[OwnMetric, ...]:
-    """The study's own metrics. Raises StudyError where one cannot be had: what names it would be unknown."""
-    given = sources.document.data.get("metrics")
-    found, failed = [], set[str]()
-    for index, name in enumerate(section.metrics):
-        path: tuple[Key, ...] = ("metrics", index) if isinstance(given, list) else ("metrics",)
-        if not is_from_outside(name, _GROUP, ()):
-            sources.unknown(path, "metric", name, offers(_GROUP) or ["FILE.py:NAME"])
+    """The study's own metrics. Raises StudyError where one cannot be had: its name would be unknown elsewhere."""
+
+    def make(name: str) -> OwnMetric:
+        metric = OwnMetric(code_of(sources, name, _METRICS))
+        for stated in ("name", "unit", "label", "wanted", "digits"):
+            getattr(metric, stated)
+        return metric
+
+    metrics = _read_own("metrics", section.metrics, _METRICS, make, sources)
+    for name in section.metrics:
+        whose = "that file" if is_in_file(name) else "an installed package"
+        sources.warnings.append(
+            f"{name} runs code of {whose}: the tolerance of {section.tolerance_dn:g} DN is of CSDs, and nothing is "
+            "promised or proven of this metric; a search takes its gradient by differences"
+        )
+    return metrics
+
+
+def own_effects(section: StudySection, sources: Sources) -> tuple[OwnEffect, ...]:
+    """The study's own effects. Raises StudyError where one cannot be had."""
+
+    def make(name: str) -> OwnEffect:
+        return OwnEffect(code_of(sources, name, _EFFECTS))
+
+    return _read_own("effects", section.effects, _EFFECTS, make, sources)
+
+
+def _read_own(
+    key: str, names: Sequence[str], group: Offered, make: Callable[[str], _Made], sources: Sources
+) -> tuple[_Made, ...]:
+    listed = isinstance(sources.document.data.get(key), list)
+    made = []
+    failed = set[str]()
+    for index, name in enumerate(names):
+        path: tuple[Key, ...] = (key, index) if listed else (key,)
+        if not is_from_outside(name, group, ()):
+            sources.unknown(path, key.removesuffix("s"), name, offers(group) or ["FILE.py:NAME"])
         elif allowed(sources, path, name):
             try:
-                metric = OwnMetric(code_of(sources, name, _GROUP))
-                _check(metric)
-                found.append(metric)
+                made.append(make(name))
             except SweepError as error:
-                if str(error) not in failed:  # several metrics may be of one file
+                if str(error) not in failed:  # several names may be of one file
                     sources.told(path, error)
                 failed.add(str(error))
-                continue
-            whose = "that file" if is_in_file(name) else "an installed package"
-            sources.warnings.append(
-                f"{name} runs code of {whose}: the tolerance of {section.tolerance_dn:g} DN is of CSDs, and nothing is "
-                "promised or proven of this metric; a search takes its gradient by differences"
-            )
-    if len(found) < len(section.metrics):
+    if len(made) < len(names):
         raise StudyError(sources.faults)
-    return tuple(found)
+    return tuple(made)
 
 
-def _check(metric: OwnMetric) -> None:
-    """What it says of itself can be used. Raises SweepError."""
-    for said in ("name", "unit", "label", "wanted", "digits"):
-        getattr(metric, said)
+def try_effects(study: Study, sources: Sources) -> None:
+    """Apply the study's own effects in each scenario. Raises StudyError where one fails."""
+    for name in study.scenarios if study.own_effects else ():
+        try:
+            scene_irradiance(study.setup(study.spaces[0], name))
+        except SweepError as error:
+            sources.told(("effects",), error)
+            raise StudyError(sources.faults) from None
 
 
 def check_names(own: Sequence[OwnMetric], asked: Asked, spaces: Sequence[Space], sources: Sources) -> None:
@@ -99,7 +130,7 @@ def try_metrics(study: Study, sources: Sources) -> None:
 
 
 def _tried(metric: OwnMetric, setup: Setup) -> bool:
-    """Whether a CFA has it; it gives the same alone and beside others. Raises SweepError where it does not.
+    """Return whether a CFA has it; it gives the same alone and beside others. Raises SweepError where it does not.
 
     Its filters are the curves that they replace, and darker ones.
     """

@@ -1,4 +1,4 @@
-"""The least error: of several the largest, as its number of decades below 1."""
+"""The smallest of the terms, their sum, and the least error."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ class Least(Rule):
     wanted = "less"
 
     def of(self, terms: FloatArray) -> FloatArray:
-        """-log10 of the largest; see `Rule.of`."""
         return np.asarray(-np.log10(np.maximum(terms.max(axis=0), _SMALLEST)), dtype=float)
 
     def gradient(self, terms: FloatArray) -> FloatArray:
@@ -32,5 +31,36 @@ class Least(Rule):
         return slope
 
     def words(self, terms: Sequence[str]) -> str:
-        """See `Rule.words`."""
         return f"-log10 of {terms[0] if len(terms) == 1 else 'the largest of ' + ', '.join(terms)}"
+
+
+class Minimum(Rule):
+    """As good as its worst term."""
+
+    name = "minimum"
+    smallest = True
+
+    def of(self, terms: FloatArray) -> FloatArray:
+        return np.asarray(terms.min(axis=0), dtype=float)
+
+    def gradient(self, terms: FloatArray) -> FloatArray:
+        """1 for the smallest, the first one of several."""
+        return np.asarray(np.arange(len(terms)) == np.argmin(terms), dtype=float)
+
+    def words(self, terms: Sequence[str]) -> str:
+        return f"smallest of {', '.join(terms)}"
+
+
+class Sum(Rule):
+    """What one term loses another may gain."""
+
+    name = "sum"
+
+    def of(self, terms: FloatArray) -> FloatArray:
+        return np.asarray(terms.sum(axis=0), dtype=float)
+
+    def gradient(self, terms: FloatArray) -> FloatArray:
+        return np.ones(len(terms))
+
+    def words(self, terms: Sequence[str]) -> str:
+        return " + ".join(terms)

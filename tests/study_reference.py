@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from .editors import Json, study_schema
+from sweep.study.editors import Json, study_schema
 
 _REF = "#/$defs/"
 _STUDY = "A study"
