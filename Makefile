@@ -5,7 +5,7 @@
 # make oldest                run the tests with the oldest versions that pyproject.toml allows, in .venv-oldest
 # make check                 ruff, mypy --strict
 # make accuracy              run the hard cases, measure what accuracy costs in time, outputs/accuracy/accuracy.html
-# make documents           print the tables of studies/README.md and outputs/README.md anew
+# make documents           print the tables of studies/guide/reference.md and outputs/README.md anew
 # make bench                 measure speed, JSON in outputs/bench
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
   $$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)

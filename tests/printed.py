@@ -21,8 +21,8 @@ def exit_codes_table() -> list[str]:
 
 
 PRINTED: dict[str, dict[str, Callable[[], list[str]]]] = {
-    "outputs/README.md": {"files": files_table, "columns": columns_table, "exit codes": exit_codes_table},
-    "studies/README.md": {"study": study_reference},
+    "outputs/README.md": {"files": files_table, "columns": columns_table},
+    "studies/guide/reference.md": {"exit codes": exit_codes_table, "study": study_reference},
 }
 
 

@@ -18,6 +18,7 @@ from .conftest import ROOT, STUDIES, Finished
 from .printed import PRINTED, with_printed
 
 README = (ROOT / "README.md").read_text()
+FOLDERS = ("outputs", "studies", "sweep", "tests")
 
 
 def prose(text: str) -> str:
@@ -36,9 +37,32 @@ def test_printed_parts_are_as_the_program_prints_them(file: str) -> None:
 
 
 def test_every_link_leads_somewhere() -> None:
-    for document in (ROOT / "README.md", *(ROOT / file for file in PRINTED), ROOT / "tests" / "README.md"):
-        for target in re.findall(r"\]\(([^)#]+)\)", document.read_text()):
-            assert (document.parent / target).exists(), (document, target)
+    for document in (ROOT / "README.md", *(ROOT / name / "README.md" for name in FOLDERS), *STUDIES.glob("guide/*.md")):
+        for target, anchor in re.findall(r"\]\(([^)#]*)#?([^)]*)\)", document.read_text()):
+            page = document.parent / target if target else document
+            assert page.exists(), (document, target)
+            assert not anchor or anchor in anchors(page.read_text()), (document, target, anchor)
+
+
+def anchors(text: str) -> set[str]:
+    """Anchors of the headings of a Markdown text, as GitHub names them."""
+    headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+FINDINGS = dict(
+    re.findall(r"^\| `(\w+)` \|.*\| (.*\d (?:DN|m|e|times)\b.*) \|$", (STUDIES / "README.md").read_text(), re.MULTILINE)
+)
+"""Name of a study -> its finding, where that has figures."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in FINDINGS if name != "stopband"])
+def test_figures_of_a_finding_are_in_the_output_of_its_study(finished: Finished, name: str) -> None:
+    folder = finished(name)
+    output = folder.with_name(f"{name}.said.txt").read_text()
+    for figure in re.findall(r"\d[\d.]*(?: (?:DN|m|e|times))?(?= |,|\.|;)", FINDINGS[name]):
+        assert figure in output, figure
 
 
 def stopband(finished: Finished) -> dict[str, pd.Series]:

@@ -85,10 +85,10 @@ def missed(seed: int) -> tuple[float, float, float]:
 
 @pytest.mark.slow
 def test_what_one_effective_index_misses() -> None:
-    """As `studies/README.md` says: medians and 95 % of 200 stacks at f/1.6 and a chief ray angle of 20 degrees."""
+    """As `studies/guide/06-lamps-angles-tolerances.md` says: medians and 95 % of 200 stacks at f/1.6 and a chief ray angle of 20 degrees."""
     found = np.array([missed(seed) for seed in range(_STACKS)])
     off, moved = (np.abs(found[:, at] - found[:, 0]) for at in (1, 2))
     said = f"{np.median(off):.1f} DN in the median and at most {np.quantile(off, 0.95):.1f} DN in 95 %"
-    text = " ".join((STUDIES / "README.md").read_text(encoding="utf-8").split())
+    text = " ".join((STUDIES / "guide" / "06-lamps-angles-tolerances.md").read_text(encoding="utf-8").split())
     assert f"misses {said} of {_STACKS} random stacks" in text
     assert np.median(moved) > 10 * np.quantile(off, 0.95)

@@ -12,7 +12,7 @@ from ..build import SCENES
 from ..commanded import commanded
 from ..conftest import ROOT, STUDIES, draw_nothing
 
-SECTION = (ROOT / "outputs" / "README.md").read_text().split("## For programs")[1].split("<!--")[0]
+SECTION = (ROOT / "studies" / "guide" / "reference.md").read_text().split("## JSON objects")[1].split("## ")[0]
 DOCUMENTED = dict(re.findall(r"^\| `(\w+)` \| (.*) \|$", SECTION, re.MULTILINE))
 
 

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import ast
 import doctest
-import os
-import re
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -23,7 +20,6 @@ NAMES = {
     *("Stopband", "MultiStopband", "Dual", "FreeForm"),
 }
 """What users rely on: a name that goes, or comes, is a decision."""
-GUIDE = ROOT / "studies" / "README.md"
 
 
 def test_the_names_are_these() -> None:
@@ -54,17 +50,6 @@ def test_nothing_is_loaded_before_a_name_is_used() -> None:
     code = "import sys, sweep; print(*(name for name in sys.modules if name.startswith('sweep.') or name == 'numpy'))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
-
-
-@pytest.mark.slow
-def test_the_guide_runs_and_shows_every_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    shown = re.findall(r"sweep\.([A-Za-z_]+)", "\n".join(re.findall(r"^(?:>>>|\.\.\.) .*", GUIDE.read_text(), re.M)))
-    assert set(shown) >= NAMES
-    (tmp_path / "my_filter.csv").write_text("wavelength_nm,mine\n400,0.9\n700,0.9\n")
-    monkeypatch.chdir(tmp_path)
-    ran = doctest.testfile(os.fspath(GUIDE), module_relative=False, optionflags=doctest.NORMALIZE_WHITESPACE)
-    assert ran.attempted > 20
-    assert ran.failed == 0
 
 
 @pytest.mark.parametrize("name", ["objects", "opening", "given"])

@@ -160,8 +160,8 @@ def test_a_cluster_whose_workers_have_no_such_files_gives_the_same_rows(tmp_path
 
 
 def test_the_family_of_the_guide_runs(tmp_path: Path) -> None:
-    text = (ROOT / "studies" / "README.md").read_text()
-    code = next(part for part in text.split("```python\n") if "class Gauss:" in part).split("```")[0]
+    text = (ROOT / "studies" / "guide" / "08-own-data-and-plugins.md").read_text()
+    code = next(part for part in text.split("```python my_filters.py\n") if "class Gauss:" in part).split("```")[0]
     grid = "grid:\n      center_nm: [620, 650]\n      sigma_nm: 20\n      depth: {min: 0, max: 1, count: 3}\n"
     body = (
         BASE.split("grid:")[0]

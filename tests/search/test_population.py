@@ -102,8 +102,8 @@ def test_no_random_filter_beats_the_limit_over_the_population() -> None:
 
 @pytest.mark.slow
 def test_the_table_of_the_documentation() -> None:
-    """Each figure in `studies/README.md`, but those of the answer and the limit: nominal, over temperature, over all."""
-    text = (STUDIES / "README.md").read_text(encoding="utf-8")
+    """Each figure in `studies/guide/06-lamps-angles-tolerances.md`, but those of the answer and the limit: nominal, over temperature, over all."""
+    text = (STUDIES / "guide" / "06-lamps-angles-tolerances.md").read_text(encoding="utf-8")
     lines = text.split("| worst case: temperature, bins, edges |")[1].splitlines()[2:6]
     printed = {cells[0]: cells[1:] for cells in ([c.strip() for c in line.strip("|").split("|")] for line in lines)}
     study = load_study(STUDIES / "robust.yaml")

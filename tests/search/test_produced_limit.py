@@ -159,7 +159,7 @@ def test_a_program_of_its_own_agrees() -> None:
 @pytest.mark.slow
 def test_free_form_filters_come_near_the_limit_over_lamps_and_edges() -> None:
     """`sweep run robust --set boxes.edges=FREE_FORM`: the figures of the documentation."""
-    text = " ".join((STUDIES / "README.md").read_text(encoding="utf-8").split())
+    text = " ".join((STUDIES / "guide" / "06-lamps-angles-tolerances.md").read_text(encoding="utf-8").split())
     study = load_study(STUDIES / "robust.yaml", changes={"boxes.edges": FREE_FORM})
     assert study.search is not None
     searched = study.problem(study.search)

@@ -207,7 +207,7 @@ def test_free_form_filters_come_near_the_limit_over_the_whole_sensor() -> None:
     worst_dn = worst_of_all_places_dn(searched.setup, curves[0])
     proven = limit_of(searched).proven
     assert worst_dn <= proven
-    text = " ".join((STUDIES / "README.md").read_text(encoding="utf-8").split())
+    text = " ".join((STUDIES / "guide" / "06-lamps-angles-tolerances.md").read_text(encoding="utf-8").split())
     below = 1 - worst_dn / proven
     assert f"Free-form filters reach {worst_dn:.0f} DN, {below:.1%} below the limit".replace("%", " %") in text
     assert below <= 0.1
@@ -224,8 +224,8 @@ def test_responses_of_filters_that_move_are_their_own() -> None:
 
 @pytest.mark.slow
 def test_the_table_of_the_documentation() -> None:
-    """Each figure in `studies/README.md`: where nothing moves, on axis, at the worst of all places."""
-    text = (STUDIES / "README.md").read_text(encoding="utf-8")
+    """Each figure in `studies/guide/06-lamps-angles-tolerances.md`: where nothing moves, on axis, at the worst of all places."""
+    text = (STUDIES / "guide" / "06-lamps-angles-tolerances.md").read_text(encoding="utf-8")
     rows = [
         line.strip("|").split("|") for line in text.split("worst over CRA 0 to 20 degrees, f/1.6 |")[1].splitlines()[2:]
     ]
