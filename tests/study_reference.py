@@ -9,6 +9,7 @@ from typing import Any
 
 from sweep.study.editors import Json, study_schema
 
+_SCHEMA = study_schema()
 _REF = "#/$defs/"
 _STUDY = "A study"
 _COPY = "WithEach"
@@ -24,10 +25,9 @@ _TYPES = {
 
 def study_reference() -> list[str]:
     """Markdown: a table of keys for each section, the study itself first."""
-    schema = study_schema()
-    sections = {name: s for name, s in schema["$defs"].items() if not name.endswith(_COPY) and s.get("properties")}
+    sections = {name: s for name, s in _SCHEMA["$defs"].items() if not name.endswith(_COPY) and s.get("properties")}
     lines = []
-    for name, section in {_STUDY: schema, **sections}.items():
+    for name, section in {_STUDY: _SCHEMA, **sections}.items():
         lines += ["", f"### {_title(name)}", "", _text(section.get("description", "")), ""]
         lines += ["| key | value | default | meaning |", "| --- | --- | --- | --- |"]
         for key, prop in section["properties"].items():
@@ -67,7 +67,11 @@ def _values(prop: Any) -> Iterator[str]:
     for part in (*prop.get("anyOf", ()), *prop.get("oneOf", ()), *prop.get("allOf", ())):
         yield from _values(part)
     if "$ref" in prop:
-        yield _link(prop["$ref"].removeprefix(_REF).removesuffix(_COPY))
+        name = prop["$ref"].removeprefix(_REF).removesuffix(_COPY)
+        if _SCHEMA["$defs"][name].get("properties"):
+            yield _link(name)
+        else:
+            yield from _values(_SCHEMA["$defs"][name])
     elif "const" in prop:
         yield f"`{prop['const']}`"
     elif "enum" in prop:
