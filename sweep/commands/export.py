@@ -15,8 +15,7 @@ from ..camera.mosaic import Mosaic
 from ..curves.filter_files import color_hints, csv_text, filter_names, isetcam_mat, unique_names
 from ..report import Output, check_kept, read_output, study_of
 from ..results.atomic import write_bytes
-from ..results.chosen import find_row
-from ..results.designs import row_curves
+from ..results.designs import find_row, row_curves
 from ..study import Study, folder_name
 from .export_also import other_files
 from .options import Also

@@ -13,7 +13,7 @@ import typer
 
 from .. import run as runner
 from ..base.errors import Fault, SweepError
-from ..results.names import REPORT
+from ..results.tables import REPORT
 from ..run.workers import workers
 from ..study import Study, folder_name, load_study
 from .progress import ProgressDisplay

@@ -108,9 +108,7 @@ def filter_of_run(folder: Path, design: str | None, wishes: AskedFor) -> Judged:
 
     Raises SweepError for an unknown design, a plain CFA, and a folder without a finished run.
     """
-    from ..results.again import study_of
-    from ..results.chosen import BEST, find_row
-    from ..results.designs import row_curves
+    from ..results.designs import BEST, find_row, row_curves, study_of
     from ..results.output import read_output
 
     output = read_output(folder)

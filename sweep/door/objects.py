@@ -131,7 +131,7 @@ class LoadedStudy:
         from ..run.routes import found_of
         from ..run.rows import rules_of
 
-        study, request = self.study, rules_of(self.study).request
+        study, rules = self.study, rules_of(self.study)
         spaces = [s for s in study.spaces if s.kind in (PLAIN, NAMED) and cfa in (None, s.cfa)]
         if not spaces:
             known = list(dict.fromkeys(s.cfa for s in study.spaces if s.kind in (PLAIN, NAMED)))
@@ -140,12 +140,12 @@ class LoadedStudy:
         rows = []
         for name in scenarios:
             for space in spaces:
-                found = found_of(space, 0, space.points(0, space.size), study.setup(space, name), request)
-                for text in found.faults.values():
+                points = space.points(0, space.size)
+                values, faults = found_of(space, 0, points, study.setup(space, name), rules)
+                for text in faults.values():
                     raise SweepError(Fault(f"{space.name} in {name}: {text}"))
-                own = space.violation(space.points(0, space.size))
-                worst = total_violation(found.columns, study.constraints, own)
-                columns = {quantity: found.columns[quantity] for quantity in study.quantities}
+                worst = total_violation(values, study.constraints, space.violation(points))
+                columns = {quantity: values[quantity] for quantity in study.quantities}
                 rows.append((space.name, space.cfa, name, columns | {"violation": worst}))
         return table_of(study, rows)
 
@@ -295,7 +295,7 @@ class FinishedRun:
     def report(self) -> Path:
         """Draw figures and report again; the page's path."""
         from ..report import make_report
-        from ..results.names import REPORT
+        from ..results.tables import REPORT
 
         make_report(self.output)
         return self.folder / REPORT

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..base.later import loaded_later
 
 if TYPE_CHECKING:
-    from ..results.again import check_kept, study_of
+    from ..results.designs import check_kept, study_of
     from ..results.output import Output, read_output
     from .page import make_report
     from .summary import summary_lines
@@ -25,10 +25,10 @@ __getattr__ = loaded_later(
     globals(),
     {
         "Output": "..results.output",
-        "check_kept": "..results.again",
+        "check_kept": "..results.designs",
         "make_report": ".page",
         "read_output": "..results.output",
-        "study_of": "..results.again",
+        "study_of": "..results.designs",
         "summary_lines": ".summary",
     },
 )

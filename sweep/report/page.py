@@ -14,10 +14,9 @@ from ..base.types import Parallel, delayed, in_turn
 from ..metrics.objective import COMBINED
 from ..results.inventory import Inventory
 from ..results.lock import locked
-from ..results.names import FIGURES, REPORT, VISION_FIGURES, is_drawn
 from ..results.output import Output
 from ..results.profiles import profile_table
-from ..results.tables import FOUND, NAMED, PLAIN, csv_of, encoded
+from ..results.tables import FIGURES, FOUND, NAMED, PLAIN, REPORT, VISION_FIGURES, csv_of, encoded, is_drawn
 from . import signal_figures as signals
 from . import tables
 from . import values as content

@@ -1,8 +1,8 @@
-"""The curves that a run keeps: a long table with a row per curve and wavelength, and the same as objects."""
+"""Curves that a run keeps: a long table with a row per curve and wavelength, and the same as objects."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,7 +10,7 @@ import pyarrow as pa
 
 from ..base.types import FloatArray
 
-QE, LIGHT, TASK, DESIGN, ON_FRONT, LIMIT = "qe", "light", "task", "design", "front", "limit"
+_QE, _LIGHT, _TASK, _DESIGN, _ON_FRONT, _LIMIT = "qe", "light", "task", "design", "front", "limit"
 """Kinds: of the sensor; of a signal; of an own task's file; a modified channel of a design that is drawn, or of one on
 the front; of the limit."""
 _WORD = pa.dictionary(pa.int32(), pa.string())
@@ -33,9 +33,11 @@ FilterCurves = dict[str, FloatArray]
 
 @dataclass(frozen=True)
 class KeptCurves:
-    """ndarray[n_wavelengths] each: QE of the sensor by name, photons per nm by type and name of the signal, spectra of
-    own tasks that are from files by task and class, and by file and column, QE of the designs that are drawn and of
-    others on the front by `design_id` and channel, of the limit's filter by CFA.
+    """Curves of a run, ndarray[n_wavelengths] each.
+
+    QE of the sensor by name, photons per nm by type and name of the signal, QE of the designs that are drawn and of
+    others on the front by `design_id` and channel, of the limit's filter by CFA, spectra of own tasks that are from
+    files by task and class, and by file and column.
     """
 
     wavelength_nm: FloatArray
@@ -60,59 +62,47 @@ class KeptCurves:
         return {kind: np.stack(photons) for kind, photons in types.items()}
 
     def _rows(self) -> Iterator[tuple[str, str, FloatArray, str | None, int | None, str | None]]:
-        yield from ((QE, name, values, None, None, None) for name, values in self.sensor.items())
-        yield from ((LIGHT, name, values, kind, None, None) for (kind, name), values in self.lights.items())
-        yield from ((TASK, name, values, owner, None, None) for (owner, name), values in self.tasks.items())
-        for what, designs in ((DESIGN, self.drawn), (ON_FRONT, self.on_front)):
+        yield from ((_QE, name, values, None, None, None) for name, values in self.sensor.items())
+        yield from ((_LIGHT, name, values, kind, None, None) for (kind, name), values in self.lights.items())
+        yield from ((_TASK, name, values, owner, None, None) for (owner, name), values in self.tasks.items())
+        for what, designs in ((_DESIGN, self.drawn), (_ON_FRONT, self.on_front)):
             for design_id, channels in designs.items():
                 for channel, values in channels.items():
                     yield what, f"{design_id} {channel}", values, None, design_id, channel
-        yield from ((LIMIT, cfa, values, None, None, None) for cfa, values in self.limits.items())
+        yield from ((_LIMIT, cfa, values, None, None, None) for cfa, values in self.limits.items())
 
     def table(self) -> pa.Table:
-        """The long table, of SCHEMA."""
-        rows, size = list(self._rows()), self.wavelength_nm.size
-        kinds, names, values, types, ids, channels = zip(*rows, strict=True) if rows else ((),) * 6
-        at = np.repeat(np.arange(len(rows)), size)
-        columns = {
-            "kind": pa.array(kinds, pa.string()).take(at),
-            "curve": pa.array(names, pa.string()).take(at),
-            "wavelength_nm": pa.array(np.tile(self.wavelength_nm, len(rows))),
-            "value": pa.array(np.concatenate([np.empty(0), *values])),
-            "signal_type": pa.array(types, pa.string()).take(at),
-            "design_id": pa.array(ids, pa.int64()).take(at),
-            "channel": pa.array(channels, pa.string()).take(at),
-        }
-        return pa.table([columns[each.name].cast(each.type) for each in SCHEMA], schema=SCHEMA)
+        """Return the long table, of SCHEMA."""
+        kinds, names, values, types, ids, channels = zip(*self._rows(), strict=True)
+        at = np.repeat(np.arange(len(kinds)), self.wavelength_nm.size)
+        columns = (
+            pa.array(kinds).take(at),
+            pa.array(names).take(at),
+            np.tile(self.wavelength_nm, len(kinds)),
+            np.concatenate(values),
+            pa.array(types, pa.string()).take(at),
+            pa.array(ids, pa.int64()).take(at),
+            pa.array(channels, pa.string()).take(at),
+        )
+        return pa.table([pa.array(column).cast(one.type) for one, column in zip(SCHEMA, columns, strict=True)], SCHEMA)
 
     @classmethod
     def of_table(cls, table: pa.Table) -> KeptCurves:
-        """The same from the long table; raises ValueError where curves are not all on one grid."""
+        """Make the curves from the long table; raises ValueError where they are not all on one grid."""
         table = table.select(SCHEMA.names).cast(SCHEMA)
-        first = np.flatnonzero(np.diff(table["wavelength_nm"].to_numpy()) <= 0)
-        size = int(first[0]) + 1 if first.size else len(table)
-        if not size or len(table) % size:
+        wavelength_nm = table["wavelength_nm"].to_numpy()
+        size = len(np.unique(wavelength_nm))
+        if not size or len(table) % size or (wavelength_nm.reshape(-1, size) != wavelength_nm[:size]).any():
             raise ValueError("the curves are not all on one wavelength grid")
-        wavelength = table["wavelength_nm"].to_numpy().reshape(-1, size)
-        if not (wavelength == wavelength[0]).all():
-            raise ValueError("the curves are not all on one wavelength grid")
-        values = table["value"].to_numpy().reshape(-1, size)
-        found = cls(wavelength[0])
+        kept = cls(wavelength_nm[:size])
         starts = table.take(pa.array(np.arange(0, len(table), size))).to_pylist()
-        for row, curve in zip(starts, values, strict=True):
-            found._take(row, curve)
-        return found
-
-    def _take(self, row: Mapping[str, object], curve: FloatArray) -> None:
-        kind, name = row["kind"], str(row["curve"])
-        if kind == QE:
-            self.sensor[name] = curve
-        elif kind == LIGHT:
-            self.lights[str(row["signal_type"]), name] = curve
-        elif kind == TASK:
-            self.tasks[str(row["signal_type"]), name] = curve
-        elif kind == LIMIT:
-            self.limits[name] = curve
-        else:
-            own = self.drawn if kind == DESIGN else self.on_front
-            own.setdefault(int(str(row["design_id"])), {})[str(row["channel"])] = curve
+        for row, curve in zip(starts, table["value"].to_numpy().reshape(-1, size), strict=True):
+            kind, name, owner = row["kind"], row["curve"], row["signal_type"]
+            if kind in (_DESIGN, _ON_FRONT):
+                designs = kept.drawn if kind == _DESIGN else kept.on_front
+                designs.setdefault(row["design_id"], {})[row["channel"]] = curve
+            elif kind in (_LIGHT, _TASK):
+                (kept.lights if kind == _LIGHT else kept.tasks)[owner, name] = curve
+            else:
+                (kept.sensor if kind == _QE else kept.limits)[name] = curve
+        return kept

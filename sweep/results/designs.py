@@ -1,31 +1,53 @@
-"""From a row of the result table back to its design."""
+"""From a finished run back to its study, and from a row of the result table back to its design."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
 
+from ..base.errors import Fault, OutputError, SweepError, nearest
+from ..base.own_code import CODE_OF, is_code
+from ..base.types import FloatArray
 from ..designs.space import Space
-from ..study import Study
+from ..study import Study, load_study
+from ..study.sources import KeptSources
+from .tables import FEW, RESOLVED, RESULTS, batches
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from .output import Output
+
+BEST = "best"
+_MOST_SHOWN = 10
+_SAME = 1e-12
+"""Largest difference of curves that were computed on two machines."""
+_Key = TypeVar("_Key")
+
 
 def row_space(study: Study, row: Mapping[Any, Any]) -> Space:
-    """The space that a row belongs to."""
+    """Return the space that a row belongs to."""
     if row["kind"] == "search":
         assert study.search is not None
         return study.search.space
-    within = row["design_id"] % sum(space.size for space in study.spaces)  # ids run through the spaces of each scenario
-    ends = np.cumsum([space.size for space in study.spaces])
-    return study.spaces[int(np.searchsorted(ends, within, side="right"))]
+    ends = np.cumsum([space.size for space in study.spaces])  # ids run through the spaces of each scenario
+    return study.spaces[int(np.searchsorted(ends, row["design_id"] % ends[-1], side="right"))]
+
+
+def row_curves(study: Study, row: Mapping[Any, Any]) -> tuple[Space, Any]:
+    """Return the space that a row belongs to and its filters' curves, ndarray[1, n_modified, n_wavelengths]."""
+    space = row_space(study, row)
+    point = np.array([[row[name] for name in space.parameters]], dtype=float)
+    return space, space.curves(point, study.grid.size)
 
 
 def computed_rows(*tables: pd.DataFrame) -> list[dict[Any, Any]]:
-    """The rows of tables, each design once; not those that failed."""
+    """Return the rows of tables, each design once; not those that failed."""
     rows: dict[Any, dict[Any, Any]] = {}
     for table in tables:
         for row in table[table["status"] == "ok"].to_dict("records"):
@@ -33,8 +55,89 @@ def computed_rows(*tables: pd.DataFrame) -> list[dict[Any, Any]]:
     return [*rows.values()]
 
 
-def row_curves(study: Study, row: Mapping[Any, Any]) -> tuple[Space, Any]:
-    """The space that a row belongs to and its filters' curves, ndarray[1, n_modified, n_wavelengths]."""
-    space = row_space(study, row)
-    point = np.array([[row[name] for name in space.parameters]], dtype=float)
-    return space, space.curves(point, study.grid.size)
+def few_rows(table: pd.DataFrame) -> list[dict[Any, Any]]:
+    """Return the rows of plain CFAs, named designs and the search's answer; not those that failed."""
+    return computed_rows(table[table["kind"].isin(FEW)])
+
+
+def find_row(output: Output, key: str) -> Mapping[Any, Any]:
+    """Return the row of a name, of a filter_id or of `best`; of one that occurs in several scenarios the first.
+
+    Raises
+    ------
+    SweepError
+        There is no such design, with the nearest name, or it failed.
+    """
+    table = output.table
+    named = table[table["name"] == key]
+    if key == BEST:
+        if output.best.empty:
+            raise SweepError(Fault("the run has no feasible design that was swept or searched", str(output.folder)))
+        row: dict[Any, Any] = output.best.iloc[0].to_dict()
+    elif len(named):
+        row = named.iloc[0].to_dict()
+    elif key.isascii() and key.isdecimal() and int(key) < output.provenance.filters:
+        filters = (part.filter(pc.equal(part["filter_id"], int(key))) for part in batches(output.folder / RESULTS))
+        rows = next((part for part in filters if part.num_rows), pa.table({})).to_pylist()
+        if not rows:
+            raise OutputError(Fault("has too few rows", str(output.folder / RESULTS), None, "filter_id", int(key)))
+        row = rows[0]
+    else:
+        names = list(dict.fromkeys(map(str, table["name"].dropna())))
+        shown = [*names[:_MOST_SHOWN], *(["..."] if len(names) > _MOST_SHOWN else [])]
+        allowed = f"{BEST}, a name ({', '.join(shown)}), or a filter_id from 0 to {output.provenance.filters - 1:,}"
+        near = nearest(key, [*names, BEST])
+        raise SweepError(Fault("no such design", str(output.folder), None, "--design", key, allowed, near))
+    if row["status"] != "ok":
+        raise SweepError(Fault("the design failed", str(output.folder), None, "--design", row["status"]))
+    return row
+
+
+def study_of(output: Output, data: Path | None, *, allow_code: bool = False) -> Study:
+    """Make the study of a finished run again.
+
+    Parameters
+    ----------
+    output : Output
+    data : Path or None
+        Folder of the study's files; without it the curves that the run kept are taken.
+    allow_code : bool
+        Code that the run was made with may run, and no other.
+
+    Raises
+    ------
+    OutputError
+        Code is not allowed, or the curves are not those of the run.
+    StudyError
+        The code is another one.
+    """
+    path, digests = output.folder / RESOLVED, output.provenance.data_sha256
+    code = {name: digest for name, digest in digests.items() if is_code(name)}
+    in_files = [name for name in code if not name.startswith(CODE_OF)]
+    if code and (not allow_code or (in_files and data is None)):
+        where = "--data FOLDER, which holds it, and " if in_files else ""
+        whose = ", ".join(in_files or [name.removeprefix(CODE_OF) for name in code])
+        problem = f"it was made with the code of {whose}"
+        raise OutputError(Fault(problem, str(output.folder), allowed=f"{where}--allow-code, if you trust it"))
+    kept = output.curves
+    if data is None and digests.keys() - code:
+        return load_study(path, kept=KeptSources(kept.sensor, kept.lights, kept.tasks), allow_code=code)
+    study = load_study(path, data, allow_code=code)
+    lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
+    check_kept(output, kept.sensor, study.sensor.qe)
+    check_kept(output, kept.lights, {(kind, name): values for kind, name, values in lights})
+    check_kept(output, kept.tasks, {} if study.tasks is None else study.tasks.from_files)
+    return study
+
+
+def check_kept(output: Output, kept: Mapping[_Key, FloatArray], made: Mapping[_Key, FloatArray]) -> None:
+    """Compare curves with those that the run kept under these names; raises OutputError where they differ."""
+
+    def same(one: FloatArray, other: FloatArray) -> bool:
+        return one.shape == other.shape and bool(np.abs(one - other).max(initial=0.0) <= _SAME)
+
+    different = [str(name) for name, values in made.items() if name in kept and not same(kept[name], values)]
+    if different:
+        shown = ", ".join(different[:_MOST_SHOWN]) + (" and more" if len(different) > _MOST_SHOWN else "")
+        problem = f"computed again, these are not what the run has: {shown}"
+        raise OutputError(Fault(problem, str(output.folder), allowed="the curve files and the version of that run"))

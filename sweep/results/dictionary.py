@@ -1,4 +1,4 @@
-"""What every file of a run holds and what every column means, as the documentation prints it."""
+"""Data dictionary: content of the files of a run and meaning of the columns, as the documentation prints it."""
 
 from __future__ import annotations
 
@@ -12,33 +12,8 @@ from ..curves.tasks import Measure, TaskName
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY, reference_of
 from ..metrics.quantity import DN, Asked, Column
 from ..metrics.registry import listed
+from . import tables as files
 from .curves import SCHEMA
-from .names import FIGURES, REPORT, RUN, SUMS
-from .tables import (
-    AUDIT,
-    CROSSINGS,
-    CURVES,
-    FRONT,
-    LEFT_OUT,
-    LIMITED_BY,
-    POINTS,
-    PROVENANCE,
-    RECOGNITION,
-    REGIONS_MAP,
-    RENDERED,
-    RESOLVED,
-    RESULTS,
-    ROBUSTNESS,
-    SEARCH_LOG,
-    SENSOR_MAP,
-    TRADED,
-    VALIDATED,
-    VISION,
-    VISION_CONDITIONS,
-    VISION_MISREAD,
-    front_schema,
-    search_schema,
-)
 from .thinning import MOST_POINTS
 
 _KEYS = {
@@ -99,9 +74,9 @@ def described(schema: pa.Schema, columns: Mapping[str, Column]) -> pa.Schema:
     meanings = {name: text for names, text in (_KEYS | _VERDICTS).items() for name in names}
     meanings |= {name: column.meaning for name, column in columns.items()}
     units = {name: column.unit for name, column in columns.items()}
-    known = [name for name in schema.names if name in meanings]
     attrs = {
-        kind: {n: words[n] for n in known if n in words} for kind, words in (("units", units), ("meanings", meanings))
+        kind: {name: words[name] for name in schema.names if name in words}
+        for kind, words in (("units", units), ("meanings", meanings))
     }
     fields = [
         field.with_metadata({"unit": units.get(field.name, ""), "meaning": meanings[field.name]})
@@ -113,7 +88,7 @@ def described(schema: pa.Schema, columns: Mapping[str, Column]) -> pa.Schema:
 
 
 def columns_table() -> list[str]:
-    """A table of Markdown: column, unit, meaning; `<a>`, `<b>` stand for any two signal types, `<task>` for a task."""
+    """Return a table of Markdown: column, unit, meaning; `<a>`, `<b>`: any two signal types, `<task>`: a task."""
     types = ("<a>", "<b>")
     rows = [_row(names, "", meaning) for names, meaning in _KEYS.items()]
     tasks = tuple(TaskName("<task>", metric, ("<light>",)) for metric in get_args(Measure))
@@ -129,59 +104,61 @@ def columns_table() -> list[str]:
 
 
 FILES = {
-    RESULTS: "a row per design and scenario; its columns are below",
-    LIMITED_BY: "the two lights that limit each CSD, of plain CFAs, named designs, answers of the search, and of the "
-    "swept designs that the report draws: the best of each CFA, those that lead, the feasible front, and up to "
+    files.RESULTS: "a row per design and scenario; its columns are below",
+    files.LIMITED_BY: "the two lights that limit each CSD, of plain CFAs, named designs, answers of the search, and "
+    "of the swept designs that the report draws: the best of each CFA, those that lead, the feasible front, and up to "
     f"{MOST_POINTS:,} other feasible and as many infeasible ones, evenly: `design_id`, `limited_by_<a>_<b>` (of a "
     "light at any place, at the worst one of the lattice that was computed)",
-    VALIDATED: "where a study validates on other lights: `design_id` and `held_out_csd_<a>_<b>`, their CSDs, DN",
-    ROBUSTNESS: "where the lights have a population, for each plain CFA, named design and answer of the search: "
+    files.VALIDATED: "where a study validates on other lights: `design_id` and `held_out_csd_<a>_<b>`, their CSDs, DN",
+    files.ROBUSTNESS: "where the lights have a population, for each plain CFA, named design and answer of the search: "
     "`design_id`; how many times as large population and production tolerances must be for the worst CSD to fall below "
     "that of the best plain CFA (`breaks_at`; null: not up to 3 times), and the CSD, lights, shifts and temperatures "
     "there; "
     "`yield`, the share of random lamps and cameras with the wanted CSD, with its 95 % interval",
-    REGIONS_MAP: "where a study asks for maps of color regions, for each plain CFA, named design and answer of the "
-    "search: design_id, norm, peak of the yellow LED (yellow_nm) and of the red one (red_nm), how many pairs of widths "
-    "the norm allows (pairs), how many of these have the wanted distance (separated), the smallest one (least_dn) and "
-    "the widths there (yellow_fwhm_nm, red_fwhm_nm)",
-    LEFT_OUT: "where each light is left out of a search in turn: the objective (of a worst case the nominal quantity, "
-    "too), signal_type, signal, the optimum that was `seen`, the same design `with_it`, and the `fall`",
-    SENSOR_MAP: "where a scene has a `field`, for each plain CFA, named design and answer of the search: `design_id`, "
-    "relative image `height`, `cra_deg` and the CSDs there, DN, before clipping and rounding",
-    SEARCH_LOG: "every evaluation of the search and of its front: " + ", ".join(search_schema(["<parameters>"]).names),
-    FRONT: "what the search found at each level of sensitivity, and the limit there; between two levels rows with the "
-    "limit alone: " + ", ".join(front_schema(["<parameters>"]).names),
-    CURVES: "a row per curve and wavelength: " + ", ".join(SCHEMA.names),
-    POINTS: "what the clouds draw: design_id, signal_type, signal, channel, dn",
-    RECOGNITION: "raw patches told apart by classifiers, where a study asks for them, with 95 % intervals",
-    CROSSINGS: "where a study with `recognition` has scenarios that differ in one number: the number `at` which a "
-    "plain CFA, named design or answer of the search has the allowed error, between those of two scenarios (`low`, "
+    files.REGIONS_MAP: "where a study asks for maps of color regions, for each plain CFA, named design and answer of "
+    "the search: design_id, norm, peak of the yellow LED (yellow_nm) and of the red one (red_nm), how many pairs of "
+    "widths the norm allows (pairs), how many of these have the wanted distance (separated), the smallest one "
+    "(least_dn) and the widths there (yellow_fwhm_nm, red_fwhm_nm)",
+    files.LEFT_OUT: "where each light is left out of a search in turn: the objective (of a worst case the nominal "
+    "quantity, too), signal_type, signal, the optimum that was `seen`, the same design `with_it`, and the `fall`",
+    files.SENSOR_MAP: "where a scene has a `field`, for each plain CFA, named design and answer of the search: "
+    "`design_id`, relative image `height`, `cra_deg` and the CSDs there, DN, before clipping and rounding",
+    files.SEARCH_LOG: "every evaluation of the search and of its front: "
+    + ", ".join(files.search_schema(["<parameters>"]).names),
+    files.FRONT: "what the search found at each level of sensitivity, and the limit there; between two levels rows "
+    "with the limit alone: " + ", ".join(files.front_schema(["<parameters>"]).names),
+    files.CURVES: "a row per curve and wavelength: " + ", ".join(SCHEMA.names),
+    files.POINTS: "what the clouds draw: design_id, signal_type, signal, channel, dn",
+    files.RECOGNITION: "raw patches told apart by classifiers, where a study asks for them, with 95 % intervals",
+    files.CROSSINGS: "where a study with `recognition` has scenarios that differ in one number: the number `at` which "
+    "a plain CFA, named design or answer of the search has the allowed error, between those of two scenarios (`low`, "
     "`high`), with everything on, and the `error` there; null where no study may have a scene between the two",
-    TRADED: "where a study has the task `color`: mean color error against luminance SNR, a row per design, light and "
-    "regularization of the color matrix",
-    RENDERED: "there, too: colors (XYZ over white) and noise of the areas of two rendered pictures",
-    VISION: "a row per image of the benchmark of vision: design_id, name, cfa, seed, order (of the lenses), lamps "
-    "(seen in training or unseen), image, state, lamp, intensity_cd, background, phantom, distance_m, level, and what "
-    "each reader says with its probability: observer, network, half (a network that learned from half of the images)",
-    VISION_CONDITIONS: "of each design at each distance and level of light: csd (DN), dprime and pair_error, the "
+    files.TRADED: "where a study has the task `color`: mean color error against luminance SNR, a row per design, "
+    "light and regularization of the color matrix",
+    files.RENDERED: "there, too: colors (XYZ over white) and noise of the areas of two rendered pictures",
+    files.VISION: "a row per image of the benchmark of vision: design_id, name, cfa, seed, order (of the lenses), "
+    "lamps (seen in training or unseen), image, state, lamp, intensity_cd, background, phantom, distance_m, level, "
+    "and what each reader says with its probability: observer, network, half (a network that learned from half of the "
+    "images)",
+    files.VISION_CONDITIONS: "of each design at each distance and level of light: csd (DN), dprime and pair_error, the "
     "smallest or the largest over the pairs of lenses",
-    VISION_MISREAD: "images that were read wrongly, in false colors: bytes of rows x columns x 3 in `pixels`",
-    AUDIT: "rows of `sweep audit`: errors against the reference settings, and those that are allowed",
-    RESOLVED: "the study with every default written out; a study file itself",
-    PROVENANCE: "versions, seed, command, machine, plans of the scenes, what the columns mean",
-    REPORT: "the report: one file that you can send, without the network",
+    files.VISION_MISREAD: "images that were read wrongly, in false colors: bytes of rows x columns x 3 in `pixels`",
+    files.AUDIT: "rows of `sweep audit`: errors against the reference settings, and those that are allowed",
+    files.RESOLVED: "the study with every default written out; a study file itself",
+    files.PROVENANCE: "versions, seed, command, machine, plans of the scenes, what the columns mean",
+    files.REPORT: "the report: one file that you can send, without the network",
     "cfas.png": "all CFAs: separation against the light of the whole CFA; also `.svg`",
     "pareto.png": "the trade-off in one modified pixel, where there is one; also `.svg`",
-    f"{FIGURES}/": "all other figures as PNG and SVG",
+    f"{files.FIGURES}/": "all other figures as PNG and SVG",
     "paper_comparison.csv": "published figures beside ours, where a study gives some; also `.parquet`",
-    RUN: "whose folder it is: the fingerprint of the study and what goes into it",
-    SUMS: "the digests for `sha256sum -c SHA256SUMS`",
+    files.RUN: "whose folder it is: the fingerprint of the study and what goes into it",
+    files.SUMS: "the digests for `sha256sum -c SHA256SUMS`",
 }
 """Every file of a run's folder, in the order in which one asks for them."""
 
 
 def files_table() -> list[str]:
-    """A table of Markdown: file, what it holds."""
+    """Return a table of Markdown: file, content."""
     return ["| file | what it holds |", "| --- | --- |", *(f"| `{name}` | {what} |" for name, what in FILES.items())]
 
 

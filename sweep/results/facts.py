@@ -1,13 +1,18 @@
-"""What `provenance.json` says of a run, as typed objects."""
+"""Content of `provenance.json` as typed objects."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from ..base.errors import Fault, OutputError
 from ..metrics.quantity import Column
+
+_MOST_SHOWN = 10
+_Model = TypeVar("_Model", bound=BaseModel)
 
 
 class _Facts(BaseModel):
@@ -17,7 +22,7 @@ class _Facts(BaseModel):
 
 
 class Origin(_Facts):
-    """Where curves come from."""
+    """Source of curves."""
 
     name: str
     source: str
@@ -52,7 +57,7 @@ class PlanFacts(_Facts):
     @property
     def computed(self) -> list[str]:
         """Effects that were computed."""
-        return [each.effect for each in self.effects if each.computed]
+        return [one.effect for one in self.effects if one.computed]
 
 
 class CheckFacts(_Facts):
@@ -67,12 +72,12 @@ class CheckFacts(_Facts):
 
     @property
     def passed(self) -> bool:
-        """True where no difference is larger than allowed; rounding of the arithmetic is not counted."""
+        """Result of the check: no difference is larger than allowed; rounding of the arithmetic is not counted."""
         return self.largest_dn <= self.allowed_dn * (1 + 1e-9) + 1e-9
 
     @property
     def sentence(self) -> str:
-        """The result in words."""
+        """Result in words."""
         rows = "1 row differs" if self.rows == 1 else f"{self.rows:,} rows differ"
         where = f"{self.quantity} of design {self.design_id} in {self.scenario}"
         return (
@@ -112,10 +117,7 @@ class SearchFacts(_Facts):
 
 
 class Provenance(_Facts):
-    """Everything needed to run a study again, what the machine was, and what its columns mean.
-
-    `spent_s`: what metrics of the whole readout took, and what all rows took, seconds of all workers.
-    """
+    """Everything needed to run a study again, the machine that ran it, and the meaning of its columns."""
 
     command: tuple[str, ...]
     duration_s: float
@@ -141,7 +143,6 @@ class Provenance(_Facts):
     trade_off: tuple[str, str]
     parameters: tuple[str, ...]
     quantities: tuple[Column, ...]
-    spent_s: tuple[float, float] = (0.0, 0.0)
     warnings: tuple[str, ...]
     search: SearchFacts | None = None
     hypervolume: dict[str, float] | None = None
@@ -149,9 +150,22 @@ class Provenance(_Facts):
 
 
 def lacking(kind: type[BaseModel], facts: Mapping[str, Any]) -> list[str]:
-    """What an object of this kind must have and these facts do not, or not as it is said."""
+    """Return the keys that an object of this kind needs and these facts lack, or have with another type."""
     try:
         kind.model_validate(facts)
     except ValidationError as error:
         return list(dict.fromkeys(".".join(map(str, fault["loc"])) for fault in error.errors()))
     return []
+
+
+def checked_facts(path: Path, kind: type[_Model], facts: Mapping[str, Any]) -> _Model:
+    """Return the facts of a file as an object; raises OutputError that names the keys that it lacks."""
+    if lacks := lacking(kind, facts):
+        raise lacking_in(path, lacks[:_MOST_SHOWN])
+    return kind.model_validate(facts)
+
+
+def lacking_in(path: Path, names: Sequence[str]) -> OutputError:
+    """Return the error of a file that lacks something."""
+    again = "delete it, and `sweep run` of the study makes it again"
+    return OutputError(Fault(f"lacks {', '.join(names)}; {again}", str(path)))

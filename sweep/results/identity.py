@@ -1,4 +1,4 @@
-"""What a run's results depend on: two runs of one identity have the same rows."""
+"""Identity of a run: two runs of one identity have the same rows."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ CHUNK = 4096
 
 
 def identity(study: Study) -> dict[str, Any]:
-    """Everything that a run's results depend on: the checked study, digests of its curves, the model's version."""
+    """Return all that a run depends on: the checked study, digests of its curves, the version of the model."""
     curves, lights = hashlib.sha256(), hashlib.sha256()
     for name, curve in sorted(study.sensor.qe.items()):
         curves.update(name.encode() + curve.tobytes())
@@ -36,5 +36,5 @@ def identity(study: Study) -> dict[str, Any]:
 
 
 def fingerprint(study: Study) -> str:
-    """SHA-256 of the canonical JSON of `identity`."""
+    """Return the SHA-256 of the canonical JSON of `identity`."""
     return hashlib.sha256(json.dumps(identity(study), sort_keys=True).encode()).hexdigest()

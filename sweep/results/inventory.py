@@ -1,4 +1,4 @@
-"""Which files in a run's folder are its own, and what they hold: damage is seen, and no other file is touched.
+"""Inventory of the files in a run's folder: damage is noticed, and no other file is touched.
 
 `run.json` says which study the folder is of. `SHA256SUMS` lists all files of the run, `run.json` included, in the form
 that `sha256sum -c` checks. A folder without `run.json` is no run's: files in it that have names of a run's are others'.
@@ -19,11 +19,10 @@ import pyarrow as pa
 from ..base.disk import MOST_FACTS, digest_of, is_link, is_real_folder, parsed_facts, read_plain
 from ..base.errors import Fault, OutputError
 from .atomic import write_bytes
-from .names import FIGURES, RUN, SUMS, is_drawn, is_own
-from .tables import AUDIT, PROVENANCE, json_of, write_table
+from .tables import AUDIT, FIGURES, MADE_BY_RUN, PROVENANCE, RUN, SUMS, is_drawn, is_own, json_of, write_table
 
 _SUM = re.compile(r"([0-9a-f]{64})  (\S+)")
-MISSING, DAMAGED, UNLISTED = "is missing", "is damaged", f"is not listed in {SUMS}"
+_MISSING, _DAMAGED, _UNLISTED = "is missing", "is damaged", f"is not listed in {SUMS}"
 
 
 class Inventory:
@@ -40,8 +39,11 @@ class Inventory:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.files = {name: sha for sha, name in _SUM.findall(_text(folder / SUMS)) if is_own(name) or name == RUN}
+        self.files: dict[str, str] = {}
         self.facts: dict[str, Any] = {}
+        with suppress(OSError):
+            text = read_plain(folder / SUMS, MOST_FACTS).decode("utf-8", "replace")
+            self.files = {name: sha for sha, name in _SUM.findall(text) if is_own(name) or name == RUN}
         path = folder / RUN
         if os.path.lexists(path):
             with suppress(OSError):
@@ -54,15 +56,21 @@ class Inventory:
 
     @property
     def fingerprint(self) -> str:
-        """That of the run's study; empty where there is no run."""
+        """Fingerprint of the run's study; empty where there is no run."""
         return str(self.facts.get("fingerprint", ""))
 
+    @property
+    def finished(self) -> bool:
+        """True where all files that the list names are there, provenance among them."""
+        listed = self.files.keys() & MADE_BY_RUN
+        return PROVENANCE in listed and not self.wrong(listed, quick=True)
+
     def path(self, name: str) -> Path:
-        """Where a file of the run stands."""
+        """Return the path of a file of the run."""
         return self.folder / name
 
     def wrong(self, names: Iterable[str] | None = None, *, quick: bool = False) -> dict[str, str]:
-        """Files that are not what the run wrote -> what is wrong with them.
+        """Return the files that are not what the run wrote, and their faults.
 
         Parameters
         ----------
@@ -71,32 +79,28 @@ class Inventory:
         quick : bool
             Only say which are missing.
         """
-        faults = dict.fromkeys(self.unlisted() if names is None else (), UNLISTED)
+        faults = dict.fromkeys(self.unlisted() if names is None else (), _UNLISTED)
         for name in sorted(self.files if names is None else names):
-            fault = self._fault(name, quick=quick)
-            if fault is not None:
-                faults[name] = fault
+            path = self.path(name)
+            if name not in self.files or not os.path.lexists(path) or self._linked(name):
+                faults[name] = _MISSING
+            elif not quick:
+                try:
+                    damaged = digest_of(path) != self.files[name]
+                except OSError:
+                    damaged = True
+                if damaged:
+                    faults[name] = _DAMAGED
         return faults
 
     def unlisted(self) -> list[str]:
-        """Files of a finished run that the list does not name, since it is damaged; provenance is written last."""
+        """Return the files of a finished run that the damaged list does not name; provenance is written last."""
         finished = os.path.lexists(self.path(PROVENANCE))
         return [name for name in self._present() if finished and is_own(name) and name not in self.files]
 
     def _present(self) -> list[str]:
         """Names of the files in the folder and among its figures."""
         return sorted([*_names(self.folder), *(f"{FIGURES}/{name}" for name in _names(self.folder / FIGURES))])
-
-    def _fault(self, name: str, *, quick: bool) -> str | None:
-        path = self.path(name)
-        if name not in self.files or not os.path.lexists(path) or self._linked(name):
-            return MISSING
-        if quick:
-            return None
-        try:
-            return None if digest_of(path) == self.files[name] else DAMAGED
-        except OSError:
-            return DAMAGED
 
     def _linked(self, name: str) -> bool:
         """True where a link leads out of the folder on the way to a file."""
@@ -108,13 +112,13 @@ class Inventory:
             raise OutputError(faults_of(self.folder, wrong))
 
     def strangers(self) -> list[str]:
-        """Files of others under names that the run's commands give; none in the folder of a run."""
+        """Return the files of others under names that the run's commands give; none in the folder of a run."""
         if self.facts:
             return []
         return [name for name in self._present() if is_own(name) or name == SUMS]
 
     def begin(self, fingerprint: str, facts: Mapping[str, Any]) -> None:
-        """Say whose folder it is; raises OutputError where files of others stand in the way or the disk refuses."""
+        """Write which study the folder is of; raises OutputError for files of others, or when the disk refuses."""
         for name in self.strangers():
             raise OutputError(Fault("is not of this run; move it away", str(self.folder / name)))
         self.facts = {"fingerprint": fingerprint, **facts}
@@ -173,12 +177,12 @@ class Inventory:
 
 
 def no_run(folder: Path) -> OutputError:
-    """The error for a folder that holds no run."""
+    """Return the error for a folder that holds no run."""
     return OutputError(Fault("no run here", str(folder), allowed="a folder that `sweep run` made"))
 
 
 def faults_of(folder: Path, wrong: Mapping[str, str]) -> list[Fault]:
-    """A line for each file that is not what the run wrote."""
+    """Return a line for each file that is not what the run wrote."""
     return [Fault(f"{what}; `sweep run` of its study makes it again", str(folder / n)) for n, what in wrong.items()]
 
 
@@ -188,11 +192,3 @@ def _names(folder: Path) -> list[str]:
         return [] if is_link(folder) else [path.name for path in folder.iterdir()]
     except OSError:
         return []
-
-
-def _text(path: Path) -> str:
-    """A file's text; none where there is no plain file of a likely size."""
-    try:
-        return read_plain(path, MOST_FACTS).decode("utf-8", "replace")
-    except OSError:
-        return ""

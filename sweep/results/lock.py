@@ -14,8 +14,8 @@ from filelock import FileLock, Timeout
 from ..base.disk import is_real_folder
 from ..base.errors import Fault, OutputError
 from .atomic import LEFT_OVER
-from .names import FIGURES
 from .parts import PARTS
+from .tables import FIGURES
 
 LOCK = ".lock"
 _WAIT_S = 0.2
@@ -55,7 +55,7 @@ def _is_lock(path: Path) -> bool:
 
 
 def in_use(output: Path) -> bool:
-    """True while a command holds the folder."""
+    """Return whether a command holds the folder."""
     if not (output / LOCK).is_file():
         return False
     try:
@@ -67,8 +67,8 @@ def in_use(output: Path) -> bool:
 
 def _clear(output: Path) -> None:
     """Remove what killed commands and workers left half written, but not through links."""
-    own = (output / PARTS, output / FIGURES)
-    for folder in (output, *(inner for inner in own if is_real_folder(inner))):
+    inner = (output / PARTS, output / FIGURES)
+    for folder in (output, *(one for one in inner if is_real_folder(one))):
         for path in folder.iterdir():
             if re.fullmatch(LEFT_OVER, path.name) and not is_real_folder(path):
                 path.unlink(missing_ok=True)

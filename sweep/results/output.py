@@ -9,7 +9,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import pyarrow as pa
+import pyarrow.parquet as pq
 from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
 
 from ..base.errors import Fault, OutputError
 from ..base.types import IndexArray
@@ -18,70 +21,37 @@ from ..metrics.bound import Bound
 from ..metrics.objective import Objective
 from ..metrics.quantity import Column
 from ..study import StudySection
-from .checks import check_columns, checked_facts, lacking_in, read_mapping
+from . import tables as files
 from .curves import SCHEMA as CURVES_SCHEMA
 from .curves import KeptCurves
-from .facts import Provenance
+from .facts import Provenance, checked_facts, lacking_in
 from .inventory import Inventory, no_run
 from .profiles import ParameterProfile, Profiles
-from .tables import (
-    AUDIT,
-    CROSSINGS,
-    CURVES,
-    FEW,
-    FOUND,
-    FRONT,
-    LEFT_OUT,
-    LIMITED_BY,
-    NAMED,
-    PLAIN,
-    POINTS,
-    PROVENANCE,
-    RECOGNITION,
-    REGIONS_MAP,
-    RENDERED,
-    RESOLVED,
-    RESULTS,
-    ROBUSTNESS,
-    ROW_COLUMNS,
-    SEARCH_LOG,
-    SENSOR_MAP,
-    SWEPT,
-    TRADED,
-    VALIDATED,
-    VISION_TABLES,
-    front_schema,
-    read_table,
-)
+from .tables import FEW, FOUND, NAMED, PLAIN, PROVENANCE, RESOLVED, RESULTS, SWEPT, read_table
 from .thinning import Counts, swept_points, thinned
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _Made = TypeVar("_Made")
-_OPTIONAL = (
-    FRONT,
-    CROSSINGS,
-    RECOGNITION,
-    SEARCH_LOG,
-    AUDIT,
-    VALIDATED,
-    ROBUSTNESS,
-    REGIONS_MAP,
-    SENSOR_MAP,
-    LEFT_OUT,
-    TRADED,
-    RENDERED,
-    *VISION_TABLES,
-)
-"""Files that some runs alone have."""
+_ALWAYS = (RESULTS, files.CURVES, files.POINTS, files.LIMITED_BY, RESOLVED, PROVENANCE)
+"""Files of every run; others are of some runs alone."""
 _ALWAYS_WRITTEN = ("study", "seed", "wavelengths", "scenarios", "objective")
 """Keys of every resolved study: it has its defaults, too, so that one that lacks them was cut."""
+_COLUMNS: dict[str, Sequence[str]] = {
+    files.CURVES: CURVES_SCHEMA.names,
+    files.LIMITED_BY: ["design_id"],
+    files.POINTS: ["design_id", "signal_type", "signal", "channel", "dn"],
+    files.FRONT: files.front_schema(()).names,
+    files.LEFT_OUT: ["objective", "signal_type", "signal", "fall"],
+    files.ROBUSTNESS: ["design_id", "breaks_at", "breaks_thickness"],
+}
+"""Columns that a report needs of the tables beside the result table."""
 
 
 @dataclass(frozen=True)
 class Output:
-    """What a run left in its folder; of a long result table, `table` holds what a report shows.
+    """Results of a run; of a long result table, `table` holds the rows that a report shows.
 
     `study`: the study that was run, and `resolved` its file. `profiles`: over the whole table, per CFA; none where a
     sweep is no grid. `swept_points`: ids of the swept designs that figures show as points. `searched`: the search's
@@ -114,20 +84,20 @@ class Output:
     _made: dict[object, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def once(self, key: object, make: Callable[[], _Made]) -> _Made:
-        """What several parts of a report need of this run, made for the first of them."""
+        """Return a value that several parts of a report need of this run, made for the first of them."""
         if key not in self._made:
             self._made[key] = make()
-        found: _Made = self._made[key]
-        return found
+        made: _Made = self._made[key]
+        return made
 
     @property
     def objective(self) -> Objective:
-        """What the study maximizes."""
+        """Objective of the study."""
         return self.study.objective
 
     @property
     def goal(self) -> Column:
-        """Column of what the study maximizes."""
+        """Column of the objective."""
         return self.columns[self.objective.column]
 
     @property
@@ -176,7 +146,7 @@ class Output:
         return list(self.study.scenarios)
 
     def words(self, column: str) -> str:
-        """A column's name as people write it."""
+        """Return a column's name as people write it."""
         return self.columns[column].words if column in self.columns else column
 
     @property
@@ -206,7 +176,7 @@ class Output:
         return Mosaic.from_name(cfa) if tile is None else Mosaic.from_rows(cfa, tile)
 
     def kind(self, *kinds: str) -> pd.DataFrame:
-        """Rows of some kinds: see `tables.PLAIN` and what stands beside it."""
+        """Return the rows of some kinds: see `tables.PLAIN`."""
         return self.table[self.table["kind"].isin(kinds)]
 
     @cached_property
@@ -221,76 +191,92 @@ class Output:
 
 
 def read_output(folder: Path, *, audited: bool = True) -> Output:
-    """Read a finished run; raises OutputError, naming each, where files are missing or not as the run wrote them.
+    """Read a finished run.
 
-    `audited`: with the rows of `sweep audit`, where there are some.
+    Parameters
+    ----------
+    folder : Path
+    audited : bool
+        Read the rows of `sweep audit`, too, where there are some.
+
+    Raises
+    ------
+    OutputError
+        Files, which it names, are missing or not as the run wrote them.
     """
     inventory = Inventory(folder)
     if not inventory.fingerprint:
         raise no_run(folder)
     if PROVENANCE not in inventory.files:
         raise OutputError(Fault("no finished run here", str(folder), allowed="a folder that `sweep run` finished"))
-    optional = [name for name in _OPTIONAL if name in inventory.files]
-    if not audited and AUDIT in optional:
-        optional.remove(AUDIT)
-    inventory.require([RESULTS, CURVES, POINTS, LIMITED_BY, RESOLVED, PROVENANCE, *optional])
-    resolved = read_mapping(folder / RESOLVED, lambda text: YAML(typ="safe").load(text))
+    optional = {name for name in (*files.MADE_BY_RUN, files.AUDIT) if name in inventory.files}.difference(_ALWAYS)
+    if not audited:
+        optional.discard(files.AUDIT)
+    inventory.require([*_ALWAYS, *sorted(optional)])
+    resolved = _mapping(folder / RESOLVED, lambda text: YAML(typ="safe").load(text))
     if lacks := [key for key in _ALWAYS_WRITTEN if key not in resolved]:
         raise lacking_in(folder / RESOLVED, lacks)
     study = checked_facts(folder / RESOLVED, StudySection, resolved)
-    provenance = checked_facts(folder / PROVENANCE, Provenance, read_mapping(folder / PROVENANCE, json.loads))
-    check_columns(folder / RESULTS, [*ROW_COLUMNS, *provenance.parameters, *(c.name for c in provenance.quantities)])
-    check_columns(folder / LIMITED_BY, ["design_id"])
-    check_columns(folder / POINTS, ["design_id", "signal_type", "signal", "channel", "dn"])
-    if FRONT in optional:
-        check_columns(folder / FRONT, front_schema(()).names)
-    if LEFT_OUT in optional:
-        check_columns(folder / LEFT_OUT, ["objective", "signal_type", "signal", "fall"])
-    if ROBUSTNESS in optional:
-        check_columns(folder / ROBUSTNESS, ["design_id", "breaks_at", "breaks_thickness"])
+    provenance = checked_facts(folder / PROVENANCE, Provenance, _mapping(folder / PROVENANCE, json.loads))
+    quantities = (column.name for column in provenance.quantities)
+    _check_columns(folder / RESULTS, [*files.ROW_COLUMNS, *provenance.parameters, *quantities])
+    for name, columns in _COLUMNS.items():
+        if name in optional or name in _ALWAYS:
+            _check_columns(folder / name, columns)
     objective = study.objective.column
     profiles = Profiles(objective, next(iter(study.scenarios)), provenance.parameters)
     points = swept_points(folder / RESULTS)
     order = [objective, *provenance.trade_off]
     table, counts = thinned(folder / RESULTS, order, provenance.trade_off[0], points, profiles.add)
-    signals, limited = (read_table(folder / name).to_pandas() for name in (POINTS, LIMITED_BY))
-    more = {name: read_table(folder / name).to_pandas() for name in optional}
+    more = {name: read_table(folder / name).to_pandas() for name in (files.POINTS, files.LIMITED_BY, *optional)}
+    for name in (files.LIMITED_BY, files.VALIDATED, files.ROBUSTNESS):
+        if name in more:
+            table = table.merge(more[name].drop(columns="filter_id", errors="ignore"), on="design_id", how="left")
+    try:
+        curves = KeptCurves.of_table(read_table(folder / files.CURVES))
+    except ValueError as error:
+        raise OutputError(Fault(f"cannot be read: {error}", str(folder / files.CURVES))) from None
     return Output(
         folder=folder,
         study=study,
         resolved=resolved,
         provenance=provenance,
-        table=_joined(table, limited, more.get(VALIDATED), more.get(ROBUSTNESS)),
+        table=table,
         counts=counts,
         swept_points=points,
-        curves=_kept_curves(folder / CURVES),
-        points=signals,
-        front=more.get(FRONT),
-        recognition=more.get(RECOGNITION),
-        crossings=more.get(CROSSINGS),
-        searched=more.get(SEARCH_LOG),
-        audited=more.get(AUDIT),
-        left_out=more.get(LEFT_OUT),
-        regions=more.get(REGIONS_MAP),
-        traded=more.get(TRADED),
-        rendered=more.get(RENDERED),
-        places=more.get(SENSOR_MAP),
-        vision={name: table for name, table in more.items() if name in VISION_TABLES},
+        curves=curves,
+        points=more[files.POINTS],
+        front=more.get(files.FRONT),
+        recognition=more.get(files.RECOGNITION),
+        crossings=more.get(files.CROSSINGS),
+        searched=more.get(files.SEARCH_LOG),
+        audited=more.get(files.AUDIT),
+        left_out=more.get(files.LEFT_OUT),
+        regions=more.get(files.REGIONS_MAP),
+        traded=more.get(files.TRADED),
+        rendered=more.get(files.RENDERED),
+        places=more.get(files.SENSOR_MAP),
+        vision={name: more[name] for name in files.VISION_TABLES if name in more},
         profiles=profiles.found if all(made.grid is not None for made in study.sweeps.values()) else {},
     )
 
 
-def _joined(table: pd.DataFrame, *others: pd.DataFrame | None) -> pd.DataFrame:
-    """The table with what other tables say of its designs."""
-    for other in others:
-        if other is not None:
-            table = table.merge(other.drop(columns="filter_id", errors="ignore"), on="design_id", how="left")
-    return table
-
-
-def _kept_curves(path: Path) -> KeptCurves:
-    check_columns(path, CURVES_SCHEMA.names)
+def _mapping(path: Path, parse: Callable[[str], Any]) -> dict[str, Any]:
+    """The mapping in a text file; raises OutputError."""
     try:
-        return KeptCurves.of_table(read_table(path))
-    except ValueError as error:
+        content = parse(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError, YAMLError) as error:
         raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
+    if not isinstance(content, dict):
+        raise OutputError(Fault("not a mapping", str(path)))
+    return content
+
+
+def _check_columns(path: Path, wanted: Sequence[str]) -> None:
+    """Raise OutputError for a table without the columns that are wanted."""
+    try:
+        names = pq.read_schema(path).names
+    except (OSError, pa.ArrowException) as error:
+        raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
+    if missing := [name for name in dict.fromkeys(wanted) if name not in names]:
+        raise lacking_in(path, missing)

@@ -63,7 +63,7 @@ class Parts:
         return key[:_DIGITS] in self._names
 
     def add(self, name: str) -> None:
-        """Know a part that was written; other names are left alone."""
+        """Register a part that was written; other names are left alone."""
         if named := _NAME.fullmatch(name):
             self._names[named.group(1)] = name
 
@@ -72,11 +72,11 @@ class Parts:
         self.add(write_part(self.folder, key, kind, content))
 
     def paths(self, kind: str) -> list[Path]:
-        """Files of the parts of a kind."""
+        """Return the files of the parts of a kind."""
         return [self.folder / name for name in self._names.values() if name.endswith(f".{kind}")]
 
     def read(self, key: str) -> bytes | None:
-        """The content of a part; None, and it is removed, where it is missing or not what was written."""
+        """Return the content of a part; None, and it is removed, where it is missing or not what was written."""
         name = self._names.get(key[:_DIGITS])
         if name is None:
             return None

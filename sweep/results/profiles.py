@@ -1,4 +1,4 @@
-"""What each parameter may be: the best objective that is left when one parameter is held at a value."""
+"""Parameter profiles: the best objective that is left when one parameter is held at a value."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 import pyarrow as pa
 
 from ..base.types import FloatArray
-from .tables import holds
+from .tables import SWEPT, holds
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _KEEPS = 0.95
-_MOST_PLACES, _MOST_PROFILES = 60, 9
+_MOST_VALUES, _MOST_PROFILES = 60, 9
 
 
 @dataclass(frozen=True)
@@ -29,78 +29,64 @@ class ParameterProfile:
 
     @property
     def drop(self) -> float:
-        """How much of the objective the worst value of the parameter costs, whatever the others are."""
+        """Loss of the objective at the worst value of the parameter, for the best of the other parameters."""
         return float(self.best.max() - self.best.min())
 
     @property
     def keeps(self) -> tuple[float, float]:
-        """From where to where, around its best value, the parameter keeps 95 % of the best objective."""
-        enough = self.best >= _KEEPS * self.best.max()
-        first = last = int(self.best.argmax())
-        while first > 0 and enough[first - 1]:
-            first -= 1
-        while last < len(enough) - 1 and enough[last + 1]:
-            last += 1
+        """Range around its best value in which the parameter keeps 95 % of the best objective."""
+        best = int(self.best.argmax())
+        low = np.flatnonzero(self.best < _KEEPS * self.best.max())
+        first = low[low < best].max(initial=-1) + 1
+        last = low[low > best].min(initial=len(self.best)) - 1
         return float(self.values[first]), float(self.values[last])
 
 
 @dataclass
 class Profiles:
-    """Collects profiles of swept designs in a scenario, by CFA, from tables of results."""
+    """Profiles of swept designs in a scenario, by CFA, collected from tables of results."""
 
     objective: str
     scenario: str
     parameters: Sequence[str]
-    _best: dict[str, dict[str, pd.Series]] = field(default_factory=dict)
+    _best: dict[tuple[str, str], pd.Series] = field(default_factory=dict)
 
     def add(self, table: pa.Table) -> None:
         """Take in some rows of the result table."""
-        wanted = holds(table, "kind", "sweep") & holds(table, "scenario", self.scenario)
-        feasible = table.select([*self.parameters, self.objective, "cfa"]).filter(
-            pa.array(wanted & table["feasible"].to_numpy())
-        )
-        for cfa, rows in feasible.to_pandas().groupby("cfa", observed=True):
-            self._take(str(cfa), rows)
-
-    def _take(self, cfa: str, rows: pd.DataFrame) -> None:
         import pandas as pd  # noqa: PLC0415  (slow to import: workers do without)
 
-        mine = self._best.setdefault(cfa, {})
+        wanted = holds(table, "kind", SWEPT) & holds(table, "scenario", self.scenario) & table["feasible"].to_numpy()
+        rows = table.select([*self.parameters, self.objective, "cfa"]).filter(pa.array(wanted)).to_pandas()
         for name in self.parameters:
-            own = rows.dropna(subset=[name])
-            if own.empty:
-                continue
-            best = own.groupby(name)[self.objective].max()
-            if name in mine:
-                best = pd.concat([mine[name], best]).groupby(level=0).max()
-            mine[name] = _places(best)
+            bests = rows.dropna(subset=[name]).groupby(["cfa", name], observed=True)[self.objective].max()
+            for cfa in bests.index.unique("cfa"):
+                best = bests.loc[cfa]
+                if (cfa, name) in self._best:
+                    best = pd.concat([self._best[cfa, name], best]).groupby(level=0).max()
+                self._best[cfa, name] = _binned(best)
 
     @property
     def found(self) -> dict[str, list[ParameterProfile]]:
         """CFA -> profiles of the parameters that matter most, of those that have more than one value."""
-        made = {
-            cfa: [
-                ParameterProfile(name, best.index.to_numpy(dtype=float), best.to_numpy(dtype=float))
-                for name, best in mine.items()
-                if len(best) > 1
-            ]
-            for cfa, mine in self._best.items()
-        }
-        return {cfa: sorted(found, key=lambda p: -p.drop)[:_MOST_PROFILES] for cfa, found in made.items() if found}
+        profiles: dict[str, list[ParameterProfile]] = {}
+        for (cfa, name), best in self._best.items():
+            if len(best) > 1:
+                profile = ParameterProfile(name, best.index.to_numpy(dtype=float), best.to_numpy(dtype=float))
+                profiles.setdefault(str(cfa), []).append(profile)
+        return {cfa: sorted(made, key=lambda p: -p.drop)[:_MOST_PROFILES] for cfa, made in profiles.items()}
 
 
-def _places(best: pd.Series) -> pd.Series:
+def _binned(best: pd.Series) -> pd.Series:
     """The same, of many values the best one in each of equal parts of their range."""
-    if len(best) <= _MOST_PLACES:
+    if len(best) <= _MOST_VALUES:
         return best
     values = best.index.to_numpy(dtype=float)
-    part = np.floor((values - values.min()) / np.ptp(values) * _MOST_PLACES).clip(max=_MOST_PLACES - 1)
-    kept = best.groupby(part).idxmax()
-    return best.loc[kept.to_numpy()]
+    part = np.floor((values - values.min()) / np.ptp(values) * _MOST_VALUES).clip(max=_MOST_VALUES - 1)
+    return best.loc[best.groupby(part).idxmax().to_numpy()]
 
 
 def profile_table(profiles: Sequence[ParameterProfile]) -> pd.DataFrame:
-    """What each parameter's value matters, in figures."""
+    """Return the profiles in figures, a row each."""
     import pandas as pd  # noqa: PLC0415  (slow to import: workers do without)
 
     return pd.DataFrame(

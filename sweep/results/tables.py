@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -38,10 +39,24 @@ VALIDATED, LEFT_OUT = "validated.parquet", "leave_one_out.parquet"
 VISION, VISION_CONDITIONS = "vision.parquet", "vision_conditions.parquet"
 VISION_MISREAD = "vision_misread.parquet"
 VISION_TABLES = (VISION, VISION_CONDITIONS, VISION_MISREAD)
-"""Of the benchmark of vision: a row per image, per distance and level, per picture that was read wrongly."""
+"""Tables of the benchmark of vision: a row per image, per distance and level, per picture that was read wrongly."""
 AUDIT = "audit.parquet"
 PROVENANCE = "provenance.json"
 RESOLVED = "study.resolved.yaml"
+RUN, SUMS = "run.json", "SHA256SUMS"
+REPORT, FIGURES, VISION_FIGURES = "report.html", "figures", "vision-"
+MADE_BY_RUN = frozenset(
+    (
+        *(RESULTS, SEARCH_LOG, FRONT, CURVES, POINTS, RECOGNITION, CROSSINGS, LIMITED_BY, ROBUSTNESS, REGIONS_MAP),
+        *(SENSOR_MAP, TRADED, RENDERED, VALIDATED, LEFT_OUT, *VISION_TABLES, PROVENANCE, RESOLVED),
+    )
+)
+"""Files that a run itself writes beside its lists; the report draws from them, `sweep audit` adds a table."""
+_DRAWN = re.compile(
+    r"report\.html|cfas\.(png|svg)|pareto(-\d+)?\.(png|svg)|paper_comparison\.(csv|parquet)"
+    r"|figures/((filters|series|places)-\d+|tiles|sensor|signals|chart|scorecard|(color-noise|rendered)-\d+"
+    r"|regions-\d+|clouds-(cfas|designs)|vision-(errors|ranks|misread))\.(png|svg)"
+)
 _PARAMETERS = "cfa_sweep_parameters"
 _ROWS_AT_ONCE = 65_536
 """That PyArrow encodes; columns of one word take less time so than with its own 1,024."""
@@ -58,7 +73,7 @@ _VERDICTS = (
     pa.field("promised_dn", pa.float64()),
     pa.field("status", _TEXT),
 )
-ROW_COLUMNS = tuple(each.name for each in (*_KEYS, *_VERDICTS))
+ROW_COLUMNS = tuple(one.name for one in (*_KEYS, *_VERDICTS))
 """Columns of every result table; parameters and quantities stand between the keys and the verdicts."""
 PLAIN, NAMED, SWEPT, FOUND = "reference", "design", "sweep", "search"
 """Kinds of rows: a plain CFA, a named design, one that was swept, the search's answer."""
@@ -69,15 +84,25 @@ ROW_GROUP = 131_072
 _LEAST_GROUP = ROW_GROUP // 4
 
 
+def is_drawn(name: str) -> bool:
+    """Return whether it is the name of a file of the report."""
+    return _DRAWN.fullmatch(name) is not None
+
+
+def is_own(name: str) -> bool:
+    """Return whether it is a name that commands give to files of a run, beside its two lists."""
+    return name in MADE_BY_RUN or name == AUDIT or is_drawn(name)
+
+
 def result_schema(parameters: Sequence[str], quantities: Sequence[str]) -> pa.Schema:
-    """Columns of the result table: keys, a column per parameter (unit in its name), quantities, verdicts."""
+    """Return the columns of the result table: keys, a column per parameter (unit in its name), quantities, verdicts."""
     number = pa.float64()
     fields = list(_KEYS) + [pa.field(name, number) for name in (*parameters, *quantities)] + list(_VERDICTS)
     return pa.schema(fields, metadata={"cfa_sweep_schema": SCHEMA_VERSION, _PARAMETERS: json.dumps(list(parameters))})
 
 
 def search_schema(parameters: Sequence[str]) -> pa.Schema:
-    """Columns of the search's log: one row per evaluation of the smooth response.
+    """Return the columns of the search's log: one row per evaluation of the smooth response.
 
     `sensitivity_min` is the level of the front that the evaluation belongs to; null in the search itself.
     """
@@ -90,7 +115,7 @@ def search_schema(parameters: Sequence[str]) -> pa.Schema:
 
 
 def front_schema(parameters: Sequence[str]) -> pa.Schema:
-    """Columns of the trade-off that the search traces: one row per level of sensitivity.
+    """Return the columns of the trade-off that the search traces: one row per level of sensitivity.
 
     `cfa_sensitivity_min`: the same level for the whole CFA; null where several channels are modified.
     """
@@ -120,7 +145,7 @@ def write_tables(tables: Iterable[pa.Table], schema: pa.Schema, path: Path) -> N
 
         for table in tables:
             waiting.append(table.replace_schema_metadata(schema.metadata))
-            if sum(each.num_rows for each in waiting) >= _LEAST_GROUP:
+            if sum(table.num_rows for table in waiting) >= _LEAST_GROUP:
                 put()
         put()
 
@@ -131,32 +156,27 @@ def write_csv(table: pd.DataFrame, path: Path) -> None:
 
 
 def csv_of(table: pd.DataFrame) -> str:
-    """A table as CSV with every digit.
+    """Return a table as CSV with every digit.
 
     Pandas alone would print numbers as NumPy's print options say, which other libraries change.
     """
-    return table.to_csv(index=False, float_format=_every_digit)
-
-
-def _every_digit(value: Any) -> str:
-    return repr(float(value))
+    return table.to_csv(index=False, float_format=lambda value: repr(float(value)))  # type: ignore[arg-type]
 
 
 def json_of(data: Mapping[str, Any]) -> str:
-    """A mapping as the text of a JSON file, its keys in order."""
+    """Return a mapping as the text of a JSON file, its keys in order."""
     return json.dumps(data, indent=2, sort_keys=True, allow_nan=False) + "\n"
 
 
 def encoded(table: pa.Table) -> bytes:
-    """A table as the bytes of a Parquet file."""
+    """Return a table as the bytes of a Parquet file."""
     sink = pa.BufferOutputStream()
-    with pq.ParquetWriter(sink, table.schema, **_how(table.schema)) as writer:
-        writer.write_table(table)
+    pq.write_table(table, sink, **_how(table.schema))
     return bytes(sink.getvalue().to_pybytes())
 
 
 def decoded(content: bytes, schema: pa.Schema, rows: int) -> pa.Table | None:
-    """The table of a Parquet file's bytes; None where they hold no such table of so many rows.
+    """Return the table of a Parquet file's bytes; None where they hold no such table of so many rows.
 
     Nothing but its size and its schema is looked at before these fit, so that no more memory is taken than they need.
     """
@@ -164,9 +184,7 @@ def decoded(content: bytes, schema: pa.Schema, rows: int) -> pa.Table | None:
         file = pq.ParquetFile(pa.BufferReader(content), page_checksum_verification=True)
         if file.metadata.num_rows != rows or not file.schema_arrow.equals(schema):
             return None
-        table = file.read()
-        # What the file says of its rows besides, stays.
-        return table.replace_schema_metadata({**(table.schema.metadata or {}), **(schema.metadata or {})})
+        return file.read().replace_schema_metadata(schema.metadata)
     except (OSError, pa.ArrowException):
         return None
 
@@ -185,7 +203,7 @@ def _how(schema: pa.Schema) -> dict[str, Any]:
 
 
 def batches(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
-    """A Parquet file, or some columns, in tables of a row group each; raises OutputError if missing or damaged."""
+    """Yield a Parquet file, or some columns, a row group at a time; raises OutputError if missing or damaged."""
     try:
         # Buffered ahead, a whole file would be in memory.
         file = pq.ParquetFile(path, pre_buffer=False, page_checksum_verification=True)
@@ -196,7 +214,7 @@ def batches(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Tab
 
 
 def rows_in(path: Path) -> int:
-    """Rows of a Parquet file; 0 where it is missing or damaged."""
+    """Return the number of rows of a Parquet file; 0 where it is missing or damaged."""
     try:
         return int(pq.read_metadata(path).num_rows)
     except (OSError, pa.ArrowException):
@@ -204,13 +222,8 @@ def rows_in(path: Path) -> int:
 
 
 def holds(table: pa.Table, column: str, *words: str) -> BoolArray:
-    """Where a column of words (dictionary-encoded) holds one of `words`, ndarray[n_rows]."""
+    """Return where a column of words (dictionary-encoded) holds one of `words`, ndarray[n_rows]."""
     return np.asarray(pc.is_in(table[column].cast(pa.string()), pa.array(words)).to_numpy(), dtype=bool)
-
-
-def release_memory() -> None:
-    """Give memory that Arrow keeps for later back to the system."""
-    pa.default_memory_pool().release_unused()
 
 
 def read_table(path: Path) -> pa.Table:

@@ -1,10 +1,11 @@
-"""A result table of any length, thinned to what a report shows: the front exactly, the named, the best, a sample."""
+"""A result table of any length, thinned to the rows that a report shows: the front exactly, the best, a sample."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +17,7 @@ import pyarrow.parquet as pq
 from ..base.errors import Fault, OutputError
 from ..base.types import BoolArray, IndexArray
 from ..metrics.columns.exposure import EXPOSURE
-from .tables import PLAIN, SWEPT, batches, holds, release_memory
+from .tables import PLAIN, SWEPT, batches, holds
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,27 +28,29 @@ MOST_POINTS = 6_000
 """Swept designs off the front, of those that are feasible and of the others each, that a report draws as points."""
 _BEST = 100
 _MS = 1e3
+_COUNTED = ("kind", "scenario", "cfa", "status", "feasible", "pareto")
 _NOT_SWEPT, _INFEASIBLE, _FEASIBLE, _ON_FRONT = range(4)
+_Group = tuple[str, str, str, str, bool, bool]
 
 
 @dataclass(frozen=True)
 class Counts:
-    """Rows of the whole table, counted by (kind, scenario, CFA, ok, feasible, pareto).
+    """Number of rows of the whole table by kind, scenario, CFA, status, `feasible` and `pareto`.
 
     Plain CFAs are no designs: they count among the rows alone.
     """
 
-    groups: Mapping[tuple[str, str, str, bool, bool, bool], int]
+    groups: Counter[_Group]
 
     @property
     def rows(self) -> int:
         """All rows."""
-        return sum(self.groups.values())
+        return self.groups.total()
 
     @property
     def failed(self) -> int:
         """Rows that could not be computed."""
-        return sum(n for (_, _, _, ok, _, _), n in self.groups.items() if not ok)
+        return sum(n for (_, _, _, status, _, _), n in self.groups.items() if status != "ok")
 
     def feasible(self, scenario: str | None = None, cfa: str | None = None, *, met: bool = True) -> int:
         """Return the number of designs that meet all constraints, or do not, in a scenario and a CFA, or in all."""
@@ -58,31 +61,19 @@ class Counts:
         return sum(n for pareto, n in self._designs(scenario, cfa, met=True) if pareto)
 
     def _designs(self, scenario: str | None, cfa: str | None, met: bool) -> Iterator[tuple[bool, int]]:
-        for (kind, own_scenario, own_cfa, ok, feasible, pareto), n in self.groups.items():
-            if kind != PLAIN and ok and feasible == met and scenario in (None, own_scenario) and cfa in (None, own_cfa):
+        for (kind, own_scenario, own_cfa, status, feasible, pareto), n in self.groups.items():
+            wanted = scenario in (None, own_scenario) and cfa in (None, own_cfa)
+            if kind != PLAIN and status == "ok" and feasible == met and wanted:
                 yield pareto, n
 
 
-def _counted(table: pa.Table) -> Counter[tuple[str, str, str, bool, bool, bool]]:
-    """Count the rows of a row group."""
-    named = {name: table[name].cast(pa.string()) for name in ("kind", "scenario", "cfa")}
-    flags = {
-        "ok": pc.equal(table["status"].cast(pa.string()), "ok"),
-        "feasible": table["feasible"],
-        "pareto": table["pareto"],
-    }
-    columns = named | flags
-    grouped = pa.table(columns).group_by(list(columns)).aggregate([([], "count_all")])
-    return Counter({tuple(row[name] for name in columns): row["count_all"] for row in grouped.to_pylist()})
-
-
 def per_exposure(separation: str) -> str:
-    """A derived column of the table to show: a separation for each millisecond of exposure."""
+    """Return the name of a derived column: a separation for each millisecond of exposure."""
     return f"{separation}_per_ms"
 
 
 def even(size: int, most: int) -> IndexArray:
-    """At most `most` of `size` indices, in order, spread evenly and not in step with a grid."""
+    """Return at most `most` of `size` indices, in order, spread evenly and not in step with a grid."""
     if size <= most:
         return np.arange(size)
     golden = (np.arange(most) * ((5**0.5 - 1) / 2)) % 1
@@ -90,23 +81,23 @@ def even(size: int, most: int) -> IndexArray:
 
 
 def swept_points(path: Path) -> IndexArray:
-    """Ids of the swept designs of a result table that a report draws as points, in order.
+    """Return the ids of the swept designs of a result table that a report draws as points, in order.
 
     They are the feasible front of each CFA and scenario, and an even share of the others, feasible or not. A design's
     id is the number of its row, so that a byte for each row is all that is held of a long table.
     """
-    groups = [np.zeros(0, dtype=np.uint8)]
+    parts = [np.zeros(0, dtype=np.uint8)]
     for table in batches(path, ["kind", "feasible", "pareto", "status"]):
         swept = holds(table, "kind", SWEPT) & holds(table, "status", "ok")
         feasible, pareto = table["feasible"].to_numpy(), table["pareto"].to_numpy()
-        found = np.where(feasible, _FEASIBLE, _INFEASIBLE).astype(np.uint8)
-        found[feasible & pareto] = _ON_FRONT
-        found[~swept] = _NOT_SWEPT
-        groups.append(found)
-    every = np.concatenate(groups)
-    others = (np.flatnonzero(every == group) for group in (_FEASIBLE, _INFEASIBLE))
-    shares = [some[even(some.size, MOST_POINTS)] for some in others]
-    return np.sort(np.concatenate([np.flatnonzero(every == _ON_FRONT), *shares]))
+        part = np.where(feasible, _FEASIBLE, _INFEASIBLE).astype(np.uint8)
+        part[feasible & pareto] = _ON_FRONT
+        part[~swept] = _NOT_SWEPT
+        parts.append(part)
+    groups = np.concatenate(parts)
+    others = (np.flatnonzero(groups == group) for group in (_FEASIBLE, _INFEASIBLE))
+    shares = [ids[even(ids.size, MOST_POINTS)] for ids in others]
+    return np.sort(np.concatenate([np.flatnonzero(groups == _ON_FRONT), *shares]))
 
 
 def thinned(
@@ -116,92 +107,111 @@ def thinned(
     keep: IndexArray,
     see: Callable[[pa.Table], None] = lambda _: None,
 ) -> tuple[pd.DataFrame, Counts]:
-    """The table to show and the counts of the whole one; no more than a row group and what is kept are in memory.
+    """Read the table to show and the counts of the whole one, a row group at a time.
 
-    Kept are all rows that are no sweep, the whole Pareto front, those with the ids `keep`, the best feasible designs by
-    `order` (columns, all maximized), the best of each CFA in each scenario, the designs of each scenario that have most
-    of `separation`, and most of it for their exposure, whatever the constraints, and of the others every n-th. `see` is
-    handed every row group of the whole table.
+    A long table keeps all rows that are no sweep, the whole Pareto front, the best feasible designs of each CFA in each
+    scenario, those with most of `separation`, and most of it for their exposure, in each scenario, and every n-th.
+
+    Parameters
+    ----------
+    path : Path
+    order : sequence of str
+        Columns that say which design is best, all maximized.
+    separation : str
+        A column, DN.
+    keep : ndarray[n_kept]
+        Ids of further designs to keep.
+    see : callable
+        Called with every row group of the whole table.
+
+    Raises
+    ------
+    OutputError
+        The file is missing or damaged.
     """
     try:
         total = int(pq.read_metadata(path).num_rows)
     except (OSError, pa.ArrowException) as error:
         raise OutputError(Fault(f"cannot be read: {error}", str(path))) from None
-    every = max(1, -(-total // MOST_ROWS))
+    step = max(1, -(-total // MOST_ROWS))
     kept: list[pa.Table] = []
-    best: pa.Table | None = None
-    counted: Counter[tuple[str, str, str, bool, bool, bool]] = Counter()
+    counted: Counter[_Group] = Counter()
     for table in batches(path):
         see(table)
-        ok, on_front = table["feasible"].to_numpy(), table["pareto"].to_numpy()
-        counted += _counted(table)
-        always = ~holds(table, "kind", SWEPT) | on_front
-        ids = table["design_id"].to_numpy()
-        kept.append(table.filter(pa.array(always | (ids % every == 0) | np.isin(ids, keep))))
-        if every > 1:
-            few = table.filter(pa.array(ok & ~always))
-            best = best_rows(few if best is None else pa.concat_tables([best, few]), order, _BEST)
-            kept += [leading(table, separation), _best_of_each(few, order)]
-        release_memory()
-    if best is not None:
-        kept.append(best)
+        names = [table[name].cast(pa.string()) for name in _COUNTED[:4]]
+        groups = pa.table([*names, table["feasible"], table["pareto"]], names=_COUNTED).group_by(list(_COUNTED))
+        for row in groups.aggregate([([], "count_all")]).to_pylist():
+            counted[*(row[name] for name in _COUNTED)] += row["count_all"]
+        ids, feasible = table["design_id"].to_numpy(), table["feasible"].to_numpy()
+        wanted = ~holds(table, "kind", SWEPT) | table["pareto"].to_numpy() | (ids % step == 0) | np.isin(ids, keep)
+        if step > 1:
+            wanted[leading_at(table, separation)] = True
+            for rows in row_groups(table).values():
+                among = np.zeros(table.num_rows, dtype=bool)
+                among[rows] = feasible[rows]
+                wanted[best_at(table, order, _BEST, among)] = True
+        kept.append(table.filter(pa.array(wanted)))
+        pa.default_memory_pool().release_unused()
     frame: pd.DataFrame = pa.concat_tables(kept).unify_dictionaries().to_pandas()
-    frame = frame.drop_duplicates("design_id").sort_values("design_id", ignore_index=True)
+    frame = frame.sort_values("design_id", ignore_index=True)
     frame[per_exposure(separation)] = frame[separation] / (frame[EXPOSURE] * _MS)
     return frame, Counts(counted)
 
 
-def best_at(table: pa.Table, order: Sequence[str], most: int, among: BoolArray | None = None) -> IndexArray:
-    """Where the best rows are by columns that are maximized, in their order; of equal ones the smallest `design_id`.
+def row_groups(table: pa.Table) -> dict[tuple[str, str], IndexArray]:
+    """Return the indices of the rows of each CFA and scenario."""
+    cfas, scenarios = (
+        {name: holds(table, column, name) for name in table[column].unique().to_pylist()}
+        for column in ("cfa", "scenario")
+    )
+    groups = {(cfa, scene): np.flatnonzero(cfas[cfa] & scenarios[scene]) for cfa, scene in product(cfas, scenarios)}
+    return {group: at for group, at in groups.items() if at.size}
 
-    `among`: rows to look at, ndarray[n_rows]; all without it.
+
+def best_at(table: pa.Table, order: Sequence[str], most: int, among: BoolArray) -> IndexArray:
+    """Return the indices of the best rows, best first; of equal ones the smallest `design_id` is first.
+
+    Parameters
+    ----------
+    table : pyarrow.Table
+    order : sequence of str
+        Columns that are maximized.
+    most : int
+        Number of rows.
+    among : ndarray[n_rows]
+        Rows that take part.
     """
-    at = np.arange(table.num_rows) if among is None else np.flatnonzero(among)
+    at = np.flatnonzero(among)
     if len(at) > most:
-        first = table[order[0]].to_numpy()[at]
-        first = np.where(np.isnan(first), -np.inf, first)
+        first = np.nan_to_num(table[order[0]].to_numpy()[at], nan=-np.inf, posinf=np.inf, neginf=-np.inf)
         at = at[first >= np.partition(first, -most)[-most]]
     keys = [*((name, "descending") for name in dict.fromkeys(order)), ("design_id", "ascending")]
     few = table.select([name for name, _ in keys]).take(at)
     return np.asarray(at[pc.sort_indices(few, sort_keys=keys)[:most].to_numpy()])
 
 
-def best_rows(table: pa.Table, order: Sequence[str], most: int) -> pa.Table:
-    """The rows of `best_at`."""
-    return table.take(best_at(table, order, most)).combine_chunks()
-
-
 def leading_at(table: pa.Table, separation: str, among: BoolArray | None = None) -> IndexArray:
-    """Where, in each scenario, the design is that separates most, and the one that separates most for its exposure.
+    """Return, for each scenario, the indices of the rows with the largest separation, and the largest for its exposure.
 
-    Of equal ones the smallest `design_id`; `among`: rows to look at, ndarray[n_rows]; all without it.
+    Parameters
+    ----------
+    table : pyarrow.Table
+    separation : str
+        A column, DN. Of equal rows the one with the smallest `design_id` counts.
+    among : ndarray[n_rows], optional
+        Rows that take part; all without it.
     """
-    seen = np.ones(table.num_rows, dtype=bool) if among is None else among
-    apart, ids = table[separation].to_numpy(), table["design_id"].to_numpy()
+    among = np.ones(table.num_rows, dtype=bool) if among is None else among
+    csd, ids = table[separation].to_numpy(), table["design_id"].to_numpy()
     with np.errstate(divide="ignore", invalid="ignore"):
         measures = [
-            np.nan_to_num(v, nan=-np.inf, posinf=np.inf, neginf=-np.inf)
-            for v in (apart, apart / table[EXPOSURE].to_numpy())
+            np.nan_to_num(values, nan=-np.inf, posinf=np.inf, neginf=-np.inf)
+            for values in (csd, csd / table[EXPOSURE].to_numpy())
         ]
-    found = []
+    leaders = []
     for scenario in table["scenario"].unique().to_pylist():
-        own = np.flatnonzero(seen & holds(table, "scenario", scenario))
-        for measured in measures if own.size else ():
-            most = own[measured[own] == measured[own].max()]
-            found.append(most[ids[most].argmin()])
-    return np.array(found, dtype=np.intp)
-
-
-def leading(table: pa.Table, separation: str) -> pa.Table:
-    """The rows of `leading_at`."""
-    return table.take(leading_at(table, separation))
-
-
-def _best_of_each(table: pa.Table, order: Sequence[str]) -> pa.Table:
-    """The best design of each CFA in each scenario."""
-    found = [table.schema.empty_table()]
-    for scenario in table["scenario"].unique().to_pylist():
-        own = table.filter(pa.array(holds(table, "scenario", scenario)))
-        for cfa in own["cfa"].unique().to_pylist():
-            found.append(best_rows(own.filter(pa.array(holds(own, "cfa", cfa))), order, 1))
-    return pa.concat_tables(found)
+        rows = np.flatnonzero(among & holds(table, "scenario", scenario))
+        for values in measures if rows.size else ():
+            most = rows[values[rows] == values[rows].max()]
+            leaders.append(most[ids[most].argmin()])
+    return np.array(leaders, dtype=np.intp)

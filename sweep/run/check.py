@@ -1,4 +1,4 @@
-"""Rows of a run against the reference settings: every effect, and the finest accuracy."""
+"""Rows of a run against the reference settings: all effects, and the finest accuracy."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 
-from ..base.types import FloatArray, delayed
+from ..base.types import delayed
 from ..camera.accuracy import REFERENCE
 from ..camera.forward import ForwardModel
 from ..camera.setup import Setup
@@ -34,27 +34,14 @@ _MOST_ROWS, _ENOUGH_ROWS = 200, 5000
 Row = Mapping[str, Any]
 
 
-def reference_setup(setup: Setup) -> Setup:
-    """The setup with every effect, at the reference settings."""
-    return replace(setup.with_all_effects, accuracy=REFERENCE)
-
-
-def allowed_dn(setup: Setup, tolerance_dn: float) -> float:
-    """Difference of a CSD from the reference that is no fault, DN.
-
-    That is the tolerance. A readout in whole numbers without noise steps by up to sqrt(channels) DN between neighboring
-    values of what is sampled: where images of a light, moments of a pulse or all field positions count, that is added.
-    """
-    scene, steps = setup.scene, setup.scene.noise is None and setup.computes("quantization")
-    sampled = scene.target is not None or scene.drive is not None or setup.all_heights
-    return tolerance_dn + (math.sqrt(len(setup.camera.mosaic.channels)) if steps and sampled else 0.0)
-
-
 def compared_rows(study: Study, rows: Sequence[Row]) -> Iterator[list[dict[str, Any]]]:
     """Compare rows of the result table with the reference, a block of designs of one space and scene at a time.
 
-    Each has `design_id`, `filter_id`, `scenario`, `plan`, `allowed_dn`, `realized_dn`: the largest difference of any
-    CSD, infinite where only one of both is a number, and the `quantity` that has it.
+    Yields
+    ------
+    list of dict
+        `design_id`, `filter_id`, `scenario`, `plan`, `allowed_dn`, `realized_dn`: the largest difference of any CSD,
+        infinite where only one of both is a number, and the `quantity` that has it.
     """
     groups: dict[tuple[int, str], tuple[Space, list[Row]]] = {}
     for row in rows:
@@ -68,7 +55,13 @@ def compared_rows(study: Study, rows: Sequence[Row]) -> Iterator[list[dict[str, 
 def _compared(study: Study, space: Space, scenario: str, rows: Sequence[Row]) -> list[dict[str, Any]]:
     points = np.array([[row[name] for name in space.parameters] for row in rows], dtype=float)
     setup = study.setup(space, scenario)
-    exact = _at_reference(study, space, setup, points)
+    model = ForwardModel(replace(setup.with_all_effects, accuracy=REFERENCE))
+    nominal = evaluate(model, space.curves(points, study.grid.size))
+    csds = [quantity for quantity in study.quantities.values() if quantity.promised]
+    worst = [quantity for quantity in csds if quantity.extreme == WORST_CASE]
+    exact = {quantity.name: nominal[quantity.name] for quantity in csds if quantity not in worst}
+    if worst:
+        exact |= worst_cases(space, model, points, nominal, worst, study.tolerance)
     differences = []
     for name, values in exact.items():
         kept = np.array([row[name] for row in rows], dtype=float)
@@ -76,7 +69,7 @@ def _compared(study: Study, space: Space, scenario: str, rows: Sequence[Row]) ->
         both_missing = np.isnan(kept) & np.isnan(values)
         differences.append(np.nan_to_num(np.where(both_missing, 0.0, np.abs(values - kept)), nan=np.inf))
     realized, names = np.stack(differences), list(exact)
-    allowed = allowed_dn(setup, study.plans[scenario].tolerance_dn if study.plans else study.section.tolerance_dn)
+    allowed = _allowed_dn(setup, study.plans[scenario].tolerance_dn if study.plans else study.section.tolerance_dn)
     return [
         {key: row[key] for key in ("design_id", "filter_id", "scenario", "plan")}
         | {"allowed_dn": allowed, "realized_dn": float(realized[at, index]), "quantity": names[at]}
@@ -84,21 +77,28 @@ def _compared(study: Study, space: Space, scenario: str, rows: Sequence[Row]) ->
     ]
 
 
-def _at_reference(study: Study, space: Space, setup: Setup, points: FloatArray) -> dict[str, FloatArray]:
-    """CSDs at the reference settings, ndarray[n_designs] each."""
-    model = ForwardModel(reference_setup(setup))
-    nominal = evaluate(model, space.curves(points, study.grid.size))
-    asked = [quantity for quantity in study.quantities.values() if quantity.promised]
-    worst = [quantity for quantity in asked if quantity.extreme == WORST_CASE]
-    csds = {quantity.name: nominal[quantity.name] for quantity in asked if quantity not in worst}
-    return csds | (worst_cases(space, model, points, nominal, worst, study.tolerance) if worst else {})
+def _allowed_dn(setup: Setup, tolerance_dn: float) -> float:
+    """Difference of a CSD from the reference that is no fault, DN.
+
+    That is the tolerance. A readout in whole numbers without noise steps by up to sqrt(channels) DN between neighboring
+    values of what is sampled: where images of a light, moments of a pulse or all field positions count, that is added.
+    """
+    scene, steps = setup.scene, setup.scene.noise is None and setup.computes("quantization")
+    sampled = scene.target is not None or scene.drive is not None or setup.all_heights
+    return tolerance_dn + (math.sqrt(len(setup.camera.mosaic.channels)) if steps and sampled else 0.0)
 
 
 def check_run(study: Study, results: Path, seconds: float, crew: Workers) -> tuple[CheckFacts | None, list[str]]:
     """Compare a seeded sample of a run's rows with the reference, as many as fit into some seconds, at least one.
 
-    Every worker, which knows the scenes, takes a part of them and of the time, and at least one row. Returns the
-    result, None where no row could be compared, and a warning for each row that could not.
+    Each worker, which knows the scenes, takes a part of them and of the time.
+
+    Returns
+    -------
+    check : CheckFacts or None
+        None where no row could be compared.
+    warnings : list of str
+        One for each row that could not.
     """
     sample = _sampled(study, results)
     parts = [sample[at :: crew.count] for at in range(crew.count)]
@@ -111,19 +111,12 @@ def check_run(study: Study, results: Path, seconds: float, crew: Workers) -> tup
     if not rows:
         return None, warnings
     shown = max(rows, key=lambda row: (row["realized_dn"] > row["allowed_dn"], row["realized_dn"]))
-    check = CheckFacts(
-        rows=len(rows),
-        design_id=int(shown["design_id"]),
-        scenario=str(shown["scenario"]),
-        quantity=str(shown["quantity"]),
-        largest_dn=float(shown["realized_dn"]),
-        allowed_dn=float(shown["allowed_dn"]),
-    )
-    return check, warnings
+    keys = {key: shown[key] for key in ("design_id", "scenario", "quantity", "allowed_dn")}
+    return CheckFacts(rows=len(rows), largest_dn=shown["realized_dn"], **keys), warnings
 
 
 def _checked(study: Study, rows: Sequence[Row], seconds: float) -> tuple[list[dict[str, Any]], list[str]]:
-    """`compared_rows` of some rows, until the time is over; and what could not be compared."""
+    """`compared_rows` of some rows, until the time is over, and a warning for each that could not be compared."""
     ended = time.monotonic() + seconds
     result: list[dict[str, Any]] = []
     warnings: list[str] = []
@@ -146,6 +139,6 @@ def _sampled(study: Study, results: Path) -> list[Row]:
         sizes = np.cumsum([table.metadata.row_group(int(group)).num_rows for group in groups])
         part = table.read_row_groups(sorted(groups[: 1 + int(np.searchsorted(sizes, _ENOUGH_ROWS))].tolist()))
     part = part.filter(holds(part, "status", "ok"))
-    some = rng.choice(part.num_rows, size=min(part.num_rows, _MOST_ROWS), replace=False)
-    rows = part.take(some).to_pylist()
+    chosen = rng.choice(part.num_rows, size=min(part.num_rows, _MOST_ROWS), replace=False)
+    rows = part.take(chosen).to_pylist()
     return [{name: math.nan if value is None else value for name, value in row.items()} for row in rows]

@@ -11,14 +11,14 @@ import pyarrow as pa
 
 from ..base.types import FloatArray
 from ..curves.tasks import Chart, StudyTasks
-from ..results.designs import row_curves
-from ..results.tables import CHART, FEW, NIGHT
+from ..results.designs import few_rows, row_curves
+from ..results.tables import CHART, NIGHT
 from ..study import Study
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_TOLD = ("design_id", "name", "scenario")
+_KEYS = ("design_id", "name", "scenario")
 _DESIGN = [("design_id", pa.int64()), ("name", pa.string()), ("scenario", pa.string())]
 _TRADED = pa.schema(
     [*_DESIGN, ("light", pa.string()), *((name, pa.float64()) for name in ("regularization", "delta_e_mean", "snr"))]
@@ -30,13 +30,12 @@ _RENDERED = pa.schema(
 
 
 def _shown(study: Study, highlights: pd.DataFrame) -> Iterator[tuple[dict[str, Any], Any]]:
-    """What a row is called by, and what its design sees: plain CFAs, named designs and the search's answer."""
+    """Keys of the rows of plain CFAs, named designs and the answer, and their colors."""
     from ..metrics.tasks.color import Looks  # noqa: PLC0415  (few studies have tasks)
 
-    rows = highlights[highlights["kind"].isin(FEW) & (highlights["status"] == "ok")]
-    for row in rows.to_dict("records"):
+    for row in few_rows(highlights):
         space, curves = row_curves(study, row)
-        yield {key: row[key] for key in _TOLD}, Looks(study.setup(space, row["scenario"]), curves)
+        yield {key: row[key] for key in _KEYS}, Looks(study.setup(space, row["scenario"]), curves)
 
 
 def _chart_of(tasks: StudyTasks) -> tuple[tuple[str, ...], Chart]:
@@ -46,23 +45,23 @@ def _chart_of(tasks: StudyTasks) -> tuple[tuple[str, ...], Chart]:
 
 
 def traded_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
-    """A row per design, light and regularization of the color matrix."""
+    """Return a row per design, light and regularization of the color matrix."""
     from ..metrics.tasks.judge import REGULARIZATIONS, traded  # noqa: PLC0415  (few studies have tasks)
 
     assert study.tasks is not None
     cases, chart = _chart_of(study.tasks)
     rows = []
-    for told, looks in _shown(study, highlights):
+    for design, looks in _shown(study, highlights):
         for at, case in enumerate(cases):
-            found = traded(looks, chart, at, study.tasks.conditions)
-            for regularization, delta_e, snr in zip(REGULARIZATIONS, *found, strict=True):
-                own = {"light": case, "regularization": float(regularization), "delta_e_mean": delta_e, "snr": snr}
-                rows.append(told | own)
+            traded_off = traded(looks, chart, at, study.tasks.conditions)
+            for regularization, delta_e, snr in zip(REGULARIZATIONS, *traded_off, strict=True):
+                values = {"light": case, "regularization": float(regularization), "delta_e_mean": delta_e, "snr": snr}
+                rows.append(design | values)
     return pa.Table.from_pylist(rows, schema=_TRADED)
 
 
 def rendered_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
-    """A row per design, picture and area; those of the eye itself have no design.
+    """Return a row per design, picture and area; those of the eye itself have no design.
 
     The chart stands in daylight of the study's illuminance; the night scene under white LEDs has its own.
     """
@@ -78,23 +77,25 @@ def rendered_table(study: Study, highlights: pd.DataFrame) -> pa.Table:
     streets = night_scene(study.grid)
     street = np.stack(list(streets.values()))
     white = chart.gray[night] / 0.18 * NIGHT_LX
-    seen = [energy_from_photons(study.grid.nodes_nm, each) @ color_matching(study.grid).T for each in (street, white)]
+    seen = [
+        energy_from_photons(study.grid.nodes_nm, photons) @ color_matching(study.grid).T for photons in (street, white)
+    ]
     names = [str(number) for number in range(1, len(chart.xyz[day]) + 1)]
     rows = _areas({}, CHART, names, chart.xyz[day] / chart.white[day]) + _areas({}, NIGHT, streets, seen[0] / seen[1])
     dark = replace(tasks.conditions, illuminance_lx=NIGHT_LX)
-    for told, looks in _shown(study, highlights):
+    for design, looks in _shown(study, highlights):
         patches = chart.photons[day] * tasks.conditions.illuminance_lx
-        rows += _areas(told, CHART, names, *rendered_areas(looks, chart, day, patches, tasks.conditions))
-        rows += _areas(told, NIGHT, streets, *rendered_areas(looks, chart, night, street, dark))
+        rows += _areas(design, CHART, names, *rendered_areas(looks, chart, day, patches, tasks.conditions))
+        rows += _areas(design, NIGHT, streets, *rendered_areas(looks, chart, night, street, dark))
     return pa.Table.from_pylist(rows, schema=_RENDERED)
 
 
 def _areas(
-    told: dict[str, Any], picture: str, names: Any, xyz: FloatArray, covariance: FloatArray | None = None
+    design: dict[str, Any], picture: str, names: Any, xyz: FloatArray, covariance: FloatArray | None = None
 ) -> list[dict[str, Any]]:
     """Rows of a picture; without a covariance there is no noise."""
     spread = np.zeros((len(xyz), 3, 3)) if covariance is None else covariance
     return [
-        told | {"picture": picture, "area": area, "xyz": own.tolist(), "covariance": noise.ravel().tolist()}
-        for area, own, noise in zip(names, xyz, spread, strict=True)
+        design | {"picture": picture, "area": area, "xyz": color.tolist(), "covariance": noise.ravel().tolist()}
+        for area, color, noise in zip(names, xyz, spread, strict=True)
     ]

@@ -1,4 +1,4 @@
-"""From finished chunks to one table: the front over all of them, and the few rows that reports draw, by streaming."""
+"""Report rows and Pareto front of a run, reduced from its tables as they come."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pyarrow as pa
 from ..base.types import BoolArray, FloatArray, IndexArray
 from ..metrics.pareto import non_dominated
 from ..results.tables import FEW, SWEPT, holds
-from ..results.thinning import best_at, best_rows, leading, leading_at
-from .rows import Rules
+from ..results.thinning import best_at, leading_at, row_groups
+from .routes import Rules
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,162 +20,122 @@ BEST_PER_CFA = 12
 """Best feasible designs of each CFA's sweeps that the report lists and draws."""
 FRONT_ROWS = 200
 """Designs of a front, spread evenly over it, whose curves and signals a report can show."""
-_MOST_CANDIDATES, _AT_ONCE = 50_000, 10_000
-"""Rows from which on fronts are thinned, and from which on rows that came are taken in."""
-
-
-class Front:
-    """The non-dominated rows of each CFA and scenario, of tables whose `pareto` marks those of each table alone.
-
-    Both quantities of `axes` are maximized. A design takes part when it meets every constraint but those on these two,
-    so that the front shows the whole trade-off.
-    """
-
-    def __init__(self, axes: tuple[str, str], kind: str | None = None) -> None:
-        """`kind`: of the rows that take part; all without one."""
-        self._axes, self._kind = axes, kind
-        self._groups: dict[tuple[str, str], FloatArray] = {}
-        self._on_it: dict[tuple[str, str], set[tuple[float, ...]]] = {}
-
-    def add(self, table: pa.Table) -> None:
-        """Take in the rows that a table marks."""
-        for group, values in self._by_group(table).items():
-            both = np.concatenate([self._groups.get(group, np.empty((0, 2))), values])
-            if len(both) > _MOST_CANDIDATES:
-                both = _thinned(both)
-            self._groups[group] = both
-
-    def finish(self) -> None:
-        """Nothing more comes."""
-        self._groups = {group: _thinned(values) for group, values in self._groups.items()}
-        self._on_it = {group: set(map(tuple, values.tolist())) for group, values in self._groups.items()}
-
-    def points(self, cfa: str, scenario: str) -> FloatArray:
-        """The two quantities of a front's rows, ndarray[n, 2], each pair once."""
-        return self._groups.get((cfa, scenario), np.empty((0, 2)))
-
-    def holds(self, table: pa.Table) -> BoolArray:
-        """Which rows of a table are on the whole front, which is finished, ndarray[n_rows]."""
-        local, values, groups = self._candidates(table)
-        front: BoolArray = np.zeros(table.num_rows, dtype=bool)
-        front[local] = [tuple(v) in self._on_it.get(g, ()) for v, g in zip(values.tolist(), groups, strict=True)]
-        return front
-
-    def marked(self, table: pa.Table) -> pa.Table:
-        """The table with `pareto` only where a row is on the whole front, which is finished."""
-        at, field = table.schema.get_field_index("pareto"), table.schema.field("pareto")
-        return table.set_column(at, field, pa.array(self.holds(table)))
-
-    def _candidates(self, table: pa.Table) -> tuple[IndexArray, FloatArray, list[tuple[str, str]]]:
-        wanted = table["pareto"].to_numpy()
-        if self._kind is not None:
-            wanted = wanted & holds(table, "kind", self._kind)
-        local = np.flatnonzero(wanted)
-        few = table.select([*self._axes, "cfa", "scenario"]).take(pa.array(local))
-        values = np.stack([few[name].to_numpy() for name in self._axes], axis=1)
-        return local, values, list(zip(few["cfa"].to_pylist(), few["scenario"].to_pylist(), strict=True))
-
-    def _by_group(self, table: pa.Table) -> dict[tuple[str, str], FloatArray]:
-        _, values, groups = self._candidates(table)
-        return {g: values[[other == g for other in groups]] for g in dict.fromkeys(groups)}
-
-
-def _thinned(values: FloatArray) -> FloatArray:
-    """The non-dominated rows, each once."""
-    return np.unique(values[non_dominated(values)], axis=0)
-
-
-class Gathered:
-    """What a run keeps of its rows: the front of all of them, that of the swept ones, and those that reports draw.
-
-    Those are every plain CFA, named design and answer, in the first scenario the best swept designs of each CFA and
-    some of its front, and in each scenario who separates most, and most for its exposure, whatever the constraints.
-    """
-
-    def __init__(self, rules: Rules, scenario: str) -> None:
-        """`scenario`: the first one, in which swept designs are drawn."""
-        self.rules, self.scenario = rules, scenario
-        self.front, self.swept = Front(rules.front), Front(rules.front, "sweep")
-        self._waiting: list[pa.Table] = []
-        self._waiting_rows = 0
-        self._always: list[pa.Table] = []
-        self._best: dict[str, pa.Table] = {}
-        self._feasible: dict[str, pa.Table] = {}
-        self._leading: dict[str, pa.Table] = {}
-
-    def add(self, few: pa.Table) -> None:
-        """Take in what `few_of` a table gives; several at once, since they are few rows."""
-        self._waiting.append(few)
-        self._waiting_rows += few.num_rows
-        if self._waiting_rows >= _AT_ONCE:
-            self._take_in()
-
-    def _take_in(self) -> None:
-        if not self._waiting:
-            return
-        few = pa.concat_tables(self._waiting).unify_dictionaries().combine_chunks()
-        self._waiting.clear()
-        self._waiting_rows = 0
-        self.front.add(few)
-        self.swept.add(few)
-        always = holds(few, "kind", *FEW)
-        if always.any():
-            self._always.append(few.filter(pa.array(always)))
-        every = few.filter(pa.array(holds(few, "kind", SWEPT)))
-        for scenario in every["scenario"].unique().to_pylist():
-            own = every.filter(pa.array(holds(every, "scenario", scenario)))
-            both = pa.concat_tables([self._leading[scenario], own]) if scenario in self._leading else own
-            self._leading[scenario] = leading(both.unify_dictionaries(), self.rules.front[0])
-        swept = every.filter(pa.array(holds(every, "scenario", self.scenario) & every["feasible"].to_numpy()))
-        for cfa in swept["cfa"].unique().to_pylist():
-            own = swept.filter(pa.array(holds(swept, "cfa", cfa)))
-            both = pa.concat_tables([self._best[cfa], own]) if cfa in self._best else own
-            self._best[cfa] = best_rows(both, self.rules.order, BEST_PER_CFA)
-            marked = own.filter(own["pareto"])
-            both = pa.concat_tables([self._feasible[cfa], marked]) if cfa in self._feasible else marked
-            self._feasible[cfa] = self._non_dominated(both) if both.num_rows > _MOST_CANDIDATES else both
-
-    @property
-    def _kept(self) -> list[pa.Table]:
-        """Rows that are always drawn. An empty table, for which PyArrow loads pandas, is made when workers are done."""
-        return [self.rules.schema.empty_table(), *self._always]
-
-    def _non_dominated(self, table: pa.Table) -> pa.Table:
-        values = np.stack([table[name].to_numpy() for name in self.rules.front], axis=1)
-        return table.filter(pa.array(non_dominated(values))).combine_chunks()
-
-    def finish(self) -> None:
-        """Nothing more comes."""
-        self._take_in()
-        self.front.finish()
-        self.swept.finish()
-
-    def frame(self) -> pd.DataFrame:
-        """The rows to draw, `pareto` as on the whole front; ordered by their ids."""
-        return self._frame([*self._kept, *self._best.values()])
-
-    def front_frame(self) -> pd.DataFrame:
-        """Swept rows: feasible ones of the whole front in the first scenario, evenly up to FRONT_ROWS; who leads."""
-        every = leading(
-            pa.concat_tables([*self._kept, *self._leading.values()]).unify_dictionaries(), self.rules.front[0]
-        )
-        tables = [every.filter(pa.array(holds(every, "kind", SWEPT)))]
-        for table in self._feasible.values():
-            found = self.front.marked(table)
-            found = found.filter(found["pareto"]).sort_by([(self.rules.front[1], "ascending")])
-            spread = np.linspace(0, max(0, found.num_rows - 1), min(FRONT_ROWS, found.num_rows)).round().astype(int)
-            tables.append(found.take(pa.array(spread)))
-        return self._frame(tables)
-
-    def _frame(self, tables: list[pa.Table]) -> pd.DataFrame:
-        frame: pd.DataFrame = self.front.marked(pa.concat_tables(tables).unify_dictionaries()).to_pandas()
-        return frame.drop_duplicates("design_id").sort_values("design_id", ignore_index=True)
+_AT_ONCE = 50_000
+"""Rows that are held before they are reduced."""
+_Group = tuple[str, str]
+"""A CFA and a scenario."""
 
 
 def few_of(table: pa.Table, rules: Rules) -> pa.Table:
-    """The rows of a chunk that `Gathered` may keep: its front, those that are no sweep, its best designs, who leads."""
-    wanted = table["pareto"].to_numpy() | holds(table, "kind", *FEW)
-    best = best_at(table, rules.order, BEST_PER_CFA, table["feasible"].to_numpy() & ~wanted)
-    leaders = leading_at(table, rules.front[0], ~wanted)
-    found = dict.fromkeys([*np.flatnonzero(wanted).tolist(), *best.tolist(), *leaders.tolist()])
-    return table.take(np.array([*found], dtype=np.int64)).combine_chunks()
+    """Return the rows that a report may need of a table, of each CFA and scenario: its front, the best, the leading.
+
+    All rows that are no sweep are among them. `pareto` marks the front of any part of a run's rows, so that the
+    function may be applied again to its results put together.
+    """
+    few, on_front = holds(table, "kind", *FEW), table["pareto"].to_numpy()
+    feasible = table["feasible"].to_numpy()
+    kept = [np.flatnonzero(few), leading_at(table, rules.front[0], ~few)]
+    for at in row_groups(table).values():
+        swept = at[~few[at]]
+        marked = swept[on_front[swept]]
+        kept.append(marked[non_dominated(_values(table.take(marked), rules.front))])
+        eligible = np.zeros(table.num_rows, dtype=bool)
+        eligible[swept] = feasible[swept]
+        kept.append(best_at(table, rules.order, BEST_PER_CFA, eligible))
+    return table.take(np.unique(np.concatenate(kept)).astype(np.int64)).combine_chunks()
+
+
+def _values(table: pa.Table, axes: tuple[str, str]) -> FloatArray:
+    return np.stack([table[name].to_numpy() for name in axes], axis=1)
+
+
+class Gathered:
+    """Rows of a run that its report shows, and the Pareto front of each CFA and scenario.
+
+    Parameters
+    ----------
+    rules : Rules
+        Rules by which designs became rows; both quantities of the front are maximized.
+    scenario : str
+        The first scenario: its swept designs are drawn.
+    """
+
+    def __init__(self, rules: Rules, scenario: str) -> None:
+        self.rules, self.scenario = rules, scenario
+        self._waiting: list[pa.Table] = []
+        self._rows = pa.table({})
+        self._front: dict[_Group, set[tuple[float, ...]]] = {}
+
+    def add(self, few: pa.Table) -> None:
+        """Add the result of `few_of` for a part of the rows."""
+        self._waiting.append(few)
+        if sum(table.num_rows for table in self._waiting) > _AT_ONCE:
+            self._waiting = [few_of(self._all(), self.rules)]
+
+    def _all(self) -> pa.Table:
+        return (
+            pa.concat_tables([self.rules.schema.empty_table(), *self._waiting])
+            .unify_dictionaries()
+            .combine_chunks()
+            .sort_by("design_id")
+        )
+
+    def finish(self) -> None:
+        """Find the front of the whole run, after all rows were added."""
+        self._rows, self._waiting = self._all(), []
+        marked = self._rows.filter(self._rows["pareto"])
+        for group, at in row_groups(marked).items():
+            values = _values(marked.take(at), self.rules.front)
+            self._front[group] = set(map(tuple, values[non_dominated(values)].tolist()))
+
+    def swept_front(self, cfa: str, scenario: str) -> FloatArray:
+        """Return the two quantities of the front of the swept rows alone, ndarray[n, 2], each pair once."""
+        wanted = holds(self._rows, "kind", SWEPT) & holds(self._rows, "cfa", cfa)
+        wanted &= holds(self._rows, "scenario", scenario) & self._rows["pareto"].to_numpy()
+        values = _values(self._rows.filter(pa.array(wanted)), self.rules.front)
+        return np.unique(values[non_dominated(values)], axis=0)
+
+    def marked(self, table: pa.Table) -> pa.Table:
+        """Return a table of the run with `pareto` only where a row is on the front of the whole run."""
+        front: BoolArray = np.zeros(table.num_rows, dtype=bool)
+        local = np.flatnonzero(table["pareto"].to_numpy())
+        few = table.take(local)
+        groups = zip(few["cfa"].to_pylist(), few["scenario"].to_pylist(), strict=True)
+        values = map(tuple, _values(few, self.rules.front).tolist())
+        front[local] = [pair in self._front[group] for pair, group in zip(values, groups, strict=True)]
+        at = table.schema.get_field_index("pareto")
+        return table.set_column(at, table.schema.field(at), pa.array(front))
+
+    def frame(self) -> pd.DataFrame:
+        """Return the rows to draw: all that are no sweep, and of the first scenario the best of each CFA's sweeps."""
+        few, drawn = holds(self._rows, "kind", *FEW), self._drawn()
+        best = [
+            best_at(self._rows, self.rules.order, BEST_PER_CFA, drawn & holds(self._rows, "cfa", cfa))
+            for cfa in self._cfas()
+        ]
+        return self._frame([np.flatnonzero(few), *best])
+
+    def front_frame(self) -> pd.DataFrame:
+        """Return swept rows: an even share of the first scenario's feasible front, and those that lead a scenario."""
+        leaders = leading_at(self._rows, self.rules.front[0])
+        at = [leaders[holds(self._rows, "kind", SWEPT)[leaders]]]
+        front = self._drawn() & self.marked(self._rows)["pareto"].to_numpy()
+        sensitivity = self._rows[self.rules.front[1]].to_numpy()
+        for cfa in self._cfas():
+            rows = np.flatnonzero(front & holds(self._rows, "cfa", cfa))
+            rows = rows[np.argsort(sensitivity[rows], kind="stable")]
+            at.append(rows[np.linspace(0, max(0, rows.size - 1), min(FRONT_ROWS, rows.size)).round().astype(int)])
+        return self._frame(at)
+
+    def _drawn(self) -> BoolArray:
+        """Feasible swept rows of the first scenario."""
+        swept = holds(self._rows, "kind", SWEPT) & holds(self._rows, "scenario", self.scenario)
+        return np.asarray(swept & self._rows["feasible"].to_numpy())
+
+    def _cfas(self) -> list[str]:
+        return list(self._rows["cfa"].unique().to_pylist())
+
+    def _frame(self, at: list[IndexArray]) -> pd.DataFrame:
+        """Rows at these indices, each once, in the order of their ids."""
+        frame: pd.DataFrame = self.marked(self._rows.take(np.unique(np.concatenate(at)))).to_pandas()
+        return frame

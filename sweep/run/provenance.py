@@ -1,4 +1,4 @@
-"""Where results come from: the resolved study, versions, digests, seed, platform."""
+"""Provenance of results: the resolved study, versions, digests, seed, platform."""
 
 from __future__ import annotations
 
@@ -17,14 +17,8 @@ from ..study.yaml_tree import yaml_text
 _PACKAGES = ("cfa-sweep", "numpy", "scipy", "numba", "pandas", "pyarrow", "joblib", "nlopt", "moocore")
 
 
-def _packages(study: Study) -> tuple[str, ...]:
-    """The packages that a run's numbers may depend on."""
-    vision = study.section.vision
-    return (*_PACKAGES, "jax", "optax") if vision is not None and vision.network else _PACKAGES
-
-
 def resolved_yaml(study: Study) -> str:
-    """The study with every default written out; a study file itself."""
+    """Return the study with all defaults written out; a study file itself."""
     section = study.section.model_dump(mode="json", by_alias=True, exclude_none=True)
     for key in ("sensor", "lights"):
         named = not section[key]["files"] and not section[key].get("technology")
@@ -35,7 +29,7 @@ def resolved_yaml(study: Study) -> str:
 
 
 def plan_facts(study: Study) -> dict[str, Any]:
-    """How each scene was simulated."""
+    """Return how each scene was simulated."""
     return {
         name: {
             "key": plan.key,
@@ -49,13 +43,14 @@ def plan_facts(study: Study) -> dict[str, Any]:
 
 
 def provenance(study: Study, how: Mapping[str, Any]) -> dict[str, Any]:
-    """Everything needed to run the study again, and what the machine was.
+    """Return all that is needed to run the study again, and the machine.
 
     `how`: `command`, `duration_s`, `backend`, `scheduler` and `workers` of the run.
     """
+    vision = study.section.vision
+    packages = (*_PACKAGES, "jax", "optax") if vision is not None and vision.network else _PACKAGES
     return {
-        "command": how["command"],
-        "duration_s": how["duration_s"],
+        **how,
         "seed": study.section.seed,
         "fingerprint": fingerprint(study),
         "model_version": MODEL_VERSION,
@@ -68,12 +63,9 @@ def provenance(study: Study, how: Mapping[str, Any]) -> dict[str, Any]:
             "has_clear": study.sensor.has_clear,
         },
         "lights": {"name": study.lights.name, "source": study.lights.source, "surrogate": study.lights.surrogate},
-        "versions": {"python": platform.python_version()} | {name: version(name) for name in _packages(study)},
+        "versions": {"python": platform.python_version()} | {name: version(name) for name in packages},
         "platform": platform.platform(),
         "byte_order": sys.byteorder,
         "cores": os.cpu_count(),
-        "backend": how["backend"],
-        "scheduler": how["scheduler"],
-        "workers": how["workers"],
         "threads_per_worker": 1,
     }

@@ -1,4 +1,4 @@
-"""How designs do over the population of the lights: what breaks them, and how many lamps and cameras they keep."""
+"""Robustness of designs over the population of the lights: scale at which they break, and yield."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ from ..metrics.drawn import draws_of
 from ..metrics.members import PopulationImager, population_imager
 from ..metrics.separation import csd_name
 from ..metrics.share import share_interval
-from ..results.designs import row_space
-from ..results.tables import FEW, PLAIN
+from ..results.designs import few_rows, row_space
+from ..results.tables import PLAIN
 from ..study import Study
+from .workers import tracked
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,7 +47,7 @@ class Candidate:
     tolerance: Tolerance
 
     def imager(self, scale: float) -> PopulationImager:
-        """The scene with the population of its lights so many times as large."""
+        """Return the model of the scene with the population of its lights so many times as large."""
         population = self.setup.lights.population
         assert population is not None
         return population_imager(
@@ -54,20 +55,20 @@ class Candidate:
         )
 
     def curves(self, off: Off) -> FloatArray:
-        """Its filters as production has them."""
+        """Return its filters as production makes them."""
         return np.asarray(self.space.curves(self.point, self.setup.camera.grid.size, off), dtype=float)
 
     def worst(self, pair: Pair, scale: float) -> tuple[float, Off]:
-        """The smallest CSD over population and tolerances so many times as far, DN, and how its filter came out."""
-        imager, own = self.imager(scale), self.space.filter is not None
-        places = self.tolerance.scaled(scale).places if own else (AS_DESIGNED,)
-        each = imager.worst(np.concatenate([self.curves(off) for off in places]), [pair])[csd_name(pair)]
-        at = int(each.argmin())
-        return float(each[at]), places[at]
+        """Return the smallest CSD over population and tolerances scaled so, DN, and its production error."""
+        imager, made = self.imager(scale), self.space.filter is not None
+        places = self.tolerance.scaled(scale).places if made else (AS_DESIGNED,)
+        csds = imager.worst(np.concatenate([self.curves(off) for off in places]), [pair])[csd_name(pair)]
+        at = int(csds.argmin())
+        return float(csds[at]), places[at]
 
 
 def robustness_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
-    """A row per plain CFA, named design and answer of the search.
+    """Return a row per plain CFA, named design and answer of the search.
 
     `breaks_at`: how many times as large the population, and the tolerances, must be for the worst CSD to fall
     below that of the plain CFA that has most at 1 (null where it does not up to 3 times, in steps of 0.25); `breaks_dn`
@@ -76,19 +77,15 @@ def robustness_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progr
     """
     pair = study.pair_over_population
     assert pair is not None
-    few = rows[rows["kind"].isin(FEW) & (rows["status"] == "ok")]
-    found: list[dict[str, Any]] = []
-    calls = []
-    shown: list[dict[Any, Any]] = few.to_dict("records")
-    for row in shown:
-        own = few[(few["kind"] == PLAIN) & (few["scenario"] == row["scenario"])]
-        plain = own.loc[[own[f"worst_{csd_name(pair)}"].idxmax()]].to_dict("records") if len(own) else []
-        rival = _design(study, plain[0]) if plain and plain[0]["design_id"] != row["design_id"] else None
+    few, calls = few_rows(rows), []
+    for row in few:
+        plain = [one for one in few if one["kind"] == PLAIN and one["scenario"] == row["scenario"]]
+        best = max(plain, key=lambda one: one[f"worst_{csd_name(pair)}"], default=row)
+        rival = None if best["design_id"] == row["design_id"] else _design(study, best)
         calls.append(delayed(_robustness, _design(study, row), rival, pair, study.section.seed))
-    for row, (numbers, lights) in zip(shown, parallel(calls), strict=True):
-        found.append({"design_id": row["design_id"], **numbers, **lights})
-        progress("robustness", len(found), len(shown))
-    return pa.Table.from_pylist(found, schema=pa.schema(_FIELDS))
+    answers = zip(few, tracked(parallel, calls, "robustness", progress), strict=True)
+    made = [{"design_id": row["design_id"], **numbers, **lights} for row, (numbers, lights) in answers]
+    return pa.Table.from_pylist(made, schema=pa.schema(_FIELDS))
 
 
 def _design(study: Study, row: dict[Any, Any]) -> Candidate:
@@ -100,7 +97,7 @@ def _design(study: Study, row: dict[Any, Any]) -> Candidate:
 def _robustness(
     design: Candidate, rival: Candidate | None, pair: Pair, seed: int
 ) -> tuple[dict[str, float], dict[str, str]]:
-    """What is found of a design, numbers and names of lights by their columns, in a form that a run can keep."""
+    """Numbers, and names of lights, of a design by their columns, in a form that a run can keep."""
     numbers, lights = ({}, {}) if rival is None else _breaks(design, rival, pair)
     population = design.setup.lights.population
     assert population is not None
@@ -112,7 +109,7 @@ def _robustness(
 
 
 def _breaks(design: Candidate, rival: Candidate, pair: Pair) -> tuple[dict[str, float], dict[str, str]]:
-    """Where a design falls below a rival first, and what it is that breaks it: numbers, and names of lights."""
+    """Scale at which a design falls below a rival first, and its causes: numbers, and names of lights."""
 
     def below(scale: float) -> bool:
         return design.worst(pair, scale)[0] < rival.worst(pair, scale)[0]
@@ -123,22 +120,22 @@ def _breaks(design: Candidate, rival: Candidate, pair: Pair) -> tuple[dict[str, 
     least, off = design.worst(pair, scale)
     imager = design.imager(scale)
     response = imager.imager.smooth(design.curves(off))[0]
-    near = min((imager.nearest(case, pair) for case in response), key=lambda each: float(each.squared.min()))
+    near = min((imager.nearest(case, pair) for case in response), key=lambda pairs: float(pairs.squared.min()))
     at = np.unravel_index(int(near.squared.argmin()), near.squared.shape)
     lights, population = design.setup.lights, design.imager(scale).members.population
     names = dict[str, str]()
-    found: dict[str, float] = {"breaks_at": scale, "breaks_dn": least, "breaks_edge_nm": off.shift_nm}
-    found["breaks_thickness"] = off.thickness
+    numbers: dict[str, float] = {"breaks_at": scale, "breaks_dn": least, "breaks_edge_nm": off.shift_nm}
+    numbers["breaks_thickness"] = off.thickness
     warm = []
     for side, (name, starts) in enumerate((("first", near.first), ("second", near.second))):
         signal = imager.members.signal(int(starts[at[side]]))
         nm = imager.members.shift_nm(int(near.steps[at][side]), float(near.shares[at][side]))
-        names[f"breaks_{name}"], found[f"breaks_{name}_nm"] = lights.names[signal], nm
+        names[f"breaks_{name}"], numbers[f"breaks_{name}_nm"] = lights.names[signal], nm
         warm.append(population.temperature_of(lights.types[signal], lights.names[signal], nm))
     together = max(low for low, _ in warm), min(high for _, high in warm)
     if population.temperatures == "common":
-        found |= {"breaks_low_c": together[0], "breaks_high_c": together[1]}
-    return found, names
+        numbers |= {"breaks_low_c": together[0], "breaks_high_c": together[1]}
+    return numbers, names
 
 
 def _first(below: Callable[[float], bool]) -> float | None:
@@ -157,14 +154,14 @@ def _first(below: Callable[[float], bool]) -> float | None:
 
 
 def drawn_dn(design: Candidate, pair: Pair, seed: int) -> FloatArray:
-    """The distance of two random members each, before clipping and rounding, DN, ndarray[n_draws].
+    """Return the CSD of two random members per draw, before clipping and rounding, DN, ndarray[n_draws].
 
     Every number is drawn whatever the design, so that all designs see the same lamps and cameras.
     """
     imager = population_imager(design.setup)
     tolerance = design.tolerance if design.space.filter is not None else Tolerance()
     draws = draws_of(imager.members, pair, tolerance, (seed, 1))
-    found = np.empty(draws.size)
+    dn = np.empty(draws.size)
     for number, off in enumerate(draws.offs):
-        draws.distances(number, imager.imager.smooth(design.curves(off))[0], found)
-    return found
+        draws.distances(number, imager.imager.smooth(design.curves(off))[0], dn)
+    return dn

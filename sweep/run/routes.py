@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+import pyarrow as pa
 
 from ..base.types import FloatArray
 from ..camera.forward import AllPhases, ForwardModel, forward_model
+from ..camera.plan import Plan
 from ..camera.setup import Setup
 from ..designs.block import CurveBlock, edges_of
 from ..designs.space import Space
 from ..designs.tolerance import AS_DESIGNED, Tolerance
-from ..metrics.evaluate import Spent, evaluate, family_quantities, image_quantities
+from ..metrics.bound import Bound
+from ..metrics.evaluate import evaluate, family_quantities, image_quantities
 from ..metrics.objective import COMBINED, Objective, columns_of
 from ..metrics.own import OwnMetric
 from ..metrics.quantity import OF_A_SHARE, WORST_CASE, YIELD, Asked, Columns, Quantity
@@ -23,122 +27,141 @@ from ..vision.section import Vision
 
 _MOST_LETTERS = 200
 _CHUNKS_BY_EDGES = 4
-"""In a block of designs that are seen by their edges alone: these take little memory."""
+"""Chunks in a block of designs that are computed from their edges alone: these take little memory."""
 
 
 @dataclass(frozen=True)
-class Request:
-    """What is wanted of each design: quantities, the objective, how far off it may come out, images and their seed."""
+class Rules:
+    """Rules by which designs become rows.
 
+    `front`: the two quantities of the Pareto front, whose constraints the designs on it need not meet. `vision`,
+    `seed`: of images; `drawn`: raw patches are drawn of plain CFAs and named designs, from the same readout.
+    """
+
+    schema: pa.Schema
     asked: Asked
     objective: Objective
+    constraints: Mapping[str, Bound]
+    front: tuple[str, str]
     tolerance: Tolerance
-    vision: Vision | None = None
-    seed: int = 0
-    drawn: bool = False
-    """Whether raw patches are drawn of plain CFAs and named designs, from the same readout."""
-
-    def imager(self, kind: str, setup: Setup) -> ForwardModel:
-        """The imager of a setup for designs of a `kind` of rows."""
-        return forward_model(setup, AllPhases if self.drawn and kind in FEW else ForwardModel)
+    plans: Mapping[str, Plan]
+    vision: Vision | None
+    seed: int
+    drawn: bool
 
     @property
-    def needs_curves(self) -> bool:
-        """Return whether designs need their curves, or the whole readout at once."""
-        asked = self.asked
-        worst = any(quantity.extreme == WORST_CASE for quantity in self.quantities.values())
-        return bool(self.vision is not None or asked.states or asked.wanted_yield or worst)
+    def order(self) -> tuple[str, ...]:
+        """Quantities by which designs are ranked, the first one first, all maximized."""
+        return (self.objective.column, *self.front)
 
-    @property
+    @cached_property
     def quantities(self) -> Mapping[str, Quantity]:
-        """Every column by its name."""
+        """Quantities by the names of their columns."""
         return columns_of(self.asked, self.objective)
 
-
-@dataclass(frozen=True)
-class Found:
-    """Quantities of designs, ndarray[n_designs] each; what is wrong with which design.
-
-    `spent_s`: see `metrics.evaluate.Spent`.
-    """
-
-    columns: Columns
-    faults: dict[int, str]
-    spent_s: float = 0.0
+    @property
+    def worst(self) -> list[Quantity]:
+        """Worst cases among the quantities."""
+        return [quantity for quantity in self.quantities.values() if quantity.extreme == WORST_CASE]
 
 
-def found_of(space: Space, start: int, points: FloatArray, setup: Setup, request: Request) -> Found:
-    """Quantities of designs of a space from `start` on, of which these are the `points`.
+def found_of(
+    space: Space, start: int, points: FloatArray, setup: Setup, rules: Rules
+) -> tuple[Columns, dict[int, str]]:
+    """Compute the quantities of designs of a space.
 
     They are computed in blocks that stay in the cache: by their edges where the family is separable, else from their
-    curves. A block that fails is halved, down to the design that does, whose fault it is, as is a number that is not
-    finite.
+    curves. A block that fails is halved, down to the design that does.
+
+    Parameters
+    ----------
+    space : Space
+    start : int
+        Number of the first design in its space.
+    points : ndarray[n_designs, n_parameters]
+        Their parameters.
+    setup : Setup
+    rules : Rules
+
+    Returns
+    -------
+    columns : dict of str to ndarray[n_designs]
+    faults : dict of int to str
+        Text of the fault of each design that failed, or that has a quantity that is not finite.
     """
     faults: dict[int, str] = {}
-    spent = Spent()
 
     def computed(begin: int, end: int) -> list[Columns]:
         try:
-            return [_columns(space, start + begin, setup, points[begin:end], request, spent)]
+            return [_columns(space, start + begin, setup, points[begin:end], rules)]
         except Exception as error:  # one design must not take the others with it
             if end - begin > 1:
                 middle = (begin + end) // 2
                 return computed(begin, middle) + computed(middle, end)
             faults[begin] = f"error: {text_of(error)}"
-            return [dict.fromkeys(request.quantities, np.array([np.nan]))]
+            return [dict.fromkeys(rules.quantities, np.array([np.nan]))]
 
-    size = CHUNK * (1 if request.needs_curves else _CHUNKS_BY_EDGES)
+    from_curves = rules.vision is not None or rules.asked.states or rules.asked.wanted_yield or rules.worst
+    size = CHUNK * (1 if from_curves else _CHUNKS_BY_EDGES)
     parts = [part for begin in range(0, len(points), size) for part in computed(begin, min(begin + size, len(points)))]
-    names = request.quantities.keys() & set.intersection(*map(set, parts))
+    names = rules.quantities.keys() & set.intersection(*map(set, parts))
     columns = {name: np.concatenate([part[name] for part in parts]) for name in names}
-    return Found(columns, _not_finite(columns, setup, request) | faults, spent.seconds)
+    return columns, _not_finite(columns, setup, rules) | faults
 
 
 def text_of(error: Exception) -> str:
-    """An error on one line, cut where it is long."""
+    """Return an error on one line, cut where it is long."""
     return " ".join(f"{type(error).__name__}: {error}".split())[:_MOST_LETTERS]
 
 
-def _columns(space: Space, start: int, setup: Setup, points: FloatArray, request: Request, spent: Spent) -> Columns:
-    """Every quantity of a block of designs, ndarray[n_designs] each."""
-    size = setup.camera.grid.size
-    imager = request.imager(space.kind, setup)
+def _columns(space: Space, start: int, setup: Setup, points: FloatArray, rules: Rules) -> Columns:
+    """Quantities of a block of designs, ndarray[n_designs] each."""
+    size, asked = setup.camera.grid.size, rules.asked
+    model = forward_model(setup, AllPhases if rules.drawn and space.kind in FEW else ForwardModel)
     edges = edges_of(space, start, start + len(points))
     designs = CurveBlock(space.curves(points, size)) if edges is None else edges
-    asked = request.asked
-    columns = evaluate(imager, designs, asked.states, probabilities=asked.probabilities, own=asked.own, spent=spent)
+    columns = evaluate(model, designs, asked.states, probabilities=asked.probabilities, own=asked.own)
     columns |= family_quantities(None if space.filter is None else space.filter.family, points)
-    if request.vision is not None:
-        columns |= image_quantities(setup, space.curves(points, size), request.vision, request.seed)
-    worst = [quantity for quantity in request.quantities.values() if quantity.extreme == WORST_CASE]
-    if worst:
-        columns |= worst_cases(space, imager, points, columns, worst, request.tolerance, asked.own, spent)
-    if request.asked.wanted_yield:
-        columns |= of_a_share(space, setup, points, request)
-    if request.objective.column == COMBINED:
-        columns[COMBINED] = request.objective.of(columns)
+    if rules.vision is not None:
+        columns |= image_quantities(setup, space.curves(points, size), rules.vision, rules.seed)
+    if rules.worst:
+        columns |= worst_cases(space, model, points, columns, rules.worst, rules.tolerance, asked.own)
+    if asked.wanted_yield:
+        columns |= _of_a_share(space, setup, points, rules)
+    if rules.objective.column == COMBINED:
+        columns[COMBINED] = rules.objective.of(columns)
     return columns
 
 
 def worst_cases(
     space: Space,
-    imager: ForwardModel,
+    model: ForwardModel,
     points: FloatArray,
     nominal: Columns,
     worst: Sequence[Quantity],
     tolerance: Tolerance,
     own: Sequence[OwnMetric] = (),
-    spent: Spent | None = None,
 ) -> Columns:
-    """Worst cases of designs over how far off they may come out, and of CSDs over the population of the lights.
+    """Return worst cases over production errors, and of CSDs over the population of the lights, ndarray[n_designs].
 
-    `nominal`: what `evaluate` gives of them; `worst`: the quantities that are asked for; `own`, `spent`:
-    see `evaluate`.
+    Parameters
+    ----------
+    space : Space
+    model : ForwardModel
+    points : ndarray[n_designs, n_parameters]
+    nominal : dict of str to ndarray[n_designs]
+        Result of `evaluate` for the designs.
+    worst : sequence of Quantity
+        Worst cases to compute.
+    tolerance : Tolerance
+        Production errors.
+    own : sequence of OwnMetric
+        See `evaluate`.
     """
-    setup = imager.setup
-    places = [off for off in tolerance.places if any(off)] if space.filter is not None else []
-    curves = [space.curves(points, setup.camera.grid.size, off) for off in (AS_DESIGNED, *places)]
-    cases = [nominal, *(evaluate(imager, shifted, own=own, spent=spent) for shifted in curves[1:])]
+    setup = model.setup
+    errors = [off for off in tolerance.places if any(off)] if space.filter is not None else []
+    curves = [space.curves(points, setup.camera.grid.size, off) for off in (AS_DESIGNED, *errors)]
+    cases = [nominal, *(evaluate(model, shifted, own=own) for shifted in curves[1:])]
     if setup.lights.population is not None:
         from ..metrics.members import population_imager  # noqa: PLC0415  (only where lights have a population)
 
@@ -147,43 +170,29 @@ def worst_cases(
     return {quantity.name: quantity.worse([case[quantity.of] for case in cases]) for quantity in worst}
 
 
-def of_a_share(space: Space, setup: Setup, points: FloatArray, request: Request) -> Columns:
-    """What the wanted share of random lamps and cameras has of each design, see `LampsAndCameras`."""
+def _of_a_share(space: Space, setup: Setup, points: FloatArray, rules: Rules) -> Columns:
+    """CSD that the wanted share of random lamps and cameras has, see `LampsAndCameras`."""
     from ..metrics.drawn import LampsAndCameras  # noqa: PLC0415  (only where a share of lamps and cameras counts)
     from ..metrics.members import population_imager  # noqa: PLC0415
 
-    tolerance = request.tolerance if space.filter is not None else Tolerance()
-    drawn = LampsAndCameras(population_imager(setup), tolerance, request.seed)
-    pairs = [q.pair for q in request.quantities.values() if q.extreme == OF_A_SHARE and q.pair is not None]
-    found = drawn.columns(lambda off, some: space.curves(points[some], setup.camera.grid.size, off), len(points), pairs)
-    return {YIELD + name: values for name, values in found.items()}
+    tolerance = rules.tolerance if space.filter is not None else Tolerance()
+    drawn = LampsAndCameras(population_imager(setup), tolerance, rules.seed)
+    pairs = [q.pair for q in rules.quantities.values() if q.extreme == OF_A_SHARE and q.pair is not None]
+    csds = drawn.columns(lambda off, some: space.curves(points[some], setup.camera.grid.size, off), len(points), pairs)
+    return {YIELD + name: values for name, values in csds.items()}
 
 
-def _not_finite(columns: Columns, setup: Setup, request: Request) -> dict[int, str]:
-    """Designs with a quantity that is no finite number, though each of them has it."""
-    lacking = _may_lack(setup, request)
-    infinite = {name for name, quantity in request.quantities.items() if quantity.infinite}
-    faulty: set[int] = set()
-    for name in columns.keys() - lacking:
-        finite = np.isfinite(columns[name])
-        if not finite.all():
-            finite |= (columns[name] == np.inf) & (name in infinite)
-            faulty |= set(np.flatnonzero(~finite).tolist())
-    return dict.fromkeys(sorted(faulty), "not finite")
+def _not_finite(columns: Columns, setup: Setup, rules: Rules) -> dict[int, str]:
+    """Designs with a quantity that is no finite number, where it is none that a design may lack.
 
-
-def _may_lack(setup: Setup, request: Request) -> set[str]:
-    """Quantities that a design may not have: those of a family; of a plain CFA, all that a modified channel has."""
-    without = ("family", "own") if setup.camera.modified else ("family", "own", "modified")
-    lacking = {name for name, quantity in request.quantities.items() if quantity.needs in without}
-    if lacking & set(request.objective.weights):
+    Those are quantities of a family and own metrics; of a plain CFA, all that a modified channel has.
+    """
+    needs = ("family", "own") if setup.camera.modified else ("family", "own", "modified")
+    lacking = {name for name, quantity in rules.quantities.items() if quantity.needs in needs}
+    if lacking & set(rules.objective.weights):
         lacking.add(COMBINED)
-    return lacking
-
-
-def spent_in_words(names: Sequence[str], spent_s: float, rows_s: float) -> list[str]:
-    """A line on what metrics of the whole readout take; none where there are none."""
-    if not names:
-        return []
-    what = f"metric {names[0]} needs" if len(names) == 1 else f"metrics {', '.join(names)} need"
-    return [f"{what} the whole readout of a design: {spent_s:,.2f} s of the workers' {rows_s:,.2f} s for all rows"]
+    faulty = np.zeros(len(next(iter(columns.values()))), dtype=bool)
+    for name in columns.keys() - lacking:
+        infinite = rules.quantities[name].infinite
+        faulty |= ~(np.isfinite(columns[name]) | ((columns[name] == np.inf) & infinite))
+    return dict.fromkeys(np.flatnonzero(faulty).tolist(), "not finite")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
@@ -18,7 +18,6 @@ from ..base.disk import read_facts
 from ..base.errors import BrokenProofError, Fault, InfeasibleError, StudyError
 from ..base.types import Progress
 from ..metrics.bound import FEASIBLE
-from ..metrics.evaluate import whole_readout_metrics
 from ..metrics.pareto import hypervolume
 from ..results.dictionary import described
 from ..results.facts import Provenance, lacking
@@ -45,12 +44,11 @@ from ..study.reach import out_of_reach
 from ..vision.installed import require_network
 from .answers import KeptAnswers
 from .check import check_run
+from .derived import Shown, row_tables
+from .details import design_details
 from .front import Gathered, few_of
 from .held_out import left_out_table
-from .looks import Looking, looks_of
-from .of_rows import ROW_TABLES, Shown
 from .provenance import plan_facts, provenance, resolved_yaml
-from .routes import spent_in_words
 from .rows import rules_of
 from .search import SearchAnswer, answer_row, front_table, limit_alone, run_search, search_facts, search_log
 from .sweep import RunOptions, Sweep
@@ -61,23 +59,18 @@ _CHECK_S, _CHECK_SHARE = 1.0, 0.1
 
 
 def files_of(study: Study) -> set[str]:
-    """Names of the files that a run of the study makes."""
-    return {RESULTS, RESOLVED, PROVENANCE, *_search_tables(study), *_row_tables(study), *_vision_tables(study)}
+    """Return the names of the files that a run of the study makes."""
+    vision = () if study.section.vision is None else VISION_TABLES
+    return {RESOLVED, *_whole(study), *row_tables(study), *vision}
 
 
-def _search_tables(study: Study) -> set[str]:
-    if study.search is None:
-        return set()
-    names = {SEARCH_LOG, FRONT} if study.search.levels else {SEARCH_LOG}
-    return names | ({LEFT_OUT} if study.leaves_one_out else set())
-
-
-def _row_tables(study: Study) -> set[str]:
-    return {name for name, table in ROW_TABLES.items() if table.asked(study)}
-
-
-def _vision_tables(study: Study) -> set[str]:
-    return set() if study.section.vision is None else {*VISION_TABLES}
+def _whole(study: Study) -> set[str]:
+    """Files for which the whole run is made again."""
+    names = {RESULTS, PROVENANCE}
+    if study.search is not None:
+        names |= {SEARCH_LOG} | ({FRONT} if study.search.levels else set())
+        names |= {LEFT_OUT} if study.leaves_one_out else set()
+    return names
 
 
 def run_study(
@@ -167,21 +160,27 @@ class _Run:
     options: RunOptions
     started: float
     how: dict[str, Any]
-    warnings: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.rules, self.parts = rules_of(self.study), Parts(self.inventory.folder)
+        self.sweep = Sweep(self.study, self.rules, self.parts, self.crew)
+        self.gathered = Gathered(self.rules, next(iter(self.study.scenarios)))
 
     def make(self, wrong: set[str]) -> tuple[str, ...]:
         """Make these files, and what depends on them; provenance comes last: without it a run is not finished."""
-        study, whole = self.study, {RESULTS, PROVENANCE, *_search_tables(self.study)}
-        if wrong & whole:
+        study = self.study
+        if wrong & _whole(study):
             wrong = files_of(study)
             self.inventory.remove([PROVENANCE])
             self.inventory.outdate()
             self._search_and_sweep()
         else:
-            self._read_rows()
-        if wrong & _row_tables(study):
+            for table in batches(self.inventory.path(RESULTS)):
+                self.gathered.add(few_of(table, self.rules))
+            self.gathered.finish()
+        if wrong & row_tables(study).keys():
             self._write_row_tables(wrong)
-        if wrong & _vision_tables(study):
+        if wrong.intersection(VISION_TABLES):
             self._write_vision()
         self.inventory.write({RESOLVED: resolved_yaml(study).encode("utf-8")})
         if PROVENANCE in wrong:
@@ -191,28 +190,8 @@ class _Run:
         return tuple(sorted(wrong))
 
     @cached_property
-    def rules(self) -> Any:
-        """Rules by which designs become rows."""
-        return rules_of(self.study)
-
-    @cached_property
-    def parts(self) -> Parts:
-        """Finished work of an interrupted run."""
-        return Parts(self.inventory.folder)
-
-    @cached_property
-    def sweep(self) -> Sweep:
-        """The jobs of the study."""
-        return Sweep(self.study, self.rules, self.parts, self.crew)
-
-    @cached_property
-    def gathered(self) -> Gathered:
-        """Rows that the report draws, and the front."""
-        return Gathered(self.rules, next(iter(self.study.scenarios)))
-
-    @cached_property
     def answer(self) -> SearchAnswer | None:
-        """The search's answer; None of a study that does not search."""
+        """Answer of the search; None of a study that does not search."""
         if self.study.search is None:
             return None
         kept = self._kept("search")
@@ -234,7 +213,7 @@ class _Run:
         for row in answered:
             gathered.add(row)
         gathered.finish()
-        marked = map(gathered.front.marked, chain(sweep.tables(), answered))
+        marked = map(gathered.marked, chain(sweep.tables(), answered))
         write_tables(marked, self.rules.schema, self.inventory.path(RESULTS))
         self.inventory.adopt(RESULTS)
         if answer is not None:
@@ -245,20 +224,14 @@ class _Run:
                 kept = self._kept("left out")
                 self._write(LEFT_OUT, left_out_table(self.study, answer.search, answer.best, kept, self.progress))
 
-    def _read_rows(self) -> None:
-        """Gather what a report draws out of the result table."""
-        for table in batches(self.inventory.path(RESULTS)):
-            self.gathered.add(few_of(table, self.rules))
-        self.gathered.finish()
-
     def _write_row_tables(self, names: set[str]) -> None:
         rows, on_front = self.gathered.frame(), self.gathered.front_frame()
-        looks = looks_of(self.study, Looking.of(self.study, names), rows, on_front, self.crew, self.progress)
+        details = design_details(self.study, names, rows, on_front, self.crew, self.progress)
         points = swept_points(self.inventory.path(RESULTS))
-        shown = Shown(self.study, rows, on_front, looks, points, self._limit, self.crew, self._kept, self.progress)
-        for name, table in ROW_TABLES.items():
+        shown = Shown(self.study, rows, on_front, details, points, self._limit, self.crew, self._kept, self.progress)
+        for name, make in row_tables(self.study).items():
             if name in names:
-                self._write(name, table.made(shown))
+                self._write(name, make(shown))
 
     def _write_vision(self) -> None:
         from .vision import vision_tables  # noqa: PLC0415  (only where a study asks for images)
@@ -292,10 +265,8 @@ class _Run:
             "trade_off": study.trade_off,
             "parameters": study.parameters,
             "quantities": [quantity.column for quantity in study.quantities.values()],
-            "spent_s": (sweep.spent_s, sweep.seconds),
         }
         warnings = [*study.warnings, *sweep.warnings]
-        warnings += spent_in_words(whole_readout_metrics(study.asked), sweep.spent_s, sweep.seconds)
         if answer is not None:
             facts["search"] = search_facts(study, answer)
             if "saturation" in study.plans[answer.search.scenario].computed:
@@ -316,7 +287,7 @@ def _hypervolumes(answer: SearchAnswer, gathered: Gathered) -> dict[str, float]:
     runs = (*answer.runs, *(run for point in answer.front for run in point.runs))
     points = [[e.objective, e.sensitivity] for run in runs for e in run.log if e.violation <= FEASIBLE]
     return {
-        "sweep": hypervolume(gathered.swept.points(answer.search.space.cfa, answer.search.scenario), reference),
+        "sweep": hypervolume(gathered.swept_front(answer.search.space.cfa, answer.search.scenario), reference),
         "search": hypervolume(np.array(points).reshape(-1, 2), reference),
     }
 

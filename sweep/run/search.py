@@ -1,4 +1,4 @@
-"""The search of a study over the cores: its best design, its limit, and the trade-off that it traces."""
+"""The search of a study over the cores: its best design, its upper bound, and the trade-off that it traces."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ from ..search.problem import Evaluation, Problem, SearchRun, best_feasible, star
 from ..search.solver import best_reachable, search_from
 from ..search.trade_off import Effort, FrontPoint, calls_at_levels, check_proof, gap_of, trade_off
 from ..study import Search, Study
-from .rows import Job, Rules, run_job
+from .routes import Rules
+from .rows import Job, run_job
 
 _REACH_STARTS = 8
 
@@ -40,7 +41,7 @@ class SearchAnswer:
 
     @property
     def gap(self) -> float | None:
-        """How far the answer is below what is proven to be out of reach, relative."""
+        """Relative distance of the answer below the proven upper bound."""
         return None if self.limit is None else gap_of(self.best, self.limit)
 
 
@@ -53,12 +54,14 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
     problem = study.problem(search)
     n_starts = min(search.starts, search.max_evaluations)
     starts = starting_points(problem, n_starts, study.section.seed)
-    each = search.max_evaluations // n_starts
-    effort = Effort(search.algorithm, starts, each, study.section.seed)
+    per_start = search.max_evaluations // n_starts
+    effort = Effort(search.algorithm, starts, per_start, study.section.seed)
     no_limit = why_not(problem)
     limited = no_limit is None
     # All at once, so that no core waits for another: few of these calls need what others find.
-    calls = [delayed(search_from, problem, i, u, search.algorithm, each, effort.seed) for i, u in enumerate(starts)]
+    calls = [
+        delayed(search_from, problem, i, u, search.algorithm, per_start, effort.seed) for i, u in enumerate(starts)
+    ]
     calls += [delayed(limit_of, problem)] if limited else []
     answers = parallel([*calls, *calls_at_levels(problem, search.levels, effort, limited=limited)])
     runs: list[SearchRun] = []
@@ -67,7 +70,7 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
         progress("search starts", len(runs), n_starts)
     best = best_feasible([e for run in runs for e in run.log])
     if best is None:
-        raise _infeasible(study, problem, starts[:_REACH_STARTS], each)
+        raise _infeasible(study, problem, starts[:_REACH_STARTS], per_start)
     limit = next(answers) if limited else None
     check_proof(best, limit)
     front = trade_off(problem, search.levels, effort, answers, parallel, progress, limited=limited)
@@ -75,15 +78,15 @@ def run_search(study: Study, search: Search, parallel: Parallel, progress: Progr
 
 
 def limit_alone(study: Study, search: Search) -> Limit | None:
-    """The limit that `run_search` finds, without a search."""
+    """Return the upper bound of `run_search`, without a search."""
     problem = study.problem(search)
     return limit_of(problem) if why_not(problem) is None else None
 
 
-def _infeasible(study: Study, problem: Problem, starts: FloatArray, each: int) -> InfeasibleError:
+def _infeasible(study: Study, problem: Problem, starts: FloatArray, per_start: int) -> InfeasibleError:
     faults = [Fault(f"{study.name}: no feasible design was found")]
     for name, bound in problem.constraints.items():
-        value = best_reachable(problem, name, starts, each)
+        value = best_reachable(problem, name, starts, per_start)
         met = "reachable alone" if bound.violation(np.array([value]))[0] <= FEASIBLE else "out of reach"
         best = f"the best value found is {value:.6g}" if np.isfinite(value) else "no well-formed filter was found"
         faults.append(Fault(f"{met}: {name} {bound}; {best}", key=f"constraints.{name}"))
@@ -91,44 +94,42 @@ def _infeasible(study: Study, problem: Problem, starts: FloatArray, each: int) -
 
 
 def answer_row(study: Study, answer: SearchAnswer, rules: Rules, parallel: Parallel) -> pa.Table:
-    """The search's answer as the camera reads it out, behind all other rows, with its limit and gap."""
+    """Return the search's answer as the camera reads it out, behind all other rows, with its upper bound and gap."""
     space = answer.search.space
-    axes = tuple((float(value),) for value in answer.best.x)
     assert space.filter is not None
     name = f"best {kind_in_words(space.filter.family.kind)}"
-    found = Space("search", name, space.cfa, space.filter, axes)
-    job = Job(found, answer.search.scenario, 0, 1, study.n_designs, study.n_filters)
+    best = Space("search", name, space.cfa, space.filter, tuple((float(value),) for value in answer.best.x))
+    job = Job(best, answer.search.scenario, 0, 1, study.n_designs, study.n_filters)
     # Workers have loaded what this takes, and this process has not.
-    (row,) = parallel([delayed(run_job, job, study.setup(found, job.scenario), rules)])
-    values: dict[str, Any] = {"space": space.name}
-    if answer.limit is not None:
-        values |= {"limit": answer.limit.proven, "gap": answer.gap}
-    for name, value in values.items():
+    (row,) = parallel([delayed(run_job, job, study.setup(best, job.scenario), rules)])
+    limit = None if answer.limit is None else answer.limit.proven
+    for name, value in {"space": space.name, "limit": limit, "gap": answer.gap}.items():
         index, kind = row.schema.get_field_index(name), row.schema.field(name)
         row = row.set_column(index, kind, pa.array([value]).cast(kind.type))
     return row
 
 
 def search_facts(study: Study, answer: SearchAnswer) -> dict[str, Any]:
-    """The search in figures, for provenance and summary."""
+    """Return the search in figures, for provenance and summary."""
+    search, space, limit = answer.search, answer.search.space, answer.limit
     return {
-        "algorithm": answer.search.algorithm,
-        "scenario": answer.search.scenario,
-        "space": answer.search.space.name,
-        "cfa": answer.search.space.cfa,
-        "channel": " and ".join(answer.search.space.filter.channels) if answer.search.space.filter else "",
-        "bounded": [] if answer.limit is None else bounded_spaces(study, answer.search),
+        "algorithm": search.algorithm,
+        "scenario": search.scenario,
+        "space": space.name,
+        "cfa": space.cfa,
+        "channel": " and ".join(space.filter.channels) if space.filter else "",
+        "bounded": [] if limit is None else bounded_spaces(study, search),
         "starts": len(answer.runs),
         "evaluations": sum(len(run.log) for run in answer.runs),
         "endings": [run.status for run in answer.runs],
         "objective": str(study.objective),
         "best_smooth_objective": answer.best.objective,
         "best_sensitivity": answer.best.sensitivity,
-        "limit_attained": None if answer.limit is None or answer.limit.curve is None else answer.limit.attained,
-        "limit_proven": None if answer.limit is None else answer.limit.proven,
-        "limit_left_out": [] if answer.limit is None else list(answer.limit.left_out),
-        "limit_programs": None if answer.limit is None else answer.limit.programs,
-        "limit_open_parts": None if answer.limit is None else answer.limit.open_parts,
+        "limit_attained": None if limit is None or limit.curve is None else limit.attained,
+        "limit_proven": None if limit is None else limit.proven,
+        "limit_left_out": [] if limit is None else list(limit.left_out),
+        "limit_programs": None if limit is None else limit.programs,
+        "limit_open_parts": None if limit is None else limit.open_parts,
         "front_limits_open": sum(p.limit is not None and p.limit.open_parts > 0 for p in answer.front),
         "gap": answer.gap,
         "no_limit": answer.no_limit,
@@ -137,7 +138,7 @@ def search_facts(study: Study, answer: SearchAnswer) -> dict[str, Any]:
 
 
 def bounded_spaces(study: Study, search: Search) -> list[str]:
-    """Kinds and names of the spaces whose feasible filters the search's upper bound holds for, in its scenario.
+    """Return kinds and names of the spaces whose feasible filters the search's upper bound holds for, in its scenario.
 
     They are in the same channel of the same CFA, replace the same curve, which they nowhere exceed, and are of the same
     technology.
@@ -146,12 +147,8 @@ def bounded_spaces(study: Study, search: Search) -> list[str]:
     assert searched is not None
     names = [f"search {search.space.name}"]
     for space in study.spaces:
-        made = space.filter
-        if made is None or (space.cfa, made.bases, made.technology) != (
-            search.space.cfa,
-            searched.bases,
-            searched.technology,
-        ):
+        made, same = space.filter, (search.space.cfa, searched.bases, searched.technology)
+        if made is None or (space.cfa, made.bases, made.technology) != same:
             continue
         low, high = (np.array([end(axis) for axis in space.axes], dtype=float) for end in (min, max))
         (base,) = (study.sensor.curve(name) for name in made.bases.values())
@@ -161,7 +158,7 @@ def bounded_spaces(study: Study, search: Search) -> list[str]:
 
 
 def search_log(answer: SearchAnswer) -> pa.Table:
-    """Every evaluation of every start, of the search and then of each level of the front."""
+    """Return every evaluation of every start, of the search and then of each level of the front."""
     names = answer.search.space.parameters
     rows = [
         {
@@ -184,7 +181,7 @@ def search_log(answer: SearchAnswer) -> pa.Table:
 
 
 def front_table(study: Study, answer: SearchAnswer) -> pa.Table:
-    """A row per level of sensitivity, and of sensitivities between with the limit alone; nulls where nothing is."""
+    """Return a row per level of sensitivity, and rows between with the upper bound alone."""
     names, setup = answer.search.space.parameters, study.setup(answer.search.space, answer.search.scenario)
     rows = []
     for point in answer.front:

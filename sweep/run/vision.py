@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,13 +17,14 @@ from ..curves.lights import class_pairs, pair_name
 from ..metrics.columns.confusion import D_PRIME, STATE_ERROR
 from ..metrics.evaluate import evaluate
 from ..metrics.separation import csd_name
-from ..results.designs import row_curves
-from ..results.tables import FEW, FOUND, VISION, VISION_CONDITIONS, VISION_MISREAD
+from ..results.designs import few_rows, row_curves
+from ..results.tables import FOUND, VISION, VISION_CONDITIONS, VISION_MISREAD
 from ..study import Study
 from ..vision.images import setup_at
 from ..vision.readers import Answers, SeedReading, read_images
 from ..vision.scenes import ORDERS, SEEN, UNSEEN, states_of
 from ..vision.section import Vision
+from .workers import tracked
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -48,46 +50,35 @@ _MISREAD = pa.schema(
 )
 
 
-@dataclass(frozen=True)
-class Predictors:
-    """What is known of a design without images, at each distance and level: ndarray[n_distances, n_levels].
-
-    The smallest CSD (DN) and d', and the largest pairwise error, over the pairs of lenses; for the study's middle
-    intensity, no background, and the mean over the disc.
-    """
-
-    csd: FloatArray
-    dprime: FloatArray
-    pair_error: FloatArray
-
-
 def vision_tables(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> dict[str, pa.Table]:
-    """The tables of `VISION_TABLES`; of designs in several scenarios the first one's rows count.
+    """Return the tables of `VISION_TABLES`; of designs in several scenarios the first one's rows count.
 
     Random numbers follow from the study's seed: all designs see the same scenes and the same photons.
     """
     vision = study.section.vision
     assert vision is not None
-    shown = rows[rows["kind"].isin(FEW) & (rows["status"] == "ok")]
-    shown = shown[(shown["scenario"] == next(iter(study.scenarios))) | (shown["kind"] == FOUND)]
-    designs = shown.to_dict("records")
+    first = next(iter(study.scenarios))
+    designs = [row for row in few_rows(rows) if row["scenario"] == first or row["kind"] == FOUND]
     setups = []
     for row in designs:
         space, curves = row_curves(study, row)
         setups.append((study.setup(space, row["scenario"]), np.asarray(curves[0], dtype=float)))
-    each = [(at, seed) for seed in range(vision.seeds) for at in range(len(designs))]
-    calls = [delayed(read_images, *setups[at], vision, (study.section.seed, seed)) for at, seed in each]
+    pairs = [(at, seed) for seed in range(vision.seeds) for at in range(len(designs))]
+    calls = [delayed(read_images, *setups[at], vision, (study.section.seed, seed)) for at, seed in pairs]
     images: list[dict[str, Any]] = []
     pictures: list[dict[str, Any]] = []
-    for done, ((at, seed), reading) in enumerate(zip(each, parallel(calls), strict=True), 1):
+    readings = tracked(parallel, calls, "images read (designs x seeds)", progress)
+    for (at, seed), reading in zip(pairs, readings, strict=True):
         design = {name: designs[at][name] for name, _ in _DESIGN}
         images += _image_rows(study, vision, design | {"seed": seed}, reading)
         pictures += _picture_rows(design | {"seed": seed}, reading)
-        progress("images read (designs x seeds)", done, len(each))
     conditions: list[dict[str, Any]] = []
     known = parallel([delayed(predictors, *setup, vision) for setup in setups])
-    for row, found in zip(designs, known, strict=True):
-        conditions += _condition_rows(vision, {name: row[name] for name, _ in _DESIGN}, found)
+    for row, figures in zip(designs, known, strict=True):
+        for condition, values in zip(product(vision.distances_m, vision.levels), figures, strict=True):
+            conditions.append(
+                dict(zip(_CONDITIONS.names, (*(row[n] for n, _ in _DESIGN), *condition, *values), strict=True))
+            )
     return {
         VISION: pa.Table.from_pylist(images, schema=_IMAGES),
         VISION_CONDITIONS: pa.Table.from_pylist(conditions, schema=_CONDITIONS),
@@ -104,7 +95,7 @@ def _image_rows(study: Study, vision: Vision, key: dict[str, Any], reading: Seed
 
 def _rows_of(study: Study, vision: Vision, key: dict[str, Any], answers: Answers) -> Iterator[dict[str, Any]]:
     scenes, states, levels = answers.scenes, states_of(vision), list(vision.levels)
-    told = {name: getattr(answers, name) for name in _READERS}
+    readings = {name: getattr(answers, name) for name in _READERS}
     for at in range(len(scenes)):
         row = key | {
             "image": at,
@@ -116,7 +107,7 @@ def _rows_of(study: Study, vision: Vision, key: dict[str, Any], answers: Answers
             "distance_m": vision.distances_m[scenes.distance[at]],
             "level": levels[scenes.level[at]],
         }
-        for name, probabilities in told.items():
+        for name, probabilities in readings.items():
             if probabilities.size:
                 best = int(probabilities[at].argmax())
                 row |= {name: states[best], f"{name}_p": float(probabilities[at, best])}
@@ -129,31 +120,27 @@ def _picture_rows(key: dict[str, Any], reading: SeedReading) -> Iterator[dict[st
         yield key | {"image": at, "rows": len(pixels), "columns": pixels.shape[1], "pixels": pixels.tobytes()}
 
 
-def _condition_rows(vision: Vision, key: dict[str, Any], found: Predictors) -> Iterator[dict[str, Any]]:
-    for i, distance_m in enumerate(vision.distances_m):
-        for j, level in enumerate(vision.levels):
-            values = {"csd": found.csd[i, j], "dprime": found.dprime[i, j], "pair_error": found.pair_error[i, j]}
-            yield key | {"distance_m": distance_m, "level": level} | {name: float(v) for name, v in values.items()}
+def predictors(setup: Setup, curves: FloatArray, vision: Vision) -> list[tuple[float, float, float]]:
+    """Return figures of a design that need no images, at each distance and, there, each level of light.
 
+    They are the smallest CSD (DN) and d' over the pairs of lenses, and the largest pairwise error, for the study's
+    middle intensity, no background, and the mean over the disc.
 
-def predictors(setup: Setup, curves: FloatArray, vision: Vision) -> Predictors:
-    """See `Predictors`; `curves`: of the modified channels, ndarray[n_modified, n_wavelengths]."""
+    Parameters
+    ----------
+    setup : Setup
+    curves : ndarray[n_modified, n_wavelengths]
+    vision : Vision
+    """
     middle_cd = sorted(vision.intensities_cd)[len(vision.intensities_cd) // 2]
-    shape = (len(vision.distances_m), len(vision.levels))
-    found = Predictors(np.empty(shape), np.empty(shape), np.empty(shape))
     pairs = class_pairs(tuple(kind for kind in setup.lights.classes if kind in vision.lenses))
-    for i, distance_m in enumerate(vision.distances_m):
-        for j, level in enumerate(vision.levels.values()):
-            there = setup_at(setup, vision, distance_m, level)
-            there = replace(there, scene=there.scene.model_copy(update={"intensity_cd": middle_cd}))
-            columns = evaluate(ForwardModel(there, once=True), curves[None], vision.lenses)
-            found.csd[i, j] = min(columns[csd_name(pair)][0] for pair in pairs)
-            found.dprime[i, j] = min(_of_pair(columns, pair) for pair in pairs)
-            found.pair_error[i, j] = columns[STATE_ERROR][0]
-    return found
-
-
-def _of_pair(columns: dict[str, FloatArray], pair: tuple[str, str]) -> float:
-    """d' of a pair, in whichever order its column names it."""
-    name = pair_name(D_PRIME, pair)
-    return float(columns[name if name in columns else pair_name(D_PRIME, (pair[1], pair[0]))][0])
+    made = []
+    for distance_m, level in product(vision.distances_m, vision.levels.values()):
+        there = setup_at(setup, vision, distance_m, level)
+        there = replace(there, scene=there.scene.model_copy(update={"intensity_cd": middle_cd}))
+        columns = evaluate(ForwardModel(there, once=True), curves[None], vision.lenses)
+        csd = min(float(columns[csd_name(pair)][0]) for pair in pairs)
+        names = [pair_name(D_PRIME, order) for pair in pairs for order in (pair, pair[::-1])]
+        dprime = min(float(columns[name][0]) for name in names if name in columns)
+        made.append((csd, dprime, float(columns[STATE_ERROR][0])))
+    return made

@@ -1,4 +1,4 @@
-"""Calls over worker processes, threads or a cluster, by joblib; what a worker's death costs; how a run is stopped."""
+"""Calls over worker processes, threads or a cluster, by joblib; deaths of workers; stopping a run."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 import signal
 import threading
 import warnings
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ import psutil
 from threadpoolctl import threadpool_limits
 
 from ..base.errors import InterruptedRunError, SweepError
-from ..base.types import Call
+from ..base.types import Call, Parallel, Progress
 
 BACKENDS = ("loky", "threading", "dask")
 _stop = threading.Event()
@@ -51,7 +51,7 @@ class Workers:
         return max(1, min(self.n_jobs, os.cpu_count() or 1))
 
     def __call__(self, calls: Iterable[Call], killed: Callable[[Call], Any] | None = None) -> Iterator[Any]:
-        """Results of calls in their order; see `unordered`."""
+        """Yield the results of calls in their order; see `unordered`."""
         early: dict[int, Any] = {}
         turn = 0
         for at, result in self.unordered(calls, killed):
@@ -63,12 +63,13 @@ class Workers:
     def unordered(
         self, calls: Iterable[Call], killed: Callable[[Call], Any] | None = None
     ) -> Iterator[tuple[int, Any]]:
-        """Numbers and results of calls, as they come.
+        """Yield the numbers and results of calls, as they come.
 
         Where a worker dies, the calls that were under way run again, one at a time. One that kills again goes to
         `killed`, whose answer counts as its result; raises WorkerKilledError without it.
         """
         waiting = dict(enumerate(calls))
+        n_jobs = -1 if self.backend == "dask" else self.count
         while waiting:
             begun: dict[int, Call] = {}
 
@@ -77,8 +78,9 @@ class Workers:
                     begun[at] = call
                     yield (_numbered, (at, call), {})
 
+            parallel = joblib.Parallel(n_jobs, return_as="generator_unordered", batch_size=1, pre_dispatch="2*n_jobs")
             try:
-                for at, result in self._parallel(dispatched()):
+                for at, result in parallel(dispatched()):
                     heed_stop()
                     del waiting[at], begun[at]
                     yield at, result
@@ -86,26 +88,17 @@ class Workers:
                 if not _is_death(error):
                     raise
                 for at, call in begun.items():
-                    yield at, self._again(call, killed)
+                    try:
+                        result = self.alone(call)
+                    except WorkerKilledError:
+                        if killed is None:
+                            raise
+                        result = killed(call)
                     del waiting[at]
-
-    def _parallel(self, calls: Iterable[Call]) -> Generator[Any]:
-        n_jobs = -1 if self.backend == "dask" else self.count
-        parallel = joblib.Parallel(n_jobs, return_as="generator_unordered", batch_size=1, pre_dispatch="2*n_jobs")
-        results: Generator[Any] = parallel(calls)
-        return results
-
-    def _again(self, call: Call, killed: Callable[[Call], Any] | None) -> Any:
-        """The result of a call that may have killed its worker."""
-        try:
-            return self.alone(call)
-        except WorkerKilledError:
-            if killed is None:
-                raise
-            return killed(call)
+                    yield at, result
 
     def alone(self, call: Call) -> Any:
-        """The result of a call with no other under way; raises WorkerKilledError where its worker dies."""
+        """Return the result of a call with no other under way; raises WorkerKilledError where its worker dies."""
         try:
             ((_, result),) = joblib.Parallel(max(2, self.count))([(_numbered, (0, call), {})])
         except Exception as error:
@@ -122,8 +115,6 @@ def workers(n_jobs: int, backend: str = "loky", scheduler: str | None = None) ->
     Raises SweepError where Dask is not installed or its scheduler does not answer.
     """
     settings: dict[str, Any] = {}
-    if backend == "loky" and joblib.effective_n_jobs(2) == 1:  # no semaphores here, as joblib has warned
-        backend = "threading"
     with ExitStack() as stack:
         stack.enter_context(warnings.catch_warnings())
         warnings.filterwarnings("ignore", message=".*have been cancelled", category=UserWarning)
@@ -135,6 +126,13 @@ def workers(n_jobs: int, backend: str = "loky", scheduler: str | None = None) ->
         stack.enter_context(threadpool_limits(limits=1))  # with one worker, and with threads, this process computes
         stack.enter_context(joblib.parallel_config(backend, **settings))
         yield Workers(n_jobs, backend)
+
+
+def tracked(parallel: Parallel, calls: Sequence[Call], phase: str, progress: Progress) -> Iterator[Any]:
+    """Yield the answers of calls in their order, with the progress of a phase."""
+    for done, answer in enumerate(parallel(calls), 1):
+        progress(phase, done, len(calls))
+        yield answer
 
 
 @contextmanager

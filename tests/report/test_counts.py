@@ -16,7 +16,7 @@ from sweep.report.answer import answer_sentences
 from sweep.report.page_data import payload
 from sweep.report.summary import counts_line
 from sweep.report.trade_off import pareto_figure, traded_cfas
-from sweep.results.chosen import find_row
+from sweep.results.designs import find_row
 from sweep.results.output import Output
 from sweep.study import load_study
 

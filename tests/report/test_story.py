@@ -17,7 +17,7 @@ from sweep.report import make_report, read_output
 from sweep.report.answer import answer_sentences, large_numbers
 from sweep.report.leaders import leaders_of
 from sweep.report.series import Line, SeriesFigure, lead_sentence
-from sweep.results.names import REPORT
+from sweep.results.tables import REPORT
 from sweep.study import load_study
 
 from ..build import ran

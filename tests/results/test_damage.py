@@ -19,10 +19,9 @@ from sweep.base.errors import OutputError
 from sweep.commands.status import status_of
 from sweep.report import make_report, read_output
 from sweep.results.inventory import Inventory
-from sweep.results.names import RUN, SUMS
 from sweep.results.parts import PARTS, Parts
+from sweep.results.tables import RUN, SUMS
 from sweep.run import output_folder, run_study
-from sweep.search.problem import SearchRun
 from sweep.study import Study, load_study
 
 from ..build import ran, stopband_study, study_file
@@ -272,16 +271,6 @@ def test_hostile_parts_run_nothing_and_give_the_right_rows(
     pd.testing.assert_frame_equal(rows(folder), expected)
     assert outside.read_text() == "precious"
     assert not (tmp_path / "ran-something").exists()
-
-
-def test_answers_that_are_none_are_not_used(small: Study, expected: pd.DataFrame, tmp_path: Path) -> None:
-    from sweep.results.records import to_json
-
-    for part in interrupted(small, tmp_path):
-        if part.suffix == ".json":
-            planted(part, to_json(SearchRun(0)))
-    ran(small, tmp_path, 1)
-    pd.testing.assert_frame_equal(rows(tmp_path), expected)
 
 
 def test_names_in_the_list_that_lead_out_of_the_folder_are_not_followed(small: Study, tmp_path: Path) -> None:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from sweep.results.dictionary import FILES, KEYS, columns_table, files_table
-from sweep.results.names import MADE_BY_RUN
-from sweep.results.tables import ROW_COLUMNS
+from sweep.results.tables import MADE_BY_RUN, ROW_COLUMNS
 
 from ..conftest import ROOT
 

@@ -18,8 +18,8 @@ from sweep.commands.status import status_of
 from sweep.report import make_report, read_output
 from sweep.results.inventory import Inventory
 from sweep.results.lock import LOCK, locked
-from sweep.results.names import RUN, is_drawn, is_own
 from sweep.results.parts import PARTS, ROWS, Parts
+from sweep.results.tables import RUN, is_drawn, is_own
 from sweep.run import output_folder, run_study
 from sweep.study import Study, load_study
 

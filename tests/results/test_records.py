@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Literal, get_type_hints
+from dataclasses import fields
+from typing import get_type_hints
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sweep.base.types import FloatArray, IndexArray
 from sweep.results.records import from_json, to_json
 from sweep.search.limit import Limit
 from sweep.search.problem import Evaluation, SearchRun
@@ -71,29 +69,6 @@ def test_a_limit_comes_back_whatever_its_fields() -> None:
         else:
             assert made == read
     assert from_json(Limit, to_json(Limit(-np.inf, np.inf, None))).proven == np.inf
-
-
-@dataclass(frozen=True)
-class Sample:
-    pair: tuple[int, str]
-    words: Mapping[str, tuple[float, ...]]
-    named: dict[str, float]
-    where: IndexArray | None
-    side: Literal["left", "right"] | None
-    grid: FloatArray
-    inner: SearchRun | None = None
-
-
-def test_fields_of_every_kind_come_back() -> None:
-    sample = Sample(
-        (3, "x"), {"a": (1.5, np.nan)}, {"b": 0.1}, np.arange(6).reshape(2, 3), "left", np.ones((2, 0)), SearchRun(1)
-    )
-    again = from_json(Sample, to_json(sample))
-    assert (again.pair, again.side, again.inner, again.grid.shape) == ((3, "x"), "left", SearchRun(1), (2, 0))
-    assert again.where.tolist() == [[0, 1, 2], [3, 4, 5]]
-    assert again.named == {"b": 0.1}
-    assert again.words["a"][0] == 1.5
-    assert math.isnan(again.words["a"][1])
 
 
 @pytest.mark.parametrize("value", [object(), np.array([object()]), {3}, b"bytes", lambda: None])

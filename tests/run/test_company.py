@@ -16,16 +16,14 @@ from sweep.camera.scene import Scene
 from sweep.camera.setup import Setup
 from sweep.designs.block import CurveBlock, edges_of
 from sweep.designs.families.dual import Dual
-from sweep.designs.families.free_form import FreeForm
-from sweep.designs.families.stopband import MultiStopband
 from sweep.designs.products import row_products
 from sweep.designs.space import Filter, Space
-from sweep.metrics.evaluate import evaluate, family_quantities
+from sweep.metrics.evaluate import evaluate
 
 from ..blocks import SPACE, VIEWS, setup_of
 from ..cases import thinned
 from ..hard.scenes import DARK, F2, FAMILY, FAR, FIXED, GRID, SENSOR, lights
-from ..rounding import assert_within_rounding, brightest_dn, rounding
+from ..rounding import assert_within_rounding, brightest_dn
 
 # Crossed edges among them, which lift N above Y, so that it sets the exposure.
 AXES = ((590.0, 603.0, 690.0), (5.0, 20.0), (410.0, 640.0, 655.0), (0.0, 6.0, 30.0), (0.5, 0.8, 1.0))
@@ -100,50 +98,6 @@ def test_a_bad_design_changes_no_other_beyond_rounding(separable: bool) -> None:
     alone = {name: values[others] for name, values in whole.items()}
     assert_same(found, others, alone, imager.setup, brightest_dn(imager.setup, fine.curves()))
     assert np.isnan(found["csd_yellow_red"][bad]).all()
-
-
-@pytest.mark.parametrize(
-    "space",
-    [
-        Space(
-            "sweep",
-            "free",
-            "RYNCy",
-            Filter(FreeForm(GRID.nodes_nm, SENSOR.qe["Y"], np.arange(540.0, 700.0, 8.0)), {"N": "Y"}, ""),
-            ((0.3, 0.7, 0.9), *(((0.2, 0.85),) * 5), *((0.6,),) * 14),
-        ),
-        Space(
-            "sweep",
-            "bands",
-            "RYNCy",
-            Filter(MultiStopband(GRID.nodes_nm, SENSOR.qe["Y"], SENSOR.qe["G"], bands=2), {"N": "Y"}, "G"),
-            (
-                (470.0, 480.0, 490.5),
-                (10.0,),
-                (540.0, 550.0),
-                (10.0, 17.0),
-                (1.0,),
-                (600.0, 610.0),
-                (8.0,),
-                (640.0, 660.0),
-                (5.0,),
-                (0.7, 1.0),
-            ),
-        ),
-    ],
-    ids=["free form", "two bands"],
-)
-def test_families_give_the_same_curves_and_lengths_alone_within_rounding(space: Space) -> None:
-    """Sums over the parameters of numbers in nm, or of shares."""
-    points = space.points(0, space.size)
-    whole = space.curves(points, GRID.size), space.violation(points), family_quantities(space.filter.family, points)
-    for at in range(space.size):
-        one = points[at : at + 1]
-        allowed = rounding(one.size, np.abs(one).sum())
-        np.testing.assert_allclose(space.curves(one, GRID.size)[0], whole[0][at], rtol=0, atol=allowed)
-        np.testing.assert_allclose(space.violation(one)[0], whole[1][at], rtol=0, atol=allowed)
-        for name, values in family_quantities(space.filter.family, one).items():
-            np.testing.assert_allclose(values[0], whole[2][name][at], rtol=0, atol=allowed)
 
 
 @pytest.mark.parametrize(

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import errno
 import os
-import time
 from dataclasses import replace
 from pathlib import Path
 
-import joblib
 import pandas as pd
 import psutil
 import pyarrow.parquet as pq
 import pytest
-from threadpoolctl import threadpool_info, threadpool_limits
 
 from sweep.base.errors import FailedDesignError, OutputError, SweepError
 from sweep.commands.status import status_of
@@ -124,19 +120,6 @@ def test_a_named_design_that_fails_is_a_row(
     make_report(read_output(tmp_path / "out"))
 
 
-@pytest.mark.slow
-def test_a_clock_that_goes_back_changes_nothing(
-    plain: Study, whole: pd.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    now = iter(range(10**9, 0, -3600))
-    monkeypatch.setattr(time, "time", lambda: float(next(now)))
-    half_done(plain, tmp_path)
-    with locked(tmp_path):
-        assert len(status_of(tmp_path).lines) >= 2
-    ran(plain, tmp_path, 1)
-    pd.testing.assert_frame_equal(rows(tmp_path), whole)
-
-
 def test_status_of_a_run(plain: Study, tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="no run here"):
         status_of(tmp_path)
@@ -202,34 +185,10 @@ def test_a_changed_study_goes_beside_the_old_one(plain: Study, tmp_path: Path) -
     assert output_folder(base, load_study(path))[0] == tmp_path / "tiny-3"
 
 
-def test_a_disk_without_a_byte_left_is_one_line(plain: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(*_: object) -> int:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(Path, "write_bytes", full)
-    with pytest.raises(OutputError, match="cannot be written: No space left on device"):
-        ran(plain, tmp_path, 1)
-
-
 @pytest.mark.slow
 def test_threads_give_the_same_rows(plain: Study, whole: pd.DataFrame, tmp_path: Path) -> None:
     run_study(plain, tmp_path, 2, lambda *_: None, backend="threading")
     pd.testing.assert_frame_equal(rows(tmp_path), whole)
-
-
-def most_threads(pause_s: float) -> int:
-    found = []
-    for _ in range(20):
-        time.sleep(pause_s)
-        found += [library["num_threads"] for library in threadpool_info()]
-    return max(found)
-
-
-@pytest.mark.slow
-def test_threads_beside_each_other_do_not_give_their_libraries_more() -> None:
-    with threadpool_limits(2), workers(2, "threading") as crew:  # whatever the environment says
-        calls = (joblib.delayed(most_threads)(0.001 * (i % 3 + 1)) for i in range(20))
-        assert set(crew(calls)) == {1}
 
 
 def test_workers_never_outnumber_the_cores(plain: Study, tmp_path: Path) -> None:

@@ -12,12 +12,12 @@ import pandas as pd
 import pytest
 
 from sweep.camera.forward import forward_model
-from sweep.designs.block import EdgeBlock
 from sweep.metrics.nearest import nearest_pairs
 from sweep.results import thinning
 from sweep.results.designs import row_curves
 from sweep.results.tables import LIMITED_BY
 from sweep.results.thinning import even, swept_points
+from sweep.run import details
 from sweep.run.runner import files_of
 from sweep.study import Study, load_study
 
@@ -92,42 +92,11 @@ def test_workers_and_routes_change_no_light(study: Study, tmp_path: Path, monkey
     ran(study, tmp_path / "two", 2)
     pd.testing.assert_frame_equal(pd.read_parquet(tmp_path / "two" / LIMITED_BY), expected)
 
-    def broken(*_: object) -> None:
-        raise ValueError("no edges today")
-
     (tmp_path / "out" / LIMITED_BY).unlink()
     with monkeypatch.context() as patch:
-        patch.setattr(EdgeBlock, "product", broken)
+        patch.setattr(details, "edges_of_some", lambda *_: None)
         ran(study, tmp_path / "out", 1)
     pd.testing.assert_frame_equal(pd.read_parquet(tmp_path / "out" / LIMITED_BY), expected)
-
-
-def test_a_design_that_cannot_be_read_has_no_lights_and_takes_none_from_others(
-    study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    ran(study, tmp_path / "out", 1)
-    expected = pd.read_parquet(tmp_path / "out" / LIMITED_BY).set_index("design_id")
-    rows = pd.read_parquet(tmp_path / "out" / "results.parquet").set_index("design_id")
-    shown = set(pd.read_parquet(tmp_path / "out" / "points.parquet")["design_id"])
-    bad = next(own.index for _, own in rows.groupby("left_nm") if len(own) == 2 and not shown & set(own.index))
-    drawn = study.spaces[-1].filter
-    assert drawn is not None
-    kind, lost = type(drawn.family), rows.loc[bad[0], "left_nm"]
-    way = kind.curves
-
-    def fragile(self: Any, x: np.ndarray) -> Any:
-        if (x[:, 0] == lost).any():
-            raise ValueError("no such filter")
-        return way(self, x)
-
-    (tmp_path / "out" / LIMITED_BY).unlink()
-    with monkeypatch.context() as patch:
-        patch.setattr(kind, "curves", fragile)
-        ran(study, tmp_path / "out", 1)
-    found = pd.read_parquet(tmp_path / "out" / LIMITED_BY).set_index("design_id")
-    assert found.loc[bad].drop(columns="filter_id").isna().all(axis=None)
-    pd.testing.assert_frame_equal(found.drop(bad), expected.drop(bad))
-    assert list(found.index) == list(expected.index)
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ import pytest
 import sweep
 from sweep.base.errors import SweepError
 from sweep.designs.plugin import PluginFamily
-from sweep.report import make_report, read_output
+from sweep.report import read_output
 from sweep.run import run_study
 from sweep.study import Study, load_study
 
@@ -46,20 +46,6 @@ def test_a_stopband_written_again_gives_the_same_rows_and_the_same_optimum(tmp_p
     assert "best Band" in set(output.table["name"])
     assert "filters.py" in output.provenance.data_sha256
     assert any("gradients are differences" in warning for warning in output.provenance.warnings)
-
-
-@pytest.mark.usefixtures("plain_pictures")
-@pytest.mark.slow
-def test_it_resumes_reports_and_is_another_study_with_other_code(tmp_path: Path) -> None:
-    first = study(tmp_path)
-    assert run_study(first, tmp_path / "out", 1, lambda *_: None)
-    assert (
-        run_study(study(tmp_path), tmp_path / "out", 1, lambda *_: None) == ()
-    )  # the same code: nothing is left to do
-    make_report(read_output(tmp_path / "out"))
-    assert "filters.py:Band" in (tmp_path / "out" / "report.html").read_text()
-    with pytest.raises(SweepError, match="holds another study"):
-        run_study(study(tmp_path, code=STOPBAND + "# changed\n"), tmp_path / "out", 1, lambda *_: None)
 
 
 def test_a_run_is_exported_audited_and_evaluated_with_its_own_code_alone(tmp_path: Path) -> None:

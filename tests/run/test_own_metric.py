@@ -15,9 +15,8 @@ import sweep
 from sweep.base.errors import InterruptedRunError, StudyError, SweepError
 from sweep.base.own_code import OwnCode
 from sweep.camera.linear import linear_model
-from sweep.metrics.own import OwnMetric
 from sweep.metrics.smooth import SmoothDesign
-from sweep.report import make_report, read_output, summary_lines
+from sweep.report import make_report, read_output
 from sweep.results.dictionary import KEYS
 from sweep.run import run_study
 from sweep.study import Study, load_study
@@ -63,20 +62,6 @@ def test_a_csd_written_again_has_the_same_numbers_and_the_same_optimum(tmp_path:
     assert kept["apart"]["unit"] == "DN"
     assert kept["red_spread"]["wanted"] == "less"
     assert pq.read_schema(tmp_path / "own" / "results.parquet").field("apart").type == "double"
-
-
-def test_the_run_says_what_its_metrics_take_and_no_row_does(tmp_path: Path) -> None:
-    made = study(tmp_path, OWN_METRIC.partition("search:")[0])
-    for jobs in (1, 2):
-        ran(made, tmp_path / str(jobs), jobs)
-    tables = [(tmp_path / str(jobs) / "results.parquet").read_bytes() for jobs in (1, 2)]
-    assert tables[0] == tables[1]
-    output = read_output(tmp_path / "1")
-    spent_s, rows_s = output.provenance.spent_s
-    assert 0 < spent_s < rows_s
-    told = "metrics apart, red_spread need the whole readout of a design: "
-    told += f"{spent_s:,.2f} s of the workers' {rows_s:,.2f} s for all rows"
-    assert f"Note: {told}." in summary_lines(output)
 
 
 @pytest.mark.slow
@@ -263,8 +248,3 @@ def test_a_file_may_have_dataclasses_and_types(tmp_path: Path) -> None:
     plain = typed.replace("from __future__ import annotations\n", "")
     made = OwnCode("mine.py:apart", plain.replace("def apart(readings)", "def apart(readings: np.ndarray)")).loaded
     assert made.__annotations__ == {"readings": np.ndarray}
-
-
-def test_metrics_of_one_text_are_one() -> None:
-    one, other = (OwnMetric(OwnCode("a.py:f", "def f(r): ...")) for _ in range(2))
-    assert {one, other} == {one}

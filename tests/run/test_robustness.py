@@ -191,18 +191,3 @@ def test_a_kill_among_the_yields_loses_none(tmp_path: Path, monkeypatch: pytest.
     tables = [pq.read_table(tmp_path / folder / ROBUSTNESS) for folder in ("whole", "out")]
     assert tables[0].equals(tables[1])
     assert len(counted) == tables[0].num_rows - 2 > 0
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore")
-def test_a_cluster_gives_the_same_yields(tmp_path: Path) -> None:
-    distributed = pytest.importorskip("distributed")
-    study = street(tmp_path, 1000)
-    ran(study, tmp_path / "one", 1)
-    with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
-    ) as cluster:
-        run_study(study, tmp_path / "far", 1, lambda *_: None, backend="dask", scheduler=cluster.scheduler_address)
-    tables = [pq.read_table(tmp_path / folder / ROBUSTNESS) for folder in ("one", "far")]
-    assert tables[0].num_rows == 3
-    assert tables[0].equals(tables[1])

@@ -17,20 +17,9 @@ from sweep.report import read_output, summary_lines
 from sweep.report.page_data import payload
 from sweep.report.values import drawn_rows
 from sweep.results.thinning import MOST_ROWS
-from sweep.run.rows import job_key, jobs_of
-from sweep.study import Study, load_study
+from sweep.study import load_study
 
 from ..build import large, ran
-
-
-@pytest.mark.slow
-def test_a_hundred_thousand_chunks_have_keys_of_their_own(tmp_path: Path) -> None:
-    study: Study = load_study(large(tmp_path, 8200))
-    jobs = list(jobs_of(study))
-    assert len(jobs) > 100_000
-    assert sum(job.stop - job.start for job in jobs) == study.n_designs
-    keys = {job_key(job, "study", None) for job in jobs}
-    assert len(keys) == len(jobs)
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""The same bits with any number of workers, and whatever number of threads the libraries are given; parts of a job."""
+"""The same bits with any number of workers, and whatever number of threads the libraries are given."""
 
 from __future__ import annotations
 
@@ -6,18 +6,12 @@ import hashlib
 import os
 import subprocess
 import sys
-from itertools import pairwise
 from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
 
-from sweep.results.identity import CHUNK
-from sweep.run.rows import Job, joined, rules_of, run_job
-from sweep.study import Study
-
 from ..build import stopband_study
-from ..rounding import assert_tables_within_rounding, brightest_dn
 
 STUDY = stopband_study(
     "tiny",
@@ -72,22 +66,3 @@ def test_threads_and_workers_change_no_bit(tmp_path: Path) -> None:
     first = digests(tmp_path, 1, 1)
     for jobs, threads in ((1, 2), (1, 4), (2, 1), (2, 4)):
         assert digests(tmp_path, jobs, threads) == first, (jobs, threads)
-
-
-@pytest.mark.parametrize("separable", [True, False])
-def test_parts_of_a_job_are_the_job_within_rounding(
-    plain: Study, separable: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if not separable:
-        monkeypatch.setattr("sweep.run.routes.edges_of", lambda *_: None)  # which leaves the curves
-    space, rules = plain.spaces[-1], rules_of(plain)
-    size = CHUNK + 300
-    for scenario in plain.scenarios:
-        setup = plain.setup(space, scenario)
-        magnitude_dn = brightest_dn(setup, space.curves(space.points(0, 100), plain.grid.size))
-        whole = run_job(Job(space, scenario, 0, size, 0, 0), setup, rules)
-        ends = [0, 1, 2, 17, 33, 1024, 2049, CHUNK, CHUNK + 1, size]
-        parts = [run_job(Job(space, scenario, a, b, a, a), setup, rules) for a, b in pairwise(ends)]
-        columns = [name for name in rules.schema.names if name != "pareto"]  # that of each part alone
-        both = [table.select(columns).to_pandas() for table in (joined(parts), whole)]
-        assert_tables_within_rounding(*both, setup, magnitude_dn, given=space.parameters)

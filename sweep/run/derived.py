@@ -1,0 +1,151 @@
+"""Tables derived from the rows that a report shows: those of a study, and their content."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow as pa
+
+from ..base.types import IndexArray, Parallel, Progress
+from ..results.curves import FilterCurves, KeptCurves
+from ..results.designs import computed_rows, row_curves, row_space
+from ..results.tables import (
+    CROSSINGS,
+    CURVES,
+    FOUND,
+    LIMITED_BY,
+    POINTS,
+    RECOGNITION,
+    REGIONS_MAP,
+    RENDERED,
+    ROBUSTNESS,
+    SENSOR_MAP,
+    TRADED,
+    VALIDATED,
+)
+from ..search.limit import Limit
+from ..study import Study
+from ..study.axes import series_of
+from .allowed_lamps import regions_table
+from .colors import rendered_table, traded_table
+from .crossings import crossings_table
+from .details import Details, limited_by_table, recognition_table, sensor_map_table
+from .held_out import held_out_table
+from .robustness import robustness_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_POINTS = pa.schema(
+    [("design_id", pa.int64())]
+    + [(name, pa.string()) for name in ("signal_type", "signal", "channel")]
+    + [("dn", pa.float64())]
+)
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Rows that a report shows, and those `on_front` of them; `limit`: of a search.
+
+    `details`: by the ids of the rows; `points`: ids of the swept designs that figures show as points,
+    ndarray[n_points]; `kept`: calls whose results are kept as parts under a name.
+    """
+
+    study: Study
+    rows: pd.DataFrame
+    on_front: pd.DataFrame
+    details: Mapping[int, Details]
+    points: IndexArray
+    limit: Callable[[], Limit | None]
+    parallel: Parallel
+    kept: Callable[[str], Parallel]
+    progress: Progress
+
+    @property
+    def drawn(self) -> list[dict[Any, Any]]:
+        """Rows of the first scenario and the search's answer; not those that failed."""
+        first = self.rows["scenario"] == next(iter(self.study.scenarios))
+        return computed_rows(self.rows[first | (self.rows["kind"] == FOUND)])
+
+    @property
+    def other_front(self) -> list[dict[Any, Any]]:
+        """Rows on the front that are not drawn."""
+        ids = [row["design_id"] for row in self.drawn]
+        return computed_rows(self.on_front[~self.on_front["design_id"].isin(ids)])
+
+
+def row_tables(study: Study) -> dict[str, Callable[[Shown], pa.Table]]:
+    """Return the derived tables of a study by the names of their files, in the order in which they are made."""
+    recognition, tasks = study.section.recognition, study.tasks
+    tables: dict[str, Callable[[Shown], pa.Table]] = {
+        CURVES: _curves_table,
+        POINTS: _points_table,
+        LIMITED_BY: lambda s: limited_by_table(s.study, s.details, s.points, s.parallel, s.progress),
+    }
+    if study.held_out is not None:
+        tables[VALIDATED] = lambda s: held_out_table(s.study, s.rows, s.on_front, s.parallel, s.progress)
+    if study.pair_over_population is not None:
+        tables[ROBUSTNESS] = lambda s: robustness_table(s.study, s.rows, s.kept("robustness"), s.progress)
+    if study.section.regions is not None:
+        tables[REGIONS_MAP] = lambda s: regions_table(s.study, s.rows, s.parallel, s.progress)
+    if any(scene.field is not None for scene in study.scenarios.values()):
+        tables[SENSOR_MAP] = lambda s: sensor_map_table(s.study, s.rows, s.parallel, s.progress)
+    if recognition is not None and series_of(study.scenarios):
+        tables[CROSSINGS] = lambda s: crossings_table(s.study, s.rows, s.parallel, s.progress)
+    if recognition is not None and recognition.patches:
+        tables[RECOGNITION] = lambda s: recognition_table(s.study, s.rows, s.details)
+    if tasks is not None and "color" in tasks.by_name:
+        tables[TRADED] = lambda s: traded_table(s.study, s.rows)
+        tables[RENDERED] = lambda s: rendered_table(s.study, s.rows)
+    return tables
+
+
+def _curves_table(shown: Shown) -> pa.Table:
+    """Curves of the sensor, the lights, own tasks' files, the designs that are drawn or on the front, the limit."""
+    study, limit = shown.study, shown.limit()
+    lights = zip(study.lights.types, study.lights.names, study.lights.photons, strict=True)
+    limits = {}
+    if limit is not None and limit.curve is not None and study.search is not None:
+        limits[study.search.space.cfa] = limit.curve
+    return KeptCurves(
+        study.grid.nodes_nm,
+        dict(study.sensor.qe),
+        {(kind, name): values for kind, name, values in lights},
+        _filters(study, shown.drawn),
+        _filters(study, shown.other_front),
+        limits,
+        {} if study.tasks is None else dict(study.tasks.from_files),
+    ).table()
+
+
+def _filters(study: Study, rows: list[dict[Any, Any]]) -> dict[int, FilterCurves]:
+    """QE of the modified channels of designs."""
+    filters = {}
+    for row in rows:
+        space, curves = row_curves(study, row)
+        channels = () if space.filter is None else space.filter.channels
+        filters[int(row["design_id"])] = dict(zip(channels, curves[0], strict=True))
+    return filters
+
+
+def _points_table(shown: Shown) -> pa.Table:
+    """Digital numbers of each signal in each channel of the designs that are drawn or on the front."""
+    lights, parts = shown.study.lights, [_POINTS.empty_table()]
+    for row in [*shown.drawn, *shown.other_front]:
+        dn = shown.details[int(row["design_id"])].dn
+        assert dn is not None
+        signals, channels = dn.shape
+        mosaic = shown.study.setup(row_space(shown.study, row), row["scenario"]).camera.mosaic
+        columns = (
+            np.full(dn.size, row["design_id"]),
+            np.repeat(lights.types, channels),
+            np.repeat(lights.names, channels),
+            np.tile(mosaic.channels, signals),
+            dn.ravel(),
+        )
+        arrays = [pa.array(values, type=kind) for values, kind in zip(columns, _POINTS.types, strict=True)]
+        parts.append(pa.Table.from_arrays(arrays, schema=_POINTS))
+    return pa.concat_tables(parts).combine_chunks()

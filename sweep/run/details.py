@@ -1,0 +1,208 @@
+"""Details of the designs that a report shows: limiting lights, digital numbers, recognition, maps over the sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pyarrow as pa
+
+from ..base.types import FloatArray, IndexArray, Parallel, Progress, delayed
+from ..camera.field import over_field, scene_at
+from ..camera.forward import AllPhases, ForwardModel, forward_model
+from ..camera.setup import Setup
+from ..curves.lights import Pair
+from ..designs.block import CurveBlock, edges_of_some
+from ..designs.space import Space
+from ..metrics.limiting import LimitingLights, limited_by_name, limiting_lights, limiting_lights_of
+from ..metrics.recognition import columns, recognize
+from ..metrics.separation import csd_name, separations
+from ..metrics.smooth import smooth_response
+from ..results.designs import computed_rows, few_rows, row_curves
+from ..results.tables import FEW, FOUND, LIMITED_BY, POINTS, RECOGNITION
+from ..study import Study
+from .workers import tracked
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_AT_ONCE, _SWEPT_AT_ONCE = 64, 4096
+_HEIGHTS = 41
+"""Image heights of a sensor map, in equal steps."""
+_MOST_VALUES = 2_000_000
+"""Digital numbers that are held at once."""
+_Design = tuple[int, FloatArray, frozenset[str]]
+"""A design's id, its curves, ndarray[1, n_modified, n_wavelengths], and the tables that it is in."""
+
+
+@dataclass(frozen=True)
+class Details:
+    """Readout of a design, as far as a table needs it.
+
+    `limited_by`: of each pair of types the two lights that limit its separation; `dn`: digital numbers at the first
+    sampling phase, ndarray[n_signals, n_channels]; `recognized`: see `recognize`.
+    """
+
+    limited_by: Mapping[Pair, str | None] | None = None
+    dn: FloatArray | None = None
+    recognized: Mapping[str, float] | None = None
+
+
+def design_details(
+    study: Study,
+    tables: Collection[str],
+    rows: pd.DataFrame,
+    on_front: pd.DataFrame,
+    parallel: Parallel,
+    progress: Progress,
+) -> dict[int, Details]:
+    """Return the details of the rows to draw and those on the front, by their ids, for the tables to be made."""
+    first, front = next(iter(study.scenarios)), {*on_front["design_id"]}
+    groups: dict[tuple[str, ...], tuple[Setup, list[_Design]]] = {}
+    for row in computed_rows(rows, on_front):
+        scenario, design_id = str(row["scenario"]), int(row["design_id"])
+        wanted = {LIMITED_BY}
+        if design_id in front or scenario == first or row["kind"] == FOUND:
+            wanted.add(POINTS)
+        if _patches(study) and row["kind"] in FEW:
+            wanted.add(RECOGNITION)
+        if wanted := wanted.intersection(tables):
+            space, curves = row_curves(study, row)
+            key = (scenario, space.cfa, *(() if space.filter is None else space.filter.channels))
+            group = groups.setdefault(key, (study.setup(space, scenario), []))
+            group[1].append((design_id, curves, frozenset(wanted)))
+    calls = [
+        delayed(_details, setup, designs[start : start + _AT_ONCE], study.states, _patches(study), study.section.seed)
+        for setup, designs in groups.values()
+        for start in range(0, len(designs), _AT_ONCE)
+    ]
+    result: dict[int, Details] = {}
+    for details in tracked(parallel, calls, "lights and patches", progress):
+        result |= details
+    return result
+
+
+def _patches(study: Study) -> int:
+    recognition = study.section.recognition
+    return 0 if recognition is None else recognition.patches or 0
+
+
+def _details(
+    setup: Setup, designs: Sequence[_Design], states: tuple[str, ...], patches: int, seed: int
+) -> dict[int, Details]:
+    """Details by ids; the random numbers of a design's patches follow from the study's seed and its id."""
+    result = {}
+    for design_id, curves, wanted in designs:
+        model = forward_model(setup, AllPhases if RECOGNITION in wanted else ForwardModel)
+        limited_by = dn = recognized = None
+        if wanted & {LIMITED_BY, POINTS}:
+            response = model.read(curves)[0]
+            limited_by = {pair: lights[0] for pair, lights in limiting_lights(setup, response).items()}
+            dn = response[0, 0].copy()
+        if RECOGNITION in wanted:
+            assert isinstance(model, AllPhases)
+            recognized = recognize(model, curves, states, patches, np.random.default_rng((seed, design_id)))
+        result[design_id] = Details(limited_by, dn, recognized)
+    return result
+
+
+def recognition_table(study: Study, rows: pd.DataFrame, details: Mapping[int, Details]) -> pa.Table:
+    """A row per plain CFA, named design and answer: its keys, `patches` and `recognition.columns`."""
+    keys = ["design_id", "kind", "name", "cfa", "scenario"]
+    made = []
+    for row in few_rows(rows):
+        recognized = details[int(row["design_id"])].recognized
+        assert recognized is not None
+        made.append({key: row[key] for key in keys} | {"patches": _patches(study)} | dict(recognized))
+    fields = [("design_id", pa.int64()), *((key, pa.string()) for key in keys[1:]), ("patches", pa.int64())]
+    return pa.Table.from_pylist(made, schema=pa.schema([*fields, *((name, pa.float64()) for name in columns())]))
+
+
+def limited_by_table(
+    study: Study, details: Mapping[int, Details], points: IndexArray, parallel: Parallel, progress: Progress
+) -> pa.Table:
+    """Return the columns `design_id` and `limited_by_<a>_<b>`, the names of two lights, of the designs that are shown.
+
+    Parameters
+    ----------
+    study : Study
+    details : mapping of int to Details
+        Details of some designs by their ids.
+    points : ndarray[n_points]
+        Ids of the swept designs that figures show as points.
+    parallel, progress : callable
+        Runner of calls, and what is called with their progress.
+
+    Returns
+    -------
+    pyarrow.Table
+        In the order of the ids.
+    """
+    names = {at: detail.limited_by for at, detail in details.items() if detail.limited_by is not None}
+    ids = points[~np.isin(points, list(names))]
+    ends = np.cumsum([space.size for space in study.spaces])
+    scene, number = np.divmod(ids, ends[-1])
+    at = np.searchsorted(ends, number, side="right")
+    scenarios, calls, parts = list(study.scenarios), [], []
+    for scene_index, space_index in dict.fromkeys(zip(scene.tolist(), at.tolist(), strict=True)):
+        space = study.spaces[space_index]
+        group = np.flatnonzero((scene == scene_index) & (at == space_index))
+        for start in range(0, group.size, _SWEPT_AT_ONCE):
+            part = group[start : start + _SWEPT_AT_ONCE]
+            numbers = number[part] - (ends[space_index] - space.size)
+            calls.append(delayed(_limits, study.setup(space, scenarios[scene_index]), space, numbers))
+            parts.append(ids[part].tolist())
+    for part, lights in zip(parts, tracked(parallel, calls, "limiting lights", progress), strict=True):
+        names |= {one: {pair: lights[pair][index] for pair in lights} for index, one in enumerate(part)}
+    shown = sorted(names)
+    limits = {
+        limited_by_name(pair): pa.array([names[at].get(pair) for at in shown], pa.string()) for pair in study.pairs
+    }
+    return pa.table({"design_id": pa.array(shown, pa.int64()), **limits})
+
+
+def _limits(setup: Setup, space: Space, numbers: IndexArray) -> LimitingLights:
+    """Lights that limit some designs of a space, by their numbers in it."""
+    model, camera = forward_model(setup), setup.camera
+    step = max(1, _MOST_VALUES // (model.n_cases * len(setup.lights.names) * len(camera.mosaic.channels)))
+    parts = []
+    for start in range(0, numbers.size, step):
+        part = numbers[start : start + step]
+        edges = edges_of_some(space, part)
+        block = CurveBlock(space.curves(space.points_of(part), camera.grid.size)) if edges is None else edges
+        parts.append(limiting_lights_of(model, block))
+    return {pair: np.concatenate([part[pair] for part in parts]) for pair in parts[0]}
+
+
+def sensor_map_table(study: Study, rows: pd.DataFrame, parallel: Parallel, progress: Progress) -> pa.Table:
+    """Return a row per image height of each plain CFA, named design and answer in a scene with a field.
+
+    CSDs are those of the response before clipping and rounding, with all other effects; of a pulsed light the
+    smallest over its moments.
+    """
+    calls = []
+    for row in few_rows(rows):
+        if study.scenarios[row["scenario"]].field is not None:
+            space, curves = row_curves(study, row)
+            setup = study.setup(space, row["scenario"])
+            calls.append(delayed(_over_heights, setup, int(row["design_id"]), np.asarray(curves, dtype=float)))
+    maps = [row for answer in tracked(parallel, calls, "field positions", progress) for row in answer]
+    names = ("height", "cra_deg", *(csd_name(pair) for pair in study.pairs))
+    schema = pa.schema([("design_id", pa.int64()), *((name, pa.float64()) for name in names)])
+    return pa.Table.from_pylist(maps, schema=schema).sort_by([("design_id", "ascending"), ("height", "ascending")])
+
+
+def _over_heights(setup: Setup, design_id: int, curves: FloatArray) -> list[dict[str, float]]:
+    """Rows of one design, the center of the image first."""
+    field, rows = setup.scene.field, list[dict[str, float]]()
+    assert field is not None
+    same = len(over_field(setup)) == 1
+    for height in np.linspace(0.0, 1.0, _HEIGHTS).tolist():
+        if not rows or not same:
+            response = smooth_response(replace(setup, scene=scene_at(setup.scene, height)), curves)
+            moments = [separations(response[:, case], setup.members) for case in range(response.shape[1])]
+            csds = {csd_name(pair): float(np.min([csd[pair][0] for csd in moments])) for pair in moments[0]}
+        rows.append({"design_id": design_id, "height": height, "cra_deg": field.cra_at(height), **csds})
+    return rows

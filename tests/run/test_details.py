@@ -1,0 +1,48 @@
+"""Details of designs for the report: the same with any number of workers, and when they are made again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from sweep.results.tables import LIMITED_BY, POINTS, RECOGNITION
+from sweep.run import run_study
+from sweep.study import load_study
+
+from ..cases import thinned
+
+STUDY = """
+study: looks
+sensor: ar0820
+lights: tl16
+pixel: {read_noise_e: 2}
+scenarios:
+  near: {target: {distance_m: 150, fov_deg: 60}, optics: {f_number: 2}, noise: true}
+  far: {target: {distance_m: 300, fov_deg: 60}, optics: {f_number: 2}, noise: true}
+cfas: [RGGB, RYNCy]
+designs:
+  RYN_4Cy: {cfa: RYNCy, channel: N, base: Y, to: G, at: RYN_4Cy}
+recognition: {states: [yellow, red], patches: 20}
+"""
+TABLES = (LIMITED_BY, POINTS, RECOGNITION)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "looks.yaml").write_text(STUDY)
+    return tmp_path
+
+
+def ran(folder: Path, jobs: int = 1) -> dict[str, list[object]]:
+    run_study(load_study(folder / "looks.yaml"), folder / f"out{jobs}", jobs, lambda *_: None)
+    return {name: pq.read_table(folder / f"out{jobs}" / name).to_pylist() for name in TABLES}
+
+
+@pytest.mark.parametrize("jobs", thinned([1, 2]))
+def test_what_is_looked_at_later_or_elsewhere_is_the_same(folder: Path, jobs: int) -> None:
+    before = ran(folder)
+    for name in TABLES:
+        (folder / "out1" / name).unlink()
+    assert ran(folder, jobs) == before
