@@ -150,6 +150,7 @@ def draw_nothing(patch: pytest.MonkeyPatch) -> None:
     names = ("pareto", "sensor", "signals", "chart")
     patch.setattr("sweep.report.page._drawings", lambda _: ((name, name, None) for name in names))
     patch.setattr("sweep.report.page.pictures_of", lambda _, kinds: {kind: kind.encode() for kind in kinds})
+    patch.setattr("sweep.report.page.inlined", lambda _: "data:image/png;base64,cG5n")
     patch.setattr("sweep.commands.describe.draw", lambda *_: None)
     patch.setattr("sweep.commands.describe.rendered", lambda _, kind: kind.encode())
 

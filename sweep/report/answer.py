@@ -15,15 +15,11 @@ from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
 from ..results.thinning import per_exposure
 from ..study.axes import series_of
-from .allowed_lamps import lamp_lines
-from .leaders import Leaders, Row, leaders_of
-from .names import capital, full_name, label, of_reference, rate_told
+from .lamps import lamp_lines, over_population, robustness_lines
+from .leaders import Leaders, Row, capital, full_name, label, leaders_of, of_reference, upper_bound_beside
 from .noise import usable_lines
-from .robustness import over_population, robustness_lines, worst_over
-from .series import lead_sentence, leads_of
+from .series import lead_sentence, leads_of, series_figures
 from .terms import assumed, constraints_told, missed_told, moves_with_light, technology_of, unknown_lines
-from .upper_bound import upper_bound_beside
-from .values import series_figures
 
 _MOST_SCENARIOS = 6
 """Scenarios beside the leading one whose best design the answer names."""
@@ -32,15 +28,13 @@ _BY_NOISE = (D_PRIME, CNR)
 
 
 def answer_sentences(output: Output) -> list[str]:
-    """Results on images first; then over scenarios that differ in one number the leaders, else the best design."""
-    return output.once("answer", lambda: [*_of_images(output), *_of_designs(output)])
-
-
-def _of_images(output: Output) -> Iterator[str]:
+    """Return results on images first; then over scenarios that differ in one number the leaders, else the best."""
+    images: list[str] = []
     if output.study.vision is not None:
-        from .vision_tables import vision_sentences  # noqa: PLC0415  (only where a study asks for images)
+        from .vision_report import vision_sentences  # noqa: PLC0415  (only where a study asks for images)
 
-        yield from vision_sentences(output)
+        images = list(vision_sentences(output))
+    return images + _of_designs(output)
 
 
 def _of_designs(output: Output) -> list[str]:
@@ -70,8 +64,11 @@ def _said_separation(output: Output, row: Row) -> str:
     light = f"at {row[CFA_SENSITIVITY]:.3f} {of_reference(output)}"
     if separation.pair is None or separation.metric in _BY_NOISE:
         return f"reaches {separation.words} {amount} {light}"
-    worst = f" in the worst case of {worst_over(output)}" if separation.extreme == WORST_CASE else ""
-    if separation.extreme == OF_A_SHARE:
+    worst = ""
+    if separation.extreme == WORST_CASE:
+        over = ["production"] if output.study.production.tolerance else []
+        worst = f" in the worst case of {' and '.join([*over, *(['all lamps'] if over_population(output) else [])])}"
+    elif separation.extreme == OF_A_SHARE:
         worst = separation.words.removeprefix(output.columns[separation.of].words).replace(" of ", " for ", 1)
     return f"separates {' from '.join(separation.pair)} by {amount}{worst} {light}"
 
@@ -185,50 +182,28 @@ def _times(output: Output, best: Row, plain: Row | None) -> str:
 
 
 def who_else(output: Output) -> list[str]:
-    """The largest separation, and the largest for its exposure, where that is not the best under the constraints."""
-    sentences = " ".join(_others(output, leaders_of(output)))
-    return [sentences] if sentences else []
-
-
-def _others(output: Output, leaders: Leaders) -> Iterator[str]:
-    best, most, rate = leaders.chosen, leaders.separates, leaders.per_exposure
-    separation, where = output.trade_off[0], _in(output, leaders.scenario)
-    per_time = separation.unit != DECADES and separation.metric not in _BY_NOISE
-    leads = best is not None and most is not None and most["design_id"] == best["design_id"]
-    if leads and best is not None and best["kind"] in (SWEPT, FOUND):
-        yield f"Nothing else in this run {'separates' if per_time else 'has'} more{where}."
-    more = most is not None and (best is None or most[separation.name] > best[separation.name])
-    if most is not None and more:
-        verb = "separates most" if per_time else "has the most"
-        figures = f"{separation.told(most[separation.name])} at {most[CFA_SENSITIVITY]:.3f} {of_reference(output)}"
-        figures += _limited_told(output, most)
-        yield f"{capital(full_name(most))} {verb} of all{where}: {figures}{_missed(output, most)}."
-    if rate is None or not per_time:
-        return
-    measure = per_exposure(separation.name)
-    same = more and most is not None and most["design_id"] == rate["design_id"]
-    most_rate = rate_told(rate[measure])
-    rivals = [r for r in (best, leaders.plain) if r is not None and r["design_id"] != rate["design_id"]]
-    others = {full_name(r): rate_told(r[measure]) for r in rivals}
-    tied = [name for name, value in others.items() if value == most_rate]
-    who = " and ".join(["it" if same else full_name(rate), *tied])
-    text = f"{capital(who)} separate{' most for their' if tied else 's most for its'} exposure{where}"
-    text += f"{', too' if same else ''}: {most_rate} {separation.unit} per ms of exposure"
-    against = ", ".join(f"{name} {value}" for name, value in others.items() if name not in tied)
-    yield text + (f" ({against})" if against else "") + ("" if same else _missed(output, rate)) + "."
-
-
-def _missed(output: Output, row: Row) -> str:
-    """Constraints that a row does not meet, in words; of a plain CFA none are asked."""
-    missed = missed_told(output, row)
-    return f", but {missed}" if missed and row["kind"] != PLAIN else ""
+    """Return who separates most, where that is not the best under the constraints, and what it does not meet."""
+    leaders, separation = leaders_of(output), output.trade_off[0]
+    best, most, where = leaders.chosen, leaders.separates, _in(output, leaders.scenario)
+    verb, more = "separates most", "separates more"
+    if separation.unit == DECADES or separation.metric in _BY_NOISE:
+        verb, more = "has the most", "has more"
+    if most is None:
+        return []
+    if best is not None and not most[separation.name] > best[separation.name]:
+        leads = most["design_id"] == best["design_id"] and best["kind"] in (SWEPT, FOUND)
+        return [f"Nothing else in this run {more}{where}."] if leads else []
+    figures = f"{separation.told(most[separation.name])} at {most[CFA_SENSITIVITY]:.3f} {of_reference(output)}"
+    missed = "" if most["kind"] == PLAIN else missed_told(output, most)  # nothing is asked of a plain CFA
+    ending = f", but {missed}" if missed else ""
+    return [f"{capital(full_name(most))} {verb} of all{where}: {figures}{_limited_told(output, most)}{ending}."]
 
 
 _RESAMPLES = 10_000
 
 
 def unseen_lines(output: Output) -> Iterator[str]:
-    """Loss of the search on lights that are left out of it."""
+    """Yield the loss of the search on lights that are left out of it."""
     if output.left_out is None:
         return
     several = output.left_out["objective"].nunique() > 1
@@ -245,7 +220,7 @@ def unseen_lines(output: Output) -> Iterator[str]:
 
 
 def generalization_gap(falls: FloatArray, seed: int) -> tuple[float, float, float]:
-    """The mean fall of an optimum on a light that was left out, with its 95 % interval by a bootstrap over the lights.
+    """Return the mean fall of an optimum on a light that was left out, with its 95 % interval by a bootstrap.
 
     `falls`: DN, ndarray[n_lights]. The interval is of lights like these, drawn at random (Efron and Tibshirani, An
     Introduction to the Bootstrap, 1993, chapter 13).
@@ -257,7 +232,7 @@ def generalization_gap(falls: FloatArray, seed: int) -> tuple[float, float, floa
 
 
 def large_numbers(output: Output) -> list[tuple[str, str, str]]:
-    """(value, name, comparison) of separation, light and distance to the upper bound of the best design.
+    """Return (value, name, comparison) of separation, light and distance to the upper bound of the best design.
 
     Without a bound, its separation per exposure. Without a best design there are none.
     """
@@ -275,10 +250,9 @@ def large_numbers(output: Output) -> list[tuple[str, str, str]]:
         return f"{best[column] / plain[column]:.2f} times {plain['name']} ({told(float(plain[column]))})"
 
     value, measure = float(best[separation.name]), per_exposure(separation.name)
-    light = beside(CFA_SENSITIVITY, "{:.3f}".format)
     numbers = [
         (separation.told(value), separation.words, beside(separation.name, separation.told)),
-        (f"{best[CFA_SENSITIVITY]:.3f}", of_reference(output), light),
+        (f"{best[CFA_SENSITIVITY]:.3f}", of_reference(output), beside(CFA_SENSITIVITY, "{:.3f}".format)),
     ]
     bound, search = upper_bound_beside(output, best), output.provenance.search
     if bound is not None and search is not None:
@@ -286,6 +260,11 @@ def large_numbers(output: Output) -> list[tuple[str, str, str]]:
         name = f"below the upper bound for any filter in {search.channel} of {search.cfa}"
         numbers.append((separation.told(bound - value), name, shown))
     elif best[measure] == best[measure] and separation.unit != DECADES and separation.metric not in (D_PRIME, CNR):
-        rate = f"{rate_told(float(best[measure]))} {separation.unit}"
-        numbers.append((rate, "per ms of exposure", beside(measure, rate_told)))
+        rate = f"{_rate(float(best[measure]))} {separation.unit}"
+        numbers.append((rate, "per ms of exposure", beside(measure, _rate)))
     return numbers
+
+
+def _rate(rate: float) -> str:
+    """A separation per millisecond of exposure."""
+    return f"{rate:.{0 if rate >= 100 else 1}f}"

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import io
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ..base.types import FloatArray
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.text import Text
 
 COLORS = {
     "infeasible": "#b8b8b8",
@@ -41,7 +39,7 @@ BOUND_FILTER_NAME = "filter at the upper bound"
 TYPE_COLORS = {"green": "#009e73", "yellow": "#c9a800", "orange": "#e66100", "red": "#b2182b"}
 CURVE_CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 _DPI = 160
-_PACKED = 3
+_COMPRESSION = 3
 """Compression level of a PNG: at its usual 6 a file is a tenth smaller and takes twice as long."""
 Drawing = Callable[[], "Figure"]
 """A drawing that is put off: a process that draws nothing need not load what draws."""
@@ -140,49 +138,28 @@ def decorate(axes: Axes) -> None:
 
 
 def pictures_of(draw: Drawing, kinds: Sequence[str]) -> dict[str, bytes]:
-    """A drawing as files of some kinds: kind -> contents."""
-    import matplotlib as mpl  # noqa: PLC0415  (slow to import)
-
-    # Nothing stands above any axes: where a title goes need not be found out, which takes a sixth of a picture's time.
-    with mpl.rc_context({"axes.titley": 1.0}):
-        figure = draw()
+    """Draw a figure and return it as files of some kinds: kind -> contents."""
+    figure = draw()
     return {kind: rendered(figure, kind) for kind in kinds}
 
 
-def _words(artist: Artist) -> Iterator[Text]:
-    """Texts of a figure but the numbers along its axes: to look at these makes ticks that nothing else needs."""
-    from matplotlib.axis import Axis  # noqa: PLC0415  (slow to import)
-    from matplotlib.text import Text  # noqa: PLC0415
-    from matplotlib.ticker import LogFormatter, ScalarFormatter  # noqa: PLC0415
-
-    if isinstance(artist, Text):
-        yield artist
-    if isinstance(artist, Axis) and isinstance(artist.get_major_formatter(), LogFormatter | ScalarFormatter):
-        yield artist.label
-    else:
-        for inner in artist.get_children():
-            yield from _words(inner)
-
-
 def rendered(figure: Figure, kind: str) -> bytes:
-    """A drawn figure as the bytes of a `png` or `svg` file; the same figure gives the same bytes."""
-    import matplotlib as mpl  # noqa: PLC0415
-    from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
-    from matplotlib.backends.backend_svg import FigureCanvasSVG  # noqa: PLC0415
-    from matplotlib.layout_engine import ConstrainedLayoutEngine  # noqa: PLC0415
+    """Return a drawn figure as the bytes of a `png` or `svg` file; the same figure gives the same bytes."""
+    import matplotlib as mpl  # noqa: PLC0415  (slow to import)
 
-    if isinstance(figure.get_layout_engine(), ConstrainedLayoutEngine):  # the first kind of this figure
-        for text in _words(figure):
-            text.set_parse_math(False)  # a name, not a formula
+    for axes in figure.axes:  # a name is no formula; numbers along a logarithmic axis are
+        legend = axes.get_legend()
+        texts = [axes.title, axes.xaxis.label, axes.yaxis.label, *axes.texts, *(legend.get_texts() if legend else ())]
+        for text in texts:
+            text.set_parse_math(False)
+    for text in figure.texts:
+        text.set_parse_math(False)
     buffer = io.BytesIO()
+    options: dict[str, Any] = {"metadata": {"Date" if kind == "svg" else "Software": None}}
+    if kind == "png":
+        options["pil_kwargs"] = {"compress_level": _COMPRESSION}
     with mpl.rc_context({"svg.hashsalt": "cfa-sweep", "svg.fonttype": "path"}), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph")  # a name in a script that the font lacks
-        figure.set_dpi(_DPI)
-        # The canvas' own functions: `savefig` would draw every figure twice.
-        if kind == "svg":
-            FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})  # type: ignore[no-untyped-call]
-        else:
-            packed = {"compress_level": _PACKED}
-            FigureCanvasAgg(figure).print_png(buffer, metadata={"Software": None}, pil_kwargs=packed)  # type: ignore[no-untyped-call]
-    figure.set_layout_engine("none")  # found once, the layout holds for the other kind, too
+        figure.savefig(buffer, format=kind, dpi=_DPI, **options)
+    figure.set_layout_engine("none")  # the layout holds for the other kind, too
     return buffer.getvalue()

@@ -14,8 +14,7 @@ from ..metrics.columns.confusion import D_PRIME, STATE_ERROR, STATE_ERROR_BOUND
 from ..metrics.recognition import CLASSIFIERS, MOST_LIKELY
 from ..results.output import Output
 from ..study.axes import series_of
-from .series import Line, SeriesFigure, quantity_of
-from .values import over_series, series_figures
+from .series import Line, SeriesFigure, over_series, quantity_of, series_figures
 
 _LEAST = 1e-12
 _ERROR = "error of the worst pair of states"
@@ -33,8 +32,8 @@ _RULE_NAMES = {MOST_LIKELY: "most likely signal", "nearest_centroid": "nearest c
 
 
 def all_series(output: Output) -> list[SeriesFigure]:
-    """Every figure of a quantity over scenarios: errors and accuracies, if asked for, then separations."""
-    return [*output.once("noise over series", lambda: list(_noise_figures(output))), *series_figures(output)]
+    """Return every figure of a quantity over scenarios: errors and accuracies, if asked for, then separations."""
+    return [*_noise_figures(output), *series_figures(output)]
 
 
 def _noise_figures(output: Output) -> Iterator[SeriesFigure]:
@@ -61,7 +60,7 @@ def _noise_figures(output: Output) -> Iterator[SeriesFigure]:
 
 
 def usable_lines(output: Output) -> Iterator[str]:
-    """For each series of scenarios, the numbers at which each design is usable; designs with the same ones together."""
+    """Yield for each series of scenarios the numbers at which designs are usable; those with the same ones together."""
     if output.study.recognition is None:
         return
     allowed = output.study.recognition.error_max
@@ -115,8 +114,8 @@ def _crossings(output: Output, series: str, key: str) -> dict[str, tuple[float, 
     return dict(zip(known["name"], zip(known["at"], known["error"], strict=True), strict=True))
 
 
-def told_apart_table(output: Output) -> pd.DataFrame:
-    """Errors in closed form and accuracies on drawn patches, a row per design and scenario."""
+def recognition_table(output: Output) -> pd.DataFrame:
+    """Return errors in closed form and accuracies on drawn patches, a row per design and scenario."""
     if output.study.recognition is None:
         return pd.DataFrame()
     rows = output.few

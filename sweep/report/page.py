@@ -20,14 +20,14 @@ from ..results.tables import FIGURES, FOUND, NAMED, PLAIN, REPORT, VISION_FIGURE
 from . import signal_figures as signals
 from . import tables
 from . import values as content
-from .allowed_lamps import lamp_drawings, lamp_table
 from .answer import answer_sentences, large_numbers
 from .colors import color_drawings
 from .figures import Drawing, draw_curves, pictures_of
+from .lamps import lamp_drawings, lamp_table
 from .leaders import leaders_of
-from .noise import all_series, told_apart_table
+from .noise import all_series, recognition_table
 from .page_data import payload
-from .pages import inlined, library, page, rows, script
+from .pages import inlined, page, rows, script
 from .scenes import effect_table, scene_groups, scene_table
 from .scorecard import draw_scorecard, scorecard
 from .sensor_map import map_drawings
@@ -111,14 +111,14 @@ def _parts(output: Output, published: pd.DataFrame) -> dict[str, Any]:
         "counts": counts_line(output),
         "interactive": drawn,
         "profiles": {cfa: rows(profile_table(profiles)) for cfa, profiles in output.profiles.items()},
-        "plotly": library(),
+        "plotly": script("plotly-gl2d.min.js"),
         "script": script("report.js"),
         "scenes": rows(scene_table(groups)),
         "lamps": rows(lamp_table(output)),
         "vision": _vision(output),
         "comparison": rows(tables.comparison_table(output)),
         "best": rows(tables.best_table(output)),
-        "recognition": rows(told_apart_table(output)),
+        "recognition": rows(recognition_table(output)),
         "left_out": rows(tables.worst_left_out(output)),
         "geometry": rows(tables.geometry_table(output)),
         "published": rows(published),
@@ -133,19 +133,17 @@ def _vision(output: Output) -> dict[str, list[list[str]]]:
     """Tables of the benchmark of vision; none where the study asks for none."""
     if output.study.vision is None:
         return {}
-    from .vision import benchmark_of  # noqa: PLC0415  (only where a study asks for images)
-    from .vision_tables import vision_parts  # noqa: PLC0415
+    from .vision_report import vision_parts  # noqa: PLC0415  (only where a study asks for images)
 
-    return {title: rows(table) for title, table in vision_parts(benchmark_of(output)).items()}
+    return {title: rows(table) for title, table in vision_parts(output).items()}
 
 
 def _vision_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
     """The figures of the benchmark of vision; none where the study asks for none."""
     if output.study.vision is not None:
-        from .vision import benchmark_of  # noqa: PLC0415  (only where a study asks for images)
-        from .vision_figures import vision_drawings  # noqa: PLC0415
+        from .vision_report import vision_drawings  # noqa: PLC0415  (only where a study asks for images)
 
-        yield from vision_drawings(output, benchmark_of(output))
+        yield from vision_drawings(output)
 
 
 def _objective(output: Output) -> str:

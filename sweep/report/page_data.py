@@ -32,7 +32,7 @@ _PUBLISHED_LABEL = "our counterpart of the paper's N_4"
 
 
 def payload(output: Output) -> dict[str, Any]:
-    """Everything that the page's script needs, ready for JSON; no NaN but inside packed numbers."""
+    """Return everything that the page's script needs, ready for JSON; no NaN but inside packed numbers."""
     rows = content.drawn_rows(output)
     columns, named = _columns(output, rows), rows[rows["name"].notna()]
     return {
@@ -43,8 +43,8 @@ def payload(output: Output) -> dict[str, Any]:
         "columns": columns,
         "groups": list(GROUPS),
         "group": _packed(_groups(rows), "u1"),
-        "design_id": _packed(rows["design_id"], "f8"),
-        "filter_id": _packed(rows["filter_id"], "f8"),
+        "design_id": _packed(rows["design_id"], "u4"),
+        "filter_id": _packed(rows["filter_id"], "u4"),
         "scenario": _words(rows["scenario"]),
         "cfa": _words(rows["cfa"]),
         "names": {str(at): _names(output, row) for at, row in named.to_dict("index").items()},
@@ -73,6 +73,14 @@ def payload(output: Output) -> dict[str, Any]:
 def _packed(values: Any, kind: str) -> dict[str, str]:
     """Numbers as base64 of little-endian bytes, which cost a third of their digits."""
     return {"dtype": kind, "bdata": base64.b64encode(np.asarray(values).astype(f"<{kind}").tobytes()).decode("ascii")}
+
+
+def _numbers(values: np.ndarray) -> dict[str, Any]:
+    """Numbers, or where they are few, these and the place of each among them."""
+    few, codes = np.unique(values, return_inverse=True)
+    if len(few) > 256:
+        return {"values": _packed(values, "f4")}
+    return {"values": _packed(few, "f4"), "codes": _packed(codes, "u1")}
 
 
 def _words(values: pd.Series) -> dict[str, Any]:
@@ -106,7 +114,7 @@ def _columns(output: Output, rows: pd.DataFrame) -> dict[str, dict[str, Any]]:
         if np.isfinite(values).any() or name in axes:
             quantity, digits = output.columns.get(name), _OF_PARAMETERS if name in output.parameters else _OF_OTHERS
             digits = digits if quantity is None else quantity.digits
-            columns[name] = {"label": output.words(name), "digits": digits, "values": _packed(values, "f4")}
+            columns[name] = {"label": output.words(name), "digits": digits, **_numbers(values)}
     return columns
 
 
@@ -194,7 +202,7 @@ def _clouds(output: Output, rows: pd.DataFrame) -> dict[str, Any]:
 
 
 def history_of(output: Output) -> dict[str, Any] | None:
-    """Best feasible objective of each start of a search and of all, and hypervolume, over the evaluations.
+    """Return the best feasible objective of each start of a search and of all, and hypervolume, over the evaluations.
 
     The best one is over the designs that meet the study's own constraints; the hypervolume is above an objective of 0
     and `least_sensitivity`, and there is none for an objective that is no CSD.

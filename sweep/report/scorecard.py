@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +13,7 @@ from ..metrics.quantity import Column
 from ..results.output import Output
 from ..results.tables import PLAIN
 from .figures import CURVE_CYCLE, canvas, legend_beside
-from .names import label
+from .leaders import label
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -68,10 +67,6 @@ class Scorecard:
 
 def scorecard(output: Output) -> Scorecard | None:
     """Scores of the plain CFAs, named designs and the search's answer in the first scenario; None without tasks."""
-    return output.once("scorecard", partial(_scorecard, output))
-
-
-def _scorecard(output: Output) -> Scorecard | None:
     columns = [c for c in output.columns.values() if c.metric.startswith(PREFIX) and not c.extreme]
     if columns:
         from ..metrics.tasks.figures import FIGURES  # noqa: PLC0415  (few studies have tasks)

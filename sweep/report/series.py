@@ -10,10 +10,13 @@ import numpy as np
 
 from ..base.types import FloatArray
 from ..metrics.quantity import DN
+from ..results.output import Output
+from ..study.axes import series_of
 from .figures import CURVE_CYCLE, canvas, legend_beside
-from .names import capital
+from .leaders import capital
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 _WIDE = 15.0
@@ -76,18 +79,13 @@ class SeriesFigure:
         return _LABELS.get(self.key, self.key)
 
     @property
-    def quantity(self) -> tuple[str, str]:
-        """Name and unit of the scenarios' number; the unit may be empty."""
-        return quantity_of(self.key)
-
-    @property
     def log_x(self) -> bool:
         """Whether the numbers span more than a decade."""
         return bool(self.x.min() > 0 and self.x.max() / self.x.min() > _WIDE)
 
     def at(self, place: int) -> str:
         """A number of the scenarios with its unit."""
-        return f"{self.x[place]:g} {self.quantity[1]}".rstrip()
+        return f"{self.x[place]:g} {quantity_of(self.key)[1]}".rstrip()
 
     @property
     def values(self) -> dict[str, FloatArray]:
@@ -96,13 +94,40 @@ class SeriesFigure:
 
 
 def quantity_of(key: str) -> tuple[str, str]:
-    """Name and unit of the number that scenarios differ in by its key; the unit may be empty."""
+    """Return name and unit of the number that scenarios differ in by its key; the unit may be empty."""
     name, _, unit = _LABELS.get(key, key).partition(" / ")
     return name, unit.strip("()")
 
 
+def over_series(rows: pd.DataFrame, scenarios: Mapping[str, float], column: str) -> dict[str, np.ndarray]:
+    """Return a column over a series' numbers for every design that has them all, ndarray[n_scenarios] each."""
+    names = list(scenarios)
+    rows = rows[rows["scenario"].isin(names)].dropna(subset=["name"]).astype({"name": str, "scenario": str})
+    designs = {str(name): part.set_index("scenario")[column] for name, part in rows.groupby("name", sort=False)}
+    return {name: y.reindex(names).to_numpy(dtype=float) for name, y in designs.items() if len(y) == len(names)}
+
+
+def series_figures(output: Output) -> list[SeriesFigure]:
+    """Return for each set of scenarios that differ in one number the separation of every named design over it."""
+    rows, separation, columns = output.few, output.trade_off[0], output.columns.values()
+    best_place = [c.name for c in columns if (c.extreme, c.of) == ("best place", separation.name) and c.name in rows]
+    figures, series = [], series_of(output.scenarios)
+    for (base, key), scenarios in series.items():
+        worst = over_series(rows, scenarios, separation.name)
+        upper = over_series(rows, scenarios, best_place[0]) if best_place else {}
+        upper = {n: y for n, y in upper.items() if np.isfinite(y).all() and not np.array_equal(y, worst[n])}
+        lines = {name: Line(y, upper.get(name)) for name, y in worst.items()}
+        if lines:
+            band = "over the places on the mosaic" if upper else ""
+            title = f"{output.study.study}, {base}: {separation.words}"
+            x = np.array(list(scenarios.values()))
+            among = base if [other for _, other in series].count(key) > 1 else ""
+            figures.append(SeriesFigure(title, key, separation.axis, x, lines, band, among=among))
+    return figures
+
+
 def lead_sentence(series: SeriesFigure) -> str:
-    """The leading design of each range, with its value and its rival's where that ends."""
+    """Return the leading design of each range, with its value and its rival's where that ends."""
     what, _, unit = series.y_label.partition(" / ")
     values, leads = series.values, leads_of(series)
 
@@ -120,7 +145,7 @@ def lead_sentence(series: SeriesFigure) -> str:
         else:
             span = f"from {series.at(start)}{' on' if last else f' to {series.at(stop)}'}"
         if leader is None:
-            parts.append(f"nobody has {_LEAST_LEAD:g} {unit} {span}")
+            parts.append(f"no CFA reaches {_LEAST_LEAD:g} {unit} {span}")
             continue
         others = sorted((d for d in values if d != leader), key=lambda d: -values[d][stop])
         rival = (None if last else leads[number + 1][0]) or next(iter(others), None)
@@ -128,11 +153,11 @@ def lead_sentence(series: SeriesFigure) -> str:
         beside = f", {rival} {told(rival, stop)}" if rival else ""
         parts.append(f"{leader} leads {span} ({told(leader, stop)}{where}{beside})")
     among = f", {series.among}" if series.among else ""
-    return f"{capital(what)} over {series.quantity[0]}{among}: {'; '.join(parts)}."
+    return f"{capital(what)} over {quantity_of(series.key)[0]}{among}: {'; '.join(parts)}."
 
 
 def leads_of(series: SeriesFigure) -> list[tuple[str | None, int, int]]:
-    """(leader, its first place, its last place) in order; None where nobody has a DN.
+    """Return (leader, its first place, its last place) in order; None where no CFA reaches 1 DN.
 
     A leader stays one as long as nobody has more.
     """

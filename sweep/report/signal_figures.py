@@ -14,7 +14,7 @@ from ..curves.color import display_colors
 from ..metrics.limiting import BETWEEN, limited_by_name
 from ..results.output import Output
 from .figures import CURVE_COLORS, TYPE_COLORS, decorate, empty_figure
-from .names import label
+from .leaders import label
 from .values import modifications
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from ..results.output import Output
 from ..results.tables import PLAIN
 from ..study.axes import series_of
 from .answer import answer_sentences
-from .names import capital, of_reference
+from .leaders import capital, of_reference
 from .scorecard import score_lines, scorecard
 from .tables import comparison_lines, comparison_with_published
 from .terms import assumed_line

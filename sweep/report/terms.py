@@ -11,8 +11,7 @@ from ..metrics.bound import FEASIBLE, Bound
 from ..metrics.quantity import DN, Column
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
-from .leaders import Row
-from .names import capital
+from .leaders import Row, capital
 from .values import modifications
 
 
@@ -85,7 +84,7 @@ def terms_of(output: Output) -> list[str]:
 _NOT_STATED = "No technology is stated of the filters: they are taken as on axis, in parallel rays."
 
 
-def technologies_of(output: Output, row: Row) -> list[Technology | None]:
+def _technologies(output: Output, row: Row) -> list[Technology | None]:
     """Technology that the study states of the filter of a row: one, or of a sweep's design each that it may be of."""
     study, search = output.study, output.provenance.search
     if row["kind"] == PLAIN:
@@ -99,7 +98,7 @@ def technologies_of(output: Output, row: Row) -> list[Technology | None]:
 
 def technology_of(output: Output, row: Row) -> Technology | None:
     """Technology of a row's filter; None if not stated, or not the same for all that it may be."""
-    stated = technologies_of(output, row)
+    stated = _technologies(output, row)
     return stated[0] if len(stated) == 1 else None
 
 
@@ -116,7 +115,7 @@ def assumed(output: Output, row: Row) -> str:
 
 def moves_with_light(output: Output, row: Row) -> bool:
     """Whether a row's filter is said to move with the angle of the light."""
-    return any(t is not None and t.interference is not None for t in technologies_of(output, row))
+    return any(t is not None and t.interference is not None for t in _technologies(output, row))
 
 
 def _told_light(scene: Scene) -> str:

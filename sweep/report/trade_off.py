@@ -10,13 +10,11 @@ import numpy as np
 
 from ..base.types import FloatArray
 from ..metrics.columns.sensitivity import CFA_SENSITIVITY
-from ..metrics.quantity import Column
 from ..results.output import Output
 from ..results.tables import FOUND, NAMED, PLAIN, SWEPT
 from ..results.thinning import even
 from .figures import COLORS, canvas, legend_beside
-from .names import label
-from .upper_bound import bounds_figure, limit_name
+from .leaders import bounds_figure, label
 from .values import modifications
 
 if TYPE_CHECKING:
@@ -99,14 +97,15 @@ def pareto_figure(output: Output, scenario: str, cfa: str) -> TradeOff:
     bound = output.constraints.get(sensitivity.name)
     least = None if bound is None else bound.min
     traced, limit = _trade_offs(output, scenario, cfa)
+    whole = output.columns[sensitivity.of] if sensitivity.extreme else sensitivity
     return TradeOff(
         title=f"{output.study.study}, {cfa}: what separation costs in sensitivity",
-        x_label=_whole_words(output, sensitivity),
+        x_label=sensitivity.words.removesuffix(whole.words) + whole.meaning,
         y_label=separation.axis,
         groups=groups,
         traced=traced,
         limit=limit,
-        limit_name=limit_name(output),
+        limit_name=_limit_name(output),
         levels=dict(zip(references["cfa"], references[separation.name], strict=True)),
         bound=least,
         bound_text="" if least is None else f"{sensitivity.words} at least {least:g}",
@@ -149,15 +148,15 @@ def around_designs(output: Output, scenario: str) -> TradeOff:
         groups={},
         traced=traced,
         limit=limit,
-        limit_name=limit_name(output),
+        limit_name=_limit_name(output),
         x_range=(0.25, 1.0),
     )
 
 
-def _whole_words(output: Output, column: Column) -> str:
-    """The meaning of a column; of a worst case that of the quantity itself."""
-    plain = output.columns[column.of] if column.extreme else column
-    return column.words.removesuffix(plain.words) + plain.meaning
+def _limit_name(output: Output) -> str:
+    """The filters of the search's upper bound, for a legend; empty without a search."""
+    search = output.provenance.search
+    return "" if search is None else f"upper bound for {search.channel} of {search.cfa}, unquantized"
 
 
 def _points(output: Output, rows: pd.DataFrame, x: str, labels: Sequence[str] = ()) -> Points:

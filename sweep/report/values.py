@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,47 +9,17 @@ import numpy as np
 from ..results.facts import Origin
 from ..results.output import Output
 from ..results.tables import SWEPT
-from ..study.axes import series_of
+from ..results.thinning import even
 from ..study.schema import Modification
 from .figures import BOUND_FILTER_NAME, TYPE_COLORS, CurvesFigure
-from .names import label
-from .series import Line, SeriesFigure
+from .leaders import label
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-def over_series(rows: pd.DataFrame, scenarios: Mapping[str, float], column: str) -> dict[str, np.ndarray]:
-    """Values of a column over a series' numbers for every design that has them all, ndarray[n_scenarios] each."""
-    named = rows[rows["scenario"].isin(list(scenarios))].dropna(subset=["name"])
-    values: dict[str, dict[str, float]] = {}
-    for name, scenario, value in zip(named["name"], named["scenario"], named[column].astype(float), strict=True):
-        values.setdefault(str(name), {})[scenario] = value
-    whole = {name: known for name, known in values.items() if len(known) == len(scenarios)}
-    return {name: np.array([known[scenario] for scenario in scenarios]) for name, known in whole.items()}
-
-
-def series_figures(output: Output) -> list[SeriesFigure]:
-    """A figure for each set of scenarios that differ in one number: the separation of every named design over it."""
-    return output.once("separations over series", partial(_series_figures, output))
-
-
-def _series_figures(output: Output) -> list[SeriesFigure]:
-    rows, separation, columns = output.few, output.trade_off[0], output.columns.values()
-    best_place = [c.name for c in columns if (c.extreme, c.of) == ("best place", separation.name) and c.name in rows]
-    figures, series = [], series_of(output.scenarios)
-    for (base, key), scenarios in series.items():
-        worst = over_series(rows, scenarios, separation.name)
-        upper = over_series(rows, scenarios, best_place[0]) if best_place else {}
-        upper = {n: y for n, y in upper.items() if np.isfinite(y).all() and not np.array_equal(y, worst[n])}
-        lines = {name: Line(y, upper.get(name)) for name, y in worst.items()}
-        if lines:
-            band = "over the places on the mosaic" if upper else ""
-            title = f"{output.study.study}, {base}: {separation.words}"
-            x = np.array(list(scenarios.values()))
-            among = base if [other for _, other in series].count(key) > 1 else ""
-            figures.append(SeriesFigure(title, key, separation.axis, x, lines, band, among=among))
-    return figures
+_MOST_POINTS = 2500
+"""Feasible and other designs each that a page draws beside the front."""
 
 
 def sensor_figure(output: Output) -> CurvesFigure:
@@ -96,8 +64,13 @@ def drawn_rows(output: Output) -> pd.DataFrame:
     whose signals were kept.
     """
     table = output.table[output.table["status"] == "ok"]
-    shown = np.union1d(output.swept_points, output.points["design_id"])
-    return table[(table["kind"] != SWEPT) | table["design_id"].isin(shown)].reset_index(drop=True)
+    kept = (table["kind"] != SWEPT) | (table["feasible"] & table["pareto"])
+    kept |= table["design_id"].isin(output.points["design_id"])
+    sample = table["design_id"].isin(output.swept_points) & ~kept
+    for feasible in (True, False):
+        group = np.flatnonzero(sample & (table["feasible"] == feasible))
+        kept.iloc[group[even(group.size, _MOST_POINTS)]] = True
+    return table[kept].reset_index(drop=True)
 
 
 def filters_figure(output: Output, cfa: str) -> CurvesFigure:

@@ -1,26 +1,33 @@
-"""The benchmark of vision as a run left it: errors of each design and reader, with intervals."""
+"""Benchmark of vision as a run left it: errors of each design and reader, and what predicts them, with intervals."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from scipy.stats import rankdata
 
-from ..base.cache import Cache
-from ..base.types import FloatArray
+from ..base.types import BoolArray, FloatArray
 from ..metrics.share import told_share
 from ..results.output import Output
 from ..results.tables import VISION, VISION_CONDITIONS
-from ..vision.scenes import UNSEEN, states_of
-from ..vision.scores import Interval, confusion_matrix, mean_of, nested_weights
+from ..vision.scenes import SHUFFLED, UNSEEN, states_of
+from ..vision.scores import Interval, confusion_matrix, interval_around, mean_of, nested_weights
 from ..vision.section import Vision
 
 OBSERVER, NETWORK, HALF = "observer", "network", "half"
 READER_NAMES = {OBSERVER: "ideal observer", NETWORK: "network", HALF: "network, half of the images"}
 _REFERENCE = "RGGB"
+PREDICTORS = {
+    "csd": "CSD",
+    "dprime": "d'",
+    "pair_error": "pairwise error in closed form",
+    OBSERVER: "ideal observer's error",
+}
+_FALLS = ("csd", "dprime")
+"""Predictors of which more is better."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,25 +102,86 @@ class Benchmark:
         return pd.DataFrame(confusion_matrix(truth, said, len(states)), states, states)
 
 
-_benchmarks: Cache[tuple[Path, str], Benchmark] = Cache(2)
-"""The latest ones, whose sentences, tables and figures share what they need."""
-
-
 def benchmark_of(output: Output) -> Benchmark:
-    """The benchmark of a run whose study asks for one."""
+    """Return the benchmark of a run whose study asks for one."""
     vision = output.study.vision
     assert vision is not None
     tables = output.vision[VISION], output.vision[VISION_CONDITIONS]
-    key = (output.folder, output.provenance.fingerprint)
-    return _benchmarks.get(key, lambda: Benchmark(vision, output.study.seed, *tables))
+    return output.once("vision", lambda: Benchmark(vision, output.study.seed, *tables))
 
 
-def said_interval(found: Interval, digits: int = 2) -> str:
-    """A value with its interval in words."""
-    return f"{found.value:.{digits}f} ({found.low:.{digits}f} to {found.high:.{digits}f})"
+def said_interval(interval: Interval) -> str:
+    """Format a value with its interval."""
+    return f"{interval.value:.2f} ({interval.low:.2f} to {interval.high:.2f})"
 
 
-def said_percent(found: Interval) -> str:
-    """A share with its interval, in percent, without the sign."""
-    value, low, high = (told_share(share).removesuffix("%") for share in (found.value, found.low, found.high))
+def said_percent(interval: Interval) -> str:
+    """Format a share with its interval, in percent, without the sign."""
+    value, low, high = (told_share(share).removesuffix("%") for share in (interval.value, interval.low, interval.high))
     return f"{value} ({low} to {high})"
+
+
+@dataclass(frozen=True)
+class Ranks:
+    """Rank correlations with how rarely the network errs, of each of `PREDICTORS`: 1 predicts every order.
+
+    `everywhere`: over all designs, distances and levels; `between`: between designs at one distance and level, the
+    mean over these. `conditions`: a row per design, distance and level, with all predictors and the measured `error`.
+    """
+
+    everywhere: dict[str, Interval]
+    between: dict[str, Interval]
+    conditions: pd.DataFrame
+
+
+@lru_cache(maxsize=4)
+def ranks_of(benchmark: Benchmark) -> Ranks:
+    """Return predictors of the network's errors, lenses in any order; intervals by a bootstrap of scenes in seeds."""
+    scenes, weights = benchmark.scenes(SHUFFLED), benchmark.weights(SHUFFLED)
+    weights = np.vstack([np.full(weights.shape[1], 1 / weights.shape[1]), weights])
+    where = list(dict.fromkeys(zip(benchmark.conditions["distance_m"], benchmark.conditions["level"], strict=True)))
+    here = np.stack([((scenes["distance_m"] == d) & (scenes["level"] == v)).to_numpy() for d, v in where])
+    # [draws, designs, conditions]; the first draw is the sample itself
+    readers = benchmark.readers[:2]
+    errors = {reader: _by_condition(benchmark.wrong(reader, SHUFFLED), here, weights) for reader in readers}
+    table = benchmark.conditions.set_index(["name", "distance_m", "level"])
+    known = {n: np.array([[table[n][d, *at] for at in where] for d in benchmark.designs]) for n in list(PREDICTORS)[:3]}
+    judged = errors[benchmark.judge]
+    everywhere, between = {}, {}
+    for name in PREDICTORS:
+        given = errors[name] if name in errors else np.broadcast_to(known[name], judged.shape)
+        if benchmark.judge == name:
+            continue
+        sign = -1.0 if name in _FALLS else 1.0
+        flat = _spearman(sign * given.reshape(len(given), -1), judged.reshape(len(judged), -1))
+        everywhere[name] = interval_around(float(flat[0]), flat[1:])
+        at_each = np.stack([_spearman(sign * given[:, :, at], judged[:, :, at]) for at in range(len(where))])
+        mean = np.ma.masked_invalid(at_each).mean(axis=0).filled(np.nan)
+        between[name] = interval_around(float(mean[0]), mean[1:])
+    conditions = pd.DataFrame(
+        [{"design": d, "distance_m": m, "level": level} for d in benchmark.designs for m, level in where]
+    )
+    for name in everywhere:
+        conditions[name] = (errors[name][0] if name in errors else known[name]).ravel()
+    conditions["error"] = judged[0].ravel()
+    return Ranks(everywhere, between, conditions)
+
+
+def _by_condition(wrong: pd.DataFrame, here: BoolArray, weights: FloatArray) -> FloatArray:
+    """Errors, ndarray[draws, designs, conditions]; NaN where a draw has no scene of a condition."""
+    values = wrong.to_numpy(dtype=float)
+    errors = np.full((len(weights), values.shape[1], len(here)), np.nan)
+    for at, scenes in enumerate(here):
+        total = weights[:, scenes].sum(axis=1, keepdims=True)
+        sums = weights[:, scenes] @ values[scenes]
+        errors[:, :, at] = np.divide(sums, total, out=np.full_like(sums, np.nan), where=total > 0)
+    return errors
+
+
+def _spearman(x: FloatArray, y: FloatArray) -> FloatArray:
+    """Rank correlation along the last axis, ndarray[draws]; NaN where one side is the same everywhere."""
+    a, b = (rankdata(values, axis=1) for values in (x, y))
+    a, b = (ranks - ranks.mean(axis=1, keepdims=True) for ranks in (a, b))
+    scale = np.sqrt((a**2).sum(axis=1) * (b**2).sum(axis=1))
+    out = np.full(len(a), np.nan)
+    return np.asarray(np.divide((a * b).sum(axis=1), scale, out=out, where=scale > 0), dtype=float)

@@ -16,8 +16,8 @@ import pytest
 from sweep.base.errors import OutputError, SweepError
 from sweep.report import read_output
 from sweep.report.compare import compare_runs
-from sweep.report.compare.fronts import ComparedFront, box_of, draw_fronts, hypervolumes
-from sweep.report.compare.tables import study_differences
+from sweep.report.compare_fronts import ComparedFront, box_of, draw_fronts, hypervolumes
+from sweep.report.compare_tables import study_differences
 from sweep.study import load_study
 
 from ..build import STUDY, ran
@@ -32,7 +32,8 @@ PLAIN = CHART.split("designs:")[0].replace(", RYNCy]", "]")
 @pytest.fixture
 def plain_fronts(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures that take no time, for tests that do not look at them."""
-    monkeypatch.setattr("sweep.report.compare.make.pictures_of", lambda *_: {"png": b"fronts", "svg": b"fronts"})
+    monkeypatch.setattr("sweep.report.compare.pictures_of", lambda *_: {"png": b"fronts", "svg": b"fronts"})
+    monkeypatch.setattr("sweep.report.compare.inlined", lambda _: "data:image/png;base64,cG5n")
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 from shutil import copytree
 
@@ -17,13 +16,10 @@ import pytest
 from sweep.base.errors import OutputError
 from sweep.metrics.pareto import knee
 from sweep.report import read_output, summary_lines
-from sweep.report.page import _drawings, _parts
 from sweep.report.page_data import history_of, payload
 from sweep.report.scenes import scene_groups
-from sweep.report.tables import comparison_with_published
 from sweep.results.facts import CheckFacts
 from sweep.results.identity import CHUNK
-from sweep.results.output import Output
 from sweep.results.profiles import ParameterProfile, Profiles
 from sweep.run.rows import Job, jobs_of, rules_of, run_job
 from sweep.study import Study, load_study
@@ -152,25 +148,6 @@ def test_the_history_ends_at_the_answer(finished: Finished) -> None:
             area += (row.objective - reached) * (row.sensitivity - history["least_sensitivity"] + 1e-6)
             reached = row.objective
     assert history["volume"][-1] == pytest.approx(area, rel=1e-6)
-
-
-@pytest.mark.parametrize("made", ["sweep.report.values._series_figures", "sweep.report.noise._noise_figures"])
-def test_what_several_parts_of_a_report_need_is_made_once(
-    made: str, finished: Finished, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    module, name = made.rsplit(".", 1)
-    calls, usual = [], getattr(import_module(module), name)
-
-    def counted(output: Output) -> object:
-        calls.append(output)
-        return usual(output)
-
-    output = read_output(finished("noise"))
-    monkeypatch.setattr(made, counted)
-    list(_drawings(output))
-    _parts(output, comparison_with_published(output))
-    summary_lines(output)
-    assert len(calls) == 1
 
 
 @pytest.mark.slow

@@ -25,7 +25,7 @@ pytestmark = needs_browser
 def ids(seen: Opened) -> list[int]:
     """design_id of every row that the page holds."""
     packed = seen.page.evaluate("JSON.parse(document.getElementById('data').textContent).design_id.bdata")
-    return [int(value) for value in np.frombuffer(base64.b64decode(packed), "<f8")]
+    return [int(value) for value in np.frombuffer(base64.b64decode(packed), "<u4")]
 
 
 def agrees(printed: str, value: float) -> bool:
@@ -96,7 +96,7 @@ def test_the_page_holds_the_limiting_lights_of_every_design(finished: Finished, 
     limited = pd.read_parquet(folder / "limited_by.parquet").set_index("design_id")
     seen = standing(folder)
     rows = ids(seen)
-    assert len(rows) > 12_000
+    assert len(rows) > 5_000
     for pair in ("green_yellow", "green_red", "yellow_red"):
         told = seen.page.evaluate(f"JSON.parse(document.getElementById('data').textContent).limited.csd_{pair}")
         codes = np.frombuffer(base64.b64decode(told["codes"]["bdata"]), f"<{told['codes']['dtype']}")

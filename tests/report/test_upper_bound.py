@@ -12,9 +12,8 @@ import pytest
 from sweep.base.errors import BrokenProofError
 from sweep.report import read_output, summary_lines
 from sweep.report.answer import answer_sentences, large_numbers
-from sweep.report.leaders import leaders_of
+from sweep.report.leaders import leaders_of, upper_bound_beside
 from sweep.report.page_data import payload
-from sweep.report.upper_bound import upper_bound_beside
 from sweep.results.output import Output
 from sweep.study import load_study
 

@@ -157,7 +157,9 @@ def test_any_number_of_workers_gives_the_same_and_a_break_is_where_the_worst_cas
     assert tables[0].equals(tables[1])
     said = "\n".join(summary_lines(read_output(tmp_path / "out1")))
     assert re.search(r"Mine falls below RGGB at [\d.]+ times .*: \S+yellow \([+-].* nm\) and \S+red .*, \d+ DN", said)
-    assert re.search(r"At least 200 DN have, of random lamps and cameras: RGGB [\d.]+%.*, mine [\d.]+%", said)
+    assert re.search(
+        r"Share of random lamps and cameras with 200 DN or more \(95 % interval\): RGGB [\d.]+%.*, mine [\d.]+%", said
+    )
     plain, _, mine = tables[0].to_pylist()
     assert plain["breaks_at"] is None
     assert 0.25 < mine["breaks_at"] < 3

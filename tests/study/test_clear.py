@@ -10,7 +10,7 @@ import pytest
 import sweep
 from sweep.camera.sensor import make_sensor
 from sweep.report.answer import answer_sentences, large_numbers
-from sweep.report.compare.tables import curve_notes
+from sweep.report.compare_tables import curve_notes
 from sweep.report.summary import summary_lines
 from sweep.report.trade_off import around_designs
 from sweep.results.output import Output, read_output

@@ -9,9 +9,8 @@ import pandas as pd
 import pytest
 
 from sweep.report.page import _vision_drawings
-from sweep.report.vision import NETWORK, OBSERVER, benchmark_of
-from sweep.report.vision_ranks import ranks_of
-from sweep.report.vision_tables import vision_sentences
+from sweep.report.vision import NETWORK, OBSERVER, benchmark_of, ranks_of
+from sweep.report.vision_report import vision_sentences
 from sweep.results.inventory import Inventory
 from sweep.results.output import Output, read_output
 from sweep.results.tables import VISION, VISION_TABLES

@@ -2,7 +2,7 @@
 /* The interactive part of a report. Everything that it draws stands in the element #data. */
 (() => {
 const data = JSON.parse(document.getElementById("data").textContent);
-const kinds = {u1: Uint8Array, u2: Uint16Array, f4: Float32Array, f8: Float64Array};
+const kinds = {u1: Uint8Array, u2: Uint16Array, u4: Uint32Array, f4: Float32Array, f8: Float64Array};
 const config = {responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"]};
 const grid = {gridcolor: "#e4e4e4", zeroline: false, automargin: true};
 const cycle = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"];
@@ -24,7 +24,10 @@ function plain(text) {
 }
 
 const columns = {};
-for (const [name, column] of Object.entries(data.columns)) columns[name] = unpack(column.values);
+for (const [name, column] of Object.entries(data.columns)) {
+  const values = unpack(column.values);
+  columns[name] = column.codes ? Float32Array.from(unpack(column.codes), (code) => values[code]) : values;
+}
 const group = unpack(data.group), ids = unpack(data.design_id), filters = unpack(data.filter_id);
 const scenario = unpack(data.scenario.codes), cfa = unpack(data.cfa.codes);
 const wavelength = Array.from(unpack(data.curves.wavelength_nm));

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from ...base.types import FloatArray
-from ...metrics.objective import COMBINED
-from ...metrics.pareto import hypervolume
-from ...metrics.quantity import DN, WORST_CASE
-from ...metrics.share import told_share
-from ...results.tables import FOUND
-from .. import Output
-from ..figures import CURVE_CYCLE, canvas, legend_beside
+from ..base.types import FloatArray
+from ..metrics.objective import COMBINED
+from ..metrics.pareto import hypervolume
+from ..metrics.quantity import DN, WORST_CASE
+from ..metrics.share import told_share
+from ..results.output import Output
+from ..results.tables import FOUND
+from .figures import CURVE_CYCLE, canvas, legend_beside
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,17 +12,14 @@ from pathlib import Path
 
 import pandas as pd
 
-from ...base.errors import Fault, OutputError, SweepError
-from ...results.atomic import write_bytes, write_text
-from ...results.tables import write_csv
-from ...study import folder_name
-from .. import Output, read_output
-from ..answer import who_else
-from ..figures import Drawing, pictures_of
-from ..pages import aligned, inlined, page, rows
-from ..terms import constraint_told
-from .fronts import draw_fronts, fronts_in, hypervolumes, on_the_same_axes
-from .tables import (
+from ..base.errors import Fault, OutputError, SweepError
+from ..results.atomic import write_bytes, write_text
+from ..results.output import Output, read_output
+from ..results.tables import write_csv
+from ..study import folder_name
+from .answer import who_else
+from .compare_fronts import draw_fronts, fronts_in, hypervolumes, on_the_same_axes
+from .compare_tables import (
     best_of_runs,
     curve_notes,
     origin_differences,
@@ -31,6 +28,9 @@ from .tables import (
     side_by_side,
     study_differences,
 )
+from .figures import Drawing, pictures_of
+from .pages import aligned, inlined, page, rows
+from .terms import constraint_told
 
 Areas = tuple[str, pd.DataFrame]
 """The box of the hypervolumes in words, and a row per front."""

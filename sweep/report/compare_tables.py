@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ...metrics.objective import COMBINED
-from ...metrics.quantity import DN, Column
-from ...results.curves import KeptCurves
-from ...results.tables import FOUND, SWEPT
-from .. import Output
-from ..names import label, of_reference
-from .fronts import dn_of
+from ..metrics.objective import COMBINED
+from ..metrics.quantity import DN, Column
+from ..results.curves import KeptCurves
+from ..results.output import Output
+from ..results.tables import FOUND, SWEPT
+from .compare_fronts import dn_of
+from .leaders import label, of_reference
 
 _SAME = 1e-9
 """Relative; CSDs of one study that were computed on two machines differ by less."""

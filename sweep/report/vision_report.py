@@ -1,0 +1,248 @@
+"""Benchmark of vision in sentences, tables and figures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from ..metrics.share import told_share
+from ..results.output import Output
+from ..results.tables import VISION_MISREAD
+from ..vision.scenes import FIXED, SEEN, SHUFFLED, UNSEEN
+from ..vision.scores import costs, macro_f1
+from .figures import CURVE_CYCLE, Drawing, canvas_grid, legend_beside, panel_grid
+from .vision import (
+    NETWORK,
+    OBSERVER,
+    PREDICTORS,
+    READER_NAMES,
+    Benchmark,
+    Ranks,
+    benchmark_of,
+    ranks_of,
+    said_interval,
+    said_percent,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_COLUMNS, _ROWS = 8, 5
+_LEAST_ERROR = 1e-12
+"""Where an error that is less is drawn."""
+_MARKERS = "osD^vP*X<>hp"
+_LABELS = {"csd": "smallest CSD / DN", "dprime": "smallest d'", "pair_error": "pairwise error", OBSERVER: "its error"}
+_WELL = 0.5
+"""A rank correlation from which on something is said to predict well."""
+
+
+def vision_sentences(output: Output) -> Iterator[str]:
+    """Predictors of the errors, who errs less than the reference, and how far the network is from the best reader."""
+    benchmark = benchmark_of(output)
+    ranks = ranks_of(benchmark)
+    csd = ranks.between.get("csd")
+    who = READER_NAMES[benchmark.judge]
+    if csd is not None:
+        how = "does not predict" if not csd.low > 0 else "predicts" if csd.value >= _WELL else "predicts badly"
+        others = ", ".join(f"{PREDICTORS[n]} {said_interval(v)}" for n, v in ranks.between.items() if n != "csd")
+        yield (
+            f"The color separation {how} which CFA the {who} reads best at the same distance and light: its rank "
+            f"correlation is {said_interval(csd)} (1: it does, below 0: the other way round); {others}."
+        )
+    yield from _against_reference(benchmark)
+    if benchmark.judge == NETWORK:
+        pairs = [
+            (d, benchmark.error(d, NETWORK, SHUFFLED), benchmark.error(d, OBSERVER, SHUFFLED))
+            for d in benchmark.designs
+        ]
+        best = min(pairs, key=lambda pair: pair[1].value)
+        yield (
+            f"The network reads {said_percent(best[1])} % of the images of {best[0]} wrongly, the ideal observer "
+            f"{said_percent(best[2])} % (lamps not seen in training, lenses in any order)."
+        )
+
+
+def _against_reference(benchmark: Benchmark) -> Iterator[str]:
+    groups: dict[str, list[str]] = {"less often with ": [], "more often with ": [], "not separated from it: ": []}
+    less, more, same = groups.values()
+    for design in benchmark.designs:
+        if design != benchmark.reference:
+            difference = benchmark.difference(design, SHUFFLED)
+            if difference.excludes_zero:
+                (less if difference.value < 0 else more).append(f"{design} {100 * difference.value:+.1f}")
+            else:
+                same.append(design)
+    parts = [f"{words}{', '.join(designs)}" for words, designs in groups.items() if designs]
+    who = READER_NAMES[benchmark.judge]
+    yield f"Beside {benchmark.reference}, the {who} errs (percent of the images) {'; '.join(parts)}."
+
+
+def _vision_table(benchmark: Benchmark) -> pd.DataFrame:
+    """A row per design: errors by reader, order of lenses and lamps, differences, F1, and what "unknown" saves."""
+    rows = []
+    for design in benchmark.designs:
+        row: dict[str, str] = {"design": design}
+        for reader in benchmark.readers:
+            for order in (FIXED, SHUFFLED):
+                title = f"{READER_NAMES[reader]}, lenses {'in order' if order == FIXED else 'shuffled'}"
+                row[f"error %: {title}"] = said_percent(benchmark.error(design, reader, order))
+        if benchmark.judge == NETWORK:
+            seen = benchmark.error(design, NETWORK, SHUFFLED, SEEN)
+            row["error %: network, shuffled, lamps seen in training"] = said_percent(seen)
+        if design == benchmark.reference:
+            row[f"less that of {benchmark.reference} %"] = "-"
+        else:
+            difference = benchmark.difference(design, SHUFFLED)
+            note = "" if difference.excludes_zero else ", not separated"
+            row[f"less that of {benchmark.reference} %"] = said_percent(difference) + note
+        row["F1"] = f"{macro_f1(benchmark.confusion(design, benchmark.judge, SHUFFLED).to_numpy()):.3f}"
+        for reader in benchmark.readers[:2]:
+            row[f"cost with unknown (share): {READER_NAMES[reader]}"] = _unknown(benchmark, design, reader)
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _unknown(benchmark: Benchmark, design: str, reader: str) -> str:
+    """Mean cost of an answer where "unknown" is allowed, and how often it is given."""
+    rows, cost = benchmark.said(design, reader, SHUFFLED), benchmark.vision.unknown_cost
+    wrong = (rows["said"] != rows["state"]).to_numpy(dtype=bool)
+    cost_of, unknown = costs(wrong, rows["p"].to_numpy(dtype=float), cost)
+    return f"{cost_of.mean():.3f} ({told_share(float(unknown.mean()), 0)})"
+
+
+def _vision_conditions_table(benchmark: Benchmark, ranks: Ranks) -> pd.DataFrame:
+    """A row per level and distance: percent read wrongly with each design, and in brackets by the ideal observer."""
+    rows = ranks.conditions
+    levels = {name: f"{name} ({level.illuminance_lx:g} lx)" for name, level in benchmark.vision.levels.items()}
+    text = (100 * rows["error"]).map("{:.1f}".format)
+    if OBSERVER in rows:
+        text += (100 * rows[OBSERVER]).map(" ({:.1f})".format)
+    keys = {"light": rows["level"].map(levels), "distance / m": rows["distance_m"].map("{:g}".format)}
+    long = rows.assign(text=text, **keys).set_index([*keys, "design"])["text"]
+    table = long.unstack().reindex(pd.MultiIndex.from_frame(pd.DataFrame(keys).drop_duplicates()))
+    return table[benchmark.designs].reset_index().rename_axis(columns=None)
+
+
+def _confusion_table(benchmark: Benchmark) -> pd.DataFrame:
+    """Counts of states as the judge takes them, a row per design and state, lenses in any order."""
+    parts = {design: benchmark.confusion(design, benchmark.judge, SHUFFLED) for design in benchmark.designs}
+    table = pd.concat(parts, names=["design", "state"])
+    return table.rename(columns=lambda name: f"said {name}").reset_index()
+
+
+def _ranks_table(ranks: Ranks) -> pd.DataFrame:
+    """A row per predictor: its rank correlations with their intervals."""
+    rows = [
+        {
+            "predictor": PREDICTORS[name],
+            "over designs, distances and levels": said_interval(ranks.everywhere[name]),
+            "between designs at one distance and level": said_interval(ranks.between[name]),
+        }
+        for name in ranks.everywhere
+    ]
+    return pd.DataFrame(rows)
+
+
+def vision_parts(output: Output) -> dict[str, pd.DataFrame]:
+    """Return every table of the report, by its title."""
+    benchmark = benchmark_of(output)
+    ranks = ranks_of(benchmark)
+    who = READER_NAMES[benchmark.judge]
+    beside = ", in brackets by the ideal observer" if benchmark.judge == NETWORK else ""
+    return {
+        "Errors of each design, percent of the images, with 95 % intervals": _vision_table(benchmark),
+        f"Percent of the images that the {who} reads wrongly{beside}; lenses shuffled": _vision_conditions_table(
+            benchmark, ranks
+        ),
+        f"Rank correlation with how rarely the {who} errs, with 95 % intervals": _ranks_table(ranks),
+        f"What the {who} says of each state; lenses shuffled": _confusion_table(benchmark),
+    }
+
+
+def vision_drawings(output: Output) -> Iterator[tuple[str, str, Drawing]]:
+    """Yield (file name, caption, drawing) of a benchmark."""
+    benchmark = benchmark_of(output)
+    ranks = ranks_of(benchmark)
+    levels = {name: level.illuminance_lx for name, level in benchmark.vision.levels.items()}
+    who = READER_NAMES[benchmark.judge]
+    errors = partial(_draw_errors, ranks.conditions, levels, benchmark.judge)
+    yield "vision-errors", f"Images that the {who} reads wrongly, over the distance", errors
+    if ranks.between:
+        yield "vision-ranks", f"What predicts the {who}'s errors", partial(_draw_ranks, ranks, list(levels), who)
+    pictures = output.vision[VISION_MISREAD]
+    if len(pictures):
+        caption = f"Images that the {who} read wrongly, lenses shuffled, in false colors: what it is > what was said"
+        yield "vision-misread", caption, partial(_draw_misread, _misread(benchmark, pictures))
+
+
+def _misread(benchmark: Benchmark, pictures: pd.DataFrame) -> list[tuple[str, NDArray[np.uint8]]]:
+    """Title and false colors, ndarray[rows, columns, 3], of a few images of every design."""
+    per_design = max(1, _COLUMNS * _ROWS // pictures["name"].nunique())
+    shown = pictures.groupby("name", sort=False).head(per_design).head(_COLUMNS * _ROWS)
+    answers = benchmark.images
+    answers = answers[(answers["order"] == SHUFFLED) & (answers["lamps"] == UNSEEN)]
+    keys = ["name", "seed", "image"]
+    columns = [*keys, "distance_m", "level", "state", benchmark.judge]
+    rows = shown[[*keys, "rows", "columns", "pixels"]].merge(answers[columns], on=keys, how="left").to_dict("records")
+    return [
+        (
+            f"{row['name']}\n{row['distance_m']:g} m, {row['level']}\n{row['state']} > {row[benchmark.judge]}",
+            np.frombuffer(row["pixels"], dtype=np.uint8).reshape(row["rows"], row["columns"], 3),
+        )
+        for row in rows
+    ]
+
+
+def _draw_errors(conditions: pd.DataFrame, levels: Mapping[str, float], judge: str) -> Figure:
+    """A panel per level: the judge's error with each design; dashed the ideal observer's."""
+    figure, panels = canvas_grid(1, len(levels), 4.2 * len(levels), 4.2)
+    for axes, (level, lux) in zip(panels, levels.items(), strict=True):
+        rows = conditions[conditions["level"] == level].sort_values("distance_m")
+        for design, color in zip(conditions["design"].unique(), CURVE_CYCLE * 4, strict=False):
+            line = rows[rows["design"] == design]
+            style: dict[str, Any] = {"color": color, "label": design, "linewidth": 1.4, "markersize": 3.5}
+            axes.plot(line["distance_m"], 100 * line["error"], "o-", **style)
+            if OBSERVER in line:
+                axes.plot(line["distance_m"], 100 * line[OBSERVER], "--", color=color, linewidth=1.0)
+        axes.set(title=f"{level}, {lux:g} lx", xlabel="distance / m")
+        axes.set_ylim(bottom=0)
+    panels[0].set_ylabel("images read wrongly / %")
+    legend_beside(panels[-1], "dashed: ideal observer" if judge != OBSERVER else None)
+    return figure
+
+
+def _draw_ranks(ranks: Ranks, levels: Sequence[str], who: str) -> Figure:
+    """A panel per predictor: a point per design, distance and level; the color is the design, the marker the level."""
+    names, designs = list(ranks.everywhere), ranks.conditions["design"].unique()
+    figure, panels = canvas_grid(1, len(names), 3.7 * len(names), 4.4)
+    for axes, name in zip(panels, names, strict=True):
+        for design, color in zip(designs, CURVE_CYCLE * 4, strict=False):
+            for level, marker in zip(levels, _MARKERS, strict=False):
+                dots = ranks.conditions[(ranks.conditions[["design", "level"]] == [design, level]).all(axis=1)]
+                x = dots[name].clip(lower=_LEAST_ERROR if name == "pair_error" else 0.0)
+                label = str(design) if level == levels[0] else None
+                axes.plot(x, 100 * dots["error"], marker, color=color, markersize=4, label=label, alpha=0.8)
+        if name != OBSERVER:
+            axes.set_xscale("log" if name == "pair_error" else "symlog")
+        between, everywhere = said_interval(ranks.between[name]), said_interval(ranks.everywhere[name])
+        title = f"{PREDICTORS[name]}\nrank correlation between CFAs {between}\nover everything {everywhere}"
+        axes.set_title(title, fontsize=8)
+        axes.set_xlabel(_LABELS[name])
+    panels[0].set_ylabel(f"images that the {who} reads wrongly / %")
+    legend_beside(panels[-1])
+    return figure
+
+
+def _draw_misread(images: Sequence[tuple[str, NDArray[np.uint8]]]) -> Figure:
+    """Draw the contact sheet."""
+    figure, panels = panel_grid(len(images), _COLUMNS, (1.5, 1.85), (0, 0))
+    for axes, (title, pixels) in zip(panels, images, strict=True):
+        axes.imshow(pixels, interpolation="nearest")
+        axes.set_axis_off()
+        axes.set_title(title, fontsize=6)
+    return figure
