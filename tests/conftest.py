@@ -115,6 +115,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Finish
                 with pytest.MonkeyPatch.context() as patch:
                     if name not in LOOKED_AT:
                         patch.setattr("sweep.report.figures.rendered", lambda _, kind: kind.encode())
+                        patch.setattr("sweep.report.page.inlined", lambda _: "data:image/png;base64,cG5n")
                     code, out, err = commanded("run", study, "--output", outputs, "--jobs", 1, *data)
                 assert code == 0, err
                 said.write_text(out)

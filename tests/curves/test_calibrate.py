@@ -36,6 +36,7 @@ def comparison(paper: Path) -> pd.DataFrame:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("sweep.report.figures.rendered", lambda _, kind: kind.encode())
+        patch.setattr("sweep.report.page.inlined", lambda _: "data:image/png;base64,cG5n")
         make_report(read_output(paper))
     found = pd.read_parquet(paper / "paper_comparison.parquet")
     pd.testing.assert_frame_equal(found, pd.read_csv(paper / "paper_comparison.csv"), check_dtype=False)
