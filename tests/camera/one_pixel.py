@@ -16,5 +16,4 @@ def readout_bound_dn(effect: str, pixel: Pixel, brightest_e: float) -> float:
     setup = SimpleNamespace(camera=SimpleNamespace(pixel=pixel), scene=scene)
     box: Any = SimpleNamespace(setup=setup, brightest_pixel_dn=brightest_e * pixel.dn_per_e, _sqrt_channels=1.0)
     bound_dn = EFFECTS[effect].bound_dn
-    assert bound_dn is not None
     return bound_dn(box, READOUT)

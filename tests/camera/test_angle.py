@@ -186,7 +186,6 @@ def test_a_field_is_the_worst_of_its_places(given: dict[str, Any]) -> None:
     setup = moved(given, cra_deg=0.0).setup
     field = setup.scene.model_copy(update={"field": SensorField(cra_deg=tuple(angles))})
     block = edges_of(SPACE, 0, SPACE.size)
-    assert block is not None
     curves = block.curves()
     each = []
     for height, cra_deg in zip((0.0, 0.5, 1.0), angles, strict=True):

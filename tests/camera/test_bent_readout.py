@@ -41,7 +41,6 @@ def test_what_cancels_between_pixels_counts_where_they_clip(
     made = saturated(place, readout, level)
     with_all = columns(made, ROUNDING, EVERY_PIXEL)
     bound_dn = EFFECTS["crosstalk"].bound_dn
-    assert bound_dn is not None
     without_crosstalk = float(np.abs(columns(made, ROUNDING | {"crosstalk"}, EVERY_PIXEL) - with_all).max())
     assert without_crosstalk <= bound_dn(made.box, frozenset({"saturation"})) * (1 + 1e-9) + _ARITHMETIC_DN
     # No closed form bounds the blur of a light, which is computed whatever the tolerance.

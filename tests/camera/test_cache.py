@@ -104,7 +104,6 @@ def test_tables_of_grids_are_shared_by_threads() -> None:
         for turn in range(40):
             space = spaces[(turn * (number + 1)) % len(spaces)]
             edges = edges_of(space, 0, 3)
-            assert edges is not None
             assert edges.space is space
 
     at_once(work)

@@ -80,24 +80,6 @@ def test_the_same_profile_is_made_once() -> None:
     assert psf.profile(*given) is not psf.profile(*given[:-1], 0.1)
 
 
-@pytest.mark.parametrize("waves", [0.0, 0.3, 2.0])
-def test_the_otf_is_the_autocorrelation_of_the_pupil(waves: float) -> None:
-    wavelength_um, f_number, n = 0.55, 2.8, 1500
-    w20_um = waves * wavelength_um
-    for s in (0.0, 0.05, 0.2, 0.5, 0.8, 0.97):
-        # The pupil has radius 1, and its two copies are shifted by 2 s.
-        side = (np.arange(n) + 0.5) * 2 / n - 1
-        x, y = np.meshgrid(side, side)
-        copies = []
-        for shift in (s, -s):
-            squared = (x + shift) ** 2 + y**2
-            copies.append((squared <= 1) * np.exp(2j * math.pi * waves * squared))
-        expected = (copies[0] * copies[1].conj()).sum().real * (2 / n) ** 2 / math.pi
-        nu = np.array([s / (wavelength_um * f_number)])
-        result = psf.otf(nu, np.array([wavelength_um]), f_number, w20_um)[0, 0]
-        assert result == pytest.approx(expected, abs=1e-4)  # of the grid at the pupil's edge
-
-
 def test_the_otf_ends_at_the_cutoff() -> None:
     nu = np.array([0.0, 0.5, 1.0, 2.0])
     in_focus, defocused = (psf.otf(nu, np.array([0.5]), 2.0, w20_um)[:, 0] for w20_um in (0.0, 0.7))

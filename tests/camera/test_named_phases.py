@@ -48,7 +48,6 @@ def lower_by_dn(made: DesignScene, seed: int) -> float:
     setup = replace(made.setup, accuracy=STANDARD)
     worst = evaluate(ForwardModel(setup), made.curves)
     light = setup.scene.target
-    assert light is not None
     rows, columns = setup.camera.mosaic.indices.shape
     named_px = np.random.default_rng([seed, 31]).uniform(0, (columns, rows), (NAMED, 2))
     response = ForwardModel(setup, read_at(light, named_px), once=True).read(made.curves)[0][0]
@@ -60,7 +59,6 @@ def test_a_named_phase_is_read_as_among_others() -> None:
     """What the test below relies on."""
     made = small_light(4)
     light = made.setup.scene.target
-    assert light is not None
     named = light.model_copy(update={"phase_px": (0.3, 0.85)})
     setup = replace(made.setup, scene=made.setup.scene.model_copy(update={"target": named}))
     among = ForwardModel(made.setup, read_at(light, np.array([[0.3, 0.85], [1.2, 0.4]])), once=True).read(made.curves)[

@@ -74,7 +74,6 @@ def brute_force(made: DesignScene, how: str) -> dict[str, tuple[float, float]]:
     """Smallest and largest over a fine lattice of the smallest CSD over the moments."""
     setup = setup_of(made, how)
     light = setup.scene.target
-    assert light is not None
     phases = read_at(light, lattice_px(setup.camera.mosaic, STEPS_PER_PX))
     if light.readout == "mean":
         phases = different_phases(setup, phases)[0]
@@ -142,7 +141,6 @@ def test_a_phase_reads_what_its_mirror_images_read(name: str, readout: str) -> N
 @pytest.mark.parametrize("readout", ["mean", "center"])
 def test_halfway_between_pixels_a_center_is_read_at_each_of_them(readout: str) -> None:
     light = scene("light", "RGGB", {"target": FAR | {"phase_px": "any", "readout": readout}}).setup.scene.target
-    assert light is not None
     read = read_at(light, np.array([[0.25, 0.75], [0.5, 1.0], [1.5, 0.5]]))
     nearest = {tuple(center): set() for center in read.center_px.tolist()}
     for center, pixel in zip(read.center_px.tolist(), read.nearest_px.tolist(), strict=True):

@@ -91,12 +91,11 @@ SCENES: dict[str, tuple[dict[str, Any], dict[str, Any], frozenset[str]]] = {
 }
 
 
-@hard_case(
-    "metamers: laser lines at two wavelengths where every filter is alike",
-    oracle="exactly 0, in smooth and in read-out CSD, in seven kinds of scenes",
-    why="the same products are summed, the others are 0; equal numbers differ by exactly 0",
-)
+@hard_case("metamers: laser lines at two wavelengths where every filter is alike")
 def metamers() -> Result:
+    """Exactly 0, in smooth and in read-out CSD, in seven kinds of scenes. Allowed: the same products are summed, the
+    others are 0; equal numbers differ by exactly 0.
+    """
     errors = []
     lights = lights_of(("yellow", "red"), lines(YELLOW, RED))
     for scenario, pixel, left_out in SCENES.values():
@@ -110,13 +109,9 @@ def metamers() -> Result:
 PAIR = ("yellow", "red")
 
 
-@hard_case(
-    "metamers under a filter that changes elsewhere",
-    oracle="exactly 0 for every stopband away from both lines",
-    why="the filter is exactly its base outside the band",
-    slow=True,
-)
+@hard_case("metamers under a filter that changes elsewhere", slow=True)
 def metamers_beside_a_band() -> Result:
+    """Exactly 0 for every stopband away from both lines. Allowed: the filter is exactly its base outside the band."""
     qe = random_qe(2, 4)
     qe[:, RED] = qe[:, YELLOW]
     setup = made(qe, lights_of(PAIR, lines(YELLOW, RED)), cfa="RYNC")
@@ -127,12 +122,11 @@ def metamers_beside_a_band() -> Result:
     return Result(float(np.max(found)), 0.0)
 
 
-@hard_case(
-    "metamers of many lines each",
-    oracle="0: both spectra give every filter the same sum of dyadic products",
-    why="sums of 61 terms with 3 roundings each: 64 half eps of the response, in 3 channels",
-)
+@hard_case("metamers of many lines each")
 def broad_metamers() -> Result:
+    """0: both spectra give every filter the same sum of dyadic products. Allowed: sums of 61 terms with 3 roundings
+    each: 64 half eps of the response, in 3 channels.
+    """
     rng = np.random.default_rng(4)
     qe = rng.integers(1, 2**10, (3, N)) / 2.0**10
     first = rng.integers(2**8, 2**9, N) / 2.0**9
@@ -151,12 +145,11 @@ def broad_metamers() -> Result:
     return Result(found if read == 0 else math.inf, 64 * EPS / 2 * response * 2 * math.sqrt(3))
 
 
-@hard_case(
-    "lines whose filters differ by 2^-16",
-    oracle="camera equation in 50 digits",
-    why="8 roundings of each response, so 8 eps of the response in each of 3 channels",
-)
+@hard_case("lines whose filters differ by 2^-16")
 def near_metamers() -> Result:
+    """Camera equation in 50 digits. Allowed: 8 roundings of each response, so 8 eps of the response in each of 3
+    channels.
+    """
     qe = np.random.default_rng(5).integers(2**10, 2**14, (3, N)) / 2.0**14
     qe[:, RED] = qe[:, YELLOW] + np.array([1, -2, 3]) * 2.0**-16
     setup = made(qe, lights_of(PAIR, lines(YELLOW, RED)), FIXED)
@@ -166,12 +159,11 @@ def near_metamers() -> Result:
     return Result(abs(float(found - exact)), 8 * EPS * float(gain) * math.sqrt(3))
 
 
-@hard_case(
-    "exposures from 5e-324 to 1e300 s",
-    oracle="camera equation in 50 digits",
-    why="12 roundings of a response; in the smallest, the spacing 5e-324 times electrons/s and DN/e of each of 4 points",
-)
+@hard_case("exposures from 5e-324 to 1e300 s")
 def exposures() -> Result:
+    """Camera equation in 50 digits. Allowed: 12 roundings of a response; in the smallest, the spacing 5e-324 times
+    electrons/s and DN/e of each of 4 points.
+    """
     qe, results = random_qe(6, 3), []
     lights = lights_of(PAIR, lines(YELLOW, RED))
     for exposure_s in (5e-324, 1e-310, 1e-300, 1e-160, 1e-30, 1.0, 1e150, 1e300):
@@ -186,12 +178,11 @@ def exposures() -> Result:
     return worst(results)
 
 
-@hard_case(
-    "lights from 1e-290 to 1e270 photons under the white-patch exposure",
-    oracle="level x full scale x K x QE over the brightest channel's mean, in 50 digits",
-    why="the exposure cancels the light: 61-term sums and 16 roundings of each response, 64 eps of it",
-)
+@hard_case("lights from 1e-290 to 1e270 photons under the white-patch exposure")
 def radiances() -> Result:
+    """Level x full scale x K x QE over the brightest channel's mean, in 50 digits. Allowed: the exposure cancels the
+    light: 61-term sums and 16 roundings of each response, 64 eps of it.
+    """
     qe, results = random_qe(7, 3), []
     top = max(sum(mp.mpf(float(v)) for v in row) / N for row in qe)
     scale = mp.mpf(0.95) * 4095 * mp.mpf(RATIO) / top
@@ -204,12 +195,11 @@ def radiances() -> Result:
     return worst(results)
 
 
-@hard_case(
-    "no light at all",
-    oracle="CSD exactly 0 at a fixed exposure; no exposure, and no number, for the white patch",
-    why="0 electrons; what the exposure of no light would be is not finite and never made up",
-)
+@hard_case("no light at all")
 def no_light() -> Result:
+    """CSD exactly 0 at a fixed exposure; no exposure, and no number, for the white patch. Allowed: 0 electrons; what
+    the exposure of no light would be is not finite and never made up.
+    """
     lights = lights_of(PAIR, lines(YELLOW, RED))
     good = True
     for qe, radiance in ((np.zeros((3, N)), 2e18), (random_qe(8, 3), 5e-324)):
@@ -225,12 +215,11 @@ def no_light() -> Result:
     return outcome(bool(good and np.isnan(dark["csd_yellow_red"][0]) and np.isinf(dark["exposure_s"][0])))
 
 
-@hard_case(
-    "everything clipped",
-    oracle="CSD exactly 0 between points that all are at full scale",
-    why="full scale is one number, whatever was cut off above it",
-)
+@hard_case("everything clipped")
 def everything_clipped() -> Result:
+    """CSD exactly 0 between points that all are at full scale. Allowed: full scale is one number, whatever was cut off
+    above it.
+    """
     errors = []
     lights = lights_of(("green", *PAIR), lines(25, YELLOW, RED))
     bright = {"exposure": {"kind": "fixed", "exposure_s": 1e4}}
@@ -243,12 +232,11 @@ def everything_clipped() -> Result:
     return Result(float(np.max(errors)), 0.0)
 
 
-@hard_case(
-    "the nearest pair changes along a line of filters",
-    oracle="closed form: the distance of the outer pair, of the inner pair, and exactly 0 where two responses meet",
-    why="8 roundings of each response: 8 eps of the largest; equal filters are exactly equal responses",
-)
+@hard_case("the nearest pair changes along a line of filters")
 def switch_along_filters() -> Result:
+    """Closed form: the distance of the outer pair, of the inner pair, and exactly 0 where two responses meet. Allowed:
+    8 roundings of each response: 8 eps of the largest; equal filters are exactly equal responses.
+    """
     qe = np.full((4, N), 0.25)
     qe[2] = 0.5
     qe[2, 30], qe[2, RED] = 0.4375, 0.25  # N at 550 and 640 nm; the band holds 590 nm
@@ -262,12 +250,11 @@ def switch_along_filters() -> Result:
     return worst([*results, (float(found[512]), 0.0)])
 
 
-@hard_case(
-    "float32 curves",
-    oracle="math.fsum of the float32 values; the same scene in float64 before its rounding to float32",
-    why="a float32 curve is exact in float64: 64 eps; rounding it to float32 moves a sum of positive terms by 2^-24",
-)
+@hard_case("float32 curves")
 def float32_curves() -> Result:
+    """Math.fsum of the float32 values; the same scene in float64 before its rounding to float32. Allowed: a float32
+    curve is exact in float64: 64 eps; rounding it to float32 moves a sum of positive terms by 2^-24.
+    """
     qe = random_qe(10, 4)
     lights = lights_of(PAIR, np.random.default_rng(11).dirichlet(np.ones(N), 2) / GRID.step_nm)
     x = np.random.default_rng(12).uniform([560, 5, 620, 5, 0], [590, 30, 660, 30, 1], (20, 5))
@@ -295,12 +282,11 @@ def float32_curves() -> Result:
     return worst([*results, (float((np.abs(one - other) / other).max()), 2.0**-24 + 64 * EPS)])
 
 
-@hard_case(
-    "a NaN in one design of a block",
-    oracle="the block without it",
-    why="designs share nothing but the order of a sum over the wavelengths: 64 eps of full scale",
-)
+@hard_case("a NaN in one design of a block")
 def nan_in_one_design() -> Result:
+    """The block without it. Allowed: designs share nothing but the order of a sum over the wavelengths: 64 eps of full
+    scale.
+    """
     qe = random_qe(13, 4)
     lights = lights_of(PAIR, lines(YELLOW, RED))
     x = np.random.default_rng(14).uniform([560, 5, 620, 5, 0], [590, 30, 660, 30, 1], (64, 5))

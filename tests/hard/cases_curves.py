@@ -47,12 +47,11 @@ def exact_mean(wave: np.ndarray, data: np.ndarray, low: Fraction, high: Fraction
     return total / (high - low)
 
 
-@hard_case(
-    "laser lines between nodes, mean over bins",
-    oracle="exact rational integral of the samples over every bin",
-    why="a bin is a difference of two sums of up to 5 pieces with 6 roundings each: 10 eps of the line's integral 1",
-)
+@hard_case("laser lines between nodes, mean over bins")
 def lines_by_mean() -> Result:
+    """Exact rational integral of the samples over every bin. Allowed: a bin is a difference of two sums of up to 5
+    pieces with 6 roundings each: 10 eps of the line's integral 1.
+    """
     results = []
     for center, half in LINES:
         wave, data = line(center, half)
@@ -66,12 +65,11 @@ def lines_by_mean() -> Result:
     return worst(results)
 
 
-@hard_case(
-    "laser lines between nodes, integral",
-    oracle="exact rational area of the triangle",
-    why="the bins' sums telescope: 10 eps of the whole, and 9 for adding 301 of them pairwise",
-)
+@hard_case("laser lines between nodes, integral")
 def integral_of_lines() -> Result:
+    """Exact rational area of the triangle. Allowed: the bins' sums telescope: 10 eps of the whole, and 9 for adding 301
+    of them pairwise.
+    """
     results = []
     for center, half in LINES[:-1]:
         wave, data = line(center, half)
@@ -81,12 +79,9 @@ def integral_of_lines() -> Result:
     return worst(results)
 
 
-@hard_case(
-    "laser lines between nodes, linear",
-    oracle="0 at every node: no photons, refused",
-    why="a line that no node sees must not become a light without photons",
-)
+@hard_case("laser lines between nodes, linear")
 def lines_by_interpolation() -> Result:
+    """0 at every node: no photons, refused. Allowed: a line that no node sees must not become a light without photons."""
     wave, data = line(632.8, 0.01)
     photons = resample(wave, data, GRID, "linear")
     words = ("no photons on the wavelength grid", "400 to 700 nm")
@@ -95,12 +90,11 @@ def lines_by_interpolation() -> Result:
     return outcome(not photons.any() and lost and on_node[233] == 100.0 and on_node.sum() == 100.0)
 
 
-@hard_case(
-    "spectra over 21 orders of magnitude keep their sign",
-    oracle="no bin of a curve that is nowhere negative is negative",
-    why="sums only grow, so their differences are not negative",
-)
+@hard_case("spectra over 21 orders of magnitude keep their sign")
 def no_negative_bins() -> Result:
+    """No bin of a curve that is nowhere negative is negative. Allowed: sums only grow, so their differences are not
+    negative.
+    """
     rng, least = np.random.default_rng(1), 0.0
     for _ in range(100):
         wave = np.unique(np.concatenate([[390.0], rng.uniform(395, 705, 400), [710.0]]))
@@ -120,12 +114,9 @@ def study_text(folder: Path, cell: str) -> Path:
     return path
 
 
-@hard_case(
-    "a NaN in a user's file",
-    oracle="refused, with file, line and column",
-    why="what is not a finite number of 0 or more is never mended",
-)
+@hard_case("a NaN in a user's file")
 def nan_in_a_file() -> Result:
+    """Refused, with file, line and column. Allowed: what is not a finite number of 0 or more is never mended."""
     good = True
     with TemporaryDirectory() as name:
         folder = Path(name)
@@ -142,12 +133,9 @@ def nan_in_a_file() -> Result:
     return outcome(good)
 
 
-@hard_case(
-    "a NaN that comes from the program",
-    oracle="refused",
-    why="comparisons are written so that NaN fails them",
-)
+@hard_case("a NaN that comes from the program")
 def nan_by_call() -> Result:
+    """Refused. Allowed: comparisons are written so that NaN fails them."""
     bad = np.full(301, 0.5)
     bad[100] = np.nan
     where = np.where(np.arange(301) == 3, np.nan, WAVE)
@@ -172,12 +160,11 @@ def quintic(wave: float, center: float, width: float) -> mp.mpf:
     return rise(min(max(t, mp.mpf(0)), mp.mpf(1)))
 
 
-@hard_case(
-    "edges of 1e-8 to 500 nm",
-    oracle="quintic in 50 digits",
-    why="t within 2 eps, slope at most 15/8; Horner's 8 roundings of at most 6 + 15 + 10: 4 eps x 31",
-)
+@hard_case("edges of 1e-8 to 500 nm")
 def edges_in_50_digits() -> Result:
+    """Quintic in 50 digits. Allowed: t within 2 eps, slope at most 15/8; Horner's 8 roundings of at most 6 + 15 + 10: 4
+    eps x 31.
+    """
     results = []
     for width in (1e-8, 1e-3, 0.7, 5.0, 60.0, 500.0):
         for share in (-1.1, -0.99, -0.9, -0.5, -0.1, 0.0, 0.3, 0.5, 0.9, 0.999, 1.1):
@@ -191,8 +178,9 @@ def shape(*design: float) -> np.ndarray:
     return Stopband(WAVE, BASE, TARGET).curves(np.array([design]))[0, 0]
 
 
-@hard_case("stopbands of zero width", oracle="the base curve, exactly", why="e - e is exactly 0, and base + 0 the base")
+@hard_case("stopbands of zero width")
 def zero_width() -> Result:
+    """The base curve, exactly. Allowed: e - e is exactly 0, and base + 0 the base."""
     designs = [(c, w, c, w, 1.0) for c in (400.0, 600.0, 600.3, 700.0) for w in (0.0, 5e-324, 1e-9, 1.0, 300.0)]
     designs += [(600.2, 0.0, 600.8, 0.0, 1.0), (590.0, 10.0, 640.0, 10.0, 0.0)]
     family = Stopband(WAVE, BASE, TARGET)
@@ -201,12 +189,11 @@ def zero_width() -> Result:
     return Result(error if formed else np.inf, 0.0)
 
 
-@hard_case(
-    "edges outside the range of wavelengths",
-    oracle="the base curve where the band is outside, the target where it covers all",
-    why="exactly the base; base + (target - base) has two roundings of at most 1: 1 eps",
-)
+@hard_case("edges outside the range of wavelengths")
 def edges_outside() -> Result:
+    """The base curve where the band is outside, the target where it covers all. Allowed: exactly the base; base +
+    (target - base) has two roundings of at most 1: 1 eps.
+    """
     outside = [(200.0, 0.0, 399.0, 0.0), (200.0, 100.0, 250.0, 100.0), (720.0, 10.0, 1900.0, 10.0), (1e3, 0, 2e3, 500)]
     across = [(200.0, 0.0, 2000.0, 0.0), (250.0, 100.0, 1200.0, 500.0), (399.9, 0.0, 700.1, 0.0)]
     results = [(float(np.abs(shape(*d, 1.0) - BASE).max()), 0.0) for d in outside]
@@ -214,12 +201,11 @@ def edges_outside() -> Result:
     return worst(results)
 
 
-@hard_case(
-    "brick walls on and between nodes",
-    oracle="counting: 1 inside, 1/2 on a wall, 0 outside",
-    why="exact; widths that are no more than rounding of a wavelength are walls, too, and have no slope",
-)
+@hard_case("brick walls on and between nodes")
 def brick_walls() -> Result:
+    """Counting: 1 inside, 1/2 on a wall, 0 outside. Allowed: exact; widths that are no more than rounding of a
+    wavelength are walls, too, and have no slope.
+    """
     good, at = True, np.arange(595.0, 616.0)
     for width in (0.0, 5e-324, 1e-300, 1e-13):
         for left, right, total in (
@@ -235,12 +221,11 @@ def brick_walls() -> Result:
     return outcome(bool(good))
 
 
-@hard_case(
-    "crossed edges",
-    oracle="how far they cross, in exact rationals",
-    why="a sum of 4 products of at most 700: 4 eps x 700; crossed by 1e-9 nm or more is more than 0",
-)
+@hard_case("crossed edges")
 def crossed_edges() -> Result:
+    """How far they cross, in exact rationals. Allowed: a sum of 4 products of at most 700: 4 eps x 700; crossed by 1e-9
+    nm or more is more than 0.
+    """
     family, results = Stopband(WAVE, BASE, TARGET), []
     for by in (1e-9, 1e-3, 1.0, 40.0, 300.0):
         for width in (0.0, 0.1, 30.0):
@@ -253,12 +238,9 @@ def crossed_edges() -> Result:
     return worst(results)
 
 
-@hard_case(
-    "two channels whose sum is kept",
-    oracle="twice the base curve, exact rationals",
-    why="two sums, each rounded by half an eps of at most 1: 1 eps",
-)
+@hard_case("two channels whose sum is kept")
 def dual_keeps_its_sum() -> Result:
+    """Twice the base curve, exact rationals. Allowed: two sums, each rounded by half an eps of at most 1: 1 eps."""
     ceiling = np.full(301, 0.97)
     designs = np.random.default_rng(2).uniform([450, 0, 550, 0, 0], [550, 80, 700, 80, 1], (50, 5))
     curves = Dual(WAVE, BASE, ceiling).curves(designs)

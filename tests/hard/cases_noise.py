@@ -110,25 +110,35 @@ WHY = (
 )
 
 
-@hard_case("electrons of 1e-3", oracle="sum over counts and steps, 25 digits", why=WHY)
+@hard_case("electrons of 1e-3")
 def few_electrons() -> Result:
+    """Sum over counts and steps, 25 digits. Allowed: a rounding for each count within 10 deviations, of at most 10
+    deviations, and of the value; squares for variances.
+    """
     return moments_result([(pixel, 1e-3) for pixel in (*PIXELS.values(), DEEP)])
 
 
-@hard_case("electrons of 9e6", oracle="sum over counts and steps, 25 digits; straight", why=WHY, slow=True)
+@hard_case("electrons of 9e6", slow=True)
 def many_electrons() -> Result:
+    """Sum over counts and steps, 25 digits; straight. Allowed: a rounding for each count within 10 deviations, of at
+    most 10 deviations, and of the value; squares for variances.
+    """
     return moments_result([(pixel, 9e6) for pixel in (PLAIN, PIXELS["well below the ADC"], DEEP)])
 
 
-@hard_case("electrons of 0, and of half a photon", oracle="sum over counts and steps, 25 digits", why=WHY)
+@hard_case("electrons of 0, and of half a photon")
 def dark() -> Result:
+    """Sum over counts and steps, 25 digits. Allowed: a rounding for each count within 10 deviations, of at most 10
+    deviations, and of the value; squares for variances.
+    """
     return moments_result([(pixel, n) for pixel in (PLAIN, PIXELS["hardly any read noise"], DEEP) for n in (0.0, 0.5)])
 
 
-@hard_case(
-    "electrons at full well and at the ADC's end", oracle="sum over counts and steps, 25 digits", why=WHY, slow=True
-)
+@hard_case("electrons at full well and at the ADC's end", slow=True)
 def at_the_ends() -> Result:
+    """Sum over counts and steps, 25 digits. Allowed: a rounding for each count within 10 deviations, of at most 10
+    deviations, and of the value; squares for variances.
+    """
     cases = [(PIXELS[name], 9990.0) for name in ("hardly any read noise", "no read noise")]
     return moments_result([*cases, (PIXELS["ADC first"], 6700.0), (PIXELS["well below the ADC"], 9990.0)])
 
@@ -143,13 +153,11 @@ def chain(pixel: Pixel) -> ForwardModel:
     )
 
 
-@hard_case(
-    "one signal far brighter than the others",
-    oracle="sum over counts and steps, 25 digits",
-    why="cubic table at 1/32 of a deviation: 5/384 / 32^4 x 16 x 0.8 of a deviation; of rounding, 177 x 0.5 DN for 12.8",
-    slow=True,
-)
+@hard_case("one signal far brighter than the others", slow=True)
 def a_blinding_signal() -> Result:
+    """Sum over counts and steps, 25 digits. Allowed: cubic table at 1/32 of a deviation: 5/384 / 32^4 x 16 x 0.8 of a
+    deviation; of rounding, 177 x 0.5 DN for 12.8.
+    """
     electrons, results = np.array([1e-3, 10.0, 10_100.0]), []
     pixel = PLAIN
     exact, allowed = [], []
@@ -177,13 +185,11 @@ def steps(mean: mp.mpf, sigma: mp.mpf) -> Moments:
     return center + first, second - first**2
 
 
-@hard_case(
-    "variance of a rounded value, little and much noise",
-    oracle="probability of every integer, 50 digits",
-    why="up to 6 terms left out below exp(-2 (7 pi / 2)^2), or tails beyond 11 sigma; 60 roundings of a variance + 1",
-    slow=True,
-)
+@hard_case("variance of a rounded value, little and much noise", slow=True)
 def rounded_variance() -> Result:
+    """Probability of every integer, 50 digits. Allowed: up to 6 terms left out below exp(-2 (7 pi / 2)^2), or tails
+    beyond 11 sigma; 60 roundings of a variance + 1.
+    """
     results = []
     for sigma in (0.01, 0.1, 0.3, 0.4999, 0.5, 0.8, 1.4999, 1.5, 4.0):
         for mean in (0.0, 0.25, 0.5, 0.4999, 100.2, 4094.7):
@@ -194,12 +200,11 @@ def rounded_variance() -> Result:
     return worst(results)
 
 
-@hard_case(
-    "variance of a rounded value without noise, and of 1e14 DN^2",
-    oracle="0; 1/4 halfway between integers; the variance and 1/12",
-    why="certain; a fair coin between two integers; 2 roundings of the variance",
-)
+@hard_case("variance of a rounded value without noise, and of 1e14 DN^2")
 def rounded_extremes() -> Result:
+    """0; 1/4 halfway between integers; the variance and 1/12. Allowed: certain; a fair coin between two integers; 2
+    roundings of the variance.
+    """
     still = rounding(np.array([0.0, 0.3, 100.7, 4095.0, 17.5]), np.zeros(5))[1]
     results = [(abs(float(v)), 0.0) for v in still[:4]] + [(abs(float(still[4]) - 0.25), EPS)]
     found = rounding(np.array([1e7]), np.array([1e7]))[1][0]
@@ -218,21 +223,17 @@ def drawn(electrons: float, pixel: Pixel) -> list[tuple[float, float]]:
     ]
 
 
-@hard_case(
-    "draws of Poisson means of 1e-3 and 9e6",
-    oracle="500,000 simulated readouts",
-    why="4 standard deviations of mean and variance",
-)
+@hard_case("draws of Poisson means of 1e-3 and 9e6")
 def poisson_draws() -> Result:
+    """500,000 simulated readouts. Allowed: 4 standard deviations of mean and variance."""
     return worst([*drawn(1e-3, PLAIN), *drawn(9e6, DEEP)])
 
 
-@hard_case(
-    "everything clipped, with noise",
-    oracle="full scale, exactly the same for signals of 1e8 to 1e300 electrons",
-    why="beyond the full well the table stands still: gain x full well, rounded once; counts below it are rarer than 1e-20",
-)
+@hard_case("everything clipped, with noise")
 def all_clipped() -> Result:
+    """Full scale, exactly the same for signals of 1e8 to 1e300 electrons. Allowed: beyond the full well the table
+    stands still: gain x full well, rounded once; counts below it are rarer than 1e-20.
+    """
     model = chain(Pixel())
     electrons = np.array([1e8, 2e8, 1e14, 1e100, 1e300, np.inf])
     found = model.readout.transfer(electrons)
@@ -240,13 +241,9 @@ def all_clipped() -> Result:
     return worst([(spread, 1e-20 * 4095), (float(np.abs(found - 4095).max()), EPS * 4095)])
 
 
-@hard_case(
-    "noise metrics of signals that all fill the range",
-    oracle="coincident: CSD, contrast and d' exactly 0, error 1/2, bound 1",
-    why="equal means differ by exactly 0",
-    slow=True,
-)
+@hard_case("noise metrics of signals that all fill the range", slow=True)
 def metrics_of_the_clipped() -> Result:
+    """Coincident: CSD, contrast and d' exactly 0, error 1/2, bound 1. Allowed: equal means differ by exactly 0."""
     found = evaluate(chain(PLAIN), np.empty((1, 0, 4)), ["a", "b"])
     bright = found["csd_a_b"][0], found["dprime_a_b"][0], found["cnr_a_b"][0]
     return outcome((*bright, found["error_a_b"][0], found["error_bound_a_b"][0]) == (0.0, 0.0, 0.0, 0.5, 1.0))

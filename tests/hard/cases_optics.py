@@ -52,27 +52,30 @@ def share_result(cases: list[tuple[float, float, float, float]]) -> Result:
 AREAS = "four areas of at most the disc's quarter, 16 roundings each (well-conditioned in the place of the edges), over the square"
 
 
-@hard_case("discs smaller than a pixel", oracle="integral of the common height, 50 digits", why=AREAS)
+@hard_case("discs smaller than a pixel")
 def small_discs() -> Result:
+    """Integral of the common height, 50 digits. Allowed: four areas of at most the disc's quarter, 16 roundings each
+    (well-conditioned in the place of the edges), over the square.
+    """
     places = [(0.0, 0.0), (0.5, 0.0), (0.5, 0.5), (0.48, 0.0), (0.3, 0.47), (1.0, 0.0)]
     return share_result([(x, y, 0.5, r) for x, y in places for r in (1e-6, 0.01, 0.05, 0.3, 0.5)])
 
 
-@hard_case(
-    "discs that just touch a pixel's edge", oracle="integral of the common height, 50 digits", why=AREAS, slow=True
-)
+@hard_case("discs that just touch a pixel's edge", slow=True)
 def touching_discs() -> Result:
+    """Integral of the common height, 50 digits. Allowed: four areas of at most the disc's quarter, 16 roundings each
+    (well-conditioned in the place of the edges), over the square.
+    """
     radii = [0.5, 1.5, 2.5, math.sqrt(0.5), math.sqrt(4.5), 10.5]
     near = [float(v) for r in radii for v in (np.nextafter(r, 0), r, np.nextafter(r, 99), r * (1 + 1e-12))]
     return share_result([(x, y, 0.5, r) for r in near for x, y in ((round(r), 0.0), (1.0, 1.0), (0.0, round(r - 0.5)))])
 
 
-@hard_case(
-    "discs half a pixel off, up to 64 pixels of radius",
-    oracle="the disc's area, from the sum over all pixels",
-    why="in each of (2 r + 5)^2 pixels 4 areas of at most the quarter disc with 16 roundings each, over the disc",
-)
+@hard_case("discs half a pixel off, up to 64 pixels of radius")
 def whole_discs() -> Result:
+    """The disc's area, from the sum over all pixels. Allowed: in each of (2 r + 5)^2 pixels 4 areas of at most the
+    quarter disc with 16 roundings each, over the disc.
+    """
     results = []
     for radius in (0.05, 0.5, 3.7, 31.5, 63.9, 64.0):
         for off in (0.0, 0.5, 0.25, 1e-9):
@@ -121,8 +124,11 @@ ROUNDINGS = 2e3 * EPS
 ENDS = "the panel in which the transfer function ends, a root of power 3/2: the rule's own error for it; 2000 eps of rounding"
 
 
-@hard_case("encircled energy at the center, f/0.5 to f/1000", oracle="1 - J0^2 - J1^2, 50 digits", why=ENDS)
+@hard_case("encircled energy at the center, f/0.5 to f/1000")
 def at_the_center() -> Result:
+    """1 - J0^2 - J1^2, 50 digits. Allowed: the panel in which the transfer function ends, a root of power 3/2: the
+    rule's own error for it; 2000 eps of rounding.
+    """
     results = []
     for f_number in NUMBERS:
         for radius in (0.01, 1.0, 12.0):
@@ -132,8 +138,11 @@ def at_the_center() -> Result:
     return worst(results)
 
 
-@hard_case("several wavelengths on one grid of frequencies", oracle="1 - J0^2 - J1^2, 50 digits", why=ENDS)
+@hard_case("several wavelengths on one grid of frequencies")
 def many_wavelengths() -> Result:
+    """1 - J0^2 - J1^2, 50 digits. Allowed: the panel in which the transfer function ends, a root of power 3/2: the
+    rule's own error for it; 2000 eps of rounding.
+    """
     waves, results = np.array([0.4, 0.473, 0.55, 0.61, 0.7]), []
     for f_number in NUMBERS:
         for radius in (1.0, 12.0):
@@ -144,12 +153,11 @@ def many_wavelengths() -> Result:
     return worst(results)
 
 
-@hard_case(
-    "transfer in focus, f/0.5 to f/1000",
-    oracle="(2 / pi)(acos s - s sqrt(1 - s^2)), 50 digits; 0 beyond the cutoff",
-    why="its slope by s is at most 4 / pi, with 3 roundings of s, and two terms of at most pi / 2: 4 eps",
-)
+@hard_case("transfer in focus, f/0.5 to f/1000")
 def transfer_in_focus() -> Result:
+    """(2 / pi)(acos s - s sqrt(1 - s^2)), 50 digits; 0 beyond the cutoff. Allowed: its slope by s is at most 4 / pi,
+    with 3 roundings of s, and two terms of at most pi / 2: 4 eps.
+    """
     results = []
     for f_number in NUMBERS:
         for share in (0.0, 1e-9, 0.1, 0.5, 0.9, 0.999999, 1 - 1e-12, 1 - 1e-15, 1.0, 1.5):
@@ -163,13 +171,12 @@ def transfer_in_focus() -> Result:
     return worst(results)
 
 
-@hard_case(
-    "transfer out of focus, up to 1000 waves of blur",
-    oracle="autocorrelation of the pupil: (4 / pi) integral of cos(8 pi W s x / lambda) sqrt(1 - (x + s)^2), 50 digits",
-    why="8 roundings of a phase p that is passed to a cosine, and a pairwise sum of terms of at most 1: (8 p + 40) eps",
-    slow=True,
-)
+@hard_case("transfer out of focus, up to 1000 waves of blur", slow=True)
 def transfer_out_of_focus() -> Result:
+    """Autocorrelation of the pupil: (4 / pi) integral of cos(8 pi W s x / lambda) sqrt(1 - (x + s)^2), 50 digits.
+    Allowed: 8 roundings of a phase p that is passed to a cosine, and a pairwise sum of terms of at most 1: (8 p + 40)
+    eps.
+    """
     results = []
     for w20 in (1e-9, 0.1, 3.0, 67.0):
         for share in (0.01, 0.3, 0.9, 0.999):
@@ -202,13 +209,11 @@ def response_of(scenario: dict[str, object], cfa: str = "RGGB") -> np.ndarray:
     return smooth_response(setup, plain(setup))[0, 0]
 
 
-@hard_case(
-    "a light of a tenth of a pixel, on a pixel, between two and between four",
-    oracle="exact overlaps of disc, readout and pixels by integration, 50 digits",
-    why="shares of a pixel within 8 eps each, a sum over at most 25 pixels, 16 roundings of the response: 64 eps of full light",
-    slow=True,
-)
+@hard_case("a light of a tenth of a pixel, on a pixel, between two and between four", slow=True)
 def tiny_light() -> Result:
+    """Exact overlaps of disc, readout and pixels by integration, 50 digits. Allowed: shares of a pixel within 8 eps
+    each, a sum over at most 25 pixels, 16 roundings of the response: 64 eps of full light.
+    """
     whole, results, r = response_of(FIXED), [], 0.05
     readout = math.hypot(2, 2) / 2
     for place in ((0.0, 0.0), (0.5, 0.0), (0.5, 0.5), (1.25, 0.5)):
@@ -227,12 +232,11 @@ def tiny_light() -> Result:
     return worst(results)
 
 
-@hard_case(
-    "a light that nearly fills the largest frame, read at its center",
-    oracle="the response to a light without an edge",
-    why="every pixel of the readout is inside the disc by 60 pixels: shares within 16 eps of 64^2, as a rounding of areas",
-)
+@hard_case("a light that nearly fills the largest frame, read at its center")
 def nearly_filled_frame() -> Result:
+    """The response to a light without an edge. Allowed: every pixel of the readout is inside the disc by 60 pixels:
+    shares within 16 eps of 64^2, as a rounding of areas.
+    """
     whole, results = response_of(FIXED, "RYYC"), []
     for across in (100.0, 127.99):
         for place in ([0.0, 0.0], [0.5, 0.5]):
@@ -242,12 +246,10 @@ def nearly_filled_frame() -> Result:
     return worst(results)
 
 
-@hard_case(
-    "lights on both sides of the 128 pixel limit",
-    oracle="allowed up to the limit, refused beyond",
-    why="the limit is on the diameter; what is refused names it",
-)
+@hard_case("lights on both sides of the 128 pixel limit")
 def size_limit() -> Result:
+    """Allowed up to the limit, refused beyond. Allowed: the limit is on the diameter; what is refused names it."""
+
     def refusal(across_px: float, f_number: float) -> str | None:
         scenario = Scene.model_validate(disc_scene(across_px) | {"optics": {"f_number": f_number}})
         found = too_much(scenario, Pixel())
@@ -260,12 +262,11 @@ def size_limit() -> Result:
     )
 
 
-@hard_case(
-    "a pixel in the middle of a blurred light, f/2 and f/1000",
-    oracle="1 - J0^2 - J1^2 at the middle of a pixel of a tenth, 50 digits",
-    why="the image bends by at most k^2 / 4, k = 2 pi / (lambda N), over the pixel; the rule's error as at the center",
-)
+@hard_case("a pixel in the middle of a blurred light, f/2 and f/1000")
 def blurred_pixels() -> Result:
+    """1 - J0^2 - J1^2 at the middle of a pixel of a tenth, 50 digits. Allowed: the image bends by at most k^2 / 4, k =
+    2 pi / (lambda N), over the pixel; the rule's error as at the center.
+    """
     results = []
     for f_number in (2.0, 1000.0):
         radius = 6.2

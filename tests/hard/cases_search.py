@@ -18,11 +18,12 @@ from sweep.metrics.objective import Objective
 from sweep.run.search import run_search
 from sweep.search.gradients import BACK_OFF
 from sweep.search.limit import limit_of
-from sweep.search.problem import Evaluation, Problem, best_feasible, starting_points
-from sweep.search.solver import best_reachable, search_from
+from sweep.search.problem import Problem, starting_points
+from sweep.search.solver import best_reachable
 from sweep.study import load_study
 
 from ..build import stopband_study
+from ..search.problems import best_of
 from .cases_chain import FIXED, GRID, PAIR, RED, WAVE, YELLOW, N, electrons_per_s, lights_of, lines, made
 from .registry import EPS, Result, hard_case, outcome, worst
 
@@ -49,30 +50,21 @@ def csd_of(depth: float) -> float:
     return GAIN * math.sqrt(FIXED_PART + (0.5 * depth) ** 2)
 
 
-def found_by(problem: Problem, algorithm: str = "SLSQP", starts: int = 4) -> Evaluation:
-    points = starting_points(problem, starts, 1)
-    best = best_feasible([e for i, u in enumerate(points) for e in search_from(problem, i, u, algorithm, 300).log])
-    assert best is not None
-    return best
-
-
 HAIR = BACK_OFF + FEASIBLE
 """How far, relative to the bound, an answer may lie from a constraint that it meets."""
 
 
-@hard_case(
-    "the optimum lies on the least sensitivity",
-    oracle="closed form: all the light that may be given up is taken from the red line",
-    why="the answer keeps 1e-8 of the bound inside (1e-9 outside is feasible), where the solver stops adds 1e-9 of the box",
-    slow=True,
-)
+@hard_case("the optimum lies on the least sensitivity", slow=True)
 def on_the_sensitivity() -> Result:
+    """Closed form: all the light that may be given up is taken from the red line. Allowed: the answer keeps 1e-8 of the
+    bound inside (1e-9 outside is feasible), where the solver stops adds 1e-9 of the box.
+    """
     results = []
     for least in (0.8085, 0.9, 0.99, 0.9999):
         depth = (1 - least) * N / OPEN
         # Where next to nothing may be taken, depth 0 is stationary: there the conservative two may stay.
         for algorithm in ("SLSQP", "MMA", "CCSAQ") if least < 0.999 else ("SLSQP",):
-            best = found_by(depth_problem({"sensitivity": Bound(min=least)}), algorithm)
+            best = best_of(depth_problem({"sensitivity": Bound(min=least)}), 4, 300, algorithm)
             room = HAIR * N / OPEN + X_TOLERANCE
             slope = GAIN * 0.25 * depth / math.sqrt(FIXED_PART + (0.5 * depth) ** 2)
             results.append(
@@ -82,27 +74,23 @@ def on_the_sensitivity() -> Result:
     return worst(results)
 
 
-@hard_case(
-    "only the unchanged filter is sensitive enough",
-    oracle="closed form: depth 0",
-    why="a depth within what counts as feasible, 1e-9, moves the CSD by its square",
-)
+@hard_case("only the unchanged filter is sensitive enough")
 def nothing_to_give() -> Result:
-    best = found_by(depth_problem({"sensitivity": Bound(min=1.0)}))
+    """Closed form: depth 0. Allowed: a depth within what counts as feasible, 1e-9, moves the CSD by its square."""
+    best = best_of(depth_problem({"sensitivity": Bound(min=1.0)}), 4, 300)
     depth = FEASIBLE * N / OPEN
     return Result(abs(best.objective - csd_of(0.0)), csd_of(depth) - csd_of(0.0) + 16 * EPS * GAIN)
 
 
-@hard_case(
-    "the most sensitive filter lies on the least separation",
-    oracle="closed form: the depth at which the CSD is just enough",
-    why="1e-8 of the bound inside, 1e-9 outside; the solver stops within 1e-9 of the box",
-)
+@hard_case("the most sensitive filter lies on the least separation")
 def on_the_separation() -> Result:
+    """Closed form: the depth at which the CSD is just enough. Allowed: 1e-8 of the bound inside, 1e-9 outside; the
+    solver stops within 1e-9 of the box.
+    """
     results = []
     for depth in (0.25, 0.5, 0.9):
         least = csd_of(depth)
-        best = found_by(depth_problem({"csd_yellow_red": Bound(min=least)}, "sensitivity"))
+        best = best_of(depth_problem({"csd_yellow_red": Bound(min=least)}, "sensitivity"), 4, 300)
         slope = GAIN * 0.25 * depth / math.sqrt(FIXED_PART + (0.5 * depth) ** 2)
         room = (HAIR * least / slope + X_TOLERANCE) * OPEN / N
         results.append((abs(best.objective - (1 - depth * OPEN / N)), 1.01 * room + 16 * EPS))
@@ -116,12 +104,11 @@ def rise(wave: np.ndarray, center: float, width: float) -> np.ndarray:
     return t**3 * (10 - 15 * t + 6 * t**2)
 
 
-@hard_case(
-    "an edge is as far left as the sensitivity allows",
-    oracle="2,001 edges by brute force, and the root of the sensitivity by bisection",
-    why="CSD per nm over sensitivity per nm, times 1.1e-8; 1e-9 of the box; rounding of sums of 61 terms",
-)
+@hard_case("an edge is as far left as the sensitivity allows")
 def edge_on_the_constraint() -> Result:
+    """2,001 edges by brute force, and the root of the sensitivity by bisection. Allowed: CSD per nm over sensitivity
+    per nm, times 1.1e-8; 1e-9 of the box; rounding of sums of 61 terms.
+    """
     led = np.exp(-0.5 * ((WAVE - np.array([[592.0], [637.0]])) / 9) ** 2)
     photons = led / led.sum(axis=1, keepdims=True) / GRID.step_nm
     setup = made(CURVES, lights_of(PAIR, photons), FIXED, cfa="RYNC")
@@ -146,19 +133,18 @@ def edge_on_the_constraint() -> Result:
     problem = Problem(
         setup, family, low, high, Objective(minimum={"csd_yellow_red": 1.0}), {"sensitivity": Bound(min=least)}
     )
-    best = found_by(problem)
+    best = best_of(problem, 4, 300)
     per_nm = abs(csd(at + 1e-4) - csd(at - 1e-4)) / 2e-4
     light_per_nm = abs(light(at + 1e-4) - light(at - 1e-4)) / 2e-4
     room = HAIR * least / light_per_nm + X_TOLERANCE * 90
     return Result(abs(best.objective - exact), 1.01 * per_nm * room + 200 * EPS * GAIN)
 
 
-@hard_case(
-    "the limit of two lines on the least sensitivity",
-    oracle="closed form: light is taken from one line alone, until none is left",
-    why="the bracket's stated width, 1e-3 DN; what is attained is never above the closed form but by what is feasible, 1e-9",
-)
+@hard_case("the limit of two lines on the least sensitivity")
 def limit_of_two_lines() -> Result:
+    """Closed form: light is taken from one line alone, until none is left. Allowed: the bracket's stated width, 1e-3
+    DN; what is attained is never above the closed form but by what is feasible, 1e-9.
+    """
     results = []
     for nodes in (0.25, 0.5, 0.875, 1.0, 5.0):
         least = 1 - nodes / N
@@ -170,13 +156,11 @@ def limit_of_two_lines() -> Result:
     return worst(results)
 
 
-@hard_case(
-    "the best value of a constraint that is out of reach",
-    oracle="closed form at the corner of the box",
-    why="linear in depth, or growing with it, so the solver ends on the box's side: 1e-9 of the box and 16 roundings",
-    slow=True,
-)
+@hard_case("the best value of a constraint that is out of reach", slow=True)
 def best_values() -> Result:
+    """Closed form at the corner of the box. Allowed: linear in depth, or growing with it, so the solver ends on the
+    box's side: 1e-9 of the box and 16 roundings.
+    """
     shallow = replace(depth_problem({}), low=np.array([602.5, 0.0, 662.5, 0.0, 0.3]))
     results = []
     for name, bound, exact in (
@@ -186,12 +170,8 @@ def best_values() -> Result:
         ("min_transmission", Bound(min=0.9), 0.7),
     ):
         problem = replace(shallow, constraints={name: bound})
-        starts = starting_points(problem, 4, 1)
-        found = best_reachable(problem, name, starts, 200)
-        assert (
-            best_feasible([e for i, u in enumerate(starts) for e in search_from(problem, i, u, "SLSQP", 100).log])
-            is None
-        )
+        found = best_reachable(problem, name, starting_points(problem, 4, 1), 200)
+        assert best_of(problem, 4, 100) is None
         results.append((abs(found / exact - 1), 2 * X_TOLERANCE + 16 * EPS))
     return worst(results)
 
@@ -209,17 +189,15 @@ search: {starts: 4, max_evaluations: 200}
 )
 
 
-@hard_case(
-    "a study that no design meets",
-    oracle="the narrowest band of the box, written out",
-    why="printed with 6 digits: half a unit of the last; both constraints are named",
-)
+@hard_case("a study that no design meets")
 def infeasible_study() -> Result:
+    """The narrowest band of the box, written out. Allowed: printed with 6 digits: half a unit of the last; both
+    constraints are named.
+    """
     with TemporaryDirectory() as name:
         path = Path(name) / "s.yaml"
         path.write_text(STUDY)
         study = load_study(path)
-    assert study.search is not None
     y, g, wave = study.sensor.qe["Y"], study.sensor.qe["G"], study.grid.nodes_nm
     shape = rise(wave, 605.0, 10.0) - rise(wave, 650.0, 10.0)
     exact = float(1 - ((y - g) * shape).sum() / y.sum())

@@ -1,14 +1,13 @@
-"""Numerically hard cases: what each measures, what it is compared with, and which error that allows.
+"""Numerically hard cases: an error, the oracle that it is measured against, and the largest error that is allowed.
 
-A case returns its error and the largest error that its derivation allows. The oracle shares no code with the package.
-Where the outcome is yes or no (refused, exactly zero, raised) the error is 0 or infinite, and nothing is allowed.
+The docstring of a case says its oracle and, after `Allowed:`, how the allowed error is derived. The oracle shares no
+code with the package. Where the outcome is yes or no (refused, exactly zero, raised) the error is 0 or infinite.
 """
 
 from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,20 +21,20 @@ EPS = 2.0**-52
 
 @dataclass(frozen=True)
 class Result:
-    """What a case measured, and the largest error that is allowed."""
+    """The error of a case, and the largest error that is allowed."""
 
     error: float
     allowed: float
 
     @property
     def good(self) -> bool:
-        """Whether the error is within what is allowed; NaN is not."""
+        """Whether the error is within the allowed one; NaN is not."""
         return self.error <= self.allowed
 
 
 @dataclass(frozen=True)
 class HardCase:
-    """A case: its name, what it is compared with, how the allowed error is derived, and whether it takes seconds."""
+    """A case: its name, oracle, derivation of the allowed error, and whether it takes seconds."""
 
     name: str
     oracle: str
@@ -47,13 +46,14 @@ class HardCase:
 CASES: list[HardCase] = []
 
 
-def hard_case(
-    name: str, *, oracle: str, why: str, slow: bool = False
-) -> Callable[[Callable[[], Result]], Callable[[], Result]]:
+def hard_case(name: str, *, slow: bool = False) -> Callable[[Callable[[], Result]], Callable[[], Result]]:
     """Register a function as a case; it runs with 50 digits in mpmath. `slow`: it takes seconds."""
 
     def register(run: Callable[[], Result]) -> Callable[[], Result]:
-        CASES.append(HardCase(name, oracle, why, mp.workdps(50)(run), slow))
+        oracle, _, why = " ".join((run.__doc__ or "").split()).partition(". Allowed: ")
+        if not oracle or not why:
+            raise TypeError(f"{name}: the docstring must name the oracle and derive the allowed error")
+        CASES.append(HardCase(name, oracle, why.removesuffix("."), mp.workdps(50)(run), slow))
         return run
 
     return register
@@ -88,8 +88,6 @@ def refused(call: Callable[[], Any], error: type[Exception], *words: str) -> boo
 
 
 def write_table(path: Path, rows: list[dict[str, Any]]) -> None:
-    """Write the table of all cases that ran as JSON; a reader sees the old file or the whole new one."""
+    """Write the table of all cases that ran as JSON."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    hidden = path.with_name(f".tmp-{os.getpid()}-{path.name}")
-    hidden.write_text(json.dumps(rows, indent=1) + "\n")
-    hidden.replace(path)
+    path.write_text(json.dumps(rows, indent=1) + "\n")

@@ -12,60 +12,49 @@ from sweep.metrics.bound import Bound
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth import smooth_response
 from sweep.search.limit import limit_of
-from sweep.search.problem import Problem, best_feasible, starting_points
+from sweep.search.problem import Problem
 from sweep.search.sides import _NEAR
-from sweep.search.solver import search_from
-from sweep.study import Study, load_study
+from sweep.study import load_study
 
-from .sides_milp import agrees, is_mixed, largest, random_problem, smallest, write_study
-
-
-@pytest.fixture(scope="module")
-def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
-    return load_study(write_study(tmp_path_factory.mktemp("sides"), 1))
+from .limit_oracles import is_mixed, limit_checked_by_milp, milp_limit, random_problem, smallest, write_study
+from .problems import best_of
 
 
 @pytest.fixture(scope="module")
 def coarse(tmp_path_factory: pytest.TempPathFactory) -> Problem:
+    """The problem on a grid of 10 nm."""
     study = load_study(write_study(tmp_path_factory.mktemp("coarse"), 10))
-    assert study.search is not None
     return study.problem(study.search)
 
 
-def test_a_filter_between_two_kinds_of_light_is_within_the_limit(study: Study) -> None:
+def test_a_filter_between_two_kinds_of_light_is_within_the_limit(tmp_path: Path) -> None:
     """Yellow between two reds: the best filter puts it above one of them and below the other."""
-    assert study.search is not None
+    study = load_study(write_study(tmp_path, 1))
     problem = study.problem(study.search)
-    limit = agrees(problem)
+    limit = limit_checked_by_milp(problem)
     assert is_mixed(problem, limit.curve)
-    log = [
-        e for i, u in enumerate(starting_points(problem, 4, 1)) for e in search_from(problem, i, u, "SLSQP", 100).log
-    ]
-    best = best_feasible(log)
-    assert best is not None
-    assert 0.9 * limit.proven < best.objective <= limit.proven
+    assert 0.9 * limit.proven < best_of(problem, 4, 100).objective <= limit.proven
 
 
 @pytest.mark.parametrize("seed", range(0, 10, 2))  # `make slow` takes 200
 def test_the_limit_is_that_of_a_milp(coarse: Problem, seed: int) -> None:
     problem = random_problem(coarse, seed)
-    limit = agrees(problem)
+    limit = limit_checked_by_milp(problem)
     if seed % 2 == 0:  # the other channels tell nothing apart, so the MILP's margin is what is left to the limit
-        assert largest(problem, limit.proven) == pytest.approx(limit.proven, abs=1e-3)
+        assert milp_limit(problem, limit.proven) == pytest.approx(limit.proven, abs=1e-3)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 3, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(20, 40))])
 def test_a_proof_bounds_filters_of_other_sensitivities(coarse: Problem, seed: int) -> None:
     problem = random_problem(coarse, seed)
     own = problem.constraints["sensitivity"].min
-    assert own is not None
     levels = [own + off for off in (-0.08, -0.02, 0.0, 0.01, 0.04)]
     limit = limit_of(problem, sensitivities=levels)
     assert limit.elsewhere[2] == pytest.approx(limit.proven, abs=_NEAR + 1e-3)
     assert (np.diff(limit.elsewhere) <= _NEAR).all()  # each may be that much above the bound of its weights
     for level, most in zip(levels, limit.elsewhere, strict=True):
         there = replace(problem, constraints={**problem.constraints, "sensitivity": Bound(min=level)})
-        assert largest(there, most + 1e-3) < most + 1e-3  # by a MILP of its own, no filter exceeds it
+        assert milp_limit(there, most + 1e-3) < most + 1e-3  # by a MILP of its own, no filter exceeds it
 
 
 @pytest.mark.slow
@@ -74,7 +63,7 @@ def test_two_hundred_limits_are_those_of_a_milp(coarse: Problem) -> None:
     mixed = 0
     for seed in range(200):
         problem = random_problem(coarse, seed)
-        mixed += is_mixed(problem, agrees(problem).curve)
+        mixed += is_mixed(problem, limit_checked_by_milp(problem).curve)
     assert mixed >= 20
 
 
@@ -89,14 +78,14 @@ def test_several_csds_have_sides_of_their_own(coarse: Problem, seed: int) -> Non
         setup=replace(problem.setup, lights=replace(lights, types=types)),
         objective=Objective(minimum={"csd_yellow_red": 1.0, "csd_orange_red": 1.5}),
     )
-    free = agrees(problem)
+    free = limit_checked_by_milp(problem)
     held = smallest(problem, free.curve, "csd_yellow_orange")
     bound = {**problem.constraints, "csd_yellow_orange": Bound(min=held + 1.0)}
     held_apart = replace(problem, constraints=bound)
-    if largest(held_apart, 0.0) == -np.inf:
+    if milp_limit(held_apart, 0.0) == -np.inf:
         assert limit_of(held_apart).proven == -np.inf
     else:
-        assert agrees(held_apart).proven <= free.proven
+        assert limit_checked_by_milp(held_apart).proven <= free.proven
 
 
 def test_every_place_of_a_light_has_sides_of_its_own(coarse: Problem, tmp_path: Path) -> None:
@@ -104,9 +93,8 @@ def test_every_place_of_a_light_has_sides_of_its_own(coarse: Problem, tmp_path: 
     target = "scenarios:\n  far: {target: {distance_m: 150, fov_deg: 60, phase_px: any}, optics: {f_number: 4}}\n"
     path.write_text(path.read_text() + target)
     study = load_study(path)
-    assert study.search is not None
     problem = study.problem(study.search)
-    limit = agrees(problem)
+    limit = limit_checked_by_milp(problem)
     assert len(smooth_response(problem.setup, problem.setup.camera.base_qe[None])[0]) > 1
     assert is_mixed(problem, limit.curve)
     assert limit.proven <= limit_of(coarse).proven * 1.001
@@ -114,7 +102,7 @@ def test_every_place_of_a_light_has_sides_of_its_own(coarse: Problem, tmp_path: 
 
 def test_a_proof_that_is_cut_short_says_what_it_has(coarse: Problem) -> None:
     problem = random_problem(coarse, 9)
-    whole = agrees(problem)
+    whole = limit_checked_by_milp(problem)
     ends = []
     for most in (3, 6, 10, whole.programs):
         found = limit_of(problem, most_programs=most)

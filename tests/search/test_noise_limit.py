@@ -18,7 +18,7 @@ from sweep.search.least_noise import least_variance
 from sweep.search.limit import limit_of, why_not
 from sweep.search.problem import Problem
 
-from .noisy_problems import problem_of, searched
+from .problems import YELLOW_RED, best_of, noisy_problem
 
 GOAL = Objective(minimum={"dprime_yellow_red": 1.0})
 SCENES = {
@@ -34,9 +34,8 @@ SCENES = {
 
 
 def problem_in(scene: str) -> Problem:
-    problem = problem_of("stopband", 5, 0.3, GOAL)
+    problem = noisy_problem("stopband", 5, 0.3, GOAL)
     scenario = Scene.model_validate(SCENES[scene])
-    assert scenario.noise is not None
     setup = replace(problem.setup, scene=scenario, left_out=frozenset())
     setup = setup.with_camera(pixel=scenario.noise.of(setup.camera.pixel))
     return replace(problem, setup=setup, constraints={"sensitivity": Bound(min=0.9)})
@@ -79,12 +78,11 @@ def test_no_filter_has_less_noise_or_a_larger_d_prime(scene: str) -> None:
     least = least_variance(imager, base, (np.zeros_like(base), base), row, 0.9)
     assert (imager.variance(curves)[..., channel] >= least).all()
     limit = limit_of(problem)
-    assert limit.curve is not None
-    reached = smooth_detectability(problem.setup, curves, ("yellow", "red"))
+    reached = smooth_detectability(problem.setup, curves, YELLOW_RED)
     assert reached.max() <= limit.proven
-    best = searched(problem)
+    best = best_of(problem, 2, 120)
     assert reached.max() < best.objective <= limit.proven
-    own = smooth_detectability(problem.setup, limit.curve[None, None], ("yellow", "red"))[0]
+    own = smooth_detectability(problem.setup, limit.curve[None, None], YELLOW_RED)[0]
     assert limit.attained == pytest.approx(own, rel=1e-12)
     assert limit.attained <= limit.proven
 
@@ -111,8 +109,3 @@ def test_between_levels_a_bound_is_told_only_where_its_noise_holds() -> None:
     below, here, above = limit.elsewhere
     assert below == np.inf
     assert above <= here <= limit.proven + 1e-3
-
-
-def test_errors_have_no_limit_and_say_why() -> None:
-    problem = replace(problem_in("chart"), objective=Objective(least={"state_error": 1.0}))
-    assert why_not(problem) == "state_error is not convex in the filter: its noise grows with the light; d' has a limit"

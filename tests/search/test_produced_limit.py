@@ -7,7 +7,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
 
 from sweep.designs.tolerance import Off
 from sweep.metrics.bound import Bound
@@ -15,15 +14,18 @@ from sweep.metrics.members import population_imager
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth import smooth_csd
 from sweep.search.limit import Limit, limit_of, why_not
-from sweep.search.problem import Problem, best_feasible, starting_points
+from sweep.search.problem import starting_points
 from sweep.search.produced import all_ways, ways_of
-from sweep.search.solver import search_from
 from sweep.study import load_study
 
 from ..conftest import STUDIES
+from .limit_oracles import linear_margin
+from .problems import PROBLEM, STUDY, YELLOW_RED, best_of
 
-STUDY = load_study(STUDIES / "stopband.yaml")
+BASE, TARGET, WAVE = STUDY.sensor.qe["Y"], STUDY.sensor.qe["G"], STUDY.grid.nodes_nm
 SHIFTS = (-2, -1, 0, 1, 2)
+MOVED = replace(PROBLEM, edge_shift_nm=2.0, objective=Objective(minimum={"worst_csd_yellow_red": 1.0}))
+"""The search for the largest worst case over what production does to the edges."""
 FREE_FORM = (
     "{cfa: RYNCy, channel: N, base: Y, technology: {interference: {effective_index: 1.8}}, family: free_form, "
     "options: {nodes: {start_nm: 560, stop_nm: 700, step_nm: 5}}}"
@@ -31,35 +33,28 @@ FREE_FORM = (
 
 
 @cache
-def problem() -> Problem:
-    assert STUDY.search is not None
-    plain = STUDY.problem(STUDY.search)
-    return replace(plain, edge_shift_nm=2.0, objective=Objective(minimum={"worst_csd_yellow_red": 1.0}))
-
-
-@cache
 def limit() -> Limit:
-    return limit_of(problem())
+    return limit_of(MOVED)
 
 
 def test_a_bound_on_sensitivity_is_none_of_what_comes_out() -> None:
     """Beside a darker Y a filter of at most 0.9 leaves the exposure to others; one that production moves may not."""
-    qe = problem().setup.camera.qe.copy()
-    qe[problem().setup.camera.mosaic.channels.index("Y")] *= 0.95
-    setup = problem().setup.with_camera(qe=qe)
-    moved = replace(problem(), setup=setup, constraints={"sensitivity": Bound(max=0.9)})
+    qe = MOVED.setup.camera.qe.copy()
+    qe[MOVED.setup.camera.mosaic.channels.index("Y")] *= 0.95
+    setup = MOVED.setup.with_camera(qe=qe)
+    moved = replace(MOVED, setup=setup, constraints={"sensitivity": Bound(max=0.9)})
     assert why_not(moved) == "the modified channel could set the exposure"
     assert why_not(replace(moved, objective=Objective(minimum={"csd_yellow_red": 1.0}))) is None
 
 
 def test_a_way_is_the_family_as_production_has_it() -> None:
     """Of random stopbands: the curve where it is known, and sums over it between the ends that rows have."""
-    rng, base, family = np.random.default_rng(5), problem().setup.camera.base_qe[0], problem().family
-    points = problem().from_unit(starting_points(problem(), 64, 1))
+    rng, family = np.random.default_rng(5), MOVED.family
+    points = MOVED.from_unit(starting_points(MOVED, 64, 1))
     curves = family.curves(points)[:, 0]
-    apart = rng.normal(size=(7, base.size))
-    ways = ways_of(problem())
-    assert all_ways(problem())
+    apart = rng.normal(size=(7, BASE.size))
+    ways = ways_of(MOVED)
+    assert all_ways(MOVED)
     for way, shift in zip(ways, (0, -2, -1, 1, 2), strict=True):
         came_out = family.produced(Off(shift)).curves(points)[:, 0]
         assert way.known.sum() >= 295
@@ -72,23 +67,21 @@ def test_a_way_is_the_family_as_production_has_it() -> None:
 
 def test_what_no_row_can_say_is_left_out_and_told() -> None:
     """Moves by part of a step, films that are too thick, a field of all places."""
-    assert not all_ways(replace(problem(), edge_shift_nm=1.5))
-    assert len(ways_of(replace(problem(), edge_shift_nm=1.5))) == 1
-    found = limit_of(replace(problem(), edge_shift_nm=1.0))
+    assert not all_ways(replace(MOVED, edge_shift_nm=1.5))
+    assert len(ways_of(replace(MOVED, edge_shift_nm=1.5))) == 1
+    found = limit_of(replace(MOVED, edge_shift_nm=1.0))
     assert found.left_out == ("some edge shifts",)  # half a nanometer is no whole step
     assert found.proven > limit().proven
     assert limit().left_out == ()
-    thick = limit_of(replace(problem(), thickness=0.003))
+    thick = limit_of(replace(MOVED, thickness=0.003))
     assert thick.left_out == ("edge shifts",)
-    assert thick.proven == pytest.approx(limit_of(replace(problem(), edge_shift_nm=0.0)).proven, abs=1e-3)
+    assert thick.proven == pytest.approx(limit_of(replace(MOVED, edge_shift_nm=0.0)).proven, abs=1e-3)
 
 
 def moved(curve: np.ndarray, shift: int) -> np.ndarray:
     """A filter of RYNCy whose shape between Y and G stands so many nanometers, the steps of the grid, farther."""
-    base, target = STUDY.sensor.qe["Y"], STUDY.sensor.qe["G"]
-    wave = STUDY.grid.nodes_nm
-    shape = np.interp(wave - shift, wave, (curve - base) / (target - base))
-    return np.asarray(base + (target - base) * shape)
+    shape = np.interp(WAVE - shift, WAVE, (curve - BASE) / (TARGET - BASE))
+    return BASE + (TARGET - BASE) * shape
 
 
 def apart(curve: np.ndarray) -> np.ndarray:
@@ -96,18 +89,17 @@ def apart(curve: np.ndarray) -> np.ndarray:
     qe, lights, grid = STUDY.sensor.qe, STUDY.lights, STUDY.grid
     brightest = max(qe[name].sum() for name in ("R", "Y", "Cy"))
     dn = 0.95 * 4095 * lights.photon_ratio * grid.size * grid.step_nm / brightest
-    yellow, red = (lights.photons[lights.members[kind]] @ curve * dn for kind in ("yellow", "red"))
-    return np.asarray((yellow[:, None] - red).ravel())
+    yellow, red = (lights.photons[lights.members[kind]] @ curve * dn for kind in YELLOW_RED)
+    return (yellow[:, None] - red).ravel()
 
 
 def others() -> np.ndarray:
     """Squared distance of each pair in the other channels, DN^2."""
-    return np.asarray(sum(apart(STUDY.sensor.qe[name]) ** 2 for name in ("R", "Y", "Cy")))
+    return sum(apart(STUDY.sensor.qe[name]) ** 2 for name in ("R", "Y", "Cy"))
 
 
 def test_its_filter_has_it_however_it_comes_out() -> None:
     found = limit()
-    assert found.curve is not None
     assert 0 <= found.proven - found.attained <= 0.02
     least = min(np.sqrt(apart(moved(found.curve, shift)) ** 2 + others()).min() for shift in SHIFTS)
     assert least == pytest.approx(found.attained, abs=0.01)
@@ -115,12 +107,11 @@ def test_its_filter_has_it_however_it_comes_out() -> None:
 
 def test_its_filter_keeps_the_bounds_of_the_study_on_worst_cases() -> None:
     """A program that knows some members of a worst case has filters that lack a little of it."""
-    bounds = {**problem().constraints, "worst_csd_yellow_red": Bound(min=256)}
-    asked = replace(problem(), constraints=bounds, objective=Objective(minimum={"csd_yellow_red": 1.0}))
+    bounds = {**MOVED.constraints, "worst_csd_yellow_red": Bound(min=256)}
+    asked = replace(MOVED, constraints=bounds, objective=Objective(minimum={"csd_yellow_red": 1.0}))
     found = limit_of(asked)
-    assert found.curve is not None
     came_out = np.stack([way.curve(found.curve) for way in ways_of(asked)])[:, None]
-    each = smooth_csd(asked.setup, came_out, ("yellow", "red"))
+    each = smooth_csd(asked.setup, came_out, YELLOW_RED)
     assert each.min() >= 256 * (1 - 1e-9)
     assert each[0] == pytest.approx(found.attained, rel=1e-12)
     assert 0 <= found.proven - found.attained <= 0.02
@@ -128,25 +119,13 @@ def test_its_filter_keeps_the_bounds_of_the_study_on_worst_cases() -> None:
 
 def margin(t: float, sign: float) -> float:
     """By how much all pairs can be further apart than t asks, with one color brighter in N of all of them; DN."""
-    base = STUDY.sensor.qe["Y"]
     rows, least = [], []
     for shift in SHIFTS:
-        start = apart(moved(base, shift))
-        by_qe = np.stack([apart(moved(base + unit, shift)) - start for unit in np.eye(base.size)], axis=1)
+        start = apart(moved(BASE, shift))
+        by_qe = np.stack([apart(moved(BASE + unit, shift)) - start for unit in np.eye(BASE.size)], axis=1)
         rows.append(sign * by_qe)
-        least.append(np.sqrt(np.maximum(0.0, t**2 - others())) - sign * (start - by_qe @ base))
-    step = np.diff(np.eye(base.size), axis=0)
-    fixed = np.concatenate([np.ones((1, base.size)), step, -step])
-    matrix = np.concatenate(
-        [
-            np.column_stack([-np.concatenate(rows), np.ones(len(SHIFTS) * rows[0].shape[0])]),
-            np.pad(-fixed, ((0, 0), (0, 1))),
-        ]
-    )
-    right = -np.concatenate([*least, [0.9 * base.sum()], np.full(2 * len(step), -0.06)])
-    ends = [*zip(np.zeros(base.size), base, strict=True), (None, None)]
-    found = linprog(np.append(np.zeros(base.size), -1.0), matrix, right, bounds=ends)
-    return float(found.x[-1]) if found.status == 0 else -np.inf
+        least.append(np.sqrt(np.maximum(0.0, t**2 - others())) - sign * (start - by_qe @ BASE))
+    return linear_margin(np.concatenate(rows), np.concatenate(least), BASE)
 
 
 @pytest.mark.slow
@@ -161,10 +140,8 @@ def test_free_form_filters_come_near_the_limit_over_lamps_and_edges() -> None:
     """`sweep run robust --set boxes.edges=FREE_FORM`: the figures of the documentation."""
     text = " ".join((STUDIES / "guide" / "06-lamps-angles-tolerances.md").read_text(encoding="utf-8").split())
     study = load_study(STUDIES / "robust.yaml", changes={"boxes.edges": FREE_FORM})
-    assert study.search is not None
     searched = study.problem(study.search)
-    best = best_feasible(search_from(searched, 0, starting_points(searched, 1, 1)[0], "SLSQP", 100).log)
-    assert best is not None
+    best = best_of(searched, 1, 100)
     came_out = [searched.family.produced(Off(shift)).curves(best.x[None]) for shift in SHIFTS]
     worst = population_imager(searched.setup).worst(np.concatenate(came_out))["csd_yellow_red"].min()
     assert worst == pytest.approx(best.objective, rel=1e-9)

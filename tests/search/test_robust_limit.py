@@ -3,38 +3,34 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
 
 from sweep.camera.field import setup_at
 from sweep.camera.linear import LinearModel, linear_model
 from sweep.camera.sensor_field import SensorField
 from sweep.camera.setup import Setup
-from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.smooth import smooth_csd, smooth_response
 from sweep.search.limit import Limit, limit_of, why_not
-from sweep.search.problem import Problem, best_feasible, starting_points
-from sweep.search.solver import search_from
+from sweep.search.problem import Problem
 from sweep.study import load_study
 
 from ..conftest import STUDIES
-from .sides_milp import agrees, is_mixed, largest, random_problem, write_study
-from .stopband_filters import random_filters
+from .limit_oracles import is_mixed, limit_checked_by_milp, linear_margin, milp_limit, random_problem, write_study
+from .problems import YELLOW_RED, best_of, feasible_filters
 
 STUDY = load_study(STUDIES / "angle.yaml")
 assert STUDY.search is not None
 PLACES_DEG = (0.0, 10.0, 20.0)
 INDEX, F_NUMBER = 1.8, 1.6
-YELLOW_RED = ("yellow", "red")
 
 
 @cache
 def problem() -> Problem:
-    assert STUDY.search is not None
     given = STUDY.problem(STUDY.search)
     scene = given.setup.scene.model_copy(update={"field": SensorField(cra_deg=PLACES_DEG)})
     return replace(given, setup=replace(given.setup, scene=scene))
@@ -46,6 +42,16 @@ def worst_of_all_places_dn(setup: Setup, curves: np.ndarray) -> float:
     return min(float(smooth_csd(setup_at(setup, float(h)), curves[None], YELLOW_RED)[0]) for h in heights)
 
 
+def smallest_csd_at(setup: Setup, angles_deg: Iterable[float], curve: np.ndarray) -> float:
+    """The smallest yellow/red distance of a filter over chief ray angles, each a scene of its own, DN."""
+    smallest = np.inf
+    for cra_deg in angles_deg:
+        optics = setup.scene.optics.model_copy(update={"cra_deg": float(cra_deg)})
+        place = replace(setup, scene=setup.scene.model_copy(update={"field": None, "optics": optics}))
+        smallest = min(smallest, float(smooth_csd(place, curve[None, None], YELLOW_RED)[0]))
+    return smallest
+
+
 @cache
 def limit() -> Limit:
     assert why_not(problem()) is None
@@ -54,32 +60,20 @@ def limit() -> Limit:
 
 def test_its_filter_has_it_at_the_worst_place_and_more_at_the_others() -> None:
     found, setup = limit(), problem().setup
-    assert found.curve is not None
     assert 0 <= found.proven - found.attained <= 2e-3
-    each = []
-    for cra_deg in PLACES_DEG:
-        optics = setup.scene.optics.model_copy(update={"cra_deg": cra_deg})
-        place = replace(setup, scene=setup.scene.model_copy(update={"field": None, "optics": optics}))
-        each.append(float(smooth_csd(place, found.curve[None, None], YELLOW_RED)[0]))
-    assert min(each) == pytest.approx(found.attained, rel=1e-12)
+    assert smallest_csd_at(setup, PLACES_DEG, found.curve) == pytest.approx(found.attained, rel=1e-12)
 
 
 @pytest.mark.slow
 def test_over_all_places_it_is_a_bracket_of_the_worst_one() -> None:
     """Of 200 image heights, each a scene of its own, none is worse for its filter; named places have no lower limit."""
-    given, optics = problem(), problem().setup.scene.optics
+    given = problem()
     field = SensorField(cra_max_deg=20.0, places="any")
     scene = given.setup.scene.model_copy(update={"field": field})
     found = limit_of(replace(given, setup=replace(given.setup, scene=scene)))
-    assert found.curve is not None
     assert 0 <= found.proven - found.attained <= 0.02
     assert found.proven <= limit().proven + 1e-6
-    least = np.inf
-    for cra_deg in np.linspace(0, 20, 200):
-        own = given.setup.scene.model_copy(
-            update={"field": None, "optics": optics.model_copy(update={"cra_deg": float(cra_deg)})}
-        )
-        least = min(least, float(smooth_csd(replace(given.setup, scene=own), found.curve[None, None], YELLOW_RED)[0]))
+    least = smallest_csd_at(given.setup, np.linspace(0, 20, 200), found.curve)
     assert found.attained <= least <= found.attained + 0.02
 
 
@@ -112,26 +106,11 @@ def pairs() -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(by_qe), np.tile(others, len(PLACES_DEG))
 
 
-@cache
-def fixed_rows() -> tuple[np.ndarray, np.ndarray]:
-    """Sensitivity and slope: rows @ N >= least."""
-    base = STUDY.sensor.qe["Y"]
-    step = np.diff(np.eye(base.size), axis=0)
-    rows = np.concatenate([np.ones((1, base.size)), step, -step])
-    return rows, np.append(0.9 * base.sum(), np.full(2 * len(step), -0.06))
-
-
 def margin(t: float, sign: float) -> float:
     """By how much all pairs can be further apart in N than t asks, with one color brighter in all of them; DN."""
-    (by_qe, others), (rows, least), base = pairs(), fixed_rows(), STUDY.sensor.qe["Y"]
+    by_qe, others = pairs()
     needed = np.sqrt(np.maximum(0.0, t**2 - others))
-    some = needed > 0
-    matrix = np.concatenate(
-        [np.column_stack([-sign * by_qe[some], np.ones(some.sum())]), np.pad(-rows, ((0, 0), (0, 1)))]
-    )
-    ends = [*zip(np.zeros(base.size), base, strict=True), (None, None)]
-    found = linprog(np.append(np.zeros(base.size), -1.0), matrix, np.append(-needed[some], -least), bounds=ends)
-    return float(found.x[-1]) if found.status == 0 else -np.inf
+    return linear_margin(sign * by_qe[needed > 0], needed[needed > 0], STUDY.sensor.qe["Y"])
 
 
 @pytest.mark.slow
@@ -143,18 +122,14 @@ def test_a_program_of_its_own_agrees() -> None:
 
 @pytest.mark.slow
 def test_no_random_feasible_filter_beats_the_robust_limit() -> None:
-    base, tried, best = problem().setup.camera.base_qe, 0, 0.0
+    setup, tried, best = problem().setup, 0, 0.0
     rng = np.random.default_rng(12)
     while tried < 100_000:
         curves = np.concatenate(
-            [random_filters(kind, 4000, rng) for kind in ("stopband", "multi_stopband", "free_form")]
+            [feasible_filters(setup, kind, 4000, rng) for kind in ("stopband", "multi_stopband", "free_form")]
         )
-        lost = 1 - designed_quantities(problem().setup, curves)["sensitivity"]
-        curves = base + np.minimum(1.0, 0.1 / np.maximum(lost, 1e-12))[:, None, None] * (curves - base)
-        found = designed_quantities(problem().setup, curves)
-        curves = curves[(found["sensitivity"] >= 0.9) & (found["slope_per_nm"] <= 0.06)]
         tried += len(curves)
-        best = max(best, float(smooth_csd(problem().setup, curves, YELLOW_RED).max()))
+        best = max(best, float(smooth_csd(setup, curves, YELLOW_RED).max()))
     assert 0.5 * limit().proven < best <= limit().proven
 
 
@@ -165,17 +140,16 @@ def moving(tmp_path_factory: pytest.TempPathFactory) -> Problem:
     text = path.read_text().replace("base: Y\n", "base: Y\n    technology: {interference: {effective_index: 1.8}}\n")
     path.write_text(text + "scenarios: {lens: {optics: {f_number: 1.6}, field: {cra_deg: [0, 12, 22]}}}\n")
     study = load_study(path)
-    assert study.search is not None
     return study.problem(study.search)
 
 
 def agrees_over_the_sensor(template: Problem, seed: int) -> bool:
     """Whether pairs of the best filter lie on both sides; a MILP with a binary per pair and place has the same limit."""
     problem = random_problem(template, seed)
-    found = agrees(problem)
+    found = limit_checked_by_milp(problem)
     assert len(smooth_response(problem.setup, problem.setup.camera.base_qe[None])[0]) == 3
     if seed % 2 == 0:  # the other channels tell nothing apart, so the MILP's margin is what is left to the limit
-        assert largest(problem, found.proven) == pytest.approx(found.proven, abs=1e-3)
+        assert milp_limit(problem, found.proven) == pytest.approx(found.proven, abs=1e-3)
     return is_mixed(problem, found.curve)
 
 
@@ -199,11 +173,8 @@ FREE_FORM = (
 def test_free_form_filters_come_near_the_limit_over_the_whole_sensor() -> None:
     """`sweep run angle --set boxes.edges=FREE_FORM`: the figure of the documentation, at all places of the sensor."""
     study = load_study(STUDIES / "angle.yaml", changes={"boxes.edges": FREE_FORM})
-    assert study.search is not None
     searched = study.problem(study.search)
-    best = best_feasible(search_from(searched, 0, starting_points(searched, 1, 1)[0], "SLSQP", 200).log)
-    assert best is not None
-    curves = searched.family.curves(best.x[None])
+    curves = searched.family.curves(best_of(searched, 1, 200).x[None])
     worst_dn = worst_of_all_places_dn(searched.setup, curves[0])
     proven = limit_of(searched).proven
     assert worst_dn <= proven
@@ -238,7 +209,6 @@ def test_the_table_of_the_documentation() -> None:
             curves = space.curves(space.points(0, 1), STUDY.grid.size)
             found[space.name] = [f"{smooth_csd(setup, curves, YELLOW_RED)[0]:.0f}" for setup in setups[:2]]
             found[space.name].append(f"{worst_of_all_places_dn(setups[2], curves[0]):.0f}")
-    assert STUDY.search is not None
     still = STUDY.problem(STUDY.search)
     limits = limit_of(replace(still, setup=still.setup.with_camera(technologies=()))), limit_of(still)
     found["limit"] = [f"{limits[0].proven:.0f}", "", f"{limits[1].proven:.0f}"]

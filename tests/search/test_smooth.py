@@ -13,25 +13,15 @@ from sweep.camera.scene import Scene
 from sweep.metrics.bound import Bound
 from sweep.metrics.evaluate import designed_quantities
 from sweep.metrics.objective import Objective
-from sweep.metrics.separation import separation
-from sweep.metrics.smooth import smooth_csd, smooth_response
+from sweep.metrics.smooth import smooth_csd
 from sweep.search.gradients import Model
 from sweep.search.limit import limit_of, why_not
-from sweep.search.problem import Problem, SearchRun, best_feasible, starting_points
-from sweep.search.solver import best_reachable, search_from
-from sweep.study import load_study
+from sweep.search.problem import Problem, SearchRun, starting_points
+from sweep.search.solver import best_reachable
 
 from ..cases import thinned
-from ..conftest import STUDIES
+from .problems import PROBLEM, best_of, best_random, csd_of, problem_of
 
-
-def problem_of(name: str) -> Problem:
-    study = load_study(STUDIES / f"{name}.yaml")
-    assert study.search is not None
-    return study.problem(study.search)
-
-
-STOPBAND = problem_of("stopband")
 EVERYTHING = {
     "sensitivity": Bound(min=0.9, max=0.99),
     "cfa_sensitivity": Bound(min=0.5),
@@ -59,6 +49,17 @@ def at(problem: Problem, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
+def check_derivatives(problem: Problem, u: np.ndarray, parameters: range) -> None:
+    """Compare with central differences: the responses are analytic between the kinks of the edge's curve, so these err by
+    O(h^2), here < 1e-5.
+    """
+    _, by_u = at(problem, u)
+    scale, step = np.abs(by_u).max(axis=1) + 1e-9, 1e-5
+    for k in parameters:
+        ends = [at(problem, u + sign * step * np.eye(u.size)[k])[0] for sign in (1, -1)]
+        np.testing.assert_allclose(by_u[:, k] / scale, (ends[0] - ends[1]) / (2 * step) / scale, atol=1e-5)
+
+
 @pytest.mark.parametrize("objective", OBJECTIVES, ids=str)
 @pytest.mark.parametrize("name", thinned(["stopband", "rccb", "freeform", "producible"]))
 def test_derivatives_agree_with_differences(name: str, objective: Objective) -> None:
@@ -66,141 +67,73 @@ def test_derivatives_agree_with_differences(name: str, objective: Objective) -> 
     own = {n: b for n, b in EVERYTHING.items() if n not in ("edge_width_nm", "band_width_nm") or name != "freeform"}
     problem = replace(problem, objective=objective, constraints=own, edge_shift_nm=2.0)
     u = np.clip(starting_points(problem, 3, 4)[2], 0.05, 0.95)
-    _, by_u = at(problem, u)
-    scale = np.abs(by_u).max(axis=1) + 1e-9
-    # The responses are analytic between the kinks of the edge's curve, so the difference errs by O(h^2), here < 1e-5.
-    step = 1e-5
-    for k in range(0, u.size, 7 if name == "freeform" else 1):
-        ends = [at(problem, u + sign * step * np.eye(u.size)[k])[0] for sign in (1, -1)]
-        numeric = (ends[0] - ends[1]) / (2 * step)
-        np.testing.assert_allclose(by_u[:, k] / scale, numeric / scale, atol=1e-5)
+    check_derivatives(problem, u, range(0, u.size, 7 if name == "freeform" else 1))
 
 
 @pytest.mark.parametrize(
-    "scenario",
+    "scene",
     [
         {"target": {"distance_m": 250, "fov_deg": 30, "phase_px": "any"}, "optics": {"f_number": 2.0}},
         {"target": {"distance_m": 250, "fov_deg": 30, "readout": "center"}, "optics": {"f_number": 2.0}},
         {"background_cd_m2": 100, "exposure": {"kind": "fixed", "exposure_s": 0.003}, "off_axis_deg": 20},
         {"drive": {"duty": 0.4, "frequency_hz": 90}, "exposure": {"kind": "fixed", "exposure_s": 0.003}},
     ],
+    ids=["any phase", "center", "background", "pulses"],
 )
 @pytest.mark.parametrize("crosstalk", [0.0, 0.05])
-def test_derivatives_hold_in_scenes(scenario: dict[str, object], crosstalk: float) -> None:
-    scene = Scene.model_validate(scenario)
-    setup = replace(STOPBAND.setup, scene=scene, accuracy=Accuracy(phases_per_px=1))
-    setup = setup.with_camera(pixel=Pixel(crosstalk=crosstalk))
-    problem = replace(STOPBAND, setup=setup)
-    u, step = np.full(problem.free.size, 0.4), 1e-5
-    _, by_u = at(problem, u)
-    scale = np.abs(by_u).max(axis=1) + 1e-9
-    for k in range(u.size):
-        ends = [at(problem, u + sign * step * np.eye(u.size)[k])[0] for sign in (1, -1)]
-        np.testing.assert_allclose(by_u[:, k] / scale, (ends[0] - ends[1]) / (2 * step) / scale, atol=1e-5)
+def test_derivatives_hold_in_scenes(scene: dict[str, object], crosstalk: float) -> None:
+    setup = replace(PROBLEM.setup, scene=Scene.model_validate(scene), accuracy=Accuracy(phases_per_px=1))
+    problem = replace(PROBLEM, setup=setup.with_camera(pixel=Pixel(crosstalk=crosstalk)))
+    check_derivatives(problem, np.full(problem.free.size, 0.4), range(problem.free.size))
 
 
 def test_a_search_in_a_far_scene_stays_below_its_limit() -> None:
     far = {"target": {"distance_m": 250, "fov_deg": 30}, "optics": {"f_number": 2.0}}
-    setup = replace(STOPBAND.setup, scene=Scene.model_validate(far))
-    problem = replace(STOPBAND, setup=setup)
+    setup = replace(PROBLEM.setup, scene=Scene.model_validate(far))
+    problem = replace(PROBLEM, setup=setup)
     limit = limit_of(problem)
-    assert limit.curve is not None
     assert smooth_csd(setup, limit.curve[None, None], ("yellow", "red"))[0] == pytest.approx(limit.attained, rel=1e-12)
-    log = [
-        e for i, u in enumerate(starting_points(problem, 4, 1)) for e in search_from(problem, i, u, "SLSQP", 125).log
-    ]
-    best = best_feasible(log)
-    assert best is not None
-    assert 0.7 * limit.proven < best.objective <= limit.proven
-    assert limit.proven < limit_of(STOPBAND).proven  # blur takes separation away from every filter
+    assert 0.7 * limit.proven < best_of(problem, 4, 125).objective <= limit.proven
+    assert limit.proven < limit_of(PROBLEM).proven  # blur takes separation away from every filter
     mixed = replace(problem, setup=setup.with_camera(pixel=Pixel(crosstalk=0.01)))
     assert why_not(mixed) == "crosstalk mixes the modified channel into others"
 
 
 def test_worst_case_is_the_smallest_over_the_shifts() -> None:
-    problem = replace(STOPBAND, edge_shift_nm=4.0, objective=Objective(minimum={"worst_csd_yellow_red": 1.0}))
+    problem = replace(PROBLEM, edge_shift_nm=4.0, objective=Objective(minimum={"worst_csd_yellow_red": 1.0}))
     problem = replace(problem, constraints={"worst_sensitivity": Bound(min=0.9)})
-    run = search_from(problem, 0, starting_points(problem, 1, 2)[0], "SLSQP", 100)
-    best = best_feasible(run.log)
-    assert best is not None
+    best = best_of(problem, 1, 100)
     moved = np.repeat(best.x[None], 401, axis=0)
     moved[:, [0, 2]] += np.linspace(-4, 4, 401)[:, None]
     curves = problem.family.curves(moved)
-    members = problem.setup.members
-    csd = separation(smooth_response(problem.setup, curves)[:, 0], members["yellow"], members["red"])
-    sensitivity = designed_quantities(problem.setup, curves)["sensitivity"]
+    csd = csd_of(problem.setup, curves)
     assert best.objective == pytest.approx(csd[::100].min(), rel=1e-12)
-    # Between the five places that are looked at, nothing is much worse.
+    # Between the five shifts that are computed, nothing is much worse.
     assert csd.min() >= best.objective * 0.99
-    assert sensitivity.min() >= 0.9 - 1e-3
-    nominal = search_from(replace(problem, edge_shift_nm=0.0), 0, starting_points(problem, 1, 2)[0], "SLSQP", 100)
-    other = best_feasible(nominal.log)
-    assert other is not None
-    assert other.objective > best.objective
+    assert designed_quantities(problem.setup, curves)["sensitivity"].min() >= 0.9 - 1e-3
+    assert best_of(replace(problem, edge_shift_nm=0.0), 1, 100).objective > best.objective
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("algorithm", "objective"),
-    [
-        pytest.param(algorithm, objective, id=f"{algorithm}-{objective}")
-        for algorithm in ("SLSQP", "COBYLA")
-        for objective in OBJECTIVES[1:]
-    ],
-)
-def test_combined_objectives_improve_on_their_starts(algorithm: str, objective: Objective) -> None:
-    problem = replace(STOPBAND, objective=objective, edge_shift_nm=1.0)
-    rng = np.random.default_rng(8)
-    model = Model(problem, SearchRun(0), 1)
-    for u in rng.uniform(size=(400, problem.free.size)):
-        model.at(u)
-    random = best_feasible(model._run.log)
-    log = [
-        e for i, u in enumerate(starting_points(problem, 4, 1)) for e in search_from(problem, i, u, algorithm, 150).log
-    ]
-    best = best_feasible(log)
-    assert random is not None
-    assert best is not None
-    assert best.objective > random.objective
-
-
-def test_a_search_ends_where_its_algorithm_asks_for_no_number() -> None:
-    """As SLSQP does where its own arithmetic fails, which depends on the machine: nothing is simulated there."""
-    run = SearchRun(0)
-    model, stopped = Model(STOPBAND, run, 10), list[bool]()
-    model.stop = lambda: stopped.append(True)
-    first = model.at(np.full(STOPBAND.free.size, 0.5))
-    assert model.at(np.array([0.5, np.nan, 0.5, 0.5])) is first
-    assert model.lost
-    assert stopped == [True]
-    assert len(run.log) == 1
-
-
-def test_dimensions_are_kept() -> None:
-    limits = {"edge_width_nm": Bound(min=25.0), "band_width_nm": Bound(min=40.0)}
-    problem = replace(STOPBAND, constraints={"sensitivity": Bound(min=0.8), **limits})
-    log = [
-        e for i, u in enumerate(starting_points(problem, 4, 1)) for e in search_from(problem, i, u, "SLSQP", 125).log
-    ]
-    best = best_feasible(log)
-    assert best is not None
-    left, left_width, right, right_width, _ = best.x
-    assert min(left_width, right_width) >= 25 * (1 - 1e-9)
-    assert right - left >= 40 * (1 - 1e-9)
+@pytest.mark.parametrize("algorithm", ["SLSQP", "COBYLA"])
+@pytest.mark.parametrize("objective", OBJECTIVES[1:], ids=str)
+def test_combined_objectives_improve_on_random_designs(algorithm: str, objective: Objective) -> None:
+    problem = replace(PROBLEM, objective=objective, edge_shift_nm=1.0)
+    assert best_of(problem, 4, 150, algorithm).objective > best_random(problem, 400).objective
 
 
 @pytest.mark.slow
 def test_best_reachable_is_the_extreme_of_a_quantity_alone() -> None:
-    starts = starting_points(STOPBAND, 4, 1)
+    starts = starting_points(PROBLEM, 4, 1)
     impossible = {
         "sensitivity": Bound(min=1.01),
         "slope_per_nm": Bound(max=1e-5),
         "band_width_nm": Bound(min=1000.0),
         "csd_yellow_red": Bound(min=4000.0),
     }
-    problem = replace(STOPBAND, constraints=impossible)
+    problem = replace(PROBLEM, constraints=impossible)
     found = {name: best_reachable(problem, name, starts, 200) for name in impossible}
-    base = STOPBAND.setup.camera.base_qe
+    base = PROBLEM.setup.camera.base_qe
     u = np.random.default_rng(5).uniform(size=(20_000, problem.free.size))
     x = problem.from_unit(u)
     x = x[(problem.family.violation(x) <= 0).all(axis=1)]
@@ -210,6 +143,4 @@ def test_best_reachable_is_the_extreme_of_a_quantity_alone() -> None:
     assert found["slope_per_nm"] >= np.abs(np.diff(base[0])).max() * (1 - 1e-9)
     assert found["slope_per_nm"] < 0.06
     assert found["band_width_nm"] == pytest.approx(problem.high[2] - problem.low[0], rel=1e-6)
-    members = problem.setup.members
-    response = smooth_response(problem.setup, problem.family.curves(x))[:, 0]
-    assert separation(response, members["yellow"], members["red"]).max() <= found["csd_yellow_red"] < 4000
+    assert csd_of(problem.setup, problem.family.curves(x)).max() <= found["csd_yellow_red"] < 4000

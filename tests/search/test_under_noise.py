@@ -26,15 +26,14 @@ from sweep.metrics.objective import Objective
 from sweep.metrics.quantity import Asked
 from sweep.metrics.registry import quantities_of
 from sweep.metrics.smooth import Rows, SmoothDesign
-from sweep.search.gradients import Model
-from sweep.search.problem import Problem, SearchRun, best_feasible, starting_points
+from sweep.search.problem import Problem, starting_points
 from sweep.search.solver import best_reachable, smooth_objective
 from sweep.study import load_study
 
 from ..conftest import STUDIES
 from ..hard.random_scenes import random_scene
 from ..hard.scenes import FAMILY, GRID, SENSOR
-from .noisy_problems import STATES, problem_of, searched
+from .problems import STATES, best_of, best_random, noisy_problem
 
 FAMILIES: tuple[Family, ...] = (
     FAMILY,
@@ -121,19 +120,14 @@ def test_derivatives_agree_with_differences_in_200_scenes() -> None:
     ids=str,
 )
 def test_a_search_finds_better_than_any_random_design(objective: Objective) -> None:
-    problem = problem_of("stopband", 30, 0.3, objective)
-    model = Model(problem, SearchRun(0), 1)
-    for u in np.random.default_rng(8).uniform(size=(100, problem.free.size)):
-        model.at(u)
-    random = best_feasible(model._run.log)
-    assert random is not None
-    assert searched(problem).objective > random.objective
+    problem = noisy_problem("stopband", 30, 0.3, objective)
+    assert best_of(problem, 2, 120).objective > best_random(problem, 100).objective
 
 
 def test_the_objective_is_met_by_the_readout() -> None:
     """Of the design that is found: exact sums over digital numbers, as the result table has them."""
-    problem = problem_of("stopband", 30, 0.3, Objective(least={"state_error": 1.0}))
-    best = searched(problem)
+    problem = noisy_problem("stopband", 30, 0.3, Objective(least={"state_error": 1.0}))
+    best = best_of(problem, 2, 120)
     imager = ForwardModel(problem.setup.with_all_effects)
     found = evaluate(imager, problem.family.curves(best.x[None]), STATES)
     # Gaussians beside exact sums of Poisson electrons: the error itself within 5 %.
@@ -142,8 +136,10 @@ def test_the_objective_is_met_by_the_readout() -> None:
 
 def test_bounds_on_errors_are_kept_and_their_reach_is_told() -> None:
     bounds = {"error_green_red": Bound(max=1e-4), "dprime_yellow_red": Bound(min=5.0), "sensitivity": Bound(min=0.8)}
-    problem = replace(problem_of("stopband", 30, 0.3, Objective(minimum={"cfa_sensitivity": 1.0})), constraints=bounds)
-    best = searched(problem)
+    problem = replace(
+        noisy_problem("stopband", 30, 0.3, Objective(minimum={"cfa_sensitivity": 1.0})), constraints=bounds
+    )
+    best = best_of(problem, 2, 120)
     curves = problem.family.curves(best.x[None])
     found = evaluate(ForwardModel(problem.setup.with_all_effects), curves, STATES)
     assert found["dprime_yellow_red"][0] == pytest.approx(5.0, rel=2e-3)  # light is bought with distance
@@ -153,7 +149,7 @@ def test_bounds_on_errors_are_kept_and_their_reach_is_told() -> None:
         replace(problem, constraints=alone), "error_yellow_red", starting_points(problem, 4, 1), 150
     )
     free = replace(problem, constraints={}, objective=Objective(least={"error_yellow_red": 1.0}))
-    assert -np.log10(reached) == pytest.approx(searched(free).objective, rel=1e-4)
+    assert -np.log10(reached) == pytest.approx(best_of(free, 2, 120).objective, rel=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -209,9 +205,9 @@ def test_what_the_optimum_by_error_gains_on_drawn_patches(
 ) -> None:
     """With 30 e of read noise a nanometer less of the band gains nothing that 20 x 400,000 patches show; where photon
     noise counts, it wins in 19 of 20 seeds or more."""
-    by_csd = searched(problem_of(name, read_noise_e, level, Objective(minimum={"csd_yellow_red": 1.0})), 6)
-    problem = problem_of(name, read_noise_e, level, Objective(least={"state_error": 1.0}))
-    by_error = searched(problem, 6)
+    by_csd = best_of(noisy_problem(name, read_noise_e, level, Objective(minimum={"csd_yellow_red": 1.0})), 6, 120)
+    problem = noisy_problem(name, read_noise_e, level, Objective(least={"state_error": 1.0}))
+    by_error = best_of(problem, 6, 120)
     assert abs(by_error.x[0] - by_csd.x[0]) > 0.5  # nm: it is another filter
     assert by_error.objective > smooth_objective(problem, by_csd.x)
     gains = []
@@ -234,7 +230,7 @@ def test_the_filter_of_the_noise_study_is_what_a_search_finds() -> None:
     study = load_study(STUDIES / "noise.yaml")
     own = study.section.designs["fewest errors"].at
     assert not isinstance(own, str)
-    best = searched(problem_of("stopband", 30, 0.95, Objective(least={"state_error": 1.0})), 4)
+    best = best_of(noisy_problem("stopband", 30, 0.95, Objective(least={"state_error": 1.0})), 4, 120)
     np.testing.assert_allclose(best.x[:4], list(own.values()), atol=0.006)
 
 

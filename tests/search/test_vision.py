@@ -43,7 +43,6 @@ KEYS: dict[str, Any] = {
 def test_the_least_error_of_the_observer_is_searched_for() -> None:
     """Not worse than filters evenly over the box; the answer's error is that of the rows."""
     study = study_of_keys(KEYS, Path())
-    assert study.search is not None
     problem = study.problem(study.search)
 
     def errors(x: np.ndarray) -> np.ndarray:
@@ -53,7 +52,6 @@ def test_the_least_error_of_the_observer_is_searched_for() -> None:
     assert over.max() > 1.05 * over.min() > 0
     points = starting_points(problem, 2, 1)
     found = best_feasible([e for i, u in enumerate(points) for e in search_from(problem, i, u, "COBYLA", 12).log])
-    assert found is not None
     assert 10**-found.objective == pytest.approx(errors(found.x[None])[0], rel=1e-9)
     assert 10**-found.objective <= 1.02 * over.min()
 

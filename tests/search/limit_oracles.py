@@ -1,4 +1,4 @@
-"""Small problems whose lights lie on both sides of each other, and an oracle of their limit: a MILP."""
+"""Oracles of upper bounds: a MILP for lights on both sides of each other, and a linear program for one side."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
-from scipy.optimize import Bounds, LinearConstraint, milp
+from scipy.optimize import Bounds, LinearConstraint, linprog, milp
 
 from sweep.designs.families.free_form import FreeForm
 from sweep.metrics.bound import FEASIBLE, Bound, total_violation
@@ -44,20 +45,10 @@ search: {starts: 4, max_evaluations: 400}
 def write_study(folder: Path, step_nm: float) -> Path:
     """Yellow at 600 nm between two reds at 560 and 640 nm, seen through a ramp from 520 to 680 nm."""
     wave = np.arange(400, 701)
-    ramp = np.interp(wave, [520, 680], [0.02, 0.82])
-    lights = [np.exp(-0.5 * ((wave - center) / 6) ** 2) for center in (600, 560, 640)]
-    for name, columns in (
-        ("qe", {"Y": ramp, "R": 0 * wave + 0.5, "C": 0 * wave + 0.9}),
-        ("lights", dict(zip("abc", lights, strict=True))),
-    ):
-        header = ",".join(["wavelength_nm", *columns])
-        np.savetxt(
-            folder / f"{name}.csv",
-            np.column_stack([wave, *columns.values()]),
-            delimiter=",",
-            header=header,
-            comments="",
-        )
+    qe = {"Y": np.interp(wave, [520, 680], [0.02, 0.82]), "R": 0 * wave + 0.5, "C": 0 * wave + 0.9}
+    lights = {name: np.exp(-0.5 * ((wave - nm) / 6) ** 2) for name, nm in (("a", 600), ("b", 560), ("c", 640))}
+    for name, columns in (("qe", qe), ("lights", lights)):
+        pd.DataFrame({"wavelength_nm": wave, **columns}).to_csv(folder / f"{name}.csv", index=False)
     path = folder / "sides.yaml"
     path.write_text(TEXT.replace("STEP", f"{step_nm:g}"))
     return path
@@ -72,7 +63,6 @@ def smallest(problem: Problem, curve: np.ndarray, name: str) -> float:
 
 def check_attained(problem: Problem, limit: Limit) -> None:
     """The filter of the limit meets everything, and reaches what is said."""
-    assert limit.curve is not None
     curves = limit.curve[None, None]
     amounts = designed_quantities(problem.setup, curves)
     amounts |= {n: np.array([smallest(problem, limit.curve, n)]) for n in problem.constraints if n in problem.pairs}
@@ -84,9 +74,7 @@ def check_attained(problem: Problem, limit: Limit) -> None:
 
 @dataclass
 class Pairs:
-    """Every pair of signals, found by probing: its difference per QE of N, its squared distance in the other channels, the
-    CSD that it must have, and the CSD that it must have per unit of the objective.
-    """
+    """Pairs of signals: difference per QE of N, squared distance in the other channels, least CSD, least CSD per objective."""
 
     apart: np.ndarray
     squared: np.ndarray
@@ -95,6 +83,7 @@ class Pairs:
 
 
 def pairs_of(problem: Problem) -> Pairs:
+    """Every pair whose CSD is an objective or constrained, by probing the response wavelength by wavelength."""
     setup, size, channel = problem.setup, problem.setup.camera.grid.size, problem.setup.camera.modified[0]
     dark = smooth_response(setup, np.zeros((1, 1, size)))[0]
     gain = smooth_response(setup, np.eye(size)[:, None])[..., channel] - dark[..., channel]
@@ -114,12 +103,11 @@ def pairs_of(problem: Problem) -> Pairs:
 
 def is_mixed(problem: Problem, curve: np.ndarray | None) -> bool:
     """Whether pairs of a CSD lie on both sides."""
-    assert curve is not None
     apart = pairs_of(problem).apart @ curve
     return bool((apart > 0).any() and (apart < 0).any())
 
 
-def largest(problem: Problem, t: float) -> float:
+def milp_limit(problem: Problem, t: float) -> float:
     """t and the largest margin above it, by a MILP with a binary per pair; exactly the limit where the other channels do
     not matter, and below t where no filter reaches t.
     """
@@ -153,13 +141,13 @@ def largest(problem: Problem, t: float) -> float:
     return t + float(found.x[-1]) if found.status == 0 else -np.inf
 
 
-def agrees(problem: Problem) -> Limit:
-    """The limit, once it was compared with the MILP."""
+def limit_checked_by_milp(problem: Problem) -> Limit:
+    """The upper bound of a problem, once it was compared with the MILP."""
     limit = limit_of(problem)
     check_attained(problem, limit)
     assert limit.open_parts == 0
     assert 0 <= limit.proven - limit.attained <= 1e-3
-    assert largest(problem, limit.proven + 1e-3) < limit.proven + 1e-3
+    assert milp_limit(problem, limit.proven + 1e-3) < limit.proven + 1e-3
     return limit
 
 
@@ -191,3 +179,19 @@ def random_problem(template: Problem, seed: int) -> Problem:
         high=np.ones(family.nodes_nm.size),
         constraints={"sensitivity": Bound(min=rng.uniform(0.5, 0.95)), "slope_per_nm": Bound(max=0.06)},
     )
+
+
+def bounded_slopes(base: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and least values of a sensitivity of 0.9 and slopes of 0.06 per nm on a grid of 1 nm: rows @ N >= least."""
+    step = np.diff(np.eye(base.size), axis=0)
+    rows = np.concatenate([np.ones((1, base.size)), step, -step])
+    return rows, np.append(0.9 * base.sum(), np.full(2 * len(step), -0.06))
+
+
+def linear_margin(by_qe: np.ndarray, needed: np.ndarray, base: np.ndarray) -> float:
+    """The largest m for which a filter has by_qe @ N >= needed + m; -inf where there is no filter at all."""
+    rows, least = bounded_slopes(base)
+    matrix = np.concatenate([np.column_stack([-by_qe, np.ones(len(by_qe))]), np.pad(-rows, ((0, 0), (0, 1)))])
+    ends = [*zip(np.zeros(base.size), base, strict=True), (None, None)]
+    solution = linprog(np.append(np.zeros(base.size), -1.0), matrix, np.append(-needed, -least), bounds=ends)
+    return float(solution.x[-1]) if solution.status == 0 else -np.inf

@@ -1,0 +1,93 @@
+"""Search problems of the project's studies, searches from several starts, and random filters of any family."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from sweep.camera.pixel import Pixel
+from sweep.camera.scene import Scene
+from sweep.camera.setup import Setup
+from sweep.designs.families.free_form import FreeForm
+from sweep.designs.families.stopband import MultiStopband
+from sweep.metrics.evaluate import designed_quantities
+from sweep.metrics.objective import Objective
+from sweep.metrics.separation import separation
+from sweep.metrics.smooth import smooth_response
+from sweep.search.gradients import Model
+from sweep.search.problem import Evaluation, Problem, SearchRun, best_feasible, starting_points
+from sweep.search.solver import search_from
+from sweep.study import load_study
+
+from ..conftest import STUDIES
+
+STATES = ("green", "yellow", "red")
+YELLOW_RED = ("yellow", "red")
+STUDY = load_study(STUDIES / "stopband.yaml")
+PROBLEM = STUDY.problem(STUDY.search)
+"""The search of the study `stopband`."""
+
+
+def problem_of(name: str) -> Problem:
+    """The search of a study of the project."""
+    study = load_study(STUDIES / f"{name}.yaml")
+    return study.problem(study.search)
+
+
+def noisy_problem(name: str, read_noise_e: float, level: float, objective: Objective) -> Problem:
+    """The search of a study of the project, of a chart under noise."""
+    problem = problem_of(name)
+    scene = Scene.model_validate({"noise": True, "exposure": {"kind": "white_patch", "level": level}})
+    pixel = Pixel(read_noise_e=read_noise_e, prnu=0.01, offset_dn=168)
+    setup = replace(problem.setup, scene=scene).with_camera(pixel=pixel)
+    return replace(problem, setup=setup, states=STATES, objective=objective)
+
+
+def best_of(problem: Problem, starts: int, evaluations: int, algorithm: str = "SLSQP") -> Evaluation | None:
+    """The best feasible design of searches from several starting points, each of so many evaluations."""
+    points = starting_points(problem, starts, 1)
+    return best_feasible(
+        [e for i, u in enumerate(points) for e in search_from(problem, i, u, algorithm, evaluations).log]
+    )
+
+
+def best_random(problem: Problem, count: int) -> Evaluation | None:
+    """The best feasible of random designs of the box."""
+    run = SearchRun(0)
+    model = Model(problem, run, count + 1)
+    for u in np.random.default_rng(8).uniform(size=(count, problem.free.size)):
+        model.at(u)
+    return best_feasible(run.log)
+
+
+def csd_of(setup: Setup, curves: np.ndarray, pair: tuple[str, str] = YELLOW_RED) -> np.ndarray:
+    """CSD of each filter by the smooth response at the first phase, ndarray[n_designs], DN."""
+    return separation(smooth_response(setup, curves)[:, 0], *(setup.members[name] for name in pair))
+
+
+def random_filters(kind: str, count: int, rng: np.random.Generator) -> np.ndarray:
+    """Filters of a family over Y of `stopband`, ndarray[n_designs, 1, n_wavelengths]."""
+    base, wave = PROBLEM.setup.camera.base_qe[0], STUDY.grid.nodes_nm
+    if kind == "free_form":
+        family = FreeForm(wave, base, np.arange(540.0, 701.0, 4.0))
+        return family.curves(family.start(rng.uniform(size=(count, 3))))
+    bands = 1 if kind == "stopband" else 2
+    target = np.minimum(STUDY.sensor.qe["G"], base) if kind == "stopband" else 0.05 * base
+    family = MultiStopband(wave, base, target, bands)
+    edges = np.sort(rng.uniform(500, 690, (count, 2 * bands)), axis=1)
+    x = np.empty((count, 5 * bands))
+    for band in range(bands):
+        x[:, [5 * band, 5 * band + 2]] = edges[:, [2 * band, 2 * band + 1]]
+        x[:, [5 * band + 1, 5 * band + 3]] = rng.uniform(5, 30, (count, 2))
+        x[:, 5 * band + 4] = rng.uniform(0, 1, count)
+    return family.curves(x[(family.violation(x) <= 0).all(axis=1)])
+
+
+def feasible_filters(setup: Setup, kind: str, count: int, rng: np.random.Generator) -> np.ndarray:
+    """Random filters, scaled toward the base until their sensitivity is 0.9, with slopes of at most 0.06 per nm."""
+    curves, base = random_filters(kind, count, rng), setup.camera.base_qe
+    lost = 1 - designed_quantities(setup, curves)["sensitivity"]
+    curves = base + np.minimum(1.0, 0.1 / np.maximum(lost, 1e-12))[:, None, None] * (curves - base)
+    quantities = designed_quantities(setup, curves)
+    return curves[(quantities["sensitivity"] >= 0.9 * (1 - 1e-12)) & (quantities["slope_per_nm"] <= 0.06)]
