@@ -1,27 +1,27 @@
-"""Sweeps and design-space exploration for color filter arrays that must tell traffic light colors apart.
+"""Sweeps and design-space exploration for color filter arrays (CFAs) that must separate traffic light colors.
 
-Three lines of Python judge a filter of one's own:
+Three lines of Python evaluate a filter:
 
 >>> import sweep
 >>> study = sweep.load_study("stopband")
 >>> dn = study.evaluate(N=0.95 * study.curve("Y")).csd_yellow_red
 
-Names are loaded when they are first used; what type they have stands in `__init__.pyi`.
+Names are loaded at their first use; `__init__.pyi` has their types.
 """
 
 __version__ = "0.3.0"
 
-_HOMES = {
-    "load_study": "door.opening:opened_study",
-    "make_study": "door.opening:made_study",
-    "read_run": "door.opening:finished_run",
-    "studies": "door.opening:studies",
-    "evaluate": "door.asked:verdict_on",
-    "sensor": "door.opening:own_sensor",
-    "lights": "door.opening:own_lights",
-    "read_curves": "door.given:curves_table",
-    "LoadedStudy": "door.objects:LoadedStudy",
-    "FinishedRun": "door.objects:FinishedRun",
+_LOCATIONS = {
+    "load_study": "api.loading:load_study",
+    "make_study": "api.loading:make_study",
+    "read_run": "api.loading:read_run",
+    "studies": "api.loading:studies",
+    "evaluate": "api.evaluate:evaluate",
+    "sensor": "api.loading:sensor",
+    "lights": "api.loading:lights",
+    "read_curves": "api.inline_curves:read_curves",
+    "LoadedStudy": "api.objects:LoadedStudy",
+    "FinishedRun": "api.objects:FinishedRun",
     "Pixel": "camera.pixel:Pixel",
     "Optics": "camera.pixel:Optics",
     "Scene": "camera.scene:Scene",
@@ -34,22 +34,22 @@ _HOMES = {
     "Quantity": "metrics.quantity:Quantity",
     "SweepError": "base.errors:SweepError",
 }
-"""Public name -> the module of the package that defines it, and its name there."""
+"""Public name to the module that defines it, and its name there."""
 
-__all__ = [*_HOMES, "__version__"]  # noqa: PLE0604  (all of them are texts)
+__all__ = [*_LOCATIONS, "__version__"]  # noqa: PLE0604  (all of them are texts)
 
 
 def __getattr__(name: str) -> object:
-    """A public name, loaded now (PEP 562)."""
-    if name not in _HOMES:
+    """Load a public name (PEP 562)."""
+    if name not in _LOCATIONS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module  # noqa: PLC0415  (nothing is loaded with the package itself)
 
-    module, _, attribute = _HOMES[name].partition(":")
-    found = globals()[name] = getattr(import_module(f".{module}", __name__), attribute)
-    return found
+    module, _, attribute = _LOCATIONS[name].partition(":")
+    value = globals()[name] = getattr(import_module(f".{module}", __name__), attribute)
+    return value
 
 
 def __dir__() -> list[str]:
-    """The public names."""
+    """List the public names."""
     return sorted(__all__)

@@ -1,3 +1,7 @@
+from .api.evaluate import evaluate
+from .api.inline_curves import read_curves
+from .api.loading import lights, load_study, make_study, read_run, sensor, studies
+from .api.objects import FinishedRun, LoadedStudy
 from .base.errors import SweepError
 from .camera.pixel import Optics, Pixel
 from .camera.scene import Scene, Target
@@ -5,15 +9,6 @@ from .curves.spectrum import WavelengthGrid
 from .designs.families.dual import Dual
 from .designs.families.free_form import FreeForm
 from .designs.families.stopband import MultiStopband, Stopband
-from .door.asked import verdict_on as evaluate
-from .door.given import curves_table as read_curves
-from .door.objects import FinishedRun, LoadedStudy
-from .door.opening import finished_run as read_run
-from .door.opening import made_study as make_study
-from .door.opening import opened_study as load_study
-from .door.opening import own_lights as lights
-from .door.opening import own_sensor as sensor
-from .door.opening import studies
 from .metrics.quantity import Quantity
 
 __version__: str

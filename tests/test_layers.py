@@ -26,7 +26,7 @@ LEVELS = [
     "results",
     "run",
     "report",
-    "door",
+    "api",
     "commands",
     "__main__",
 ]

@@ -63,8 +63,8 @@ def test_the_limit_is_of_filters_with_as_much_light(own: Path) -> None:
     assert found.limit == pytest.approx(limit.proven, abs=0.01)
     mine = sweep.evaluate(own, relative_to="Y")
     assert mine.limit is not None
-    assert mine.smooth is not None
-    assert mine.gap == pytest.approx(1 - mine.smooth / mine.limit)
+    assert mine.before_quantization_dn is not None
+    assert mine.gap == pytest.approx(1 - mine.before_quantization_dn / mine.limit)
     assert 0.01 < mine.gap < 1
 
 
@@ -104,7 +104,7 @@ def test_a_filter_a_little_above_the_curve_it_replaces_has_a_limit_too(tmp_path:
         found
     )
     assert found.limit is not None
-    assert found.smooth is not None
+    assert found.before_quantization_dn is not None
     ceiling, rng = np.maximum(y, sampled), np.random.default_rng(1)
     stops = [np.where((nm > a) & (nm < a + w), rng.uniform(), 1.0) for a in range(560, 680, 10) for w in (10, 30, 50)]
     rivals = np.array([ceiling * stop for stop in stops])
@@ -112,7 +112,7 @@ def test_a_filter_a_little_above_the_curve_it_replaces_has_a_limit_too(tmp_path:
     assert len(rivals) > 5
     table = study.evaluate(N=np.concatenate([rivals, sampled[None]]))
     assert table["csd_yellow_red"].max() <= found.limit + 2  # the table's are rounded: two of four steps
-    assert found.smooth <= found.limit
+    assert found.before_quantization_dn <= found.limit
 
 
 @pytest.mark.usefixtures("plain_pictures")

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sweep.api.channels import channel_of, layout_of
 from sweep.base.errors import DataError, OutputError, StudyError
 from sweep.commands.list_studies import list_lines, studies_of
 from sweep.commands.new import new_study
 from sweep.commands.new.template import scalar
-from sweep.door.channels import channel_of, layout_of
 from sweep.study import load_study
 from sweep.study.document import Document
 

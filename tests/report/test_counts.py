@@ -162,7 +162,7 @@ def test_a_leading_scenario_without_a_feasible_design_is_said(tmp_path: Path) ->
 @pytest.mark.parametrize("name", ["robust", "angle", "balanced"])
 def test_filters_named_for_an_optimum_meet_its_constraints(name: str) -> None:
     study = load_study(STUDIES / f"{name}.yaml")
-    from sweep.door.objects import LoadedStudy
+    from sweep.api.objects import LoadedStudy
 
     rows = LoadedStudy(study).evaluate(scenario=next(iter(study.scenarios)))
     assert rows.loc[rows["sensitivity"].notna(), "feasible"].all()

@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 import pytest
 
+from sweep.api.user_filters import evaluate_curves
 from sweep.curves.population import Population
 from sweep.designs.tolerance import Off
-from sweep.door.own_filters import judged
 from sweep.metrics.members import population_imager
 from sweep.metrics.objective import Objective
 from sweep.metrics.smooth import smooth_csd
@@ -115,6 +115,6 @@ def test_a_filter_of_ones_own_has_its_worst_case_where_no_edges_shift() -> None:
     study = load_study(STUDIES / "robust.yaml", changes={"production.edge_shift_nm": "0"})
     setup = study.setup(study.spaces[3], "f/2")
     curves = 0.9 * setup.camera.base_qe[None]
-    found = judged(study, setup, curves)["worst_csd_yellow_red"]
+    found = evaluate_curves(study, setup, curves)["worst_csd_yellow_red"]
     assert found == population_imager(setup).worst(curves)["csd_yellow_red"]
     assert 0 < found[0] < smooth_csd(setup, curves, YELLOW_RED)[0]

@@ -9,10 +9,10 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+from ...api.channels import Layout, layout_of, sensor_file
 from ...base.errors import DataError, Fault, OutputError, StudyError, SweepError
 from ...curves.light_files import lights_file
 from ...curves.light_unit import LightUnit
-from ...door.channels import Layout, layout_of, sensor_file
 from ...results.atomic import atomic, write_text
 from ...study import Study, folder_name, load_study
 from ...study.editors import SCHEMA_FILE, schema_text

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 
 from ruamel.yaml import YAML
 
+from ...api.channels import NEW, Channels, Layout
 from ...curves.signal_color import LightColor
-from ...door.channels import NEW, Channels, Layout
 
 TYPICAL_NM = {"green": 505, "yellow": 590, "orange": 605, "red": 635}
 """Signal types in the order of a study, and about where their lights peak."""

@@ -51,10 +51,10 @@ def evaluate_(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Judge a filter of your own, or of a run: its CSDs and its light beside RGGB's, and its gap to the limit."""
-    from ...door.asked import verdict_on
+    """Evaluate a filter from a file or a run: its CSDs and light beside RGGB, and its gap to the upper bound."""
+    from ...api.evaluate import evaluate
 
-    found = verdict_on(
+    evaluation = evaluate(
         source,
         design=design,
         channel=channel,
@@ -71,12 +71,12 @@ def evaluate_(
     )
     facts = {
         "source": str(source),
-        "rows": found.table.to_dict("records") if as_json else [],
-        "limit_of": found.goal.name,
-        "limit_dn": found.limit,
-        "before_quantization_dn": found.smooth,
-        "gap": found.gap,
-        "no_limit": found.no_limit,
-        "notes": found.notes,
+        "rows": evaluation.table.to_dict("records") if as_json else [],
+        "limit_of": evaluation.goal.name,
+        "limit_dn": evaluation.limit,
+        "before_quantization_dn": evaluation.before_quantization_dn,
+        "gap": evaluation.gap,
+        "no_limit": evaluation.no_limit,
+        "notes": evaluation.notes,
     }
-    say([str(found)], facts, as_json=as_json, quiet=quiet)
+    say([str(evaluation)], facts, as_json=as_json, quiet=quiet)

@@ -1,4 +1,4 @@
-"""Channels of a user's file of QE, by its columns, and the CFAs and the filter that these allow."""
+"""Match columns of a QE file to channels, and choose CFAs and the modified channel from them."""
 
 from __future__ import annotations
 
@@ -33,18 +33,18 @@ _LETTERS |= {"m": "M", "mg": "M"}
 _ORDER = ("R", "G", "B", "W", "C", "Y", "Cy", "M")
 _TOKEN = re.compile(r"[A-Z]?[a-z]+|[A-Z]+")
 _CLEAR_NM = 180.0
-"""Equivalent width from which on a curve is rather that of a clear pixel."""
+"""Equivalent width above which a curve is taken for a clear pixel."""
 _RATIO = "_over_"
-"""In the name of a filter's transmission over another curve, as `sweep export` writes it."""
+"""Part of the column names that `sweep export` gives to transmissions."""
 _NEEDED_NM = (450.0, 680.0)
-"""What a sensor's curves must cover, so that every signal color is seen."""
+"""Range that QE curves must cover to see every signal color."""
 NEW = "N"
-"""The channel that a study designs."""
+"""Name of the modified channel."""
 
 
 @dataclass(frozen=True)
 class Channels:
-    """`columns`: channel -> the file's column. `left_out`: other columns, each with its reason. `guessed`: by shape."""
+    """Columns of each channel, other columns with the reason they are left out, and whether shapes were used."""
 
     columns: Mapping[str, str]
     left_out: Mapping[str, str]
@@ -53,7 +53,7 @@ class Channels:
 
 @dataclass(frozen=True)
 class Layout:
-    """CFAs to compare, and the one with the channel N in it: N starts from `base` and goes `to` a curve or a floor."""
+    """CFAs to compare and the CFA with the modified channel N between `base` and `to`."""
 
     plain: tuple[str, ...]
     changed: str
@@ -62,44 +62,63 @@ class Layout:
 
     @property
     def cfas(self) -> tuple[str, ...]:
-        """What the study lists; a CFA of one channel tells no colors apart, so there is nothing to compare with."""
+        """CFAs of the study: those with more than one channel, and the modified one."""
         several = tuple(name for name in self.plain if name != self.base * 4)
         return (*several, self.changed)
 
     @property
     def clear(self) -> str | None:
-        """The unfiltered channel, where it is the base."""
+        """Clear channel, if it is the base."""
         return self.base if self.base in ("W", "C") else None
 
 
 def channel_of(column: str) -> str | None:
-    """The channel that a column's name says, else None.
+    """Return the channel that the name of a column states.
 
-    The whole name (`R`), or a filter's after ISETCam's hint (`wC`, `cCy`); else a word or a letter in any case (`red`,
-    `QE_R`, `rRed`). N says none: it is the channel that a study designs.
+    Parameters
+    ----------
+    column : str
+        The name of a channel (`R`), one after ISETCam's hint letter (`wC`, `cCy`), or a name with a color word or
+        letter (`red`, `QE_R`).
+
+    Returns
+    -------
+    str or None
+        The channel; None if the name states none, and for N, the modified channel.
     """
     whole = column[1:] if column[:1] in tuple(HINTS) and column[1:] in (*_ORDER, NEW) else column
     if whole in (*_ORDER, NEW):
         return None if whole == NEW else whole
     tokens = [token.casefold() for token in _TOKEN.findall(column)]
     for known in (_WORDS, _LETTERS):
-        found = {known[token] for token in tokens if token in known}
-        if len(found) == 1:
-            return found.pop()
+        stated = {known[token] for token in tokens if token in known}
+        if len(stated) == 1:
+            return stated.pop()
     return None
 
 
 def channels_of(curves: Mapping[str, Curve]) -> Channels:
-    """Channels by the columns' names, or, where no name says one, by the curves' shapes."""
+    """Assign columns to channels by their names, or by the shapes of the curves if no name states a channel.
+
+    Parameters
+    ----------
+    curves : mapping of str to Curve
+        Curves by column name.
+
+    Returns
+    -------
+    Channels
+        Column of each channel, and the columns that are left out.
+    """
     lit = {column: curve for column, curve in curves.items() if curve.width_nm > 0}
     left_out = {column: "0 from 400 to 700 nm" for column in curves if column not in lit}
     left_out |= {column: reason for column in lit if (reason := _no_channel(column))}
     lit = {column: curve for column, curve in lit.items() if column not in left_out}
     named = {column: channel for column in lit if (channel := channel_of(column)) is not None}
-    meant = named or {column: _by_shape(curve) for column, curve in lit.items()}
+    assigned = named or {column: _by_shape(curve) for column, curve in lit.items()}
     columns: dict[str, str] = {}
-    for column in sorted(lit, key=lambda column: column != meant.get(column)):  # a whole name before a part of one
-        channel = meant.get(column)
+    for column in sorted(lit, key=lambda column: column != assigned.get(column)):  # a whole name before a part of one
+        channel = assigned.get(column)
         if channel is None:
             left_out[column] = "the name says no channel"
         elif channel in columns:
@@ -111,7 +130,7 @@ def channels_of(curves: Mapping[str, Curve]) -> Channels:
 
 
 def _no_channel(column: str) -> str:
-    """Why a column that `sweep export` writes is no channel to begin with; empty for others."""
+    """Return the reason why a column of `sweep export` is no channel; empty for other columns."""
     if _RATIO in column:
         return "a transmission, no QE"
     hinted = column[:1] in tuple(HINTS) and column[1:] == NEW
@@ -119,7 +138,7 @@ def _no_channel(column: str) -> str:
 
 
 def _by_shape(curve: Curve) -> str:
-    """A broad curve is a clear pixel; others go by where they have their half, 400 to 700 nm."""
+    """Return C for a broad curve, else B, G or R by the median wavelength from 400 to 700 nm."""
     if curve.width_nm >= _CLEAR_NM:
         return "C"
     inside = (curve.wavelength_nm >= 400) & (curve.wavelength_nm <= 700)
@@ -129,10 +148,20 @@ def _by_shape(curve: Curve) -> str:
 
 
 def layout_of(channels: Mapping[str, float]) -> Layout:
-    """The CFAs of two by two pixels that channels (with their total QE) allow; the last that fits gets the channel N.
+    """Choose CFAs of 2 x 2 pixels and the modified channel.
 
-    RYYCy where there are red, yellow and cyan; else a clear pixel beside R, G and B, or beside what there is of them;
-    else RGGB; else whatever there is, around its most sensitive channel.
+    RYYCy with red, yellow and cyan; else a clear pixel beside R, G and B; else RGGB; else all channels around the most
+    sensitive one. The last CFA that fits gets the channel N.
+
+    Parameters
+    ----------
+    channels : mapping of str to float
+        Sum of the QE of each channel.
+
+    Returns
+    -------
+    Layout
+        CFAs, modified CFA, base and target curve.
     """
     clear = next((name for name in ("W", "C") if name in channels), "")
     known = [("G", ["R", "G", "G", "B"])]
@@ -157,7 +186,7 @@ def layout_of(channels: Mapping[str, float]) -> Layout:
 
 @dataclass(frozen=True)
 class SensorFile:
-    """`totals`: channel -> sum of its curve. `range_nm`: where a grid in whole nm can begin and end."""
+    """QE file of a sensor: channels, sum of each curve, scale of the values, and the range of a grid in whole nm."""
 
     name: str
     channels: Channels
@@ -166,27 +195,61 @@ class SensorFile:
     range_nm: tuple[int, int]
 
     def keys(self, file: str) -> dict[str, Any]:
-        """What a study says of it."""
+        """Return the keys of a study for this sensor.
+
+        Parameters
+        ----------
+        file : str
+            Path of the file as the study names it.
+
+        Returns
+        -------
+        dict
+            Name and files.
+        """
         entry = {"file": file, "columns": dict(self.channels.columns), "scale": self.scale}
         return {"name": self.name, "files": [entry]}
 
 
 def sensor_file(path: Path) -> SensorFile:
-    """The channels of a file of QE curves; raises DataError for one that no study can use."""
+    """Read the channels of a file of QE curves.
+
+    Parameters
+    ----------
+    path : Path
+        File of curves.
+
+    Returns
+    -------
+    SensorFile
+        Channels, scale and range.
+
+    Raises
+    ------
+    DataError
+        If the file has no QE curve, or too short a range.
+    """
     curves = clean_curves(path)
     channels = channels_of(curves)
     if not channels.columns:
         raise DataError(Fault("no curve that could be QE", str(path), allowed="values above 0 between 400 and 700 nm"))
-    wave = next(iter(curves.values())).wavelength_nm
-    if wave[0] > _NEEDED_NM[0] or wave[-1] < _NEEDED_NM[1]:
+    wavelength_nm = next(iter(curves.values())).wavelength_nm
+    if wavelength_nm[0] > _NEEDED_NM[0] or wavelength_nm[-1] < _NEEDED_NM[1]:
         allowed = f"{_NEEDED_NM[0]:g} to {_NEEDED_NM[1]:g} nm or more"
         raise DataError(
-            Fault("QE of too few wavelengths", str(path), None, None, f"{wave[0]:g} to {wave[-1]:g} nm", allowed)
+            Fault(
+                "QE of too few wavelengths",
+                str(path),
+                None,
+                None,
+                f"{wavelength_nm[0]:g} to {wavelength_nm[-1]:g} nm",
+                allowed,
+            )
         )
     return SensorFile(
         name=path.stem[:MOST_LETTERS],
         channels=channels,
         totals={channel: float(curves[column].values.sum()) for channel, column in channels.columns.items()},
         scale=qe_scale(max(curves[column].peak for column in channels.columns.values())),
-        range_nm=(max(400, math.ceil(wave[0])), min(700, math.floor(wave[-1]))),
+        range_nm=(max(400, math.ceil(wavelength_nm[0])), min(700, math.floor(wavelength_nm[-1]))),
     )

@@ -1,4 +1,4 @@
-"""Filters of one's own through the door, beside what a run and an independent sum say of them."""
+"""Filters of one's own through the API, beside what a run and an independent sum say of them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..build import one_line, study_file
 
 @pytest.fixture(scope="module")
 def tiny(tmp_path_factory: pytest.TempPathFactory) -> sweep.LoadedStudy:
-    return sweep.load_study(study_file(tmp_path_factory.mktemp("door")))
+    return sweep.load_study(study_file(tmp_path_factory.mktemp("api")))
 
 
 def test_a_filter_gets_the_very_numbers_of_the_same_named_design(tiny: sweep.LoadedStudy) -> None:

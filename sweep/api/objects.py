@@ -1,4 +1,4 @@
-"""A study and a finished run as objects: what the command line does, from Python."""
+"""A study and a finished run as Python objects."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from ..metrics.bound import total_violation
 from ..metrics.quantity import Column, Quantity
 from ..search.limit import Limit
 from ..study import Study, folder_name
-from .given import CurveLike, on_grid, over_nm
-from .own_filters import (
-    any_filter,
-    at_least,
-    bases_of,
-    cfa_with,
-    judged,
-    limit_or_reason,
-    setup_with,
-    table_of,
+from .inline_curves import CurveLike, on_grid, wavelength_table
+from .user_filters import (
+    any_filter_problem,
+    evaluate_curves,
+    find_cfa,
+    replaced_curves,
+    results_table,
+    upper_bound_or_reason,
+    user_filter_setup,
+    with_lower_bound,
     with_units,
 )
 
@@ -37,15 +37,20 @@ if TYPE_CHECKING:
 
 
 class LoadedStudy:
-    """A checked study: what it holds, what any filter is worth in it, and its run.
+    """A checked study, which evaluates filters, bounds them, and runs.
 
+    Parameters
+    ----------
+    study : Study
+        The study as the other subpackages use it.
+
+    Examples
+    --------
     >>> import sweep
     >>> study = sweep.load_study("stopband")
     >>> table = study.evaluate(N=0.9 * study.curve("Y"))
     >>> f"{table.csd_yellow_red[0]:.0f} DN at a sensitivity of {table.sensitivity[0]:.2f}"
     '35 DN at a sensitivity of 0.90'
-
-    `study`: the same as the other rooms of the package know it.
     """
 
     def __init__(self, study: Study) -> None:
@@ -56,40 +61,56 @@ class LoadedStudy:
 
     @property
     def name(self) -> str:
-        """The study's name."""
+        """Name of the study."""
         return self.study.name
 
     @property
     def cfas(self) -> tuple[str, ...]:
-        """Names of its CFAs."""
+        """Names of the CFAs."""
         return tuple(self.study.mosaics)
 
     @property
     def wavelength_nm(self) -> np.ndarray:
-        """The wavelengths that all curves are on, nm."""
+        """Wavelengths of all curves, nm, ndarray of shape (n_wavelengths,)."""
         return self.study.grid.nodes_nm
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
-        """What a table of its designs holds: name -> unit, meaning, and what constraints may say of it."""
+        """Quantities of every design by column name, with unit, meaning and allowed constraints."""
         return self.study.quantities
 
     @property
     def curves(self) -> pd.DataFrame:
-        """QE of the sensor, a column per curve; the index is nm."""
-        return over_nm(self.wavelength_nm, self.study.sensor.qe)
+        """QE of the sensor, one column per curve; the index is nm."""
+        return wavelength_table(self.wavelength_nm, self.study.sensor.qe)
 
     def curve(self, name: str) -> pd.Series:
-        """A QE curve of the sensor; the index is nm. Raises SweepError, with the nearest name, where there is none."""
-        return over_nm(self.wavelength_nm, {name: self.study.sensor.curve(name)})[name]
+        """Return a QE curve of the sensor.
+
+        Parameters
+        ----------
+        name : str
+            Name of the curve, such as ``"Y"``.
+
+        Returns
+        -------
+        pandas.Series
+            QE, 0 to 1; the index is nm.
+
+        Raises
+        ------
+        SweepError
+            If the sensor has no such curve, with the nearest name.
+        """
+        return wavelength_table(self.wavelength_nm, {name: self.study.sensor.curve(name)})[name]
 
     @property
     def lights(self) -> pd.DataFrame:
-        """Photons per nm of every signal, each of one photon in all; columns are (signal type, name), the index nm."""
+        """Photons per nm of every signal, normalized to a sum of one; columns are (signal type, name), the index nm."""
         from pandas import MultiIndex
 
         lights = self.study.lights
-        table = over_nm(self.wavelength_nm, dict(enumerate(lights.photons)))
+        table = wavelength_table(self.wavelength_nm, dict(enumerate(lights.photons)))
         keys = zip(lights.types, lights.names, strict=True)  # two files may have a column of one name
         return table.set_axis(MultiIndex.from_tuples(keys, names=["type", "signal"]), axis=1)
 
@@ -102,31 +123,51 @@ class LoadedStudy:
         relative_to: str | None = None,
         **channels: CurveLike,
     ) -> pd.DataFrame:
-        """Every quantity of own filters, given by channel: `evaluate(N=curve)`, or rows of curves for many filters.
+        """Evaluate filters given by channel, with every effect of the scene.
 
-        Without a channel: of the plain CFAs and named designs. The values are QE, or, with `relative_to`, transmissions
-        times that curve of the sensor. `base`: the curve that the filter replaces, where the study does not say it. Its
-        technology is that of the study's own filters. A row per scene and filter; units and meanings are in `attrs`.
-        All effects are computed. What only a family's parameters say is NaN, and where it is constrained, no filter is
-        feasible. Raises SweepError for curves that are not clean, names that are unknown, and a QE above 1.
+        Parameters
+        ----------
+        cfa : str, optional
+            CFA of the study whose channels are replaced. Left out, the one that the study modifies in these channels.
+        scenario : str, optional
+            One scenario; left out, all of them.
+        base : str, optional
+            Curve that the filter replaces, where the study does not state it.
+        relative_to : str, optional
+            The values are transmissions, to be multiplied by this curve of the sensor. Left out, they are QE.
+        **channels : CurveLike
+            Curve of each modified channel, ``evaluate(N=curve)``, or rows of curves for many filters, ndarray of shape
+            (n_filters, n_wavelengths). Without a channel, the plain CFAs and named designs are evaluated.
+
+        Returns
+        -------
+        pandas.DataFrame
+            One row per scenario and filter, with every quantity of the study; units and meanings are in ``attrs``.
+            Quantities that only the parameters of a family determine are NaN; if one of them is constrained, the filter
+            is not feasible.
+
+        Raises
+        ------
+        SweepError
+            If a curve is not clean, a name is unknown, or a QE exceeds 1.
         """
         study = self.study
         scenarios = [self._scenario(scenario)] if scenario is not None else list(study.scenarios)
         if not channels:
-            return self._own(cfa, scenarios)
+            return self._plain_and_named(cfa, scenarios)
         factor = 1.0 if relative_to is None else study.sensor.curve(relative_to)
         rows = {name: on_grid(name, curve, study.grid) * factor for name, curve in channels.items()}
-        if len({len(each) for each in rows.values()}) > 1:
-            raise SweepError(Fault("different numbers of filters", value={n: len(each) for n, each in rows.items()}))
-        chosen = cfa_with(study, list(channels)) if cfa is None else self._cfa(cfa, list(channels))
-        bases = bases_of(study, chosen, list(channels), base)
+        counts = {name: len(curves) for name, curves in rows.items()}
+        if len(set(counts.values())) > 1:
+            raise SweepError(Fault("different numbers of filters", value=counts))
+        chosen = find_cfa(study, list(channels)) if cfa is None else self._cfa(cfa, list(channels))
+        bases = replaced_curves(study, chosen, list(channels), base)
         curves = np.stack([*rows.values()], axis=1)
-        setups = {name: setup_with(study, chosen, name, bases) for name in scenarios}
-        found = {name: judged(study, setup, curves) for name, setup in setups.items()}
-        return table_of(study, [("own", chosen, n, columns) for n, columns in found.items()])
+        setups = {name: user_filter_setup(study, chosen, name, bases) for name in scenarios}
+        columns = {name: evaluate_curves(study, setup, curves) for name, setup in setups.items()}
+        return results_table(study, [("own", chosen, name, values) for name, values in columns.items()])
 
-    def _own(self, cfa: str | None, scenarios: list[str]) -> pd.DataFrame:
-        """The study's plain CFAs and named designs."""
+    def _plain_and_named(self, cfa: str | None, scenarios: list[str]) -> pd.DataFrame:
         from ..results.tables import NAMED, PLAIN
         from ..run.routes import found_of
         from ..run.rows import rules_of
@@ -147,7 +188,7 @@ class LoadedStudy:
                 worst = total_violation(values, study.constraints, space.violation(points))
                 columns = {quantity: values[quantity] for quantity in study.quantities}
                 rows.append((space.name, space.cfa, name, columns | {"violation": worst}))
-        return table_of(study, rows)
+        return results_table(study, rows)
 
     def limit(
         self,
@@ -157,47 +198,101 @@ class LoadedStudy:
         scenario: str | None = None,
         sensitivity: float | None = None,
     ) -> Limit:
-        """What no filter in a channel exceeds: `.proven`, and `.curve`, the QE of a filter that attains `.attained`.
+        """Compute the upper bound on the CSD of any filter in a channel.
 
-        It is for filters between the least transmission and the curve that they replace, under the study's constraints
-        (but those that `.left_out` names, such as bounds on widths of edges), before clipping and quantization;
-        `sensitivity` asks for at least so much of it. Raises SweepError where there is no such limit, and says why.
+        It holds for filters between the least transmission and the curve that they replace, under the study's
+        constraints, before clipping and quantization.
+
+        Parameters
+        ----------
+        cfa, channel : str, optional
+            Modified channel; left out, the one of the search.
+        scenario : str, optional
+            Scenario; left out, the first one.
+        sensitivity : float, optional
+            Least sensitivity of the filters, in addition to the study's constraints.
+
+        Returns
+        -------
+        Limit
+            ``.proven``, the upper bound, DN; ``.attained`` and ``.curve``, the CSD and QE of a filter near it;
+            ``.left_out``, constraints that the bound does not use.
+
+        Raises
+        ------
+        SweepError
+            If there is no such upper bound, with the reason.
         """
         space = self._modified(cfa, channel)
         assert space.filter is not None
         scene = next(iter(self.study.scenarios)) if scenario is None else self._scenario(scenario)
-        problem = any_filter(self.study, self.study.setup(space, scene))
+        problem = any_filter_problem(self.study, self.study.setup(space, scene))
         if sensitivity is not None:
-            problem = at_least(problem, "sensitivity", sensitivity)
-        found, reason = limit_or_reason(problem)
-        if found is None:
+            problem = with_lower_bound(problem, "sensitivity", sensitivity)
+        limit, reason = upper_bound_or_reason(problem)
+        if limit is None:
             raise SweepError(Fault(f"no limit: {reason}"))
-        return found
+        return limit
 
     def plot(self, **channels: CurveLike) -> Figure:
-        """Draw the sensor's QE over the lights, with own curves over them: `plot(N=curve)`. A Matplotlib figure."""
+        """Draw the sensor's QE over the spectra of the lights.
+
+        Parameters
+        ----------
+        **channels : CurveLike
+            Further curves to draw, by name.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure.
+        """
         from ..report.figures import CurvesFigure, draw_curves
 
         study = self.study
-        own = {name: on_grid(name, curve, study.grid) for name, curve in channels.items()}
+        user = {name: on_grid(name, curve, study.grid) for name, curve in channels.items()}
         members = study.lights.members
         peak_one = study.lights.photons / study.lights.photons.max(axis=1, keepdims=True)
         shades = {kind: peak_one[at].max(axis=0) for kind, at in members.items()}
-        curves = {**study.sensor.qe, **{f"{name} (own)": rows for name, rows in own.items()}}
+        curves = {**study.sensor.qe, **{f"{name} (own)": rows for name, rows in user.items()}}
         title = f"Quantum efficiency, {study.sensor.name}"
         return draw_curves(CurvesFigure(title, "QE", study.grid.nodes_nm, curves, shades=shades))
 
     def plan(self, tolerance_dn: float | None = None) -> LoadedStudy:
-        """The study with a plan for each of its scenes: the effects that `tolerance_dn` calls for, and no others.
+        """Return the study with a plan of effects for each scenario.
 
-        Then `evaluate` computes by it, and `study.plans` says what it left out and why.
+        Parameters
+        ----------
+        tolerance_dn : float, optional
+            Tolerance of any CSD, DN; left out, that of the study.
+
+        Returns
+        -------
+        LoadedStudy
+            Its `evaluate` computes only the effects that the tolerance calls for; ``study.plans`` states what is left
+            out and why.
         """
         return LoadedStudy(self.study.with_plans(tolerance_dn))
 
     def run(self, output: Path | str = "outputs", jobs: int | None = None) -> FinishedRun:
-        """Run the study into `output`/<name>, draw its report, and give the finished run; what is finished stays.
+        """Run the study and draw its report; finished work of an earlier run is kept.
 
-        `jobs`: worker processes, all cores if left out. Raises SweepError as the command says it.
+        Parameters
+        ----------
+        output : path-like
+            Folder in which a folder with the name of the study is made.
+        jobs : int, optional
+            Worker processes; left out, one per core.
+
+        Returns
+        -------
+        FinishedRun
+            The finished run.
+
+        Raises
+        ------
+        SweepError
+            As `sweep run` reports it.
         """
         from ..report import make_report, read_output
         from ..run import output_folder, run_study
@@ -223,7 +318,7 @@ class LoadedStudy:
         return name
 
     def _modified(self, cfa: str | None, channel: str | None) -> Space:
-        """The space whose channel is meant: by the search, or the first that fits."""
+        """Return the design space of the search, or the first that has the CFA and channel."""
         spaces = [s for s in self.study.spaces if s.filter is not None]
         searched = [] if self.study.search is None else [self.study.search.space]
         for space in (*searched, *spaces):
@@ -234,14 +329,28 @@ class LoadedStudy:
 
 
 class FinishedRun:
-    """What a run left in its folder.
+    """Results of a finished run.
 
+    Parameters
+    ----------
+    folder : Path
+        Output folder of the study.
+    data : Path, optional
+        Folder of the study's files.
+    allow_code : bool
+        Permit the code that the run was made with to run.
+
+    Raises
+    ------
+    SweepError
+        If files are missing or differ from those that the run wrote.
+
+    Examples
+    --------
     >>> import sweep
     >>> run = sweep.read_run("outputs/stopband")  # doctest: +SKIP
     >>> run.best.csd_yellow_red  # doctest: +SKIP
     233.8
-
-    `output`: the same as the report knows it.
     """
 
     def __init__(self, folder: Path, data: Path | None = None, *, allow_code: bool = False) -> None:
@@ -255,7 +364,7 @@ class FinishedRun:
 
     @cached_property
     def table(self) -> pd.DataFrame:
-        """The whole result table; units and meanings of its quantities are in `attrs`."""
+        """Result table with one row per design and scenario; units and meanings are in ``attrs``."""
         from ..results.tables import RESULTS, read_table
 
         columns: Mapping[str, Column] = self.output.columns
@@ -263,37 +372,43 @@ class FinishedRun:
 
     @property
     def best(self) -> pd.Series:
-        """The best feasible design that was swept or searched; raises SweepError where there is none."""
+        """Best feasible design that was swept or searched; raises SweepError if there is none."""
         if self.output.best.empty:
             raise OutputError(Fault("the run has no feasible design that was swept or searched", str(self.folder)))
         return self.output.best.iloc[0].dropna()
 
     @property
     def curves(self) -> pd.DataFrame:
-        """QE that the run kept, the index is nm: columns (`sensor`, curve), and (design_id, channel) of its filters."""
+        """QE curves of the run over nm; columns are ("sensor", curve) and (design_id, channel)."""
         kept = self.output.curves
         columns: dict[tuple[Any, str], np.ndarray] = {("sensor", name): curve for name, curve in kept.sensor.items()}
-        columns |= {(i, channel): curve for i, own in kept.designs.items() for channel, curve in own.items()}
-        table = over_nm(kept.wavelength_nm, columns)
+        columns |= {(i, channel): curve for i, filters in kept.designs.items() for channel, curve in filters.items()}
+        table = wavelength_table(kept.wavelength_nm, columns)
         table.columns.names = ["design", "curve"]
         return table
 
     @cached_property
     def study(self) -> LoadedStudy:
-        """The study that was run, with the very curves that the run kept."""
+        """Study that was run, with the curves that the run kept."""
         from ..report import study_of
 
         return LoadedStudy(study_of(self.output, self._data, allow_code=self._allow_code))
 
     @property
     def summary(self) -> str:
-        """What the run found, as the command says it."""
+        """Summary of the run as `sweep run` prints it."""
         from ..report import summary_lines
 
         return "\n".join(summary_lines(self.output))
 
     def report(self) -> Path:
-        """Draw figures and report again; the page's path."""
+        """Draw figures and report again.
+
+        Returns
+        -------
+        Path
+            The report, ``report.html``.
+        """
         from ..report import make_report
         from ..results.tables import REPORT
 

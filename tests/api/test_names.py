@@ -43,7 +43,7 @@ def test_types_are_told_of_the_very_names() -> None:
         if isinstance(node, ast.ImportFrom)
         for alias in node.names
     }
-    assert told == sweep._HOMES
+    assert told == sweep._LOCATIONS
 
 
 def test_nothing_is_loaded_before_a_name_is_used() -> None:
@@ -52,7 +52,7 @@ def test_nothing_is_loaded_before_a_name_is_used() -> None:
     assert done.stdout.split() == []
 
 
-@pytest.mark.parametrize("name", ["objects", "opening", "given"])
+@pytest.mark.parametrize("name", ["objects", "loading", "inline_curves", "evaluate"])
 def test_examples_in_the_code_run(name: str) -> None:
-    module = __import__(f"sweep.door.{name}", fromlist=[name])
+    module = __import__(f"sweep.api.{name}", fromlist=[name])
     assert doctest.testmod(module).failed == 0

@@ -1,0 +1,277 @@
+"""Evaluate one filter, from a file of curves or from a finished run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..base.disk import is_file, is_folder
+from ..base.errors import DataError, Fault, nearest
+from ..base.types import FloatArray
+from ..camera.mosaic import Mosaic
+from ..camera.sensor import SensorCurves
+from ..curves.facts import qe_scale
+from ..curves.files import read_curves
+from ..curves.light_unit import LightUnit
+from ..curves.lights import Lights
+from ..curves.spectrum import Curves
+from .channels import NEW, Layout, layout_of, sensor_file
+from .filter_evaluation import (
+    PLAIN_TILE,
+    USER_CURVE,
+    FilterEvaluation,
+    FilterUnderTest,
+    diagonal_curve,
+    evaluate_filter,
+    with_base,
+)
+from .loading import CurveSource, lights, make_study, sensor_source
+
+_PERCENT = 0.01
+
+
+@dataclass(frozen=True)
+class EvaluateOptions:
+    """Options of `evaluate`; values that are None follow from the file or the run.
+
+    Parameters
+    ----------
+    column : str, optional
+        Column of the file with the filter.
+    channel, cfa : str, optional
+        Channel of a CFA that the filter is for.
+    base : str, optional
+        Curve that the filter replaces.
+    sensor : str
+        A built-in sensor, or a file of QE curves.
+    lights : str, optional
+        A built-in data set, or a file of spectra.
+    quantity : {'energy', 'photons'}
+        Unit of the spectra in a file.
+    relative_to : str, optional
+        The file holds transmissions, to be multiplied by this curve.
+    transmission : bool
+        The file holds transmissions of the clear pixel.
+    data : path-like, optional
+        Folder of a run's files.
+    allow_code : bool
+        Permit the code that the run was made with to run.
+    """
+
+    column: str | None = None
+    channel: str | None = None
+    cfa: str | None = None
+    base: str | None = None
+    sensor: str = "ar0820"
+    lights: str | None = None
+    quantity: LightUnit = "energy"
+    relative_to: str | None = None
+    transmission: bool = False
+    data: Path | str | None = None
+    allow_code: bool = False
+
+
+def evaluate(source: Path | str, *, design: str | None = None, **options: Any) -> FilterEvaluation:
+    """Evaluate one filter beside RGGB, the CFA that it changes, and its upper bound.
+
+    Parameters
+    ----------
+    source : path-like
+        A file with the filter's curve, or the folder of a finished run.
+    design : str, optional
+        A design of the run: ``design_id``, name, or ``best`` (default).
+    **options
+        Fields of `EvaluateOptions`: column, channel, cfa, base, sensor, lights, quantity, relative_to, transmission;
+        for a run also data and allow_code.
+
+    Returns
+    -------
+    FilterEvaluation
+        ``table``, ``limit`` and ``gap``; printed, it is the text of `sweep evaluate`.
+
+    Raises
+    ------
+    SweepError
+        If a name is unknown, a value is missing, or a curve is not clean.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> evaluation = sweep.evaluate("my_filter.csv", relative_to="Y")  # doctest: +SKIP
+    >>> evaluation.gap  # doctest: +SKIP
+    0.876
+    """
+    path = Path(source)
+    if is_folder(path):
+        return evaluate_filter(filter_of_run(path, design, EvaluateOptions(**options)))
+    for key, value in (("design", design), ("data", options.get("data")), ("allow-code", options.get("allow_code"))):
+        if value:
+            raise DataError(Fault(f"`{key}` goes with a run's folder", str(path), None, f"--{key}", str(value)))
+    return evaluate_filter(filter_of_file(path, EvaluateOptions(**options)))
+
+
+def filter_of_file(path: Path, options: EvaluateOptions) -> FilterUnderTest:
+    """Read a filter from a file, with the CFA and lights to evaluate it with.
+
+    Parameters
+    ----------
+    path : Path
+        A file of curves.
+    options : EvaluateOptions
+        Channel, sensor and lights.
+
+    Returns
+    -------
+    FilterUnderTest
+        Input of `evaluate_filter`.
+
+    Raises
+    ------
+    SweepError
+        If the file is not clean, or a name is unknown or missing.
+    """
+    sensor = sensor_source(options.sensor, {})
+    keys: dict[str, Any] = {}
+    if is_file(Path(options.sensor)):
+        start_nm, stop_nm = sensor_file(Path(options.sensor)).range_nm
+        keys["wavelengths"] = {"start_nm": start_nm, "stop_nm": stop_nm}
+    qe = _curves_of(sensor, keys)
+    layout = _default_layout(qe)
+    name = options.cfa or layout.changed
+    mosaic = Mosaic.from_name(name)
+    channel = options.channel or _channel_without_curve(mosaic, qe)
+    if channel not in mosaic.channels:
+        known = list(mosaic.channels)
+        near = nearest(channel, known)
+        raise DataError(Fault(f"no such channel of {name}", None, None, "--channel", channel, ", ".join(known), near))
+    default = layout.base if (name, channel) == (layout.changed, NEW) else None
+    base = options.base or default or diagonal_curve(mosaic, channel, qe.qe)
+    qe.curve(base)
+    factor = options.relative_to or (qe.clear if options.transmission else None)
+    curves = read_curves(path)
+    column = _find_column(path, curves, options.column, channel)
+    top = float(curves.values[column].max())
+    scale = qe_scale(top)
+    if scale not in (1, _PERCENT):
+        raise DataError(Fault("values above 1", str(path), None, column, top, "0 to 1, or percent up to 100"))
+    entry: dict[str, Any] = {"file": str(path.absolute()), "columns": {USER_CURVE + channel: column}, "scale": scale}
+    entry |= {} if factor is None else {"relative_to": factor}
+    read_as = "QE" if factor is None else f"a transmission, times {factor}"
+    percent = "; values in percent" if scale == _PERCENT else ""
+    note = f"{path}: {column} read as {read_as}{percent}; it is {channel} of {name}, in place of {base}"
+    with_filter = CurveSource({**sensor.keys, "files": [*sensor.keys["files"], entry]}, sensor.curves)
+    spectra, types = _lights_and_types(options.lights or "tl16", options.quantity)
+    curve_names = _curve_names(qe, with_base(mosaic, {channel: base}).name, mosaic)
+    return FilterUnderTest(mosaic, {channel: base}, with_filter, spectra, types, curve_names, keys, (note,))
+
+
+def filter_of_run(folder: Path, design: str | None, options: EvaluateOptions) -> FilterUnderTest:
+    """Take a design of a finished run, in the scene of its row, with the run's lights or others.
+
+    Parameters
+    ----------
+    folder : Path
+        Output folder of a study.
+    design : str, optional
+        ``design_id``, name, or ``best`` (default).
+    options : EvaluateOptions
+        Lights; data and allow_code for runs made with user code.
+
+    Returns
+    -------
+    FilterUnderTest
+        Input of `evaluate_filter`.
+
+    Raises
+    ------
+    SweepError
+        If the design is unknown or a plain CFA, or the folder holds no finished run.
+    """
+    from ..results.designs import BEST, find_row, row_curves, study_of
+    from ..results.output import read_output
+
+    output = read_output(folder)
+    data = None if options.data is None else Path(options.data)
+    study = study_of(output, data, allow_code=options.allow_code)
+    row = find_row(output, design or BEST)
+    space, curves = row_curves(study, row)
+    if space.filter is None:
+        raise DataError(Fault("a plain CFA has no filter to judge", str(folder), None, "--design", design))
+    nodes_nm = study.grid.nodes_nm
+    filters = {USER_CURVE + channel: curve for channel, curve in zip(space.filter.channels, curves[0], strict=True)}
+    curves_nm = {name: (nodes_nm, curve) for name, curve in {**study.sensor.qe, **filters}.items()}
+    clear = study.sensor.clear if study.sensor.has_clear else None
+    plain = sensor_source(None, curves_nm, name=study.sensor.name, clear=clear)
+    sensor = CurveSource({**plain.keys, "technology": study.sensor.technologies}, plain.curves)
+    mosaic = study.mosaics[space.cfa]
+    curve_names = _curve_names(study.sensor, space.cfa, mosaic) | dict(study.section.cfas[space.cfa].curves)
+    if options.lights is None:
+        spectra, types = _lights_of_run(study.lights, nodes_nm), study.lights.classes
+    else:
+        spectra, types = _lights_and_types(options.lights, options.quantity)
+        if "files" in spectra.keys:  # as bright as the run's lights
+            spectra = CurveSource({**spectra.keys, "photon_ratio": study.lights.photon_ratio}, spectra.curves)
+    scene = {str(row["scenario"]): study.section.scenarios[str(row["scenario"])]}
+    keys = {"pixel": study.section.pixel, "scenarios": scene, "wavelengths": study.grid}
+    note = f"{folder}: {row['name'] or design} of {space.cfa}, in scenario {row['scenario']}"
+    bases = dict(space.filter.bases)
+    return FilterUnderTest(mosaic, bases, sensor, spectra, types, curve_names, keys, (note,), space.filter.technology)
+
+
+def _curves_of(source: CurveSource, keys: Mapping[str, Any]) -> SensorCurves:
+    """Return the curves of a sensor without a study."""
+    channel = next((name for entry in source.keys["files"] for name in entry["columns"]), "G")
+    return make_study(sensor=source, cfas={"any": {"tile": [[channel]]}}, **keys).study.sensor
+
+
+def _lights_and_types(source: str, quantity: LightUnit) -> tuple[CurveSource, tuple[str, ...]]:
+    """Return lights of a built-in data set or a file, and their signal types in order."""
+    spectra = lights(source, quantity=quantity)
+    if "files" in spectra.keys:
+        return spectra, tuple(spectra.keys["files"][0]["signals"])
+    return spectra, make_study(lights=spectra, cfas=[PLAIN_TILE]).study.lights.classes
+
+
+def _lights_of_run(spectra: Lights, nodes_nm: FloatArray) -> CurveSource:
+    """Return the lights of a run, with the photons that they have in it."""
+    import pandas as pd
+
+    labels = [f"{kind} {name}" for kind, name in zip(spectra.types, spectra.names, strict=True)]
+    table = pd.DataFrame(spectra.photons.T, columns=labels, index=nodes_nm)
+    types = {kind: [labels[at] for at in indices] for kind, indices in spectra.members.items()}
+    source = lights(table, quantity="photons", types=types)
+    return CurveSource({**source.keys, "photon_ratio": spectra.photon_ratio}, source.curves)
+
+
+def _curve_names(sensor: SensorCurves, cfa: str, mosaic: Mosaic) -> dict[str, str]:
+    """Return the curve of each channel that is named differently."""
+    return {c: name for c in mosaic.channels if (name := sensor.curve_name(cfa, c)) != c}
+
+
+def _default_layout(sensor: SensorCurves) -> Layout:
+    """Return the CFA with a channel to design that the sensor's curves allow."""
+    if {"R", "Y", "Cy"} <= set(sensor.qe):
+        return layout_of(dict.fromkeys(("R", "Y", "Cy"), 1.0))
+    return layout_of({name: float(curve.sum()) for name, curve in sensor.qe.items()})
+
+
+def _channel_without_curve(mosaic: Mosaic, sensor: SensorCurves) -> str:
+    """Return the only channel without a curve in the sensor; raises DataError if there is none, or several."""
+    without = [channel for channel in mosaic.channels if channel not in sensor.qe]
+    if len(without) != 1:
+        allowed = ", ".join(without or mosaic.channels)
+        raise DataError(Fault(f"which channel of {mosaic.name} is the filter?", None, None, "--channel", None, allowed))
+    return without[0]
+
+
+def _find_column(path: Path, curves: Curves, column: str | None, channel: str) -> str:
+    """Return the stated column, the only one, or the one named like the channel."""
+    names = list(curves.values)
+    chosen = column or (names[0] if len(names) == 1 else channel)
+    if chosen not in names:
+        known, near = ", ".join(names), nearest(chosen, names)
+        problem = "which column is the filter?" if column is None else "no such column"
+        raise DataError(Fault(problem, str(path), None, "--column", column, known, near))
+    return chosen

@@ -1,0 +1,191 @@
+"""Curves given in Python: a pandas Series, two arrays, values on the wavelength grid, or a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from ..base.errors import DataError, Fault
+from ..base.types import FloatArray
+from ..curves import files
+from ..curves.spectrum import Curves, WavelengthGrid, check_samples, resample
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+CurveLike: TypeAlias = "pd.Series | FloatArray | tuple[Any, Any] | Path | str"
+"""A Series over nm, values on a study's wavelength grid, a pair (nm, values), or a file with one curve."""
+_FORMS = "a series whose index is nm, (nm, values), or a file with one curve"
+
+
+def read_curves(file: Path | str) -> pd.DataFrame:
+    """Read the curves of a file.
+
+    Parameters
+    ----------
+    file : path-like
+        A table (CSV and similar text, or ISETCam ``.mat``) with wavelengths and one or more curves.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One column per curve; the index is the wavelength, nm. Values are those of the file, without scaling.
+
+    Raises
+    ------
+    SweepError
+        If the file cannot be read or has samples that are not clean, with file and line.
+
+    Examples
+    --------
+    >>> import sweep
+    >>> curves = sweep.read_curves("my_filter.csv")  # doctest: +SKIP
+    >>> curves["N"].max()  # doctest: +SKIP
+    0.61
+    """
+    curves = files.read_curves(Path(file))
+    return wavelength_table(curves.wavelength_nm, curves.values)
+
+
+def wavelength_table(wavelength_nm: FloatArray, columns: Mapping[Any, FloatArray]) -> pd.DataFrame:
+    """Return a table with one column per curve over wavelength.
+
+    Parameters
+    ----------
+    wavelength_nm : ndarray of shape (n_wavelengths,)
+        Wavelengths, nm; they become the index.
+    columns : mapping of name to ndarray of shape (n_wavelengths,)
+        Values of each curve.
+
+    Returns
+    -------
+    pandas.DataFrame
+        The table; its index is named ``wavelength_nm``.
+    """
+    import pandas as pd  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
+    return pd.DataFrame(dict(columns), index=pd.Index(wavelength_nm, name="wavelength_nm"))
+
+
+def to_curves(name: str, curve: CurveLike) -> Curves:
+    """Convert one curve to samples over its own wavelengths.
+
+    Parameters
+    ----------
+    name : str
+        Name of the curve in the result and in error messages.
+    curve : CurveLike
+        A Series over nm, a pair (nm, values), or a file with one curve.
+
+    Returns
+    -------
+    Curves
+        Wavelengths, nm, and values of this curve.
+
+    Raises
+    ------
+    DataError
+        If this is no curve, or if its samples are not clean.
+    """
+    if isinstance(curve, Path | str):
+        return _curve_in_file(name, Path(curve))
+    if isinstance(curve, tuple) and len(curve) == 2:
+        wavelength_nm, values = np.asarray(curve[0]), np.asarray(curve[1])
+    else:
+        import pandas as pd  # noqa: PLC0415  (slow to import: kept off the start-up path)
+
+        if not isinstance(curve, pd.Series):
+            raise DataError(Fault("no curve over wavelength", key=name, value=type(curve).__name__, allowed=_FORMS))
+        wavelength_nm, values = curve.index.to_numpy(), curve.to_numpy()
+    try:
+        return Curves(*_checked(name, wavelength_nm, values), source=name)
+    except (TypeError, ValueError):
+        raise DataError(Fault("a curve's samples are numbers", key=name, allowed=_FORMS)) from None
+
+
+def table_to_curves(table: pd.DataFrame) -> Curves:
+    """Convert a table with one column per curve and nm as its index.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        One column per curve; the index is the wavelength, nm.
+
+    Returns
+    -------
+    Curves
+        Wavelengths, nm, and values of all columns.
+
+    Raises
+    ------
+    DataError
+        If the table has no column, or if samples are not clean.
+    """
+    columns = {str(name): to_curves(str(name), column) for name, column in table.items()}
+    if not columns:
+        raise DataError(Fault("a table without curves", allowed="a column per curve, nm as the index"))
+    nodes_nm = next(iter(columns.values())).wavelength_nm
+    return Curves(nodes_nm, {name: curves.values[name] for name, curves in columns.items()}, "table")
+
+
+def on_grid(name: str, curve: CurveLike, grid: WavelengthGrid) -> FloatArray:
+    """Bring one or more curves to a study's wavelength grid.
+
+    Parameters
+    ----------
+    name : str
+        Name of the curve in error messages.
+    curve : CurveLike
+        An array has its values on the grid already: one curve, or one row per curve. Other curves are resampled
+        linearly.
+    grid : WavelengthGrid
+        Wavelengths of the study.
+
+    Returns
+    -------
+    ndarray of shape (n_curves, n_wavelengths)
+        Values on the grid.
+
+    Raises
+    ------
+    DataError
+        If this is no curve, if samples are not clean, or if the curve does not cover the grid.
+    """
+    if isinstance(curve, np.ndarray):
+        rows = np.atleast_2d(np.asarray(curve, dtype=float))
+        if rows.ndim != 2 or rows.shape[1] != grid.size:
+            allowed = f"{grid.size} values, on the study's wavelengths, or rows of these; or {_FORMS}"
+            raise DataError(Fault("an array that does not fit the grid", key=name, value=curve.shape, allowed=allowed))
+        for row in rows:
+            _checked(name, grid.nodes_nm, row)
+        return rows
+    curves = to_curves(name, curve)
+    try:
+        return resample(curves.wavelength_nm, curves.values[name], grid)[None]
+    except DataError as error:
+        raise _named(error, name) from None
+
+
+def _checked(name: str, wavelength_nm: Any, values: Any) -> tuple[FloatArray, Mapping[str, FloatArray]]:
+    try:
+        nodes_nm, samples = check_samples(np.asarray(wavelength_nm, dtype=float), np.asarray(values, dtype=float))
+    except DataError as error:
+        raise _named(error, name) from None
+    return nodes_nm, {name: samples}
+
+
+def _named(error: DataError, name: str) -> DataError:
+    return DataError([Fault(f.problem, None, None, name, f.value, f.allowed) for f in error.faults])
+
+
+def _curve_in_file(name: str, path: Path) -> Curves:
+    curves = files.read_curves(path)
+    if len(curves.values) != 1:
+        shown = ", ".join(list(curves.values)[:10])
+        allowed = f'one of them: sweep.read_curves("{path}")["NAME"]'
+        raise DataError(Fault("a file of several curves", str(path), None, name, shown, allowed))
+    (values,) = curves.values.values()
+    return Curves(curves.wavelength_nm, {name: values}, str(path))
