@@ -6,6 +6,7 @@
 # make check                 ruff, mypy --strict
 # make accuracy              run the hard cases, measure what accuracy costs in time, outputs/accuracy/accuracy.html
 # make documents           print the tables of studies/guide/reference.md and outputs/README.md anew
+# make docs                  build guide and API reference as HTML, outputs/docs/studies/guide/index.html
 # make bench                 measure speed, JSON in outputs/bench
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
   $$p -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
@@ -22,7 +23,7 @@ unexport PYTHONDONTWRITEBYTECODE
 TESTS := $(ONE_THREAD) $(BIN)/python -m pytest -n logical --dist worksteal
 KERNELS := sweep/base/machine_code.py $(shell grep -rl --include=*.py "machine_code import" sweep)
 
-.PHONY: study report test slow oldest accuracy check documents bench clean
+.PHONY: study report test slow oldest accuracy check documents docs bench clean
 .DELETE_ON_ERROR:
 
 study: $(VENV)/.ready$(EXTRA)
@@ -51,6 +52,10 @@ check: $(VENV)/.ready-dev
 
 documents: $(VENV)/.ready-dev
 	$(BIN)/python -m tests.printed
+
+docs: $(VENV)/.ready-docs
+	$(BIN)/python -m sphinx -q -W --keep-going -c studies/guide . outputs/docs
+	@echo "Documentation: outputs/docs/studies/guide/index.html"
 
 bench: $(VENV)/.ready-bench
 	$(ONE_THREAD) $(BIN)/python tests/bench.py $(ARGS)
@@ -93,6 +98,11 @@ $(VENV)/.compiled: $(VENV)/.ready-dev tests/compile.py $(KERNELS)
 	@echo "Compiling what the tests share: once, which takes half a minute."
 	@$(ONE_THREAD) $(BIN)/python -m tests.compile
 	@touch $@
+
+$(VENV)/.ready-docs: pyproject.toml | $(VENV)/bin/python
+	$(INSTALLING)
+	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
+	@touch $@ $(VENV)/.ready
 
 $(VENV)/.ready-bench: pyproject.toml | $(VENV)/bin/python
 	$(INSTALLING)
