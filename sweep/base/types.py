@@ -33,12 +33,20 @@ def in_turn(calls: Iterable[Call]) -> Iterator[Any]:
 
 
 class Section(BaseModel):
-    """A frozen section; unknown keys, NaN, infinity and quoted numbers are refused.
+    """Frozen section of a study; unknown keys, NaN, infinity and quoted numbers are refused.
 
-    What checks it is built for the first that is read: most sections of the language are in no study.
+    The docstring below a field is its description. Validators are built at the first use, since most sections are in
+    no study.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True, defer_build=True)
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        allow_inf_nan=False,
+        strict=True,
+        defer_build=True,
+        use_attribute_docstrings=True,
+    )
 
 
 def from_to(value: Any) -> Any:

@@ -12,30 +12,27 @@ Preset = Literal["fast", "standard", "reference"]
 
 
 class Accuracy(Section):
-    """Numerical settings of the simulation; `make accuracy` measures what each costs and which error it leaves.
-
-    `phases_per_px`: sampling phases of a light that may fall anywhere, on a square lattice in each pixel of the tile;
-    phases that see the same by symmetry are computed once. `finest_phase_px`: CSDs are computed on a lattice four times
-    as fine, whose worst phases are refined down to this step; 0: on the lattice alone. `field_positions`: image heights
-    from the middle of the sensor to its corner, where all of them count; the worst are refined, too, unless
-    `finest_phase_px` is 0. `rays`: of the lens's cone that an interference filter sees, null: the integral over all of
-    them. `psf_step_nm`: wavelengths at which the point spread function is computed, linear in between; a grid that is
-    coarser is not refined. `pwm_moments`: moments of a pulse behind a nonlinear readout, eight times as fine at the
-    worst phase, where the worst is refined (behind a linear readout its two ends are the extremes).
-    `single_precision`: of the product of filters and light.
-    """
+    """Numerical settings of the simulation; `make accuracy` measures the time and error of each."""
 
     phases_per_px: Literal[1, 4, 16, 64] = 16
+    """Sampling phases of a light that may fall anywhere, on a square lattice in each pixel of the tile; phases that are
+    equal by symmetry are computed once."""
     finest_phase_px: float = Field(default=1 / 128, ge=0, le=0.25)
+    """Step to which the worst phases of a lattice four times as fine are refined, pixels; 0: no refinement."""
     field_positions: int = Field(default=33, ge=2, le=257)
+    """Image heights where all field positions count; the worst are refined, unless `finest_phase_px` is 0."""
     rays: Annotated[int, Field(ge=1, le=64)] | None = None
+    """Rays of the lens's cone that an interference filter sees; left out, the integral over all of them."""
     psf_step_nm: float = Field(default=10.0, gt=0, le=100)
+    """Wavelength step of the point spread function, linear in between; a coarser grid is not refined."""
     pwm_moments: int = Field(default=9, ge=2, le=1000)
+    """Moments of a pulse behind a nonlinear readout, eight times as many at the worst phase."""
     single_precision: bool = False
+    """Single precision for the product of filters and light."""
 
     @property
     def phase_steps_per_px(self) -> int:
-        """Phases of the lattice along a row or a column of one pixel."""
+        """Phases of the lattice along a row or column of one pixel."""
         return {1: 1, 4: 2, 16: 4, 64: 8}[self.phases_per_px]
 
 
@@ -51,7 +48,7 @@ REFERENCE = PRESETS["reference"]
 
 
 def _from_preset(value: Any, check: ValidatorFunctionWrapHandler) -> Accuracy:
-    """Settings from a preset's name, or a mapping of settings that differ from those of its `preset`."""
+    """Return settings from the name of a preset, or from a mapping of changes to its `preset`."""
     settings = {"preset": value} if isinstance(value, str) else value
     if not isinstance(settings, dict):
         return check(settings)  # type: ignore[no-any-return]

@@ -42,27 +42,66 @@ _FEWER = 400
 
 @dataclass(frozen=True)
 class Cone:
-    """A cone of rays: `half_rad` around a chief ray that is `chief_rad` off the normal; both below 90 degrees."""
+    """Cone of rays.
+
+    Parameters
+    ----------
+    half_rad : float
+        Half angle, below 90 degrees, rad.
+    chief_rad : float
+        Angle of the chief ray to the normal, below 90 degrees, rad.
+    """
 
     half_rad: float
     chief_rad: float
 
 
 def half_angle_rad(f_number: float) -> float:
-    """asin(1 / 2F); a lens faster than f/0.5 has all directions."""
+    """Return the half angle of a lens's cone, asin(1 / 2F).
+
+    Parameters
+    ----------
+    f_number : float
+        f-number; a lens faster than f/0.5 has all directions.
+
+    Returns
+    -------
+    float
+        Half angle, rad.
+    """
     return math.asin(min(1.0, 0.5 / f_number))
 
 
 def stretch(sine_squared: FloatArray, index: float) -> FloatArray:
-    """m: a transmission at the wavelength l is that of l m at normal incidence."""
+    """Return m: the transmission at wavelength l is that at l m for normal incidence.
+
+    Parameters
+    ----------
+    sine_squared : ndarray
+        Squared sine of the angle of the ray.
+    index : float
+        Effective index.
+
+    Returns
+    -------
+    ndarray of the same shape
+        m, at least 1.
+    """
     return np.asarray(1 / np.sqrt(1 - sine_squared / index**2), dtype=float)
 
 
 @dataclass(frozen=True)
 class _Arc:
-    """Part of a cone by a number from 0 to 1 that grows with the angle.
+    """Part of a cone, parametrized by a number from 0 to 1 that grows with the angle.
 
-    `sine_squared`: of the angle there; `density`: of rays; `place`: the number at a squared sine. All take ndarray[n].
+    Parameters
+    ----------
+    sine_squared : callable
+        Squared sine of the angle.
+    density : callable
+        Density of rays.
+    place : callable
+        Parameter at a squared sine.
     """
 
     sine_squared: Callable[[FloatArray], FloatArray]
@@ -71,7 +110,7 @@ class _Arc:
 
 
 def _arcs(cone: Cone) -> list[_Arc]:
-    """The part that holds all azimuths, if there is one, and the other, if there is one."""
+    """Return the parts of a cone with all azimuths and with some, as far as they exist."""
     half, chief = cone.half_rad, cone.chief_rad
     area = math.sin(half) ** 2 * math.cos(chief)  # of the cone's projected solid angle, over pi
     found = []
@@ -103,16 +142,28 @@ def _arcs(cone: Cone) -> list[_Arc]:
 
 
 def _points(edges: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Gauss-Legendre points between neighboring edges and their weights, ndarray[n_panels, order] each."""
+    """Return Gauss-Legendre points and weights between neighboring edges, ndarray of shape (n_panels, order) each."""
     node, weight = _RULE
     half = np.diff(edges)[:, None] / 2
     return edges[:-1, None] + half * (1 + node), half * weight
 
 
 def gauss_rays(cone: Cone, count: int) -> tuple[FloatArray, FloatArray]:
-    """Squared sines of the angles of a few rays that stand for the cone, and their weights, ndarray[count] each.
+    """Return a few rays that stand for the cone.
 
     The Gauss rule of the cone's own distribution: exact for polynomials of the squared sine of degree 2 count - 1.
+
+    Parameters
+    ----------
+    cone : Cone
+        Cone of rays.
+    count : int
+        Number of rays.
+
+    Returns
+    -------
+    sine_squared, weight : ndarray of shape (count,)
+        Squared sines of their angles, and weights that sum to 1.
     """
     panels = np.linspace(0.0, 1.0, _FEWER // _ORDER + 1)
     at, weight = _points(panels)
@@ -140,7 +191,15 @@ def gauss_rays(cone: Cone, count: int) -> tuple[FloatArray, FloatArray]:
 
 
 class Stretches:
-    """Distribution of the stretch m over the rays of a cone: shares of the rays, and of their m, below any m."""
+    """Distribution of the stretch m over the rays of a cone.
+
+    Parameters
+    ----------
+    cone : Cone
+        Cone of rays.
+    index : float
+        Effective index.
+    """
 
     def __init__(self, cone: Cone, index: float) -> None:
         self._index = index
@@ -149,7 +208,18 @@ class Stretches:
         self.least, self.most = stretch(np.array([ends.min(), ends.max()]), index)
 
     def below(self, m: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The share of rays whose stretch is below each `m`, and the sum of theirs; `m`: ndarray[n], ascending."""
+        """Return the share of rays with a smaller stretch, and the sum of their stretches.
+
+        Parameters
+        ----------
+        m : ndarray of shape (n,)
+            Stretches, ascending.
+
+        Returns
+        -------
+        shares, sums : ndarray of shape (n,)
+            Share of the rays and share-weighted sum of their stretches.
+        """
         shares, sums = np.zeros(m.size), np.zeros(m.size)
         sine_squared = np.clip(1 - 1 / np.maximum(m, 1.0) ** 2, 0.0, 1.0) * self._index**2
         for arc in self._arcs:
@@ -172,12 +242,34 @@ _LEAST_BASE = 1e-9
 
 
 def cone_of(scene: Scene) -> Cone:
-    """The rays of a scene's lens."""
+    """Return the cone of rays of a scene's lens.
+
+    Parameters
+    ----------
+    scene : Scene
+        f-number and chief ray angle.
+
+    Returns
+    -------
+    Cone
+        The cone.
+    """
     return Cone(half_angle_rad(scene.optics.f_number), math.radians(scene.optics.cra_deg))
 
 
 def too_steep(scene: Scene) -> tuple[tuple[str, ...], str, str, str] | None:
-    """Fault of a scene whose rays graze a filter that moves with them: key, problem, value, what is allowed."""
+    """Return the fault of a scene whose rays graze an interference filter.
+
+    Parameters
+    ----------
+    scene : Scene
+        Optics and field.
+
+    Returns
+    -------
+    tuple or None
+        Key, problem, value, and allowed values; None if there is no fault.
+    """
     chief_deg = scene.optics.cra_deg if scene.field is None else scene.field.steepest_deg
     steepest = cone_of(scene).half_rad + math.radians(chief_deg)
     if steepest <= _STEEPEST_RAD:
@@ -188,7 +280,13 @@ def too_steep(scene: Scene) -> tuple[tuple[str, ...], str, str, str] | None:
 
 
 class AngularResponse:
-    """Filters of a setup as the rays of its lens see them, and the light as the filters see it."""
+    """Angular response of the filters of a setup in the cone of its lens.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    """
 
     def __init__(self, setup: Setup) -> None:
         self.matrices: dict[int, csr_matrix] = {}
@@ -201,11 +299,37 @@ class AngularResponse:
             }
 
     def curves(self, qe: FloatArray, channels: Sequence[int]) -> FloatArray:
-        """Curves of some channels, ndarray[..., n, n_wavelengths], as the rays see them."""
+        """Return curves averaged over the cone of rays.
+
+        Parameters
+        ----------
+        qe : ndarray of shape (..., n, n_wavelengths)
+            QE at normal incidence.
+        channels : sequence of int
+            Channels of the second axis from the end.
+
+        Returns
+        -------
+        ndarray of the same shape
+            QE in the cone.
+        """
         return self._applied(qe, channels, of_light=False)
 
     def light(self, light: FloatArray, channels: Sequence[int]) -> FloatArray:
-        """Weights of curves as seen, ndarray[..., n, n_wavelengths], as weights of the curves themselves."""
+        """Return weights of curves at normal incidence from weights of curves in the cone.
+
+        Parameters
+        ----------
+        light : ndarray of shape (..., n, n_wavelengths)
+            Light on the filters.
+        channels : sequence of int
+            Channels of the second axis from the end.
+
+        Returns
+        -------
+        ndarray of the same shape
+            Light that gives the same sums at normal incidence.
+        """
         return self._applied(light, channels, of_light=True)
 
     def _applied(self, values: FloatArray, channels: Sequence[int], *, of_light: bool) -> FloatArray:
@@ -221,7 +345,18 @@ class AngularResponse:
 
 
 def known_at(carrier: FloatArray) -> IndexArray:
-    """Indices of the wavelengths where a carrier lets enough light through to know the filter on it."""
+    """Return the wavelengths at which a base transmission is large enough to know the filter on it.
+
+    Parameters
+    ----------
+    carrier : ndarray of shape (n_wavelengths,)
+        Base transmission.
+
+    Returns
+    -------
+    ndarray of int
+        Indices of wavelengths.
+    """
     return np.flatnonzero(carrier > _LEAST_BASE * carrier.max())
 
 
@@ -229,7 +364,7 @@ _MATRICES: Cache[bytes, csr_matrix] = Cache(256)
 
 
 def _matrix(wavelength_nm: FloatArray, carrier: FloatArray, index: float, cone: Cone, n_rays: int | None) -> csr_matrix:
-    """Matrix from a curve on a carrier to the curve as the rays see it; kept."""
+    """Return the matrix from a curve on a base transmission to the curve in the cone; cached."""
     key = wavelength_nm.tobytes() + carrier.tobytes() + repr((index, cone, n_rays)).encode()
 
     def made() -> csr_matrix:
@@ -247,7 +382,7 @@ def _matrix(wavelength_nm: FloatArray, carrier: FloatArray, index: float, cone: 
 
 
 def _means(wavelength_nm: FloatArray, knots_nm: FloatArray, index: float, cone: Cone, n_rays: int | None) -> _Entries:
-    """The mean over the rays of a transmission that is given at knots: rows, columns and values of a matrix.
+    """Return the mean over the rays of a transmission given at knots, as rows, columns and values of a matrix.
 
     Values are 0 or more, and those of each row (a wavelength) sum to 1; columns are knots.
     """
@@ -258,7 +393,7 @@ def _means(wavelength_nm: FloatArray, knots_nm: FloatArray, index: float, cone: 
 
 
 def _over_rays(wavelength_nm: FloatArray, knots_nm: FloatArray, m: FloatArray, weights: FloatArray) -> _Entries:
-    """`_means` over single rays."""
+    """Return the mean over single rays."""
     at = np.clip(wavelength_nm[:, None] * m, knots_nm[0], knots_nm[-1])
     first = np.clip(np.searchsorted(knots_nm, at, side="right") - 1, 0, max(knots_nm.size - 2, 0))
     last = np.minimum(first + 1, knots_nm.size - 1)
@@ -270,7 +405,7 @@ def _over_rays(wavelength_nm: FloatArray, knots_nm: FloatArray, m: FloatArray, w
 
 
 def _over_cone(wavelength_nm: FloatArray, knots_nm: FloatArray, stretches: Stretches) -> _Entries:
-    """`_means` over all rays: between two knots the share of the rays there, and their mean place."""
+    """Return the mean over all rays: for each pair of knots the share of rays between them, and their mean position."""
     last = knots_nm.size - 1
     low = np.clip(np.searchsorted(knots_nm, wavelength_nm * stretches.least, side="right") - 1, 0, last)
     high = np.clip(np.searchsorted(knots_nm, wavelength_nm * stretches.most), 0, last)

@@ -1,4 +1,4 @@
-"""A camera: its pixels, the mosaic of their filters, and what each channel's quantum efficiency is."""
+"""Camera: pixel, mosaic and the QE of each channel."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from .pixel import Pixel
 
 @dataclass(frozen=True)
 class Camera:
-    """Camera that a block of designs shares; its lens is part of the scene, since a study sets it by scene.
+    """Camera that a batch of designs shares; its lens is part of the scene, since a study sets it by scene.
 
-    Attributes
+    Parameters
     ----------
     grid : WavelengthGrid
         Wavelengths of all curves, nm.
     mosaic : Mosaic
-        The CFA.
-    qe : ndarray[n_channels, n_wavelengths]
-        Quantum efficiency of the mosaic's channels, electrons per photon; the rows of `modified` hold the base curve.
+        CFA.
+    qe : ndarray of shape (n_channels, n_wavelengths)
+        QE of the mosaic's channels, electrons per photon; rows of `modified` hold the base curve.
     modified : tuple of int
-        Channels whose curve a design replaces, one per curve that a family makes.
-    clear_qe : ndarray[n_wavelengths]
-        The reference of the CFA's sensitivity.
+        Channels whose curve a design replaces, one per curve of the family.
+    clear_qe : ndarray of shape (n_wavelengths,)
+        QE of the clear pixel, the reference of the CFA sensitivity.
     pixel : Pixel
-        Pitch, full well, noise, ADC.
-    technologies : tuple
-        By what each channel's filter works, None where that is not stated; empty where it is of none.
+        Pitch, full well, noise and ADC.
+    technologies : tuple of Technology or None
+        Physical principle of each channel's filter, None if it is not stated; empty if none is stated.
     """
 
     grid: WavelengthGrid
@@ -46,7 +46,7 @@ class Camera:
 
     @property
     def base_qe(self) -> FloatArray:
-        """Curves that the modified channels replace, ndarray[n_modified, n_wavelengths]."""
+        """Curves that the modified channels replace, ndarray of shape (n_modified, n_wavelengths)."""
         return self.qe[list(self.modified)]
 
     @property
@@ -55,7 +55,18 @@ class Camera:
         return tuple(i for i in range(len(self.mosaic.channels)) if i not in self.modified)
 
     def effective_index(self, channel: int) -> float:
-        """Effective index of a channel's filter; infinite for one that does not move with the angle of the light."""
+        """Return the effective index of a channel's filter.
+
+        Parameters
+        ----------
+        channel : int
+            Index of the channel.
+
+        Returns
+        -------
+        float
+            Effective index; infinite for a filter that does not move with the angle of the light.
+        """
         return index_of(self.technologies[channel]) if self.technologies else math.inf
 
     @property
@@ -64,15 +75,26 @@ class Camera:
         return tuple(c for c in range(len(self.mosaic.channels)) if math.isfinite(self.effective_index(c)))
 
     def base_transmission(self, channel: int) -> FloatArray:
-        """Curve of a channel under its filter, the same at every angle: its base, or if plain the clear pixel's."""
+        """Return the base transmission of a channel, which is the same at every angle.
+
+        Parameters
+        ----------
+        channel : int
+            Index of the channel.
+
+        Returns
+        -------
+        ndarray of shape (n_wavelengths,)
+            Its base curve, or the clear pixel's for an unmodified channel.
+        """
         return self.qe[channel] if channel in self.modified else self.clear_qe
 
     @property
     def area_step_m2_nm(self) -> float:
-        """Light-sensitive area times the step of the grid: electrons/s of a sum of irradiance times QE."""
+        """Light-sensitive area times wavelength step, m2 nm: electrons/s per unit of irradiance times QE."""
         return self.grid.step_nm * self.pixel.area_m2
 
     @property
     def longest_distance_dn(self) -> float:
-        """No two points of the unclipped response that fit into the range are further apart; DN."""
+        """Upper bound on the distance of two unclipped responses within the range of the ADC, DN."""
         return float(2 * self.pixel.full_scale_dn * np.sqrt(len(self.mosaic.channels)))

@@ -1,4 +1,4 @@
-"""Compiled inner loops: areas of a disc on squares, sums over splines, pixels' electrons, exposure and readout.
+"""Compiled inner loops: areas of a disc on squares, sums over splines, electrons of pixels, exposure and readout.
 
 They release the GIL.
 """
@@ -15,7 +15,7 @@ from ..base.types import FloatArray, IndexArray
 
 @njit(cache=True, nogil=True)
 def _area(x: float, y: float, radius: float) -> float:
-    """Signed area of the disc over the rectangle from 0 to (x, y), odd in both."""
+    """Return the signed area of the disc over the rectangle from 0 to (x, y), odd in both."""
     sign = np.sign(x) * np.sign(y)
     x, y = min(abs(x), radius), min(abs(y), radius)
     corner = math.sqrt((radius - y) * (radius + y))  # from here on the circle is lower than y
@@ -28,7 +28,22 @@ def _area(x: float, y: float, radius: float) -> float:
 
 @njit(cache=True, nogil=True)
 def covered_share(x: float, y: float, half: float, radius: float) -> float:
-    """Share of a square of half side `half` around (x, y) that lies in the disc of `radius` around 0, exact."""
+    """Return the exact share of a square that lies in a disc around the origin.
+
+    Parameters
+    ----------
+    x, y : float
+        Center of the square.
+    half : float
+        Half of its side.
+    radius : float
+        Radius of the disc; all lengths in one unit.
+
+    Returns
+    -------
+    float
+        0 to 1.
+    """
     x, y, squared = abs(x), abs(y), radius * radius
     if (x + half) * (x + half) + (y + half) * (y + half) <= squared:
         return 1.0
@@ -42,7 +57,22 @@ def covered_share(x: float, y: float, half: float, radius: float) -> float:
 
 @njit(cache=True, nogil=True)
 def covered_shares(x: FloatArray, y: FloatArray, half: float, radius: float) -> FloatArray:
-    """`covered_share` of squares, ndarray[n] each."""
+    """Return `covered_share` of many squares.
+
+    Parameters
+    ----------
+    x, y : ndarray of shape (n,)
+        Centers of the squares.
+    half : float
+        Half of their side.
+    radius : float
+        Radius of the disc.
+
+    Returns
+    -------
+    ndarray of shape (n,)
+        0 to 1.
+    """
     found = np.empty(x.size)
     for at in range(x.size):
         found[at] = covered_share(x[at], y[at], half, radius)
@@ -51,7 +81,24 @@ def covered_shares(x: FloatArray, y: FloatArray, half: float, radius: float) -> 
 
 @njit(cache=True, nogil=True)
 def covered_by_disc(x: FloatArray, y: FloatArray, half: float, radius: float) -> FloatArray:
-    """Share of each pixel in a disc, ndarray[n, n_rows, n_columns]; `x`: ndarray[n, n_columns], `y` likewise."""
+    """Return the share of each pixel in a disc.
+
+    Parameters
+    ----------
+    x : ndarray of shape (n, n_columns)
+        Columns from the center of the disc.
+    y : ndarray of shape (n, n_rows)
+        Rows from the center of the disc.
+    half : float
+        Half of the side of a pixel.
+    radius : float
+        Radius of the disc.
+
+    Returns
+    -------
+    ndarray of shape (n, n_rows, n_columns)
+        0 to 1.
+    """
     found = np.empty((len(x), y.shape[1], x.shape[1]))
     for case in range(len(x)):
         for row in range(y.shape[1]):
@@ -62,10 +109,20 @@ def covered_by_disc(x: FloatArray, y: FloatArray, half: float, radius: float) ->
 
 @njit(cache=True, nogil=True)
 def gather(seen: FloatArray, shares: FloatArray, place: IndexArray, through: IndexArray, out: FloatArray) -> None:
-    """Add what pixels get, ndarray[n_designs, n_cases, n_signals, n_units], pixel by pixel.
+    """Add the light of pixels in place, pixel by pixel.
 
-    `seen`: ndarray[n_designs, n_channels, n_places, n_signals]; `shares`: ndarray[n_parts]; `place`: ndarray[n_parts,
-    n_cases, n_units]; `through`: the channel of `seen`, or -1 for one that does not count, ndarray[n_parts, n_units].
+    Parameters
+    ----------
+    seen : ndarray of shape (n_designs, n_channels, n_places, n_signals)
+        Light behind each channel's filter at each place.
+    shares : ndarray of shape (n_parts,)
+        Weight of each part of a pixel.
+    place : ndarray of int, shape (n_parts, n_cases, n_elements)
+        Place of each part.
+    through : ndarray of int, shape (n_parts, n_elements)
+        Row of `seen`, or -1 for a channel that does not count.
+    out : ndarray of shape (n_designs, n_cases, n_signals, n_elements)
+        Array that is changed.
     """
     n_signals = out.shape[2]
     own = np.empty(n_signals)
@@ -88,9 +145,18 @@ def gather(seen: FloatArray, shares: FloatArray, place: IndexArray, through: Ind
 
 @njit(cache=True, nogil=True)
 def expose(rates: FloatArray, fixed: FloatArray, uniform: FloatArray, time_s: float) -> None:
-    """(rates + fixed + uniform) time_s in the place of `rates`, electrons/s, ndarray[n_designs, n_cases, n_signals].
+    """Replace `rates` by (rates + fixed + uniform) time_s.
 
-    `fixed`: ndarray[n_cases, n_signals]; `uniform`: ndarray[n_designs, n_cases].
+    Parameters
+    ----------
+    rates : ndarray of shape (n_designs, n_cases, n_signals)
+        Electrons/s; changed in place.
+    fixed : ndarray of shape (n_cases, n_signals)
+        Electrons/s of fixed channels.
+    uniform : ndarray of shape (n_designs, n_cases)
+        Electrons/s of background and dark current.
+    time_s : float
+        Exposure time, s.
     """
     for d in range(rates.shape[0]):
         for case in range(rates.shape[1]):
@@ -102,7 +168,19 @@ def expose(rates: FloatArray, fixed: FloatArray, uniform: FloatArray, time_s: fl
 def whole_numbers(
     electrons: FloatArray, top_e: float, dn_per_e: float, offset_dn: float, full_scale_dn: float, out: FloatArray
 ) -> None:
-    """`quantization.rounded` of `electrons`, held at `top_e`; ndarray[n], NaN stays NaN."""
+    """Convert electrons to whole digital numbers; NaN stays NaN.
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (n,)
+        Expected electrons.
+    top_e : float
+        Electrons at saturation.
+    dn_per_e, offset_dn, full_scale_dn : float
+        Gain, pedestal and full scale, DN.
+    out : ndarray of shape (n,)
+        Digital numbers, DN.
+    """
     whole = math.floor(offset_dn)
     rest = offset_dn - whole
     for i in range(electrons.size):
@@ -115,7 +193,7 @@ def whole_numbers(
 
 @njit(cache=True, nogil=True)
 def _basis(x: float, first: int, knots: FloatArray, result: FloatArray) -> None:
-    """Put the four cubic B-splines that are not 0 between `knots[first]` and the next one into `result`."""
+    """Put the four nonzero cubic B-splines between `knots[first]` and the next knot into `result`."""
     result[0] = 1.0
     for order in range(1, 4):
         saved = 0.0
@@ -129,7 +207,7 @@ def _basis(x: float, first: int, knots: FloatArray, result: FloatArray) -> None:
 
 @njit(cache=True, nogil=True)
 def _inner_basis(t: float, result: FloatArray) -> None:
-    """`_basis` where all knots around are equidistant, at a share `t` of the way to the next one."""
+    """Put the four B-splines between equidistant knots into `result`, at a share `t` of the way to the next knot."""
     s = 1.0 - t
     result[0] = s * s * s / 6
     result[1] = (1 + s * (3 + s * (3 - 3 * s))) / 6
@@ -160,7 +238,7 @@ def means_of_cubic(
     coefficients: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Means over squares of a spline in the distance from the origin, by one rule along both sides.
+    """Compute means over squares of a spline in the distance from the origin, by one rule along both sides.
 
     The weights go to the spline's coefficients first, so that no more is done for each function than one product. That
     takes less than a third of the time of SciPy's `BSpline.design_matrix` and a sixth of that of calling the spline.

@@ -21,7 +21,7 @@ _LATTICES: Cache[tuple[DiscProfile, float, bytes], FloatArray] = Cache(4)
 
 
 def covered(x: FloatArray, y: FloatArray, half: float, radius: float) -> FloatArray:
-    """Share of a square that lies in a disc around the origin, from the exact areas.
+    """Return the share of a square that lies in a disc around the origin, from the exact areas.
 
     Parameters
     ----------
@@ -45,17 +45,17 @@ def covered(x: FloatArray, y: FloatArray, half: float, radius: float) -> FloatAr
 
 @dataclass(frozen=True)
 class PixelLight:
-    """Light of pixels relative to a uniform field, each different place once.
+    """Light of pixels relative to a uniform field, each distinct place once.
 
-    Attributes
+    Parameters
     ----------
-    values : ndarray[n_places, n_functions]
-        Of each function that the light is made of; the last place is dark.
-    place : ndarray[n_cases, rows, columns]
-        Index of each pixel's place.
-    shares : ndarray[n_functions, n_wavelengths] or None
-        How much of each function is in the light of each wavelength; None where all wavelengths see the same, which is
-        then one function.
+    values : ndarray of shape (n_places, n_functions)
+        Functions of the light at each place; the last place is dark.
+    place : ndarray of int, shape (n_cases, rows, columns)
+        Place of each pixel.
+    shares : ndarray of shape (n_functions, n_wavelengths) or None
+        Share of each function in each wavelength; None if all wavelengths are equal, which is then one
+        function.
     """
 
     values: FloatArray
@@ -63,20 +63,27 @@ class PixelLight:
     shares: FloatArray | None
 
     def by_pixel(self) -> FloatArray:
-        """Light of each pixel, ndarray[n_cases, rows, columns, n_wavelengths or 1]."""
-        return self._at_wavelengths(self.values)[self.place]
-
-    def folded(self, weights: FloatArray) -> FloatArray:
-        """Weighted sums over the pixels of each case.
-
-        Parameters
-        ----------
-        weights : ndarray[n_cases, rows, columns, n]
-            Of each pixel in each of n sums.
+        """Return the light of each pixel.
 
         Returns
         -------
-        ndarray[n_cases, n, n_wavelengths or 1]
+        ndarray of shape (n_cases, rows, columns, n_wavelengths or 1)
+            Light relative to a uniform field.
+        """
+        return self._at_wavelengths(self.values)[self.place]
+
+    def folded(self, weights: FloatArray) -> FloatArray:
+        """Sum over the pixels of each case with weights.
+
+        Parameters
+        ----------
+        weights : ndarray of shape (n_cases, rows, columns, n)
+            Weight of each pixel in each of n sums.
+
+        Returns
+        -------
+        ndarray of shape (n_cases, n, n_wavelengths or 1)
+            Weighted sums.
         """
         result = np.empty((len(weights), weights.shape[-1], self.values.shape[1]))
         for case, case_weights in enumerate(weights):
@@ -90,21 +97,21 @@ class PixelLight:
 
 
 def different(window: Window, wanted: BoolArray) -> tuple[FloatArray, IndexArray]:
-    """Different places of pixels around the light's center: the image is round, so that mirrored places are one.
+    """Return the distinct places of pixels around the light's center; the image is round, so mirrored places are equal.
 
     Parameters
     ----------
     window : Window
         Pixels around the light, n_cases x rows x columns.
-    wanted : ndarray[n_cases, rows, columns]
-        Which of them are asked for.
+    wanted : ndarray of bool, shape (n_cases, rows, columns)
+        Pixels that are requested.
 
     Returns
     -------
-    places_px : ndarray[n_places, 2]
-        Distances from the center along the rows and columns, the shorter one first, pixels.
-    place : ndarray[n_wanted]
-        Index of the place of each pixel that is wanted.
+    places_px : ndarray of shape (n_places, 2)
+        Distances from the center along rows and columns, the shorter one first, pixels.
+    place : ndarray of int, shape (n_wanted,)
+        Place of each requested pixel.
     """
     x, y = window.dx[:, 0, :], window.dy[:, :, 0]
     along = np.round(np.abs(np.concatenate([x.ravel(), y.ravel()])), 12)
@@ -118,7 +125,7 @@ def different(window: Window, wanted: BoolArray) -> tuple[FloatArray, IndexArray
 def light_on_pixels(
     window: Window, wanted: BoolArray, half_px: float, radius_px: float, profile: DiscProfile | None, pitch_um: float
 ) -> PixelLight:
-    """Light of the pixels that are wanted; the others are dark.
+    """Return the light of the requested pixels; the others are dark.
 
     Parameters
     ----------

@@ -1,12 +1,12 @@
-"""Effects of the camera: when each is active, and a closed-form bound on what leaving it out changes in any CSD.
+"""Effects of the camera: when each is active, and a closed-form bound on the change of any CSD without it.
 
-A CSD is a distance of two points, each with a coordinate for every channel. Where leaving an effect out moves each
-coordinate of their difference by at most d, the distance changes by at most d sqrt(channels).
+A CSD is a distance of two points with a coordinate for each channel. If leaving an effect out moves each coordinate of
+their difference by at most d, the distance changes by at most d sqrt(channels).
 
-Bounds are for every design of a box and in DN. Light that is a share s less moves a pixel of at most P DN by s P, and
-the difference of two pixels by at most twice as much. A readout that clips moves by no more than what it reads. One
-that rounds without noise may move by a whole step more for each pixel; with Gaussian read noise sigma (DN) the mean of
-the rounded value is steeper than the value by at most 1 + 2 sum over k of exp(-2 (pi k sigma)^2).
+Bounds hold for every design of a box, in DN. Light that is a share s less moves a pixel of at most P DN by s P, and
+the difference of two pixels by at most twice that. A readout that clips moves by no more than its input. One that
+rounds without noise may move by a whole step more for each pixel; with Gaussian read noise sigma (DN) the mean of the
+rounded value is steeper than the value by at most 1 + 2 sum over k of exp(-2 (pi k sigma)^2).
 """
 
 from __future__ import annotations
@@ -31,7 +31,15 @@ _STEEPEST_TERMS = 50
 
 @dataclass(frozen=True)
 class Box:
-    """Designs of a scene: every channel's QE lies between `low` and `high`, ndarray[n_channels, n_wavelengths]."""
+    """Designs of a scene, with bounds on the QE of each channel.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    low, high : ndarray of shape (n_channels, n_wavelengths)
+        Bounds on the QE.
+    """
 
     setup: Setup
     low: FloatArray
@@ -39,7 +47,7 @@ class Box:
 
     @cached_property
     def _exposures_s(self) -> tuple[float, float]:
-        """Shortest and longest exposure."""
+        """Shortest and longest exposure time, s."""
         setup = self.setup
         white = white_irradiance(setup) * setup.camera.area_step_m2_nm
         modified = list(setup.camera.modified)
@@ -56,9 +64,9 @@ class Box:
 
     @cached_property
     def _highest(self) -> FloatArray:
-        """No ray sees more of a channel, ndarray[n_channels, n_wavelengths].
+        """Upper bound on the curves in the cone of rays, ndarray of shape (n_channels, n_wavelengths).
 
-        What an interference filter lets through of its carrier is nowhere more than where it lets most through.
+        The transmission of an interference filter is nowhere above its maximum.
         """
         highest = self.high.copy()
         for channel in self.setup.camera.moving:
@@ -69,14 +77,14 @@ class Box:
 
     @cached_property
     def brightest_signal_dn(self) -> float:
-        """Largest response of any channel to a signal whose image is whole, unclipped and without black level, DN."""
+        """Largest unclipped response of any channel to a signal whose image is whole, without pedestal, DN."""
         camera = self.setup.camera
         dn = camera.area_step_m2_nm * self._exposures_s[1] * self.light_range[1] * camera.pixel.dn_per_e
         return float((signal_irradiance(self.setup) @ self._highest.T).max() * dn)
 
     @cached_property
     def brightest_pixel_dn(self) -> float:
-        """`brightest_signal_dn` with background and dark current."""
+        """`brightest_signal_dn` with background and dark current, DN."""
         setup, time_s = self.setup, self._exposures_s[1]
         camera = setup.camera
         background = (self._highest @ background_irradiance(setup)).max() * camera.area_step_m2_nm
@@ -91,9 +99,15 @@ class Box:
 class Effect:
     """One effect.
 
-    `inactive`: why it changes nothing in a box whatever is computed beside it, None where it may. `bound_dn`: on what
-    leaving it out changes in any CSD of a box, given the effects of the readout that are computed; None where no closed
-    form is known, so that an active effect is computed.
+    Parameters
+    ----------
+    name : str
+        Name.
+    inactive : callable
+        From a box to the reason why the effect changes nothing in it; None if it may.
+    bound_dn : callable, optional
+        From a box and the effects of the readout that are computed to the bound, DN. Left out, no closed
+        form is known, and an active effect is computed.
     """
 
     name: str
@@ -102,7 +116,7 @@ class Effect:
 
 
 def _share_bound_dn(box: Box, share: float, readout: frozenset[str]) -> float:
-    """Bound for light that is a share less."""
+    """Return the bound for light that is reduced by a share."""
     result = 2 * share * box.brightest_pixel_dn * box._sqrt_channels
     if "quantization" not in readout:
         return result
@@ -112,7 +126,7 @@ def _share_bound_dn(box: Box, share: float, readout: frozenset[str]) -> float:
 
 
 def _steepness(sigma_dn: float) -> float:
-    """Largest slope of the mean rounded value under read noise."""
+    """Return the largest slope of the mean rounded value under read noise."""
     k = np.arange(1, _STEEPEST_TERMS)
     terms = np.exp(-2 * (math.pi * k * sigma_dn) ** 2)
     return math.inf if terms[-1] > 1e-17 else 1 + 2 * float(terms.sum())
@@ -123,10 +137,10 @@ def _no_noise(box: Box) -> str | None:
 
 
 def _noise_bound_dn(box: Box, _: frozenset[str]) -> float:
-    """Bound on how far the full well and the ends of the ADC shift the mean of noisy readouts.
+    """Return the bound on the shift of the mean of noisy readouts by the full well and the ends of the ADC.
 
-    The dark end adds most in the dark. The others' loss grows with the signal up to the first of them, and falls
-    beyond, where the readout of the mean stands still.
+    The dark end adds most in the dark. The loss at the others grows with the signal up to the first of them, and falls
+    beyond it, where the readout of the mean is constant.
     """
     pixel = box.setup.camera.pixel
     gain, read_e = pixel.dn_per_e, pixel.read_noise_e
@@ -138,10 +152,10 @@ def _noise_bound_dn(box: Box, _: frozenset[str]) -> float:
 
 
 def _rounding_bound_dn(box: Box, _: frozenset[str]) -> float:
-    """A step of rounding; under noise what read noise leaves of it.
+    """Return the bound for a step of rounding, which read noise dithers.
 
-    The k-th harmonic of the mean rounding error is 1 / (pi k) exp(-2 (pi k sigma)^2), whatever the electrons are. Where
-    the ADC's range ends, half a DN is missing at most in the readouts beyond.
+    The k-th harmonic of the mean rounding error is 1 / (pi k) exp(-2 (pi k sigma)^2) for any number of electrons. At
+    the end of the ADC's range at most half a DN is missing in the readouts beyond.
     """
     pixel = box.setup.camera.pixel
     sigma = pixel.dn_per_e * pixel.read_noise_e

@@ -1,7 +1,7 @@
-"""Expected electrons of a scene on a sensor, for a block of designs: what light, filters, drive and exposure give.
+"""Expected electrons of a scene on a sensor, for a batch of designs.
 
-In the physical order: light through optics and filters onto the elements of the pixel response, a uniform background,
-dark current, a pulse's moment, the exposure. Nothing is clipped, rounded or noisy yet.
+Stages in physical order: light through optics and filters onto the elements of the pixel response, a uniform
+background, dark current, the moment of a pulse, the exposure. Nothing is clipped, rounded or noisy yet.
 """
 
 from __future__ import annotations
@@ -28,11 +28,21 @@ _MANY = 50_000
 
 @dataclass(frozen=True)
 class Changing:
-    """Those designs of a block that differ in one channel alone: electrons, or the digital numbers read from them.
+    """Designs of a batch that differ in one channel alone: their electrons, or the digital numbers read from them.
 
-    `fixed`: ndarray[n_cases, n_signals, n_channels], what they share (that channel's values mean nothing); `make`
-    gives those of `channel` for a part of them, ndarray[n, n_cases, n_signals]; `exposure_s`: that of each. `which`:
-    ndarray[n_designs], the n designs.
+    Parameters
+    ----------
+    fixed : ndarray of shape (n_cases, n_signals, n_channels)
+        Values of the shared channels; those of `channel` are undefined.
+    channel : int
+        Index of the channel that differs.
+    make : callable
+        From a slice of the designs to their values of that channel, ndarray of shape (n, n_cases,
+        n_signals).
+    exposure_s : float
+        Exposure time of all of them, s.
+    which : ndarray of bool, shape (n_designs,)
+        Designs of the batch that these are.
     """
 
     fixed: FloatArray
@@ -43,16 +53,27 @@ class Changing:
 
     @cached_property
     def values(self) -> FloatArray:
-        """That channel of each, made when it is asked for."""
+        """Values of the channel that differs, computed at the first use."""
         return self.make(slice(None))
 
     @property
     def whole(self) -> FloatArray:
-        """All channels of each, ndarray[n, n_cases, n_signals, n_channels]."""
+        """All channels of all designs, ndarray of shape (n, n_cases, n_signals, n_channels)."""
         return self.whole_of(slice(None))
 
     def whole_of(self, part: slice) -> FloatArray:
-        """The same of a part of the designs."""
+        """Return all channels of some designs.
+
+        Parameters
+        ----------
+        part : slice
+            Designs.
+
+        Returns
+        -------
+        ndarray of shape (n, n_cases, n_signals, n_channels)
+            Values of every channel.
+        """
         values = self.values[part] if "values" in self.__dict__ else self.make(part)
         found = np.repeat(self.fixed[None], len(values), axis=0)
         found[..., self.channel] = values
@@ -60,7 +81,7 @@ class Changing:
 
 
 def _expose(rates: FloatArray, fixed: FloatArray, uniform: FloatArray, time_s: float) -> None:
-    """`compiled.expose`, of few values without what is compiled: the same sums."""
+    """Add fixed and uniform rates and multiply by the exposure time, in place."""
     if rates.size < _MANY:
         rates[:] = ((fixed + rates) + uniform[..., None]) * time_s
         return
@@ -70,7 +91,7 @@ def _expose(rates: FloatArray, fixed: FloatArray, uniform: FloatArray, time_s: f
 
 
 def _background(setup: Setup) -> FloatArray:
-    """Electrons/s of the background for each QE, behind all that dims it, ndarray[n_wavelengths]."""
+    """Return electrons/s of the background per unit of QE, behind air and lens, ndarray of shape (n_wavelengths,)."""
     dimmed = way_of_light(setup, setup.camera.grid.nodes_nm, background=True)
     return np.asarray(background_irradiance(setup) * setup.camera.area_step_m2_nm * dimmed, dtype=float)
 
@@ -84,7 +105,7 @@ class Electrons:
     """
 
     def __init__(self, light: SceneLight, response: PixelResponse, *, once: bool = False) -> None:
-        """`once`: for a single use, so that no table is made."""
+        """Compute the products of light, response and fixed QE."""
         self.setup = setup = light.setup
         self.light, self.response = light, response
         fixed, modified = list(setup.camera.fixed), list(setup.camera.modified)
@@ -118,26 +139,36 @@ class Electrons:
             self._touched, self._kept = np.empty(0, dtype=np.intp), None
 
     def at_each_position(self, light: FloatArray, channels: Sequence[int]) -> FloatArray:
-        """Light on some channels, ndarray[n_cases, ..., n, n_wavelengths], as their filters see it at its place."""
+        """Return light on some channels behind their filters at each field position.
+
+        Parameters
+        ----------
+        light : ndarray of shape (n_cases, ..., n, n_wavelengths)
+            Light on the elements.
+        channels : sequence of int
+            Channels of the second axis from the end.
+
+        Returns
+        -------
+        ndarray of the same shape
+            Light weighted by the angular response of the filters.
+        """
         return np.concatenate(
             [seen.light(light[self.position == at], channels) for at, seen in enumerate(self.light.angular)]
         )
 
     def _products(self, light: FloatArray, qe: FloatArray, of: Sequence[int]) -> FloatArray:
-        """Sum over channels and wavelengths of light, QE and signals, [n_designs, n_cases, n_signals, n_elements].
-
-        `light`, `qe`: of the channels `of`.
-        """
+        """Sum light times QE times signals over channels and wavelengths, [n_designs, n_cases, n_signals, n_units]."""
         parts = [self._products_at(at, light[self.position == at], qe, of) for at in range(len(self.light.angular))]
         return np.concatenate(parts, axis=1)
 
     def _add_pixels(self, split: SplitLight, qe: FloatArray, of: Sequence[int], found: FloatArray) -> None:
-        """Add `_products` of a light in factors to `found`."""
+        """Add the products of a factored light in place."""
         spectra = self.light.angular[0].curves(qe, of)[:, :, None] * self.light.signals
         split.add_sums(spectra, of, found)
 
     def _products_at(self, place: int, light: FloatArray, qe: FloatArray, of: Sequence[int]) -> FloatArray:
-        """Of the cases of one place of the field."""
+        """Sum the products at one field position."""
         cases, units, channels, _ = light.shape
         size, n, n_signals = self.setup.camera.grid.size, len(qe), len(self.light.signals)
         weights = np.broadcast_to(light, (cases, units, channels, size)).reshape(cases * units, channels * size)
@@ -149,7 +180,7 @@ class Electrons:
         return np.asarray(np.moveaxis(found, 1, 2), dtype=float)
 
     def _table(self) -> FloatArray:
-        """Signals times response, [channels x wavelengths, n_cases x n_signals x n_elements]."""
+        """Return signals times response, [channels x wavelengths, n_cases x n_signals x n_elements]."""
         cases, units, channels, size = self._modified.shape
         if not any(seen.matrices for seen in self.light.angular):
             found = np.empty((channels, size, cases, len(self.light.signals), units))
@@ -161,9 +192,17 @@ class Electrons:
         return np.ascontiguousarray(product.reshape(-1, channels * size).T)
 
     def rates(self, curves: FloatArray) -> FloatArray:
-        """Electrons/s of each signal, ndarray[n_designs, n_cases, n_signals, n_elements].
+        """Return electrons/s of each signal.
 
-        `curves`: QE of the modified channels, ndarray[n_designs, n_modified, n_wavelengths].
+        Parameters
+        ----------
+        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_cases, n_signals, n_elements)
+            Electrons/s of the signals, without background and dark current.
         """
         found = np.repeat(self.fixed[None], len(curves), axis=0)
         if self._split is not None and self.setup.camera.modified:
@@ -179,7 +218,22 @@ class Electrons:
         return found
 
     def expected(self, curves: FloatArray, scales: FloatArray, exposure_s: FloatArray) -> FloatArray:
-        """Expected electrons before the full well, ndarray[n_designs, n_cases x n_scales, n_signals, n_elements]."""
+        """Return expected electrons before the full well.
+
+        Parameters
+        ----------
+        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+        scales : ndarray of shape (n_designs, n_scales)
+            Light relative to its mean at each moment of a pulse.
+        exposure_s : ndarray of shape (n_designs,)
+            Exposure time, s.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_cases * n_scales, n_signals, n_elements)
+            Electrons.
+        """
         uniform = self._fixed_uniform + self.through_filters(self.of_background(curves))
         uniform = uniform + self.setup.camera.pixel.dark_e_per_s
         rates = self.rates(curves)
@@ -193,16 +247,32 @@ class Electrons:
         return rates
 
     def of_background(self, curves: FloatArray) -> FloatArray:
-        """Electrons/s of the background in the modified channels, ndarray[n, n_places, n_modified].
+        """Return electrons/s of the background in the modified channels.
 
-        `curves`: ndarray[n, n_modified, n_wavelengths].
+        Parameters
+        ----------
+        curves : ndarray of shape (n, n_modified, n_wavelengths)
+            QE of the modified channels.
+
+        Returns
+        -------
+        ndarray of shape (n, n_positions, n_modified)
+            Electrons/s.
         """
         return np.asarray(np.einsum("nml,pml->npm", curves, self.background), dtype=float)
 
     def through_filters(self, rates: FloatArray) -> FloatArray:
-        """Uniform light on the elements, ndarray[n_designs, n_cases, n_elements].
+        """Distribute uniform light of the modified channels over the elements.
 
-        `rates`: electrons/s of the modified channels, ndarray[n_designs, n_places, n_modified].
+        Parameters
+        ----------
+        rates : ndarray of shape (n_designs, n_positions, n_modified)
+            Electrons/s of the modified channels.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_cases, n_elements)
+            Electrons/s.
         """
         found = np.zeros((len(rates), *self._modified_uniform.shape[:2]))
         for index in range(rates.shape[2]):
@@ -210,10 +280,19 @@ class Electrons:
         return found
 
     def changing(self, block: Block) -> Changing | None:
-        """Electrons of designs that differ in one channel alone, each element a channel; None where they do not.
+        """Return electrons of designs that differ in one channel alone, if each element is a channel.
 
-        Needs a modified channel that no other element looks through, and a light that does not pulse. Designs whose
-        modified channel sets the exposure are left out.
+        Designs whose modified channel sets the exposure are left out.
+
+        Parameters
+        ----------
+        block : Block
+            Designs of one family.
+
+        Returns
+        -------
+        Changing or None
+            None if other elements see the modified channel, or if the light is pulsed.
         """
         setup = self.setup
         touched = np.flatnonzero((self._modified_uniform != 0).any(axis=(0, 2)))

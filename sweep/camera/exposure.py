@@ -1,4 +1,4 @@
-"""Exposure time: fixed, or set by the brightest channel on a white patch; and the light of a scene before any pixel."""
+"""Exposure time, fixed or set by the brightest channel on a white patch, and the light of a scene."""
 
 from __future__ import annotations
 
@@ -15,7 +15,18 @@ from .setup import Setup
 
 
 def white_irradiance(setup: Setup) -> FloatArray:
-    """Photon irradiance of the white patch, flat in photons, ndarray[n_wavelengths]."""
+    """Return the photon irradiance of the white patch, which is flat in photons.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene, lights and grid.
+
+    Returns
+    -------
+    ndarray of shape (n_wavelengths,)
+        Irradiance, photons/s/m2/nm.
+    """
     scenario, grid = setup.scene, setup.camera.grid
     ratio = setup.lights.photon_ratio
     if isinstance(scenario.exposure, WhitePatchExposure) and scenario.exposure.photon_ratio is not None:
@@ -25,16 +36,38 @@ def white_irradiance(setup: Setup) -> FloatArray:
 
 
 def fixed_white(setup: Setup) -> float:
-    """Electrons/s on the white patch of the brightest channel that no design modifies."""
+    """Return electrons/s on the white patch of the brightest channel that no design modifies.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+
+    Returns
+    -------
+    float
+        Electrons/s.
+    """
     rates = setup.camera.qe[list(setup.camera.fixed)] @ white_irradiance(setup) * setup.camera.area_step_m2_nm
     return float(rates.max(initial=0.0))
 
 
 def exposure_times(setup: Setup, modified_white: FloatArray, fixed: float | None = None) -> FloatArray:
-    """Exposure of each design, s, ndarray[n_designs]; infinite where a white-patch exposure sees no light.
+    """Return the exposure time of each design.
 
-    `modified_white`: electrons/s of the modified channels on the white patch, ndarray[n_designs, n_modified]. `fixed`:
-    `fixed_white` of the setup, where it is known.
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    modified_white : ndarray of shape (n_designs, n_modified)
+        Electrons/s of the modified channels on the white patch.
+    fixed : float, optional
+        Result of `fixed_white`, if it is known.
+
+    Returns
+    -------
+    ndarray of shape (n_designs,)
+        Exposure time, s; infinite if a white-patch exposure sees no light.
     """
     exposure = setup.scene.exposure
     if not isinstance(exposure, WhitePatchExposure):
@@ -46,17 +79,35 @@ def exposure_times(setup: Setup, modified_white: FloatArray, fixed: float | None
 
 
 def may_set_exposure(setup: Setup, most: float = 1.0) -> bool:
-    """Whether a modified channel up to its base curve may be the one that is exposed for: the brightest on white.
+    """Return whether a modified channel below its base curve may be the brightest on white and set the exposure.
 
-    `most`: the largest sensitivity that it has, its sum over that of its base curve.
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    most : float
+        Largest sensitivity of the channel: the sum of its curve over that of its base.
+
+    Returns
+    -------
+    bool
+        True if it may set the exposure.
     """
     return isinstance(setup.scene.exposure, WhitePatchExposure) and not leaves_exposure(setup) >= most
 
 
 def leaves_exposure(setup: Setup) -> float:
-    """The largest sensitivity with which no modified channel is the brightest on white; infinite for dark bases.
+    """Return the largest sensitivity at which no modified channel is the brightest on white.
 
-    The white patch is flat in photons, so sums of the curves say it, the same for equal curves.
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+
+    Returns
+    -------
+    float
+        Sensitivity; infinite for dark base curves.
     """
     camera, rates = setup.camera, setup.camera.qe.sum(axis=1)
     kept, modified = (rates[list(some)].max(initial=0.0) for some in (camera.fixed, camera.modified))
@@ -64,11 +115,23 @@ def leaves_exposure(setup: Setup) -> float:
 
 
 def relative_slope(setup: Setup, white: FloatArray, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
-    """Derivative of one design's exposure over that exposure, ndarray[n_parameters].
+    """Return the derivative of one design's exposure time, relative to that time.
 
-    `white`: electrons/s for each QE of the white patch, ndarray[n_wavelengths]; `curves`: QE of the modified channels,
-    ndarray[n_modified, n_wavelengths]; `curves_gradient`: its derivative, ndarray[n_parameters, n_modified,
-    n_wavelengths].
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+    white : ndarray of shape (n_wavelengths,)
+        Electrons/s of the white patch per unit of QE.
+    curves : ndarray of shape (n_modified, n_wavelengths)
+        QE of the modified channels.
+    curves_gradient : ndarray of shape (n_parameters, n_modified, n_wavelengths)
+        Derivative of the QE.
+
+    Returns
+    -------
+    ndarray of shape (n_parameters,)
+        Relative derivative, per unit of parameter.
     """
     # By the same products: a filter that leaves its base as it is, beside a pixel of that curve, sets nothing.
     rates, kept = curves @ white, setup.camera.qe[list(setup.camera.fixed)] @ white
@@ -80,12 +143,12 @@ def relative_slope(setup: Setup, white: FloatArray, curves: FloatArray, curves_g
 
 
 class SceneLight:
-    """The light of a scene.
+    """Light of a scene.
 
-    `signals`, `white`: electrons/s for each QE of light and the white patch at every wavelength, ndarray[n_signals,
-    n_wavelengths] and ndarray[n_wavelengths]; `fixed_white`: of the brightest channel that no design modifies.
-    `moments`: of a pulse, instead of those of the accuracy (see `pwm.scales`). `positions`: a setup of each field
-    position; `angular`: the filters as the rays see them there.
+    Parameters
+    ----------
+    setup : Setup
+        Scene, lights and camera.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -98,9 +161,31 @@ class SceneLight:
         self.angular = [AngularResponse(position) for position in self.positions]
 
     def exposure_s(self, curves: FloatArray) -> FloatArray:
-        """Exposure of each design, s, ndarray[n_designs]; `curves`: ndarray[n_designs, n_modified, n_wavelengths]."""
+        """Return the exposure time of each design.
+
+        Parameters
+        ----------
+        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+
+        Returns
+        -------
+        ndarray of shape (n_designs,)
+            Exposure time, s.
+        """
         return exposure_times(self.setup, curves @ self.white, self.fixed_white)
 
     def scales(self, exposure_s: FloatArray) -> FloatArray:
-        """Light relative to its mean at the moments of a pulsed light, ndarray[n_designs, n_moments]."""
+        """Return the light relative to its mean at the moments of a pulsed light.
+
+        Parameters
+        ----------
+        exposure_s : ndarray of shape (n_designs,)
+            Exposure time, s.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_moments)
+            Relative light.
+        """
         return pwm.scales(self.setup, exposure_s, self.moments)

@@ -1,7 +1,8 @@
-"""Field positions: each has a chief ray angle and a field angle of its own.
+"""Field positions, each with its own chief ray angle and field angle.
 
-A field position is said by its image height h, 0 in the middle of the sensor and 1 in its corner. The lens has no
-distortion: the tangent of the field angle grows like h. Each is a scene of its own, with the same exposure for all.
+A field position is given by its image height h, 0 in the center of the sensor and 1 in its corner. The lens has no
+distortion: the tangent of the field angle is proportional to h. Each position is a scene of its own; all share one
+exposure.
 """
 
 from __future__ import annotations
@@ -22,7 +23,20 @@ _HALVINGS = 4
 
 
 def scene_at(scene: Scene, height: float) -> Scene:
-    """The scene as seen at an image height, 0 to 1."""
+    """Return the scene at one image height.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with a field.
+    height : float
+        Image height, 0 to 1.
+
+    Returns
+    -------
+    Scene
+        Scene with chief ray angle and field angle at this height.
+    """
     assert scene.field is not None
     corner = math.tan(math.radians(scene.off_axis_deg))
     optics = scene.optics.model_copy(update={"cra_deg": scene.field.cra_at(height)})
@@ -31,12 +45,36 @@ def scene_at(scene: Scene, height: float) -> Scene:
 
 
 def setup_at(setup: Setup, height: float) -> Setup:
-    """The setup at an image height, 0 to 1."""
+    """Return the setup at one image height.
+
+    Parameters
+    ----------
+    setup : Setup
+        Setup whose scene has a field.
+    height : float
+        Image height, 0 to 1.
+
+    Returns
+    -------
+    Setup
+        Setup at this height.
+    """
     return replace(setup, scene=scene_at(setup.scene, height))
 
 
 def field_heights(setup: Setup) -> tuple[float, ...]:
-    """Image heights at which a scene is computed; 0 where all of them see the same."""
+    """Return the image heights at which a scene is computed.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene and accuracy.
+
+    Returns
+    -------
+    tuple of float
+        Image heights, 0 to 1; (0,) if all of them are equal.
+    """
     scene = setup.scene
     if scene.field is None or not setup.positions_differ:
         return (0.0,)
@@ -47,7 +85,18 @@ def field_heights(setup: Setup) -> tuple[float, ...]:
 
 
 def over_field(setup: Setup) -> tuple[Setup, ...]:
-    """A setup of each field position that is computed; the setup itself where the scene has no field."""
+    """Return a setup for each field position that is computed.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene and accuracy.
+
+    Returns
+    -------
+    tuple of Setup
+        The setup itself if the scene has no field.
+    """
     if setup.scene.field is None:
         return (setup,)
     return tuple(setup_at(setup, height) for height in field_heights(setup))
@@ -56,11 +105,26 @@ def over_field(setup: Setup) -> tuple[Setup, ...]:
 def refined_heights(
     heights: tuple[float, ...], values: FloatArray, evaluate: Callable[[float], FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
-    """Smallest values over all image heights and where, ndarray[n_values] each, by refinement of the smallest known.
+    """Refine the smallest values over all image heights.
 
-    `values`: ndarray[n_values, n_heights], known at ascending `heights`; `evaluate`: from a height to
-    ndarray[n_values].
-    The steps around a start are halved; that no lower value lies elsewhere is not proven.
+    The steps around the two smallest known values are halved four times; it is not proven that no lower value lies
+    elsewhere.
+
+    Parameters
+    ----------
+    heights : tuple of float
+        Known image heights, ascending.
+    values : ndarray of shape (n_values, n_heights)
+        Functions of the height at these.
+    evaluate : callable
+        From an image height to ndarray of shape (n_values,).
+
+    Returns
+    -------
+    values : ndarray of shape (n_values,)
+        Smallest values.
+    heights : ndarray of shape (n_values,)
+        Image height of each.
     """
     known = dict(zip(heights, values.T, strict=True))
     at, lowest = np.zeros(len(values)), values.min(axis=1)

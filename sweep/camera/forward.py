@@ -1,6 +1,6 @@
-"""The forward model: light on the pixels, electrons, full well, readout, for a block of designs.
+"""Forward model: light on the pixels, electrons, full well, readout, for a batch of designs.
 
-In the physical order: optics, pixel aperture and mosaic sampling with crosstalk (the pixel response), photon noise,
+Stages in physical order: optics, pixel aperture and mosaic sampling with crosstalk (the pixel response), photon noise,
 full well, read noise, black level, ADC, readout. Effects that the setup leaves out are not computed.
 """
 
@@ -35,18 +35,23 @@ _BLOCK = 2_000_000
 
 
 class ForwardModel:
-    """A scene, ready for designs; the pixel response is made once it is asked for.
+    """Forward model of one scene and camera; the pixel response is computed at its first use.
 
-    `phases`: the sampling phases of a light, None of one that fills the field; of those that see the same, one.
-    `light`: the scene's; `electrons`: what the designs give on the elements of the response; `readout`: how these are
-    read.
+    Parameters
+    ----------
+    setup : Setup
+        Camera, lights, scene and accuracy.
+    phases : Phases, optional
+        Sampling phases instead of those of the scene.
+    once : bool
+        Evaluate once, so that no table of products is kept.
     """
 
     all_apart, together = False, False
     """True: all phases are kept; True: the pixels of all field positions are held together."""
 
     def __init__(self, setup: Setup, phases: Phases | None = None, *, once: bool = False) -> None:
-        """`phases`: sampling phases instead of the scene's. `once`: for a single use, so that no table is made."""
+        """Store the setup, and split responses that are too large to hold at once."""
         self.setup = setup
         self._once = once
         # Parts whose pixels would be too many to hold together: field positions, or blocks of phases.
@@ -67,7 +72,7 @@ class ForwardModel:
         self._phase_blocks = phase_blocks if len(phase_blocks) > 1 else []
 
     def _parts(self) -> Iterator[ForwardModel]:
-        """Models of the field positions, or of the blocks of phases, made as they are read; none of a whole model."""
+        """Yield the models of field positions, or of blocks of phases; nothing for an undivided model."""
         yield from self._positions
         yield from (type(self)(self.setup, block, once=True) for block in self._phase_blocks)
 
@@ -76,7 +81,20 @@ class ForwardModel:
         return bool(self._positions or self._phase_blocks)
 
     def at(self, phases: Phases | None, moments: FloatArray | None = None) -> ForwardModel:
-        """The same scene at other phases, and other moments of a pulse (see `pwm.scales`), for a single use."""
+        """Return the model of the same scene at other phases, for a single use.
+
+        Parameters
+        ----------
+        phases : Phases or None
+            Sampling phases of a target.
+        moments : ndarray of shape (n_moments,), optional
+            Moments of a pulsed light, 0 (least light) to 1 (most light).
+
+        Returns
+        -------
+        ForwardModel
+            The model at these phases and moments.
+        """
         model, light = ForwardModel(self.setup, phases, once=True), copy(self.light)
         light.moments = moments
         model.__dict__["light"] = light
@@ -86,7 +104,7 @@ class ForwardModel:
 
     @cached_property
     def light(self) -> SceneLight:
-        """The light of the scene."""
+        """Light of the scene."""
         return SceneLight(self.setup)
 
     @cached_property
@@ -101,7 +119,7 @@ class ForwardModel:
 
     @property
     def _of_channels(self) -> bool:
-        """True where the response is that of a target's channels, whose phases are kept one by one."""
+        """True if each phase of a target's channels is kept on its own."""
         return self.setup.linear and self.setup.all_phases and self.setup.scene.field is None
 
     @cached_property
@@ -115,18 +133,30 @@ class ForwardModel:
 
     @cached_property
     def readout(self) -> Readout:
-        """The readout of the elements."""
+        """Readout of the elements of the pixel response."""
         return Readout(self.setup, self._response)
 
     @property
     def n_cases(self) -> int:
-        """Sampling phases times field positions."""
+        """Number of sampling phases times number of field positions."""
         if self._positions:
             return sum(position.n_cases for position in self._positions)
         return sum(map(len, self._phase_blocks)) or self._response.shape[0]
 
     def read_changing(self, block: Block) -> Changing | None:
-        """`Electrons.changing` as read, DN; None, too, where a channel is read from several elements."""
+        """Read designs that differ in one channel alone.
+
+        Parameters
+        ----------
+        block : Block
+            Designs of one family.
+
+        Returns
+        -------
+        Changing or None
+            Digital numbers, DN; None if the designs differ in more, or if a channel is read from several
+            elements.
+        """
         if self._in_parts or not self.readout.by_channel:
             return None
         electrons = self.electrons.changing(block)
@@ -140,7 +170,20 @@ class ForwardModel:
         return replace(electrons, fixed=transfer(electrons.fixed), make=make)
 
     def read(self, curves: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The readout, DN, ndarray[n_designs, n_cases, n_signals, n_channels], and exposure, s, ndarray[n_designs]."""
+        """Read out a batch of designs.
+
+        Parameters
+        ----------
+        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+
+        Returns
+        -------
+        dn : ndarray of shape (n_designs, n_cases, n_signals, n_channels)
+            Digital numbers, DN; means under noise.
+        exposure_s : ndarray of shape (n_designs,)
+            Exposure time, s.
+        """
         return self._read_once("read", curves, self._read)
 
     def _read(self, curves: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -151,7 +194,7 @@ class ForwardModel:
         return np.concatenate(dn), exposure_s
 
     def _read_once(self, how: str, curves: FloatArray, read: Callable[[FloatArray], _Result]) -> _Result:
-        """Result of `read`; that of a single design is kept, since several tables are made of it in a row."""
+        """Return the result of `read`, and keep that of a single design, from which several tables are made."""
         if len(curves) != 1 or self._in_parts:
             return read(curves)
         asked = curves.tobytes()
@@ -162,9 +205,19 @@ class ForwardModel:
         return result
 
     def read_with_noise(self, curves: FloatArray) -> NoisyReadout:
-        """The readout as from `read`, with its variance and what errors need to know of it.
+        """Read out a batch of designs with the variance of the noise.
 
-        Pixels are read one by one, so neither saturation nor quantization may be left out.
+        Pixels are read one by one: saturation and quantization must be computed.
+
+        Parameters
+        ----------
+        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+
+        Returns
+        -------
+        NoisyReadout
+            Mean and variance of each channel, and whether the noise is Gaussian.
         """
         return self._read_once("noise", curves, self._read_with_noise)
 
@@ -182,7 +235,7 @@ class ForwardModel:
         return NoisyReadout(mean, variance, gaussian, reach, exposure_s)
 
     def _blocks(self, curves: FloatArray, exposure_s: FloatArray) -> Iterator[FloatArray]:
-        """`Electrons.expected` of blocks of designs."""
+        """Yield expected electrons of blocks of designs."""
         scales = self.light.scales(exposure_s)
         size = self.n_cases * scales.shape[1] * len(self.light.signals) * self._response.shape[1]
         step = max(1, _BLOCK // size)
@@ -191,10 +244,22 @@ class ForwardModel:
             yield self.electrons.expected(curves[block], scales[block], exposure_s[block])
 
     def pixel_electrons(self, curves: FloatArray) -> FloatArray:
-        """Expected electrons of the pixels that are read, ndarray[n_designs, n_cases, n_signals, n_pixels].
+        """Return expected electrons of the pixels that are read.
 
-        Of a light that fills the field, the pixels of one tile, row by row. Raises SweepError where the pixels of all
-        phases do not fit into memory.
+        Parameters
+        ----------
+        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_cases, n_signals, n_pixels)
+            Electrons; for a patch that fills the field, the pixels of one tile, row by row.
+
+        Raises
+        ------
+        SweepError
+            If the pixels of all phases do not fit into memory.
         """
         if self._phase_blocks:
             most = f"at most those of {len(self._phase_blocks[0])} places: a smaller light, or a named place"
@@ -208,7 +273,20 @@ class ForwardModel:
         return result
 
     def channels_of(self, pixels: FloatArray, case: int) -> FloatArray:
-        """`Readout.channels_of` at a phase and field position."""
+        """Return the channels from their pixels at one phase and field position.
+
+        Parameters
+        ----------
+        pixels : ndarray of shape (n, n_pixels)
+            Values of the pixels of `pixel_electrons`.
+        case : int
+            Index of the phase and field position.
+
+        Returns
+        -------
+        ndarray of shape (n, n_channels)
+            Readout of each channel.
+        """
         for position in self._positions:
             if case < position.n_cases:
                 return position.channels_of(pixels, case)
@@ -217,12 +295,12 @@ class ForwardModel:
 
     @property
     def few_pixels(self) -> tuple[IndexArray, ...] | None:
-        """`Readout.few_pixels`; None where a target's pixels are many."""
+        """Pixels whose mean is each channel; None for a target, or if they are many."""
         return None if self.setup.scene.target is not None else self.readout.few_pixels
 
 
 class AllPhases(ForwardModel):
-    """A forward model of all phases, for what tells a phase from its mirror image: pixels that are drawn one by one."""
+    """Forward model that keeps mirrored phases apart, for pixels that are drawn one by one."""
 
     all_apart = True
 
@@ -233,7 +311,20 @@ _known: Cache[tuple[type[ForwardModel], int], tuple[Setup, ForwardModel]] = Cach
 
 
 def forward_model(setup: Setup, kind: type[ForwardModel] = ForwardModel) -> ForwardModel:
-    """The forward model of a setup; the latest ones are kept, so that a response is made once in a process."""
+    """Return the forward model of a setup; recent models are cached.
+
+    Parameters
+    ----------
+    setup : Setup
+        Camera, lights, scene and accuracy.
+    kind : type
+        Class of the model.
+
+    Returns
+    -------
+    ForwardModel
+        The model.
+    """
 
     def made() -> tuple[Setup, ForwardModel]:
         return setup, _models.get((kind, hashlib.sha256(pickle.dumps(setup)).digest()), lambda: kind(setup))

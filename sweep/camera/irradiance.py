@@ -1,9 +1,8 @@
 """Photon irradiance on the sensor: radiance of the lights through air and lens.
 
-`scene_irradiance` makes that of a scene, and hands it to the effects of a user's own, one after the other.
-
-Extinction by haze and fog dims a target and not the background, which is nearer. Off axis a lens without vignetting
-gives cos^4 of the light, of the background, too.
+`scene_irradiance` computes the irradiance of a scene and passes it through the effects of user code. Extinction by haze
+and fog dims a target, but not the background, which is nearer. Off axis a lens without vignetting transmits cos^4 of
+the light, of the background, too.
 """
 
 from __future__ import annotations
@@ -25,7 +24,18 @@ _CONTRAST = 0.02
 
 
 def scene_irradiance(setup: Setup) -> Irradiance:
-    """Return the irradiance of a scene behind the effects of a user's own."""
+    """Return the irradiance of a scene behind veiling glare and the effects of user code.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene, lights and camera.
+
+    Returns
+    -------
+    Irradiance
+        Irradiance of signals and background, photons/s/m2/nm.
+    """
     irradiance = Irradiance(setup.camera.grid.nodes_nm, _signals(setup), _uniform(setup, setup.scene.background_cd_m2))
     if setup.scene.veiling_glare is not None:
         glare = setup.scene.veiling_glare
@@ -38,16 +48,21 @@ def scene_irradiance(setup: Setup) -> Irradiance:
 
 
 def with_veiling_glare(irradiance: Irradiance, share: float, mean: FloatArray) -> Irradiance:
-    """Spread a share of the mean light of the field evenly over the field (ISO 9358's integral of veiling glare).
+    """Spread a share of the mean light of the field evenly over the field (integral of veiling glare, ISO 9358).
 
     Parameters
     ----------
     irradiance : Irradiance
-        That of a lens without glare.
+        Irradiance of a lens without glare.
     share : float
-        0 to 1, which every pixel lacks of its own light.
-    mean : ndarray[n_wavelengths]
-        Mean irradiance of the field. The light of a signal, which is small in the field, is left out of it.
+        Share, 0 to 1, that each pixel loses of its own light.
+    mean : ndarray of shape (n_wavelengths,)
+        Mean irradiance of the field; the light of a signal, which is small in the field, is neglected.
+
+    Returns
+    -------
+    Irradiance
+        Irradiance with glare.
     """
     kept = 1 - share
     background = kept * irradiance.background + share * mean
@@ -55,17 +70,39 @@ def with_veiling_glare(irradiance: Irradiance, share: float, mean: FloatArray) -
 
 
 def signal_irradiance(setup: Setup) -> FloatArray:
-    """Photon irradiance of each signal, ndarray[n_signals, n_wavelengths]; see `Irradiance`."""
+    """Return the photon irradiance of each signal.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene, lights and camera.
+
+    Returns
+    -------
+    ndarray of shape (n_signals, n_wavelengths)
+        Irradiance where the image is whole, photons/s/m2/nm.
+    """
     return scene_irradiance(setup).signals
 
 
 def background_irradiance(setup: Setup) -> FloatArray:
-    """Photon irradiance of the uniform background, ndarray[n_wavelengths]; see `Irradiance`."""
+    """Return the photon irradiance of the uniform background.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+
+    Returns
+    -------
+    ndarray of shape (n_wavelengths,)
+        Irradiance, photons/s/m2/nm.
+    """
     return scene_irradiance(setup).background
 
 
 def _signals(setup: Setup) -> FloatArray:
-    """Irradiance of each signal, of its radiance or its luminance, ndarray[n_signals, n_wavelengths]."""
+    """Return the irradiance of each signal from its radiance or luminance, [n_signals, n_wavelengths]."""
     scene = setup.scene
     factor = irradiance_factor(scene.optics)
     luminance = scene.luminance_cd_m2
@@ -76,7 +113,7 @@ def _signals(setup: Setup) -> FloatArray:
 
 
 def _uniform(setup: Setup, luminance_cd_m2: float) -> FloatArray:
-    """Irradiance of a uniform light of some luminance, flat in photons, ndarray[n_wavelengths]."""
+    """Return the irradiance of a uniform light, flat in photons, ndarray of shape (n_wavelengths,)."""
     grid = setup.camera.grid
     if not luminance_cd_m2:
         return np.zeros(grid.size)
@@ -86,7 +123,18 @@ def _uniform(setup: Setup, luminance_cd_m2: float) -> FloatArray:
 
 
 def size_exponent(visibility_m: float) -> float:
-    """Exponent q of the wavelength in extinction (Kim, McArthur, Korevaar 2001): 0 in dense fog, 1.6 in clear air."""
+    """Return the exponent of the wavelength in extinction (Kim, McArthur, Korevaar, 2001).
+
+    Parameters
+    ----------
+    visibility_m : float
+        Meteorological visibility, m.
+
+    Returns
+    -------
+    float
+        Exponent q: 0 in dense fog, 1.6 in clear air.
+    """
     km = visibility_m / 1000
     if km < 0.5:
         return 0.0
@@ -98,9 +146,21 @@ def size_exponent(visibility_m: float) -> float:
 
 
 def air_transmittance(scene: Scene, wavelength_nm: FloatArray) -> FloatArray:
-    """Share of a target's light that the air lets through, ndarray[n_wavelengths].
+    """Return the transmittance of the air between target and camera.
 
-    exp(-beta D); beta = ln(1 / 0.02) / visibility (lambda / 550 nm)^-q (Koschmieder).
+    exp(-beta D) with beta = ln(1 / 0.02) / visibility (lambda / 550 nm)^-q (Koschmieder).
+
+    Parameters
+    ----------
+    scene : Scene
+        Visibility and distance.
+    wavelength_nm : ndarray of shape (n_wavelengths,)
+        Wavelengths, nm.
+
+    Returns
+    -------
+    ndarray of shape (n_wavelengths,)
+        Transmittance, 0 to 1.
     """
     if scene.visibility_m is None or scene.target is None:
         return np.ones(wavelength_nm.size)
@@ -110,12 +170,38 @@ def air_transmittance(scene: Scene, wavelength_nm: FloatArray) -> FloatArray:
 
 
 def relative_illumination(scene: Scene) -> float:
-    """cos^4 of the field angle."""
+    """Return the relative illumination of a lens without vignetting, cos^4 of the field angle.
+
+    Parameters
+    ----------
+    scene : Scene
+        Field angle.
+
+    Returns
+    -------
+    float
+        Relative illumination, 0 to 1.
+    """
     return math.cos(math.radians(scene.off_axis_deg)) ** 4
 
 
 def way_of_light(setup: Setup, wavelength_nm: FloatArray, *, background: bool = False) -> FloatArray:
-    """Factor of air and lens on a signal's light, or on that of the `background`, ndarray[n_wavelengths]."""
+    """Return the factor of air and lens on the light of a signal or of the background.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene and effects.
+    wavelength_nm : ndarray of shape (n_wavelengths,)
+        Wavelengths, nm.
+    background : bool
+        Return the factor on the background, which fog does not dim.
+
+    Returns
+    -------
+    ndarray of shape (n_wavelengths,)
+        Factor, 0 to 1.
+    """
     result = np.ones(wavelength_nm.size)
     if setup.computes("illumination"):
         result *= relative_illumination(setup.scene)

@@ -1,4 +1,4 @@
-"""The smooth response of a scene and the variance of its noise, with their derivatives: what a search sees.
+"""Linear response of a scene and variance of its noise, with derivatives, for the search.
 
 Nothing is clipped or rounded. The noise is that of a pixel far from both ends of its range, whose steps of rounding
 are dithered: gain^2 (n + (PRNU n)^2 + read noise^2) + 1/12 for n expected electrons (EMVA 1288).
@@ -29,60 +29,133 @@ _FIELD_POSITIONS = 9
 
 
 class LinearModel(ForwardModel):
-    """The forward model of an unclipped, unrounded readout: linear in a design's QE but for the exposure."""
+    """Forward model of an unclipped, unrounded readout, which is linear in a design's QE except for the exposure."""
 
     def smooth(self, curves: FloatArray) -> FloatArray:
-        """Unquantized, unclipped response, DN, ndarray[n_designs, n_cases, n_signals, n_channels]."""
+        """Return the unquantized, unclipped response.
+
+        Parameters
+        ----------
+        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_cases, n_signals, n_channels)
+            Response, DN.
+        """
         return self.readout.folded(unquantized(self._expected(curves), self.readout.pixel))
 
     def gradient(self, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
-        """Exact derivative of `smooth` at one design, with that of its exposure; a pulse's share of it is held.
+        """Return the exact derivative of `smooth` at one design, with that of its exposure; a pulse's share is held.
 
-        `curves`: ndarray[n_modified, n_wavelengths]; `curves_gradient`: ndarray[n_parameters, n_modified,
-        n_wavelengths]. Returns DN per unit of parameter, ndarray[n_parameters, n_cases, n_signals, n_channels].
+        Parameters
+        ----------
+        curves : ndarray of shape (n_modified, n_wavelengths)
+            QE of the modified channels.
+        curves_gradient : ndarray of shape (n_parameters, n_modified, n_wavelengths)
+            Derivative of the QE.
+
+        Returns
+        -------
+        ndarray of shape (n_parameters, n_cases, n_signals, n_channels)
+            DN per unit of parameter.
         """
         return self.smooth_with_gradient(curves, curves_gradient)[1]
 
     def smooth_with_gradient(self, curves: FloatArray, curves_gradient: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """`smooth` of one design, ndarray[n_cases, n_signals, n_channels], and its `gradient`."""
+        """Return `smooth` and `gradient` of one design.
+
+        Parameters
+        ----------
+        curves : ndarray of shape (n_modified, n_wavelengths)
+            QE of the modified channels.
+        curves_gradient : ndarray of shape (n_parameters, n_modified, n_wavelengths)
+            Derivative of the QE.
+
+        Returns
+        -------
+        response : ndarray of shape (n_cases, n_signals, n_channels)
+            Response, DN.
+        gradient : ndarray of shape (n_parameters, n_cases, n_signals, n_channels)
+            DN per unit of parameter.
+        """
         whole, slope = self._with_slope(curves, curves_gradient)
         response = self.readout.folded(unquantized(whole, self.readout.pixel))
         return response, self.readout.folded(slope * self.setup.camera.pixel.dn_per_e)
 
     def variance(self, curves: FloatArray) -> FloatArray:
-        """Variance of the noise, DN^2, of the shape of `smooth`."""
+        """Return the variance of the noise.
+
+        Parameters
+        ----------
+        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_cases, n_signals, n_channels)
+            Variance, DN^2.
+        """
         electrons, pixel = self.by_pixel._expected(curves), self.readout.pixel
         own = electrons + (pixel.prnu * electrons) ** 2 + pixel.read_noise_e**2
         return self.by_pixel.readout.spread(pixel.dn_per_e**2 * own + _STEPS_DN2)
 
     def variance_gradient(self, curves: FloatArray, curves_gradient: FloatArray) -> FloatArray:
-        """Exact derivative of `variance` at one design, DN^2 per unit of parameter; see `gradient`."""
+        """Return the exact derivative of `variance` at one design.
+
+        Parameters
+        ----------
+        curves : ndarray of shape (n_modified, n_wavelengths)
+            QE of the modified channels.
+        curves_gradient : ndarray of shape (n_parameters, n_modified, n_wavelengths)
+            Derivative of the QE.
+
+        Returns
+        -------
+        ndarray of shape (n_parameters, n_cases, n_signals, n_channels)
+            DN^2 per unit of parameter.
+        """
         pixel = self.readout.pixel
         whole, slope = self.by_pixel._with_slope(curves, curves_gradient)
         per_e = pixel.dn_per_e**2 * (1 + 2 * pixel.prnu**2 * whole)
         return self.by_pixel.readout.spread(per_e * slope)
 
     def spread_electrons(self, curves: FloatArray) -> FloatArray:
-        """Expected electrons of the pixels, each with its share of a channel's variance, of the shape of `smooth`."""
+        """Return expected electrons of the pixels, weighted by their shares of a channel's variance.
+
+        Parameters
+        ----------
+        curves : ndarray of shape (n_designs, n_modified, n_wavelengths)
+            QE of the modified channels.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_cases, n_signals, n_channels)
+            Electrons.
+        """
         return self.by_pixel.readout.spread(self.by_pixel._expected(curves))
 
     def spread_shares(self) -> FloatArray:
-        """Sum of the shares that the pixels have in a channel's variance, ndarray[n_cases, n_channels]."""
+        """Return the sum of the pixels' shares of a channel's variance.
+
+        Returns
+        -------
+        ndarray of shape (n_cases, n_channels)
+            Sum of the shares.
+        """
         response = self.by_pixel.electrons.response
         repeats = self.by_pixel._expected(self.setup.camera.base_qe[None]).shape[1] // len(response.spread)
         return np.repeat(response.spread.sum(axis=1), repeats, axis=0)
 
     @cached_property
     def members(self) -> dict[str, IndexArray]:
-        """Signal type -> indices of its signals."""
+        """Indices of the signals of each signal type."""
         return self.setup.members
 
     @cached_property
     def by_pixel(self) -> LinearModel:
-        """The same scene with its pixels kept apart, whose variances are not those of their mean.
-
-        Raises SweepError where the pixels of all places of the light do not fit into memory.
-        """
+        """Model of the same scene with single pixels; raises SweepError if they do not fit into memory."""
         setup = replace(self.setup, left_out=self.setup.left_out - {"saturation", "quantization"})
         result = _ByPixel(setup)
         if result._phase_blocks:
@@ -92,12 +165,12 @@ class LinearModel(ForwardModel):
         return result
 
     def _expected(self, curves: FloatArray) -> FloatArray:
-        """Expected electrons of the units, ndarray[n_designs, n_cases, n_signals, n_units]."""
+        """Return expected electrons, ndarray of shape (n_designs, n_cases, n_signals, n_elements)."""
         exposure_s = self.light.exposure_s(curves)
         return self.electrons.expected(curves, self.light.scales(exposure_s), exposure_s)
 
     def _with_slope(self, curves: FloatArray, curves_gradient: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """`_expected` of one design, and its exact derivative, electrons per unit of parameter; see `gradient`."""
+        """Return expected electrons and their derivative."""
         own, n = self.electrons, len(curves_gradient)
         one = curves[None]
         exposure_s = self.light.exposure_s(one)
@@ -110,19 +183,40 @@ class LinearModel(ForwardModel):
         return whole, np.asarray(slope + relative[:, None, None, None] * whole, dtype=float)
 
     def per_qe(self, modified: int, curves: FloatArray) -> FloatArray:
-        """DN per QE of one modified channel at every wavelength, with the exposure of the design `curves`.
+        """Return the response per unit of QE of one modified channel at every wavelength.
 
-        ndarray[n_cases, n_signals, n_units, n_wavelengths]; the smooth response is linear in it where N does not set
-        the exposure.
+        The smooth response is linear in it if the channel does not set the exposure.
+
+        Parameters
+        ----------
+        modified : int
+            Index among the modified channels.
+        curves : ndarray of shape (n_modified, n_wavelengths)
+            QE of the design whose exposure is used.
+
+        Returns
+        -------
+        ndarray of shape (n_cases, n_signals, n_elements, n_wavelengths)
+            DN per unit of QE.
         """
         response, channel = self.electrons.response, self.setup.camera.modified[modified]
         rates = self._per_qe(modified, curves, response.light[:, :, channel], response.uniform[:, :, channel])
         return rates * self.setup.camera.pixel.dn_per_e
 
     def spread_per_qe(self, modified: int, curves: FloatArray) -> FloatArray:
-        """Electrons per QE of one modified channel in its pixels, each with its share of the channel's variance.
+        """Return electrons per unit of QE of one modified channel in its pixels, weighted by their shares of variance.
 
-        ndarray[n_cases, n_signals, n_wavelengths]; see `per_qe`.
+        Parameters
+        ----------
+        modified : int
+            Index among the modified channels.
+        curves : ndarray of shape (n_modified, n_wavelengths)
+            QE of the design whose exposure is used.
+
+        Returns
+        -------
+        ndarray of shape (n_cases, n_signals, n_wavelengths)
+            Electrons per unit of QE.
         """
         own, channel = self.by_pixel, self.setup.camera.modified[modified]
         response = own.electrons.response
@@ -136,10 +230,7 @@ class LinearModel(ForwardModel):
         return own._per_qe(modified, curves, light[:, None], uniform[:, None])[:, :, 0]
 
     def _per_qe(self, modified: int, curves: FloatArray, light: FloatArray, uniform: FloatArray) -> FloatArray:
-        """Electrons per QE of one modified channel, ndarray[n_cases, n_signals, n_units, n_wavelengths].
-
-        `light`, `uniform`: what units get through it, see `PixelResponse`, without the axis of the channels.
-        """
+        """Return electrons per unit of QE of one modified channel, from light and uniform weights of its elements."""
         own, channel = self.electrons, self.setup.camera.modified[modified]
         exposure_s = self.light.exposure_s(curves[None])
         scales = self.light.scales(exposure_s)[0]
@@ -151,7 +242,7 @@ class LinearModel(ForwardModel):
 
 
 class _ByPixel(LinearModel):
-    """A linear model whose pixels are kept apart, those of all field positions together."""
+    """Linear model of single pixels, those of all field positions together."""
 
     together = True
 
@@ -160,10 +251,17 @@ _models: Cache[bytes, LinearModel] = Cache(16)
 
 
 def linear_model(setup: Setup) -> LinearModel:
-    """The linear model of a setup: what a search sees.
+    """Return the linear model of a setup; recent models are cached.
 
-    The latest ones are kept, so that a response is made once in a process. All places of the sensor are seen at few
-    field positions.
+    Parameters
+    ----------
+    setup : Setup
+        Camera, lights, scene and accuracy; at most 9 field positions and 2 moments of a pulse are used.
+
+    Returns
+    -------
+    LinearModel
+        The model.
     """
     few = setup.accuracy.model_copy(
         update={"field_positions": min(setup.accuracy.field_positions, _FIELD_POSITIONS), "pwm_moments": 2}

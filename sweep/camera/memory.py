@@ -1,4 +1,4 @@
-"""Memory of the pixel responses of a scene, before they are made."""
+"""Estimate of the memory of the pixel responses of a scene."""
 
 from __future__ import annotations
 
@@ -16,7 +16,18 @@ _COPIES = 4
 
 
 def pixels_per_phase(setup: Setup) -> int:
-    """About how many pixels are computed around a light."""
+    """Estimate the number of pixels that are computed around a light.
+
+    Parameters
+    ----------
+    setup : Setup
+        Target and mosaic.
+
+    Returns
+    -------
+    int
+        Pixels.
+    """
     target, rows_columns = setup.scene.target, setup.camera.mosaic.indices.shape
     assert target is not None
     reach = reach_px(setup, target)
@@ -24,9 +35,19 @@ def pixels_per_phase(setup: Setup) -> int:
 
 
 def bytes_per_phase(setup: Setup, *, by_pixel: bool) -> int:
-    """About how much memory the response at one phase takes while it is made.
+    """Estimate the memory of the response at one phase.
 
-    Pixels are held in factors (see `SplitLight`), those of one field position after the other.
+    Parameters
+    ----------
+    setup : Setup
+        Scene, mosaic and grid.
+    by_pixel : bool
+        Single pixels, factored (see `SplitLight`), one field position after the other.
+
+    Returns
+    -------
+    int
+        Bytes.
     """
     n = len(setup.camera.mosaic.channels)
     if by_pixel:
@@ -35,13 +56,37 @@ def bytes_per_phase(setup: Setup, *, by_pixel: bool) -> int:
 
 
 def blocks(setup: Setup, phases: Phases) -> list[Phases]:
-    """Phases whose responses, pixel by pixel, fit into half of `MOST_BYTES` together."""
+    """Split phases into blocks whose responses of single pixels fit into half of `MOST_BYTES`.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene, mosaic and grid.
+    phases : Phases
+        Sampling phases.
+
+    Returns
+    -------
+    list of Phases
+        Blocks.
+    """
     step = max(1, MOST_BYTES // 2 // bytes_per_phase(setup, by_pixel=True))
     return [phases.subset(slice(at, at + step)) for at in range(0, len(phases), step)]
 
 
 def too_large(setup: Setup) -> tuple[str, str, str] | None:
-    """Why a target's response is not computed: problem, value, what is allowed; None when it is."""
+    """Return the reason why a target's response is not computed.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene, mosaic and accuracy.
+
+    Returns
+    -------
+    tuple of str or None
+        Problem, value, and allowed values; None if it is computed.
+    """
     if setup.scene.target is None:
         return None
     channels = f"{len(setup.camera.mosaic.channels)} channels and {setup.camera.grid.size} wavelengths"

@@ -1,4 +1,4 @@
-"""A color filter array is an integer tile over named channels."""
+"""Color filter array as an integer tile over named channels."""
 
 from __future__ import annotations
 
@@ -16,10 +16,19 @@ _TOKEN = re.compile(r"[A-Z][a-z0-9]*")
 
 @dataclass(frozen=True)
 class Mosaic:
-    """`tile[row][column]` indexes `channels`; the tile repeats over the sensor.
+    """Color filter array.
 
-    Channels are kept once each, in the order of their first pixel, so `len(channels)` is the paper's m_p
-    (RGGB 3, RCCC 2, RCCB 3, RYYCy 3, RYNCy 4): a channel that occurs more than once counts once.
+    Each channel is kept once, in the order of its first pixel, so that ``len(channels)`` is the paper's m_p (RGGB 3,
+    RCCC 2, RCCB 3, RYYCy 3, RYNCy 4).
+
+    Parameters
+    ----------
+    name : str
+        Name.
+    channels : tuple of str
+        Names of the channels.
+    tile : tuple of tuple of int
+        ``tile[row][column]`` indexes `channels`; the tile repeats over the sensor.
     """
 
     name: str
@@ -28,7 +37,25 @@ class Mosaic:
 
     @classmethod
     def from_rows(cls, name: str, rows: Sequence[Sequence[str]]) -> Mosaic:
-        """Make a mosaic from rows of channel names; raises SweepError on an empty or ragged tile."""
+        """Make a mosaic from rows of channel names.
+
+        Parameters
+        ----------
+        name : str
+            Name.
+        rows : sequence of sequence of str
+            Channel of each pixel of the tile.
+
+        Returns
+        -------
+        Mosaic
+            The mosaic.
+
+        Raises
+        ------
+        SweepError
+            If the tile is empty or ragged.
+        """
         if not rows or not rows[0] or any(len(row) != len(rows[0]) for row in rows):
             raise SweepError(Fault("a tile needs rows of equal length", key=name, value=[list(row) for row in rows]))
         channels = tuple(dict.fromkeys(channel for row in rows for channel in row))
@@ -36,10 +63,22 @@ class Mosaic:
 
     @classmethod
     def from_name(cls, name: str) -> Mosaic:
-        """Read a 2x2 CFA from its name, row by row: `RYYCy` is R Y / Y Cy.
+        """Make a 2 x 2 mosaic from its name, row by row: ``RYYCy`` is R Y / Y Cy.
 
-        A channel is a capital letter and the small letters and digits that follow it. Raises SweepError unless the
-        name has exactly four channels.
+        Parameters
+        ----------
+        name : str
+            Four channels, each a capital letter and the small letters and digits that follow it.
+
+        Returns
+        -------
+        Mosaic
+            The mosaic.
+
+        Raises
+        ------
+        SweepError
+            If the name does not have exactly four channels.
         """
         tokens = _TOKEN.findall(name)
         if "".join(tokens) != name or len(tokens) != 4:
@@ -54,15 +93,15 @@ class Mosaic:
 
     @property
     def colorless(self) -> Mosaic:
-        """The same tile with numbers for colors: all that the light of a pixel depends on before its filter."""
+        """The same tile with numbers for channels: the part that the light on a pixel depends on before its filter."""
         return Mosaic("", tuple(str(at) for at in range(len(self.channels))), self.tile)
 
     @property
     def indices(self) -> IndexArray:
-        """The tile as ndarray[rows, columns] of channel indices."""
+        """Tile as ndarray of shape (rows, columns) of channel indices."""
         return np.asarray(self.tile, dtype=np.intp)
 
     @property
     def counts(self) -> IndexArray:
-        """Pixels per tile of each channel, ndarray[n_channels]."""
+        """Pixels of each channel per tile, ndarray of shape (n_channels,)."""
         return np.bincount(self.indices.ravel(), minlength=len(self.channels))

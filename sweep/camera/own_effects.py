@@ -1,4 +1,4 @@
-"""An effect of a user's own, or one that an installed package offers: a function of the irradiance on the sensor."""
+"""Effects of user code or of an installed package: functions of the irradiance on the sensor."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from ..base.types import FloatArray
 
 @dataclass(frozen=True)
 class Irradiance:
-    """Photon irradiance on the sensor, on axis, before air and relative illumination dim it; photons/s/m^2/nm.
+    """Photon irradiance on the sensor, on axis, before air and relative illumination dim it, photons/s/m2/nm.
 
-    Attributes
+    Parameters
     ----------
-    wavelength_nm : ndarray[n_wavelengths]
+    wavelength_nm : ndarray of shape (n_wavelengths,)
         Equidistant, ascending.
-    signals : ndarray[n_signals, n_wavelengths]
-        Each signal's where its image is whole.
-    background : ndarray[n_wavelengths]
+    signals : ndarray of shape (n_signals, n_wavelengths)
+        Irradiance of each signal where its image is whole.
+    background : ndarray of shape (n_wavelengths,)
         Uniform over the field.
     """
 
@@ -32,23 +32,37 @@ class Irradiance:
 
 @dataclass(frozen=True)
 class OwnEffect:
-    """A function of an `Irradiance` and its `Scene` that returns an `Irradiance`.
+    """Function of an `Irradiance` and its `Scene` that returns an `Irradiance`.
 
-    It is always computed, since it has no bound. It must not depend on anything else, so that a study gives the same
-    rows again.
+    It is always computed, since it has no bound, and must depend on nothing else.
     """
 
     code: OwnCode
 
     @property
     def name(self) -> str:
-        """Its name in plans and provenance."""
+        """Name in plans and provenance."""
         return own_name(self.code.name)
 
     def applied(self, irradiance: Irradiance, scene: object) -> tuple[FloatArray, FloatArray]:
-        """Irradiance of signals and background behind the effect, in the shapes of those before it.
+        """Return the irradiance of signals and background behind the effect.
 
-        Raises SweepError for what is raised, and for what is no irradiance: another shape, negative or not finite.
+        Parameters
+        ----------
+        irradiance : Irradiance
+            Irradiance before the effect.
+        scene : Scene
+            Scenario of the study.
+
+        Returns
+        -------
+        signals, background : ndarray
+            Irradiance in the shapes of those before it, photons/s/m2/nm.
+
+        Raises
+        ------
+        SweepError
+            If the code raises, or returns another shape, negative or non-finite values.
         """
         result = self.code.called(self.code.loaded, irradiance, scene)
         behind = []

@@ -1,8 +1,8 @@
 """Sampling phases: where the light's center falls on the mosaic.
 
-A scene names a phase, or asks for the worst of `any`. Then a lattice of phases over the tile is computed, those that
-see the same by symmetry once. For CSDs it is four times as fine, and its worst phases are refined: neighbors at half
-the step are compared, down to the finest one.
+A scene names a phase, or asks for the worst of `any`. Then a lattice of phases over the tile is computed, phases that
+are equal by symmetry once. For CSDs the lattice is four times as fine, and its worst phases are refined: neighbors at
+half the step are compared, down to the finest one.
 """
 
 from __future__ import annotations
@@ -32,8 +32,12 @@ _NEIGHBORS = np.array([[x, y] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0
 class Phases:
     """Sampling phases and the pixel at which each is read out.
 
-    `center_px`: the light's center, ndarray[n_phases, 2] as (column, row), pixels. `nearest_px`: ndarray[n_phases, 2],
-    the pixel nearest to it; halfway between two it is either.
+    Parameters
+    ----------
+    center_px : ndarray of shape (n_phases, 2)
+        Center of the light as (column, row), pixels.
+    nearest_px : ndarray of shape (n_phases, 2)
+        Nearest pixel; halfway between two pixels it is either of them.
     """
 
     center_px: FloatArray
@@ -44,28 +48,76 @@ class Phases:
 
     @property
     def keys(self) -> list[tuple[float, ...]]:
-        """A key of each phase."""
+        """Hashable key of each phase."""
         return [tuple(row) for row in np.concatenate([self.center_px, self.nearest_px], axis=1).tolist()]
 
     def subset(self, which: slice | IndexArray) -> Phases:
-        """Some of the phases."""
+        """Return some of the phases.
+
+        Parameters
+        ----------
+        which : slice or ndarray of int
+            Indices of phases.
+
+        Returns
+        -------
+        Phases
+            The selected phases.
+        """
         return Phases(self.center_px[which], self.nearest_px[which])
 
 
 def lattice_px(mosaic: Mosaic, steps_per_px: int) -> FloatArray:
-    """Centers of a square lattice over the tile, ndarray[n, 2] as (column, row)."""
+    """Return the centers of a square lattice over the tile.
+
+    Parameters
+    ----------
+    mosaic : Mosaic
+        Tile.
+    steps_per_px : int
+        Steps along each side of a pixel.
+
+    Returns
+    -------
+    ndarray of shape (n_phases, 2)
+        Centers as (column, row), pixels.
+    """
     rows, columns = mosaic.indices.shape
     x, y = np.meshgrid(np.arange(columns * steps_per_px) / steps_per_px, np.arange(rows * steps_per_px) / steps_per_px)
     return np.stack([x.ravel(), y.ravel()], axis=1)
 
 
 def n_phases(setup: Setup) -> int:
-    """Phases of the lattice of a scene; 1 where it names the phase, or the light fills the field."""
+    """Return the number of phases of a scene's lattice.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene, mosaic and accuracy.
+
+    Returns
+    -------
+    int
+        1 if the scene names the phase, or if the light fills the field.
+    """
     return setup.accuracy.phases_per_px * setup.camera.mosaic.indices.size if setup.all_phases else 1
 
 
 def scene_phases(setup: Setup) -> Phases:
-    """The phases of a scene: the whole lattice, or the named one; this one, halfway, is read at the pixel before."""
+    """Return the phases of a scene: the whole lattice, or the named one.
+
+    A named phase halfway between two pixels is read at the first of them.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene, mosaic and accuracy.
+
+    Returns
+    -------
+    Phases
+        Sampling phases.
+    """
     target = setup.scene.target
     rows, columns = setup.camera.mosaic.indices.shape
     if target is None:
@@ -78,9 +130,23 @@ def scene_phases(setup: Setup) -> Phases:
 
 
 def different_phases(setup: Setup, phases: Phases) -> tuple[Phases, IndexArray]:
-    """Phases that see something else than all before them, and which of these each phase sees, ndarray[n].
+    """Return phases that differ by more than symmetry.
 
-    Of a mean over the light, mirrored phases see the same.
+    With the mean over the light, mirrored phases are equal.
+
+    Parameters
+    ----------
+    setup : Setup
+        Target and mosaic.
+    phases : Phases
+        Sampling phases.
+
+    Returns
+    -------
+    different : Phases
+        The first phase of each set of equal ones.
+    which : ndarray of int, shape (n_phases,)
+        Index in `different` of each phase.
     """
     target, tile = setup.scene.target, setup.camera.mosaic.indices
     keys = np.concatenate([phases.center_px, phases.nearest_px], axis=1)
@@ -95,7 +161,7 @@ def different_phases(setup: Setup, phases: Phases) -> tuple[Phases, IndexArray]:
 
 
 def _folded(along: FloatArray, mirror: float | None, period: int) -> FloatArray:
-    """Places along an axis, each as the one of its mirror images that stands for it."""
+    """Return positions along an axis folded at the mirror."""
     if mirror is None:
         return np.asarray(np.mod(along, period))
     beyond = np.mod(along - mirror, period)
@@ -103,14 +169,27 @@ def _folded(along: FloatArray, mirror: float | None, period: int) -> FloatArray:
 
 
 def _mirror(rows: IndexArray) -> float | None:
-    """Position where rows are their own mirror image, pixels; None where they are not."""
+    """Return the position at which rows are mirror-symmetric, pixels; None if there is none."""
     n = len(rows)
     mirrors = [m for m in range(n) if np.array_equal(rows[(m - np.arange(n)) % n], rows)]
     return mirrors[0] / 2 if mirrors else None
 
 
 def read_at(target: Target, centers_px: FloatArray) -> Phases:
-    """Phases at some centers; of a readout at the center with each of the pixels that are equally near."""
+    """Return phases at some centers; a readout at the center has one phase for each of equally near pixels.
+
+    Parameters
+    ----------
+    target : Target
+        Readout.
+    centers_px : ndarray of shape (n, 2)
+        Centers as (column, row), pixels.
+
+    Returns
+    -------
+    Phases
+        Phases; those beyond the first n are at further nearest pixels.
+    """
     low, high = np.ceil(centers_px - 0.5), np.floor(centers_px + 0.5)
     result = Phases(centers_px, low)
     if target.readout == "center":
@@ -124,7 +203,20 @@ def read_at(target: Target, centers_px: FloatArray) -> Phases:
 
 
 def fine_lattice(setup: Setup) -> tuple[Phases, float]:
-    """Different phases of the lattice from which extremes are refined, and its step, pixels."""
+    """Return the phases of the lattice from which extremes are refined.
+
+    Parameters
+    ----------
+    setup : Setup
+        Target, mosaic and accuracy.
+
+    Returns
+    -------
+    phases : Phases
+        Phases that differ by more than symmetry.
+    step_px : float
+        Step of the lattice, pixels.
+    """
     target, steps = setup.scene.target, _FINER * setup.accuracy.phase_steps_per_px
     assert target is not None
     while True:
@@ -137,25 +229,31 @@ def fine_lattice(setup: Setup) -> tuple[Phases, float]:
 def refined_minima(
     setup: Setup, lattice: Phases, step_px: float, values: FloatArray, evaluate: Callable[[Phases], FloatArray]
 ) -> tuple[FloatArray, Phases]:
-    """Smallest values over all phases, ndarray[n_values], and where, by refinement of the smallest ones of a lattice.
+    """Refine the smallest values over all sampling phases.
 
-    A pattern search: from each of the best known phases, none within a step of a better one, to the best of those
-    around it at half the lattice's step; then again, from the best of all that is known by then, with half the step
-    before; at the finest step as long as it is better. It finds a minimum near good phases; that no lower one lies
-    elsewhere is not proven.
+    A pattern search: from each of the best known phases to the best neighbor at half the step of the lattice; then
+    again, from the best of all known phases, at half the step before; at the finest step as long as values fall. It
+    finds minima near good phases; it does not prove that no lower one lies elsewhere.
 
     Parameters
     ----------
     setup : Setup
         Scene and accuracy.
     lattice : Phases
-        The different phases that are known.
+        Known phases, which differ by more than symmetry.
     step_px : float
         Their distance along rows and columns, pixels.
-    values : ndarray[n_values, n_lattice]
+    values : ndarray of shape (n_values, n_lattice)
         Functions of the phase at these.
     evaluate : callable
-        From phases to the values there, ndarray[n_values, n_phases].
+        From phases to the values there, ndarray of shape (n_values, n_phases).
+
+    Returns
+    -------
+    values : ndarray of shape (n_values,)
+        Smallest values.
+    phases : Phases
+        Phase of each smallest value.
     """
     target, finest, n_starts = setup.scene.target, setup.accuracy.finest_phase_px, _STARTS
     assert target is not None
@@ -191,7 +289,7 @@ def refined_minima(
 def _apart(
     centers_px: FloatArray, values: FloatArray, n_starts: int, step_px: float, period_px: IndexArray
 ) -> IndexArray:
-    """Indices of the smallest values, of which none lies within a step of one that is smaller, ndarray[n_starts]."""
+    """Return the indices of the smallest values that are more than a step apart, ndarray of shape (n_starts,)."""
     starts: list[int] = []
     order = np.argsort(values, kind="stable")
     while len(starts) < n_starts and order.size:
@@ -204,7 +302,7 @@ def _apart(
 def _known_or_evaluated(
     phases: Phases, known: dict[tuple[float, ...], FloatArray], evaluate: Callable[[Phases], FloatArray]
 ) -> FloatArray:
-    """Values at phases, ndarray[n_values, n_phases], each evaluated once."""
+    """Return values at phases, ndarray of shape (n_values, n_phases), and evaluate the unknown ones."""
     keys = phases.keys
     new = np.array([at for at, key in enumerate(keys) if key not in known], dtype=np.intp)
     if new.size:

@@ -1,7 +1,8 @@
-"""Pixel response: the weight of each quantum efficiency in each readout element, at each sampling phase.
+"""Pixel response: the weight of each QE in each readout element, at each sampling phase.
 
-Optics do not depend on the filter. So everything between the scene and the pixels' electrons is a weight per wavelength
-for each readout element (a channel's mean, or a single pixel) and each channel whose filter it looks through.
+Optics do not depend on the filter. Everything between the scene and the electrons of the pixels is therefore a weight
+per wavelength for each readout element (the mean of a channel, or a single pixel) and each channel whose filter it
+sees.
 """
 
 from __future__ import annotations
@@ -33,12 +34,26 @@ _KEPT_BYTES = 32 * 2**20
 
 @dataclass(frozen=True)
 class SplitLight:
-    """`PixelResponse.light` of pixels, ndarray[n_cases, n_elements, n_channels, n_wavelengths], in factors.
+    """`PixelResponse.light` of single pixels in factors.
 
-    `values`: functions of the light at each different place, ndarray[n_places, n_functions]; `shares`: how much of each
-    is in each wavelength, ndarray[n_functions, n_wavelengths], None where all see the same; `factor`: of the light's
-    way, ndarray[n_wavelengths]. A pixel is a sum of parts: `parts`: how much of each, ndarray[n_parts]; `place`: where
-    it is, ndarray[n_parts, n_cases, n_elements]; `through`: whose filter it has, ndarray[n_parts, n_elements].
+    A pixel is a sum of parts, each at a distinct place behind the filter of one channel.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n_places, n_functions)
+        Functions of the light at each distinct place.
+    shares : ndarray of shape (n_functions, n_wavelengths) or None
+        Share of each function in each wavelength; None if all wavelengths are equal.
+    factor : ndarray of shape (n_wavelengths,)
+        Factor of air and lens.
+    parts : ndarray of shape (n_parts,)
+        Weight of each part.
+    place : ndarray of int, shape (n_parts, n_cases, n_elements)
+        Place of each part.
+    through : ndarray of int, shape (n_parts, n_elements)
+        Channel whose filter each part has.
+    n_channels : int
+        Channels of the mosaic.
     """
 
     values: FloatArray
@@ -51,11 +66,17 @@ class SplitLight:
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
-        """Shape of the array."""
+        """Shape (n_cases, n_elements, n_channels, n_wavelengths) of the array."""
         return (*self.place.shape[1:], self.n_channels, self.factor.size)
 
     def whole(self) -> FloatArray:
-        """The array itself."""
+        """Return the array.
+
+        Returns
+        -------
+        ndarray of shape (n_cases, n_elements, n_channels, n_wavelengths)
+            Product of the factors.
+        """
         by_place = (self.values if self.shares is None else self.values @ self.shares) * self.factor
         result = np.zeros(self.shape)
         pixels = np.arange(self.place.shape[2])
@@ -64,16 +85,24 @@ class SplitLight:
         return result
 
     def _seen(self, spectra: FloatArray) -> FloatArray:
-        """Sums over the wavelengths at each place: ndarray[..., n, n_wavelengths] -> ndarray[..., n_places, n]."""
+        """Sum over the wavelengths at each place: [..., n, n_wavelengths] to [..., n_places, n]."""
         seen = spectra * self.factor
         by_function = seen.sum(axis=-1, keepdims=True) if self.shares is None else seen @ self.shares.T
         return np.asarray(self.values @ np.swapaxes(by_function, -1, -2), dtype=float)
 
     def add_sums(self, spectra: FloatArray, channels: Sequence[int], found: FloatArray) -> None:
-        """Add sums over channels and wavelengths to `found`, ndarray[n_designs, n_cases, n_signals, n_elements].
+        """Add sums over channels and wavelengths in place.
 
-        `spectra`: QE times signals, ndarray[n_designs, n_channels, n_signals, n_wavelengths], of the `channels`. Other
-        designs change one by no more than rounding.
+        Results of one design do not depend on other designs, except for rounding.
+
+        Parameters
+        ----------
+        spectra : ndarray of shape (n_designs, n_channels, n_signals, n_wavelengths)
+            QE times signals.
+        channels : sequence of int
+            Channels of the second axis.
+        found : ndarray of shape (n_designs, n_cases, n_signals, n_elements)
+            Array that is changed.
         """
         from .compiled import gather  # noqa: PLC0415  (compiled: kept off the start-up path)
 
@@ -82,9 +111,19 @@ class SplitLight:
         gather(np.ascontiguousarray(self._seen(spectra)), self.parts, self.place, row[self.through], found)
 
     def folded(self, weights: FloatArray, channel: int) -> FloatArray:
-        """Weighted sums over the elements of their light through one channel's filter, ndarray[n_cases, n_wavelengths].
+        """Sum light through one channel's filter over the elements.
 
-        `weights`: ndarray[n_cases, n_elements].
+        Parameters
+        ----------
+        weights : ndarray of shape (n_cases, n_elements)
+            Weight of each element.
+        channel : int
+            Index of the channel.
+
+        Returns
+        -------
+        ndarray of shape (n_cases, n_wavelengths)
+            Weighted sums.
         """
         by_place = np.zeros((len(weights), len(self.values)))
         for share, place, through in zip(self.parts, self.place, self.through, strict=True):
@@ -99,10 +138,18 @@ class SplitLight:
 class PixelResponse:
     """Weights of a scene.
 
-    `source`: `light` as an array, or, of the pixels of a target, in factors. `uniform`: ndarray[n_phases, n_elements,
-    n_channels], the same of a uniform background, which nothing has dimmed yet. `readout`: ndarray[n_phases,
-    n_elements, n_channels], weight of each element in the value of each channel, `spread`: of its variance in that of
-    the channel. `by_channel`: whether each element is a channel; else it is a pixel.
+    Parameters
+    ----------
+    source : ndarray or SplitLight
+        `light`, as an array or in factors.
+    uniform : ndarray of shape (n_phases, n_elements, n_channels)
+        Weights of a uniform background, not dimmed by air or lens.
+    readout : ndarray of shape (n_phases, n_elements, n_channels)
+        Weight of each element in the value of each channel.
+    spread : ndarray of shape (n_phases, n_elements, n_channels)
+        Weight of its variance in that of the channel.
+    by_channel : bool
+        True if each element is a channel; else it is a pixel.
     """
 
     source: FloatArray | SplitLight
@@ -113,35 +160,52 @@ class PixelResponse:
 
     @cached_property
     def light(self) -> FloatArray:
-        """Light of a signal on an element through each channel's filter, relative to a uniform field on axis
-        in clear air, ndarray[n_phases, n_elements, n_channels, n_wavelengths].
+        """Light on each element through each channel's filter, relative to a uniform field on axis in clear air.
+
+        ndarray of shape (n_phases, n_elements, n_channels, n_wavelengths).
         """
         return self.source.whole() if isinstance(self.source, SplitLight) else self.source
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Phases and elements."""
+        """Number of phases and elements."""
         return self.source.shape[0], self.source.shape[1]
 
 
 def colorless(setup: Setup) -> Setup:
-    """The setup without filters, which is all that responses depend on; the same for CFAs whose tiles are alike."""
+    """Return the setup without filters, which responses do not depend on.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+
+    Returns
+    -------
+    Setup
+        The same for all CFAs with equal tiles.
+    """
     camera = setup.camera
     dark = {"qe": np.zeros_like(camera.qe), "clear_qe": np.zeros_like(camera.clear_qe)}
     return setup.with_camera(mosaic=camera.mosaic.colorless, modified=(), technologies=(), **dark)
 
 
 def pixel_response(setup: Setup, phases: Phases | None, *, by_pixel: bool) -> PixelResponse:
-    """The response at every wavelength of the grid, of one field position after the other.
+    """Compute the pixel response at every wavelength of the grid, one field position after the other.
 
     Parameters
     ----------
     setup : Setup
         Camera, scene and accuracy.
     phases : Phases or None
-        Sampling phases of a target; None where the light fills the field.
+        Sampling phases of a target; None if the light fills the field.
     by_pixel : bool
-        Keep the pixels apart, for a readout that is not linear.
+        Keep single pixels, for a nonlinear readout.
+
+    Returns
+    -------
+    PixelResponse
+        Weights.
     """
     wavelength_nm = setup.camera.grid.nodes_nm
     if setup.scene.field is not None:
@@ -167,19 +231,32 @@ def pixel_response(setup: Setup, phases: Phases | None, *, by_pixel: bool) -> Pi
 
 
 def _one_light(source: FloatArray | SplitLight) -> bool:
-    """True where every wavelength sees the same."""
+    """Return whether all wavelengths are equal."""
     return source.shares is None if isinstance(source, SplitLight) else bool(source.shape[-1] == 1)
 
 
 class ChannelResponses:
-    """Responses of channels at phases, each made once for all CFAs whose tiles are alike; threads take turns."""
+    """Cache of channel responses by phase, shared by CFAs with equal tiles; thread-safe."""
 
     def __init__(self) -> None:
         self._known: dict[tuple[float, ...], tuple[FloatArray, FloatArray]] = {}
         self._one_at_a_time = threading.Lock()
 
     def at(self, setup: Setup, phases: Phases) -> PixelResponse:
-        """The response at some phases."""
+        """Return the response at some phases.
+
+        Parameters
+        ----------
+        setup : Setup
+            Scene and camera.
+        phases : Phases
+            Sampling phases.
+
+        Returns
+        -------
+        PixelResponse
+            Weights of the channels.
+        """
         keys = phases.keys
         with self._one_at_a_time:
             new = [at for at, key in enumerate(keys) if key not in self._known]
@@ -201,12 +278,38 @@ _RESPONSES: Cache[bytes, PixelResponse] = Cache(8)
 
 
 def channel_responses(setup: Setup) -> ChannelResponses:
-    """The responses of a target's channels in a scene, kept."""
+    """Return the cache of the responses of a target's channels in a scene.
+
+    Parameters
+    ----------
+    setup : Setup
+        Scene and camera.
+
+    Returns
+    -------
+    ChannelResponses
+        The cache.
+    """
     return _CHANNELS.get(hashlib.sha256(pickle.dumps(colorless(setup))).digest(), ChannelResponses)
 
 
 def kept_response(setup: Setup, phases: Phases | None, *, by_pixel: bool) -> PixelResponse:
-    """`pixel_response` for the phases of the scene; kept where it is small."""
+    """Return the pixel response at the phases of the scene; small ones are cached.
+
+    Parameters
+    ----------
+    setup : Setup
+        Camera, scene and accuracy.
+    phases : Phases or None
+        Sampling phases of the scene.
+    by_pixel : bool
+        Keep single pixels.
+
+    Returns
+    -------
+    PixelResponse
+        Weights.
+    """
     heights = field_heights(setup)  # filters that move need more positions than those that do not
     count = 1 if phases is None else len(phases)
     if (
@@ -220,7 +323,7 @@ def kept_response(setup: Setup, phases: Phases | None, *, by_pixel: bool) -> Pix
 
 
 def _uniform(setup: Setup, *, by_pixel: bool) -> PixelResponse:
-    """A field without structure: one tile stands for all."""
+    """Return the response of a field without structure, for which one tile stands."""
     tile, n = setup.camera.mosaic.indices, len(setup.camera.mosaic.channels)
     of_channel = (tile[..., None] == np.arange(n)).astype(float)
     share = sampling.crosstalk_share(setup)
@@ -243,7 +346,7 @@ def _joined(parts: list[PixelResponse]) -> PixelResponse:
 
 
 def _profile(setup: Setup, wavelength_nm: FloatArray) -> psf.DiscProfile | None:
-    """The light's blurred image, as far as any pixel of the readout can be; None where blur is left out."""
+    """Return the light's blurred image as far as any pixel of the readout; None if blur is left out."""
     target = setup.scene.target
     if target is None or not setup.computes("blur"):
         return None
@@ -255,7 +358,7 @@ def _profile(setup: Setup, wavelength_nm: FloatArray) -> psf.DiscProfile | None:
 
 
 def _pixels(setup: Setup, wavelength_nm: FloatArray, phases: Phases, *, by_pixel: bool) -> PixelResponse:
-    """Every pixel of the readout, at every phase."""
+    """Return the response of every pixel of the readout at every phase."""
     target, pixel, n = setup.scene.target, setup.camera.pixel, len(setup.camera.mosaic.channels)
     assert target is not None
     radius, half = sampling.radii_px(setup, target)[0], pixel.fill_factor**0.5 / 2
@@ -276,8 +379,9 @@ def _pixels(setup: Setup, wavelength_nm: FloatArray, phases: Phases, *, by_pixel
 
 
 def _weights(setup: Setup, phases: Phases) -> tuple[sampling.Window, FloatArray, FloatArray]:
-    """The pixels around the light, whose channel each is, ndarray[rows, columns, n_channels], and its weight in the
-    value of each, ndarray[n_cases, rows, columns, n_channels].
+    """Return pixels around the light, their channels and their weights.
+
+    Shapes (rows, columns, n_channels) and (n_cases, rows, columns, n_channels).
     """
     target, mosaic, n = setup.scene.target, setup.camera.mosaic, len(setup.camera.mosaic.channels)
     assert target is not None
@@ -292,7 +396,7 @@ def _weights(setup: Setup, phases: Phases) -> tuple[sampling.Window, FloatArray,
 
 
 def _apart(light: disc_image.PixelLight, of_channel: FloatArray, apart: FloatArray, share: float) -> PixelResponse:
-    """The pixels one by one: those with a weight in any readout."""
+    """Return the response of single pixels that have a weight in any readout."""
     used = (apart > 0).any(axis=(0, 3))
     rows, columns = np.nonzero(used)
     taken = [((1 - share), rows, columns)]

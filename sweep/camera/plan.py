@@ -1,4 +1,4 @@
-"""Which effects of a scene are computed, which are left out, and why."""
+"""Choice of the effects of a scene that are computed, with reasons."""
 
 from __future__ import annotations
 
@@ -17,9 +17,19 @@ _OWN = "an effect of the study's own: always computed"
 
 @dataclass(frozen=True)
 class Choice:
-    """One effect of a plan: whether it is computed, a bound on what it changes in any CSD (DN), and why.
+    """One effect of a plan.
 
-    `bound_dn`: 0 of an effect that is inactive, None where no closed form is known.
+    Parameters
+    ----------
+    effect : str
+        Name of the effect.
+    computed : bool
+        False if it is left out.
+    bound_dn : float or None
+        Upper bound on the change of any CSD without it, DN; 0 if it is inactive, None if no closed form is
+        known.
+    reason : str
+        Reason of the choice.
     """
 
     effect: str
@@ -30,9 +40,9 @@ class Choice:
 
 @dataclass(frozen=True)
 class Plan:
-    """Plan of one scene's simulation: accuracy settings, and a choice for each effect.
+    """Plan of one scene: accuracy settings, and a choice for each effect.
 
-    The bounds of what is left out sum to at most half the tolerance; the other half is that of the settings, whose
+    The bounds of all that is left out sum to at most half the tolerance. The other half is for the settings, whose
     error is measured (`sweep audit`).
     """
 
@@ -53,12 +63,12 @@ class Plan:
 
     @property
     def error_bound_dn(self) -> float:
-        """No CSD differs by more from one with every effect, by the same settings."""
+        """Upper bound on the change of any CSD by all effects that are left out, at the same settings, DN."""
         return sum(choice.bound_dn or 0.0 for choice in self.choices if not choice.computed)
 
     @cached_property
     def key(self) -> str:
-        """Hash of what is computed and how: part of every cache key, and in every row."""
+        """Hash of effects and settings, part of every cache key and of every row."""
         computed = {"computed": self.computed, "accuracy": self.accuracy.model_dump()}
         return hashlib.sha256(json.dumps(computed, sort_keys=True).encode()).hexdigest()[:12]
 
@@ -66,23 +76,28 @@ class Plan:
 def plan_scene(
     scenario: str, boxes: Sequence[Box], tolerance_dn: float, accuracy: Accuracy, *, for_noise: bool = False
 ) -> Plan:
-    """The plan of a scene that holds for all its boxes of designs.
+    """Choose the effects of a scene, for all its boxes of designs.
 
-    Of the effects that are active the smallest bounds are left out first. What the readout does comes before the
-    optics, whose bounds depend on it.
+    Active effects with the smallest bounds are left out first. Effects of the readout come before the optics, whose
+    bounds depend on them.
 
     Parameters
     ----------
     scenario : str
         Name of the scene.
     boxes : sequence of Box
-        Designs of the scene, those of each space.
+        Designs of the scene, one box per design space.
     tolerance_dn : float
         Tolerance of any CSD, DN.
     accuracy : Accuracy
         Settings of the study.
     for_noise : bool
-        Errors under noise are asked for, which need every pixel and what the readout does to it.
+        Errors under noise are requested, which need every pixel and its readout.
+
+    Returns
+    -------
+    Plan
+        The plan.
     """
     choices = {name: _inactive(effect, boxes) for name, effect in EFFECTS.items()}
     active = [name for name, choice in choices.items() if choice is None]
@@ -103,7 +118,7 @@ def plan_scene(
 
 
 def _inactive(effect: Effect, boxes: Sequence[Box]) -> Choice | None:
-    """The choice for an effect that changes nothing in any box; None where it may."""
+    """Return the choice for an effect that is inactive in every box, else None."""
     reasons = [effect.inactive(box) for box in boxes]
     return None if None in reasons else Choice(effect.name, False, 0.0, str(reasons[0]))
 
@@ -116,7 +131,7 @@ def _bound_dn(effect: Effect, boxes: Sequence[Box], readout: frozenset[str]) -> 
 
 
 def _order(item: tuple[str, float | None]) -> tuple[bool, float]:
-    """Smallest bounds first; saturation last, since noise and rounding need it."""
+    """Sort by bound, with saturation last, since noise and rounding need it."""
     name, bound_dn = item
     return name == "saturation", float("inf") if bound_dn is None else bound_dn
 

@@ -45,7 +45,7 @@ _MOST_AT_ONCE = 2_000_000
 
 @lru_cache(maxsize=64)
 def gauss_legendre(order: int) -> tuple[FloatArray, FloatArray]:
-    """Nodes and weights of a Gauss-Legendre rule, kept: finding the nodes of a long one takes milliseconds.
+    """Return nodes and weights of a Gauss-Legendre rule; cached, since long rules take milliseconds.
 
     Returns
     -------
@@ -57,7 +57,7 @@ def gauss_legendre(order: int) -> tuple[FloatArray, FloatArray]:
 
 
 def defocus_um(scenario: Scene, pitch_um: float) -> float:
-    """W20, the optical path error at the edge of the pupil, when the lens is not focused on the target.
+    """Return W20, the optical path error at the edge of the pupil of a lens that is not focused on the target.
 
     W20 = dz / (8 N^2), with dz the distance between the images of the target and of what is in focus (Goodman, 3rd
     edition, section 6.4, on a focusing error; here for an image close to the focal plane).
@@ -85,12 +85,19 @@ def defocus_um(scenario: Scene, pitch_um: float) -> float:
 
 
 def too_much(scenario: Scene, pixel: Pixel) -> tuple[tuple[str, ...], str, str, str] | None:
-    """Why a target's image is not computed.
+    """Return the reason why a target's image is not computed.
+
+    Parameters
+    ----------
+    scenario : Scene
+        Target and optics.
+    pixel : Pixel
+        Pitch.
 
     Returns
     -------
     tuple or None
-        The setting's place in the scenario, the problem, the value, and what is allowed; None where nothing is wrong.
+        Key of the scenario, problem, value, and allowed values; None if it is computed.
     """
     target, optics = scenario.target, scenario.optics
     if target is None:
@@ -116,7 +123,7 @@ def too_much(scenario: Scene, pixel: Pixel) -> tuple[tuple[str, ...], str, str, 
 
 
 def otf(frequency_per_um: FloatArray, wavelength_um: FloatArray, f_number: float, w20_um: float) -> FloatArray:
-    """Optical transfer function of a circular pupil with defocus.
+    """Return the optical transfer function of a circular pupil with defocus.
 
     With s = lambda N nu, which is 1 at the cutoff,
       OTF = (4 / pi) integral_0^acos(s) sin^2 p cos(8 pi W20 N nu (cos p - s)) dp
@@ -156,7 +163,7 @@ def otf(frequency_per_um: FloatArray, wavelength_um: FloatArray, f_number: float
 
 
 def _frequency_rule(reach_um: float, wavelength_um: FloatArray, f_number: float) -> tuple[FloatArray, FloatArray]:
-    """Gauss-Legendre rules side by side, up to the cutoff of the shortest wavelength.
+    """Return Gauss-Legendre rules side by side, up to the cutoff of the shortest wavelength.
 
     Parameters
     ----------
@@ -196,7 +203,7 @@ def _hankel_sums(radius_um: FloatArray, frequency_per_um: FloatArray, spectrum: 
 
 
 def _chebyshev_nodes(reach_um: float, highest_per_um: float) -> FloatArray:
-    """Chebyshev nodes in r^2 whose polynomial is h(r) from 0 to a reach, to 1e-15.
+    """Return the Chebyshev nodes in r^2 whose polynomial is h(r) from 0 to a reach, to 1e-15.
 
     J0(z x) has 2 J_k(z / 2)^2 of the Chebyshev polynomial of order k in 2 x^2 - 1, but for its sign (Graf's addition
     theorem, Abramowitz and Stegun, 9.1.79), which falls fast from k = z / 2 on.
@@ -212,7 +219,7 @@ def _chebyshev_nodes(reach_um: float, highest_per_um: float) -> FloatArray:
 
 
 class DiscProfile:
-    """The image h(r) of a disc at many wavelengths, as a table of fewer functions of the radius.
+    """Image h(r) of a disc at many wavelengths, as a table of fewer functions of the radius.
 
     The images at neighboring wavelengths are nearly the same, so that some tens of functions of r make those at
     hundreds of wavelengths, but for rounding: a QR decomposition with pivoting finds them. Each is a cubic spline.
@@ -273,7 +280,7 @@ class DiscProfile:
         self._coefficients = np.ascontiguousarray(self._spline.c)  # by columns, from some versions of SciPy
 
     def at(self, r_um: FloatArray) -> FloatArray:
-        """Image at distances from the disc's center.
+        """Return the image at distances from the disc's center.
 
         Parameters
         ----------
@@ -288,7 +295,7 @@ class DiscProfile:
         return np.asarray(self._spline(r_um) @ self.shares, dtype=float)
 
     def pixel_means(self, places_um: FloatArray, half_um: float) -> FloatArray:
-        """Means of the functions of the radius over square pixels, by a Gauss-Legendre rule along each side.
+        """Return means of the functions of the radius over square pixels, by a Gauss-Legendre rule along each side.
 
         Parameters
         ----------
@@ -318,13 +325,30 @@ PROFILES: Cache[tuple[float, float, tuple[float, ...], float, float], DiscProfil
 def profile(
     radius_um: float, reach_um: float, wavelengths_um: tuple[float, ...], f_number: float, w20_um: float
 ) -> DiscProfile:
-    """A `DiscProfile` of these parameters, kept."""
+    """Return the image of a disc; recent ones are cached.
+
+    Parameters
+    ----------
+    radius_um, reach_um : float
+        Radius of the disc's sharp image, and largest distance from its center, micrometers.
+    wavelengths_um : tuple of float
+        Wavelengths, micrometers.
+    f_number : float
+        f-number of the lens.
+    w20_um : float
+        Defocus, micrometers.
+
+    Returns
+    -------
+    DiscProfile
+        The image.
+    """
     key = (radius_um, reach_um, wavelengths_um, f_number, w20_um)
     return PROFILES.get(key, lambda: DiscProfile(radius_um, reach_um, np.array(wavelengths_um), f_number, w20_um))
 
 
 def psf_knots_nm(wavelength_nm: FloatArray, step_nm: float) -> FloatArray:
-    """Wavelengths at which images are made; between them they are interpolated linearly.
+    """Return the wavelengths at which images are computed; between them they are interpolated linearly.
 
     Parameters
     ----------

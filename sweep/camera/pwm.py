@@ -1,4 +1,4 @@
-"""A pulsed LED: how much of its light falls into an exposure depends on when the exposure starts."""
+"""Light of a pulsed LED in an exposure, which depends on the starting time of the exposure."""
 
 from __future__ import annotations
 
@@ -10,10 +10,22 @@ from .setup import Setup
 
 
 def extremes(drive: Drive, exposure_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Least and most light in an exposure relative to the mean, over all starting times, ndarray[...] each.
+    """Return the least and most light in an exposure relative to the mean, over all starting times.
 
-    The light is on for `duty` of each period, `1 / duty` as bright as its mean. n whole periods and a rest r give
-    n duty and, of the rest, between max(0, r - (1 - duty)) and min(r, duty).
+    The light is on for `duty` of each period, 1 / duty as bright as its mean. In n whole periods and a rest r it is on
+    for n duty and, in the rest, for max(0, r - (1 - duty)) to min(r, duty).
+
+    Parameters
+    ----------
+    drive : Drive
+        Duty and frequency.
+    exposure_s : ndarray
+        Exposure time, s.
+
+    Returns
+    -------
+    least, most : ndarray of the same shape
+        Light relative to its mean.
     """
     periods = exposure_s * drive.frequency_hz
     whole = np.floor(periods)
@@ -24,27 +36,66 @@ def extremes(drive: Drive, exposure_s: FloatArray) -> tuple[FloatArray, FloatArr
 
 
 def smallest(drive: Drive, shortest_s: float, longest_s: float) -> float:
-    """The least light for any exposure of a range: at its ends, or where a dark interval has just been added."""
+    """Return the least relative light of any exposure in a range: at its ends, or where a dark interval was just added.
+
+    Parameters
+    ----------
+    drive : Drive
+        Duty and frequency.
+    shortest_s, longest_s : float
+        Range of the exposure time, s.
+
+    Returns
+    -------
+    float
+        Light relative to its mean.
+    """
     return float(extremes(drive, _candidates(drive, shortest_s, longest_s, 1 - drive.duty))[0].min())
 
 
 def largest(drive: Drive, shortest_s: float, longest_s: float) -> float:
-    """The most light for any exposure of a range: at its ends, or where one more pulse just fits."""
+    """Return the most relative light of any exposure in a range: at its ends, or where one more pulse just fits.
+
+    Parameters
+    ----------
+    drive : Drive
+        Duty and frequency.
+    shortest_s, longest_s : float
+        Range of the exposure time, s.
+
+    Returns
+    -------
+    float
+        Light relative to its mean.
+    """
     return float(extremes(drive, _candidates(drive, shortest_s, longest_s, drive.duty))[1].max())
 
 
 def _candidates(drive: Drive, shortest_s: float, longest_s: float, rest: float) -> FloatArray:
-    """Ends of a range of exposures, and the first ones in it that are whole periods and a rest of one."""
+    """Return the ends of a range of exposures, and the first exposures in it of whole periods and a rest."""
     times_s = (np.floor(shortest_s * drive.frequency_hz) + np.arange(3) + rest) / drive.frequency_hz
     return np.array([shortest_s, longest_s, *times_s[(times_s >= shortest_s) & (times_s <= longest_s)]])
 
 
 def scales(setup: Setup, exposure_s: FloatArray, moments: FloatArray | None = None) -> FloatArray:
-    """Light relative to its mean at the moments that are computed, ndarray[n_designs, n_moments].
+    """Return the light relative to its mean at the moments that are computed.
 
-    Behind a linear readout the two ends are the extremes. Behind one that clips the distance of two signals may be
-    smallest at any moment between them. `moments`: from 0 (least light) to 1 (most), ndarray[n_moments], instead of
-    those of the accuracy.
+    Behind a linear readout the extremes are at the two ends. Behind a nonlinear one the distance of two signals may be
+    smallest at any moment between them.
+
+    Parameters
+    ----------
+    setup : Setup
+        Drive and accuracy.
+    exposure_s : ndarray of shape (n_designs,)
+        Exposure time, s.
+    moments : ndarray of shape (n_moments,), optional
+        Moments from 0 (least light) to 1 (most light), instead of those of the accuracy.
+
+    Returns
+    -------
+    ndarray of shape (n_designs, n_moments)
+        Relative light.
     """
     drive = setup.scene.drive
     if drive is None or not setup.computes("flicker"):

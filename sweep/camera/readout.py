@@ -1,4 +1,4 @@
-"""The readout of a scene: from expected electrons through full well, noise and ADC to the channels' digital numbers.
+"""Readout of a scene: from expected electrons through full well, noise and ADC to digital numbers of the channels.
 
 A channel is the mean over the disc, or the demosaicked center.
 """
@@ -27,10 +27,22 @@ _MANY_STEPS = 16.0
 
 
 def rounded(dn: FloatArray, pixel: Pixel) -> FloatArray:
-    """The pedestal added to `dn`, rounded half up, inside the ADC's range.
+    """Add the pedestal, round half up, and clip to the range of the ADC.
 
-    The whole part of the pedestal is added after rounding, so that no digit of a float is lost to it: values with and
-    without a whole pedestal differ by exactly that.
+    The whole part of the pedestal is added after rounding, so that values with and without a whole pedestal differ by
+    exactly that.
+
+    Parameters
+    ----------
+    dn : ndarray
+        Unrounded values without pedestal, DN.
+    pixel : Pixel
+        Pedestal and bits.
+
+    Returns
+    -------
+    ndarray of the same shape
+        Digital numbers, DN.
     """
     whole = math.floor(pixel.offset_dn)
     steps = np.asarray(dn + (pixel.offset_dn - whole), dtype=float)
@@ -41,7 +53,22 @@ def rounded(dn: FloatArray, pixel: Pixel) -> FloatArray:
 
 
 def draws_dn(electrons: FloatArray, pixel: Pixel, rng: np.random.Generator) -> FloatArray:
-    """Monte Carlo: a readout of each pixel, which expects `electrons` and has its own gain error; rounded."""
+    """Draw one readout of each pixel (Monte Carlo), with its own gain error.
+
+    Parameters
+    ----------
+    electrons : ndarray
+        Expected electrons.
+    pixel : Pixel
+        Full well, gain, noise and ADC.
+    rng : numpy.random.Generator
+        Source of random numbers.
+
+    Returns
+    -------
+    ndarray of the same shape
+        Digital numbers, DN.
+    """
     # In place: to give memory to an array of millions of pixels takes as long as a sum over them.
     expected = rng.standard_normal(electrons.shape)
     expected *= pixel.prnu
@@ -59,13 +86,21 @@ def draws_dn(electrons: FloatArray, pixel: Pixel, rng: np.random.Generator) -> F
 
 @dataclass(frozen=True)
 class NoisyReadout:
-    """Mean (DN) and variance (DN^2) of each channel, ndarray[n_designs, n_cases, n_signals, n_channels].
+    """Readout with noise.
 
-    `gaussian`: where its noise may be taken as Gaussian. No pixel is cut by full well or an end of the ADC, and read
-    noise dithers each pixel (0.7 DN), or the deviation is at least 4 steps of the pixel that weighs most. In random
-    pixels and pairs the error of Gaussians was then never less than 1 / 1.2 of the exact one, down to 1e-12
-    (`tests/metrics/test_confusion.py`): evidence, not a proof. `reach_dn`: no pixel moves the channel further from its
-    mean, but for 1e-15. `exposure_s`: ndarray[n_designs].
+    Parameters
+    ----------
+    mean, variance : ndarray of shape (n_designs, n_cases, n_signals, n_channels)
+        Mean, DN, and variance, DN^2, of each channel.
+    gaussian : ndarray of bool, same shape
+        True if the noise may be taken as Gaussian: no pixel is cut by the full well or an end of the ADC,
+        and read noise dithers each pixel (0.7 DN) or the deviation is at least 4 steps of the pixel that
+        weighs most. In random pixels and pairs the error of Gaussians was then never less than 1 / 1.2 of
+        the exact one, down to 1e-12 (`tests/metrics/test_confusion.py`): evidence, not a proof.
+    reach_dn : ndarray, same shape
+        Largest distance of a pixel's number from its mean with a probability above 1e-15, DN.
+    exposure_s : ndarray of shape (n_designs,)
+        Exposure time, s.
     """
 
     mean: FloatArray
@@ -76,26 +111,77 @@ class NoisyReadout:
 
 
 def is_cut(electrons: FloatArray, pixel: Pixel) -> FloatArray:
-    """1 where the full well or an end of the ADC cuts a pixel's noise, else 0; of expected electrons of any shape."""
+    """Return 1 where the full well or an end of the ADC cuts a pixel's noise, else 0.
+
+    Parameters
+    ----------
+    electrons : ndarray
+        Expected electrons.
+    pixel : Pixel
+        Full well, gain, noise and ADC.
+
+    Returns
+    -------
+    ndarray of the same shape
+        0 or 1.
+    """
     low, high = table.unclipped_e(pixel)
     return ((electrons < low) | (electrons > high)).astype(float)
 
 
 def is_gaussian(variance: FloatArray, heaviest: FloatArray, cut: BoolArray, pixel: Pixel) -> BoolArray:
-    """`NoisyReadout.gaussian`: `heaviest` is the largest weight of a pixel, `cut` where any pixel is."""
+    """Return whether the noise of a channel may be taken as Gaussian; see `NoisyReadout`.
+
+    Parameters
+    ----------
+    variance : ndarray
+        Variance of the channel, DN^2.
+    heaviest : ndarray
+        Largest weight of a pixel in the channel.
+    cut : ndarray of bool
+        True where a pixel of the channel is cut.
+    pixel : Pixel
+        Gain and read noise.
+
+    Returns
+    -------
+    ndarray of bool
+        True where the noise is Gaussian.
+    """
     dithered = pixel.dn_per_e * pixel.read_noise_e >= _DITHERED_DN
     return np.asarray(~cut & (dithered | (variance >= _MANY_STEPS * heaviest**2)), dtype=bool)
 
 
 def reach_dn(electrons: FloatArray, pixel: Pixel) -> FloatArray:
-    """Largest distance of a pixel's number from its mean, but for 1e-15, DN: of the brightest on the last axis."""
+    """Return the largest distance of a pixel's number from its mean with a probability above 1e-15.
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (..., n_pixels)
+        Expected electrons.
+    pixel : Pixel
+        Full well, gain, noise and ADC.
+
+    Returns
+    -------
+    ndarray of shape (..., 1)
+        Distance, DN, for the brightest pixel.
+    """
     reach_e = 9 * (np.sqrt(electrons) + pixel.prnu * electrons + pixel.read_noise_e) + 27
     reach = np.minimum(pixel.dn_per_e * reach_e + 1, float(pixel.full_scale_dn))
     return np.asarray(reach.max(axis=-1, keepdims=True), dtype=float)
 
 
 class Readout:
-    """Readout of the elements of a pixel response. `by_channel`: each element is a channel already."""
+    """Readout of the elements of a pixel response.
+
+    Parameters
+    ----------
+    setup : Setup
+        Pixel, scene and effects.
+    response : PixelResponse
+        Weights of the elements in each channel.
+    """
 
     def __init__(self, setup: Setup, response: PixelResponse) -> None:
         self.setup = setup
@@ -105,7 +191,18 @@ class Readout:
         self.by_channel = response.by_channel
 
     def transfer(self, electrons: FloatArray) -> FloatArray:
-        """Digital numbers of the elements from their expected electrons; the mean of those that noise gives."""
+        """Convert expected electrons to digital numbers; under noise, to their means.
+
+        Parameters
+        ----------
+        electrons : ndarray
+            Expected electrons of the elements.
+
+        Returns
+        -------
+        ndarray of the same shape
+            Digital numbers, DN.
+        """
         setup, pixel = self.setup, self.pixel
         clips, rounds = setup.computes("saturation"), setup.computes("quantization")
         noisy = setup.scene.noise is not None
@@ -122,7 +219,7 @@ class Readout:
         return rounded(held * pixel.dn_per_e, pixel)
 
     def _whole_numbers(self, electrons: FloatArray, clips: bool) -> FloatArray:
-        """`transfer` in one pass, without noise."""
+        """Convert electrons to whole digital numbers without noise, in one pass."""
         from .compiled import whole_numbers  # noqa: PLC0415  (compiled: kept off the start-up path)
 
         many = np.ascontiguousarray(electrons)
@@ -133,21 +230,62 @@ class Readout:
         return found
 
     def variance_dn(self, electrons: FloatArray) -> FloatArray:
-        """Variance of the elements' digital numbers, DN^2, with their rounding."""
+        """Return the variance of the digital numbers, with rounding.
+
+        Parameters
+        ----------
+        electrons : ndarray
+            Expected electrons of the elements.
+
+        Returns
+        -------
+        ndarray of the same shape
+            Variance, DN^2.
+        """
         return table.variance(electrons, self.pixel)
 
     def folded(self, dn: FloatArray) -> FloatArray:
-        """Value of each channel from those of the elements: the last axis n_elements -> n_channels."""
+        """Combine the elements to channels.
+
+        Parameters
+        ----------
+        dn : ndarray of shape (n_designs, n_cases, n_signals, n_elements)
+            Digital numbers, DN.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_cases, n_signals, n_channels)
+            Digital numbers of the channels, DN.
+        """
         return dn if self.by_channel else self._weighed(dn, self._weights)
 
     def spread(self, variance: FloatArray) -> FloatArray:
-        """Variance of each channel from those of the elements: the last axis n_elements -> n_channels."""
+        """Combine variances of the elements to those of the channels.
+
+        Parameters
+        ----------
+        variance : ndarray of shape (n_designs, n_cases, n_signals, n_elements)
+            Variance, DN^2.
+
+        Returns
+        -------
+        ndarray of shape (n_designs, n_cases, n_signals, n_channels)
+            Variance of the channels, DN^2.
+        """
         return self._weighed(variance, self._spread)
 
     def with_noise(self, electrons: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray, FloatArray]:
-        """`NoisyReadout.mean`, `variance`, `gaussian` and `reach_dn` of a block.
+        """Read out a block with noise.
 
-        Pixels are read one by one, so neither saturation nor quantization may be left out.
+        Parameters
+        ----------
+        electrons : ndarray of shape (n_designs, n_cases, n_signals, n_elements)
+            Expected electrons; elements are pixels.
+
+        Returns
+        -------
+        mean, variance, gaussian, reach_dn : ndarray
+            As in `NoisyReadout`.
         """
         dn, variance_dn = self.transfer(electrons), self.variance_dn(electrons)
         # A digital number that is the same in all but one of a billion readouts: what is left of its noise is
@@ -158,9 +296,19 @@ class Readout:
         return (mean, variance, *self._shape_of_noise(electrons, variance))
 
     def channels_of(self, pixels: FloatArray, place: int) -> FloatArray:
-        """Readout of each channel from its pixels (those of `ForwardModel.pixel_electrons`) at a place of the light.
+        """Return the channels from their pixels at one sampling phase.
 
-        ndarray[n, n_pixels] -> ndarray[n, n_channels].
+        Parameters
+        ----------
+        pixels : ndarray of shape (n, n_pixels)
+            Values of the pixels of `ForwardModel.pixel_electrons`.
+        place : int
+            Index of the sampling phase.
+
+        Returns
+        -------
+        ndarray of shape (n, n_channels)
+            Readout of each channel.
         """
         setup = self.setup
         if setup.scene.target is None:
@@ -170,7 +318,7 @@ class Readout:
 
     @property
     def few_pixels(self) -> tuple[IndexArray, ...] | None:
-        """Pixels of `ForwardModel.pixel_electrons` of which each channel is the mean; None where they are many."""
+        """Pixels whose mean is each channel; None for a target, or if they are many."""
         setup = self.setup
         if setup.scene.target is not None or setup.camera.mosaic.counts.max() > _FEW:
             return None
@@ -178,12 +326,12 @@ class Readout:
         return tuple(np.flatnonzero(channels == at) for at in range(len(setup.camera.mosaic.channels)))
 
     def _weighed(self, values: FloatArray, weights: FloatArray) -> FloatArray:
-        """Sums over the elements by their `weights`, ndarray[n_cases, n_elements, n_channels]."""
+        """Sum over the elements with weights, ndarray of shape (n_cases, n_elements, n_channels)."""
         repeats = values.shape[1] // self.n_cases
         return np.asarray(values @ np.repeat(weights, repeats, axis=0))
 
     def _shape_of_noise(self, electrons: FloatArray, variance: FloatArray) -> tuple[BoolArray, FloatArray]:
-        """`NoisyReadout.gaussian` and `reach_dn` of a block."""
+        """Return `gaussian` and `reach_dn` of `NoisyReadout`."""
         repeats = electrons.shape[1] // self.n_cases
         heaviest = self._weights.max(axis=1) if self.setup.scene.target else 1 / self.setup.camera.mosaic.counts[None]
         heaviest = np.repeat(np.broadcast_to(heaviest, (self.n_cases, variance.shape[-1])), repeats, axis=0)[:, None]

@@ -1,7 +1,7 @@
-"""Mosaic sampling: which pixels a light covers, optical crosstalk between them, and their weights in the readout.
+"""Mosaic sampling: pixels that a light covers, optical crosstalk, and weights of the pixels in the readout.
 
-Crosstalk: part of a pixel's light comes through the filters of its four neighbors. A readout is the mean over the disc,
-or demosaicking at one pixel, for any tile.
+Crosstalk: part of a pixel's light comes through the filters of its four neighbors. A readout is the mean over the
+disc, or the demosaicked value at one pixel, for any tile.
 """
 
 from __future__ import annotations
@@ -19,10 +19,14 @@ from .setup import Setup
 
 @dataclass(frozen=True)
 class Window:
-    """Pixels around a light for some places of its center.
+    """Pixels around a light for some phases, with a margin of one pixel that has no weight.
 
-    `channel`: ndarray[rows, columns] of channel indices; `dx`, `dy`: ndarray[n_cases, rows, columns], pixels from the
-    light's center. One pixel of margin on every side has no weight in any readout.
+    Parameters
+    ----------
+    channel : ndarray of int, shape (rows, columns)
+        Channel of each pixel.
+    dx, dy : ndarray of shape (n_cases, rows, columns)
+        Distance from the light's center along columns and rows, pixels.
     """
 
     channel: IndexArray
@@ -31,31 +35,72 @@ class Window:
 
     @property
     def columns(self) -> FloatArray:
-        """`dx` of each column, ndarray[n_cases, columns]."""
+        """`dx` of each column, ndarray of shape (n_cases, columns)."""
         return np.ascontiguousarray(self.dx[:, 0, :])
 
     @property
     def rows(self) -> FloatArray:
-        """`dy` of each row, ndarray[n_cases, rows]."""
+        """`dy` of each row, ndarray of shape (n_cases, rows)."""
         return np.ascontiguousarray(self.dy[:, :, 0])
 
 
 def radii_px(setup: Setup, target: Target) -> tuple[float, float]:
-    """Radius of the light and of the readout, in pixels; a readout reaches a pixel of every channel."""
+    """Return the radii of light and readout; the readout reaches a pixel of every channel.
+
+    Parameters
+    ----------
+    setup : Setup
+        Mosaic.
+    target : Target
+        Light.
+
+    Returns
+    -------
+    light_px, readout_px : float
+        Radii, pixels.
+    """
     radius = target.object_resolution_px / 2
     rows, columns = setup.camera.mosaic.indices.shape
     return radius, max(radius, math.hypot(rows, columns) / 2)
 
 
 def reach_px(setup: Setup, target: Target) -> float:
-    """Largest distance from the light's center of a pixel with a weight, along a row or column."""
+    """Return the largest distance along a row or column of a pixel with a weight.
+
+    Parameters
+    ----------
+    setup : Setup
+        Mosaic.
+    target : Target
+        Light and readout.
+
+    Returns
+    -------
+    float
+        Distance from the light's center, pixels.
+    """
     if target.readout == "mean":
         return radii_px(setup, target)[1] + 0.5
     return float(max(setup.camera.mosaic.indices.shape))
 
 
 def window(mosaic: Mosaic, phases_px: FloatArray, reach_px: float) -> Window:
-    """All pixels within `reach_px` (and the margin) of the light's centers, ndarray[n_cases, 2] as (column, row)."""
+    """Return all pixels near the centers of the light.
+
+    Parameters
+    ----------
+    mosaic : Mosaic
+        Tile.
+    phases_px : ndarray of shape (n_cases, 2)
+        Centers as (column, row), pixels.
+    reach_px : float
+        Distance from the centers, pixels.
+
+    Returns
+    -------
+    Window
+        Pixels, with the margin.
+    """
     low = np.floor(phases_px.min(axis=0) - reach_px).astype(int) - 1
     high = np.ceil(phases_px.max(axis=0) + reach_px).astype(int) + 1
     columns, rows = (np.arange(a, b + 1) for a, b in zip(low, high, strict=True))
@@ -68,7 +113,24 @@ def window(mosaic: Mosaic, phases_px: FloatArray, reach_px: float) -> Window:
 
 
 def mean_weights(seen: Window, half: float, readout_px: float, n_channels: int) -> FloatArray:
-    """Weight of each pixel in the mean of its channel, ndarray[n_cases, rows, columns]; each channel's sum to 1."""
+    """Return the weight of each pixel in the mean of its channel.
+
+    Parameters
+    ----------
+    seen : Window
+        Pixels around the light.
+    half : float
+        Half of the side of a pixel's light-sensitive square, pixels.
+    readout_px : float
+        Radius of the readout, pixels.
+    n_channels : int
+        Channels of the mosaic.
+
+    Returns
+    -------
+    ndarray of shape (n_cases, rows, columns)
+        Weights; those of each channel sum to 1.
+    """
     from .compiled import covered_by_disc  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     weights = covered_by_disc(seen.columns, seen.rows, half, readout_px)
@@ -79,11 +141,24 @@ def mean_weights(seen: Window, half: float, readout_px: float, n_channels: int) 
 
 
 def center_weights(seen: Window, home: FloatArray, mosaic: Mosaic) -> FloatArray:
-    """Weight of each pixel in the value of its channel at the pixel that is read out.
+    """Return the weight of each pixel in the demosaicked value of its channel at one pixel.
 
-    `home`: ndarray[n_cases, 2], that pixel from the light's center (column, row), pixels. Returns ndarray[n_cases,
-    rows, columns]; each channel's sum to 1. Normalized convolution with a tent as wide as the tile,
-    (1 - |dx| / columns)(1 - |dy| / rows), which for a Bayer tile is bilinear interpolation.
+    Normalized convolution with a tent as wide as the tile, (1 - |dx| / columns)(1 - |dy| / rows), which for a Bayer
+    tile is bilinear interpolation.
+
+    Parameters
+    ----------
+    seen : Window
+        Pixels around the light.
+    home : ndarray of shape (n_cases, 2)
+        Pixel that is read out, as (column, row) from the light's center, pixels.
+    mosaic : Mosaic
+        Tile.
+
+    Returns
+    -------
+    ndarray of shape (n_cases, rows, columns)
+        Weights; those of each channel sum to 1.
     """
     # From pixel to pixel: whole numbers, so that equal weights are equal to the last bit.
     dx, dy = (np.rint(a - home[:, axis, None, None]) for axis, a in enumerate((seen.dx, seen.dy)))
@@ -97,9 +172,21 @@ def center_weights(seen: Window, home: FloatArray, mosaic: Mosaic) -> FloatArray
 
 
 def with_crosstalk(light: FloatArray, share: float, *, periodic: bool = False) -> FloatArray:
-    """(1 - share) of a pixel's own and share / 4 of each neighbor's: ndarray[n_cases, rows, columns, ...], same shape.
+    """Mix each pixel with its neighbors: (1 - share) of its own light and share / 4 of each neighbor's.
 
-    Beyond the border is nothing, or, for the tile of a uniform field, the other side.
+    Parameters
+    ----------
+    light : ndarray of shape (n_cases, rows, columns, ...)
+        Light of the pixels.
+    share : float
+        Crosstalk, 0 to 1.
+    periodic : bool
+        Continue the tile of a uniform field at its other side; else nothing lies beyond the border.
+
+    Returns
+    -------
+    ndarray of the same shape
+        Light with crosstalk.
     """
     found = (1 - share) * light
     given = share / 4 * light
@@ -115,5 +202,16 @@ def with_crosstalk(light: FloatArray, share: float, *, periodic: bool = False) -
 
 
 def crosstalk_share(setup: Setup) -> float:
-    """Share of a pixel's light that comes through the filters of its neighbors."""
+    """Return the share of a pixel's light that comes through the filters of its neighbors.
+
+    Parameters
+    ----------
+    setup : Setup
+        Pixel and effects.
+
+    Returns
+    -------
+    float
+        0 if crosstalk is left out.
+    """
     return setup.camera.pixel.crosstalk if setup.computes("crosstalk") else 0.0

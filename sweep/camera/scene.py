@@ -1,4 +1,4 @@
-"""What is looked at: the chart's patches or a traffic light at a distance, under an exposure, in a weather."""
+"""Scene: chart patches or a traffic light at a distance, with exposure and weather."""
 
 from __future__ import annotations
 
@@ -19,41 +19,61 @@ OBJECT_RESOLUTION = "object_resolution_px"
 
 
 class WhitePatchExposure(Section):
-    """The paper's exposure: the brightest channel on the white patch reaches `level` of full scale, per CFA.
+    """Exposure time set per CFA, so that the brightest channel on a white patch reaches `level` of full scale.
 
-    The white patch is flat in photons and fills the field, on axis in clear air; the level counts neither pedestal nor
-    crosstalk, background or dark current. `photon_ratio` (K) is the photons of a signal patch over those of the white
-    patch; null takes the data set's own, which for peak-normalized spectra is equivalent bandwidth / grid span.
+    The white patch is flat in photons and fills the field, on axis in clear air. The level counts neither pedestal nor
+    crosstalk, background or dark current.
     """
 
     kind: Literal["white_patch"] = "white_patch"
+    """`white_patch`."""
     level: Share = 0.95
+    """Share of full scale."""
     photon_ratio: Ratio | None = None
+    """Photons of a signal patch over those of the white patch; left out, that of the lights: equivalent bandwidth over
+    the span of the grid for peak-normalized spectra."""
 
 
 class FixedExposure(Section):
-    """The same exposure time for every CFA, seconds: femtoseconds to 30 years."""
+    """The same exposure time for every CFA."""
 
     kind: Literal["fixed"] = "fixed"
+    """`fixed`."""
     exposure_s: Seconds
+    """Exposure time, s."""
 
 
 class Geometry(Section):
-    """A traffic light of `diameter_m` at `distance_m`, seen by a sensor of `width_px` columns over `fov_deg`."""
+    """A traffic light seen by a sensor."""
 
     distance_m: Meters
+    """Distance, m."""
     fov_deg: float = Field(ge=1e-6, le=360)
+    """Horizontal field of view, degrees."""
     width_px: int = Field(default=3840, ge=1, le=10_000_000)
+    """Columns of the sensor."""
     diameter_m: Meters = DIAMETER_M
+    """Diameter of the light, m."""
 
     @property
     def object_resolution_px(self) -> float:
-        """Pixels across the light, r_o = (width / FOV) 2 atan(d / 2D), uniform pixel density (the paper's Table 1)."""
+        """Pixels across the light, r_o = (width / FOV) 2 atan(d / 2D), at uniform pixel density (paper, Table 1)."""
         angle_deg = math.degrees(2 * math.atan(self.diameter_m / (2 * self.distance_m)))
         return self.width_px / self.fov_deg * angle_deg
 
     def focal_length_um(self, pitch_um: float) -> float:
-        """Focal length that gives the pixels per radian, micrometers."""
+        """Return the focal length that gives the pixels per radian.
+
+        Parameters
+        ----------
+        pitch_um : float
+            Pixel pitch, micrometers.
+
+        Returns
+        -------
+        float
+            Focal length, micrometers.
+        """
         return pitch_um * self.width_px / math.radians(self.fov_deg)
 
 
@@ -65,7 +85,7 @@ _PlacePx = Annotated[
 
 
 def _place(value: Any) -> Any:
-    """`any`, or two finite numbers."""
+    """Check `any` or two finite numbers."""
     if value == "any":
         return value
     numbers = list(value) if isinstance(value, list | tuple) else []
@@ -76,51 +96,64 @@ def _place(value: Any) -> Any:
 
 
 class Target(Geometry):
-    """A traffic light as a disc on the sensor.
-
-    `phase_px`: where its center falls, in pixels from the center of the tile's first pixel (column, row); `any` asks
-    for the worst of all places. `readout`: `mean` of each channel's pixels over the disc, weighted by how much of each
-    the disc covers (over at least the radius in which every channel has a pixel), or the demosaicked pixel at the
-    `center`.
-    """
+    """A traffic light as a uniform disc on the sensor."""
 
     phase_px: Annotated[
         Literal["any"] | tuple[float, float], BeforeValidator(_place, json_schema_input_type=Literal["any"] | _PlacePx)
     ] = (0.0, 0.0)
+    """Sampling phase: center of the light as (column, row), pixels from the center of the tile's first pixel; `any`:
+    the worst of all phases."""
     readout: Literal["mean", "center"] = "mean"
+    """`mean`: mean of each channel's pixels over the disc, weighted by the share of each that the disc covers (over at
+    least the radius in which every channel has a pixel); `center`: the demosaicked pixel at the center."""
 
 
 class Drive(Section):
-    """A pulsed LED: on for `duty` of each period; its mean intensity is the rated one."""
+    """A pulsed LED (PWM); its mean intensity is the rated one."""
 
     duty: Share
+    """Share of each period in which the LED is on."""
     frequency_hz: float = Field(ge=1e-6, le=1e12)
+    """Frequency of the pulses, Hz."""
 
 
 class VeilingGlare(Section):
-    """Light that the lens spreads evenly over the field: a `share` of its mean, which is then missing in the image.
-
-    `field_cd_m2`: mean luminance of the whole field, flat in photons; left out, that of the background.
-    """
+    """Light that the lens spreads evenly over the field, and that is missing in the image."""
 
     share: Share
+    """Share of the mean light of the field."""
     field_cd_m2: float | None = Field(default=None, ge=0, le=1e15)
+    """Mean luminance of the whole field, flat in photons, cd/m2; left out, that of the background."""
 
 
 class Noise(Section):
-    """Photon, read and dark noise and PRNU of the study's pixel; what is given here replaces the pixel's figure."""
+    """Photon, read and dark noise and PRNU; figures given here replace those of the study's pixel."""
 
     read_noise_e: ReadNoise | None = None
+    """Read noise, electrons (standard deviation)."""
     dark_e_per_s: DarkCurrent | None = None
+    """Dark current, electrons per second."""
     prnu: Prnu | None = None
+    """Relative standard deviation of the pixels' gains."""
 
     def of(self, pixel: Pixel) -> Pixel:
-        """The pixel with this noise."""
+        """Return a pixel with this noise.
+
+        Parameters
+        ----------
+        pixel : Pixel
+            Pixel of the study.
+
+        Returns
+        -------
+        Pixel
+            The pixel with the figures that are given here.
+        """
         return pixel.model_copy(update=self.model_dump(exclude_none=True))
 
 
 def _noise(value: Any) -> Any:
-    """`true` is the pixel's own noise, `false` none."""
+    """Convert true to the pixel's own noise, and false to none."""
     if isinstance(value, bool):
         return {} if value else None
     if value is None or isinstance(value, dict | Noise):
@@ -129,31 +162,36 @@ def _noise(value: Any) -> Any:
 
 
 class Scene(Section):
-    """What the camera sees, and how it is exposed: a scenario of a study.
+    """Scene and exposure: a scenario of a study.
 
-    Without a `target` every signal is a self-emissive patch that fills the field. Signals have the same photon count,
-    `photon_radiance` (photons/s/sr/m^2, summed over the wavelength grid), or, with `intensity_cd`, the luminance of a
-    light of that luminous intensity and the target's diameter (0.2 m without a target). `background_cd_m2`: light that
-    is added over the whole field, also in front of the target, flat in photons. `drive`: of a pulsed LED. `field`: the
-    worst place of the sensor. `off_axis_deg`: the field angle, off which a lens without vignetting gives cos^4 of the
-    light. `visibility_m`: the distance at which haze or fog leaves 2 % of a target's light (Koschmieder's
-    meteorological range). `veiling_glare`: light that the lens spreads over the field. `noise`: photon, read and dark
-    noise and PRNU act before the mean is taken; true, or figures of its own. Limits: 1 to 1e40 photons (the sun's disc:
-    1e25), 1e-12 to 1e15 cd, a background up to 1e15 cd/m^2 (the sun: 2e9).
+    Without a `target` every signal is a self-emissive patch that fills the field.
     """
 
     photon_radiance: float = Field(default=2e18, ge=1, le=1e40)
+    """Radiance of every signal, photons/s/sr/m2, summed over the wavelength grid."""
     intensity_cd: float | None = Field(default=None, ge=1e-12, le=1e15)
+    """Luminous intensity of every signal instead of equal photons, cd; its luminance follows from the target's diameter
+    (0.2 m without a target)."""
     exposure: Annotated[WhitePatchExposure | FixedExposure, Field(discriminator="kind")] = WhitePatchExposure()
+    """Exposure time, set by a white patch or fixed."""
     optics: Optics = Optics()
+    """Lens."""
     target: Target | None = None
+    """Traffic light at a distance."""
     background_cd_m2: float = Field(default=0.0, ge=0, le=1e15)
+    """Luminance that is added over the whole field, also in front of the target, flat in photons, cd/m2."""
     drive: Drive | None = None
+    """Pulsed LED."""
     field: SensorField | None = None
+    """Field positions, of which the worst counts."""
     off_axis_deg: float = Field(default=0.0, ge=0, lt=90)
+    """Field angle, degrees; a lens without vignetting transmits cos^4 of the light."""
     visibility_m: Meters | None = None
+    """Meteorological visibility, m: haze or fog leaves 2 % of a target's light (Koschmieder)."""
     veiling_glare: VeilingGlare | None = None
+    """Light that the lens spreads over the field."""
     noise: Annotated[Noise | None, BeforeValidator(_noise, json_schema_input_type=bool | Noise | None)] = None
+    """Photon, read and dark noise and PRNU, before the mean is taken: true, or figures of its own."""
 
     @model_validator(mode="after")
     def _goes_together(self) -> Scene:
@@ -171,12 +209,12 @@ class Scene(Section):
 
     @property
     def any_phase(self) -> bool:
-        """True where the light may fall anywhere on the mosaic."""
+        """True if the worst sampling phase counts."""
         return self.target is not None and self.target.phase_px == "any"
 
     @property
     def luminance_cd_m2(self) -> float | None:
-        """Luminance of a signal, L = I / (pi d^2 / 4) (EN 12368's round signal); None for equal photons."""
+        """Luminance of a signal, L = I / (pi d^2 / 4) (round signal of EN 12368); None for equal photons."""
         if self.intensity_cd is None:
             return None
         diameter = DIAMETER_M if self.target is None else self.target.diameter_m

@@ -23,11 +23,26 @@ _CLEAR_NAMES = ("c", "w", "clear", "white", "mono", "panchromatic")
 
 @dataclass(frozen=True)
 class SensorCurves:
-    """QE by curve name, each ndarray[n_wavelengths], electrons per photon (or on one common relative scale).
+    """QE curves of a sensor on the wavelength grid.
 
-    `clear` names the reference of the CFA's sensitivity: a pixel without filter where `has_clear`, else the brightest
-    curve. `variants` maps a CFA's name to channels of it that use a
-    curve of another name. `technologies`: by what the filters of curves work, where that is stated.
+    Parameters
+    ----------
+    name : str
+        Name of the sensor.
+    qe : mapping of str to ndarray of shape (n_wavelengths,)
+        QE by curve name, electrons per photon, or on one common relative scale.
+    clear : str
+        Curve that the CFA sensitivity is relative to: the clear pixel, or the brightest curve.
+    source : str
+        File or data set.
+    surrogate : bool
+        True for modeled curves.
+    variants : mapping
+        For a CFA: channels that use a curve with another name.
+    technologies : mapping of str to Technology or None
+        Physical principle of the filters, where it is stated.
+    has_clear : bool
+        True if `clear` is a pixel without a filter.
     """
 
     name: str
@@ -41,15 +56,42 @@ class SensorCurves:
 
     @property
     def brightest(self) -> str:
-        """The reference where that is only the brightest curve; empty where it is a pixel without filter."""
+        """Name of the reference if it is only the brightest curve; empty if it is a clear pixel."""
         return "" if self.has_clear else self.clear
 
     def curve_name(self, cfa: str, channel: str) -> str:
-        """The curve that `channel` of `cfa` uses."""
+        """Return the name of the curve of a channel.
+
+        Parameters
+        ----------
+        cfa, channel : str
+            Names of CFA and channel.
+
+        Returns
+        -------
+        str
+            Name of the curve.
+        """
         return self.variants.get(cfa, {}).get(channel, channel)
 
     def curve(self, name: str) -> FloatArray:
-        """A curve by its name, ndarray[n_wavelengths]; raises DataError with the nearest name when there is none."""
+        """Return a curve.
+
+        Parameters
+        ----------
+        name : str
+            Name of the curve.
+
+        Returns
+        -------
+        ndarray of shape (n_wavelengths,)
+            QE.
+
+        Raises
+        ------
+        DataError
+            If there is no such curve, with the nearest name.
+        """
         if name not in self.qe:
             known = list(self.qe)
             raise DataError(
@@ -63,23 +105,65 @@ class SensorCurves:
         return self.qe[name]
 
     def mosaic_qe(self, mosaic: Mosaic, replaced: Mapping[str, str] | None = None) -> FloatArray:
-        """Curves of the mosaic's channels, ndarray[n_channels, n_wavelengths].
+        """Return the curves of a mosaic's channels.
 
-        `replaced` names the curve of channels that the sensor does not have itself (a modified channel and its base).
+        Parameters
+        ----------
+        mosaic : Mosaic
+            CFA.
+        replaced : mapping of str to str, optional
+            Curve of channels that the sensor does not have (a modified channel and its base).
+
+        Returns
+        -------
+        ndarray of shape (n_channels, n_wavelengths)
+            QE.
         """
         return np.stack([self.curve(name) for name in self.mosaic_curves(mosaic, replaced)])
 
     def mosaic_curves(self, mosaic: Mosaic, replaced: Mapping[str, str] | None = None) -> list[str]:
-        """The names of these curves."""
+        """Return the names of the curves of a mosaic's channels.
+
+        Parameters
+        ----------
+        mosaic : Mosaic
+            CFA.
+        replaced : mapping of str to str, optional
+            Curve of channels that the sensor does not have.
+
+        Returns
+        -------
+        list of str
+            Names, one per channel.
+        """
         names = {**{c: self.curve_name(mosaic.name, c) for c in mosaic.channels}, **(replaced or {})}
         return [names[channel] for channel in mosaic.channels]
 
 
 def make_sensor(name: str, qe: Mapping[str, FloatArray], source: str, clear: str | None = None) -> SensorCurves:
-    """A sensor from curves on the grid; `clear` defaults to the curve with the largest total.
+    """Make a sensor from curves on the grid.
 
-    That one counts as a pixel without filter only where its name says so.
-    Raises DataError when a QE is above 1 or below 1e-9 everywhere, or `clear` is not a curve.
+    Parameters
+    ----------
+    name : str
+        Name of the sensor.
+    qe : mapping of str to ndarray of shape (n_wavelengths,)
+        QE by curve name.
+    source : str
+        File, for error messages.
+    clear : str, optional
+        Clear pixel; left out, the curve with the largest sum, which is a clear pixel only if its name says
+        so.
+
+    Returns
+    -------
+    SensorCurves
+        The sensor.
+
+    Raises
+    ------
+    DataError
+        If a QE exceeds 1 or is below 1e-9 everywhere, or if `clear` is no curve.
     """
     faults = []
     for curve, values in qe.items():
@@ -100,7 +184,20 @@ def make_sensor(name: str, qe: Mapping[str, FloatArray], source: str, clear: str
 
 
 def ar0820_sensor(grid: WavelengthGrid, parameters: SurrogateParameters) -> SensorCurves:
-    """The surrogate sensor from its parameters; RCCC and RCCB have a red of their own."""
+    """Make the surrogate sensor from its parameters; RCCC and RCCB have a red of their own.
+
+    Parameters
+    ----------
+    grid : WavelengthGrid
+        Wavelengths, nm.
+    parameters : SurrogateParameters
+        Parameters of the model.
+
+    Returns
+    -------
+    SensorCurves
+        The sensor.
+    """
     curves = ar0820(grid, parameters)
     red = {"R": "Rx"}
     return SensorCurves("ar0820", curves.values, "C", curves.source, True, {"RCCC": red, "RCCB": red})

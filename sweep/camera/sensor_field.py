@@ -1,4 +1,4 @@
-"""Where on the sensor a scene is seen, from its middle to its corner, and how steeply light falls in there."""
+"""Field positions of a scene, from the center of the sensor to its corner, and their chief ray angles."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ LINEAR = "linear"
 
 
 def _places(value: object) -> object:
-    """`any`, or how many."""
+    """Check `any` or a count."""
     if value != "any" and (isinstance(value, bool) or not isinstance(value, int) or not 2 <= value <= 100):
         raise ValueError("places are `any`, or a whole number from 2 to 100")
     return value
 
 
 def _listed(value: object) -> object:
-    """A list of a study as a tuple, so that a scene can be a key."""
+    """Convert a list to a tuple, so that a scene is hashable."""
     if value is not None and not (isinstance(value, list | tuple) and 2 <= len(value) <= _MOST):
         raise ValueError(f"a list of 2 to {_MOST} numbers")
     return value if value is None else tuple(value)
@@ -36,30 +36,31 @@ _SIZE = Field(min_length=2, max_length=_MOST)
 
 
 class SensorField(Section):
-    """Places of the sensor from its middle to its corner, the worst of which counts; places are image heights.
+    """Field positions from the center of the sensor to its corner, of which the worst counts.
 
-    The chief ray angle grows linearly to `cra_max_deg` in the corner (`profile: linear`); or it is linear between the
-    rows of a file, `profile: FILE`, whose first column is the image height (mm, percent, or relative to the corner) and
-    whose second one the angle in degrees; or between the angles `cra_deg` at the relative `heights`, in equal steps
-    where these are left out. `corner_mm`: the image height of the corner; left out, a file's last row is the corner.
-    `places`: so many, in equal steps of image height (9 where left out, or those of a list `cra_deg`), or `any`: all
-    places, of which the smallest CSDs are looked for. A scene's `off_axis_deg` is then the field angle of
-    the corner.
+    The chief ray angle grows linearly to `cra_max_deg` in the corner, or is linear between the rows of a file
+    (`profile: FILE`) or of a list (`cra_deg`). A scene's `off_axis_deg` is then the field angle of the corner.
     """
 
     cra_max_deg: _Cra | None = None
+    """Chief ray angle in the corner, degrees."""
     profile: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
+    """`linear`, or a file: image height (mm, percent, or relative to the corner) and chief ray angle, degrees."""
     corner_mm: Annotated[float, Field(ge=1e-3, le=1e4)] | None = None
+    """Image height of the corner, mm; left out, the last row of the file."""
     heights: Annotated[
         tuple[_Height, ...] | None,
         BeforeValidator(_listed, json_schema_input_type=Annotated[list[_Height], _SIZE] | None),
     ] = None
+    """Relative image heights of `cra_deg`; left out, in equal steps."""
     cra_deg: Annotated[
         tuple[_Cra, ...] | None, BeforeValidator(_listed, json_schema_input_type=Annotated[list[_Cra], _SIZE] | None)
     ] = None
+    """Chief ray angles, degrees."""
     places: Annotated[
         Literal["any"] | int | None, BeforeValidator(_places, json_schema_input_type=Literal["any"] | _Count | None)
     ] = None
+    """Number of positions in equal steps of image height (9, or those of `cra_deg`), or `any`: all of them."""
 
     @model_validator(mode="after")
     def _one_profile(self) -> SensorField:
@@ -77,17 +78,17 @@ class SensorField(Section):
 
     @property
     def file(self) -> str | None:
-        """The file that is still to be read, relative to the study."""
+        """File that is still to be read, relative to the study."""
         return None if self.profile == LINEAR else self.profile
 
     @property
     def everywhere(self) -> bool:
-        """Whether all real places count, not only some that are named."""
+        """True if all field positions count."""
         return self.places == "any"
 
     @property
     def knots(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Relative image heights, and the chief ray angles there, degrees; in between it is linear."""
+        """Relative image heights and their chief ray angles, degrees; linear in between."""
         if self.cra_deg is None:
             assert self.cra_max_deg is not None  # a file's rows take its place when a study is loaded
             return (0.0, 1.0), (0.0, self.cra_max_deg)
@@ -97,17 +98,28 @@ class SensorField(Section):
 
     @property
     def seen_heights(self) -> tuple[float, ...]:
-        """The image heights that are looked at; where all count, those at which the search for the worst begins."""
+        """Image heights of counted positions; if all count, those at which the search for the worst begins."""
         if self.places is None and self.cra_deg is not None:
             return self.knots[0]
         count = self.places if isinstance(self.places, int) else PLACES
         return tuple(place / (count - 1) for place in range(count))
 
     def cra_at(self, height: float) -> float:
-        """The chief ray angle at a relative image height, degrees."""
+        """Return the chief ray angle at a relative image height.
+
+        Parameters
+        ----------
+        height : float
+            Relative image height, 0 to 1.
+
+        Returns
+        -------
+        float
+            Chief ray angle, degrees.
+        """
         return float(np.interp(height, *self.knots))
 
     @property
     def steepest_deg(self) -> float:
-        """The largest chief ray angle of any place."""
+        """Largest chief ray angle of any position, degrees."""
         return max(self.knots[1])

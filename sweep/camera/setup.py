@@ -1,4 +1,4 @@
-"""Setup of a block of designs: camera, lights, scene, and how accurately the scene is simulated."""
+"""Setup of a batch of designs: camera, lights, scene and accuracy."""
 
 from __future__ import annotations
 
@@ -19,23 +19,24 @@ READOUT = frozenset({"noise", "quantization", "saturation"})
 
 @dataclass(frozen=True)
 class Setup:
-    """Camera, lights and scene that a block of designs shares.
+    """Camera, lights and scene that a batch of designs shares.
 
-    Attributes
+    Parameters
     ----------
     camera : Camera
+        Pixel, mosaic and QE.
     lights : Lights
-        The signals and their types.
+        Signals and their types.
     scene : Scene
-        What a scenario of a study states.
-    tasks : StudyTasks or None
-        What else the study asks of its designs.
+        Scenario of the study.
+    tasks : StudyTasks, optional
+        Further tasks that designs are evaluated by.
     accuracy : Accuracy
         Numerical settings.
     left_out : frozenset of str
         Effects that are not computed (see `effects`).
     own_effects : tuple of OwnEffect
-        Those of a user's own.
+        Effects of user code.
     """
 
     camera: Camera
@@ -47,41 +48,63 @@ class Setup:
     own_effects: tuple[OwnEffect, ...] = field(default=(), kw_only=True)
 
     def with_camera(self, **changes: Any) -> Setup:
-        """The setup with some attributes of its camera changed."""
+        """Return the setup with some attributes of its camera changed.
+
+        Parameters
+        ----------
+        **changes
+            Attributes of `Camera`.
+
+        Returns
+        -------
+        Setup
+            The changed setup.
+        """
         return replace(self, camera=replace(self.camera, **changes))
 
     @property
     def members(self) -> dict[str, IndexArray]:
-        """Signal type -> indices of its signals."""
+        """Indices of the signals of each signal type."""
         return self.lights.members
 
     def computes(self, effect: str) -> bool:
-        """True for an effect that is not left out."""
+        """Return whether an effect is computed.
+
+        Parameters
+        ----------
+        effect : str
+            Name of an effect.
+
+        Returns
+        -------
+        bool
+            False if it is left out.
+        """
         return effect not in self.left_out
 
     @property
     def with_all_effects(self) -> Setup:
-        """The setup with no effect left out."""
+        """The setup with every effect computed."""
         return replace(self, left_out=frozenset())
 
     @property
     def linear(self) -> bool:
-        """True where digital numbers are linear in electrons: neither clipped nor rounded."""
+        """True if digital numbers are linear in electrons: neither clipped nor rounded."""
         return self.left_out >= READOUT
 
     @property
     def all_phases(self) -> bool:
-        """True where the worst of all sampling phases is asked for."""
+        """True if the scene asks for the worst sampling phase."""
         return self.scene.any_phase
 
     @property
     def positions_differ(self) -> bool:
-        """True where field positions see something else by the effects that are computed."""
+        """True if field positions differ in an effect that is computed."""
         tilted = self.computes("angle") and bool(self.camera.moving)
         return tilted or (self.computes("illumination") and self.scene.off_axis_deg != 0)
 
     @property
     def all_heights(self) -> bool:
-        """True where the worst of all field positions is asked for, and they differ."""
+        """True if the scene asks for the worst of all field positions, and they differ."""
         field = self.scene.field
         return field is not None and field.everywhere and self.positions_differ

@@ -18,9 +18,18 @@ _RARE = 1e-22
 
 @njit(cache=True, nogil=True)
 def rounded_gaussian(mean: FloatArray, sigma: float, top: float, out: FloatArray) -> None:
-    """Mean and variance of round(clip(x, 0, top)) for Gaussian x, by the probability to pass each step.
+    """Compute mean and variance of round(clip(x, 0, top)) for Gaussian x, by the probability of passing each step.
 
-    `mean`: ndarray[n], `sigma` > 0; `out`: ndarray[2, n].
+    Parameters
+    ----------
+    mean : ndarray of shape (n,)
+        Means.
+    sigma : float
+        Standard deviation, above 0.
+    top : float
+        Upper end, an integer.
+    out : ndarray of shape (2, n)
+        Mean and variance.
     """
     scale = 1 / (sigma * math.sqrt(2))
     for i in range(mean.size):
@@ -43,10 +52,23 @@ def rounded_gaussian(mean: FloatArray, sigma: float, top: float, out: FloatArray
 
 @njit(cache=True, nogil=True)
 def poisson_shares(electrons: float, start: int, rare: float, shares: FloatArray) -> tuple[int, int]:
-    """How often each count from `start` on occurs, relative to the most frequent; where these begin and end.
+    """Compute the probability of each count, relative to the most frequent one.
 
-    `shares`: ndarray[n_counts], filled between the two; its last count takes all higher ones, too. Counts that occur
-    less often than `rare` are left out.
+    Parameters
+    ----------
+    electrons : float
+        Expected number.
+    start : int
+        First count.
+    rare : float
+        Counts below this relative probability are left out.
+    shares : ndarray of shape (n_counts,)
+        Filled between the two returned indices; its last count takes all higher ones.
+
+    Returns
+    -------
+    begin, end : int
+        Range of indices that is filled.
     """
     last, mode = shares.size - 1, int(electrons)
     low = high = min(mode - start, last)
@@ -95,11 +117,20 @@ def _sum_square(shares: FloatArray, values: FloatArray, about: float, variance: 
 def poisson_moments(
     electrons: FloatArray, start: int, values: FloatArray, variance: FloatArray, out: FloatArray
 ) -> None:
-    """Means of several quantities of a Poisson number of electrons; the variance of the last one, where asked for.
+    """Compute means of several quantities of a Poisson number of electrons, and the variance of the last one.
 
-    `electrons`: ndarray[n], expected numbers. `values`: ndarray[n_quantities, n_counts], of the counts from `start`
-    on; beyond the last count they stay as they are. `variance`: ndarray[n_counts], the last quantity's own at each
-    count, or empty. `out`: ndarray[n_quantities + 1, n].
+    Parameters
+    ----------
+    electrons : ndarray of shape (n,)
+        Expected numbers.
+    start : int
+        First count.
+    values : ndarray of shape (n_quantities, n_counts)
+        Quantities at each count; constant beyond the last count.
+    variance : ndarray of shape (n_counts,) or (0,)
+        Variance of the last quantity at each count, if requested.
+    out : ndarray of shape (n_quantities + 1, n)
+        Means, and the variance.
     """
     quantities, counts = values.shape
     shares = np.empty(counts)
@@ -126,11 +157,22 @@ def means_over_gains(
     table: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Means over pixels' Gaussian gains by the trapezoidal rule, and the variance with that of the last mean.
+    """Compute means over Gaussian gains of the pixels by the trapezoidal rule, and the variance of the last mean.
 
-    `electrons`: ndarray[n], expected numbers. Gains of up to `drawn` standard deviations `prnu` count, in steps of one
-    over `per_deviation` and less where there are more electrons. `roots`, `table`: nodes and coefficients of a cubic
-    spline over the root of the electrons, ndarray[4, n_nodes - 1, 3]: two means and the variance. `out`: ndarray[3, n].
+    Parameters
+    ----------
+    electrons : ndarray of shape (n,)
+        Expected numbers.
+    prnu : float
+        Relative standard deviation of the gains.
+    drawn : float
+        Standard deviations beyond which gains are left out.
+    per_deviation : float
+        Steps per standard deviation, more where there are more electrons.
+    roots, table : ndarray of shape (n_nodes,) and (4, n_nodes - 1, 3)
+        Nodes and coefficients of a cubic spline over the root of the electrons: two means and the variance.
+    out : ndarray of shape (3, n)
+        Two means and the variance.
     """
     for i in range(electrons.size):
         half = math.ceil(drawn * per_deviation * math.sqrt(1 + prnu * prnu * electrons[i]))
@@ -162,7 +204,24 @@ def means_over_gains(
 
 
 def poisson_means(electrons: FloatArray, start: int, values: FloatArray, variance: FloatArray = _NONE) -> FloatArray:
-    """`poisson_moments` into a new ndarray[n_quantities + 1, n]."""
+    """Return the result of `poisson_moments` in a new array.
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (n,)
+        Expected numbers.
+    start : int
+        First count.
+    values : ndarray of shape (n_quantities, n_counts)
+        Quantities at each count.
+    variance : ndarray of shape (n_counts,), optional
+        Variance of the last quantity at each count.
+
+    Returns
+    -------
+    ndarray of shape (n_quantities + 1, n)
+        Means, and the variance.
+    """
     out = np.empty((len(values) + 1, electrons.size))
     poisson_moments(np.ascontiguousarray(electrons), start, values, variance, out)
     return out
@@ -178,7 +237,23 @@ def cubic_of_electrons(
     step: float,
     out: FloatArray,
 ) -> None:
-    """Values of a table at expected electrons, ndarray[n]: see `table.MomentTable`. Beyond `last_e` they stay."""
+    """Evaluate a table at expected electrons (see `table.MomentTable`); constant beyond `last_e`.
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (n,)
+        Expected electrons.
+    last_e : float
+        Last electrons of the table.
+    nodes, coefficients : ndarray
+        Cubics of the table.
+    piece : ndarray of int
+        Piece at each multiple of `step`.
+    step : float
+        Step in the root of the electrons.
+    out : ndarray of shape (n,)
+        Values.
+    """
     for i in range(electrons.size):
         held = electrons[i]
         held = last_e if held > last_e else held

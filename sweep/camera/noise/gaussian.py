@@ -1,4 +1,4 @@
-"""A Gaussian that is clipped, and one that is rounded: mean and variance in closed form."""
+"""Mean and variance of a clipped and of a rounded Gaussian, in closed form."""
 
 from __future__ import annotations
 
@@ -18,24 +18,72 @@ _EULER_DN = 4.0
 
 
 def density(z: FloatArray) -> FloatArray:
-    """Density of the standard normal distribution."""
+    """Return the density of the standard normal distribution.
+
+    Parameters
+    ----------
+    z : ndarray
+        Arguments.
+
+    Returns
+    -------
+    ndarray of the same shape
+        Density.
+    """
     return np.asarray(np.exp(-0.5 * z**2) / math.sqrt(2 * math.pi), dtype=float)
 
 
 def share_below(z: FloatArray) -> FloatArray:
-    """Share of the standard normal distribution below `z`, of any shape."""
+    """Return the standard normal distribution function.
+
+    Parameters
+    ----------
+    z : ndarray
+        Arguments.
+
+    Returns
+    -------
+    ndarray of the same shape
+        Probability below z.
+    """
     from scipy.special import ndtr  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
     return np.asarray(ndtr(z), dtype=float)
 
 
 def ramp(z: FloatArray) -> FloatArray:
-    """Mean of max(0, z + Z) for a standard normal Z."""
+    """Return the mean of max(0, z + Z) for a standard normal Z.
+
+    Parameters
+    ----------
+    z : ndarray
+        Arguments.
+
+    Returns
+    -------
+    ndarray of the same shape
+        Means.
+    """
     return np.asarray(z * share_below(z) + density(z), dtype=float)
 
 
 def clipped_gaussian(mean: FloatArray, sigma: float, low: float, high: float) -> tuple[FloatArray, FloatArray]:
-    """Mean and variance of a Gaussian that is clipped to low..high; `mean`: ndarray of any shape."""
+    """Return mean and variance of a clipped Gaussian.
+
+    Parameters
+    ----------
+    mean : ndarray
+        Means before clipping.
+    sigma : float
+        Standard deviation before clipping.
+    low, high : float
+        Ends.
+
+    Returns
+    -------
+    mean, variance : ndarray of the same shape
+        Moments after clipping.
+    """
     if sigma == 0:
         return np.clip(mean, low, high), np.zeros_like(mean)
     z_low, z_high = (np.clip((end - mean) / sigma, -TAILS, TAILS) for end in (low, high))
@@ -49,10 +97,24 @@ def clipped_gaussian(mean: FloatArray, sigma: float, low: float, high: float) ->
 
 
 def clipped_and_rounded(mean: FloatArray, sigma: float, top: float) -> tuple[FloatArray, FloatArray]:
-    """Mean and variance of round(clip(x, 0, top)) for Gaussian x; `mean`: ndarray[n], `top`: an integer.
+    """Return mean and variance of round(clip(x, 0, top)) for Gaussian x.
 
-    The sum over the steps of the probability to pass each, or, where the noise spans many steps, the midpoint rule's
-    Euler-Maclaurin series for that sum (four terms: less than 1e-10 DN is left from 4 DN of noise on).
+    The sum over the steps of the probability of passing each, or, where the noise spans many steps, the Euler-
+    Maclaurin series of the midpoint rule for that sum (four terms: less than 1e-10 DN is left from 4 DN of noise on).
+
+    Parameters
+    ----------
+    mean : ndarray of shape (n,)
+        Means before clipping, DN.
+    sigma : float
+        Standard deviation, DN.
+    top : float
+        Full scale, an integer, DN.
+
+    Returns
+    -------
+    mean, variance : ndarray of shape (n,)
+        Moments, DN and DN^2.
     """
     if sigma == 0:
         return np.clip(np.floor(mean + 0.5), 0.0, top), np.zeros_like(mean)
@@ -78,10 +140,10 @@ def clipped_and_rounded(mean: FloatArray, sigma: float, top: float) -> tuple[Flo
 
 
 def _by_series(rest: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean of e = round(x) - x, and variance of round(x), by the Fourier series of e in the mean of x.
+    """Return mean of e = round(x) - x and variance of round(x), by the Fourier series of e in the mean of x.
 
-    E[e] = sum over k of (-1)^k sin(2 pi k m) exp(-2 (pi k sigma)^2) / (pi k). Variance: sigma^2 + E[e^2] - E[e]^2 +
-    2 cov(x, e); Stein's lemma gives the covariance.
+    E[e] = sum over k of (-1)^k sin(2 pi k m) exp(-2 (pi k sigma)^2) / (pi k). Variance: sigma^2 + E[e^2] - E[e]^2 + 2
+    cov(x, e); Stein's lemma gives the covariance.
     """
     shift, square, slope = np.zeros_like(rest), np.full_like(rest, 1 / 12), np.zeros_like(rest)
     for k in range(1, _TERMS + 1):
@@ -94,7 +156,7 @@ def _by_series(rest: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatAr
 
 
 def _by_steps(rest: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The same from the probabilities to pass each step, where little noise lets the series converge slowly."""
+    """Return the same from the probabilities of passing each step, for little noise."""
     mean, square = np.zeros_like(rest), np.zeros_like(rest)
     least = np.maximum(sigma, 1e-12)
     for step in range(_TERMS):
@@ -105,7 +167,20 @@ def _by_steps(rest: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArr
 
 
 def rounding(mean_dn: FloatArray, sigma_dn: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean of round(x) - x (DN) and variance of round(x) (DN^2) for Gaussian x far from both ends of the ADC."""
+    """Return mean of round(x) - x and variance of round(x) for Gaussian x far from both ends of the ADC.
+
+    Parameters
+    ----------
+    mean_dn : ndarray of shape (n,)
+        Means, DN.
+    sigma_dn : ndarray of shape (n,)
+        Standard deviations, DN.
+
+    Returns
+    -------
+    shift_dn, variance_dn2 : ndarray of shape (n,)
+        Mean shift, DN, and variance, DN^2.
+    """
     rest = mean_dn - np.floor(mean_dn + 0.5)
     shift, variance = np.zeros_like(rest), sigma_dn**2 + 1 / 12
     little = sigma_dn < _SERIES_DN

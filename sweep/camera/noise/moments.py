@@ -1,8 +1,8 @@
 """Mean and variance of a pixel's digital number: Poisson electrons, full well, read noise, pedestal, ADC, rounding.
 
-Exact sums over the numbers of electrons wherever something bends or steps: near the dark, the full well and the ends of
-the ADC, and below 2^20 electrons wherever read noise does not hide the steps of rounding. Elsewhere the readout is
-straight, and from 2^20 electrons on the steps are dithered by a Gaussian.
+Exact sums over the numbers of electrons wherever the readout is nonlinear: near the dark end, the full well and the
+ends of the ADC, and below 2^20 electrons wherever read noise does not dither the steps of rounding. Elsewhere the
+readout is linear, and from 2^20 electrons on the steps are dithered by a Gaussian.
 """
 
 from __future__ import annotations
@@ -36,7 +36,20 @@ _FAR_ROOT = 16.0
 
 
 def straight(electrons: FloatArray, pixel: Pixel) -> FloatArray:
-    """`moments` where nothing clips and noise, Gaussian in all, dithers the steps: ndarray[3, n]."""
+    """Return the moments of a linear readout whose Gaussian noise dithers the steps.
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (n,)
+        Expected electrons.
+    pixel : Pixel
+        Gain, noise and pedestal.
+
+    Returns
+    -------
+    ndarray of shape (3, n)
+        See `moments`.
+    """
     mean = pixel.dn_per_e * electrons + pixel.offset_dn
     sigma = pixel.dn_per_e * np.sqrt(electrons + (pixel.prnu * electrons) ** 2 + pixel.read_noise_e**2)
     shift, variance = gaussian.rounding(mean, sigma)
@@ -44,7 +57,20 @@ def straight(electrons: FloatArray, pixel: Pixel) -> FloatArray:
 
 
 def of_count(electrons: FloatArray, pixel: Pixel) -> FloatArray:
-    """The same given the number of electrons, which then has no noise of its own."""
+    """Return the moments for a given number of electrons, without photon noise.
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (n,)
+        Numbers of electrons.
+    pixel : Pixel
+        Full well, gain, noise and ADC.
+
+    Returns
+    -------
+    ndarray of shape (3, n)
+        See `moments`.
+    """
     top, sigma = float(pixel.full_scale_dn), pixel.dn_per_e * pixel.read_noise_e
     mean = pixel.dn_per_e * np.minimum(electrons, pixel.well_e) + pixel.offset_dn
     return np.stack(
@@ -54,10 +80,18 @@ def of_count(electrons: FloatArray, pixel: Pixel) -> FloatArray:
 
 @dataclass(frozen=True)
 class Ends:
-    """Where a pixel's readout is not straight.
+    """Electrons at which a pixel's readout stops to be linear.
 
-    Below `low_e` electrons the dark end of the ADC is felt, from `high_e` on the full well or the bright end, from
-    `full_e` on nothing changes any more. An expected number `last_e` is sure to exceed that.
+    Parameters
+    ----------
+    low_e : float
+        Below, the dark end of the ADC has an effect.
+    high_e : float
+        Above, the full well or the bright end has an effect.
+    full_e : float
+        Above, the readout is constant.
+    last_e : float
+        Expected number whose counts exceed `full_e` almost surely.
     """
 
     low_e: float
@@ -67,7 +101,18 @@ class Ends:
 
     @classmethod
     def of(cls, pixel: Pixel) -> Ends:
-        """The ends of a pixel."""
+        """Return the ends of a pixel.
+
+        Parameters
+        ----------
+        pixel : Pixel
+            Full well, gain, noise and ADC.
+
+        Returns
+        -------
+        Ends
+            Its ends.
+        """
         reach_e = _REACH * pixel.read_noise_e
         adc_e = (pixel.full_scale_dn - pixel.offset_dn) / pixel.dn_per_e
         full_e = min(pixel.well_e, adc_e + reach_e)
@@ -76,12 +121,12 @@ class Ends:
 
 
 def _least_exceeding(electrons: float) -> float:
-    """An expected number of electrons whose count is more than this, but for less than 1e-19."""
+    """Return an expected number of electrons whose count is larger with a probability of 1 - 1e-19."""
     return ((_REACH + math.sqrt(_REACH**2 + 4 * max(electrons, 0.0))) / 2) ** 2
 
 
 def _felt(electrons: FloatArray, pixel: Pixel) -> BoolArray:
-    """Where counts of Poisson electrons reach an end, or show steps."""
+    """Return where counts of Poisson electrons reach an end or show steps of rounding."""
     ends = Ends.of(pixel)
     sigma = _REACH * np.sqrt(electrons)
     found = (electrons - sigma < ends.low_e) | (electrons + sigma + _REACH**2 > ends.high_e)
@@ -91,12 +136,36 @@ def _felt(electrons: FloatArray, pixel: Pixel) -> BoolArray:
 
 
 def without_prnu(pixel: Pixel) -> Pixel:
-    """The pixel with the same gain as all others."""
+    """Return the pixel with equal gains.
+
+    Parameters
+    ----------
+    pixel : Pixel
+        Pixel.
+
+    Returns
+    -------
+    Pixel
+        The pixel without PRNU.
+    """
     return pixel.model_copy(update={"prnu": 0.0})
 
 
 def counted(electrons: FloatArray, pixel: Pixel) -> FloatArray:
-    """`moments` of pixels without PRNU: ndarray[3, n] of ndarray[n] expected electrons, ascending."""
+    """Return the moments of pixels without PRNU.
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (n,)
+        Expected electrons, ascending.
+    pixel : Pixel
+        Full well, gain, noise and ADC.
+
+    Returns
+    -------
+    ndarray of shape (3, n)
+        See `moments`.
+    """
     from .compiled import poisson_means  # noqa: PLC0415  (compiled: kept off the start-up path)
 
     found = straight(electrons, pixel)
@@ -106,7 +175,20 @@ def counted(electrons: FloatArray, pixel: Pixel) -> FloatArray:
 
 
 def runs(electrons: FloatArray, pixel: Pixel) -> Iterator[tuple[slice, int, FloatArray]]:
-    """Runs of ascending expected electrons whose counts are summed, their first count, and `of_count` from it on."""
+    """Yield runs of expected electrons whose counts are summed.
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (n,)
+        Expected electrons, ascending.
+    pixel : Pixel
+        Full well, gain, noise and ADC.
+
+    Yields
+    ------
+    run, first, moments : slice, int, ndarray
+        Range of electrons, their first count, and `of_count` from it on.
+    """
     felt = _felt(electrons, pixel)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], felt, [False]])))
     for left, right in zip(edges[::2], edges[1::2], strict=True):
@@ -115,7 +197,20 @@ def runs(electrons: FloatArray, pixel: Pixel) -> Iterator[tuple[slice, int, Floa
 
 
 def counts_of(electrons: FloatArray, pixel: Pixel) -> tuple[int, int]:
-    """First and last count that these expected numbers of electrons, ascending, come to; the well holds no more."""
+    """Return the first and last count of expected numbers of electrons; the full well holds no more.
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (n,)
+        Expected electrons, ascending.
+    pixel : Pixel
+        Full well, gain, noise and ADC.
+
+    Returns
+    -------
+    first, last : int
+        Counts.
+    """
     low, high = electrons[0], electrons[-1]
     first = max(0, math.floor(low - (_REACH + 1) * math.sqrt(low)))
     full = math.ceil(Ends.of(pixel).full_e)
@@ -124,7 +219,18 @@ def counts_of(electrons: FloatArray, pixel: Pixel) -> tuple[int, int]:
 
 
 def table_nodes(pixel: Pixel) -> FloatArray:
-    """Roots of the electrons at which a table without PRNU knows `counted`, ascending from 0 to the end."""
+    """Return the roots of the electrons at which a table without PRNU is computed.
+
+    Parameters
+    ----------
+    pixel : Pixel
+        Full well, gain, noise and ADC.
+
+    Returns
+    -------
+    ndarray of shape (n_nodes,)
+        Roots, ascending from 0.
+    """
     ends = Ends.of(pixel)
     last = math.sqrt(_least_exceeding(ends.full_e))
     every = np.arange(0, last + 2 * STEP, STEP)
@@ -141,7 +247,18 @@ def table_nodes(pixel: Pixel) -> FloatArray:
 
 @lru_cache(maxsize=8)
 def table_without_prnu(pixel: Pixel) -> CubicSpline:
-    """`counted` over the root of the electrons."""
+    """Return `counted` as a spline over the root of the electrons.
+
+    Parameters
+    ----------
+    pixel : Pixel
+        Full well, gain, noise and ADC.
+
+    Returns
+    -------
+    scipy.interpolate.CubicSpline
+        Moments.
+    """
     from scipy.interpolate import CubicSpline  # noqa: PLC0415  (slow to import: kept off the start-up path)
 
     roots = table_nodes(pixel)
@@ -149,10 +266,22 @@ def table_without_prnu(pixel: Pixel) -> CubicSpline:
 
 
 def with_prnu(electrons: FloatArray, pixel: Pixel) -> FloatArray:
-    """`moments`, ndarray[3, n], by the trapezoidal rule over the pixels' Gaussian gains.
+    """Return the moments by the trapezoidal rule over Gaussian gains of the pixels.
 
     The integrand is a Gaussian times a function that is smooth over a deviation 2 / (prnu root of the electrons), so
     that the rule converges exponentially; its step leaves less than 1e-13.
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (n,)
+        Expected electrons, ascending.
+    pixel : Pixel
+        Full well, gain, noise and ADC.
+
+    Returns
+    -------
+    ndarray of shape (3, n)
+        See `moments`.
     """
     from .compiled import means_over_gains  # noqa: PLC0415  (compiled: kept off the start-up path)
 
@@ -170,5 +299,18 @@ def with_prnu(electrons: FloatArray, pixel: Pixel) -> FloatArray:
 
 
 def moments(electrons: FloatArray, pixel: Pixel) -> FloatArray:
-    """Means and variance, ndarray[3, n] (see `UNROUNDED`), of ndarray[n] expected electrons, ascending; exact sums."""
+    """Return the moments of the digital number, by exact sums.
+
+    Parameters
+    ----------
+    electrons : ndarray of shape (n,)
+        Expected electrons, ascending.
+    pixel : Pixel
+        Full well, gain, noise and ADC.
+
+    Returns
+    -------
+    ndarray of shape (3, n)
+        Mean before rounding and after, DN, and variance after rounding, DN^2.
+    """
     return with_prnu(electrons, pixel) if pixel.prnu else counted(electrons, pixel)

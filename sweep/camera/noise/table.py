@@ -1,4 +1,4 @@
-"""Mean and variance of the readout from a table: every pixel of every design is looked up, not summed."""
+"""Mean and variance of the readout by table lookup."""
 
 from __future__ import annotations
 
@@ -19,8 +19,14 @@ _LEAST_PRNU = 1e-9
 class MomentTable(NamedTuple):
     """Cubics over the root of the expected electrons.
 
-    `nodes`: ndarray[n + 1], at least `moments.STEP` apart; `coefficients`: ndarray[3, n, 4], for each of
-    `moments.moments`; `piece`: ndarray of the piece at each multiple of `moments.STEP` from 0 up.
+    Parameters
+    ----------
+    nodes : ndarray of shape (n + 1,)
+        At least `moments.STEP` apart.
+    coefficients : ndarray of shape (3, n, 4)
+        Coefficients of each of `moments.moments`.
+    piece : ndarray of int
+        Piece at each multiple of `moments.STEP` from 0 up.
     """
 
     nodes: FloatArray
@@ -29,23 +35,73 @@ class MomentTable(NamedTuple):
 
 
 def mean_unrounded(electrons: FloatArray, pixel: Pixel) -> FloatArray:
-    """Mean before rounding, DN, of expected electrons of any shape."""
+    """Return the mean before rounding.
+
+    Parameters
+    ----------
+    electrons : ndarray
+        Expected electrons.
+    pixel : Pixel
+        Full well, gain, noise and ADC.
+
+    Returns
+    -------
+    ndarray of the same shape
+        Mean, DN.
+    """
     return _looked_up(electrons, pixel, moments.UNROUNDED)
 
 
 def mean_rounded(electrons: FloatArray, pixel: Pixel) -> FloatArray:
-    """Mean of the digital number, DN."""
+    """Return the mean of the digital number.
+
+    Parameters
+    ----------
+    electrons : ndarray
+        Expected electrons.
+    pixel : Pixel
+        Full well, gain, noise and ADC.
+
+    Returns
+    -------
+    ndarray of the same shape
+        Mean, DN.
+    """
     return _looked_up(electrons, pixel, moments.ROUNDED)
 
 
 def variance(electrons: FloatArray, pixel: Pixel) -> FloatArray:
-    """Variance of the digital number, DN^2."""
+    """Return the variance of the digital number.
+
+    Parameters
+    ----------
+    electrons : ndarray
+        Expected electrons.
+    pixel : Pixel
+        Full well, gain, noise and ADC.
+
+    Returns
+    -------
+    ndarray of the same shape
+        Variance, DN^2.
+    """
     return np.maximum(_looked_up(electrons, pixel, moments.VARIANCE), 0.0)
 
 
 @lru_cache(maxsize=64)
 def unclipped_e(pixel: Pixel) -> tuple[float, float]:
-    """From and up to how many electrons neither end takes more from the mean than 1e-5 of the noise."""
+    """Return the range of electrons in which neither end shifts the mean by more than 1e-5 of the noise.
+
+    Parameters
+    ----------
+    pixel : Pixel
+        Full well, gain, noise and ADC.
+
+    Returns
+    -------
+    low_e, high_e : float
+        Range, electrons; (1, 0) if it is empty.
+    """
     electrons = tables(pixel).nodes ** 2
     sigma = pixel.dn_per_e * np.sqrt(electrons + (pixel.prnu * electrons) ** 2 + pixel.read_noise_e**2)
     off = mean_unrounded(electrons, pixel) - pixel.dn_per_e * electrons - pixel.offset_dn
@@ -65,10 +121,20 @@ def _looked_up(electrons: FloatArray, pixel: Pixel, row: int) -> FloatArray:
 
 @lru_cache(maxsize=8)
 def tables(pixel: Pixel) -> MomentTable:
-    """Table of a pixel.
+    """Return the table of a pixel.
 
-    With PRNU the noise grows faster than the root of the electrons; the nodes lie further apart where it does:
-    equidistant in asinh(PRNU root) / PRNU, which is twice the standard deviation.
+    With PRNU the noise grows faster than the root of the electrons. Nodes are then equidistant in asinh(PRNU root) /
+    PRNU, twice the standard deviation.
+
+    Parameters
+    ----------
+    pixel : Pixel
+        Full well, gain, noise and ADC.
+
+    Returns
+    -------
+    MomentTable
+        The table.
     """
     from scipy.interpolate import CubicSpline  # noqa: PLC0415  (slow to import: kept off the start-up path)
 

@@ -1,9 +1,9 @@
-"""What noise may do at the bright end at most, in closed form: for all that it takes no sums over counts.
+"""Closed-form bounds on the effect of noise at the bright end.
 
-Chernoff's bound of a pixel's electrons Y = N + read noise, N Poisson with a mean of `electrons` times a Gaussian gain:
-E exp(t Y) <= exp(m a + (m a p)^2 / 2 + (t r)^2 / 2), a = exp(t) - 1, with mean m, PRNU p and read noise r, for t > 0. A
-gain below 0 gives no electrons, which adds its share: it lies ten deviations off or further. Every t gives a bound, so
-that a grid of them will do.
+Chernoff's bound on a pixel's electrons Y = N + read noise, N Poisson with a mean of `electrons` times a Gaussian gain:
+E exp(t Y) <= exp(m a + (m a p)^2 / 2 + (t r)^2 / 2), a = exp(t) - 1, with mean m, PRNU p and read noise r, for t > 0.
+A gain below 0 gives no electrons, which adds its share: it is at least ten deviations off. Every t gives a bound, so a
+grid of them suffices.
 """
 
 from __future__ import annotations
@@ -21,17 +21,51 @@ _EXPONENTS = np.geomspace(1e-7, 4.0, 256)
 
 
 def share_above(level_e: float, electrons: float, pixel: Pixel, read_noise_e: float) -> float:
-    """Share of readouts of a pixel above a level at most; `electrons`: what the pixel expects."""
+    """Return an upper bound on the share of readouts above a level.
+
+    Parameters
+    ----------
+    level_e : float
+        Level, electrons.
+    electrons : float
+        Expected electrons.
+    pixel : Pixel
+        PRNU.
+    read_noise_e : float
+        Read noise, electrons.
+
+    Returns
+    -------
+    float
+        0 to 1.
+    """
     return min(1.0, float(np.exp(_exponents(level_e, electrons, pixel, read_noise_e)).min()))
 
 
 def mean_above(level_e: float, electrons: float, pixel: Pixel, read_noise_e: float) -> float:
-    """Mean of max(0, Y - `level_e`) at most, electrons: x is at most exp(t x - 1) / t."""
+    """Return an upper bound on the mean of max(0, Y - level); x is at most exp(t x - 1) / t.
+
+    Parameters
+    ----------
+    level_e : float
+        Level, electrons.
+    electrons : float
+        Expected electrons.
+    pixel : Pixel
+        PRNU.
+    read_noise_e : float
+        Read noise, electrons.
+
+    Returns
+    -------
+    float
+        Electrons.
+    """
     return float((np.exp(_exponents(level_e, electrons, pixel, read_noise_e) - 1) / _EXPONENTS).min())
 
 
 def _exponents(level_e: float, electrons: float, pixel: Pixel, read_noise_e: float) -> FloatArray:
-    """Of the bound for every t of the grid, as far as a float goes."""
+    """Return the exponent of the bound for every t of the grid."""
     more = electrons * np.expm1(_EXPONENTS)
     log_mean = np.logaddexp(more + (more * pixel.prnu) ** 2 / 2, math.log(_BELOW_ZERO))
     return np.asarray(np.minimum(log_mean + (_EXPONENTS * read_noise_e) ** 2 / 2 - _EXPONENTS * level_e, 700.0))
